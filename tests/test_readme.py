@@ -15,7 +15,7 @@ import tfarm
 from tests.shell import heard, run
 from tfarm.cli.running import whole_command
 from tfarm.report import writing
-from tfarm.report.page import PIECES
+from tfarm.report.writing import PIECES
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -97,7 +97,7 @@ def test_the_example_of_a_report_runs(tmp_path, capsys, monkeypatch):
         monkeypatch.setattr(writing, dear, lambda *_: None)
     monkeypatch.setattr(writing, "write_assets", lambda folder: (folder.mkdir(), (folder / "live.js").touch()))
     pieces = [each for each in PIECES if each.name in ("the arm", "root moment")]
-    monkeypatch.setattr("tfarm.report.page.PIECES", pieces)
+    monkeypatch.setattr("tfarm.report.writing.PIECES", pieces)
     (line,) = (line for line in COMMANDS if line.startswith("tfarm report "))
     code, out, err = run(capsys, *shlex.split(line)[1:])
     assert (code, out.strip()) == (0, "pages/index.html")

@@ -26,11 +26,16 @@ def shared(
     count: int,
     begun: Callable[[Sequence[Task]], object] = lambda _: None,
 ) -> Iterator[tuple[Task, Result]]:
-    """Yield each task with its result as it comes, by `count` processes.
+    """Yield each task with its result as it comes, by `count` processes, or by this one where no others may be started.
 
     `begun` is called with the running tasks whenever one is begun.  An error of a task is raised here once the running
     ones have ended; the others are not begun.  Raises ConvergenceError where a process dies.
     """
+    if count == 1 or not may_start_processes():
+        for task, call in tasks.items():
+            begun([task])
+            yield task, call()
+        return
     waiting = iter(tasks)
     running: dict[Future[Result], Task] = {}
     with _pool(count) as pool:

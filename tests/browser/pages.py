@@ -24,8 +24,8 @@ from tfarm.dsp.results import simulated_run
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import gain_map
 from tfarm.loop.stability import stability
-from tfarm.report.cases import Case
 from tfarm.report.live import ASSETS, save_live, write_assets
+from tfarm.report.page import Case
 from tfarm.schema import to_dict
 
 Real = NDArray[np.float64]

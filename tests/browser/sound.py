@@ -20,15 +20,14 @@ import pytest
 import tfarm
 from tests.browser.pages import Opened, browser  # noqa: F401, a fixture
 from tests.hostile import NAME, TEXT
-from tests.report.full import ARM, report_elsewhere
+from tests.report.written import ARM, report_elsewhere
 from tests.shared import once
 from tfarm.dsp import load_chain
 from tfarm.fitting.fit import fit
 from tfarm.report import write, writing
-from tfarm.report.cases import Case, GivenLaw
 from tfarm.report.live import ASSETS, save_live, write_assets
-from tfarm.report.page import PIECES, pieces_of
-from tfarm.report.writing import write_comparison
+from tfarm.report.page import Case, GivenLaw
+from tfarm.report.writing import PIECES, pieces_of, write_comparison
 
 LAB = replace(tfarm.load("sasaki2012-lab"), name=NAME, assumptions=ARM.assumptions)
 LAW = tfarm.Law({"hub_angle": ([2.0, 8.0], [0.02, 1.0]), "hub_rate": 0.4}, name=TEXT)
@@ -52,7 +51,7 @@ def few(tmp_path_factory):
     chain = load_chain("sasaki2012-lab")
     few = [piece for piece in PIECES if piece.anchor in ("arm", "modes", "margins", "law")]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tfarm.report.page.PIECES", tuple(few))
+        patch.setattr("tfarm.report.writing.PIECES", tuple(few))
         patch.setattr(writing, "save_proof", lambda *_: None)
         write([LAB], out, only=("modes", "margins"))
         write([replace(LAB, name="law")], out, laws=[[GivenLaw(LAW)]], only=("margins",))
@@ -60,7 +59,7 @@ def few(tmp_path_factory):
         H = tfarm.transfer(LAB, "root_moment")(1j * omega)
         seen = tfarm.Measured(output="root_moment", input="hub_torque", omega=omega, values=H, sigma=abs(H))
         found = fit(LAB, [seen], free=["hub.inertia"], profile=False)
-        patch.setattr("tfarm.report.page.PIECES", tuple(piece for piece in PIECES if piece.anchor in ("fit", "arm")))
+        patch.setattr("tfarm.report.writing.PIECES", tuple(piece for piece in PIECES if piece.anchor in ("fit", "arm")))
         _arm_page(Case(replace(found.arm, name="fitted"), chain, (), found), out / "fitted")
     save_live(Case(LAB, chain), out / NAME)
     write_assets(out / ASSETS)

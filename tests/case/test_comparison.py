@@ -151,21 +151,22 @@ def test_a_law_of_other_signals_is_mapped_over_factor_and_delay():
     late = tfarm.Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
     found = tfarm.compare(LAB, [LAW, late], modes=1)
     assert found.regions is None
-    for side, reach in zip(found.sides, found.reaches, strict=True):
-        (around,) = (each for each in reach.stable_intervals[0] if each[0] < 1 < each[1])
+    delays, reaches = found.reaches
+    for side, reach in zip(found.sides, reaches, strict=True):
+        (around,) = (each for each in reach[0] if each[0] < 1 < each[1])
         factors = [factor for factor in side.loop.in_band.gain if 0.1 < factor < 3.9]
         assert [end for end in around if 0.1 < end < 3.9] == pytest.approx(factors, rel=1e-6)
         at, delay = side.reach(np.array([0.0, 1.0]) * side.loop.exact_delay), side.loop.exact_delay
-        ends = [end for window in at.stable_intervals[1] for end in window]
+        ends = [end for window in at[1] for end in window]
         assert min(abs(end - 1.0) for end in ends) < 1e-6
-        assert 0 < delay < reach.delay[-1]
+        assert 0 < delay < delays[-1]
     figure = tfarm.plots.comparison.figure(found)
     lines = figure.get_suptitle().replace("\u00a0", " ").splitlines()
     assert [line.partition(":")[0] for line in lines] == [each.name for each in found.sides]
     right = figure.axes[2]
     drawn = {(float(x), float(y)) for line in right.lines for x, y in zip(*line.get_data(), strict=True)}
-    for reach in found.reaches:
-        columns = zip((1e3 * reach.delay).tolist(), reach.stable_intervals, strict=True)
+    for reach in reaches:
+        columns = zip((1e3 * delays).tolist(), reach, strict=True)
         assert {(delay, end) for delay, column in columns for window in column for end in window} <= drawn
 
 
@@ -185,16 +186,17 @@ def test_a_law_in_z_and_gains_are_compared_at_the_samples_of_both():
     """At the largest stable factor L passes -1 over it; at no further delay the plane's edges are these factors."""
     late = tfarm.Law({"hub_rate": ([0.35, -0.1], [1.0, -0.2]), "root_moment": 0.3}, period=0.01)
     found = tfarm.compare(LAB, [LAW, late], modes=1)
-    for side, law, plane in zip(found.sides, (LAW, late), found.reaches, strict=True):
+    delays, reaches = found.reaches
+    for side, law, reach in zip(found.sides, (LAW, late), reaches, strict=True):
         alone = Analysis(sampled_verdict(LAB, tfarm.Law.of_gains(law) if law is LAW else law))
         assert side.loop.gain_factors == alone.gain_factors
         assert side.sampled.is_stable == alone.verdict.is_stable
         _, L = side.loop_function
         assert abs(1 + alone.gain_factors[1] * L).min() < 1e-2
-        assert alone.gain_factors in plane.stable_intervals[0]
-        stable = [any(low < 1 < high for low, high in each) for each in plane.stable_intervals]
-        last = plane.delay[stable].max()
-        assert last <= side.delay_margin < last + plane.delay[1]
+        assert alone.gain_factors in reach[0]
+        stable = [any(low < 1 < high for low, high in each) for each in reach]
+        last = delays[stable].max()
+        assert last <= side.delay_margin < last + delays[1]
     upper, _, right = tfarm.plots.comparison.figure(found).axes
     assert upper.get_xlim()[1] == pytest.approx(np.pi / 0.01, rel=1e-3)  # the last point of its grid
     assert right.get_xlabel() == "further delay [ms]"

@@ -10,7 +10,7 @@ from tests.hostile import LONG, TEXT, Read, check_drawing, check_page
 from tests.shell import run
 from tfarm.dsp import Chain
 from tfarm.errors import one_line
-from tfarm.report.cases import Case
+from tfarm.report.page import Case
 from tfarm.report.writing import _write_pages, write_comparison
 from tfarm.schema import json_value, to_dict
 
@@ -82,7 +82,7 @@ def test_the_same_comparison_is_the_same_bytes(compared, folder, tmp_path):
 
 def test_an_index_leads_to_the_comparison_and_back(compared, tmp_path, monkeypatch):
     """One that is there; an arm's page that is made later leads to it too."""
-    monkeypatch.setattr("tfarm.report.sections.save_figure", lambda *_, **__: None)
+    monkeypatch.setattr("tfarm.report.page.save_figure", lambda *_, **__: None)
     index, arm = tmp_path / "index.html", tmp_path / LAB.name
     index.write_text("an old index", encoding="utf-8")
     shown = write_comparison(compared, tmp_path)

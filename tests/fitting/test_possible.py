@@ -13,7 +13,7 @@ from tests.fitting.test_fit import LAB, PAIRS, measured
 from tests.shared import thinned
 from tfarm.dsp import Chain
 from tfarm.fitting.fit import fit, possible, repeats, response_band, share_stable
-from tfarm.report.cases import Case
+from tfarm.report.page import Case
 from tfarm.report.response_sections import fit_section
 from tfarm.spectrum.table import default_gains
 
@@ -67,6 +67,7 @@ def test_the_section_of_a_page(known):
         "Gains on all of these arms", "Margins over these arms",
     ]  # fmt: skip
     assert "the loop is stable on 3 of 3 of these arms" in " ".join(section.words)
+    assert "[N m s/rad]" in section.blocks[4].figure.axes[0].get_xlabel()
     table = section.blocks[1]
     assert [row["value"] for row in table] == [each.value for each in known.parameters]
     each = [tfarm.margins(arm, default_gains(known.arm)).in_band.disk for arm in possible(known, count=3).arms]

@@ -5,7 +5,6 @@ import pytest
 from matplotlib.figure import Figure
 
 import tfarm
-from tests.plots.labels import complaints
 from tfarm.plots.frequency import broken, draw_magnitude, draw_phase
 from tfarm.plots.style import style
 from tfarm.response.frequency import bode, resonant_band
@@ -73,7 +72,3 @@ def test_breaking_a_curve_keeps_every_point_in_order():
     x, y = broken(np.array([1.0, 2, 3]), np.array([5.0, 6, 7]), np.array([2.7, 2.5]), np.array([9.0, 8]))
     assert x == pytest.approx([1, 2, 2.5, np.nan, 2.5, 2.7, np.nan, 2.7, 3], nan_ok=True)
     assert y == pytest.approx([5, 6, 8, np.nan, 8, 9, np.nan, 9, 7], nan_ok=True)
-
-
-def test_no_label_is_clipped_and_none_overlap(data):
-    assert complaints(tfarm.plots.bode.figure(data)) == []

@@ -12,7 +12,7 @@ from tfarm.loop.plane import moment_axis, rate_axis, rate_columns
 from tfarm.loop.stability import stability
 from tfarm.plots.regions import sampled_region
 from tfarm.report.live import live_data
-from tfarm.report.sections import prose
+from tfarm.report.page import prose
 
 LAB = tfarm.load("sasaki2012-lab")
 FRICTION = 0.02

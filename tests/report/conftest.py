@@ -4,7 +4,7 @@ from functools import partial
 
 import pytest
 
-from tests.report.full import report_elsewhere
+from tests.report.written import report_elsewhere
 from tests.shared import once
 
 

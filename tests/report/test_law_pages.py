@@ -11,8 +11,7 @@ import pytest
 
 import tfarm
 from tests.hostile import check_page
-from tests.report.coarse import plain_cards
-from tests.report.written import blocks_of, values_of
+from tests.report.written import blocks_of, plain_cards, values_of
 from tests.shared import sized
 from tests.shell import answer, run
 from tfarm import HubFeedback, Law, ParameterError
@@ -22,10 +21,10 @@ from tfarm.dsp.sampled import sampled_loop
 from tfarm.errors import one_line
 from tfarm.fitting.recording import compare_run, load_run, overshoot
 from tfarm.report import writing
-from tfarm.report.cases import Case, GivenLaw
 from tfarm.report.loop_section import law_section, margins_section
-from tfarm.report.page import PIECES, file_of, pieces_of
+from tfarm.report.page import Case, GivenLaw
 from tfarm.report.sampled_section import measured_step, sampled_section
+from tfarm.report.writing import PIECES, file_of, pieces_of
 from tfarm.schema import to_json
 
 LAB, BARE, PRESET = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "quanser-2dsfl"))
@@ -86,7 +85,7 @@ def test_the_loop_function_of_an_unstable_loop_has_no_margins(given):
     law = Law({"hub_angle": -5.0, "hub_rate": ([1.0], [0.01, 1.0])}, name="backwards")
     section = margins_section(Case(LAB, Chain(), (GivenLaw(law),)))
     assert section.facts[0].value == "UNSTABLE"
-    assert {block.stem for block in section.blocks} == {"law-bode", "margins", "law-spill", "law-windows"}
+    assert set(blocks_of(section)) == {"law-bode", "margins", "law-spill", "law-windows"}
     assert "interval" not in table(section, "law-windows")
 
 
@@ -95,7 +94,7 @@ def test_the_loop_function_of_an_unstable_loop_has_no_margins(given):
 
 def test_a_page_is_about_its_law_and_its_file_repeats_it(file, tmp_path, monkeypatch, capsys):
     plain_cards(monkeypatch.setattr)
-    monkeypatch.setattr("tfarm.report.page.PIECES", [piece for piece in PIECES if piece.anchor == "law"])
+    monkeypatch.setattr("tfarm.report.writing.PIECES", [piece for piece in PIECES if piece.anchor == "law"])
     code, out, err = run(
         capsys, "report", LAB.name, "--law", str(file), "--period", "0.004", "--only", "margins", "--out", str(tmp_path)
     )
@@ -205,8 +204,8 @@ def test_what_is_measured_and_computed_of_the_real_controllers():
 def test_a_measured_run_is_put_in_the_place_of_the_slew():
     laws = tuple(GivenLaw(*_with_run(name)) for name in ("lqg", "hinf"))
     section = sampled_section(Case(tfarm.load(DATA / "rig.toml"), load_chain(DATA / "rig.toml"), laws))
-    stems = [block.stem for block in section.blocks]
-    assert stems == [
+    blocks = blocks_of(section)
+    assert list(blocks) == [
         "sampled", "sampled-delays", "sampled-modes-law-1", "sampled-modes-law-2", "sampled-measured",
         "sampled-overshoot",
     ]  # fmt: skip
@@ -215,7 +214,7 @@ def test_a_measured_run_is_put_in_the_place_of_the_slew():
     assert shown["further_delay_ms"] == [0.0, 5.0, 10.0] * 2
     verdicts = [fact.value for fact in section.facts if fact.value.isupper()]
     assert verdicts == ["UNSTABLE", "STABLE"]
-    assert "MIT" in section.blocks[4].caption
+    assert "MIT" in blocks["sampled-measured"].caption
 
 
 def _with_run(name):
@@ -229,3 +228,23 @@ def test_laws_of_one_name_are_numbered_and_a_signal_that_no_arm_has_is_refused()
     assert to_json({"rows": law_section(Case(LAB, Chain(), two)).blocks[0]}).count("PD (2)") == 1
     with pytest.raises(ParameterError, match="hub_spin"):
         writing.write([LAB], Path("nowhere"), laws=[(GivenLaw(Law({"hub_spin": 1.0})),)])
+
+
+# ------------------------------------------------------------ measured responses
+
+
+FILE = "tests/data/sweep/tip.csv"
+GIVEN = f"tip_acceleration/hub_torque={FILE}"
+
+
+def test_the_page_has_the_command_that_makes_it(tmp_path, capsys, monkeypatch):
+    for kept in ("save_proof", "save_card"):  # which have their own tests
+        monkeypatch.setattr(writing, kept, lambda *_: None)
+    monkeypatch.setattr("tfarm.report.writing.PIECES", [each for each in PIECES if each.name == "measured responses"])
+    given = ("report", "sasaki2012-lab", "--only", "bode", "--measured", GIVEN, "--out", str(tmp_path))
+    code, out, _ = run(capsys, *given)
+    assert code == 0
+    page = (tmp_path / "sasaki2012-lab" / "bode.html").read_text()
+    assert out.strip().endswith("bode.html")
+    assert f"--measured {GIVEN} --only bode" in page
+    assert "Single changes that explain a mode" in page

@@ -1,27 +1,31 @@
-"""Sections that cannot be made have their reason; sections of each page; files that cannot be written are named."""
+"""Sections that cannot be made have their reason; a report is written whole or not at all; hostile texts are text."""
 
 import hashlib
+import re
+import shutil
 import sys
+import time
 from dataclasses import replace
 from functools import partial
 from urllib.parse import unquote
 
+import numpy as np
 import pytest
 
 import tfarm
-from tests.hostile import NAME
-from tests.report.coarse import plain_cards
-from tests.report.full import ARM
-from tests.report.written import ANCHORS, HELD, Links, Unmakeable, links_of
+from tests.hostile import NAME, TEXT, check_drawing, check_page
+from tests.report.written import ANCHORS, ARM, HELD, Links, Unmakeable, files_of, links_of, plain_cards
 from tests.shell import run
 from tfarm import processes
 from tfarm.arm import to_toml
+from tfarm.cli import app as cli_app
 from tfarm.dsp import Chain, load_chain
-from tfarm.report import page as card_room
+from tfarm.fitting.fit import fit
 from tfarm.report import write, writing
-from tfarm.report.cases import Case
-from tfarm.report.page import PIECES, Piece, pieces_of
-from tfarm.report.sections import PageSection
+from tfarm.report.live import save_live
+from tfarm.report.page import Case, PageSection
+from tfarm.report.response_sections import fit_section
+from tfarm.report.writing import PIECES, Piece, pieces_of
 
 
 def test_a_page_is_about_the_arms_own_file(tmp_path, monkeypatch, capsys):
@@ -32,7 +36,7 @@ def test_a_page_is_about_the_arms_own_file(tmp_path, monkeypatch, capsys):
         seen.append((case.arm.name, case.chain))
         return PageSection(anchor="sampled", title="The sampled loop")
 
-    monkeypatch.setattr("tfarm.report.page.PIECES", (Piece("s", "sampled", section),))
+    monkeypatch.setattr("tfarm.report.writing.PIECES", (Piece("s", "sampled", section),))
     monkeypatch.setattr(writing, "save_proof", lambda *_: None)
     plain_cards(monkeypatch.setattr)
     file = tmp_path / "bench.toml"
@@ -51,7 +55,7 @@ def without_a_section(monkeypatch, error):
     """A report of two sections, the second of which meets that error."""
     pieces = {piece.name: piece for piece in PIECES}
     broken = replace(pieces["root loci"], make=Unmakeable(error))
-    monkeypatch.setattr("tfarm.report.page.PIECES", (pieces["the arm"], broken))
+    monkeypatch.setattr("tfarm.report.writing.PIECES", (pieces["the arm"], broken))
     monkeypatch.setattr(writing, "save_proof", lambda *_: None)
     plain_cards(monkeypatch.setattr)
 
@@ -76,7 +80,7 @@ def test_a_section_that_cannot_be_made_has_its_reason_in_its_place(tmp_path, mon
 
 def test_an_index_without_the_picture_of_an_arm_names_it(tmp_path, monkeypatch):
     without_a_section(monkeypatch, tfarm.ConvergenceError("no zeros found", None, None))
-    monkeypatch.setattr(card_room, "bode", Unmakeable(tfarm.ConvergenceError("no zeros found", None, None)))
+    monkeypatch.setattr(writing, "bode", Unmakeable(tfarm.ConvergenceError("no zeros found", None, None)))
     write([ARM], tmp_path, only=("locus",))
     targets = Links(tmp_path / "index.html").targets
     assert not any(target.endswith(".svg") for target in targets)
@@ -107,7 +111,7 @@ def test_every_piece_has_the_anchor_of_its_section(pages):
 def test_a_page_has_the_same_sections_whatever_is_written_with_it(tmp_path, monkeypatch):
     """The note on an arm without a loop is on the pages of the loop alone."""
     kept = tuple(replace(each, make=partial(bare, each.anchor)) for each in PIECES)
-    monkeypatch.setattr("tfarm.report.page.PIECES", kept)
+    monkeypatch.setattr("tfarm.report.writing.PIECES", kept)
     monkeypatch.setattr(writing, "save_proof", lambda *_: None)
     plain_cards(monkeypatch.setattr)
     for only in (("modes",), ("locus",), ("modes", "locus")):
@@ -151,7 +155,7 @@ STRANGE_CARDS = (
 
 @pytest.mark.usefixtures("audited")
 def test_other_files_in_the_folder_are_kept_and_strange_cards_passed_over(tmp_path, monkeypatch):
-    monkeypatch.setattr("tfarm.report.page.PIECES", ())
+    monkeypatch.setattr("tfarm.report.writing.PIECES", ())
     (tmp_path / NAME).mkdir()
     (tmp_path / NAME / "mine.txt").write_text("mine")
     for i, card in enumerate(STRANGE_CARDS):
@@ -177,3 +181,127 @@ def test_a_plain_script_starts_no_processes(monkeypatch):
     assert not processes.may_start_processes()
     monkeypatch.delattr(Script, "__file__")
     assert processes.may_start_processes()
+
+
+# ------------------------------------------------------------ all or nothing
+
+
+# ------------------------------------------------------------ all or nothing
+
+
+@pytest.mark.parametrize("where", ["file", "file/below/it", "taken"])
+def test_an_unwritable_out_is_refused_before_any_work_and_left_alone(tmp_path, monkeypatch, where):
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "taken").mkdir()
+    (tmp_path / "taken" / NAME).write_text("mine")
+    monkeypatch.setattr(writing, "make_all", lambda *_: pytest.fail("work began"))
+    before = files_of(tmp_path)
+    with pytest.raises(tfarm.ParameterError) as caught:
+        write([ARM], tmp_path / where)
+    assert caught.value.key == "out"
+    assert "\n" not in str(caught.value)
+    assert ("File exists" if where == "file" or where == "taken" else "Not a directory") in str(caught.value)
+    assert files_of(tmp_path) == before
+
+
+def test_a_name_too_long_for_a_folder_is_refused_too(tmp_path):
+    with pytest.raises(tfarm.ParameterError, match=r"name = .*320 bytes; at most 200"):
+        write([replace(ARM, name="𝒳" * 80)], tmp_path / "new" / "folder")
+    assert files_of(tmp_path) == {}
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.usefixtures("audited")
+def test_work_that_fails_leaves_nothing(tmp_path, monkeypatch):
+    def fail(_, folder, *__):
+        (folder / "half.svg").write_text("half")
+        raise tfarm.ConvergenceError("stopped short", None, None)
+
+    def scripts(folder):
+        folder.mkdir()
+        (folder / "half.js").write_text("half")
+
+    monkeypatch.setattr("tfarm.report.writing.PIECES", ())
+    monkeypatch.setattr(writing, "write_assets", scripts)
+    monkeypatch.setattr(writing, "save_card", fail)
+    with pytest.raises(tfarm.ConvergenceError):
+        write([ARM], tmp_path / "new" / "out")
+    assert not (tmp_path / "new").exists()
+
+
+def test_work_that_fails_leaves_an_earlier_report_as_it_was(pages, tmp_path, monkeypatch):
+    def fail(*_):
+        raise tfarm.ConvergenceError("stopped short", None, None)
+
+    before, out = files_of(pages), tmp_path / "out"
+    shutil.copytree(pages, out)
+    monkeypatch.setattr("tfarm.report.writing.PIECES", [piece for piece in PIECES if piece.name == "the arm"])
+    monkeypatch.setattr(writing, "save_card", fail)
+    with pytest.raises(tfarm.ConvergenceError):
+        write([ARM], out, only=("modes",))
+    assert files_of(out) == before
+
+
+def test_pages_are_moved_after_what_they_name(tmp_path, monkeypatch):
+    (tmp_path / "made" / "data").mkdir(parents=True)
+    for name in ("a.html", "data/x.csv"):
+        (tmp_path / "made" / name).touch()
+    moved = []
+    monkeypatch.setattr(writing.os, "replace", lambda _, place: moved.append(place.name))
+    writing.move_into(tmp_path / "made", tmp_path / "out")
+    assert moved == ["x.csv", "a.html"]
+
+
+def test_the_folder_of_an_arm_is_small(pages):
+    """Four arms have 20 MB; this one is made on coarse grids."""
+    assert sum(len(content) for content in files_of(pages / NAME).values()) < 4e6
+
+
+def test_progress_is_a_line_in_a_pipe_too(monkeypatch, capsys):
+    monkeypatch.setattr(cli_app, "PROGRESS_AFTER", 0.02)
+    with cli_app.progress() as advance:
+        advance(3, 7, "a section")
+        deadline = time.monotonic() + 30
+        seen = ""
+        while "a section" not in seen and time.monotonic() < deadline:
+            time.sleep(0.02)
+            seen += capsys.readouterr().err
+    assert re.fullmatch(r"tfarm: 3 of 7 done, running: a section \(\d+ s\)", seen.splitlines()[0])
+
+
+# ------------------------------------------------------------ hostile names
+
+
+LAB = replace(tfarm.load("sasaki2012-lab"), name=NAME)
+OMEGA = np.geomspace(8.0, 300.0, 30)
+
+
+def test_of_a_fit(tmp_path):
+    H = tfarm.transfer(LAB, "root_moment")(1j * OMEGA)
+    seen = tfarm.Measured(output="root_moment", input="hub_torque", omega=OMEGA, values=H, sigma=abs(H), source=TEXT)
+    found = fit(LAB, [seen], free=["hub.inertia"], profile=False)
+    case = Case(found.arm, Chain(), (), found)
+    saved = writing.make_section("fit", "fit", partial(fit_section, count=2), case, tmp_path)
+    for suffix in ("svg", "json"):
+        assert list(tmp_path.rglob(f"*.{suffix}"))
+    for drawing in tmp_path.rglob("*.svg"):
+        check_drawing(drawing.read_text(encoding="utf-8"))
+    writing._write_pages(case, tmp_path, [saved], None, "", tmp_path)
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    check_page(page, NAME)
+    assert "\u202e" not in page
+
+
+def test_of_a_section_and_a_live_page_that_cannot_be_made(tmp_path, monkeypatch):
+    error = tfarm.ConvergenceError(TEXT, 0.0, 1.0)
+
+    def fails(*_):
+        raise error
+
+    monkeypatch.setattr("tfarm.report.live.live_data", fails)
+    save_live(Case(LAB, Chain()), tmp_path)
+    check_page((tmp_path / "live.html").read_text(encoding="utf-8"), NAME, TEXT)
+    saved = writing.make_section("stability region of both gains", "margins-map", fails, Case(LAB, Chain()), tmp_path)
+    assert saved.failure
+    writing._write_pages(Case(LAB, Chain()), tmp_path, [saved], None, "", tmp_path)
+    check_page((tmp_path / "index.html").read_text(encoding="utf-8"), NAME, TEXT.partition(" & ")[0])

@@ -19,15 +19,19 @@ from tfarm.loop import loci as loci_room
 from tfarm.loop.locus import locus
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
-from tfarm.report import cases, gains_section
+from tfarm.report import loop_section
+from tfarm.report import page as cases
 from tfarm.report.arm_section import arm_section, assumptions_section, derived_table
-from tfarm.report.cases import Case, GivenLaw, has_loop, on_hub
-from tfarm.report.gains_section import beyond_table, edge_of_K2, locus_section
-from tfarm.report.loop_section import margin_table, margins_section, nyquist_section
-from tfarm.report.modes_section import damped_tables, modal_table
-from tfarm.report.page import pieces_of
-from tfarm.report.response_sections import bode_section
-from tfarm.report.sections import prose
+from tfarm.report.loop_section import (
+    beyond_table,
+    edge_of_K2,
+    locus_section,
+    margin_table,
+    margins_section,
+)
+from tfarm.report.page import Case, has_loop, on_hub, prose
+from tfarm.report.response_sections import bode_section, damped_tables, modal_table
+from tfarm.report.writing import pieces_of
 from tfarm.spectrum import DampedModes
 from tfarm.spectrum.table import default_gains
 
@@ -139,7 +143,7 @@ def is_stable(arm, law, up_to):
 def test_the_interval_of_K2_is_that_of_the_poles(name):
     """On either side of an edge; at the end of a search nothing happens, and no edge is claimed."""
     arm, law = ARMS[name], default_gains(ARMS[name])
-    words = gains_section.intervals(arm).partition("; K2")[2]
+    words = loop_section.intervals(arm).partition("; K2")[2]
     down, up = (number(end.strip("<> ()")) for end in re.search(r"\(.+?\)", words)[0].split(", "))
     band = 3 * tfarm.modes(arm, 3).natural_frequency[-1]
     assert is_stable(arm, replace(law, K2=0.999 * up), band)
@@ -173,20 +177,6 @@ def test_rows_of_K2_beyond_1_agree_with_its_edge(name):
         assert verdict != "unstable" or count > 0
     assert "unstable" in verdicts
     assert "∞" not in column(table, "spectral_abscissa").cells
-
-
-def test_the_answer_of_a_static_crossing_is_in_the_locus():
-    """The pinned tip at K2 = 1 exactly: one pole at 0, by the static torque; the others as found in a box."""
-    arm = ARMS["pinned"]
-    law = HubFeedback(K1=0.3, K2=0.3)
-    found = locus(arm, law, "K2", -1.0, 1.6, 300, 4)
-    at = int(np.flatnonzero(found.gain == 1.0)[0])
-    assert np.isfinite(found.branches).all()
-    assert 0 in found.branches[:, at]
-    assert not (found.branches[:, at + 1] == 0).any()
-    poles = poles_below(Loop(arm, replace(law, K2=float(found.gain[at + 1]))), 500.0).values
-    for branch in found.branches[:3, at + 1]:
-        assert abs(poles - branch).min() < 1e-9 * abs(branch)
 
 
 def test_branches_that_cannot_be_followed_are_left_out_with_a_word(monkeypatch):
@@ -224,22 +214,6 @@ def test_a_free_pin_has_its_rate_loop(monkeypatch):
     pieces = pieces_of(Case(arm, Chain()))
     names = [each.name for each in pieces if any(map(each.is_on, ("margins", "locus", "sampled", "tune")))]
     assert names == ["the arm", "the loop", "stability margins", "root loci", "Nyquist plot"]
-
-
-def test_a_free_pin_has_its_nyquist_plot():
-    """Under the default K1, and a negative one: as many encirclements as poles in a box."""
-    arm = ARMS["free-pin"]
-    law = default_gains(arm)
-    laws = (GivenLaw(law), GivenLaw(replace(law, K1=-law.K1 / 10)))
-    table = nyquist_section(Case(arm, Chain(), laws)).blocks[-1]
-    quantity, _, *laws = table.columns
-    counts = []
-    for each in laws:
-        found = dict(zip(quantity.values, each.values, strict=True))
-        counts.append(found["unstable poles"])
-        assert found["unstable poles by Nyquist's criterion"] == counts[-1] == -found["encirclements of -1"]
-        assert "K2 = 0" in each.title
-    assert counts[0] == 0 < counts[1]
 
 
 def test_a_margin_without_end_has_no_frequency(monkeypatch):

@@ -1,4 +1,4 @@
-"""Why trust this: the proofs kept for each arm, the digits shown, and the page made of them."""
+"""Why trust this: the proofs kept for each arm, the digits shown, formulas as MathML, and the page made of them."""
 
 import json
 import re
@@ -10,14 +10,18 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.report import full
+from tests.report import written
 from tfarm.arm import to_toml
-from tfarm.audit import published
+from tfarm.audit import claims, published
 from tfarm.audit.published import PublishedRow
-from tfarm.report import modes_section, write, writing
+from tfarm.audit.rows import tex
+from tfarm.report import response_sections, write, writing
 from tfarm.report import trust as trust_proofs
-from tfarm.report.modes_section import how_proven, modal_table, rounds_to
+from tfarm.report.response_sections import how_proven, modal_table, rounds_to
 from tfarm.report.trust import (
+    anchor,
+    compared_formulas,
+    in_letters,
     proof_tables,
     prove,
     published_tables,
@@ -27,6 +31,7 @@ from tfarm.report.trust import (
 )
 from tfarm.response import frequency
 from tfarm.response.frequency import worst_error
+from tfarm.schema.html import GREEK
 
 ARM = tfarm.load("stocky-steel")
 BRACKET = ("71.50568246689014371", "71.505682466890143711")
@@ -38,7 +43,7 @@ CHEAP = ("(8)", "Table 1 (rho)", "Table 1 (I_h)", "section 5: inputs", "(22)", "
 def proof(pages):
     """The proof that a session's report was made with, as it is read again: that of ARM under another name."""
     (found,) = written_proofs(pages)
-    assert found.sha256 == trust_proofs.hash_of(full.ARM)
+    assert found.sha256 == trust_proofs.hash_of(written.ARM)
     return replace(found, name=ARM.name, sha256=trust_proofs.hash_of(ARM))
 
 
@@ -122,7 +127,7 @@ def test_the_modal_table_has_the_proof_of_its_digits(proven_modes, monkeypatch):
         raise tfarm.CertificationError("a double frequency near 7 rad/s")
 
     monkeypatch.setattr(type(modes), "certify", fail)
-    modes_section.proven_modes.cache_clear()
+    response_sections.proven_modes.cache_clear()
     assert how_proven(modes, omega, hertz).endswith("not proven: a double frequency near 7 rad/s.")
     monkeypatch.setattr(trust_proofs, "boxed", lambda *_: ())  # which are proven, or not, apart from these
     unproven = prove(ARM)
@@ -155,15 +160,6 @@ def test_a_response_that_is_zero_throughout_has_no_error():
     assert [output for output, _ in prove(locked).errors] == ["root_moment"]
 
 
-def test_a_proof_is_kept_and_read_again(proof, tmp_path, monkeypatch):
-    (tmp_path / ARM.name).mkdir()
-    monkeypatch.setattr(trust_proofs, "prove", lambda arm, chain: {(ARM, None): proof}[arm, chain])
-    save_proof(ARM, tmp_path / ARM.name)
-    (read,) = written_proofs(tmp_path)
-    assert read == proof
-    assert read.sha256 == trust_proofs.hash_of(tfarm.load("stocky-steel"))
-
-
 # ------------------------------------------------------------ the page
 
 
@@ -177,6 +173,7 @@ def test_the_page_shows_verdicts_in_words_and_formulas_as_mathml(page):
     assert 'href="#eq-8"' in page
     assert "A*G*Φ<sub>x</sub>*κ" in page  # the residual of (8) as printed
     assert page.count('class="claim"') == len(CHEAP)
+    assert page.count("printed, and used here") == page.count("✓ right as printed</span></h3>") > 0
 
 
 def test_long_tables_and_claims_are_folded_below_their_answers(page):
@@ -269,3 +266,101 @@ def test_a_box_that_cannot_be_proven_has_its_reason(monkeypatch):
     monkeypatch.setattr("tfarm.loop.poles.Poles.certify", fails)
     (loop,) = prove(tfarm.load("sasaki2012")).boxes
     assert (loop.count, loop.failure) == (0, "a zero lies on the edge")
+
+
+# ------------------------------------------------------------ formulas
+
+
+CLAIMS = claims()
+TEXTS = [(claim, text) for claim in CLAIMS for text in (claim.printed, claim.corrected) if text]
+WITH_DW = {"(21)", "(22)"}  # their plain text has dw for the increment
+
+
+def leaves(markup):
+    return [leaf for line in markup for leaf in ElementTree.fromstring(str(line)).iter() if leaf.text]
+
+
+def formulas(text):
+    """A formula as MathML, a line each."""
+    return compared_formulas(text, text)[0]
+
+
+def changed(markup):
+    return [leaf.text for leaf in leaves(markup) if leaf.get("class") == "changed"]
+
+
+def claim_of(equation):
+    return next(claim for claim in CLAIMS if claim.equation == equation)
+
+
+def pair(equation):
+    claim = claim_of(equation)
+    return compared_formulas(tex(claim.printed), tex(claim.corrected))
+
+
+@pytest.mark.parametrize(("claim", "text"), TEXTS, ids=lambda it: getattr(it, "equation", ""))
+def test_every_greek_letter_of_the_plain_text_is_set(claim, text):
+    shown = "".join(leaf.text for leaf in leaves(formulas(tex(text))))
+    for name, letter in GREEK.items():
+        if name == "Delta" and claim.equation in WITH_DW:
+            continue
+        count = len(re.findall(rf"(?<![A-Za-z]){name}(?![A-Za-z])", text))
+        assert shown.replace("ϕ", "φ").count(letter) == count, name
+    assert not re.search("xmlns|http|&#", "".join(formulas(tex(text))))
+
+
+@pytest.mark.parametrize(
+    ("equation", "printed", "corrected"),
+    [
+        ("(8)", ["Θ"], ["Φ"]),
+        ("(14)", ["t"], ["s"]),
+        ("(17)", ["x"], ["t"]),
+        ("(22)", ["−"], ["+"]),
+        ("(A.1)", ["−", "−"], ["+", "+"]),
+        ("Table 1 (rho)", ["2.7667"], ["2766.7"]),
+        ("(1)-(14): damping C", [], ["(", "1", "+", "C", "s", ")"]),
+    ],
+)
+def test_what_differs_is_marked_and_nothing_else(equation, printed, corrected):
+    left, right = pair(equation)
+    assert changed(left) == printed
+    assert changed(right) == corrected
+
+
+def test_the_same_formula_has_no_marks():
+    typeset = tex(claim_of("(15)").printed)
+    assert [changed(side) for side in compared_formulas(typeset, typeset)] == [[], []]
+
+
+def test_a_determinant_has_bars_as_high_as_it():
+    claim = claim_of("Delta, Delta k_i")
+    bars = [leaf for leaf in leaves(formulas(tex(claim.printed))) if leaf.text == "|"]
+    assert [bar.get("form") for bar in bars] == ["prefix", "postfix"] * 5
+    assert all(bar.get("stretchy") == "true" for bar in bars)
+
+
+def test_infinity_is_no_operator_and_plus_minus_is_one():
+    lines = formulas(r"x = \pm \sqrt{a \pm b},\quad y < \infty")
+    tags = [(leaf.tag, leaf.get("form")) for leaf in leaves(lines) if leaf.text in "±∞"]
+    assert tags == [("mo", "prefix"), ("mo", "infix"), ("mi", None)]
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("u theta_t only", "u θ<sub>t</sub> only"),
+        ("kappa*G, m^2", "κ*G, m²"),
+        ("a_31 and K2", "a<sub>31</sub> and K2"),
+        ("phi_xt^2", "φ<sub>xt</sub>²"),
+        ("<b>rho</b>", "&lt;b&gt;ρ&lt;/b&gt;"),
+        ("alphabet, eta", "alphabet, η"),
+    ],
+)
+def test_plain_text_in_letters(text, shown):
+    assert in_letters(text) == shown
+
+
+def test_every_equation_has_an_anchor_of_its_own():
+    anchors = [anchor(claim.equation) for claim in CLAIMS]
+    assert len(set(anchors)) == len(anchors)
+    assert anchor("(A.1)") == "eq-a-1"

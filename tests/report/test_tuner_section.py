@@ -17,7 +17,7 @@ from tfarm.dsp import Chain, Sampling
 from tfarm.dsp.traces import away
 from tfarm.errors import CertificationError
 from tfarm.report import tuner_section as tuner_section_room
-from tfarm.report.cases import Case
+from tfarm.report.page import Case
 from tfarm.report.tuner_section import section_of, tuner_section
 from tfarm.schema.html import with_symbols
 from tfarm.tuner import Learning, LearningCurves, Plan, initial_network, train, tune
@@ -56,16 +56,6 @@ def test_what_is_drawn_is_the_tuning(small):
     bars = [line for line in blocks["tune-gain"].figure.axes[0].lines if line.get_linewidth() == 9]
     assert [tuple(bar.get_ydata()) for bar in bars] == [(guard.lo, guard.hi)]
     assert [tuple(bar.get_xdata()) for bar in bars] == [(0.3, 0.3)]
-
-
-def test_the_simulated_slew_costs_as_much_as_the_trial(small):
-    """Two methods: the simulator with the network as a gain schedule, and the trial that the tuner learns from."""
-    data = small[0]
-    simulation, result = data.slews["with the tuner"], data.tuning.training.result
-    x = simulation.at_samples.root_moment - simulation.scenario.rigid_moment
-    scale = abs(result.x).max()
-    assert abs(x - result.x).max() < 1e-9 * scale
-    assert abs(simulation.gain - result.K).max() < 1e-9
 
 
 def test_curves_are_trainings_of_their_seeds(small):
@@ -108,17 +98,9 @@ def test_the_answer_compares_the_costs(tuner, words):
     assert text.endswith(f"{5 * (tuner < 1)} of 5 seeds end below that.")
 
 
-def test_the_angle_that_a_moving_gain_leaves_is_its_integral_over_K1(small):
-    """At rest J theta_t = 0 = sum of torque: K1 (theta - theta_ref) = -T sum K x, the sampled law's own balance."""
+def test_the_angle_that_a_moving_gain_leaves_is_named(small):
     data = small[0]
-    simulation = data.slews["with the tuner"]
-    x = simulation.at_samples.root_moment - simulation.scenario.rigid_moment
-    integral = 0.01 * float(np.sum(simulation.gain * x))
-    rate = 0.01 * float(np.sum(simulation.at_samples.hub_rate - simulation.scenario.hub_rate))
-    momentum = 0.65334498 * simulation.at_samples.hub_rate[-1]
-    assert rate == pytest.approx(-(integral + momentum) / 0.3, rel=0.02)
-    drift = away(LAB, simulation)[-1]
-    assert drift == pytest.approx(rate, rel=0.02)
+    drift = away(LAB, data.slews["with the tuner"])[-1]
     assert abs(drift) > 50 * abs(away(LAB, data.constant)[-1])
     (fact,) = (fact for fact in small[1].facts if fact.unit == "mm")
     assert float(fact.value) == pytest.approx(1e3 * abs(drift), rel=0.05)

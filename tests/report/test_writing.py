@@ -14,15 +14,14 @@ import pytest
 
 import tfarm
 from tests.hostile import LONG, NAME, PRINTED, check_drawing, check_page
-from tests.report.coarse import coarsen, plain_cards
-from tests.report.full import ARM
 from tests.report.readme import PICTURES, write_pictures
-from tests.report.written import HELD, Links, files_of, ids_of, links_of, validated
-from tfarm.dsp import Chain
+from tests.report.written import ARM, HELD, Links, coarsen, files_of, ids_of, links_of, plain_cards, validated
+from tfarm.dsp import Chain, load_chain
 from tfarm.report import write, writing
-from tfarm.report.cases import Case
-from tfarm.report.page import PIECES, index_page, pieces_of
+from tfarm.report.page import TEMPLATES, Case, GivenLaw, prose, sheet
 from tfarm.report.trust import write_trust, written_proofs
+from tfarm.report.writing import PIECES, Card, index_page, kept, pieces_of, save_card
+from tfarm.schema import Column
 from tfarm.schema.html import with_symbols
 from tfarm.spectrum.table import default_gains
 
@@ -170,7 +169,7 @@ def test_every_cell_of_a_narrow_page_has_its_title(pages):
 
 def test_the_pages_of_an_arm_lead_to_each_other(tmp_path, monkeypatch):
     piece = next(piece for piece in PIECES if piece.name == "the arm")
-    monkeypatch.setattr("tfarm.report.page.PIECES", (piece,))
+    monkeypatch.setattr("tfarm.report.writing.PIECES", (piece,))
     monkeypatch.setattr(writing, "save_proof", lambda *_: None)
     plain_cards(monkeypatch.setattr)
     write([replace(ARM, name="plain")], tmp_path, only=("modes", "bode"))
@@ -219,7 +218,7 @@ POOL = """
 import os, time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from tfarm.report.page import PIECES
+from tfarm.report.writing import PIECES
 from tfarm.processes import leave_with_parent
 if __name__ == "__main__":
     pool = ProcessPoolExecutor(1, get_context("forkserver"), leave_with_parent)
@@ -247,3 +246,67 @@ def is_alive(process):
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except FileNotFoundError:
         return False
+
+
+# ------------------------------------------------------------ texts
+
+
+TEXTS = (TEMPLATES / "prose.txt").read_text(encoding="utf-8")
+NAMES = set(re.findall(r"{% macro (\w+)\(", TEXTS))
+OF_TRUST = {f"trust_{name}" for name in ("proofs", "accuracy", "published")}  # used by its template
+
+
+def test_every_text_is_used():
+    code = "\n".join(file.read_text(encoding="utf-8") for file in TEMPLATES.parent.glob("*.py"))
+    assert set(re.findall(r'(?:prose|picture|sheet)\(\s*"(\w+)"', code)) <= NAMES
+    used = {name for name in NAMES if f'"{name}"' in code} | OF_TRUST
+    assert all(TEXTS.count(f"{name}(") > 1 for name in NAMES - used)  # which other texts have in them
+
+
+def test_line_breaks_of_a_text_are_spaces_and_a_table_has_title_and_caption():
+    assert prose("fit", verdict="fitted", found="3 numbers").startswith("Fitted: 3 numbers. The interval holds")
+    table = sheet("matrices", [Column("row", "", of=["x1"])], stem="of-a-law", name="A ¶ <law>")
+    assert (table.stem, table.title) == ("of-a-law", "Matrices of A ¶ <law>")
+    assert table.caption.startswith("A ¶ <law>: A and C under the states, B and D under")
+
+
+# ------------------------------------------------------------ the index
+
+
+LAB = tfarm.load("sasaki2012-lab")
+FAST = tfarm.Law({"hub_angle": ((2.0, 30.0), (0.002, 1.0)), "root_moment": -0.2}, delay=0.002, name="PD, fast")
+SLOW = tfarm.Law({"hub_angle": ((0.2, 0.3), (0.1, 1.0))}, name="PD, slow")
+SAMPLED = tfarm.Law({"hub_rate": ((0.3,), (1.0,))}, period=0.01, name="sampled")
+
+
+def rows_of(tmp_path, laws, chain):
+    """The rows that the index has of an arm with a page."""
+    folder = tmp_path / LAB.name
+    folder.mkdir()
+    save_card(Case(LAB, chain, tuple(laws)), folder)
+    (folder / "index.html").write_text("a page")
+    (card,) = kept(tmp_path, "card", Card).values()
+    return card.loops, index_page(tmp_path, trust="")
+
+
+@pytest.mark.parametrize("law", [FAST, SLOW])
+def test_a_law_has_its_own_verdicts_and_nothing_of_the_default_gains(tmp_path, law):
+    """Those of the answers to `margins` and `sampled`; at 10 ms one of them does not hold."""
+    chain = load_chain(LAB.name)
+    (row,), page = rows_of(tmp_path, [GivenLaw(law)], chain)
+    word = tfarm.sampled(LAB, law).verdict.word
+    assert row["law"] == law.name
+    assert row["verdict"] == tfarm.margins(LAB, law).stability.verdict == "stable"
+    assert row["sampled"].lower() == f"{word} when sampled every 10 ms"
+    assert row["sampled"].startswith("UNSTABLE") == (law is FAST)
+    assert f">{row['sampled']}</td>" in page
+    assert not {"K1", "K2"} & row.keys()
+    assert law.name in page
+    assert "K1 = 0.3" not in page
+
+
+def test_each_law_has_a_row_and_one_in_z_no_continuous_verdict(tmp_path):
+    rows, page = rows_of(tmp_path, [GivenLaw(SAMPLED), GivenLaw(tfarm.HubFeedback(K1=0.3, K2=0.3))], Chain())
+    assert [row.get("verdict") for row in rows] == [None, "stable"]
+    assert [row["sampled"] for row in rows] == ["stable when sampled every 10 ms"] * 2
+    assert page.count(f'{LAB.name}/index.html">{LAB.name}</a></td>') == 2

@@ -1,14 +1,82 @@
-"""Files, links and anchors of written pages, and what their tests stand on."""
+"""What the tests of pages share: coarse grids, a full report on one arm, and the files, links and anchors of pages.
+
+On coarse grids words, links and bytes are tested: where a boundary lies has tests of its own.  The report is made once
+a session, by a process with other hashes and in another time zone; its name and assumptions are as hostile as they may
+be; its audit is the one that the command of this session has made.
+"""
 
 import math
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import tfarm
-from tests.hostile import Read
-from tests.report.full import ARM
+from tests.hostile import LONG, NAME, PRINTED, Read
+from tfarm.arm import to_toml
 from tfarm.audit.published import validate
-from tfarm.report.page import PIECES
+from tfarm.dsp import crossings as sampled_regions
+from tfarm.dsp import modes as sampled_loci
+from tfarm.dsp import verdict
+from tfarm.loop import loci
+from tfarm.plots import regions
+from tfarm.report import live, loop_section, writing
+from tfarm.report.writing import PIECES
+
+COARSE = (
+    (loop_section, "GRID_COLUMNS", 48),
+    (loop_section, "GRID_ROWS", 40),
+    (regions, "SAMPLED_COLUMNS", 24),
+    (regions, "OVERLAY_COLUMNS", 8),
+    (sampled_regions, "MOST_COLUMNS", 0),  # with the corners that so few have
+    (loci, "LOCUS_POINTS", 60),
+    (sampled_loci, "SAMPLED_LOCUS_VALUES", 31),
+    (verdict, "PERIOD_SHARES", (1.0, 5.0)),
+    (writing, "MOST_WORKERS", 1),  # a second process would have its own grids
+    (regions, "sampled_region", regions.sampled_region.__wrapped__),  # what is kept of it is of other grids
+    (live, "sampled_region", regions.sampled_region.__wrapped__),
+)
+
+
+def coarsen(put=setattr):
+    """Put the coarse grids in place, for good or, with a MonkeyPatch's setattr, until it is undone."""
+    for room, name, value in COARSE:
+        put(room, name, value)
+
+
+def plain_cards(put):
+    """Cards of the index with an empty picture, for tests that are not about it: a response and a drawing each."""
+    put(writing, "bode", lambda *_: None)
+    put(writing, "draw_card", SimpleNamespace(figure=lambda _: None))
+    put(writing, "save_figure", lambda _, folder, stem, formats: (folder / f"{stem}.svg").write_text("<svg/>"))
+
+
+ASSUMPTIONS = (PRINTED, "second assumption", LONG)
+ARM = replace(tfarm.load("stocky-steel"), name=NAME, assumptions=ASSUMPTIONS)
+REPORT = (
+    "import pickle, sys, tfarm; from pathlib import Path; from tfarm import audit; from tfarm.report import write;"
+    "rows = pickle.loads(Path(sys.argv[3]).read_bytes()); audit.audit = lambda: rows;"
+    "from tests.report.written import coarsen; coarsen();"  # the map and the sampled section have tests of their own
+    "print(write([tfarm.load(sys.argv[1])], Path(sys.argv[2])));"
+    "pyplot = sys.modules.get('matplotlib.pyplot');"  # python-control imports it; no figure may be its own
+    "print(bool(pyplot and pyplot.get_fignums()))"
+)
+
+
+def report_elsewhere(audit_file, out):
+    file = out.with_suffix(".toml")
+    file.write_text(to_toml(ARM), encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-c", REPORT, str(file), str(out), str(audit_file)],
+        env={**os.environ, "PYTHONHASHSEED": "12345", "TZ": "Asia/Tokyo"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert (done.stdout.splitlines(), done.stderr) == ([str(out / "index.html"), "False"], "")
+
 
 ANCHORS = {piece.anchor for piece in PIECES}
 HELD = replace(ARM, hub=tfarm.Hub(inertia=math.inf))  # no loop: its proofs are quick
@@ -16,8 +84,8 @@ validated = cache(lambda: tuple(validate()))  # as this process has it
 
 
 def blocks_of(section):
-    """Pictures and tables of a section by their stems."""
-    return {block.stem: block for block in section.blocks}
+    """Pictures and tables of a section by their stems; those without columns are not on the page."""
+    return {block.stem: block for block in section.blocks if getattr(block, "columns", True)}
 
 
 def values_of(table):

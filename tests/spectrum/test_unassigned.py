@@ -20,7 +20,7 @@ from tfarm.arm import Motor
 from tfarm.cli.running import run
 from tfarm.errors import ConvergenceError
 from tfarm.loop.locus import open_poles
-from tfarm.report.modes_section import damped_tables, locked_table
+from tfarm.report.response_sections import damped_tables, locked_table
 from tfarm.spectrum import damped as damped_module
 from tfarm.spectrum.damped import NOT_ASSIGNED, origins_of
 

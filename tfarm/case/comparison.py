@@ -37,17 +37,11 @@ MOST_COMPARED = 30  # flexible modes of a table that a person reads
 LONGEST_SIDE_NAME = 60  # characters of a name: of two in one legend
 POLES_BEYOND_MODES = 6  # poles with Im s >= 0 beyond the modes: real ones, those of the hub, the motor and a controller
 REGION_COLUMNS, REGION_ROWS = 80, 40  # of the plane of both gains; its edges upwards are exact
-FIRST_COLUMN = 1e-6  # of the largest rate gain: where the first column beyond 0 is, from which most regions begin
 BEYOND_LAWS = 1.5  # how far the plane reaches beyond the controllers' own gains
 FURTHER_DELAYS = 25  # columns of the plane of further delay and a factor on each controller
 MOST_FACTOR, FACTORS = 4.0, 40  # of a continuous-time controller: where that plane ends, and values that are counted
-LONGEST_WAIT, BORNE = 2.0, 1.2  # samples up to which the delay goes, or times the larger delay margin
-MOST_DELAYED = 10.0  # samples at most
-CURVE_FROM = 0.05  # of the first mode: where the curve of a loop begins
 FARTHEST = 1.0  # |ln s - ln p|: by more no controller moves a mode here, a factor e of its frequency or 57 deg
 HUB = 0  # the number of the pole below the first mode that no mode of the link is near
-GONE_AFTER_SAMPLE = 1e-3  # |z| of a pole that leaves this much of itself after a sample: of those nothing is compared
-REAL_Z = 1e-12  # imaginary part of a real z: rounding
 
 
 class ArmMode(NamedTuple):
@@ -65,13 +59,6 @@ class PoleOfMode(NamedTuple):
     size: Annotated[float, Quantity("abs(s)", "rad/s", help="natural frequency of the closed-loop pole pair")]
     damping_ratio: Annotated[Percent, Quantity("damping ratio", help="-Re s / |s|, below 0 where it grows")]
     pole: complex
-
-
-class Reach(NamedTuple):
-    """The intervals of a factor on a controller in which its loop is stable, at each further delay [s]."""
-
-    delay: Real
-    stable_intervals: list[Sequence[Window]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,7 +118,7 @@ class ComparedSide:
         else:
             omega = dense(self.loop.stability)
             L = np.asarray(self.loop.stability.loop.loop_function(1j * omega), dtype=np.complex128)
-        shown = np.isfinite(L) & (L != 0) & (omega > CURVE_FROM * self.arm_modes[0].frequency)
+        shown = np.isfinite(L) & (L != 0) & (omega > 0.05 * self.arm_modes[0].frequency)
         return omega[shown], L[shown]
 
     @property
@@ -151,14 +138,14 @@ class ComparedSide:
         is_open = verdict.verdict != "unstable" and not verdict.is_known_beyond
         return f"up to {verdict.band:.4g} rad/s, not determined beyond" if is_open else ""
 
-    def reach(self, delay: Real) -> Reach:
-        """The stable factors on the law with so much further delay each [s]."""
+    def reach(self, delay: Real) -> list[Sequence[Window]]:
+        """The intervals of a factor on the law in which its loop is stable, at each further delay [s]."""
         if isinstance(self.loop, Analysis):
             sampling, late = self.loop.loop.chain.sampling, self.loop.loop.with_delay
             now = [late(sampling.delay_samples + more) for more in (delay / sampling.period).tolist()]
-            return Reach(delay, [stable_factors(each) for each in now])
+            return [stable_factors(each) for each in now]
         loop, factors = Loop(self.arm, as_law(self.law)), between(0.0, MOST_FACTOR, FACTORS)
-        return Reach(delay, [*plane(loop, ("delay", "gain"), loop.law.delay + delay, factors).stable_intervals])
+        return [*plane(loop, ("delay", "gain"), loop.law.delay + delay, factors).stable_intervals]
 
 
 def poles_by_mode(poles: Complex, open_loop: Mapping[int, complex]) -> dict[int, complex]:
@@ -327,16 +314,16 @@ class Comparison:
             )
             for n, (name, number) in enumerate(zip(PLANE, (REGION_COLUMNS, REGION_ROWS), strict=True))
         )
-        x = np.union1d(x, [FIRST_COLUMN * x[-1]])
+        x = np.union1d(x, [1e-6 * x[-1]])  # a column just beyond 0, from which most regions begin
         return [gain_map(side.arm, x, y, law.Kp) for side, law in zip(self.sides, laws, strict=True)]
 
     @cached_property
-    def reaches(self) -> tuple[Reach, Reach]:
-        """Of each loop the factors on its law that keep it stable, over further delays."""
+    def reaches(self) -> tuple[Real, list[list[Sequence[Window]]]]:
+        """Further delays [s], to two samples or beyond both margins, and the stable factors on each law there."""
         T = self.one.sampled.period
-        longest = max([LONGEST_WAIT * T, *(BORNE * (each.delay_margin or 0.0) for each in self.sides)])
-        delay = np.linspace(0.0, min(longest, MOST_DELAYED * T), FURTHER_DELAYS)
-        return self.one.reach(delay), self.other.reach(delay)
+        longest = max(2.0 * T, *(1.2 * (each.delay_margin or 0.0) for each in self.sides))
+        delay = np.linspace(0.0, min(longest, 10.0 * T), FURTHER_DELAYS)
+        return delay, [each.reach(delay) for each in self.sides]
 
 
 def compare(
@@ -439,8 +426,8 @@ def _sampled_poles(found: Analysis, most: int) -> tuple[Complex, dict[int, compl
     And those of the rig by itself with Im z > 0, by flexible mode.
     """
     T, pulse, z = found.loop.chain.sampling.period, found.loop.pulse, found.loop.poles.z
-    z = np.where(abs(z.imag) <= REAL_Z, z.real, z)
-    s = np.log(z[(abs(z) > GONE_AFTER_SAMPLE) & (z.imag >= 0)]) / T
+    z = np.where(abs(z.imag) <= 1e-12, z.real, z)  # but for rounding
+    s = np.log(z[(abs(z) > 1e-3) & (z.imag >= 0)]) / T  # of others a thousandth is left after a sample
     upper = np.nonzero((pulse.mode > 0) & (pulse.poles.imag > 0))[0]
     own = np.log(pulse.multipliers[upper]) / T
     by_mode = zip(pulse.mode[upper].tolist(), (own.real + 1j * abs(own.imag)).tolist(), strict=True)

@@ -260,14 +260,14 @@ def report(
     """
     from tfarm.arm import law_tables
     from tfarm.fitting import data, recording
-    from tfarm.report import cases, write
+    from tfarm.report import page, write
 
     names: list[str] = arms or list(tfarm.presets())
     files: list[Path | None] = [*(law or [])]
     subjects = [load_arm(name, theory) for name in names]
     laws = [
         [
-            cases.GivenLaw(
+            page.GivenLaw(
                 load_law(arm, name, gains, file)[0],
                 file.name if file else "",
                 recording.load_run(file) if file else None,

@@ -86,15 +86,12 @@ class TimeCurve:
         k = np.clip(np.searchsorted(self.t, t * (1 + TIME_ROUNDING), side="right") - 1, 0, self.t.size - 1)
         return TimeCurve(t, self.low[k], self.high[k], self.is_band)
 
-    def columns(self, key: str, title: str, unit: str) -> Sequence[Column]:
+    def columns(self, key: str, unit: str) -> Sequence[Column]:
         """The drawn curve, for its file: one column, or both edges of the band."""
         name = f"{key}_{unit.replace(' ', '_')}"
         if not self.is_band:
-            return (Column(name, title, unit, of=self.low),)
-        return (
-            Column(f"{name}_low", f"{title}, lowest", unit, of=self.low),
-            Column(f"{name}_high", f"{title}, highest", unit, of=self.high),
-        )
+            return (Column(name, of=self.low),)
+        return Column(f"{name}_low", of=self.low), Column(f"{name}_high", of=self.high)
 
 
 def resolved(simulator: Simulator, arm: Arm, *runs: Callable[[Simulator], Simulation]) -> list[Simulation]:

@@ -43,7 +43,6 @@ from .style import (
     by_name,
     gains_words,
     name_axes,
-    page,
     picture,
     plain_ticks,
     safe,
@@ -51,19 +50,10 @@ from .style import (
 
 RAD_PER_CYCLE = 2 * math.pi  # rad/s of 1 Hz
 NUMBER_STRIP = 0.085  # height of the strip of mode numbers above the magnitude, as a share of its axes: a line of them
-NUMBERS_APART = 0.019  # share of the width below which two mode numbers would touch: two digits of 8 points on 9 inches
-NEAR_ROOT = 0.004  # of a frequency: nearer to a root on the axis a magnitude sets no limit of the picture
-LEAST_DRAWN, MOST_DRAWN = 1e-4, 1e3  # sizes of L that are drawn: so that the part near 1 shows
-RIGHT_ANGLES = (1, 1.8, 4.5, 9, 10)  # steps between ticks of a phase, up to powers of ten
+MOST_DRAWN = 1e3  # size of L that is drawn: so that the part near 1 shows
 RING_SIZES = (0.2, 0.5, 1.0, 2.0, 5.0, math.inf)  # |L| of the rings
-ARC_RADIUS, LAST_RADIUS, RADIUS_STEP = 1.04, 1.2, 0.03  # of the first arc at infinity, of the last, and between two
-ARC_COUNT, REACH = 1.28, 1.35  # radii of the number of arcs that turn alike, and of the picture
+ARC_RADIUS, REACH = 1.04, 1.35  # of the first arc at infinity, and of the picture
 ARCS_ALIKE = math.radians(20.0)  # arcs whose ends are as near as that turn alike
-ARROWS_AT = np.array([0.12, 0.4, 0.75])  # of the drawn length of the curve, arcs at infinity apart
-FITTED_POINTS = 1200  # of a computed curve, besides the measured frequencies: more than a column has pixels
-POINTS_OF_BAND = 800  # of a band of responses, about one to a pixel: each is computed for every possible arm
-MAP_MESH = 60  # gains of each axis of a map, each pair counted for every possible arm
-SPAN = 1.25  # of the decades that are measured: an infinite peak of the exact curve leaves the picture
 TICKS_A_DECADE = (1.0, 2.0, 5.0)  # where a measurement covers few of them
 NOISE_ROOM = 2.5  # factor above and below the noise: two ticks a picture at least
 FREQUENCY_HZ = "frequency [Hz]"
@@ -88,14 +78,13 @@ def bode(data: Bode | Mapping[str, Bode], *, ax: Sequence[Axes]) -> None:
     draw_phase(data, ax=ax[1])
 
 
-def draw_card(data: Bode) -> Figure:
+@picture(size=(4.4, 2.5), title=lambda _: "")
+def draw_card(data: Bode, *, ax: Axes) -> None:
     """The magnitude alone, small, for the index."""
-    with page(4.4, 2.5, "") as (figure, ax):
-        draw_magnitude(data, ax=ax)
-        ax.set_ylabel(f"|{data.label}| [{data.gain_unit}]", fontsize=8.5)
-        for each in (ax.legend(), *ax.texts, *ax.child_axes):
-            each.set_visible(False)
-    return figure
+    draw_magnitude(data, ax=ax)
+    ax.set_ylabel(f"|{data.label}| [{data.gain_unit}]", fontsize=8.5)
+    for each in (ax.legend(), *ax.texts, *ax.child_axes):
+        each.set_visible(False)
 
 
 def draw_magnitude(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
@@ -130,7 +119,7 @@ def draw_phase(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
         ax.plot(*broken(one.omega, one.phase, jumps, np.full(jumps.size, np.nan)), color=colour)
     ax.set(xscale="log", xlim=one.band, xlabel=FREQUENCY, ylabel=PHASE)
     ax.margins(y=0.1)
-    ax.yaxis.set_major_locator(MaxNLocator(5, steps=RIGHT_ANGLES))
+    ax.yaxis.set_major_locator(MaxNLocator(5, steps=(1, 1.8, 4.5, 9, 10)))  # right angles and parts of them
 
 
 def hertz_axis(ax: Axes, height: float) -> None:
@@ -162,7 +151,7 @@ def magnitude_limits(data: Bode) -> tuple[float, float]:
     if data.is_zero:
         return 0.1, 10.0
     roots = np.r_[data.infinite, data.vanishing]
-    away = (abs(data.omega[:, None] / roots - 1) > NEAR_ROOT).all(axis=1)
+    away = (abs(data.omega[:, None] / roots - 1) > 0.004).all(axis=1)  # nearer ones set no limit of the picture
     size = np.log10([each for each in (*abs(data.value[away]), *abs(data.rigid[:1])) if each > 0])
     margin = max(0.25, 0.06 * np.ptp(size))
     return 10 ** (size.min() - margin), 10 ** (size.max() + margin)
@@ -181,7 +170,8 @@ def _mark_roots(data: Bode, ax: Axes) -> None:
                 roots, np.full(roots.size, height), marker, transform=ax.get_xaxis_transform(), clip_on=False,
                 mfc="white", mec=INK, ms=6.0, mew=1.0, zorder=5, label=label,
             )  # fmt: skip
-    last, width = -math.inf, NUMBERS_APART * math.log(data.band[1] / data.band[0])
+    # nearer than that share of the width two mode numbers would touch: two digits of 8 points on 9 inches
+    last, width = -math.inf, 0.019 * math.log(data.band[1] / data.band[0])
     for number, omega in enumerate(data.resonances.imag, 1):
         if math.log(omega) - last > width:
             last = math.log(omega)
@@ -202,20 +192,21 @@ def draw_loops(each: Mapping[str, tuple[Real, Complex]], upper: Axes, lower: Axe
     upper.set(xscale="log", yscale="log", ylabel="|L| [−]")
     upper.margins(x=0)
     low, high = upper.get_ylim()
-    upper.set_ylim(max(low, LEAST_DRAWN * min(1.0, high)), min(high, MOST_DRAWN * max(1.0, low)))
+    upper.set_ylim(max(low, 1e-4 * min(1.0, high)), min(high, MOST_DRAWN * max(1.0, low)))
     lower.set(xscale="log", xlim=upper.get_xlim(), xlabel=FREQUENCY)
     hertz_axis(upper, 1.0)
 
 
-def draw_loop(found: Margins, name: str) -> Figure:
+@picture(
+    size=(9.0, 5.8), rows=(1.5, 1.0),
+    title=lambda found, name: f"{found.stability.loop.arm.name}: the loop function L(iω) of {name}",
+)  # fmt: skip
+def draw_loop(found: Margins, name: str, *, ax: Sequence[Axes]) -> None:
     """|L| above the phase from -180 to 180 deg; |L| = 1 and L < 0 marked where they are crossed."""
     omega, L = loop_curve(found)
-    title = f"{found.stability.loop.arm.name}: the loop function L(iω) of {name}"
-    with page(9.0, 5.8, title, nrows=2, sharex=True, height_ratios=[1.5, 1.0]) as (figure, (upper, lower)):
-        draw_loops({name: (omega, L)}, upper, lower)
-        if found.in_band is not None:
-            _mark_margins(found.in_band, omega, upper, lower)
-    return figure
+    draw_loops({name: (omega, L)}, *ax)
+    if found.in_band is not None:
+        _mark_margins(found.in_band, omega, *ax)
 
 
 def _mark_margins(margins: LoopMargins, omega: Real, upper: Axes, lower: Axes) -> None:
@@ -269,14 +260,14 @@ def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     ax.set_title(lines, fontsize=9.0, loc="center")
 
 
-def draw_nyquist(title: str, plots: Mapping[str, Nyquist]) -> Figure:
-    """One disc a controller, of at most two, by name."""
-    band = significant(max(data.verdict.band for data in plots.values()), 5)
-    title = f"{title}: the loop function L(iω) up to {band} rad/s"
-    with page(9.0 if len(plots) > 1 else 5.6, 5.3, title, ncols=len(plots), squeeze=False) as (figure, axes):
-        for ax, (name, data) in zip(axes[0], plots.items(), strict=True):
-            nyquist(data, ax=ax, name=name)
-    return figure
+@picture(
+    size=(5.6, 5.3),
+    title=lambda data, _: f"{data.verdict.loop.arm.name}: the loop function L(iω) up to "
+                          f"{significant(data.verdict.band, 5)} rad/s",
+)  # fmt: skip
+def draw_nyquist(data: Nyquist, name: str, *, ax: Axes) -> None:
+    """The disc of a controller, for its page."""
+    nyquist(data, ax=ax, name=name)
 
 
 def _curve(data: Nyquist, ax: Axes) -> None:
@@ -290,7 +281,7 @@ def _curve(data: Nyquist, ax: Axes) -> None:
         if data.is_arc[piece[0]]:
             first, *_, last = np.unwrap(np.angle(data.L[piece])).tolist()
             alike.setdefault((round(first / ARCS_ALIKE), round(last / ARCS_ALIKE)), []).append((piece, first, last))
-    step = min(RADIUS_STEP, (LAST_RADIUS - ARC_RADIUS) / max(1, len(alike) - 1))
+    step = min(0.03, (1.2 - ARC_RADIUS) / max(1, len(alike) - 1))  # from one radius to the next, the last being 1.2
     for number, same in enumerate(alike.values()):
         piece, first, last = same[0]
         turn: Complex = np.exp(1j * np.linspace(first, last, 61))
@@ -299,12 +290,12 @@ def _curve(data: Nyquist, ax: Axes) -> None:
         ax.plot(whole.real, whole.imag, color=BLUE, lw=0.8, ls=(0, (3, 1.5)), zorder=3, label="past poles on the axis")
         _arrows(ring[1:], np.diff(ring), np.array([30]), ax)
         if len(same) > 1:
-            place = ARC_COUNT * turn[30]
+            place = 1.28 * turn[30]
             ax.text(place.real, place.imag, f"{len(same)} ×", fontsize=8.0, color=BLUE, ha="center", va="center")
     drawn = z[~data.is_arc]
     way = np.diff(drawn)
     length = np.cumsum(abs(way))
-    _arrows(drawn[1:], way, np.searchsorted(length, length[-1] * ARROWS_AT), ax)
+    _arrows(drawn[1:], way, np.searchsorted(length, length[-1] * np.array([0.12, 0.4, 0.75])), ax)
 
 
 def _arrows(z: Complex, way: Complex, at: NDArray[np.int64], ax: Axes) -> None:
@@ -334,7 +325,7 @@ def _over_measured(
         upper.plot(omega / RAD_PER_CYCLE, abs(values), **looks)
         draw_wrapped(omega / RAD_PER_CYCLE, values, lower, **looks)
     within = np.log10([each for each in (*size, *(np.median(abs(values)) for _, values, _ in curves)) if each > 0])
-    margin = 0.15 + (SPAN - 1) / 2 * np.ptp(within)
+    margin = 0.15 + 0.125 * np.ptp(within)  # an infinite peak of the exact curve leaves the picture
     upper.set(yscale="log", ylim=10 ** np.array([within.min() - margin, within.max() + margin]))
     upper.yaxis.set_minor_formatter(NullFormatter())
     for ax in (upper, lower):
@@ -361,41 +352,45 @@ def fitted(fit: Fit, *, ax: Sequence[Axes]) -> None:
         (fit.solution.point, {"color": BLUE, "lw": 1.4, "label": "fitted, exact"}),
     )
     for number, (one, upper, lower) in enumerate(zip(fit.responses, ax[:count], ax[count:], strict=False)):
-        omega = np.unique(np.r_[np.geomspace(one.omega[0], one.omega[-1], FITTED_POINTS), one.omega])
+        omega = np.unique(np.r_[np.geomspace(one.omega[0], one.omega[-1], 1200), one.omega])
         curves = [(omega, problem.at(number, omega).computed(point)[0], looks) for point, looks in arms]
         _over_measured(one, curves, upper, lower)
         upper.set(title=one.label, xlabel="", ylabel=f"magnitude [{one.unit}]")
 
 
-def draw_band(those: Possible, output: str) -> Figure:
+@picture(
+    size=(9.0, 4.6),
+    title=lambda those, output: f"{those.fit.before.name}: {signal_words(output)[0]} of the arms "
+                                "that the data leave possible",
+)  # fmt: skip
+def draw_band(those: Possible, output: str, *, ax: Axes) -> None:
     """Magnitude of a response of the arm that fits best, in the band of all arms that the data leave possible."""
     ends = [end for each in those.fit.responses for end in each.omega[[0, -1]]]
-    omega = np.geomspace(min(ends), max(ends), POINTS_OF_BAND)
+    omega = np.geomspace(min(ends), max(ends), 800)  # about one to a pixel
     least, most, best = response_band(those, output, omega)
     name, unit = signal_words(output)
-    unit = unit_over(unit, those.fit.arm.input_unit)
-    with page(9.0, 4.6, f"{those.fit.before.name}: {name} of the arms that the data leave possible") as (figure, ax):
-        label = f"all of {len(those.arms)} arms that the data leave possible"
-        ax.fill_between(omega / RAD_PER_CYCLE, least, most, color=BLUE, alpha=0.3, lw=0, label=label)
-        ax.plot(omega / RAD_PER_CYCLE, best, color=BLUE, lw=1.3, label="the arm that fits best")
-        ax.set(xscale="log", yscale="log", xlabel=FREQUENCY_HZ, ylabel=f"|{name}| [{unit}]")
-        plain_ticks(ax.xaxis, subs=TICKS_A_DECADE)
-    return figure
+    label = f"all of {len(those.arms)} arms that the data leave possible"
+    ax.fill_between(omega / RAD_PER_CYCLE, least, most, color=BLUE, alpha=0.3, lw=0, label=label)
+    ax.plot(omega / RAD_PER_CYCLE, best, color=BLUE, lw=1.3, label="the arm that fits best")
+    ax.set(xscale="log", yscale="log", xlabel=FREQUENCY_HZ)
+    ax.set_ylabel(f"|{name}| [{unit_over(unit, those.fit.arm.input_unit)}]")
+    plain_ticks(ax.xaxis, subs=TICKS_A_DECADE)
 
 
-def draw_share(those: Possible, ranges: Sequence[tuple[float, float]]) -> Figure:
+@picture(
+    size=(8.0, 5.0),
+    title=lambda those, _: f"{those.fit.before.name}: stabilising gains for the arms that the data leave possible",
+)  # fmt: skip
+def draw_share(those: Possible, ranges: Sequence[tuple[float, float]], *, ax: Axes) -> None:
     """The share of the possible arms that each pair of gains stabilises in continuous time; `ranges` of both gains."""
-    across, up = (np.linspace(*ends, MAP_MESH) for ends in ranges)
-    title = f"{those.fit.before.name}: stabilising gains for the arms that the data leave possible"
-    with page(8.0, 5.0, title) as (figure, ax):
-        mesh = ax.pcolormesh(
-            across, up, share_stable(those, across, up), cmap="Blues", vmin=0.0, vmax=1.0, shading="nearest",
-            rasterized=True,
-        )  # fmt: skip
-        figure.colorbar(mesh, ax=ax).set_label("share of the arms with a stable loop [−]")
-        name_axes(PLANE, those.fit.arm, HubFeedback(), ax)
-        ax.grid(False)
-    return figure
+    across, up = (np.linspace(*ends, 60) for ends in ranges)
+    mesh = ax.pcolormesh(
+        across, up, share_stable(those, across, up), cmap="Blues", vmin=0.0, vmax=1.0, shading="nearest",
+        rasterized=True,
+    )  # fmt: skip
+    ax.figure.colorbar(mesh, ax=ax).set_label("share of the arms with a stable loop [−]")
+    name_axes(PLANE, those.fit.arm, HubFeedback(), ax)
+    ax.grid(False)
 
 
 @picture(

@@ -40,7 +40,6 @@ from .style import (
     ORANGE,
     PURPLE,
     by_name,
-    page,
     picture,
     plain_ticks,
     safe,
@@ -48,14 +47,8 @@ from .style import (
 
 SHAPE_POINTS = 401  # of a drawn mode: about one to a pixel of its picture
 ALONG, DISPLACEMENT = "distance from the hub, x [m]", "displacement w(x), largest = 1 [−]"
-HUB_RADIUS = 0.055  # radius of the drawn hub, and half the payload's side, as shares of the length
-SEGMENT_COLOURS = ("#cfe0ee", "#e3ecd5")  # colours of neighbours
-BESIDE_ARM, HALF_HEIGHT = 0.2, 0.12  # shares of the length left of the hub and right of the tip; above, at least
-AROUND_SKETCH = 1.15  # inches above and below it: three lines, and the axis
+BESIDE_ARM = 0.2  # share of the length left of the hub and right of the tip
 HUB_WIDTH = 0.06  # width of the drawn hub, as a share of the length
-K_RANGE = (-0.25, 1.25)  # of the moment gain: from 0 to the continuous loop's bound, 1, and a quarter to either side
-GUARD = "#bfe3d6"
-MOST_COST = 1.25  # of the cost without feedback: higher ones are drawn at the top edge
 TIME = "time [s]"
 DASHED, DOTTED, LONG_DASHED = (0, (4, 3)), (0, (1, 2)), (0, (5, 3))
 
@@ -109,22 +102,21 @@ def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
             one.set(xlabel=ALONG, ylabel=DISPLACEMENT)
 
 
-def draw_differences(name: str, differences: Mapping[str, Real]) -> Figure:
+@picture(
+    size=(9.0, 3.6), title=lambda name, _: f"{name}: simpler beam theories against the Timoshenko theory",
+)  # fmt: skip
+def draw_differences(name: str, differences: Mapping[str, Real], *, ax: Axes) -> None:
     """How far each simpler theory's frequencies lie above the Timoshenko theory's [%], mode by mode."""
     looks = {"euler-bernoulli": (ORANGE, "s"), "rayleigh": (PURPLE, "D"), "shear": (GREEN, "o")}
-    with page(9.0, 3.6, f"{name}: simpler beam theories against the Timoshenko theory") as (figure, ax):
-        for theory, values in differences.items():
-            color, marker = looks[theory]
-            ax.plot(
-                np.arange(1, len(values) + 1), values, marker=marker, ms=5, lw=1.2, color=color,
-                label=theory_name(theory),
-            )  # fmt: skip
-        if all((values > 0).all() for values in differences.values()):
-            ax.set_yscale("log")
-            plain_ticks(ax.yaxis)
-        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-        ax.set(xlabel="mode number", ylabel="frequency above Timoshenko's [%]")
-    return figure
+    for theory, values in differences.items():
+        color, marker = looks[theory]
+        number = np.arange(1, len(values) + 1)
+        ax.plot(number, values, marker=marker, ms=5, lw=1.2, color=color, label=theory_name(theory))
+    if all((values > 0).all() for values in differences.values()):
+        ax.set_yscale("log")
+        plain_ticks(ax.yaxis)
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.set(xlabel="mode number", ylabel="frequency above Timoshenko's [%]")
 
 
 def theory_name(theory: str) -> str:
@@ -144,7 +136,7 @@ def _depth(link: Link) -> float:
 def _frame(arm: Arm) -> tuple[float, float, float]:
     """Left end, right end and half the height [m] of the picture."""
     tip = arm.length + arm.hub.radius + max(0.0, arm.payload.offset)
-    return -BESIDE_ARM * arm.length, tip + BESIDE_ARM * arm.length, max(HALF_HEIGHT * arm.length, 0.6 * _deepest(arm))
+    return -BESIDE_ARM * arm.length, tip + BESIDE_ARM * arm.length, max(0.12 * arm.length, 0.6 * _deepest(arm))
 
 
 def _deepest(arm: Arm) -> float:
@@ -153,7 +145,7 @@ def _deepest(arm: Arm) -> float:
 
 def _sketch_size(arm: Arm) -> tuple[float, float]:
     left, right, half = _frame(arm)
-    return 9.0, AROUND_SKETCH + 8.6 * 2 * half / (right - left)
+    return 9.0, 1.15 + 8.6 * 2 * half / (right - left)  # with three lines above, and the axis below
 
 
 @picture((Arm, "tfarm.load returns"), size=_sketch_size, title=lambda _: "")
@@ -161,12 +153,12 @@ def sketch(arm: Arm, *, ax: Axes) -> None:
     """Hub, link and payload from the side, to scale [m], in the axes given or in new ones; the axes."""
     left, right, half = _frame(arm)
     root = arm.hub.radius
-    bore = HUB_RADIUS * arm.length
+    bore = 0.055 * arm.length
     ax.set(aspect="equal", xlim=(left, right), ylim=(-half, half), yticks=[], xlabel="distance from the hub's axis [m]")
     ax.spines[["left", "right", "top"]].set_visible(False)
     ax.axhline(0, color=FAINT, lw=0.8, ls=(0, (6, 3, 1, 3)), zorder=0)
     start = root
-    for link, colour in zip(arm.links, cycle(SEGMENT_COLOURS), strict=False):
+    for link, colour in zip(arm.links, cycle(("#cfe0ee", "#e3ecd5")), strict=False):
         deep = _depth(link)
         ax.add_patch(Rectangle((start, -deep / 2), link.length, deep, fc=colour, ec=BLUE, lw=1.0, zorder=2))
         start += link.length
@@ -256,27 +248,33 @@ def _draw_curve(curve: TimeCurve, ax: Axes, colour: str, *, scale: float = 1.0, 
         ax.plot(curve.t, low, color=colour, lw=1.3, **looks)
 
 
-def draw_measured_runs(title: str, each: Mapping[str, RunComparison]) -> Figure:
+def _measured_rows(each: Mapping[str, RunComparison]) -> int:
+    return 1 + any(found.measured.root_moment.size for found in each.values())
+
+
+@picture(
+    size=lambda each: (max(4.7 * len(each), 6.0), 6.0 if _measured_rows(each) > 1 else 3.6),
+    title=lambda _: "Measured steps, and the exact sampled loop",
+    grid=lambda figure, each: figure.subplots(_measured_rows(each), len(each), sharex="col", sharey="row"),
+)  # fmt: skip
+def draw_measured_runs(each: Mapping[str, RunComparison], *, ax: Sequence[Axes]) -> None:
     """A column a controller: hub angle above, root moment below where it was measured."""
-    moment = any(found.measured.root_moment.size for found in each.values())
-    grid: dict[str, Any] = {"nrows": 1 + moment, "ncols": len(each), "sharex": "col", "sharey": "row", "squeeze": False}
-    with page(max(4.7 * len(each), 6.0), 6.0 if moment else 3.6, title, **grid) as (figure, axes):
-        for column, (name, found) in zip(axes.T, each.items(), strict=True):
-            measured, run = found.measured, found.run
-            column[0].plot(measured.t, np.degrees(measured.reference), color=GREY, lw=1.0, ls=DASHED, label="reference")
-            column[0].set(title=safe(name), xlim=(0.0, float(measured.t[-1])))
-            column[-1].set_xlabel(TIME)
-            signals = (
-                (np.degrees(measured.hub_angle), np.degrees(found.hub_angle)),
-                (measured.root_moment, run.at_samples.root_moment),
-            )
-            for ax, (seen, computed) in zip(column, signals, strict=False):
-                if seen.size:
-                    ax.plot(measured.t, seen, color=ORANGE, label="measured")
-                ax.plot(run.t, computed, color=BLUE, lw=1.2, label="exact sampled loop")
-        for ax, label in zip(axes[:, 0], ("hub angle [deg]", "root moment [N m]"), strict=False):
-            ax.set_ylabel(label)
-    return figure
+    axes = np.reshape(np.array(ax), (-1, len(each)))
+    for column, (name, found) in zip(axes.T, each.items(), strict=True):
+        measured, run = found.measured, found.run
+        column[0].plot(measured.t, np.degrees(measured.reference), color=GREY, lw=1.0, ls=DASHED, label="reference")
+        column[0].set(title=safe(name), xlim=(0.0, float(measured.t[-1])))
+        column[-1].set_xlabel(TIME)
+        signals = (
+            (np.degrees(measured.hub_angle), np.degrees(found.hub_angle)),
+            (measured.root_moment, run.at_samples.root_moment),
+        )
+        for one, (seen, computed) in zip(column, signals, strict=False):
+            if seen.size:
+                one.plot(measured.t, seen, color=ORANGE, label="measured")
+            one.plot(run.t, computed, color=BLUE, lw=1.2, label="exact sampled loop")
+    for one, label in zip(axes[:, 0], ("hub angle [deg]", "root moment [N m]"), strict=False):
+        one.set_ylabel(label)
 
 
 @picture(
@@ -286,7 +284,7 @@ def draw_measured_runs(title: str, each: Mapping[str, RunComparison]) -> Figure:
 def tuned_gain(found: Tuning, *, ax: Axes) -> None:
     """A tuned gain over time (from `tfarm.tune`) in its guard, in the axes given or new ones; the axes."""
     guard, result = found.training.guard, found.training.result
-    ax.axhspan(guard.lo, guard.hi, color=GUARD, lw=0, zorder=0.5, label="guard: proven for any K(t) in it")
+    ax.axhspan(guard.lo, guard.hi, color="#bfe3d6", lw=0, zorder=0.5, label="guard: proven for any K(t) in it")
     ax.step(result.t, result.K, where="post", color=INK, lw=1.4, label="the tuner's gain K(t)")
     best = found.best_constant.gain
     ax.axhline(best, color=PURPLE, lw=1.2, ls=LONG_DASHED, label=f"best constant gain, {significant(best, 3)}")
@@ -295,40 +293,42 @@ def tuned_gain(found: Tuning, *, ax: Axes) -> None:
     ax.set(xlim=(0.0, float(result.t[-1])), xlabel=TIME, ylabel=f"gain on the root moment, {MOMENT_GAIN} [−]")
 
 
-def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap]) -> Figure:
+@picture(
+    size=(9.0, 5.2),
+    title=lambda tuning, *_: f"{tuning.trial.arm.name}: the tuner's gain, and where it is proven stable",
+    grid=lambda figure, *_: figure.subplots(1, 2, sharey=True, width_ratios=[1.0, 1.35]),
+)  # fmt: skip
+def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap], *, ax: Sequence[Axes]) -> None:
     """Left the map with the guard as a bar and in it the gains that the tuner takes, right the gain over time."""
-    title = f"{tuning.trial.arm.name}: the tuner's gain, and where it is proven stable"
-    with page(9.0, 5.2, title, ncols=2, sharey=True, width_ratios=[1.0, 1.35]) as (figure, (left, right)):
-        overlay(continuous, sampled, ax=left)
-        left.set_title("", loc="right")
-        left.lines[-1].remove()  # the mark of one controller: the bar is at its rate gain
-        guard, K = tuning.training.guard, tuning.training.result.K
-        at, _ = tuning.trial.loop.gains.point
-        for (low, high), looks in (
-            ((guard.lo, guard.hi), {"color": GREEN, "lw": 9, "alpha": 0.75}),
-            ((float(K.min()), float(K.max())), {"color": INK, "lw": 2.4}),
-        ):
-            left.plot([at, at], [low, high], solid_capstyle="butt", zorder=6, **looks)
-        tuned_gain(tuning, ax=right)
-        left.set_ylim(*K_RANGE)
-        right.set_ylabel("")
-    return figure
+    left, right = ax
+    overlay(continuous, sampled, ax=left)
+    left.set_title("", loc="right")
+    left.lines[-1].remove()  # the mark of one controller: the bar is at its rate gain
+    guard, K = tuning.training.guard, tuning.training.result.K
+    at, _ = tuning.trial.loop.gains.point
+    for ends, colour, width, alpha in ((guard.lo, guard.hi), GREEN, 9, 0.75), ((K.min(), K.max()), INK, 2.4, None):
+        left.plot([at, at], ends, solid_capstyle="butt", zorder=6, color=colour, lw=width, alpha=alpha)
+    tuned_gain(tuning, ax=right)
+    left.set_ylim(-0.25, 1.25)  # from 0 to the continuous loop's bound, 1, and a quarter to either side
+    right.set_ylabel("")
 
 
-def draw_curves(curves: LearningCurves, tuning: Tuning) -> Figure:
+@picture(
+    size=(9.0, 4.4),
+    title=lambda curves, tuning: f"{tuning.trial.arm.name}: learning, {how_many(curves.seeds, 'seed')}",
+)  # fmt: skip
+def draw_curves(curves: LearningCurves, tuning: Tuning, *, ax: Axes) -> None:
     """Learning curves: each seed, median and quartiles, and the baselines; diverged ones leave through the top."""
-    trial, seeds = np.arange(1, curves.costs.shape[1] + 1), len(curves.costs)
-    top = MOST_COST * tuning.without.cost
+    trial = np.arange(1, curves.costs.shape[1] + 1)
+    top = 1.25 * tuning.without.cost  # higher costs are drawn at the top edge
     low, middle, high = (np.minimum(curves.quantile(share), 2 * top) for share in QUARTILES)
-    with page(9.0, 4.4, f"{tuning.trial.arm.name}: learning, {how_many(seeds, 'seed')}") as (figure, ax):
-        ax.plot(trial, np.minimum(curves.costs, 2 * top).T, color="#b9b9b9", lw=0.6, zorder=1)
-        ax.fill_between(trial, low, high, color=BLUE, alpha=0.22, lw=0, zorder=2, label="middle half of the seeds")
-        ax.plot(trial, middle, color=BLUE, lw=1.8, zorder=3, label="median")
-        for cost, colour, label in (
-            (tuning.without.cost, ORANGE, "no moment feedback"),
-            (tuning.best_constant.cost, PURPLE, "best constant gain"),
-            (tuning.bound.cost, INK, "linear-quadratic optimum: lower bound"),
-        ):
-            ax.axhline(cost, color=colour, lw=1.2, ls=LONG_DASHED, zorder=2.5, label=f"{label}, {significant(cost, 3)}")
-        ax.set(xlim=(1, max(2, trial[-1])), xlabel="trial number", ylim=(0.0, top), ylabel="cost of a trial [−]")
-    return figure
+    ax.plot(trial, np.minimum(curves.costs, 2 * top).T, color="#b9b9b9", lw=0.6, zorder=1)
+    ax.fill_between(trial, low, high, color=BLUE, alpha=0.22, lw=0, zorder=2, label="middle half of the seeds")
+    ax.plot(trial, middle, color=BLUE, lw=1.8, zorder=3, label="median")
+    for cost, colour, label in (
+        (tuning.without.cost, ORANGE, "no moment feedback"),
+        (tuning.best_constant.cost, PURPLE, "best constant gain"),
+        (tuning.bound.cost, INK, "linear-quadratic optimum: lower bound"),
+    ):
+        ax.axhline(cost, color=colour, lw=1.2, ls=LONG_DASHED, zorder=2.5, label=f"{label}, {significant(cost, 3)}")
+    ax.set(xlim=(1, max(2, trial[-1])), xlabel="trial number", ylim=(0.0, top), ylabel="cost of a trial [−]")

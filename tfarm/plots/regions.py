@@ -20,7 +20,7 @@ from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback, shown_unit
+from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback
 from tfarm.arrays import Real
 from tfarm.case import Comparison
 from tfarm.crossing import Window, pieces
@@ -40,7 +40,7 @@ from tfarm.loop.plane import (
     static_edges,
 )
 from tfarm.loop.plane import gain_map as counted
-from tfarm.schema import Column, Table
+from tfarm.schema import Column
 from tfarm.spectrum.table import default_gains
 
 from .frequency import MOST_DRAWN, bode, draw_loops
@@ -61,32 +61,15 @@ from .style import (
     safe,
 )
 
-STABLE_COLOUR, FEWEST_COLOUR, MOST_COLOUR, BOUNDLESS_COLOUR = "#dcefe6", "#fbeadd", "#eebd95", "#f3d9c6"
-CONTOUR_STEPS, MOST_CONTOURS = (1.0, 2.0, 5.0), 7  # of the contours
-LEAST_NAMED = 12  # points of a contour with a number, on a grid of about 50 by 60
-LABEL_SHARES = (0.5, 0.35, 0.65, 0.2, 0.8)  # of a contour's length: where its number may stand, the best first
-NUMBER_ROOM = (0.08, 0.045)  # of the picture's width and height, from one number on a contour to the next
-LEAST_ROOM = 0.028  # of the picture's width or height: the count of a region with less around its middle is not written
-NEAR_MIDDLE = 0.9  # of the most room in a region: as good a place
-RESTING_NAMED = 3  # frequencies of the hub at rest in the legend, at their common edge
-NUMBERS_UP, NUMBERS_ACROSS = 0.05, 0.14  # shares of the picture between two frequencies up it, and across it
-MOST_PATCHES = 6  # counts of unstable poles with an entry of the legend each
-DIAMOND, STAR = "D", "*"  # of controllers
+MOST_COLOUR = "#eebd95"  # of as many unstable poles as any gains have
+NUMBERS_ACROSS = 0.14  # share of the picture's width between two frequencies
 HALO: list[AbstractPathEffect] = [withStroke(linewidth=3.0, foreground="white")]  # around numbers on a line
 K2_RANGE = (-1.0, 1.5)  # of the gain that balances a torque: 1 where the input is one, less for a motor's current
 CUT_RANGE = (-1.02, 1.52)  # of the same: where intervals are cut, just outside the picture: no cut is seen as an edge
 OVERLAY_COLUMNS = 72  # values of the gain across, and either side of upright edges
 LITTLE_DAMPINGS = (1e-4, 1e-6)  # s: drawn too at C = 0
-OVERLAY_ASPECT = 1.8  # times as wide as high the picture is, about
-BEYOND_STABLE = 1.7  # of the largest stable gain across: how far the picture goes
-SEEN_AS_ONE = 1e-3  # ends as close as this are seen as one
-BELOW_GAIN = 15.0  # divisor of the gain across of the controller: where the picture begins, on its logarithmic axis
 SAMPLED_COLUMNS = 120  # values of the gain across at which the sampled region is cut, besides its exact ends
-MAP_ASPECT = 1.5  # times as wide as high the picture is, about
 BEYOND_PICTURE = 0.1  # of the gain up the plane, beyond the picture: an edge there is none of the region
-SAND = "#f6dfcb"
-DAMPING_BLUES = ("#c9dcef", "#7fb0da", "#2f7cbc")  # lightest: most damping
-CONVENTION = "u = −{} dθ/dt − {} M;  a positive root moment M accelerates the hub".format(*PLANE)
 
 
 def _title(found: Plane | GainMap) -> str:
@@ -143,7 +126,7 @@ def _counts(found: Plane | GainMap, counts: NDArray[np.int64], ax: Axes) -> None
         inside = counts == count
         label = "infinitely many unstable poles (∞)" if count == INFINITE else how_many(count, "unstable pole")
         number += count > 0
-        if number <= MOST_PATCHES:
+        if number <= 6:
             ax.fill_between([], [], [], color=image[inside][0], label=label if count else "stable")
         elif count == counts.max():
             ax.fill_between([], [], [], color=MOST_COLOUR, label=f"more unstable poles, at most {count}")
@@ -151,8 +134,8 @@ def _counts(found: Plane | GainMap, counts: NDArray[np.int64], ax: Axes) -> None
         room = ndimage.distance_transform_edt(np.pad(inside, 1), np.divide(1, counts.shape))[1:-1, 1:-1]
         for region in range(1, last + 1) if count else ():
             own = np.where(regions == region, room, 0.0)
-            if own.max() > LEAST_ROOM:
-                middles = np.argwhere(own > NEAR_MIDDLE * own.max())
+            if own.max() > 0.028:  # of the picture's width or height: else there is no room for a number
+                middles = np.argwhere(own > 0.9 * own.max())
                 row, column = min(middles, key=lambda at: abs(at - middles.mean(axis=0)).sum())
                 text = "∞" if count == INFINITE else str(count)
                 ax.text(found.x[column], found.y[row], text, fontsize=9.0, ha="center", va="center", clip_on=True)
@@ -161,27 +144,29 @@ def _counts(found: Plane | GainMap, counts: NDArray[np.int64], ax: Axes) -> None
 def colours(unstable: NDArray[np.int64]) -> Real:
     """Green where stable, orange the stronger the more poles are unstable."""
     share = np.clip((unstable - 1) / max(1, unstable.max() - 1), 0, 1)[..., None]
-    image = np.array(to_rgb(FEWEST_COLOUR)) * (1 - share) + np.array(to_rgb(MOST_COLOUR)) * share
-    image[unstable == INFINITE] = to_rgb(BOUNDLESS_COLOUR)
-    image[unstable == 0] = to_rgb(STABLE_COLOUR)
+    image = np.array(to_rgb("#fbeadd")) * (1 - share) + np.array(to_rgb(MOST_COLOUR)) * share
+    image[unstable == INFINITE] = to_rgb("#f3d9c6")
+    image[unstable == 0] = to_rgb("#dcefe6")
     return np.asarray(image)
 
 
 def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
     """Of the least damping ratio (up, across), where it is a number: inside the stable region."""
     ends = np.nanmin(damping, initial=math.inf), np.nanmax(damping, initial=0.0)
-    levels = [level for level in LogLocator(subs=CONTOUR_STEPS).tick_values(*ends) if ends[0] < level < ends[1]]
+    levels = [level for level in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(*ends) if ends[0] < level < ends[1]]
     if not levels:
         return
     with np.errstate(invalid="ignore", divide="ignore"):  # by its logarithm, which is straighter
         logarithm = np.ma.masked_invalid(np.log(damping))
     lines = ax.contour(
-        across, up, logarithm, np.log(levels[-MOST_CONTOURS:]), colors=BLUE, linewidths=0.9, linestyles="-", zorder=2.5
+        across, up, logarithm, np.log(levels[-7:]), colors=BLUE, linewidths=0.9, linestyles="-", zorder=2.5
     )
     longest = (max(pieces, key=len) for pieces in lines.allsegs if pieces)
     places: list[Real] = []
     for piece in longest:
-        along = (piece[int(share * len(piece))] for share in LABEL_SHARES if len(piece) > LEAST_NAMED)
+        along = (
+            piece[int(share * len(piece))] for share in (0.5, 0.35, 0.65, 0.2, 0.8) if len(piece) > 12
+        )  # best first
         places += next(([at] for at in along if _is_free(at, places, ax)), [])
     for text in ax.clabel(lines, fontsize=8.0, fmt=lambda log: f"{plain(100 * math.exp(log), 3)} %", manual=places):
         text.set(path_effects=HALO, zorder=6)
@@ -191,7 +176,7 @@ def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
 def _is_free(at: Real, places: Sequence[Real], ax: Axes) -> bool:
     """Whether a number there touches none of those at the other places."""
     frame = ax.transData - ax.transAxes
-    away = (abs(frame.transform(place) - frame.transform(at)) > NUMBER_ROOM for place in places)
+    away = (abs(frame.transform(place) - frame.transform(at)) > (0.08, 0.045) for place in places)
     return all(each.any() for each in away)
 
 
@@ -227,7 +212,7 @@ def _undamped_boundary(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
         ax.hlines(edges, found.upright, x.high, color=INK, lw=1.8, label="stability boundary, exact")
     if found.is_known:
         whole = found.arm.input_per_torque
-        omega = ", ".join(significant(float(w), 4) for w in resting_frequencies(found, RESTING_NAMED))
+        omega = ", ".join(significant(float(w), 4) for w in resting_frequencies(found, 3))
         ax.hlines(whole, x.low, x.high, color=INK, lw=0.8, label=f"every mode with the hub at rest: {omega} … rad/s")
         ax.vlines(found.upright, whole, y.high, color=INK, lw=0.8)
         return
@@ -237,7 +222,7 @@ def _undamped_boundary(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
     ax.hlines(levels, found.upright, x.high, color=INK, lw=0.5, label=label)
     last = -math.inf
     for (t, w), place in zip(resting, y.place(levels), strict=True):
-        if place > last + NUMBERS_UP:
+        if place > last + 0.05:
             last = place
             ax.annotate(
                 significant(w, 4), (1.0, t), xytext=(4, 0), va="center", fontsize=7.5, textcoords="offset points",
@@ -282,10 +267,10 @@ def draw_proven(arm: Arm, x: Axis, y: Axis, ax: Axes) -> None:
         ax.plot([0, x.high], [0, 0], color=PURPLE, lw=1.6, label=f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven")
 
 
-def law_mark(law: HubFeedback, marker: str, label: str, ax: Axes) -> None:
-    """One controller, as a point."""
+def law_mark(law: HubFeedback, is_best: bool, label: str, ax: Axes) -> None:
+    """One controller, as a diamond, or as a star."""
     ax.plot(
-        *law.point, marker, ms=13.0 if marker == STAR else 8.0, mfc=ORANGE, mec="white", mew=1.0, zorder=7,
+        *law.point, "*" if is_best else "D", ms=13.0 if is_best else 8.0, mfc=ORANGE, mec="white", mew=1.0, zorder=7,
         ls="none", label=label,
     )  # fmt: skip
 
@@ -312,13 +297,13 @@ def stable_regions(arm: Arm, gains: HubFeedback, chain: Chain) -> StableRegions:
     loops = [sampled_verdict(arm.having(damping=C), gains, chain).full for C in dampings]
     ends = np.unique(np.concatenate([ends_of_K1(loop) for loop in loops]))
     ends = ends[ends > 0]
-    ends = ends[np.diff(ends, prepend=0.0) > SEEN_AS_ONE * ends]
+    ends = ends[np.diff(ends, prepend=0.0) > 1e-3 * ends]
     own, _ = gains.point
     span, cut = (arm.input_per_torque * np.array(ends) for ends in (K2_RANGE, CUT_RANGE))
-    low, top = own / BELOW_GAIN, BEYOND_STABLE * max([own, *ends])
+    low, top = own / 15.0, 1.7 * max([own, *ends])  # beyond all that is stable
     across = with_both_sides(np.geomspace(low, top, OVERLAY_COLUMNS), ends)
     across = across[(low <= across) & (top >= across)]
-    wide = OVERLAY_ASPECT / np.log(top / low)
+    wide = 1.8 / np.log(top / low)  # about the width of the picture over its height
     planes = [
         rounded_map(sampled_map(loop, across, cut), lambda x, y: np.asarray(wide * np.log(x) + 1j * y / np.ptp(span)))
         for loop in loops
@@ -327,20 +312,17 @@ def stable_regions(arm: Arm, gains: HubFeedback, chain: Chain) -> StableRegions:
     return StableRegions(counted(arm, every, cut), tuple(with_more(plane, every) for plane in planes))
 
 
-def regions_table(data: StableRegions, stem: str) -> Table:
+def region_columns(data: StableRegions) -> list[Column]:
     """The numbers of the picture: at each value of the gain across the ends of the stable intervals of the other."""
-    own = data.continuous.arm.damping
-    each = {"continuous_K2_intervals": data.continuous.stable_intervals}
-    for plane in data.sampled:
-        C = plane.loop.plant.arm.damping
-        each["sampled_K2_intervals" if own == C else f"sampled_at_C_{C:g}_s"] = plane.stable_intervals
-    columns = [
-        Column(key, key, of=[tuple(float(end) for window in column for end in window) for column in intervals])
-        for key, intervals in each.items()
+    arm, planes = data.continuous.arm, {plane.loop.plant.arm.damping: plane for plane in data.sampled}
+    each = {"continuous_K2_intervals": data.continuous.stable_intervals} | {
+        "sampled_K2_intervals" if arm.damping == C else f"sampled_at_C_{C:g}_s": plane.stable_intervals
+        for C, plane in planes.items()
+    }
+    return [
+        Column(PLANE[0], of=data.continuous.axes[0]),
+        *(Column(key, of=[tuple(map(float, np.ravel(column))) for column in own]) for key, own in each.items()),
     ]
-    across, up = PLANE
-    values = Column(across, across, shown_unit(across, data.continuous.arm), of=data.continuous.axes[0])
-    return Table(stem=stem, title=f"Stable intervals of {up}, continuous and sampled", columns=(values, *columns))
 
 
 @lru_cache(maxsize=8)
@@ -351,7 +333,7 @@ def sampled_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> GainMap | None:
         across = with_both_sides(rate_columns(arm, x, SAMPLED_COLUMNS), ends_of_K1(loop))
         across = across[(x.low <= across) & (x.high > across)]
         plane = sampled_map(loop, across, [y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])
-        return rounded_map(plane, lambda across, up: np.asarray(MAP_ASPECT * x.place(across) + 1j * y.place(up)))
+        return rounded_map(plane, lambda across, up: np.asarray(1.5 * x.place(across) + 1j * y.place(up)))
     except ConvergenceError:
         return None
 
@@ -374,12 +356,13 @@ def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes
     ax.grid(False)
     ax.axhline(0.0, color=GREY, lw=0.7, zorder=3.5)
     name_axes(PLANE, continuous.arm, continuous.law, ax)
-    ax.set_title(CONVENTION, loc="right", fontsize=8.5, color=GREY)
+    convention = "u = −{} dθ/dt − {} M;  a positive root moment M accelerates the hub".format(*PLANE)
+    ax.set_title(convention, loc="right", fontsize=8.5, color=GREY)
     draw_region(
         continuous.x, continuous.stable_intervals, ORANGE, "stable, continuous: every mode", ax, width=0.9,
-        facecolor=SAND,
+        facecolor="#f6dfcb",
     )  # fmt: skip
-    for plane, colour in zip(planes, DAMPING_BLUES[len(planes) == 1 :], strict=False):
+    for plane, colour in zip(planes, ("#c9dcef", "#7fb0da", "#2f7cbc")[len(planes) == 1 :], strict=False):
         C = plane.loop.plant.arm.damping
         hypothesis = "" if continuous.arm.damping == C else f", if C were {scientific(C, 1)} s"
         label = f"stable, sampled every {ms} ms{hypothesis if C else f', C = 0: the first {plane.modes_used} modes'}"
@@ -439,11 +422,12 @@ def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
 
 def _factors(data: Comparison, ax: Axes) -> None:
     """Factors that keep each loop stable, over the further delay of its controller."""
-    for found, side, colour in zip(data.reaches, data.sides, COLOURS, strict=False):
-        draw_region(1e3 * found.delay, found.stable_intervals, colour, f"{side.name}: stable", ax)
+    delay, reaches = data.reaches
+    for stable, side, colour in zip(reaches, data.sides, COLOURS, strict=False):
+        draw_region(1e3 * delay, stable, colour, f"{side.name}: stable", ax)
     ax.plot(
         [0.0], [1.0], "o", mfc=INK, mec="white", ms=7.5, zorder=7, clip_on=False, label="the controllers as they are"
     )
     ax.axhline(1.0, color=INK, lw=0.6)
-    limits = {"xlim": (0.0, 1e3 * data.reaches[0].delay[-1]), "ylim": (0.0, min(ax.get_ylim()[1], MOST_DRAWN))}
+    limits = {"xlim": (0.0, 1e3 * delay[-1]), "ylim": (0.0, min(ax.get_ylim()[1], MOST_DRAWN))}
     ax.set(xlabel="further delay [ms]", ylabel="factor on the controller [−]", **limits)

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
@@ -17,51 +16,47 @@ from tfarm.errors import one_line
 from tfarm.loop.loci import POLE_DIGITS, Loci, ReducedLocus, held_branches
 from tfarm.loop.locus import CONTROLLER, OTHER, Locus, frame, origin_name, rounded
 
-from .style import BLUE, FIGURES, GREEN, GREY, INK, ORANGE, PURPLE, gains_words, page, picture
+from .style import BLUE, FIGURES, GREEN, GREY, INK, ORANGE, PURPLE, gains_words, picture
 
-ZOOMED = 4  # modes drawn on their own
 MODE_COLOURS = (INK, BLUE, GREEN, PURPLE, "#7a5a00", "#d81b60", "#1a9ec0", "#6d9b1f")  # one a mode, none twice
 OTHER_COLOURS = {CONTROLLER: "#5b7083", OTHER: "#c48a9a"}
-HIGHER_COLOUR = "#9a9a9a"  # of all higher modes alike
 ROOM_AROUND = 0.12  # around a branch, as a share of its extent
 CROSS_AT_ZERO: dict[str, Any] = {"ls": "none", "marker": "x", "ms": 6, "mew": 1.4}  # without the varying feedback
 CIRCLE_AT_FIRST: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6, "mfc": "white", "mew": 1.2}  # at the start
 DOT: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 3.2}
 THIN: dict[str, Any] = {"lw": 0.9, "ls": (0, (2, 1.5)), "zorder": 3}  # of the reduced model
-LONGEST_LAW = 40  # characters of the controller in a title
-PARTS = 4  # of the range of the varied number: at their ends dots are on each branch
-MOST_NAMED = 6  # crossings in a legend
 
 
 def zoomed(exact: Locus) -> list[int]:
     """The branches drawn on their own: the first that swings of each mode."""
     imag, mode = exact.branches.imag, exact.mode
     first = {int(mode[n]): n for n in reversed(range(mode.size)) if (imag[n] > 0).any()}
-    return [first[number] for number in sorted(first)][:ZOOMED]
+    return [first[number] for number in sorted(first)][:4]
 
 
-def draw_loci(data: Loci) -> Figure:
+@picture(
+    size=(9.0, 5.8), title=lambda data: _title(data.exact),
+    grid=lambda figure, _: figure.subplot_mosaic("AABC;AADE", width_ratios=[1.7, 1.7, 1.3, 1.3]),
+)  # fmt: skip
+def draw_loci(data: Loci, *, ax: Sequence[Axes]) -> None:
     """All branches in one panel, and each mode enlarged in one of its own."""
     exact, fine, chosen = data.exact, rounded(data.exact), zoomed(data.exact)
-    grid: dict[str, Any] = {"mosaic": "AABC;AADE", "width_ratios": [1.7, 1.7, 1.3, 1.3]}
-    with page(9.0, 5.8, _title(exact), make=Figure.subplot_mosaic, **grid) as (figure, axes):
-        whole, *panels = axes.values()
-        _panel(fine, exact, data.reduced, range(len(exact.branches)), whole)
-        whole.set_title("all branches", fontsize=9.0)
-        for n, ax in zip(chosen, panels, strict=False):
-            _panel(fine, exact, data.reduced, [n], ax)
-            ax.set_title(_mode_looks(exact, n)["label"], fontsize=9.0)
-            ax.tick_params(labelsize=7.0)
-            ax.xaxis.label.set_size(8.0)
-            ax.yaxis.label.set_size(8.0)
-        for ax in panels[len(chosen) :]:
-            ax.remove()
-    return figure
+    whole, *panels = ax
+    _panel(fine, exact, data.reduced, range(len(exact.branches)), whole)
+    whole.set_title("all branches", fontsize=9.0)
+    for n, one in zip(chosen, panels, strict=False):
+        _panel(fine, exact, data.reduced, [n], one)
+        one.set_title(_mode_looks(exact, n)["label"], fontsize=9.0)
+        one.tick_params(labelsize=7.0)
+        one.xaxis.label.set_fontsize(8.0)
+        one.yaxis.label.set_fontsize(8.0)
+    for one in panels[len(chosen) :]:
+        one.remove()
 
 
 def _title(exact: Locus, *_: object) -> str:
     first, last = (plain(float(exact.gain[i]), 4) for i in (0, -1))
-    law = one_line(gains_words(exact.law, but=exact.vary).partition(", of ")[0], LONGEST_LAW)
+    law = one_line(gains_words(exact.law, but=exact.vary).partition(", of ")[0], 40)
     values = f"{exact.vary} goes from {first} to {last} {exact.varied.title[1]}".rstrip()
     return f"{exact.arm.name}: closed-loop poles as {values} with {law}"
 
@@ -72,7 +67,7 @@ def _mode_looks(exact: Locus, branch: int) -> dict[str, Any]:
     if origin in OTHER_COLOURS:
         return {"color": OTHER_COLOURS[origin], "label": origin_name(origin)}
     if origin >= len(MODE_COLOURS):
-        return {"color": HIGHER_COLOUR, "label": f"modes {len(MODE_COLOURS)} and higher"}
+        return {"color": "#9a9a9a", "label": f"modes {len(MODE_COLOURS)} and higher"}
     return {"color": MODE_COLOURS[origin], "label": origin_name(origin)}
 
 
@@ -84,7 +79,7 @@ def _panel(fine: Locus, exact: Locus, reduced: ReducedLocus | None, numbers: Seq
     branches, gain, last = held_branches(fine.branches), exact.gain, float(exact.gain[-1])
     is_factor = not exact.varied.is_of_arm and exact.vary != "delay"
     begins = 0.0 if is_factor and min(gain[0], last) <= 0 <= max(gain[0], last) else float(gain[0])
-    values = [float(f"{value:.3g}") for value in np.linspace(begins, last, PARTS + 1)]
+    values = [float(f"{value:.3g}") for value in np.linspace(begins, last, 5)]
     first, *others = (plain(value, 3) for value in values)
     way = np.sign(last - gain[0])
     ax.axvline(0, color=INK, lw=0.9, zorder=1)
@@ -109,7 +104,7 @@ def _panel(fine: Locus, exact: Locus, reduced: ReducedLocus | None, numbers: Seq
         label = f"crosses the axis at {exact.vary} = {plain(each.gain, 5)}, {significant(each.omega, 4)} rad/s"
         (omega,) = kept_digits([each.omega], POLE_DIGITS)
         ax.plot([0], [omega], "D", ls="none", ms=6, mfc=ORANGE, mec="white", mew=0.8, zorder=6,
-                label=label if number < MOST_NAMED else "further crossings of the axis")  # fmt: skip
+                label=label if number < 6 else "further crossings of the axis")  # fmt: skip
     shown = branches[list(numbers)]
     left, right, low, high = frame(shown if everything else shown[shown.imag >= 0])
     wide, tall = ROOM_AROUND * (right - left), ROOM_AROUND * (high - low)
@@ -132,13 +127,16 @@ def locus(exact: Locus, reduced: ReducedLocus | None = None, *, ax: Axes) -> Non
 FIGURES[Loci] = lambda data: locus.figure(data.exact, data.reduced)
 
 
-def draw_sampled_loci(data: SampledLoci) -> Figure:
+def _z_title(data: SampledLoci) -> str:
+    ms = plain(1e3 * data.loop.chain.sampling.period)
+    return f"{data.loop.plant.arm.name}: poles of the loop sampled every {ms} ms"
+
+
+@picture(size=(9.0, 3.6), title=_z_title, grid=lambda figure, _: figure.subplots(1, 2))
+def draw_sampled_loci(data: SampledLoci, *, ax: Sequence[Axes]) -> None:
     """The z-plane with the locus along each gain."""
-    arm, ms = data.loop.plant.arm.name, plain(1e3 * data.loop.chain.sampling.period)
-    with page(9.0, 3.6, f"{arm}: poles of the loop sampled every {ms} ms", ncols=2) as (figure, axes):
-        for along, ax in zip(data.by.values(), axes, strict=True):
-            _z_plane(data, along, ax)
-    return figure
+    for along, one in zip(data.by.values(), ax, strict=True):
+        _z_plane(data, along, one)
 
 
 def _z_plane(data: SampledLoci, along: SampledLocus, ax: Axes) -> None:

@@ -12,14 +12,13 @@ import re
 import textwrap
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from functools import partial, wraps
 from pathlib import Path
 from typing import Any, get_args
 
 import matplotlib.style
 import numpy as np
-from matplotlib.axes import Axes
+from matplotlib.axes import Axes as Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure as Figure  # which pages name too
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
@@ -61,19 +60,6 @@ STYLE = Path(__file__).with_name("tfarm.mplstyle")
 style = partial(matplotlib.style.context, ["default", STYLE])  # whatever the user's own settings are
 
 
-@contextmanager
-def page(
-    width: float, height: float, title: str, new: Callable[..., Figure] = Figure,
-    make: Callable[..., Any] = Figure.subplots, **grid: Any,
-) -> Iterator[tuple[Figure, Any]]:  # fmt: skip
-    """A figure of that size [inches] with the axes that `make` makes of `grid`; after drawing, legend and title."""
-    with style():
-        figure = new(figsize=(width, height), layout="constrained")  # so that no label is clipped
-        yield figure, make(figure, **grid)
-        legend_below(figure)
-        headline(figure, title)
-
-
 FIGURES: dict[Any, Callable[..., Figure]] = {}  # by the class of a record the picture of it as a figure of its own
 
 
@@ -98,7 +84,7 @@ def picture(
     ----------
     of
         Class of each record, and its origin ("tfarm.bode returns"): other objects are refused by ParameterError.  Of
-        several records, in a list or by name, each is checked.
+        several records, in a list or by name, each is checked.  A picture of a page alone has none.
     title
         A function of the records: the headline of that figure.
     size
@@ -109,15 +95,17 @@ def picture(
 
     def decorated(draw: Callable[..., None]) -> Any:
         is_one = grid is None and len(rows) == 1
+        make = grid or (lambda figure, *_: figure.subplots(len(rows), sharex=True, height_ratios=rows))
 
         def figure(*found: Any, new: Callable[..., Figure] = Figure, **how: Any) -> Figure:
-            width, height = size(*found) if callable(size) else size
-            above: dict[str, Any] = {"nrows": len(rows), "sharex": True, "height_ratios": rows}
-            made = above if grid is None else {"make": lambda figure: grid(figure, *found)}
-            with page(width, height, title(*found), new, **made) as (drawn, _):
+            with style():
+                drawn = new(figsize=size(*found) if callable(size) else size, layout="constrained")  # no label clipped
+                make(drawn, *found)
                 draw(*found, ax=drawn.axes[0] if is_one else drawn.axes, **how)
-                for ax in drawn.axes[:-1] if grid is None else []:
+                for ax in drawn.axes[: len(rows) - 1] if grid is None else []:
                     ax.set_xlabel("")
+                legend_below(drawn)
+                headline(drawn, title(*found))
             return drawn
 
         @wraps(draw)

@@ -14,15 +14,11 @@ from tfarm.arm.schema import file_key
 from tfarm.audit.assumptions import Study, has_hub_inertia, hub_study, section_study
 from tfarm.digits import fixed, plain, significant, singly, unit
 from tfarm.dsp.chain import file_text
+from tfarm.plots import style
 from tfarm.plots.motion import sketch
-from tfarm.plots.style import COLOURS, GREY, Figure, page
-from tfarm.report.cases import Case
-from tfarm.report.sections import Fact, PageSection, Picture, picture, prose, sheet
+from tfarm.plots.style import COLOURS, GREY, Axes
+from tfarm.report.page import Case, Fact, PageSection, Picture, picture, prose, sheet
 from tfarm.schema import Column, Quantity, Table, table
-
-HEADLINE_MODES = 3  # natural frequencies among the headline numbers, the rigid body's 0 not shown
-MOST_POISSON = 0.5  # of an isotropic material; a larger E/2G - 1 is none's ratio
-TEXTS = ("name", "assumptions")  # of the file, which are in other places of the page
 
 
 def arm_section(case: Case) -> PageSection:
@@ -34,11 +30,11 @@ def arm_section(case: Case) -> PageSection:
     )  # fmt: skip
     rows = list(parameters(arm, tomllib.loads(file_text(arm, case.chain))))
     return PageSection(
-        anchor="arm", title="The arm", facts=headline_numbers(arm), words=list(filter(None, words)),
+        title="The arm", facts=headline_numbers(arm), words=list(filter(None, words)),
         items=arm.assumptions,
         blocks=(
             picture("arm", sketch.figure(arm), arm=arm, input=input),
-            sheet("parameters", table(rows).columns, is_rig=not arm.is_uniform),
+            sheet("parameters", table(rows), is_rig=not arm.is_uniform),
             derived_table(arm),
         ),
     )  # fmt: skip
@@ -50,7 +46,7 @@ def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
     def frequency(label: str, omega: float, digits: int) -> Fact:
         return Fact(label, significant(omega, 8), "rad/s", f"{significant(omega / (2 * math.pi), digits)} Hz")
 
-    modes = tfarm.modes(arm, count=HEADLINE_MODES)
+    modes = tfarm.modes(arm, count=3)  # the rigid body's 0 is not shown
     slenderness = arm.link.slenderness if arm.is_uniform else arm.length / arm.link.section.radius_of_gyration
     depth = f"depth/length {significant(math.sqrt(12) / slenderness, 3)} as a rectangle"
     numbered = zip(modes.index, modes.natural_frequency, strict=True)
@@ -81,7 +77,7 @@ def parameters(arm: Arm, table: Mapping[str, Any], under: str = "") -> Iterator[
             yield from parameters(arm, value, f"{under}{key}.")
         elif isinstance(value, list) and all(isinstance(each, dict) for each in value):
             yield from parameters(arm, {str(number): each for number, each in enumerate(value, 1)}, f"{under}{key}.")
-        elif key not in TEXTS:
+        elif key not in ("name", "assumptions"):  # which are in other places of the page
             of = file_key(f"{under}{key}", arm)
             yield Parameter(of.label, value, unit(of.unit), f"{under}{key}")
 
@@ -110,7 +106,7 @@ def derived_table(arm: Arm) -> Table:
             ("bending stiffness", "EI", link.EI, "N m²"),
             ("shear stiffness", "κGA", link.kGA, "N"),
             ("Poisson's ratio of an isotropic material", "E/2G − 1",
-             -1 < link.poissons_ratio <= MOST_POISSON and link.poissons_ratio, ""),
+             -1 < link.poissons_ratio <= 0.5 and link.poissons_ratio, ""),
             ("radius of gyration", "√(I/A)", link.section.radius_of_gyration, "m"),
             ("slenderness", "L/√(I/A)", link.slenderness, ""),
         )
@@ -126,7 +122,7 @@ def derived_table(arm: Arm) -> Table:
         Derived("shear cut-off" + ", of several segments the lowest" * bool(arm.outer), "√(κGA/ρI)", cutoff, "rad/s"),
         Derived("shear cut-off", "", cutoff and cutoff / (2 * math.pi), "Hz"),
     ]  # fmt: skip
-    return sheet("derived", table([row for row in rows if row.value is not False]).columns, arm=arm)
+    return sheet("derived", table([row for row in rows if row.value is not False]), arm=arm)
 
 
 # ------------------------------------------------------------ the paper
@@ -180,16 +176,11 @@ def is_from_paper(arm: Arm) -> bool:
 
 def paper_section(case: Case) -> PageSection:
     """Table 1 and its corrections."""
-    values = sheet("paper_values", table(paper_values(case.arm)).columns)
-    title, words = "The paper's values, corrected", (prose("paper"),)
-    return PageSection(anchor="paper", title=title, words=words, blocks=(values,))
+    values = sheet("paper_values", table(paper_values(case.arm)))
+    return PageSection(title="The paper's values, corrected", words=(prose("paper"),), blocks=(values,))
 
 
 # ------------------------------------------------------------ assumptions
-
-
-CANDIDATE_COLUMNS = ("is_own", "depth", "width", "second_moment", "hub_inertia")
-LOOP_COLUMNS = ("verdict", "K2_below", "K2_below_is_edge")
 
 
 def assumptions_section(case: Case) -> PageSection:
@@ -200,33 +191,35 @@ def assumptions_section(case: Case) -> PageSection:
     if arm.is_uniform and has_hub_inertia(arm):
         blocks += candidate_blocks(hub_study(arm), "assumptions_hub", "hub inertia [kg m²]")
     words = (prose("assumptions", arm=arm, is_from_paper=is_from_paper(arm), has_hub=has_hub_inertia(arm)),)
-    return PageSection(anchor="assumptions", title="What the assumptions do", words=words, blocks=blocks)
+    return PageSection(title="What the assumptions do", words=words, blocks=blocks)
 
 
 def candidate_blocks(study: Study, kind: str, label: str) -> Iterator[Picture | Table]:
     """Natural frequencies over the candidates as a picture, and with the sensitivities, a column a mode, as a table."""
     stem, rows = f"{kind.replace('_', '-')}-frequencies", study.candidates
-    yield picture("assumed_frequencies", draw_candidates(study, label), stem=stem, label=label,
+    yield picture("assumed_frequencies", draw_candidates.figure(study, label), stem=stem, label=label,
                   omega=study.natural_frequency)  # fmt: skip
-    own = [name for name in CANDIDATE_COLUMNS if getattr(rows[0], name) is not None]
+    own = ("is_own", "depth", "width", "second_moment", "hub_inertia")
     columns = (
-        *table(rows, own).columns,
+        *table(rows, [name for name in own if getattr(rows[0], name) is not None]).columns,
         *(Column(f"mode_{n}_rad_s", f"mode {n}", "rad/s", of=each, digits=singly(significant, 6))
           for n, each in enumerate(study.natural_frequency.T, 1)),
         *(Column(f"sensitivity_{n}", f"sensitivity of mode {n}", "%/%", of=each, digits=partial(fixed, decimals=3))
           for n, each in enumerate(study.sensitivity.T, 1)),
-        *table(rows, LOOP_COLUMNS).columns,
+        *table(rows, ("verdict", "K2_below", "K2_below_is_edge")).columns,
     )  # fmt: skip
     yield sheet(kind, columns, study=study)
 
 
-def draw_candidates(study: Study, label: str) -> Figure:
+@style.picture(
+    size=(9.0, 4.6),
+    title=lambda study, label: f"{study.arm.name}: natural frequencies over the {label.partition(' [')[0]}",
+)  # fmt: skip
+def draw_candidates(study: Study, label: str, *, ax: Axes) -> None:
     """Natural frequencies over the candidates of an assumed parameter, both axes logarithmic; the arm's own filled."""
     own = study.is_own
-    with page(9.0, 4.6, f"{study.arm.name}: natural frequencies over the {label.partition(' [')[0]}") as (figure, ax):
-        ax.axvline(study.values[own][0], color=GREY, lw=1.0, ls=(0, (4, 3)))
-        for number, (colour, omega) in enumerate(zip(COLOURS, study.natural_frequency.T, strict=False), 1):
-            ax.plot(study.values, omega, "o-", color=colour, mfc="white", label=f"mode {number}")
-            ax.plot(study.values[own], omega[own], "o", color=colour, ms=7.0, zorder=4)
-        ax.set(xscale="log", yscale="log", xlabel=label, ylabel="natural frequency [rad/s]")
-    return figure
+    ax.axvline(study.values[own][0], color=GREY, lw=1.0, ls=(0, (4, 3)))
+    for number, (colour, omega) in enumerate(zip(COLOURS, study.natural_frequency.T, strict=False), 1):
+        ax.plot(study.values, omega, "o-", color=colour, mfc="white", label=f"mode {number}")
+        ax.plot(study.values[own], omega[own], "o", color=colour, ms=7.0, zorder=4)
+    ax.set(xscale="log", yscale="log", xlabel=label, ylabel="natural frequency [rad/s]")

@@ -30,26 +30,16 @@ from tfarm.loop.plane import gain_map, moment_axis, rate_axis, rate_columns
 from tfarm.loop.stability import band_of_family, stability
 from tfarm.loop.windows import windows_of
 from tfarm.plots.regions import BEYOND_PICTURE, sampled_region
-from tfarm.report.cases import Case, has_loop, sign_words
-from tfarm.report.page import argument, is_preset
-from tfarm.report.sections import TEMPLATES, render
+from tfarm.report.page import TEMPLATES, Case, argument, has_loop, is_preset, render, sign_words, write_text
 from tfarm.response import transfer
 from tfarm.spectrum.table import angle_unit, default_gains
 
-STATIONS = 24  # places along the arm at which its shape is drawn, besides the clamp
-OFF_A_POLE = 1e-9  # of a pole: where the ratio of two outputs is taken that both have it; the ratio is off by as much
 MOST_LIVE_SAMPLES = 5000  # of a slew: 160 kB of references; a longer one is left to `tfarm simulate`
 LIVE_COLUMNS = 90  # values of the gain across at which the continuous region is cut
-ANGLE_RANGE = 0.1  # of J w1^2: the largest gain on the hub angle of the page
-ANGLE_LINEAR = 1e-4  # of that: where its slider begins to be logarithmic
-EDGE_DIGITS = 7  # of the edges of the map's regions: far more than a screen has
-SENSOR_PIECES = 16  # pieces of the arm between two positions
 SENSED_MODES = 6  # whose frequencies and zeros the chart of sensors has
 SENSOR_DIGITS = 6  # of the numbers of that chart: far more than a screen has
 LIVE_PAGE, ASSETS = "live.html", "assets"
-CHARTS, RUNTIME, SCRIPT = "live_charts.json", f"vega-{vl_convert.get_vega_version()}.js", "live.js"
-BUNDLED = "window.vegaEmbed = vegaEmbed;"
-SCRIPT_PARTS = tuple(f"live_{name}.js" for name in ("loop", "sampled", "locus", "sets", "player", "sensor", "page"))
+RUNTIME, SCRIPT = f"vega-{vl_convert.get_vega_version()}.js", "live.js"
 
 
 def packed(values: Any) -> str:
@@ -110,11 +100,10 @@ def _plant(plant: Plant) -> dict[str, Any]:
 def _upper(plant: Plant) -> dict[str, Any]:
     """The same with the poles whose imaginary part is not negative alone, those with a conjugate counted twice."""
     upper, weight = _kept(plant)
-    mode = plant.mode[upper].tolist()
     return _plant(plant) | {
         "eigenvalues": packed(plant.poles[upper].astype(complex)),
         "residues": packed((plant.residues[:, upper] * weight).astype(complex)),
-        "mode": mode,
+        "mode": plant.mode[upper].tolist(),
     }
 
 
@@ -125,11 +114,10 @@ def _kept(plant: Plant) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
 
 def _task(task: Scenario, chain: Chain, arm: Arm) -> dict[str, Any]:
     """References a sample, converters, and the numbers of the slew."""
-    rows = quantisers(chain).tolist()
     ideal = np.c_[task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference, task.rigid_moment]
     return {
         "ideal": packed(ideal),
-        "converters": [[x if math.isfinite(x) else None for x in row] for row in rows],
+        "converters": [[x if math.isfinite(x) else None for x in row] for row in quantisers(chain).tolist()],
         "single": chain.converters.arithmetic == "float32",
         "bound": FOLDED_UP * arm.bending_scale,
         "rise": task.busy_until,
@@ -147,13 +135,10 @@ def _shapes(arm: Arm, plant: Plant) -> dict[str, Any]:
     The ratio of residues is that of the numerators, whatever drives the hub.
     """
     upper, _ = _kept(plant)
-    s = plant.poles[upper].astype(complex) * (1 + OFF_A_POLE)
-    x = np.linspace(0.0, arm.length, STATIONS + 1)
-    ratios = []
-    for place in x:
-        here, tip = transfer(arm, ["displacement", "tip_displacement"], x=float(place))(s)
-        ratios.append(here / tip)
-    return {"x": x.tolist(), "offset": arm.reach - arm.length, "shapes": packed(np.array(ratios))}
+    s = plant.poles[upper].astype(complex) * (1 + 1e-9)  # off poles of both outputs; the ratio is off by as much
+    x = np.linspace(0.0, arm.length, 25)
+    ratios = [np.divide(*transfer(arm, ["displacement", "tip_displacement"], x=each)(s)) for each in x.tolist()]
+    return {"x": x.tolist(), "offset": arm.reach - arm.length, "shapes": packed(ratios)}
 
 
 def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[str, Any]:
@@ -162,11 +147,11 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
     Raises what `gain_map` and `loop_panels` raise.
     """
     x = rate_axis(arm)
-    y, stiffest = moment_axis(arm, x), ANGLE_RANGE * angle_unit(arm)
+    y, stiffest = moment_axis(arm, x), 0.1 * angle_unit(arm)
     axes: dict[str, dict[str, Any]] = {
         name: {"low": axis.low, "high": axis.high, "linear": None if axis.is_linear else axis.linear}
         for name, axis in zip(PLANE, (x, y), strict=True)
-    } | {ANGLE_GAIN: {"low": 0.0, "high": stiffest, "linear": ANGLE_LINEAR * stiffest}}
+    } | {ANGLE_GAIN: {"low": 0.0, "high": stiffest, "linear": 1e-4 * stiffest}}
     reference = default_gains(arm)
     laws = (dict(zip(axes, each, strict=True)) for each in product(*((of["low"], of["high"]) for of in axes.values())))
     band, is_quiet = band_of_family(Loop(arm, as_law(HubFeedback(**law))) for law in laws)
@@ -231,7 +216,7 @@ def _areas(across: Any, intervals: Sequence[Sequence[tuple[float, float]]]) -> l
     parts = enumerate(pieces(across, intervals))
     keys = ("part", PLANE[0], "low", "high")
     return [
-        dict(zip(keys, (number, *kept_digits(point, EDGE_DIGITS)), strict=True))
+        dict(zip(keys, (number, *kept_digits(point, 7)), strict=True))
         for number, piece in parts
         for point in piece.points
     ]
@@ -257,11 +242,10 @@ def sensor_numbers(arm: Arm) -> dict[str, Any]:
 
     None where they cannot be had, and then `no_sensor` is the reason.
     """
-    x, sensors = np.linspace(0.0, arm.length, SENSOR_PIECES + 1), {}
+    x, sensors = np.linspace(0.0, arm.length, 17), {}
     try:
         for kind in get_args(Sensor):
-            places = sensed_places(arm, kind, x, SENSED_MODES)
-            sensors[kind] = _numbers(positions(arm, kind, places, SENSED_MODES))
+            sensors[kind] = _numbers(positions(arm, kind, sensed_places(arm, kind, x, SENSED_MODES), SENSED_MODES))
     except TfarmError as error:
         return {"sensor": None, "no_sensor": str(error)}
     return {"sensor": sensors}
@@ -295,24 +279,25 @@ def save_live(case: Case, folder: Path) -> None:
     try:
         data = live_data(arm, chain, given[0] if given else None)
     except TfarmError as error:
-        out.write_text(render("live_failed.html", title=title, why=str(error)), encoding="utf-8", newline="")
+        write_text(out, render("live_failed.html", title=title, why=str(error)))
         return
     data["command_name"] = argument(arm.name, is_preset(arm, chain))
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False).replace("<", "\\u003c")
     page = render("live.html", title=title, data=data, text=text, sign=sign_words(arm), columns=LIVE_COLUMNS,
                   samples=PANEL_SAMPLES * len(data["low"]), error=scientific(data["error"], 1),
                   assets=f"../{ASSETS}", runtime=RUNTIME, script=SCRIPT)  # fmt: skip
-    out.write_text(page, encoding="utf-8", newline="")
+    write_text(out, page)
 
 
 def write_assets(folder: Path) -> None:
     """Vega's runtime, as vl-convert carries it, and this page's own script with its charts."""
     folder.mkdir(exist_ok=True)
-    (folder / RUNTIME).write_text(vl_convert.javascript_bundle(BUNDLED), encoding="utf-8", newline="")
-    drawn = json.loads((TEMPLATES / CHARTS).read_text(encoding="utf-8"))
+    write_text(folder / RUNTIME, vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;"))
+    drawn = json.loads((TEMPLATES / "live_charts.json").read_text(encoding="utf-8"))
     config = drawn.pop("config")  # of every chart; its colours are set by the page, for a light screen or a dark one
     charts = {name: vl_convert.vegalite_to_vega({**chart, "config": config}) for name, chart in drawn.items()}
     named = json.dumps(charts, separators=(",", ":"), sort_keys=True)
-    scripts = "".join((TEMPLATES / name).read_text(encoding="utf-8") for name in SCRIPT_PARTS)
+    parts = ("loop", "sampled", "locus", "sets", "player", "sensor", "page")
+    scripts = "".join((TEMPLATES / f"live_{name}.js").read_text(encoding="utf-8") for name in parts)
     own = f"(() => {{\nconst LIVE_CHARTS = {named};\n{scripts}}})();\n"  # the runtime has names of its own
-    (folder / SCRIPT).write_text(own, encoding="utf-8", newline="")
+    write_text(folder / SCRIPT, own)

@@ -1,31 +1,60 @@
-"""The continuous loops of a case: verdict and margins, Nyquist plots, poles; and its laws as they were read."""
+"""The continuous loops of a case: margins, Nyquist plots, poles, laws; and of both gains the map and the root loci."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tfarm.arm import cancelled
+from tfarm.arm import GAINS, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, cancelled, shown_unit, unit_of
 from tfarm.arm.blocks import Rational, StateSpace
 from tfarm.arm.law import REFERENCE, is_measured
-from tfarm.digits import plain, singly
+from tfarm.arrays import Real
+from tfarm.digits import plain, significant, singly
+from tfarm.dsp import GainMap as SampledMap
 from tfarm.dsp.discretise import rule_in_words
-from tfarm.errors import TfarmError
-from tfarm.loop import margins, nyquist, poles, stability
-from tfarm.plots import frequency
-from tfarm.report.cases import Case, Controller, brief_on, margins_of
-from tfarm.report.sections import Fact, PageSection, Picture, picture, prose, sheet, upper
+from tfarm.errors import ConvergenceError, TfarmError
+from tfarm.loop import loci, loop, margins, nyquist, plane, poles, stability
+from tfarm.plots import frequency, regions, roots, style
+from tfarm.plots.style import Axes
+from tfarm.records import record
+from tfarm.report.page import (
+    DESIGNED_MODES,
+    Case,
+    Controller,
+    Fact,
+    PageSection,
+    Picture,
+    best,
+    brief_on,
+    has_loop,
+    margins_of,
+    picture,
+    prose,
+    sheet,
+    upper,
+)
 from tfarm.response.signals import Signals, sign_convention
-from tfarm.schema import Column, Quantity, Table, across, curve_table, quantities, roots_table, table
+from tfarm.schema import Column, Quantity, Table, across, curve_table, quantities, roots_table, table, text
+from tfarm.spectrum.table import default_gains, default_words, first_frequency, rate_unit
+from tfarm.synthesis import judge, models, structures
 
-MOST_SPILLED = 12  # flexible modes of the largest model that is compared with the exact loop
+GRID_COLUMNS, GRID_ROWS = 240, 200  # of the coloured grid
+DAMPING_EVERY = 4  # of them, the damping is computed at one in four
+DAMPING_MODES = 8  # of the model whose poles that is of: it is right to a few digits, more than a contour shows
+LISTED_MOMENT_GAINS = (0.9, 1.0, 1.01, 1.1, 1.5)  # values of K2 whose exact poles are listed
+RANGE_OF_K2 = (-1.0, 1.6)  # of the locus, times what balances a torque: both sides of 0, and beyond 1
+shortly = partial(plain, digits=4)  # how a gain is written in a title
 
 
 def no_loop_section(case: Case) -> PageSection:
     """One sentence for an arm that has no loop."""
-    return PageSection(anchor="no-loop", title="The loop", answer=prose("no_loop", arm=case.arm))
+    return PageSection(title="The loop", answer=prose("no_loop", arm=case.arm))
 
 
 # ------------------------------------------------------------ margins
@@ -40,12 +69,12 @@ def margins_section(case: Case) -> PageSection:
     for each, it in found:
         blocks += tables_of(each, it)
         try:
-            few = stability.spill(each.arm, each.law, MOST_SPILLED)
-            blocks.append(sheet("spill", table(few.models).columns, stem=each.stem("spill"), each=each, found=few))
+            few = stability.spill(each.arm, each.law, 12)
+            blocks.append(sheet("spill", table(few.models), stem=each.stem("spill"), each=each, found=few))
         except TfarmError as error:
             words.append(f"Spillover of {each.name} is not determined: {error}.")
     return PageSection(
-        anchor="margins", title="Stability and stability margins", answer=prose("margins_lead", found=briefs),
+        title="Stability and stability margins", answer=prose("margins_lead", found=briefs),
         facts=[verdict_fact(*each) for each in briefs], words=words, blocks=blocks,
     )  # fmt: skip
 
@@ -61,24 +90,20 @@ def margin_table(found: Sequence[tuple[Controller, margins.Margins]]) -> Table:
     leads = [each.name for each, it in found if it.in_band is not None and it.in_band.phase < 0]
     undamped = any(it.stability.loop.arm.is_undamped for _, it in found)
     own = across({each.title: it for each, it in found}, keys=[each.key for each, _ in found])
-    return sheet("margins", own.columns, undamped=undamped, leads=leads)
+    return sheet("margins", own, undamped=undamped, leads=leads)
 
 
 def _bode_picture(each: Controller, found: margins.Margins) -> Picture:
     omega, L = margins.loop_curve(found)
-    columns = (
-        Column("omega_rad_s", "angular frequency", "rad/s", of=omega),
-        Column("re_L", "Re L", of=L.real),
-        Column("im_L", "Im L", of=L.imag),
-    )
-    figure, stem = frequency.draw_loop(found, each.name), each.stem("bode")
+    columns = Column("omega_rad_s", of=omega), Column("re_L", of=L.real), Column("im_L", of=L.imag)
+    figure, stem = frequency.draw_loop.figure(found, each.name), each.stem("bode")
     return picture("loop_function", figure, stem=stem, data=columns, each=each, found=found)
 
 
 def tables_of(each: Controller, found: margins.Margins) -> Iterator[Table]:
     """Every crossing of |L| = 1 and of L < 0 in the range, ascending, and the stability interval of each number."""
     for kind, rows in (("gain_crossovers", found.gain_crossovers), ("phase_crossovers", found.phase_crossovers)):
-        yield sheet(kind, table(rows).columns, stem=each.stem(kind.replace("_", "-")), each=each)
+        yield sheet(kind, table(rows), stem=each.stem(kind.replace("_", "-")), each=each)
     columns = table(found.stability_intervals).columns
     yield sheet("intervals", columns, stem=each.stem("windows"), each=each, note=found.intervals_note)
 
@@ -91,13 +116,12 @@ def nyquist_section(case: Case) -> PageSection:
     plots = [(each, nyquist.nyquist_of(margins_of(each.arm, each.law).stability)) for each in case.in_s]
     own = any(found.unstable_open for _, found in plots)
     blocks: list[Picture | Table] = [
-        picture("nyquist_plot", frequency.draw_nyquist(case.arm.name, {each.name: found}), stem=each.stem("nyquist"),
-                data=curve_table(found).columns, each=each, found=found)
+        picture("nyquist_plot", frequency.draw_nyquist.figure(found, each.name), stem=each.stem("nyquist"),
+                data=curve_table(found), each=each, found=found)
         for each, found in plots
     ]  # fmt: skip
-    blocks.append(sheet("nyquist_count", across({each.title: found for each, found in plots}).columns, own=own))
-    title, words = "Nyquist plot: encirclements of −1", [prose("nyquist", own=own)]
-    return PageSection(anchor="margins-nyquist", title=title, words=words, blocks=blocks)
+    blocks.append(sheet("nyquist_count", across({each.title: found for each, found in plots}), own=own))
+    return PageSection(title="Nyquist plot: encirclements of −1", words=[prose("nyquist", own=own)], blocks=blocks)
 
 
 # ------------------------------------------------------------ poles
@@ -129,9 +153,9 @@ def law_section(case: Case) -> PageSection:
     ]  # fmt: skip
     words.append(prose("not_on_page", discrete=[each.name for each in named if each.law.is_discrete]))
     entries = [entry for each in named for entry in entries_of(each)]
-    blocks = [sheet("law_entries", table(entries).columns), *(own for each in named for own in matrices_tables(each))]
+    blocks = [sheet("law_entries", table(entries)), *(own for each in named for own in matrices_tables(each))]
     title = "The controller" if len(named) == 1 else "The controllers"
-    return PageSection(anchor="law", title=title, answer=prose("laws", each=named), words=words, blocks=blocks)
+    return PageSection(title=title, answer=prose("laws", each=named), words=words, blocks=blocks)
 
 
 class Entry(NamedTuple):
@@ -183,3 +207,230 @@ def matrices_tables(each: Controller) -> Iterator[Table]:
         )  # fmt: skip
         stem = each.stem("matrices") + f"-{number}" * (number > 1)
         yield sheet("matrices", columns, stem=stem, name=each.name)
+
+
+# ------------------------------------------------------------ the map of both gains
+
+
+@dataclass(frozen=True)
+@record
+class MapOfArm:
+    """The numbers of the map.
+
+    `region` is the exact count on the coloured grid, `edge` (n, 3) the exact boundary, both gains and w, within the
+    picture with rows of nan where it leaves it; `damping` (rows, columns) the least damping ratio of the first
+    `DESIGNED_MODES` modes at `axes`, every fourth value of each gain on the grid and the frame's, and `counts` the
+    unstable poles there.  `sampled` is the
+    region of the loop sampled by the case's chain, None where that is not determined.
+    """
+
+    case: Case
+    x: plane.Axis
+    y: plane.Axis
+    region: plane.Plane
+    edge: Real
+    axes: tuple[Real, Real]
+    damping: Real
+    counts: NDArray[np.int64]
+    sampled: SampledMap | None
+
+
+def map_of_arm(case: Case) -> MapOfArm:
+    """The map of an arm, its ranges chosen by J w1 and by its stability intervals."""
+    arm, x = case.arm, plane.rate_axis(case.arm)
+    y = plane.moment_axis(arm, x)
+    found = plane.gain_map(arm, x.grid(GRID_COLUMNS), y.grid(GRID_ROWS))
+    half = DAMPING_EVERY // 2
+    across, up = (
+        np.r_[axis.low, each[half::DAMPING_EVERY], axis.high] for axis, each in zip((x, y), found.axes, strict=True)
+    )
+    sampled = regions.sampled_region(arm, x, y, case.chain)
+    damping, counts = damping_over(arm, across, up), plane.gain_map(arm, across, up).unstable
+    return MapOfArm(case, x, y, found, plane.edge(found, x, y), (across, up), damping, counts, sampled)
+
+
+def damping_over(arm: Arm, across: Real, up: Real) -> Real:
+    """The least damping ratio (rows, columns) of the first modes over both gains."""
+    signals = tuple(each.output for name in PLANE for each in GAINS if each.name == name)
+    model = models.continuous_model(arm, signals, DESIGNED_MODES, DAMPING_MODES, first_frequency(arm))
+    points = np.reshape(np.meshgrid(across, up), (2, -1))
+    parts = np.array_split(points, math.ceil(points.shape[1] / 500), axis=1)  # for memory, whatever the grid
+    laws = (
+        [structures.Entry(name, row[None], structures.ONE) for name, row in zip(signals, part, strict=True)]
+        for part in parts
+    )
+    return np.concatenate([judge.damping_of(model, model.poles(law)) for law in laws]).reshape(up.size, across.size)
+
+
+@style.picture(
+    size=(9.0, 6.2), title=lambda data: f"{data.case.arm.name}: stability region of both gains",
+)  # fmt: skip
+def draw_map_of_arm(data: MapOfArm, *, ax: Axes) -> None:
+    """Both gains: the count, its boundary, the damping, the sampled region, Lyapunov's frame, and the laws."""
+    case, found, x, y = data.case, data.region, data.x, data.y
+    designed = best(case.arm, case.chain)
+    regions.ground(found, x, y, ax)
+    regions.contours(*data.axes, np.where(data.counts == 0, data.damping, np.nan), ax)
+    regions.draw_boundary(found, data.edge, x, y, ax)
+    regions.draw_sampled(data.sampled, ax)
+    if case.arm.is_uniform:
+        regions.draw_proven(case.arm, x, y, ax)
+    points = (default_gains(case.arm), *([] if designed is None else [designed.law]))
+    for each, gains in zip(case.in_s, points, strict=True):
+        brief = brief_on(case.arm, each.law, case.chain)
+        regions.law_mark(gains, each.key == "best", f"{each.title};\n{brief.short}", ax)
+    if designed is not None:
+        regions.search_frame(designed.bounds, ax)
+
+
+def map_data(data: MapOfArm) -> Sequence[Column]:
+    """The grid with counts and damping, the boundary with its frequencies, then the ends of the sampled intervals.
+
+    Ends that are cut by the picture are left out.
+    """
+    points = zip(*map(np.ravel, np.meshgrid(*data.axes)), data.counts.ravel(), data.damping.ravel(), strict=True)
+    grid = [("grid", K1, K2, math.inf if count < 0 else int(count), damping, "") for K1, K2, count, damping in points]
+    line = [("boundary", K1, K2, "", "", omega) for K1, K2, omega in data.edge.tolist() if not math.isnan(K1)]
+    columns = () if data.sampled is None else zip(data.sampled.axes[0], data.sampled.stable_intervals, strict=True)
+    sampled = [
+        ("sampled boundary", across, end, "", "", "")
+        for across, windows in columns for window in windows for end in window if data.y.low <= end <= data.y.high
+    ]  # fmt: skip
+    rate = "_".join([PLANE[0], *shown_unit(PLANE[0], data.case.arm).replace("/", " ").split()])
+    keys = ("what", rate, PLANE[1], "unstable_poles", "least_damping_ratio", "omega_rad_s")
+    return [Column(key, of=own) for key, own in zip(keys, zip(*grid, *line, *sampled, strict=True), strict=True)]
+
+
+def map_section(case: Case) -> PageSection:
+    """The stability regions of both gains, continuous and sampled, and the gains that damp best."""
+    arm, data, found = case.arm, map_of_arm(case), best(case.arm, case.chain)
+    drawn = picture(
+        "map", draw_map_of_arm.figure(data), data=map_data(data), found=data, arm=arm,
+        band=loop.band_of(arm, DESIGNED_MODES),
+        unit=f"{plain(rate_unit(arm), 4)} {unit_of(RATE_GAIN, arm)}",
+        deepest=plane.DEEPEST_MOMENT_GAIN * arm.input_per_torque,
+    )  # fmt: skip
+    answer = intervals(arm)
+    if found is not None:
+        gains = ", ".join(found.law.gain_text(name, partial(significant, digits=4), arm) for name in PLANE)
+        brief = brief_on(arm, case.in_s[-1].law, case.chain)
+        answer += " " + prose("best_gains", found=found, modes=DESIGNED_MODES, gains=gains, brief=brief)
+    return PageSection(title="Stability region of both gains", answer=answer, blocks=(drawn,))
+
+
+def intervals(arm: Arm) -> str:
+    """The verdict on the default gains, and the stability interval of each."""
+    found = margins_of(arm, default_gains(arm))
+    rows = [row for row in found.stability_intervals if row.name in PLANE]
+    return prose("default_gains", gains=default_words(arm), verdict=found.stability.verdict, rows=rows)
+
+
+# ------------------------------------------------------------ root loci
+
+
+class AtGain(NamedTuple):
+    """The exact loop at one value of a gain; its verdict may be undecided on the axis."""
+
+    value: Annotated[float, Quantity("value", digits=4, help="value of the gain that varies, the other one fixed")]
+    verdict: Annotated[str, Quantity("stability", help="verdict on the exact loop with that gain")]
+    unstable_poles: Annotated[
+        int | str | None,
+        Quantity("unstable poles", help="closed-loop poles right of the imaginary axis, conjugates counted"),
+    ]
+    spectral_abscissa: Annotated[
+        float | None,
+        Quantity(
+            "spectral abscissa",
+            "1/s",
+            4,
+            help="largest real part of the poles in the box; 0 where it is on the axis to working precision",
+        ),
+    ]
+    first_pairs: Annotated[str, Quantity("first pairs of poles", "1/s", help="poles with Im s > 0 of least frequency")]
+
+
+def locus_section(case: Case) -> PageSection:
+    """Poles of the controllers; of an arm's own page root loci along each gain too, and poles at K2 = 1 and beyond."""
+    words, tables = poles_tables(case)
+    if case.laws:
+        return PageSection(title="Closed-loop poles", words=words, blocks=tables)
+    arm, gains, blocks = case.arm, default_gains(case.arm), list[Picture | Table]()
+    ranges = {RATE_GAIN: (0.0, 2.0 * rate_unit(arm))}
+    if has_loop(arm):
+        ranges[MOMENT_GAIN] = RANGE_OF_K2[0] * arm.input_per_torque, RANGE_OF_K2[1] * arm.input_per_torque
+    found: dict[str, loci.Loci] = {}
+    for name, (start, stop) in ranges.items():
+        try:
+            found[name] = loci.loci(arm, gains, name, start, stop)
+            blocks += locus_blocks(found[name])
+        except ConvergenceError:
+            words.append(prose("not_followed", name=name))
+            blocks += [rates_table(arm, gains)] * (name == RATE_GAIN)
+    if found:
+        along = {f"along {name}": each for name, each in found.items()}
+        blocks.append(sheet("loci", across(along, keys=list(found))))
+    blocks += [beyond_table(arm, gains)] if has_loop(arm) else []
+    others = {name: gains.gain_text(other, shortly, arm) for name, other in zip(PLANE, reversed(PLANE), strict=True)}
+    answer = prose("locus_lead", found=found, gains=others)
+    return PageSection(title="Root loci", answer=answer, words=words, blocks=[*blocks, *tables])
+
+
+def locus_blocks(data: loci.Loci) -> Iterator[Picture | Table]:
+    """The picture of a locus, its branches, and their crossings of the imaginary axis."""
+    stem = f"locus-{data.name}"
+    yield picture("locus", roots.draw_loci.figure(data), stem=stem, data=locus_data(data), found=data)
+    yield sheet("branches", table(data.rows), stem=f"{stem}-branches", found=data)
+    yield sheet("crossings", table(data.exact.crossings), stem=f"{stem}-crossings", found=data)
+
+
+def locus_data(data: loci.Loci) -> Sequence[Column]:
+    """The poles of the exact and of the reduced locus, to the digits that hold on every processor."""
+    return [
+        Column(data.name, of=data.exact.gain),
+        *(
+            Column(f"{which}_{n}_{part}", of=["" if math.isnan(value) else value for value in values.tolist()])
+            for which, branches in (("exact", data.exact.branches), ("reduced", data.reduced.branches))
+            for n, row in enumerate(loci.held_branches(branches))
+            for part, values in (("re", row.real), ("im", row.imag))
+        ),
+    ]
+
+
+def beyond_table(arm: Arm, gains: HubFeedback) -> Table:
+    """Verdict and poles of the exact loop for a few K2 around 1 and beyond."""
+    edge, unit = edge_of_K2(arm, gains) or 0.0, arm.input_per_torque
+    last = LISTED_MOMENT_GAINS[-1] * unit
+    more = [float(f"{share * edge:.3g}") for share in (0.9, 1.1) if edge > last]
+    values = [*(share * unit for share in LISTED_MOMENT_GAINS), *(value for value in more if last < value)]
+    undecided = [] if arm.is_undamped else [edge]  # no list of poles ends there
+    one = gains.having(MOMENT_GAIN, unit).gain_text(MOMENT_GAIN, shortly, arm)
+    rows = [at_gain(arm, gains.having(MOMENT_GAIN, value), value, undecided) for value in values]
+    return sheet("beyond", table(rows), arm=arm, one=one, at=gains.gain_text(RATE_GAIN, shortly))
+
+
+def edge_of_K2(arm: Arm, law: HubFeedback) -> float | None:
+    """The moment gain at which the loop loses its stability as it grows alone; None where none was found."""
+    windows = margins_of(arm, law).windows[MOMENT_GAIN]
+    return windows.around[1] if windows.around and windows.end(windows.around[1]) == "edge" else None
+
+
+def rates_table(arm: Arm, gains: HubFeedback) -> Table:
+    """Verdict and poles of the exact loop for a few rate gains."""
+    values = [float(f"{share * rate_unit(arm):.3g}") for share in (0.0, 0.05, 0.2, 0.5, 1.0, 2.0)]
+    rows = [at_gain(arm, gains.having(RATE_GAIN, value), value) for value in values]
+    return sheet("rates", table(rows), at=gains.gain_text(MOMENT_GAIN, shortly))
+
+
+def at_gain(arm: Arm, law: HubFeedback, value: float, undecided: Sequence[float] = ()) -> AtGain:
+    """The row of one value; a pole may be on the axis to working precision, and is on it at those undecided."""
+    try:
+        found = None if np.isclose(value, undecided, rtol=1e-9, atol=0.0).any() else stability.stability(arm, law)
+    except ConvergenceError:
+        found = None
+    if found is None:
+        return AtGain(value, "on the axis, not determined", None, None, "")
+    poles, moving, rightmost = found.poles.values, found.poles.moving, found.poles.spectral_abscissa
+    rounding = stability.MARGIN_OF_ZERO * abs(moving[moving.real == rightmost]).max(initial=0.0)
+    pairs = text(poles[poles.imag > 0][:3].tolist(), 5)
+    count = "infinitely many" if found.unstable_roots_infinite else found.unstable_roots
+    return AtGain(value, found.verdict, count, rightmost if abs(rightmost) > rounding else 0.0, pairs)

@@ -1,264 +1,209 @@
-"""An arm's page: its sections in their order, what is seen of them at once, and the HTML by templates."""
+"""A page: the case that it is about, and what it is made of: texts, pictures and tables, saved before it is written.
+
+Texts are in templates/prose.txt, pages in the other templates; here is how both are filled in.
+"""
 
 from __future__ import annotations
 
-import hashlib
 import json
-import re
+import math
 import shlex
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import asdict, dataclass
-from functools import partial
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 from pydantic import TypeAdapter
 
-from tfarm.arm import PLANE, Arm, as_law, load, presets
-from tfarm.arm.writing import law_toml
-from tfarm.dsp import Chain, load_chain
-from tfarm.dsp.chain import file_text
-from tfarm.errors import ParameterError, TfarmError
-from tfarm.plots.frequency import draw_card
-from tfarm.plots.style import save_figure
-from tfarm.report.arm_section import arm_section, assumptions_section, headline_numbers, is_from_paper, paper_section
-from tfarm.report.cases import Case, Controller, brief_on, has_loop, margins_of, sign_words
-from tfarm.report.gains_section import locus_section, map_section
-from tfarm.report.loop_section import law_section, margins_section, no_loop_section, nyquist_section
-from tfarm.report.modes_section import modes_section
-from tfarm.report.response_sections import bode_section, fit_section, measured_section
-from tfarm.report.sampled_section import sampled_section
-from tfarm.report.sections import PICTURES, Fact, PageSection, prose, render
-from tfarm.report.tuner_section import tuner_section
-from tfarm.response.frequency import bode
-from tfarm.schema.glossary import GLOSSARY_TERMS
-from tfarm.schema.html import with_symbols
+import tfarm
+from tfarm.arm import (
+    ANGLE_GAIN,
+    MOMENT_GAIN,
+    PLANE,
+    RATE_GAIN,
+    AnyLaw,
+    Arm,
+    HubFeedback,
+    Law,
+    arm_and_law,
+    as_law,
+    load,
+    presets,
+)
+from tfarm.digits import how_many, listed, plain, scientific, significant
+from tfarm.dsp import Chain, discretise, load_chain, verdict
+from tfarm.errors import ConvergenceError, one_line
+from tfarm.fitting.data import Measured
+from tfarm.fitting.fit import Fit
+from tfarm.fitting.recording import MeasuredRun
+from tfarm.loop.loop import Loop
+from tfarm.loop.margins import Margins, margins
+from tfarm.plots.style import Figure, gains_words, save_figure
+from tfarm.records import record
+from tfarm.response.signals import Signals, sign_of
+from tfarm.schema import Column, Table, save_table, text
+from tfarm.schema.html import as_html, with_symbols
+from tfarm.spectrum.table import default_gains
+from tfarm.synthesis.design import Design, design
 
-BADGES = {"stable": "ok", "yes": "ok", "unstable": "corrected", "no": "corrected", "marginal": "undecided",
-            "undecided": "undecided"}  # fmt: skip
-OPEN_PICTURES = 2  # of a section: those that answer its question; the rest is a click away
-PROMISES = (
-    "certified", "complete", "converged", "default gains", "enclosed", "Lyapunov region", "not determined", "proven",
-    "small gain", "winding number",
-)  # fmt: skip
-PROMISE = re.compile(rf"\b(?:{'|'.join(PROMISES)})\b", re.IGNORECASE)
-
-
-@dataclass(frozen=True, slots=True)
-class Piece:
-    """One section of one arm's page: a name for the progress bar, the section's anchor, and how to make it of a case.
-
-    A page that it does not suit has no such section.  The page that `report --only` asks for is called by the first
-    word of its sections' anchors; its `title` is that of one of them, and `is_also_on` picks the other pages of that
-    kind that have the section.  The full page has all, and at its top the answers of those that have one.
-    `seconds` is about how long a section takes to make, where that is long: the longest are begun first.  Sections of
-    one `task` are made one after the other in one process, as they share a design or the damped modes of the arm.
-    """
-
-    name: str
-    anchor: str
-    make: Callable[[Case], PageSection]
-    suits: Callable[[Case], Any] = lambda case: True
-    title: str = ""
-    is_also_on: Callable[[str], bool] = lambda page: False
-    seconds: float = 0.0
-    task: str = ""
-
-    @property
-    def page(self) -> str:
-        """The page that has it when it is asked for alone."""
-        return self.anchor.partition("-")[0]
-
-    def is_on(self, page: str) -> bool:
-        """Whether that page, asked for alone, has the section."""
-        return page == self.page or self.is_also_on(page)
-
-
-LOOP_TASK = "continuous loop"  # of the sections that have the gains of best damping
-LOOP_PAGES = ("margins", "locus", "sampled", "tune")  # on which an arm without a loop has nothing but that it has none
-OF_LAWS = (*LOOP_PAGES, "law", "no")  # first words of the sections that a page about laws begins with
-
-
-def _in_s(case: Case) -> bool:
-    """Whether a controller of the case acts in continuous time."""
-    return not case.arm.is_locked and any(not each.law.is_discrete for each in case.controllers)
-
-
-def _of_gains(case: Case) -> bool:
-    """Whether the page is about both gains of the arm itself."""
-    return not case.laws and has_loop(case.arm)
-
-
-PIECES = (
-    Piece("fit to measurements", "fit", fit_section, lambda case: case.fit),
-    Piece("stability region of both gains", "margins-map", map_section, _of_gains, seconds=5.0, task=LOOP_TASK),
-    Piece("the arm", "arm", arm_section, is_also_on=lambda page: True),
-    Piece("the paper's values", "paper", paper_section, lambda case: is_from_paper(case.arm)),
-    Piece("response of the root moment", "bode-root-moment", partial(bode_section, output="root_moment"),
-          title="Bode plots"),
-    Piece("response of the tip", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),
-    Piece("measured responses", "bode-measured", measured_section, lambda case: case.measured),
-    Piece("modes", "modes", modes_section, title="Modes", seconds=1.0),
-    Piece("the loop", "no-loop", no_loop_section, lambda case: not case.has_loop, is_also_on=LOOP_PAGES.__contains__),
-    Piece("stability margins", "margins", margins_section, _in_s, "Gains and margins", task=LOOP_TASK),
-    Piece("root loci", "locus", locus_section, _in_s, "Root loci", seconds=7.0, task=LOOP_TASK),
-    Piece("Nyquist plot", "margins-nyquist", nyquist_section, _in_s, task=LOOP_TASK),
-    Piece("sampled loop", "sampled", sampled_section, lambda case: case.has_loop, "The sampled loop", seconds=8.0),
-    Piece("controllers", "law", law_section, lambda case: case.laws and not case.arm.is_locked,
-           is_also_on=LOOP_PAGES.__contains__),
-    Piece("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", seconds=6.0, task="sampled loop"),
-    Piece("assumptions", "assumptions", assumptions_section, title="What the assumptions do"),
-)  # fmt: skip
-QUESTIONS = {piece.page: piece.title for piece in PIECES if piece.title}  # pages that may be asked for alone
-
-
-def pieces_of(case: Case) -> list[Piece]:
-    """The sections of a page, in their order; a page about laws begins with its loops."""
-    suited = [piece for piece in PIECES if piece.suits(case)]
-    return sorted(suited, key=lambda piece: bool(case.laws) and piece.page not in OF_LAWS)
-
-
-def explained(text: str) -> Markup:
-    """A sentence as a page shows it; a word that promises something leads to its meaning at its first place."""
-    seen: set[str] = set()
-
-    def linked(found: re.Match[str]) -> str:
-        word, before = found[0].lower(), len(seen)
-        seen.add(word)
-        return found[0] if len(seen) == before else f'<a class="term" href="#{word_id(word)}">{found[0]}</a>'
-
-    return Markup(PROMISE.sub(linked, str(with_symbols(text))))
-
-
-def word_id(name: str) -> str:
-    """The anchor of a word of the glossary on a page."""
-    return f"word-{name.lower().replace(' ', '-')}"
-
-
-def pages_in(folder: Path, written: Sequence[str] = ()) -> list[tuple[str, str]]:
-    """(file, title) of the pages in an arm's folder, and of those that are being written."""
-    there = {name: title for name, title in PAGES.items() if name in written or (folder / f"{name}.html").is_file()}
-    return [(f"{name}.html", title) for name, title in there.items()]
-
-
-def arm_page(
-    case: Case,
-    sections: Sequence[PageSection],
-    only: str | None,
-    *,
-    trust: str,
-    live: bool,
-    others: Sequence[tuple[str, str]],
-) -> str:
-    """The page of one case, with every section or with those of one question.
-
-    `trust` is the page on trust, as seen from the arm's folder; empty if there is none.
-    `live`: whether there is a live page in the folder.  `others` are the file and title of each other page of this arm.
-    """
-    arm = case.arm
-    return render(
-        "arm.html",
-        title=f"{arm.name}: {QUESTIONS[only]}" if only else arm.name,
-        sections=sections,
-        looks=BADGES,
-        open_pictures=OPEN_PICTURES,
-        only=only,
-        others=others,
-        signs="" if arm.is_locked else sign_words(arm),
-        glossary=[term for term in GLOSSARY_TERMS if term.name in PROMISES],
-        trust=trust,
-        live=live,
-        summary=summary(case),
-        sha256=hashlib.sha256(file_of(case).encode()).hexdigest(),
-        command=command_of(case, only),
-        has_proof=not (case.laws and only),
-        explained=explained,
-        word_id=word_id,
-    )
-
-
-def summary(case: Case) -> str:
-    """The arm in one sentence, and the laws that its page is about in another."""
-    return prose("summary", arm=case.arm, laws=[each.name for each in case.laws])
-
-
-# ------------------------------------------------------------ files and commands
-
-
-def file_of(case: Case) -> str:
-    """The arm's file with its chain, and with the law that the page is about where TOML can say that alone."""
-    law = own_law(case)
-    return file_text(case.arm, case.chain) + ("" if law is None else f"\n{law}")
-
-
-def own_law(case: Case) -> str | None:
-    """The table [law] of the one law of a page; None of none or several, or of one with files of its own."""
-    with suppress(ParameterError):
-        if len(case.laws) == 1 and case.laws[0].measured is None:
-            return law_toml(as_law(case.laws[0].law))
-    return None
-
-
-def command_of(case: Case, only: str | None) -> str:
-    """The command that writes this page; an arm that is no preset is named by its file, as are laws with theirs."""
-    law = own_law(case)
-    options = [] if law is not None else [f"--law {shlex.quote(each.file or 'FILE')}" for each in case.laws]
-    options += [f"--measured {shlex.quote(f'{each.name}={each.source}')}" for each in case.measured]
-    options += [f"--only {only}"] * bool(only)
-    name = argument(case.arm.name, law is None and is_preset(case.arm, case.chain))
-    return " ".join(["tfarm report", name, *options, "--out reports"])
-
-
-def is_preset(arm: Arm, chain: Chain) -> bool:
-    """Whether the arm comes with tfarm, and its chain is the one that comes with it."""
-    return arm.name in presets() and (load(arm.name), load_chain(arm.name)) == (arm, chain)
-
-
-def argument(name: str, preset: bool) -> str:
-    """The name of an arm in a command."""
-    return shlex.quote(name if preset else f"{name}.toml")
-
-
-# ------------------------------------------------------------ the index, and what it reads in the folders of arms
-
-
-COMPARISON_PAGE = "compare.html"
-FACTS = 4  # of the headline numbers
-INDEX_COLUMNS = ("law", "verdict", *PLANE, "sampled")  # columns of the index's table of arms
-PAGES = {"index": "full report", "live": "live loop", **QUESTIONS}
+TEMPLATES = Path(__file__).parent / "templates"
+PICTURES, DATA = "pictures", "data"  # folders in that of an arm
 T = TypeVar("T")
+PART = "\ue000"  # between title and caption, which no name has in it
+DESIGNED_MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
 
 
-@dataclass(frozen=True)
-class Card:
-    """An arm as the index shows it; `picture` is empty where there is none."""
-
-    name: str
-    summary: str
-    facts: list[Fact]
-    picture: str
-    loops: list[dict[str, str]]
-
-    @property
-    def rows(self) -> list[dict[str, str]]:
-        """The rows of the table of arms by INDEX_COLUMNS: one a loop, an empty one without a loop."""
-        return [dict.fromkeys(INDEX_COLUMNS, "") | row for row in self.loops or [{}]]
+# ------------------------------------------------------------ texts
 
 
-@dataclass(frozen=True)
-class KeptComparison:
-    """The title of the comparison in a folder of reports, and the arms that it compares."""
+def upper(text: str) -> str:
+    """A text as it begins a sentence."""
+    return text[:1].upper() + text[1:]
 
+
+@cache
+def templates() -> Environment:
+    """All templates; only those of pages escape what is put into them."""
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=lambda name: name is not None and name.endswith(".html"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.globals |= {"inf": math.inf, "rate": RATE_GAIN, "moment": MOMENT_GAIN, "angle": ANGLE_GAIN,
+                            "plane": " and ".join(PLANE)}  # fmt: skip
+    environment.filters.update(
+        symbol=with_symbols, text=text, plain=plain, significant=significant, scientific=scientific, upper_first=upper,
+        listed=listed, how_many=how_many, as_html=as_html,
+    )  # fmt: skip
+    return environment
+
+
+@cache
+def _texts() -> Any:
+    """All texts by name; a line break behind a tag is a space in them."""
+    source = (TEMPLATES / "prose.txt").read_text(encoding="utf-8").replace("¶", PART)
+    return templates().overlay(trim_blocks=False).from_string(source).module
+
+
+def prose(name: str, /, **values: Any) -> str:
+    """The text of that name in templates/prose.txt with these values."""
+    return " ".join(getattr(_texts(), name)(**values).split())
+
+
+def _parts(name: str, values: dict[str, Any]) -> list[str]:
+    return [part.strip() for part in prose(name, **values).split(PART)]
+
+
+def render(template: str, **values: Any) -> str:
+    """A page from its template."""
+    return templates().get_template(template).render(version=tfarm.__version__, **values)
+
+
+class Fact(NamedTuple):
+    """One headline number, or the word for it."""
+
+    label: str
+    value: str
+    unit: str = ""
+    note: str = ""
+
+
+class Picture(NamedTuple):
+    """A finished figure with its words.  `stem` names its files; `data` are the numbers that it draws."""
+
+    stem: str
+    title: str
+    caption: str
+    alt: str
+    figure: Figure
+    data: tuple[Column, ...] = ()
+
+
+def picture(
+    kind: str, figure: Figure, *, data: Table | Iterable[Column] = (), stem: str = "", **values: Any
+) -> Picture:
+    """A picture with the title, the caption and the alternative text of its kind; `stem` names its files."""
+    title, caption, alt = _parts(kind, values)
+    return Picture(stem or kind.replace("_", "-"), title, caption, alt, figure, _columns(data))
+
+
+def sheet(kind: str, columns: Table | Iterable[Column], /, *, stem: str = "", **values: Any) -> Table:
+    """A table with the title and the caption of its kind; `stem` names its files."""
+    title, caption = _parts(kind, values)
+    return Table(columns=_columns(columns), stem=stem or kind.replace("_", "-"), title=title, caption=caption)
+
+
+def _columns(of: Table | Iterable[Column]) -> tuple[Column, ...]:
+    return of.columns if isinstance(of, Table) else tuple(of)
+
+
+class SavedBlock(NamedTuple):
+    """A picture or table as the page shows it, its files saved."""
+
+    stem: str
+    title: str
+    is_table: bool
+    html: Markup
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PageSection:
+    """A part of a page.  `answer` is its result in a sentence or two, at the top of the full page too.
+
+    `words` are paragraphs, `items` a list; `blocks` pictures and tables, of which one without columns is not shown.
+    `failure` is the reason why the section could not be made, which its words have too; empty otherwise.
+    """
+
+    anchor: str = ""
     title: str = ""
-    arms: tuple[str, ...] = ()
+    answer: str = ""
+    words: Sequence[str] = ()
+    items: Sequence[str] = ()
+    facts: Sequence[Fact] = ()
+    blocks: Sequence[Any] = ()
+    failure: str = ""
+
+
+def save_section(section: PageSection, folder: Path) -> PageSection:
+    """The section with its blocks saved: what remains to be written are words."""
+    for name in (PICTURES, DATA):
+        (folder / name).mkdir(exist_ok=True)
+    shown = [block for block in section.blocks if getattr(block, "columns", True)]
+    return replace(section, blocks=[save_block(block, folder) for block in shown])
+
+
+def save_block(block: Picture | Table, folder: Path) -> SavedBlock:
+    """A picture as pictures/*.svg, its numbers as data/*.csv; a table as data/*.csv and .json."""
+    shape: Any = templates().get_template("blocks.html").module
+    is_table = isinstance(block, Table)
+    if isinstance(block, Table):
+        html = shape.table(block, [f"{DATA}/{name}" for name in save_table(block, folder / DATA)])
+    else:
+        save_figure(block.figure, folder / PICTURES, block.stem, formats=("svg",))
+        numbers = Table(columns=block.data, stem=f"{block.stem}-data")
+        saved = save_table(numbers, folder / DATA, kinds=("csv",)) if block.data else ()
+        html = shape.picture(block, [f"{PICTURES}/{block.stem}.svg", *(f"{DATA}/{name}" for name in saved)])
+    return SavedBlock(block.stem, block.title, is_table, html)
+
+
+def write_text(file: Path, text: str) -> None:
+    """A file of text, the same bytes on every system."""
+    file.write_text(text, encoding="utf-8", newline="")
+
+
+# ------------------------------------------------------------ what an index reads in the folders of arms
 
 
 def keep(folder: Path, kind: str, content: Mapping[str, Any]) -> None:
     """kind.json, with a mark of what it is."""
     text = json.dumps({f"tfarm_{kind}": 1, **content}, ensure_ascii=False, indent=1) + "\n"
-    (folder / f"{kind}.json").write_text(text, encoding="utf-8", newline="")
+    write_text(folder / f"{kind}.json", text)
 
 
 def kept_in(folder: Path, kind: str, record: type[T]) -> T | None:
@@ -276,44 +221,144 @@ def kept(out: Path, kind: str, record: type[T]) -> dict[Path, T]:
     return {folder: each for folder, each in found if each is not None and getattr(each, "name", "") == folder.name}
 
 
-def kept_comparison(out: Path) -> KeptComparison:
-    """The comparison in a folder of reports; an empty one where there is none."""
-    found = kept_in(out, "compare", KeptComparison) if (out / COMPARISON_PAGE).is_file() else None
-    return found or KeptComparison()
+# ------------------------------------------------------------ the case
 
 
-def save_card(case: Case, folder: Path) -> None:
-    """pictures/card.svg and card.json; a picture that cannot be made is left out, as its section on the page is."""
-    (folder / PICTURES).mkdir(exist_ok=True)
-    arm, picture = case.arm, ""
-    with suppress(TfarmError):
-        save_figure(draw_card(bode(arm, "root_moment")), folder / PICTURES, "card", formats=("svg",))
-        picture = "card.svg"
-    loops = [loop_cells(each, case.chain) for each in case.controllers if case.laws or has_loop(arm)]
-    facts = list(headline_numbers(arm)[:FACTS])
-    keep(folder, "card", asdict(Card(arm.name, summary(case), facts, picture, loops)))
+@dataclass(frozen=True)
+@record
+class GivenLaw:
+    """A law, the name of its `file` where it has one, and a run that was `measured` under it on the rig."""
+
+    law: AnyLaw
+    file: str = ""
+    measured: MeasuredRun | None = None
+
+    @property
+    def name(self) -> str:
+        """Its own name, or its gains with their values."""
+        law = as_law(self.law)
+        return one_line(law.name, 60) if law.gains is None else gains_words(law)
 
 
-def loop_cells(each: Controller, chain: Chain) -> dict[str, str]:
-    """A controller in cells of the table of arms by INDEX_COLUMNS; a verdict that cannot be had is left out."""
-    cells = {"law": each.given.name}
-    with suppress(TfarmError):
-        if not each.law.is_discrete:
-            found = margins_of(each.arm, each.law)
-            cells["verdict"] = found.stability.verdict
-            for row in found.stability_intervals:
-                if row.name in PLANE:
-                    cells[row.name] = f"{row.interval.as_text(5)} {row.unit}".rstrip() if row.interval else "none"
-    with suppress(TfarmError):
-        cells["sampled"] = brief_on(each.arm, each.law, chain).short
-    return cells
+@dataclass(frozen=True)
+@record
+class Controller:
+    """A law on an arm: `arm` has the input that `law` drives, `given` is its source.
+
+    `name` is for reading, `key` for the columns and names of files, "law" or of several "law_1", "law_2" ...
+    """
+
+    arm: Arm
+    law: Law
+    given: GivenLaw
+    name: str
+    key: str
+
+    @property
+    def gains(self) -> str:
+        """Its gains with their values, or the signals that it reads."""
+        law = self.law
+        return f"order {law.order}, of {', '.join(law.signals)}" if law.gains is None else gains_words(law)
+
+    @property
+    def title(self) -> str:
+        """Its name and gains."""
+        return f"{self.name}: {self.gains}"
+
+    def stem(self, suffix: str) -> str:
+        """The name of a file of it."""
+        return f"{self.key.replace('_', '-')}-{suffix}"
 
 
-def index_page(out: Path, *, trust: str) -> str:
-    """The page that leads to all others in a folder of reports."""
-    cards = [
-        asdict(card) | {"pages": pages, "loops": card.rows} for folder, card in kept(out, "card", Card).items()
-        if (pages := pages_in(folder))
-    ]  # fmt: skip
-    compared = kept_comparison(out).title
-    return render("index.html", title="tfarm reports", cards=cards, trust=trust, compared=compared, looks=BADGES)
+class Case(NamedTuple):
+    """An arm, its chain, and the laws that the page is about; without any it is about the default gains.
+
+    `fit` is the source of the arm's numbers, if they were fitted to measurements; `measured` are responses that are
+    drawn over its own.
+    """
+
+    arm: Arm
+    chain: Chain
+    laws: tuple[GivenLaw, ...] = ()
+    fit: Fit | None = None
+    measured: tuple[Measured, ...] = ()
+
+    @property
+    def controllers(self) -> tuple[Controller, ...]:
+        """The laws, each under a name that no other has; else the default gains."""
+        if not self.laws:
+            return (on_hub(self.arm, default_gains(self.arm), "default gains", "default"),)
+        found: list[Controller] = []
+        for number, given in enumerate(self.laws, 1):
+            law = as_law(given.law)
+            name = given.name if law.gains is None else "the gains given"
+            name += f" ({number})" * (name in {each.name for each in found})
+            key = f"law_{number}" if len(self.laws) > 1 else "law"
+            found.append(Controller(arm_and_law(self.arm, law)[0], law, given, name, key))
+        return tuple(found)
+
+    @property
+    def in_s(self) -> tuple[Controller, ...]:
+        """The continuous-time controllers: those given, else the default gains and the best ones."""
+        found = None if self.laws else best(self.arm, self.chain)
+        more = () if found is None else (on_hub(self.arm, found.law, "best damping", "best"),)
+        return tuple(each for each in (*self.controllers, *more) if not each.law.is_discrete)
+
+    @property
+    def has_loop(self) -> bool:
+        """Whether the page has sections on loops: of laws wherever the hub can turn, of gains where both are felt."""
+        return not self.arm.is_locked if self.laws else has_loop(self.arm)
+
+
+def on_hub(arm: Arm, gains: HubFeedback, name: str, key: str) -> Controller:
+    """Gains at the hub under a name of their own."""
+    return Controller(arm, as_law(gains), GivenLaw(gains), name, key)
+
+
+def check_laws(case: Case) -> None:
+    """Raise ParameterError for a law that does not suit this arm or the sampling period of its chain."""
+    for each in case.controllers if case.laws and not case.arm.is_locked else ():
+        law = discretise.with_all_gains(*arm_and_law(each.arm, each.law))
+        Signals(each.arm, law.signals)
+        if not law.is_discrete:
+            Loop(each.arm, law)
+        discretise.discretised(law, case.chain.sampling.period)
+
+
+def has_loop(arm: Arm) -> bool:
+    """Whether both gains can be closed: the hub can turn, and has inertia."""
+    return not (arm.is_locked or arm.has_massless_hub)
+
+
+def sign_words(arm: Arm) -> str:
+    """The law, and the sign of its moment gain."""
+    return prose("signs", law=sign_of(arm))
+
+
+@lru_cache(maxsize=16)
+def best(arm: Arm, chain: Chain) -> Design | None:
+    """The optimum of `tfarm design ARM`; None where no gains within its bounds hold, or the moment has no place."""
+    try:
+        found = design(arm, modes=DESIGNED_MODES, chain=chain) if has_loop(arm) else None
+    except ConvergenceError:
+        return None
+    return None if found is None or found.at_limit else found  # where the hub does not move there is no law to draw
+
+
+brief_on = lru_cache(maxsize=64)(verdict.sampled_brief)  # each computed once for all sections of a page
+_margins = lru_cache(maxsize=64)(margins)
+
+
+def margins_of(arm: Arm, law: AnyLaw) -> Margins:
+    """Verdict and margins, computed once for all sections."""
+    return _margins(arm, as_law(law))
+
+
+def is_preset(arm: Arm, chain: Chain) -> bool:
+    """Whether the arm comes with tfarm, and its chain is the one that comes with it."""
+    return arm.name in presets() and (load(arm.name), load_chain(arm.name)) == (arm, chain)
+
+
+def argument(name: str, preset: bool) -> str:
+    """The name of an arm in a command."""
+    return shlex.quote(name if preset else f"{name}.toml")

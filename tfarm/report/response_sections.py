@@ -1,44 +1,261 @@
-"""Frequency responses on an arm's page: exact ones, measured ones over them, and the fit to measurements."""
+"""The arm without a controller: modes, shapes, theories, sensitivities; frequency responses, computed and measured."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from decimal import Decimal, localcontext
+from functools import lru_cache, partial
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN
-from tfarm.digits import listed, plain
-from tfarm.errors import ConvergenceError
+import tfarm
+from tfarm.arm import MOMENT_GAIN, Arm, Theory
+from tfarm.arrays import Real
+from tfarm.digits import fixed, kept_digits, lined, listed, plain
+from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.fitting.fit import ARMS, Possible, possible
 from tfarm.fitting.overlay import overlay
 from tfarm.loop.margins import Margins, margins
 from tfarm.loop.plane import ranges_of
-from tfarm.plots import frequency, style
-from tfarm.report.cases import Case, has_loop
-from tfarm.report.sections import PageSection, Picture, picture, prose, sheet, upper
+from tfarm.plots import frequency, motion
+from tfarm.plots.style import gains_words
+from tfarm.report.page import Case, PageSection, Picture, has_loop, picture, prose, sheet, upper
 from tfarm.response.frequency import AXIS_SHARE, Bode, bode
-from tfarm.schema import Quantity, Table, curve_table, table
-from tfarm.spectrum.table import default_gains
+from tfarm.schema import Column, Quantity, Table, curve_table, table
+from tfarm.spectrum import DampedModes, Modes, damped_modes, modes
+from tfarm.spectrum.damped import damped_at_hub
+from tfarm.spectrum.listing import SHAPE_DIGITS, ListedMode, beyond_the_box, listed_modes
+from tfarm.spectrum.proofs import Certificate
+from tfarm.spectrum.table import default_gains, hub_locked
 
-SPANS_ON_ALL = {"phase": ("phase margin", "deg"), "delay": ("delay margin", "s"), "disk": ("disk margin", "")}
+PROVEN_MODES, BRACKET_DIGITS = 10, 20  # flexible modes of each arm, as its page lists them; beyond a double's digits
+PROVEN_DIGITS = 12  # of an eigenvalue: more than a page prints of any
+TWO_PI = Decimal("6.2831853071795864769252867665590057683943387987502")
+TABLED_MODES, DRAWN_MODES, LOCKED_MODES = 10, 6, 6  # as `tfarm modes` lists them; shapes in three rows of two
+SIMPLER: tuple[Theory, ...] = ("shear", "rayleigh", "euler-bernoulli")
+
+
+def modes_section(case: Case) -> PageSection:
+    """Everything about free vibration: at C = 0, and the eigenvalues at the arm's own C."""
+    arm, found = case.arm, tfarm.modes(case.arm, count=TABLED_MODES)
+    words, blocks = [prose("complete_modes")], list[Picture | Table]([modal_table(found)])
+    if not arm.is_uniform:
+        blocks.append(locked_table(found))
+        words += [prose("which_is_measured")] * (not arm.is_locked)
+    if not arm.is_undamped:
+        try:
+            blocks += damped_tables(found)
+        except (ConvergenceError, CertificationError) as error:
+            words.append(prose("no_damped_table", why=error))
+    blocks += [_shapes(tfarm.modes(arm, count=DRAWN_MODES)), *theories(arm), sensitivity_table(found)]
+    return PageSection(title="Modes", words=words, blocks=blocks)
+
+
+def _flexible(modes: Modes) -> Real:
+    return modes.natural_frequency[modes.index > 0]
+
+
+# ------------------------------------------------------------ natural frequencies, and their proof
+
+
+def modal_table(modes: Modes) -> Table:
+    """Frequencies, hub participation, modal moment and nodes."""
+    rows = [_rounded(row, modes.arm.length) for row in listed_modes(modes).modes]
+    names = ("index", "natural_frequency", "natural_frequency_hz", "hub_participation", "modal_moment", "nodes")
+    columns = table(rows, names).columns
+    proof = how_proven(modes, columns[1].cells, columns[2].cells)
+    return sheet("modal_table", columns, arm=modes.arm, proof=proof)
+
+
+def _rounded(row: ListedMode, length: float) -> ListedMode:
+    """The row with all that depends on a mode's shape to the digits that hold on every processor."""
+    participation, moment = kept_digits((row.hub_participation, row.modal_moment + 0.0), SHAPE_DIGITS)
+    nodes = np.round(row.nodes, SHAPE_DIGITS - 1 - math.floor(math.log10(length))).tolist()
+    return replace(row, hub_participation=participation, modal_moment=moment, nodes=nodes)
+
+
+@lru_cache(maxsize=8)  # for the arm's page and the page on trust, as the damped ones below
+def proven_modes(arm: Arm, count: int) -> Certificate:
+    """Brackets of the arm's first natural frequencies.  Raises CertificationError where that cannot be proven."""
+    return modes(arm, count).certify(BRACKET_DIGITS)
+
+
+def how_proven(modes: Modes, cells: Sequence[str], cells_hz: Sequence[str]) -> str:
+    """Whether every digit of these cells [rad/s] and [Hz] is certified: a sentence or two."""
+    try:
+        proof = proven_modes(modes.arm, int(modes.index[-1]))
+    except CertificationError as error:
+        return f"The digits are those of double precision, not proven: {error}."
+    rows = np.flatnonzero(modes.index > 0).tolist()
+    is_proven = all(
+        rounds_to(cells[row], bracket) and rounds_to(cells_hz[row], bracket, TWO_PI)
+        for row, bracket in zip(rows, proof.brackets, strict=True)
+    )
+    return prose("proven_digits", is_proven=is_proven, digits=BRACKET_DIGITS, proof=proof, arm=modes.arm)
+
+
+def rounds_to(cell: str, bracket: tuple[str, str], divisor: Decimal = Decimal(1)) -> bool:
+    """Whether every number in the bracket, divided by the divisor, is rounded to the number of the cell."""
+    with localcontext(prec=45):
+        return all((Decimal(end) / divisor).quantize(Decimal(cell)) == Decimal(cell) for end in bracket)
+
+
+# ------------------------------------------------------------ damped modes, and those of a locked hub
+
+
+@lru_cache(maxsize=8)
+def proven_damped_modes(arm: Arm, count: int) -> DampedModes:
+    """The arm's first damped modes, each enclosed to 12 digits, none missing in their box.
+
+    Raises CertificationError where that cannot be proven, ConvergenceError where they are too near to each other.
+    """
+    found = damped_modes(modes(arm, count))
+    found.certify(PROVEN_DIGITS)
+    return found
+
+
+def damped_tables(undamped: Modes) -> list[Table]:
+    """The arm's damped modes, each number certified to 12 digits and printed to fewer; then those of no mode."""
+    arm = undamped.arm
+    damped, found = proven_damped_modes(arm, int(undamped.index[-1])), listed_modes(undamped)
+    every = np.concatenate([damped.eigenvalues, damped.unassigned_pairs])
+    inside = np.all(damped.box.holds(every) | np.isnan(every), axis=1)
+    number = len(damped.index)
+    names = ("index", "eigenvalue", "second_eigenvalue", "damping_ratio")
+    is_there = Column("complete", "list complete", of=np.where(inside, "in the box", "outside")[:number])
+    return [
+        sheet(
+            "damped_modes", [*table(found.modes[:number], names).columns, is_there], arm=arm, damped=damped,
+            note=found.damped_note, is_inside=bool(inside.all()), beyond=beyond_the_box(arm),
+            edges=[plain(round(x)) if abs(x) >= 100 else plain(x, 3) for x in damped.box],
+        ),
+        *([sheet("unassigned_eigenvalues", table(found.unassigned))] if found.unassigned else []),
+    ]  # fmt: skip
+
+
+FREE = "natural frequency, the hub free to turn and without losses"
+LOCKED = "natural frequency, the hub fixed"
+
+
+class LockedMode(NamedTuple):
+    """A mode with the hub free, with the losses of the hub where it has any, and with the hub locked."""
+
+    mode: Annotated[int, Quantity("mode", help="number of the flexible mode")]
+    free: Annotated[float, Quantity("hub free", "rad/s", 8, FREE, "hub_free_rad_s")]
+    free_hz: Annotated[float, Quantity("hub free", "Hz", 8, FREE, "hub_free_hz")]
+    with_losses: Annotated[
+        float | None,
+        Quantity(
+            "with its own losses, Im s", "rad/s", 8, "frequency of the free hub with its own friction and back-EMF"
+        ),
+    ]
+    damping: Annotated[
+        float | None,
+        Quantity(
+            "damping ratio",
+            "%",
+            4,
+            "share of critical damping by the losses of the hub alone",
+            "with_losses_damping_percent",
+        ),
+    ]
+    locked: Annotated[float, Quantity("hub locked", "rad/s", 8, LOCKED, "hub_locked_rad_s")]
+    locked_hz: Annotated[float, Quantity("hub locked", "Hz", 8, LOCKED, "hub_locked_hz")]
+
+
+def locked_table(found: Modes) -> Table:
+    """A row a mode: hub free, with its losses where it has any, and locked."""
+    arm, numbers = found.arm, range(1, LOCKED_MODES + 1)
+    own = tfarm.modes(arm, LOCKED_MODES, theory=found.theory)
+    free, held = _flexible(own), _flexible(hub_locked(own))
+    lossy = None if arm.is_locked else damped_at_hub(arm, LOCKED_MODES)
+    losses: list[Any] = [[None] * LOCKED_MODES] * 2
+    if lossy is not None and not lossy.left_out and lossy.is_assigned.all():
+        losses = [each[lossy.index > 0].tolist() for each in (lossy.eigenvalues[:, 0].imag, 100 * lossy.damping_ratio)]
+    columns = zip(numbers, free, free / (2 * math.pi), *losses, held, held / (2 * math.pi), strict=True)
+    rows = [LockedMode(*row) for row in columns]
+    return sheet("hub_locked", table(rows), has_losses=lossy is not None)
+
+
+# ------------------------------------------------------------ shapes, theories, sensitivities
+
+
+def _shapes(modes: Modes) -> Picture:
+    shapes = motion.scaled(modes, DRAWN_MODES)
+    columns = (
+        Column("x_m", of=np.linspace(0.0, modes.arm.length, motion.SHAPE_POINTS)),
+        *(Column(f"mode_{number}", of=np.round(w, SHAPE_DIGITS - 1) + 0.0) for number, w in shapes.items()),
+    )
+    nodes = [own for number, own in zip(modes.index, modes.nodes, strict=True) if number in shapes]
+    return picture("mode_shapes", motion.modes.figure(modes), data=columns, nodes=nodes)
+
+
+def theories(arm: Arm) -> tuple[Table, Picture]:
+    """Natural frequencies by the four beam theories, and differences from the first in per cent."""
+    names: tuple[Theory, ...] = ("timoshenko", *SIMPLER)
+    omega = {theory: _flexible(tfarm.modes(arm, TABLED_MODES, theory=theory)) for theory in names}
+    differences = {theory: 100 * (omega[theory] / omega["timoshenko"] - 1) for theory in SIMPLER}
+    named = {motion.theory_name(theory): each for theory, each in differences.items()}
+    columns = (
+        Column("mode", "mode", of=range(1, TABLED_MODES + 1)),
+        *(Column(f"{theory.replace('-', '_')}_rad_s", motion.theory_name(theory), "rad/s", of=each, digits=lined(8, 7))
+          for theory, each in omega.items()),
+        *(Column(f"{name.lower().replace('-', '_')}_difference_percent", f"{name}, difference", "%", of=each,
+                 digits=lined(5, 3)) for name, each in named.items()),
+    )  # fmt: skip
+    return (
+        sheet("theories", columns, worst=differences["euler-bernoulli"]),
+        picture("theory_differences", motion.draw_differences.figure(arm.name, dict(reversed(differences.items()))),
+                differences=named),
+    )  # fmt: skip
+
+
+def sensitivity_table(modes: Modes) -> Table:
+    """Per cent of frequency per per cent of each parameter: a row a parameter, a column a mode."""
+    flexible = modes.index > 0
+    rows = {
+        name.replace("youngs", "Young's").replace("_", " "): np.round(values[flexible], SHAPE_DIGITS - 1) + 0.0
+        for name, values in modes.sensitivity.items()
+    }
+    shown = {name: values for name, values in rows.items() if abs(values).max() > 5e-7}  # which do not read as zero
+    by_mode = zip(modes.index[flexible], np.array(list(shown.values())).T, strict=True)
+    columns = (
+        Column("parameter", "parameter", of=list(shown)),
+        *(Column(f"mode_{number}", f"mode {number}", "%/%", of=values, digits=partial(fixed, decimals=3),
+                 tint=list(map(tint, values))) for number, values in by_mode),
+    )  # fmt: skip
+    dropped = [name for name in rows if name not in shown]
+    return sheet("sensitivities", columns, is_rig=not modes.arm.is_uniform, dropped=dropped)
+
+
+def tint(x: float) -> str:
+    """Orange for a rise, blue for a fall, full at 2 %/%; light enough for dark print."""
+    strength = 0.45 * min(1.0, abs(x) / 2.0) ** 0.6
+    return "#" + "".join(
+        f"{round(255 - strength * (255 - part)):02x}" for part in ((196, 80, 10) if x > 0 else (0, 96, 168))
+    )
+
+
+# ------------------------------------------------------------ frequency responses
 
 
 def bode_section(case: Case, output: str) -> PageSection:
     """One output: picture, its meaning, poles and zeros."""
     data = bode(case.arm, output)
-    anchor, what = f"bode-{output.replace('_', '-')}", f"{data.input_label} to {data.label}"
+    stem, what = f"bode-{output.replace('_', '-')}", f"{data.input_label} to {data.label}"
     if data.is_zero:
         none = f"The {data.label} is zero at every frequency: this arm's tip is pinned."
-        return PageSection(anchor=anchor, title=f"From {what}", words=(none,))
+        return PageSection(title=f"From {what}", words=(none,))
     roots, facts = table([*data.pole_list, *data.zero_list], parent=data).columns, {"data": data, "boxes": _boxes(data)}
     blocks = (
-        picture("bode", frequency.bode.figure(data), stem=anchor, data=curve_table(data).columns, **bode_facts(data)),
-        sheet("bode_table", roots, stem=f"{anchor}-roots", **facts),
+        picture("bode", frequency.bode.figure(data), stem=stem, data=curve_table(data), **bode_facts(data)),
+        sheet("bode_table", roots, stem=f"{stem}-roots", **facts),
     )
     words = () if roots else (f"{prose('bode_roots', **facts)} There are none.",)
-    return PageSection(anchor=anchor, title=f"From {what}", words=words, blocks=blocks)
+    return PageSection(title=f"From {what}", words=words, blocks=blocks)
 
 
 def bode_facts(data: Bode) -> dict[str, Any]:
@@ -71,8 +288,8 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
         names = listed([f"{each.label} [{each.unit}]" for each in fit.responses])
         blocks.append(picture("fit_overlay", frequency.fitted.figure(fit), names=names))
     blocks += [
-        sheet("fitted", table(fit.parameters).columns, stem="fit"),
-        sheet("fit_resonances", table(fit.resonances).columns),
+        sheet("fitted", table(fit.parameters), stem="fit"),
+        sheet("fit_resonances", table(fit.resonances)),
     ]
     try:
         those = possible(fit, count)
@@ -80,10 +297,10 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
         words.append(f"What the data leave of a loop is not drawn: {error}.")
     else:
         every = [margins(each, default_gains(fit.arm)) for each in those.arms if has_loop(fit.arm)]
-        words += [prose("fit_share", gains=style.gains_words(default_gains(fit.arm)), every=every)] if every else []
+        words += [prose("fit_share", gains=gains_words(default_gains(fit.arm)), every=every)] if every else []
         blocks += _of_all_arms(those, every)
     answer = prose("fit", verdict=fit.verdict, found=fit.in_words)
-    return PageSection(anchor="fit", title="Fitted to measurements", answer=answer, words=words, blocks=blocks)
+    return PageSection(title="Fitted to measurements", answer=answer, words=words, blocks=blocks)
 
 
 class MarginSpan(NamedTuple):
@@ -98,18 +315,19 @@ class MarginSpan(NamedTuple):
 def _of_all_arms(those: Possible, every: list[Margins]) -> Iterator[Picture | Table]:
     """The band of a response, and of an arm with a loop the share of arms over its gains, and the margins over all."""
     if those.fit.responses:
-        yield picture("fit_band", frequency.draw_band(those, "root_moment"), arms=those.arms)
+        yield picture("fit_band", frequency.draw_band.figure(those, "root_moment"), arms=those.arms)
     if not every:
         return
-    yield picture("fit_map", frequency.draw_share(those, ranges_of(those.fit.arm)))
+    yield picture("fit_map", frequency.draw_share.figure(those, ranges_of(those.fit.arm)))
     stable = [each for each in every if each.in_band is not None]
     ends = (each.windows[MOMENT_GAIN].around for each in stable)
     found = {(f"{MOMENT_GAIN} up to", ""): [pair[1] for pair in ends if pair is not None]}
-    found |= {title: [getattr(each.in_band, name) for each in stable] for name, title in SPANS_ON_ALL.items()}
+    titles = {"phase": ("phase margin", "deg"), "delay": ("delay margin", "s"), "disk": ("disk margin", "")}
+    found |= {title: [getattr(each.in_band, name) for each in stable] for name, title in titles.items()}
     known = {title: [value for value in values if value is not None] for title, values in found.items()}
     rows = [MarginSpan(*title, min(values), max(values)) for title, values in known.items() if values]
-    gains = style.gains_words(default_gains(those.fit.arm))
-    yield sheet("fit_margins", table(rows).columns, gains=gains, stable=stable)
+    gains = gains_words(default_gains(those.fit.arm))
+    yield sheet("fit_margins", table(rows), gains=gains, stable=stable)
 
 
 # ------------------------------------------------------------ measured
@@ -123,9 +341,9 @@ def measured_section(case: Case) -> PageSection:
         name = found.measured.label
         words.append(prose("measured_response", name=name, found=found, peaks=found.unmatched / (2 * math.pi)))
         blocks += [
-            picture("measured", frequency.measured.figure(found), stem=f"measured{label}", data=found.csv_table.columns,
+            picture("measured", frequency.measured.figure(found), stem=f"measured{label}", data=found.csv_table,
                     name=name),
-            sheet("measured_modes", table(found.modes).columns, stem=f"measured-modes{label}"),
-            sheet("measured_required", table(found.required_changes).columns, stem=f"measured-required{label}"),
+            sheet("measured_modes", table(found.modes), stem=f"measured-modes{label}"),
+            sheet("measured_required", table(found.required_changes), stem=f"measured-required{label}"),
         ]  # fmt: skip
-    return PageSection(anchor="bode-measured", title="Measured over exact", words=words, blocks=blocks)
+    return PageSection(title="Measured over exact", words=words, blocks=blocks)

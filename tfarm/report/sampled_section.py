@@ -14,23 +14,19 @@ import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, shown_unit
 from tfarm.digits import kept_digits, plain, significant, singly
-from tfarm.dsp import Analysis, Chain, Simulation, Verdict, crossings, modes, results, sampled_verdict, traces, verdict
+from tfarm.dsp import Analysis, Chain, Simulation, crossings, modes, results, sampled_verdict, traces, verdict
 from tfarm.dsp.chain import MOST_DELAY
 from tfarm.errors import ParameterError
 from tfarm.fitting.recording import RunComparison, compare_run, overshoot
 from tfarm.plots import motion, regions, roots, style
-from tfarm.report.cases import Case, Controller, margins_of, on_hub
-from tfarm.report.sections import Fact, PageSection, Picture, picture, prose, sheet
+from tfarm.report.page import Case, Controller, Fact, PageSection, Picture, margins_of, on_hub, picture, prose, sheet
 from tfarm.schema import Column, Quantity, Table, across, quantities, table, text, with_unit
 from tfarm.spectrum.table import default_gains
 
 MORE_DELAY = (0.0, 0.5, 1.0)  # samples of further delay for which the verdict is given
-PAST_HUB = 1.25  # times the rate gain at which sampling alone makes the hub unstable: the end of its locus
-LOCUS_K2 = (-0.5, 1.5)  # of its locus: the stability interval of most arms, and a little to either side
 VERDICT_COLUMNS = ("word", "spectral_radius", "time_constant", "slowest", "holds_for")
 WHOLE_LAW_COLUMNS = ("index", "natural_frequency", "band", "aliased", "first_order", "by_damping", "log_radius")
 CURVE_DIGITS = 7  # digits of a curve in its file: a hundredth of the width of a line is four
-Analysed = Sequence[tuple[Controller, Analysis]]
 
 
 def sampled_section(case: Case) -> PageSection:
@@ -43,23 +39,23 @@ def sampled_section(case: Case) -> PageSection:
         planes = [overlay_picture(regions.stable_regions(arm, first.loop.gains, chain), first)]
         along = [periods_table(arm, first.loop.gains, chain), loci_picture(first)]
     numbers = across({each.title: it for each, it in found}, keys=[each.key for each, _ in found])
-    slews, words = slew_of(case)
+    pictures, words = slews(case)
     return PageSection(
-        anchor="sampled",
         title=f"The sampled loop, {plain(1e3 * chain.sampling.period)} ms",
         answer=prose("sampled_lead", found=found, period=chain.sampling.period),
         facts=[fact for each in found for fact in facts_on(*each)],
         words=[chain_words(arm, chain), *words],
         blocks=[
             *planes,
-            sheet("sampled", numbers.columns),
-            *(sheet("sampled_numbers", table(it.stability_intervals).columns, stem=_stem("numbers", each), each=each,
+            sheet("sampled", numbers),
+            *(sheet("sampled_numbers", table(it.stability_intervals), stem=_stem("numbers", each), each=each,
                     found=it) for each, it in found),
             delays_table(found, chain),
             *along,
-            *(modes_table(*each) for each in found),
+            *(sheet("sampled_modes", table(it.modes, () if it.loop.is_of_gains else WHOLE_LAW_COLUMNS),
+                    stem=_stem("modes", each), each=each, found=it) for each, it in found),
             *measured_blocks(case),
-            *slews,
+            *pictures,
         ],
     )  # fmt: skip
 
@@ -89,23 +85,16 @@ def _stem(name: str, each: Controller) -> str:
     return f"sampled-{name}" if each.key in ("default", "law") else f"sampled-{name}-{each.key.replace('_', '-')}"
 
 
-def modes_table(each: Controller, found: Analysis) -> Table:
-    """The modes of the sampled loop one by one; the parts of K1 and K2 are those of gains at the hub."""
-    columns = table(found.modes, () if found.loop.is_of_gains else WHOLE_LAW_COLUMNS).columns
-    return sheet("sampled_modes", columns, stem=_stem("modes", each), each=each, found=found)
-
-
-def delays_table(found: Analysed, chain: Chain) -> Table:
+def delays_table(found: Sequence[tuple[Controller, Analysis]], chain: Chain) -> Table:
     """The verdict on each controller as it is, and with half a sample and a whole one of further delay."""
-    rows: list[tuple[str, float, Verdict]] = []
     T, own = chain.sampling.period, chain.sampling.delay_samples
-    for each, it in found:
-        for more in MORE_DELAY:
-            if not more:
-                rows.append((each.name, 0.0, it.verdict))
-            elif own + more + each.law.delay / T <= MOST_DELAY:
-                late = replace(chain, sampling=replace(chain.sampling, delay_samples=own + more))
-                rows.append((each.name, 1e3 * T * more, sampled_verdict(each.arm, each.law, late)))
+    late = {more: replace(chain, sampling=replace(chain.sampling, delay_samples=own + more)) for more in MORE_DELAY[1:]}
+    rows = [
+        (each.name, 1e3 * T * more, sampled_verdict(each.arm, each.law, late[more]) if more else it.verdict)
+        for each, it in found
+        for more in MORE_DELAY
+        if not more or own + more + each.law.delay / T <= MOST_DELAY
+    ]
     names, delays, verdicts = zip(*rows, strict=True)
     first = Column("law", "controller", of=names), Column("further_delay_ms", "further delay", "ms", of=delays)
     is_free = any(verdict.loop.has_free_angle for verdict in verdicts)
@@ -137,7 +126,7 @@ def overlay_picture(both: regions.StableRegions, found: Analysis) -> Picture:
     return picture(
         "sampled_overlay",
         regions.draw_overlay(both),
-        data=regions.regions_table(both, "").columns,
+        data=regions.region_columns(both),
         arm=arm,
         low=float(both.continuous.axes[0][0]),
         nested=len(both.sampled) > 1,
@@ -151,11 +140,12 @@ def loci_picture(found: Analysis) -> Picture:
     """Root loci of the sampled loop in the z-plane, along each gain."""
     loop, arm = found.loop, found.loop.plant.arm
     turning = arm.hub_side_inertia * arm.input_per_torque  # at the hub, in the unit of the input times s^2
-    top = max(PAST_HUB * 2 * turning / loop.chain.sampling.period, modes.STRONGER * loop.gains[RATE_GAIN])
-    loci = modes.sampled_loci(loop, top, LOCUS_K2)
+    # past the rate gain at which sampling alone makes the hub unstable; K2 over the stable interval of most arms
+    top = max(1.25 * 2 * turning / loop.chain.sampling.period, modes.STRONGER * loop.gains[RATE_GAIN])
+    loci = modes.sampled_loci(loop, top, (-0.5, 1.5))
     aliased = int((found.modes.band > 0).sum())
     return picture(
-        "sampled_loci", roots.draw_sampled_loci(loci), data=loci_data(loci), half=loci.half_rate, aliased=aliased
+        "sampled_loci", roots.draw_sampled_loci.figure(loci), data=loci_data(loci), half=loci.half_rate, aliased=aliased
     )
 
 
@@ -167,8 +157,8 @@ def loci_data(data: modes.SampledLoci) -> Sequence[Column]:
             loop = locus.loop.having(**{locus.gain: value})
             each = zip(locus.mode.tolist(), poles, strict=True)
             rows += [(name, *map(loop.number, PLANE), mode, z.real, z.imag) for mode, z in each if not z.imag < 0]
-    titles = {"locus": "locus", **{name: name for name in PLANE}, "mode": "mode", "real": "Re z", "imaginary": "Im z"}
-    return [Column(*title, of=cells) for title, cells in zip(titles.items(), zip(*rows, strict=True), strict=True)]
+    keys = ("locus", *PLANE, "mode", "real", "imaginary")
+    return [Column(key, of=cells) for key, cells in zip(keys, zip(*rows, strict=True), strict=True)]
 
 
 # ------------------------------------------------------------ in time
@@ -214,7 +204,7 @@ def slew_row(name: str, run: Simulation) -> SlewRow:
     return SlewRow(name, run.residual_moment, run.settling_time, error, None)
 
 
-def slew_of(case: Case) -> tuple[list[Picture | Table], list[str]]:
+def slews(case: Case) -> tuple[list[Picture | Table], list[str]]:
     """The slew of the chain under each controller, and why one is not simulated; without one where runs are measured.
 
     Of an arm's own gains the slew without moment feedback is there too.
@@ -224,12 +214,7 @@ def slew_of(case: Case) -> tuple[list[Picture | Table], list[str]]:
     if all(each.given.measured is not None for each in case.controllers):
         return [], []
     bare = [] if case.laws else [default_gains(case.arm).having(MOMENT_GAIN, 0.0)]
-    without = [on_hub(case.arm, gains, f"{MOMENT_GAIN} = 0", "without") for gains in bare]
-    return slew(case, [*without, *case.controllers])
-
-
-def slew(case: Case, controllers: Sequence[Controller]) -> tuple[list[Picture | Table], list[str]]:
-    """The slew of the chain under each controller, and why one is not simulated."""
+    controllers = *(on_hub(case.arm, gains, f"{MOMENT_GAIN} = 0", "without") for gains in bare), *case.controllers
     runs: dict[str, Simulation] = {}
     words, task = [], case.chain.slew
     for each in controllers:
@@ -239,18 +224,18 @@ def slew(case: Case, controllers: Sequence[Controller]) -> tuple[list[Picture | 
             )
         except ParameterError as error:
             words.append(f"No slew of {each.name} is simulated: {error}.")
-    simulated = [each for each in controllers if each.name in runs]
     if len({each.arm.input_unit for each in controllers}) > 1:
         return [], [*words, "The controllers drive inputs of different units: their slews are not drawn together."]
-    if not simulated:
+    if not runs:
         return [], words
+    simulated = [each for each in controllers if each.name in runs]
     arm, title = simulated[0].arm, prose("slew_title", task=task, reach=case.arm.reach)
     figure = motion.slew.figure(arm, {style.safe(name): run for name, run in runs.items()}, title)
     columns = response_columns(arm, {each.key: runs[each.name] for each in simulated})
     rows = [slew_row(name, run) for name, run in runs.items()]
     return [
         picture("sampled_slew", figure, data=columns, runs=runs, piece=piece_of_bands(runs), task=title),
-        sheet("slew_numbers", table(rows).columns, stem="sampled-slew-numbers"),
+        sheet("slew_numbers", table(rows), stem="sampled-slew-numbers"),
     ], words
 
 
@@ -269,19 +254,16 @@ def response_columns(arm: Arm, each: Mapping[str, Simulation]) -> Sequence[Colum
     moments = {key: traces.curve_of(run, "root_moment") for key, run in each.items()}
     t, first = min((moment.t for moment in moments.values()), key=len), next(iter(each.values()))
     rigid = np.r_[first.scenario.rigid_moment[1:], first.scenario.rigid_moment[-1:]]
-    columns: list[Column] = [
-        Column("t_s", "time", "s", of=t),
-        Column("rigid_moment_N_m", "rigid arm", "N m", of=traces.held_at(first, rigid, t)),
-    ]
+    columns: list[Column] = [Column("t_s", of=t), Column("rigid_moment_N_m", of=traces.held_at(first, rigid, t))]
     driven, unit = "torque" if arm.input_unit == "N m" else "input", arm.input_unit
     for key, run in each.items():
-        columns += moments[key].at(t).columns(f"root_moment_{key}", "root moment", "N m")
-        columns += traces.curve_of(run, "tip_displacement").at(t).columns(f"tip_{key}", "tip", "m")
-        columns += traces.tip_deviation(arm, run).at(t).columns(f"tip_error_{key}", "tip less reference", "m")
+        columns += moments[key].at(t).columns(f"root_moment_{key}", "N m")
+        columns += traces.curve_of(run, "tip_displacement").at(t).columns(f"tip_{key}", "m")
+        columns += traces.tip_deviation(arm, run).at(t).columns(f"tip_error_{key}", "m")
         name = f"{driven}_{key}_{unit.replace(' ', '_')}"
-        columns.append(Column(name, driven, unit, of=traces.held_at(run, run.torque, t)))
+        columns.append(Column(name, unit=unit, of=traces.held_at(run, run.torque, t)))
         if run.gain is not None and np.ptp(run.gain):
-            columns.append(Column(f"K_{key}", "gain", of=traces.held_at(run, run.gain, t)))
+            columns.append(Column(f"K_{key}", of=traces.held_at(run, run.gain, t)))
     return [replace(each, of=kept_digits(map(float, each.values), CURVE_DIGITS)) for each in columns]
 
 
@@ -337,25 +319,25 @@ def measured_blocks(case: Case) -> Iterator[Picture | Table]:
     found = {each.name: compare_run(each.arm, each.law, case.chain, run) for each, run in runs}
     if not found:
         return
-    figure = motion.draw_measured_runs("Measured steps, and the exact sampled loop", found)
+    figure = motion.draw_measured_runs.figure(found)
     columns = compared_data({each.key: found[each.name] for each, _ in runs})
     yield picture("sampled_measured", figure, data=columns, found=found)
     rows = [measured_step(name, it) for name, it in found.items() if it.measured.hub_angle.size]
-    yield sheet("sampled_overshoot", table(rows).columns)
+    yield sheet("sampled_overshoot", table(rows))
 
 
 def compared_data(found: Mapping[str, RunComparison]) -> Iterator[Column]:
     """The curves of the picture: a row a sample, measured values taken between their rows."""
     t = min((it.run.t for it in found.values()), key=len)
-    yield Column("t_s", "time", "s", of=t)
+    yield Column("t_s", of=t)
     for key, it in found.items():
-        measured, computed = it.measured, it.run.at_samples.root_moment
-        yield Column(f"reference_{key}_rad", "reference", "rad", of=np.interp(t, measured.t, measured.reference))
-        if measured.hub_angle.size:
-            there = np.interp(t, measured.t, measured.hub_angle)
-            yield Column(f"hub_angle_measured_{key}_rad", "hub angle", "rad", of=there)
-        yield Column(f"hub_angle_computed_{key}_rad", "hub angle", "rad", of=it.hub_angle[: t.size])
-        if measured.root_moment.size:
-            there = np.interp(t, measured.t, measured.root_moment)
-            yield Column(f"root_moment_measured_{key}_N_m", "root moment", "N m", of=there)
-        yield Column(f"root_moment_computed_{key}_N_m", "root moment", "N m", of=computed[: t.size])
+        measured, run = it.measured, it.run
+        for name, at, values in (
+            (f"reference_{key}_rad", measured.t, measured.reference),
+            (f"hub_angle_measured_{key}_rad", measured.t, measured.hub_angle),
+            (f"hub_angle_computed_{key}_rad", run.t, it.hub_angle),
+            (f"root_moment_measured_{key}_N_m", measured.t, measured.root_moment),
+            (f"root_moment_computed_{key}_N_m", run.t, run.at_samples.root_moment),
+        ):
+            if values.size:
+                yield Column(name, of=np.interp(t, at, values))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import platform
 import re
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from decimal import Decimal, localcontext
@@ -30,10 +29,14 @@ from tfarm.dsp.chain import file_text
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.plots.style import gains_words
-from tfarm.report.cases import has_loop
-from tfarm.report.modes_section import BRACKET_DIGITS, PROVEN_DIGITS, PROVEN_MODES, proven_damped_modes, proven_modes
-from tfarm.report.page import argument, keep, kept
-from tfarm.report.sections import DATA, PageSection, render, save_section, sheet
+from tfarm.report.page import DATA, PageSection, argument, has_loop, keep, kept, render, save_section, sheet, write_text
+from tfarm.report.response_sections import (
+    BRACKET_DIGITS,
+    PROVEN_DIGITS,
+    PROVEN_MODES,
+    proven_damped_modes,
+    proven_modes,
+)
 from tfarm.response.frequency import BAND_POINTS, worst_error
 from tfarm.schema import Column, Quantity, Table, save_table, table
 from tfarm.schema.html import GREEK, LETTER
@@ -191,18 +194,17 @@ def written_proofs(out: Path) -> Sequence[ArmProof]:
 
 def proof_tables(proofs: Sequence[ArmProof]) -> list[Table]:
     """The counts of natural frequencies, all proven digits of these, and the boxes of other eigenvalues, if any."""
-    names = ("name", "has_rigid_mode", "enclosed", "count", "count_below", "verdict")
     digits = {proof.name: proof.leading_digits or [""] * PROVEN_MODES for proof in proofs}
     columns = (
         Column("mode", "mode", of=range(1, PROVEN_MODES + 1)),
         *(Column(f"{name}_rad_s", name, "rad/s", of=own, shown=[f"{text}…" if text else UNPROVEN for text in own])
           for name, own in digits.items()),
     )  # fmt: skip
-    boxes = [each for proof in proofs for each in proof.boxes]
+    counts = table(proofs, ("name", "has_rigid_mode", "enclosed", "count", "count_below", "verdict"))
     return [
-        sheet("counts", table(proofs, names).columns),
+        sheet("counts", counts),
         sheet("digits", columns, modes=PROVEN_MODES, digits=BRACKET_DIGITS),
-        sheet("boxes", table(boxes).columns, digits=PROVEN_DIGITS),
+        sheet("boxes", table([each for proof in proofs for each in proof.boxes]), digits=PROVEN_DIGITS),
     ]
 
 
@@ -226,29 +228,25 @@ def published_tables(found: published.Validation) -> list[Table]:
     columns = (*table(found.sources).columns, *counts)
     return [
         sheet("sources", columns),
-        sheet("differences", table(found.differences).columns),
-        sheet("published", table(found.rows).columns),
+        sheet("differences", table(found.differences)),
+        sheet("published", table(found.rows)),
     ]
 
 
 def again_tables(proofs: Sequence[ArmProof]) -> list[Table]:
     """The hashes of the arms' files, and the versions that computed this."""
     found = {"tfarm": tfarm.__version__, "python": platform.python_version(), **{p: version(p) for p in PACKAGES}}
-    columns = Column("package", "package", of=list(found)), Column("version", "version", of=list(found.values()))
     return [
-        sheet("inputs", table(proofs, ("name", "source", "sha256")).columns),
-        sheet("versions", columns),
+        sheet("inputs", table(proofs, ("name", "source", "sha256"))),
+        sheet(
+            "versions", [Column("package", "package", of=list(found)), Column("version", "version", of=found.values())]
+        ),
     ]
 
 
 AUDIT_COLUMNS = (
     "equation", "verdict", "printed", "corrected", "residual_printed", "residual_corrected", "evidence",
 )  # fmt: skip
-VERDICT_MARKS = {"ok": ("✓", "right as printed"), "corrected": ("≠", "corrected"), "undecided": ("?", "undecided")}
-MathElement = ElementTree.Element
-STATEMENT_END = re.compile(r"(?<=[,;])\\quad\s*")
-LEAVES = ("mi", "mo", "mn", "mtext")
-LONG_TEX = 300  # characters of a line from which it is set smaller
 TRUST_FOLDER = "trust"
 PACKAGES = (
     "numpy",
@@ -264,23 +262,6 @@ PACKAGES = (
 )
 
 
-def shown_row(row: AuditRow) -> dict[str, Any]:
-    """A row of the audit, typeset; `corrected` is empty where the print is right."""
-    printed, corrected = compared_formulas(row.printed_tex, row.corrected_tex)
-    return {
-        "anchor": anchor(row.equation),
-        "equation": in_letters(row.equation),
-        "verdict": row.verdict,
-        "mark": VERDICT_MARKS[row.verdict][0],
-        "words": VERDICT_MARKS[row.verdict][1],
-        "printed": printed,
-        "corrected": [] if row.printed == row.corrected else corrected,
-        "left_printed": _left(row.residual_printed),
-        "left_corrected": _left(row.residual_corrected),
-        "evidence": in_letters(row.evidence),
-    }
-
-
 def in_letters(text: str) -> Markup:
     """The audit's plain text with Greek letters, subscripts and exponents: theta_t^2 becomes θ<sub>t</sub>²."""
     greek = LETTER.sub(lambda name: GREEK[name[1]], powers(unit(str(escape(text)))))
@@ -294,17 +275,10 @@ def anchor(equation: str) -> str:
     return "eq-" + re.sub(r"[^a-z0-9]+", "-", equation.lower()).strip("-")
 
 
-def _left(residual: str) -> Markup:
-    """The residual of a formula in the check, in words and letters."""
-    if residual == "0":
-        return Markup("nothing")
-    return in_letters(f"nothing but rounding at 50 digits, {residual}" if is_zero(residual) else residual)
-
-
 def compared_formulas(printed: str, corrected: str) -> tuple[list[Markup], list[Markup]]:
     """Both as MathML, a line each, the symbols in which they differ of the class "changed"."""
     both = _set(printed), _set(corrected)
-    a, b = ([leaf for line in each for leaf in line.iter() if leaf.tag in LEAVES] for each in both)
+    a, b = ([leaf for line in each for leaf in line.iter() if leaf.tag in ("mi", "mo", "mn", "mtext")] for each in both)
     matcher = SequenceMatcher(a=[leaf.text for leaf in a], b=[leaf.text for leaf in b], autojunk=False)
     for what, i, j, k, m in matcher.get_opcodes():
         for leaf in (*a[i:j], *b[k:m]) if what != "equal" else ():
@@ -313,13 +287,13 @@ def compared_formulas(printed: str, corrected: str) -> tuple[list[Markup], list[
     return left, right
 
 
-def _set(tex: str) -> list[MathElement]:
+def _set(tex: str) -> list[ElementTree.Element]:
     """A formula a line, without the name space that a file of XML would need and a page of HTML does not."""
-    found, lines = [], STATEMENT_END.split(tex)
-    for line in lines:
+    found = []
+    for line in re.split(r"(?<=[,;])\\quad\s*", tex):
         upright = re.sub(r"\\mathrm\{(\w)\}", r"\\text{\1}", line.strip())  # a single letter would be slanted
         root = ElementTree.fromstring(re.sub(r' xmlns="[^"]*"', "", convert(upright, display="block"), count=1))
-        root.attrib |= {"class": "long"} if len(line) > LONG_TEX else {}
+        root.attrib |= {"class": "long"} if len(line) > 300 else {}  # which is set smaller
         for row in root.iter("mrow"):
             for before, leaf in pairwise([ElementTree.Element("mo"), *row]):
                 _correct(leaf, before)
@@ -327,7 +301,7 @@ def _set(tex: str) -> list[MathElement]:
     return found
 
 
-def _correct(leaf: MathElement, before: MathElement) -> None:
+def _correct(leaf: ElementTree.Element, before: ElementTree.Element) -> None:
     """Plus-minus is an operator, infinity is none, and a determinant's bars are as high as it, by what is `before`."""
     if leaf.text == "±":
         leaf.tag = "mo"
@@ -355,12 +329,10 @@ def write_trust(
     found = published.Validation(tuple(printed))
     tables = {"proofs": proof_tables(proofs), "accuracy": [accuracy_table(proofs)],
               "published": published_tables(found), "again": again_tables(proofs)}  # fmt: skip
-    sections = {name: save_section(PageSection(anchor=name, title="", blocks=own), folder)
+    sections = {name: save_section(PageSection(blocks=own), folder)
                 for name, own in tables.items()}  # fmt: skip
-    plain = table(audited, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation")
-    save_table(plain, folder / DATA)
+    save_table(table(audited, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation"), folder / DATA)
     errors = [error for proof in proofs for _, error in proof.errors]
-    verdicts = Counter(row.verdict for row in audited)
     preset = {proof.name: proof.source == "preset" for proof in proofs}
     is_usual = set(preset) == set(presets()) and all(preset.values())
     names = "" if is_usual else "".join(f" {argument(*each)}" for each in preset.items())
@@ -373,9 +345,10 @@ def write_trust(
         points=BAND_POINTS,
         worst=scientific(max(errors), 2) if errors else "",
         found=found,
-        verdicts={verdict: verdicts[verdict] for verdict in VERDICT_MARKS},
-        marks=VERDICT_MARKS,
-        equations=[shown_row(row) for row in audited],
+        equations=[(row, *compared_formulas(row.printed_tex, row.corrected_tex)) for row in audited],
+        anchor=anchor,
+        in_letters=in_letters,
+        is_zero=is_zero,
         command=f"tfarm report{names} --out reports",
     )
-    (folder / "index.html").write_text(page, encoding="utf-8", newline="")
+    write_text(folder / "index.html", page)

@@ -15,9 +15,8 @@ from tfarm.dsp import Chain, Simulation, results, scenarios, traces
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.plots import motion, regions
 from tfarm.records import record
-from tfarm.report.cases import Case, has_loop
+from tfarm.report.page import Case, Fact, PageSection, Picture, has_loop, picture, prose, sheet
 from tfarm.report.sampled_section import chain_words, piece_of_bands, response_columns
-from tfarm.report.sections import Fact, PageSection, Picture, picture, prose, sheet
 from tfarm.schema import Column, Quantity, Table, table
 from tfarm.spectrum.table import first_frequency
 from tfarm.tuner import LearningCurves, Plan, Tuning, compare_controllers, learning_curves, tried_loops, tune
@@ -30,16 +29,11 @@ CURVE_SAMPLES = 80_000_000  # that their trials may have together, some 35 s of 
 LONG_TRIAL = 16_000  # samples: the comparison of a longer one is of the arm itself alone
 LONGEST_TRIAL = 70_000  # samples: a page has no longer one
 QUANTISED_AND_LATE = 3  # row of the comparison, which begins with those of the arm itself
-SERVO_SPEED = 1 / 20  # of the first frequency: the servo's angle loop is so slow that it leaves the mode alone
-SERVO_TURN = 0.03  # rad a sample, where that is slower
-ON_TARGET = 1e-10  # of the tip's travel: no slew ends nearer its target than rounding
 SAME_COST = 1e-4  # relative difference of two costs below which they are called the same
 CONTROLLERS = {
     "without": "none", "best_constant": "constant", "own_constant": "own constant", "tuner": "tuner", "bound": "bound",
     "ZV": "ZV", "EI": "EI",
 }  # fmt: skip
-
-
 TITLE = "The gain tuner against baselines"
 
 
@@ -54,7 +48,7 @@ def tuner_section(case: Case) -> PageSection:
             answer = prose("tuner_unstable")
     except CertificationError as error:
         answer = prose("tuner_unproven", error=error)
-    return PageSection(anchor="tune", title=TITLE, answer=answer)
+    return PageSection(title=TITLE, answer=answer)
 
 
 def why_not(arm: Arm, chain: Chain) -> str:
@@ -115,7 +109,7 @@ def curve_seeds(samples: int) -> int:
 
 def _servo_tuning(arm: Arm, plan: Plan, chain: Chain) -> Tuning | None:
     """The same tuning with an angle loop a twentieth as fast as the first mode, or slower at a long period."""
-    speed = min(SERVO_SPEED * first_frequency(arm), SERVO_TURN / chain.sampling.period)
+    speed = min(first_frequency(arm) / 20, 0.03 / chain.sampling.period)  # it leaves the mode alone; rad a sample
     try:
         return tune(arm, plan.holding(arm, float(f"{arm.turned_inertia * speed**2:.2g}")), chain)
     except (CertificationError, ConvergenceError):
@@ -144,7 +138,7 @@ def section_of(data: TunerNumbers) -> PageSection:
     servo = [] if data.servo is None else [servo_table(data, data.servo)]
     blocks = [_gain_picture(data), *slew_pictures(data), *cost_tables(data), *servo, _curves_picture(data)]
     answer, facts = tuner_in_short(data), tuner_facts(data)
-    return PageSection(anchor="tune", title=TITLE, answer=answer, facts=facts, words=words, blocks=blocks)
+    return PageSection(title=TITLE, answer=answer, facts=facts, words=words, blocks=blocks)
 
 
 def saved_cost(data: TunerNumbers) -> float:
@@ -161,7 +155,7 @@ def tuner_in_short(data: TunerNumbers) -> str:
 def off_target(data: TunerNumbers, error: float) -> str:
     """How far from its target the tip ends [mm]; 0 where rounding is all there is of it."""
     travel = data.arm.reach * float(abs(data.constant.scenario.hub_angle).max())
-    return significant(1e3 * abs(error) * (abs(error) > ON_TARGET * travel), 2)
+    return significant(1e3 * abs(error) * (abs(error) > 1e-10 * travel), 2)
 
 
 def tuner_facts(data: TunerNumbers) -> tuple[Fact, ...]:
@@ -213,7 +207,7 @@ def servo_table(data: TunerNumbers, servo: Tuning) -> Table:
     ]
     gains = ", ".join(law.gain_text(name, partial(significant, digits=3), data.arm) for name in (ANGLE_GAIN, RATE_GAIN))
     left = None if error is None else off_target(data, error)
-    return sheet("tune_servo", table(rows).columns, gains=gains, guard=servo.training.guard, error=left)
+    return sheet("tune_servo", table(rows), gains=gains, guard=servo.training.guard, error=left)
 
 
 def cost_tables(data: TunerNumbers) -> list[Table]:
@@ -246,13 +240,9 @@ def _of_each(rows: Sequence[Outcomes], name: str, digits: int) -> tuple[Column, 
 def _gain_picture(data: TunerNumbers) -> Picture:
     tuning, result = data.tuning, data.tuning.training.result
     plane = regions.stable_regions(data.arm, tuning.constant, tuning.trial.loop.chain)
-    columns = (
-        Column("t_s", "time", "s", of=result.t),
-        Column("K", "gain", of=result.K),
-        Column("x_N_m", "x, as the controller reads it", "N m", of=result.x),
-    )
+    columns = Column("t_s", of=result.t), Column("K", of=result.K), Column("x_N_m", of=result.x)
     gain = tuning.constant.gain_text(RATE_GAIN, plain)
-    return picture("tune_gain", motion.draw_gain(tuning, *plane), data=columns, tuning=tuning, gain=gain)
+    return picture("tune_gain", motion.draw_gain.figure(tuning, *plane), data=columns, tuning=tuning, gain=gain)
 
 
 def slew_pictures(data: TunerNumbers) -> Iterator[Picture]:
@@ -269,8 +259,8 @@ def slew_pictures(data: TunerNumbers) -> Iterator[Picture]:
 def _curves_picture(data: TunerNumbers) -> Picture:
     curves = data.curves
     columns = (
-        Column("trial", "trial", of=range(1, curves.costs.shape[1] + 1)),
-        *(Column(name, name, of=costs) for name, costs in curves.quartile_curves.items()),
-        *(Column(f"seed_{seed}", f"seed {seed}", of=costs) for seed, costs in enumerate(curves.costs)),
+        Column("trial", of=range(1, curves.costs.shape[1] + 1)),
+        *(Column(name, of=costs) for name, costs in curves.quartile_curves.items()),
+        *(Column(f"seed_{seed}", of=costs) for seed, costs in enumerate(curves.costs)),
     )
-    return picture("tune_curves", motion.draw_curves(curves, data.tuning), data=columns, curves=curves)
+    return picture("tune_curves", motion.draw_curves.figure(curves, data.tuning), data=columns, curves=curves)

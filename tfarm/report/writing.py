@@ -1,60 +1,189 @@
-"""From arms to a folder of pages: everything is made in a temporary folder, and moved into place when complete."""
+"""From arms to a folder of pages: everything is made in a temporary folder, and moved into place when complete.
+
+The sections of an arm's page in their order, its page by templates, the index, and the page of a comparison.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import os
+import re
+import shlex
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from tfarm.arm import Arm
+from markupsafe import Markup
+
+from tfarm.arm import PLANE, Arm, as_law
+from tfarm.arm.writing import law_toml
 from tfarm.case import Comparison
 from tfarm.dsp import Chain
-from tfarm.errors import ParameterError, TfarmError, must_be_known
+from tfarm.dsp.chain import file_text
+from tfarm.errors import ParameterError, TfarmError, must_be_known, require
 from tfarm.files import temporary_folder
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
+from tfarm.plots.frequency import draw_card
 from tfarm.plots.regions import comparison
-from tfarm.processes import may_start_processes, shared
-from tfarm.report.cases import Case, GivenLaw, check_laws
+from tfarm.plots.style import save_figure
+from tfarm.processes import shared
+from tfarm.report.arm_section import arm_section, assumptions_section, headline_numbers, is_from_paper, paper_section
 from tfarm.report.live import ASSETS, LIVE_PAGE, is_live, save_live, write_assets
-from tfarm.report.page import (
-    COMPARISON_PAGE,
-    LOOP_TASK,
-    QUESTIONS,
-    arm_page,
-    file_of,
-    index_page,
-    keep,
-    kept_comparison,
-    pages_in,
-    pieces_of,
-    save_card,
+from tfarm.report.loop_section import (
+    law_section,
+    locus_section,
+    map_section,
+    margins_section,
+    no_loop_section,
+    nyquist_section,
 )
-from tfarm.report.sections import PageSection, picture, prose, render, save_section, sheet, upper
+from tfarm.report.page import (
+    PICTURES,
+    Case,
+    Controller,
+    Fact,
+    GivenLaw,
+    PageSection,
+    argument,
+    brief_on,
+    check_laws,
+    has_loop,
+    is_preset,
+    keep,
+    kept,
+    kept_in,
+    margins_of,
+    picture,
+    prose,
+    render,
+    save_section,
+    sheet,
+    sign_words,
+    upper,
+    write_text,
+)
+from tfarm.report.response_sections import bode_section, fit_section, measured_section, modes_section
+from tfarm.report.sampled_section import sampled_section
 from tfarm.report.trust import TRUST_FOLDER, gather, save_proof, write_trust, written_proofs
+from tfarm.report.tuner_section import tuner_section
+from tfarm.response.frequency import bode
 from tfarm.schema import quantities, table
+from tfarm.schema.glossary import GLOSSARY_TERMS
+from tfarm.schema.html import with_symbols
 from tfarm.stopping import undone_if_stopped
 
 ReportProgress = Callable[[int, int, str], object]
 Notice = Callable[[str], object]
+Calls = Mapping[str, Sequence[Callable[[], Any]]]  # by task: what one process does in turn
 MOST_WORKERS = 2  # processes that share the pieces of a report: as many cores as a small machine has
 WORTH_A_PROCESS = 8  # pieces for which a second process, which takes a second or two to start, is worth it
-EVIDENCE, SCRIPTS = "why trust this", "scripts of the live pages"  # pieces of no arm
+EVIDENCE, SCRIPTS = "why trust this", "scripts of the live pages"  # tasks of no arm
+LOOP_TASK, SAMPLED_TASK = "continuous loop", "sampled loop"  # each of sections that share a design or damped modes
+LONGEST = (SAMPLED_TASK, LOOP_TASK, EVIDENCE)  # tasks of five seconds and more, which are begun first
+TRUST_PAGE, COMPARISON_PAGE = f"{TRUST_FOLDER}/index.html", "compare.html"
 RESERVED_NAMES = {  # of folders that no arm may have
-    "index.html", "readme.md", "pictures", "bench.json", "trust", "data", "compare.html", "compare.json", ASSETS,
+    "index.html", "readme.md", "pictures", "bench.json", TRUST_FOLDER, "data", COMPARISON_PAGE, "compare.json", ASSETS,
 }  # fmt: skip
-TRUST_PAGE = f"{TRUST_FOLDER}/index.html"
+BADGES = {"stable": "ok", "yes": "ok", "unstable": "corrected", "no": "corrected", "marginal": "undecided",
+            "undecided": "undecided"}  # fmt: skip
+PROMISES = (
+    "certified", "complete", "converged", "default gains", "enclosed", "Lyapunov region", "not determined", "proven",
+    "small gain", "winding number",
+)  # fmt: skip
 
 
-class Job(NamedTuple):
-    """A piece of a report: jobs of one task are done in turn by one process, and the longest tasks are begun first."""
+# ------------------------------------------------------------ the sections of a page
 
-    task: str
-    call: Callable[[], Any]
-    seconds: float = 0.0
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """One section of one arm's page: a name for the progress bar, the section's anchor, and how to make it of a case.
+
+    A page that it does not suit has no such section.  The page that `report --only` asks for is called by the first
+    word of its sections' anchors; its `title` is that of one of them, and `is_also_on` picks the other pages of that
+    kind that have the section.  The full page has all, and at its top the answers of those that have one.
+    Sections of one `task` are made one after the other in one process.
+    """
+
+    name: str
+    anchor: str
+    make: Callable[[Case], PageSection]
+    suits: Callable[[Case], Any] = lambda case: True
+    title: str = ""
+    is_also_on: Callable[[str], bool] = lambda page: False
+    task: str = ""
+
+    @property
+    def page(self) -> str:
+        """The page that has it when it is asked for alone."""
+        return self.anchor.partition("-")[0]
+
+    def is_on(self, page: str | None) -> bool:
+        """Whether the page has the section: that one asked for alone, or the full one."""
+        return not page or page == self.page or self.is_also_on(page)
+
+
+LOOP_PAGES = ("margins", "locus", "sampled", "tune")  # on which an arm without a loop has nothing but that it has none
+OF_LAWS = (*LOOP_PAGES, "law", "no")  # first words of the sections that a page about laws begins with
+
+
+def _in_s(case: Case) -> bool:
+    """Whether a controller of the case acts in continuous time."""
+    return not case.arm.is_locked and any(not each.law.is_discrete for each in case.controllers)
+
+
+def _of_gains(case: Case) -> bool:
+    """Whether the page is about both gains of the arm itself."""
+    return not case.laws and has_loop(case.arm)
+
+
+PIECES = (
+    Piece("fit to measurements", "fit", fit_section, lambda case: case.fit),
+    Piece("stability region of both gains", "margins-map", map_section, _of_gains, task=LOOP_TASK),
+    Piece("the arm", "arm", arm_section, is_also_on=lambda page: True),
+    Piece("the paper's values", "paper", paper_section, lambda case: is_from_paper(case.arm)),
+    Piece("response of the root moment", "bode-root-moment", partial(bode_section, output="root_moment"),
+          title="Bode plots"),
+    Piece("response of the tip", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),
+    Piece("measured responses", "bode-measured", measured_section, lambda case: case.measured),
+    Piece("modes", "modes", modes_section, title="Modes"),
+    Piece("the loop", "no-loop", no_loop_section, lambda case: not case.has_loop, is_also_on=LOOP_PAGES.__contains__),
+    Piece("stability margins", "margins", margins_section, _in_s, "Gains and margins", task=LOOP_TASK),
+    Piece("root loci", "locus", locus_section, _in_s, "Root loci", task=LOOP_TASK),
+    Piece("Nyquist plot", "margins-nyquist", nyquist_section, _in_s, task=LOOP_TASK),
+    Piece("sampled loop", "sampled", sampled_section, lambda case: case.has_loop, "The sampled loop",
+          task=SAMPLED_TASK),
+    Piece("controllers", "law", law_section, lambda case: case.laws and not case.arm.is_locked,
+           is_also_on=LOOP_PAGES.__contains__),
+    Piece("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", task=SAMPLED_TASK),
+    Piece("assumptions", "assumptions", assumptions_section, title="What the assumptions do"),
+)  # fmt: skip
+QUESTIONS = {piece.page: piece.title for piece in PIECES if piece.title}  # pages that may be asked for alone
+PAGES = {"index": "full report", "live": "live loop", **QUESTIONS}
+
+
+def pieces_of(case: Case) -> list[Piece]:
+    """The sections of a page, in their order; a page about laws begins with its loops."""
+    suited = [piece for piece in PIECES if piece.suits(case)]
+    return sorted(suited, key=lambda piece: bool(case.laws) and piece.page not in OF_LAWS)
+
+
+def make_section(name: str, anchor: str, make: Callable[[Case], PageSection], case: Case, folder: Path) -> PageSection:
+    """A section saved in the arm's folder, or in its place why tfarm could not make it; a bug of ours stays loud."""
+    try:
+        section = replace(make(case), anchor=anchor)
+    except TfarmError as error:
+        answer = f"This section could not be made for this arm: {error}."
+        section = PageSection(anchor=anchor, title=upper(name), answer=answer, failure=str(error))
+    return save_section(section, folder)
+
+
+# ------------------------------------------------------------ a report
 
 
 def write(
@@ -81,31 +210,28 @@ def write(
     any work if `out` cannot be written, two arms share a name or there is none, or an arm or its chain does not suit a
     law; ConvergenceError if a process dies.  If the work itself fails, `out` is as it was.
     """
-    out, n, names = Path(out), len(arms), [arm.name for arm in arms]
-    _check(names, only or ())
+    out, n, names, only = Path(out), len(arms), [arm.name for arm in arms], only or ()
+    _check(names, only)
     each = zip(arms, chains or [Chain()] * n, laws or [()] * n, fits or [None] * n, strict=True)
     cases = [Case(arm, chain, tuple(own), fit, tuple(measured)) for arm, chain, own, fit in each]
     for case in cases:
         check_laws(case)
     with _temporary(out, "out", names + [TRUST_FOLDER, ASSETS] * (not only)) as place:
-        sections = _written(cases, out, place, only or (), progress)
-    for name, section in ((case.arm.name, section) for case, own in sections for section in own):
+        sections = _written(cases, out, place, only, progress)
+    for name, section in sections:
         if section.failure and notice is not None:
             notice(f"{name}: the page leaves out “{section.title}”: {section.failure}")
-    alone = f"{names[0]}/{only[0]}.html" if n == 1 and only and len(only) == 1 else "index.html"
-    return out / alone
+    return out / (f"{names[0]}/{only[0]}.html" if n == len(only) == 1 else "index.html")
 
 
 def _check(names: Sequence[str], only: tuple[str, ...]) -> None:
     """Raise ParameterError for a page that there is none of, and where an arm would have no folder of its own."""
-    if not names:
-        raise ParameterError(key="arms", value=(), remedy="name at least one arm to report on")
+    require(bool(names), "arms", (), "name at least one arm to report on")
     for question in only:
         must_be_known("only", question, QUESTIONS)
     taken = dict.fromkeys(RESERVED_NAMES, "the folder of reports has a file of this name; give the arm another name")
     for name in names:
-        if name.casefold() in taken:
-            raise ParameterError(key="name", value=name, remedy=taken[name.casefold()])
+        require(name.casefold() not in taken, "name", name, taken.get(name.casefold(), ""))
         taken[name.casefold()] = "two arms of this name would share one folder; give one of them another name"
 
 
@@ -138,56 +264,64 @@ def _temporary(out: Path, key: str, names: Sequence[str] = ()) -> Iterator[Path]
         remove_empty()
 
 
-# ------------------------------------------------------------ the work
+def _written(
+    cases: Sequence[Case], out: Path, place: Path, only: tuple[str, ...], progress: ReportProgress | None
+) -> list[tuple[str, PageSection]]:
+    """Make all pages in `place` and move them to `out`, the index last; every section with the name of its arm."""
+    tasks: dict[str, Sequence[Callable[[], Any]]] = {} if only else {EVIDENCE: [gather]}
+    if not only and any(map(is_live, cases)):
+        tasks[SCRIPTS] = [partial(write_assets, place / ASSETS)]
+    own = [tasks_of(case, place / case.arm.name, only) for case in cases]
+    for each in own:
+        tasks |= each
+    done = make_all(tasks, progress)
+    trust = TRUST_PAGE if not only or (out / TRUST_PAGE).is_file() else ""
+    sections = []
+    for case, each in zip(cases, own, strict=True):
+        made = [section for task in each for section in done[task] if section is not None]
+        _write_pages(case, place / case.arm.name, made, only, trust, out / case.arm.name)
+        sections += [(case.arm.name, section) for section in made]
+    move_into(place, out)
+    if not only:
+        audited, printed = done[EVIDENCE][0]
+        write_trust(audited, printed, written_proofs(out), place / TRUST_FOLDER)
+    write_text(place / "index.html", index_page(out, trust=trust))
+    move_into(place, out)
+    return sections
 
 
-def jobs_of(case: Case, folder: Path, only: tuple[str, ...]) -> Iterator[Job]:
-    """The jobs of one arm: its sections, its card and proof, and of a full report its live page.
+def tasks_of(case: Case, folder: Path, only: tuple[str, ...]) -> Calls:
+    """What is to be made of one arm: its sections, its card and proof, and of a full report its live page.
 
     Card, proof and live page are made by the process of the section that has computed most of them: the card has the
     verdicts, the proof certifies the modes that are listed, the live page has the regions of the map.
     """
-    of = f"{case.arm.name}: "
-    pieces = [piece for piece in pieces_of(case) if not only or any(map(piece.is_on, only))]
-    for piece in pieces:
-        make = partial(make_section, piece.name, piece.anchor, piece.make, case, folder)
-        yield Job(of + (piece.task or piece.name), make, piece.seconds)
-    has_loop = any(piece.task == LOOP_TASK for piece in pieces)
-    yield Job(of + (LOOP_TASK if has_loop else "card"), partial(save_card, case, folder))
+    folder.mkdir()
+    tasks: dict[str, list[Callable[[], Any]]] = defaultdict(list)
+    for piece in pieces_of(case):
+        if any(map(piece.is_on, only or ("",))):
+            make = partial(make_section, piece.name, piece.anchor, piece.make, case, folder)
+            tasks[piece.task or piece.name].append(make)
+    tasks[LOOP_TASK if LOOP_TASK in tasks else "card"].append(partial(save_card, case, folder))
     if not (only and case.laws):
-        yield Job(f"{of}modes", partial(save_proof, case.arm, folder, case.chain))
+        tasks["modes"].append(partial(save_proof, case.arm, folder, case.chain))
     if not only and is_live(case):
-        yield Job(of + LOOP_TASK, partial(save_live, case, folder))
+        tasks[LOOP_TASK].append(partial(save_live, case, folder))
+    return {f"{case.arm.name}: {task}": calls for task, calls in tasks.items()}
 
 
-def make_section(name: str, anchor: str, make: Callable[[Case], PageSection], case: Case, folder: Path) -> PageSection:
-    """A section saved in the arm's folder, or in its place why tfarm could not make it; a bug of ours stays loud."""
-    try:
-        section = make(case)
-    except TfarmError as error:
-        answer = f"This section could not be made for this arm: {error}."
-        section = PageSection(anchor=anchor, title=upper(name), answer=answer, failure=str(error))
-    return save_section(section, folder)
-
-
-def make_all(jobs: Sequence[Job], progress: ReportProgress | None) -> Mapping[str, Sequence[Any]]:
-    """The results of all jobs, by task."""
-    own = {name: [job for job in jobs if job.task == name] for name in (job.task for job in jobs)}
-    longest = sorted(own, key=lambda name: -sum(job.seconds for job in own[name]))
-    tasks = {name: partial(_in_turn, [job.call for job in own[name]]) for name in longest}
+def make_all(tasks: Calls, progress: ReportProgress | None) -> dict[str, Sequence[Any]]:
+    """The results of all calls, by task."""
+    longest = sorted(tasks, key=lambda task: not task.endswith(LONGEST))
     done: dict[str, Sequence[Any]] = {}
 
     def begun(running: Sequence[str]) -> None:
         if progress is not None:
             progress(len(done), len(tasks), ", ".join(running))
 
-    if len(tasks) < WORTH_A_PROCESS or MOST_WORKERS == 1 or not may_start_processes():
-        for name, task in tasks.items():
-            begun([name])
-            done[name] = task()
-    else:
-        for name, result in shared(tasks, MOST_WORKERS, begun):
-            done[name] = result  # noqa: PERF403  `begun` counts them meanwhile
+    count = MOST_WORKERS if len(tasks) >= WORTH_A_PROCESS else 1
+    for task, results in shared({task: partial(_in_turn, tasks[task]) for task in longest}, count, begun):
+        done[task] = results  # noqa: PERF403  `begun` counts them meanwhile
     begun(["pages"])
     return done
 
@@ -196,85 +330,166 @@ def _in_turn(calls: Sequence[Callable[[], Any]]) -> list[Any]:
     return [call() for call in calls]
 
 
-def _written(
-    cases: Sequence[Case], out: Path, place: Path, only: tuple[str, ...], progress: ReportProgress | None
-) -> list[tuple[Case, list[PageSection]]]:
-    """Make all pages in `place`, move them to `out`, and the index last; the sections of each case."""
-    folders = {case.arm.name: place / str(i) for i, case in enumerate(cases)}
-    jobs = [] if only else [Job(EVIDENCE, gather, seconds=8.0)]
-    jobs += [Job(SCRIPTS, partial(write_assets, place / ASSETS))] if not only and any(map(is_live, cases)) else []
-    for case in cases:
-        folders[case.arm.name].mkdir()
-        jobs += jobs_of(case, folders[case.arm.name], only)
-    done = make_all(jobs, progress)
-    trust = TRUST_PAGE if not only or (out / TRUST_PAGE).is_file() else ""
-    sections = [(case, _sections_of(case, done)) for case in cases]
-    for case, own in sections:
-        _write_pages(case, folders[case.arm.name], own, only or None, trust, out / case.arm.name)
-    if (place / ASSETS).is_dir():
-        move_into(place / ASSETS, out / ASSETS)
-    for name, folder in folders.items():
-        move_into(folder, out / name)
-    if not only:
-        audited, printed = done[EVIDENCE][0]
-        write_trust(audited, printed, written_proofs(out), place / TRUST_FOLDER)
-        move_into(place / TRUST_FOLDER, out / TRUST_FOLDER)
-    _write(place / "index.html", index_page(out, trust=trust))
-    os.replace(place / "index.html", out / "index.html")
-    return sections
+def move_into(made: Path, folder: Path) -> None:
+    """Every file replaced in one step each, pages last, so that a page never names a file that is not there."""
+    files = [file.relative_to(made) for file in made.rglob("*") if file.is_file()]
+    for file in sorted(files, key=lambda file: (file.suffix == ".html", file.as_posix())):
+        (folder / file).parent.mkdir(parents=True, exist_ok=True)
+        os.replace(made / file, folder / file)
 
 
-def _sections_of(case: Case, done: Mapping[str, Sequence[Any]]) -> list[PageSection]:
-    """The sections of a page that were made, in their order."""
-    tasks = {f"{case.arm.name}: {piece.task or piece.name}" for piece in pieces_of(case)}
-    made = {each.anchor: each for task in tasks & done.keys() for each in done[task] if each is not None}
-    return [made[piece.anchor] for piece in pieces_of(case) if piece.anchor in made]
+# ------------------------------------------------------------ an arm's page
 
 
 def _write_pages(
-    case: Case,
-    folder: Path,
-    sections: Sequence[PageSection],
-    only: tuple[str, ...] | None,
-    trust: str,
-    earlier: Path,
+    case: Case, folder: Path, made: Sequence[PageSection], only: Sequence[str], trust: str, earlier: Path
 ) -> None:
     """The arm's file, with the chain that the page is about, and its page, or the page of each question asked.
 
-    These lead to each other, and to what is in the `earlier` folder of the arm.
+    These lead to each other, to what is in the `earlier` folder of the arm, and to the page on `trust`, if any.
     """
-    _write(folder / "arm.toml", file_of(case))
-    compared = kept_comparison(earlier.parent)
-    for question in only or (None,):
-        anchors = {piece.anchor for piece in pieces_of(case) if not question or piece.is_on(question)}
+    arm, file, compared = case.arm, file_of(case), kept_comparison(earlier.parent)
+    write_text(folder / "arm.toml", file)
+    pages = [page for page in pages_in(earlier, only or ("index",)) if page[0] != LIVE_PAGE]
+    pages += [(f"../{COMPARISON_PAGE}", compared.title)] if arm.name in compared.arms else []
+    by_anchor = {section.anchor: section for section in made}
+    for question in only or ("",):
         name = f"{question or 'index'}.html"
-        others = [page for page in pages_in(earlier, only or ("index",)) if page[0] not in (name, LIVE_PAGE)]
-        others += [(f"../{COMPARISON_PAGE}", compared.title)] if case.arm.name in compared.arms else []
-        page = arm_page(
-            case,
-            [each for each in sections if each.anchor in anchors],
-            question,
+        anchors = [piece.anchor for piece in pieces_of(case) if piece.is_on(question)]
+        page = render(
+            "arm.html",
+            title=f"{arm.name}: {QUESTIONS[question]}" if question else arm.name,
+            sections=[by_anchor[anchor] for anchor in anchors if anchor in by_anchor],
+            looks=BADGES,
+            open_pictures=2,  # of a section: those that answer its question; the rest is a click away
+            only=question,
+            others=[page for page in pages if page[0] != name],
+            signs="" if arm.is_locked else sign_words(arm),
+            glossary=[term for term in GLOSSARY_TERMS if term.name in PROMISES],
             trust=f"../{trust}" if trust else "",
             live=(folder / LIVE_PAGE).is_file(),
-            others=others,
+            summary=summary(case),
+            sha256=hashlib.sha256(file.encode()).hexdigest(),
+            command=command_of(case, question),
+            has_proof=not (case.laws and question),
+            explained=explained,
+            word_id=word_id,
         )
-        _write(folder / name, page)
+        write_text(folder / name, page)
 
 
-def _write(file: Path, text: str) -> None:
-    file.write_text(text, encoding="utf-8", newline="")
+def explained(text: str) -> Markup:
+    """A sentence as a page shows it; a word that promises something leads to its meaning at its first place."""
+    shown = str(with_symbols(text))
+    for word in PROMISES:
+        linked = rf'<a class="term" href="#{word_id(word)}">\g<0></a>'
+        shown = re.sub(rf"\b{word}\b", linked, shown, count=1, flags=re.IGNORECASE)
+    return Markup(shown)
 
 
-def move_into(made: Path, folder: Path) -> None:
-    """Every file replaced in one step each, pages last, so that a page never names a file that is not there."""
-    files = [file for file in made.rglob("*") if file.is_file()]
-    for file in sorted(files, key=lambda file: (file.suffix == ".html", file.relative_to(made).as_posix())):
-        place = folder / file.relative_to(made)
-        place.parent.mkdir(exist_ok=True)
-        os.replace(file, place)
+def word_id(name: str) -> str:
+    """The anchor of a word of the glossary on a page."""
+    return f"word-{name.lower().replace(' ', '-')}"
+
+
+def pages_in(folder: Path, written: Sequence[str] = ()) -> list[tuple[str, str]]:
+    """(file, title) of the pages in an arm's folder, and of those that are being written."""
+    there = {name: title for name, title in PAGES.items() if name in written or (folder / f"{name}.html").is_file()}
+    return [(f"{name}.html", title) for name, title in there.items()]
+
+
+def summary(case: Case) -> str:
+    """The arm in one sentence, and the laws that its page is about in another."""
+    return prose("summary", arm=case.arm, laws=[each.name for each in case.laws])
+
+
+def file_of(case: Case) -> str:
+    """The arm's file with its chain, and with the law that the page is about where TOML can say that alone."""
+    law = own_law(case)
+    return file_text(case.arm, case.chain) + ("" if law is None else f"\n{law}")
+
+
+def own_law(case: Case) -> str | None:
+    """The table [law] of the one law of a page; None of none or several, or of one with files of its own."""
+    with suppress(ParameterError):
+        if len(case.laws) == 1 and case.laws[0].measured is None:
+            return law_toml(as_law(case.laws[0].law))
+    return None
+
+
+def command_of(case: Case, only: str) -> str:
+    """The command that writes this page; an arm that is no preset is named by its file, as are laws with theirs."""
+    law = own_law(case)
+    options = [] if law is not None else [f"--law {shlex.quote(each.file or 'FILE')}" for each in case.laws]
+    options += [f"--measured {shlex.quote(f'{each.name}={each.source}')}" for each in case.measured]
+    options += [f"--only {only}"] * bool(only)
+    name = argument(case.arm.name, law is None and is_preset(case.arm, case.chain))
+    return " ".join(["tfarm report", name, *options, "--out reports"])
+
+
+# ------------------------------------------------------------ the index
+
+
+@dataclass(frozen=True)
+class Card:
+    """An arm as the index shows it; `picture` is empty where there is none."""
+
+    name: str
+    summary: str
+    facts: list[Fact]
+    picture: str
+    loops: list[dict[str, str]]
+
+
+def save_card(case: Case, folder: Path) -> None:
+    """pictures/card.svg and card.json; a picture that cannot be made is left out, as its section on the page is."""
+    (folder / PICTURES).mkdir(exist_ok=True)
+    arm, picture = case.arm, ""
+    with suppress(TfarmError):
+        save_figure(draw_card.figure(bode(arm, "root_moment")), folder / PICTURES, "card", formats=("svg",))
+        picture = "card.svg"
+    loops = [loop_cells(each, case.chain) for each in case.controllers if case.laws or has_loop(arm)]
+    facts = list(headline_numbers(arm)[:4])
+    keep(folder, "card", asdict(Card(arm.name, summary(case), facts, picture, loops)))
+
+
+def loop_cells(each: Controller, chain: Chain) -> dict[str, str]:
+    """A controller in cells of the table of arms; a verdict that cannot be had is left out."""
+    cells = {"law": each.given.name}
+    with suppress(TfarmError):
+        if not each.law.is_discrete:
+            found = margins_of(each.arm, each.law)
+            cells["verdict"] = found.stability.verdict
+            for row in found.stability_intervals:
+                if row.name in PLANE:
+                    cells[row.name] = f"{row.interval.as_text(5)} {row.unit}".rstrip() if row.interval else "none"
+    with suppress(TfarmError):
+        cells["sampled"] = brief_on(each.arm, each.law, chain).short
+    return cells
+
+
+def index_page(out: Path, *, trust: str) -> str:
+    """The page that leads to all others in a folder of reports."""
+    cards = [(card, pages) for folder, card in kept(out, "card", Card).items() if (pages := pages_in(folder))]
+    compared = kept_comparison(out).title
+    return render("index.html", title="tfarm reports", cards=cards, trust=trust, compared=compared, looks=BADGES)
 
 
 # ------------------------------------------------------------ a comparison
+
+
+@dataclass(frozen=True)
+class KeptComparison:
+    """The title of the comparison in a folder of reports, and the arms that it compares."""
+
+    title: str = ""
+    arms: tuple[str, ...] = ()
+
+
+def kept_comparison(out: Path) -> KeptComparison:
+    """The comparison in a folder of reports; an empty one where there is none."""
+    found = kept_in(out, "compare", KeptComparison) if (out / COMPARISON_PAGE).is_file() else None
+    return found or KeptComparison()
 
 
 def write_comparison(found: Comparison, out: Path) -> Path:
@@ -289,11 +504,11 @@ def write_comparison(found: Comparison, out: Path) -> Path:
         saved = save_section(_comparison_section(found), made)
         others = [("index.html", "all arms"), *((f"{name}/index.html", name) for name in arms)]
         pages = [(file, name) for file, name in others if (out / file).is_file()]
-        _write(made / COMPARISON_PAGE, render(COMPARISON_PAGE, title=title, saved=saved, pages=pages))
+        write_text(made / COMPARISON_PAGE, render(COMPARISON_PAGE, title=title, saved=saved, pages=pages))
         keep(made, "compare", {"title": title, "arms": arms})
         move_into(made, out)
         if (out / "index.html").is_file():
-            _write(made / "index.html", index_page(out, trust=TRUST_PAGE if (out / TRUST_PAGE).is_file() else ""))
+            write_text(made / "index.html", index_page(out, trust=TRUST_PAGE if (out / TRUST_PAGE).is_file() else ""))
             move_into(made, out)
     return out / COMPARISON_PAGE
 
@@ -301,8 +516,8 @@ def write_comparison(found: Comparison, out: Path) -> Path:
 def _comparison_section(found: Comparison) -> PageSection:
     """The verdicts and the picture of a comparison, then its tables of differences."""
     drawn = picture("comparison_picture", comparison.figure(found), stem="comparison", found=found)
-    quantities_of = quantities(type(found)).items()
-    rows = ((of, getattr(found, name)) for name, of in quantities_of if of.label and name != "is_sampled")
-    first, *tables = (sheet("compared", table(each).columns, stem=f"compare-{of.key}", of=of) for of, each in rows)
-    words = [prose("comparison", found=found)]
-    return PageSection(anchor="compared", title="Compared", words=words, blocks=[first, drawn, *tables])
+    rows = (
+        (of, getattr(found, name)) for name, of in quantities(Comparison).items() if of.label and name != "is_sampled"
+    )
+    first, *tables = (sheet("compared", table(each), stem=f"compare-{of.key}", of=of) for of, each in rows)
+    return PageSection(words=[prose("comparison", found=found)], blocks=[first, drawn, *tables])
