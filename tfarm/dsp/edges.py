@@ -76,10 +76,6 @@ def delay_margin(loop: Sampled) -> DelayMargin:
     def log_radius(more: float) -> float:
         return loop.with_delay(now + more).poles.log_spectral_radius
 
-    def grows(more: float) -> bool:
-        later = loop.with_delay(now + more)
-        return bool((abs(later.eigenvalues) > 1 - CLEARLY).any()) and later.poles.log_spectral_radius >= 0
-
     if log_radius(0.0) >= 0:
         return DelayMargin(0.0, False)
     plant, T = loop.plant, loop.chain.sampling.period
@@ -89,7 +85,8 @@ def delay_margin(loop: Sampled) -> DelayMargin:
     step = float(min(LONGEST_SCAN_STEP, 2 * np.pi / fastest / STEPS_A_TURN))  # samples
     scanned = step * np.arange(min(MOST_STEPS, int(LONGEST_DELAY_SAMPLES / step)) + 1)
     for low, high in pairwise(scanned.tolist()):
-        if grows(high):
+        later = loop.with_delay(now + high)
+        if (abs(later.eigenvalues) > 1 - CLEARLY).any() and not later.is_stable:
             is_between = log_radius(low) < 0
             return DelayMargin(float(brentq(log_radius, low, high, xtol=DELAY_KNOWN)) if is_between else low, False)
     return DelayMargin(min(MOST_STEPS * step, LONGEST_DELAY_SAMPLES), True)
@@ -113,7 +110,7 @@ def damping_edge(loop: Sampled) -> float:
     def log_radius(C: float) -> float:
         return log_radius_with(loop, C, loop.plant.count)
 
-    if loop.poles.is_stable:
+    if loop.is_stable:
         return 0.0
     high = 2 * STRONGEST / first_frequency(loop.plant.arm)
     if log_radius(high) >= 0:
@@ -249,7 +246,7 @@ def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[Interval]
         other, modes = _with_others(loop), loop.plant.count
 
         def confirmed(value: float) -> Proof:
-            return other().having(**{name: value}).poles.is_stable, math.inf
+            return other().having(**{name: value}).is_stable, math.inf
 
         def edge(value: float, opposite: float, *, below: bool) -> Figure:
             spare = DISTINCT_FROM_ZERO * (abs(opposite) if opposite and math.isfinite(opposite) else 1.0)
@@ -317,7 +314,7 @@ def shown_delay(loop: Sampled, band: Band | None) -> Figure:
         margin, modes, other = delay_margin(loop), loop.plant.count, _with_others(loop)
 
         def holds(more: float) -> Proof:
-            return None if more < 0 else other().with_delay(now + more).poles.is_stable, math.inf
+            return None if more < 0 else other().with_delay(now + more).is_stable, math.inf
 
         if margin.samples == 0.0:
             return Figure(0.0, OTHER_DIGITS, band.top if band else None, None if band else modes)

@@ -134,16 +134,13 @@ def origins(loop: Sampled) -> NDArray[np.int64]:
     0, and each pole is followed.
     """
     open_loop = np.r_[loop.pulse.multipliers, 1 + loop.in_z.poles]
-    labels = np.nonzero(np.r_[loop.pulse.poles != 0, loop.in_z.poles + 1 != 0])[0]
-    ahead, rows = open_loop[labels], []
-    scales = np.r_[FIRST_SCALE, np.arange(1, FOLLOWING_STEPS + 1) / FOLLOWING_STEPS, 1.0]
-    for number, scale in enumerate(scales[:-1]):
-        z = loop.times(float(scale)).eigenvalues
-        order = _matched(ahead, z)
-        rows.append(z[order])
-        ahead = _ahead(rows, scales[max(0, number - 1) : number + 2])
-    origin = np.full(z.size, -1)
-    origin[order] = labels
+    labels = np.flatnonzero(np.r_[loop.pulse.poles != 0, loop.in_z.poles + 1 != 0])
+    scales = np.r_[FIRST_SCALE, np.arange(1, FOLLOWING_STEPS + 1) / FOLLOWING_STEPS]
+    weak, full = loop.times(FIRST_SCALE).reduced_matrix(), loop.reduced_matrix()
+    first, *others = np.linalg.eigvals(weak + scales[:-1, None, None] * (full - weak))
+    poles = [first[_matched(open_loop[labels], first)], *others, loop.eigenvalues]
+    origin = np.full(loop.eigenvalues.size, -1)
+    origin[_matched(followed_branches(poles, scales)[-1], loop.eigenvalues)] = labels
     origin.flags.writeable = False
     return origin
 

@@ -317,15 +317,16 @@ class PulseTransfer:
         rows = np.empty(0, np.int64) if base is None else np.flatnonzero(base >= 0)
         near = (rows, rows if base is None else base[rows])
         gap[near] = 1.0
-        push = self.early + self.late / z[:, None]
-        weights = push * (offset[:, None] / gap)
-        weights[near] = push[near]
-        value = self.residues @ weights.T + np.outer(self.plant.static, offset / z)
+        share = offset[:, None] / gap
+        share[near] = 1.0
+        value = (self.residues * self.early) @ share.T + np.outer(self.plant.static, offset / z)
+        if self.sampling.fraction:
+            value += (self.residues * self.late) @ share.T / z
         if self.plant.rigid[:, 0].any():
             distance = z - 1.0 if delta is None else delta
             distance = distance if base is None else np.where(base == self.poles.size - 1, offset, distance)
-            ramp = self.ramps[0] + self.ramps[1] / z
-            twice = (self.sampling.period * push[:, -1] / distance + ramp) / distance
+            ramp, push = (early + late / z for early, late in (self.ramps, (self.early[-1], self.late[-1])))
+            twice = (self.sampling.period * push / distance + ramp) / distance
             value = value + np.outer(self.plant.rigid[:, 0], twice * offset)
         return value * z ** (-self.sampling.whole_delay)
 
