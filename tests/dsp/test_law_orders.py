@@ -75,17 +75,6 @@ def test_a_growth_that_rounding_leaves_open_is_marginal():
     np.testing.assert_allclose(others[:6], logs[1:7], rtol=1e-4)
 
 
-@pytest.mark.parametrize("period", [1e-4, 0.01])
-@pytest.mark.parametrize("rule", ["tustin", "zoh", "matched"])
-def test_a_cluster_of_eight_poles_has_the_radius_of_its_state_transition(rule, period):
-    case = Case(LAB, Law(CLUSTER, rule=rule), chain_of(period))
-    verdict = sampled_verdict(LAB, case.law, case.chain)
-    at_one, logs = truth(verdict.loop, case)
-    assert (verdict.is_settled, at_one) == (True, 0)
-    found = np.sort(verdict.loop.poles.log_radius)[:-11:-1]
-    np.testing.assert_allclose(found, logs[:10], rtol=1e-8)
-
-
 INTEGRATOR, CANCELLED = ([0.02, 0.0], [1.0, -1.0]), ([1.0, -1.0], [1.0, -1.0])
 
 

@@ -88,7 +88,7 @@ def test_what_is_proven_of_random_laws_is_the_count_of_their_poles(number, seed)
         if case is None or not case.arm.least_damping:
             continue
         band = complete_band(whole_loop(case.arm, case.law, case.chain))
-        proven = band.circle().count(band.loop.weights)
+        proven = band.circle.count(band.loop.weights)
         found.append(proven)
         assert proven in (None, (band.full.poles.log_radius > 0).sum())
     assert sum(each is not None for each in found) >= min(number, 3)

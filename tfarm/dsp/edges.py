@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 from tfarm.arm import AnyLaw, Arm
 from tfarm.digits import general
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.circle import Band, Circle, complete_band
+from tfarm.dsp.circle import Band, complete_band
 from tfarm.dsp.crossings import stable_windows
 from tfarm.dsp.discretise import acting_law, with_all_gains
 from tfarm.dsp.plant import FORGOTTEN, held_amplitude
@@ -237,10 +237,9 @@ def figure(value: float, digits: int, modes: int, proven: Test, other: Test, *, 
 
 def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[Interval]:
     """Return the stability intervals of a number, with more and more modes until all digits are certified."""
-    circle = None if band is None else band.circle()
 
     def proof(value: float) -> Proof:
-        return _proof(band, circle, loop.having(**{name: value}))
+        return _proof(band, loop.having(**{name: value}))
 
     def found(loop: Sampled) -> list[Interval]:
         other, modes = _with_others(loop), loop.plant.count
@@ -288,16 +287,10 @@ def _most(loop: Sampled) -> int:
     return min(MOST_EDGE_MODES, most_modes(loop.plant.arm, loop.chain))
 
 
-def _proof(band: Band | None, circle: Circle | None, loop: Sampled) -> Proof:
+def _proof(band: Band | None, loop: Sampled) -> Proof:
     """Whether a loop is stable with every mode of a band, by its discs on the circle."""
-    count = None if circle is None else circle.count(loop.weights)
+    count = None if band is None else band.circle.count(loop.weights)
     return None if count is None else count == 0, 0.0 if band is None else band.top
-
-
-def _proof_of(loop: Sampled) -> Proof:
-    """Whether a loop is stable with every mode of its own band."""
-    band = complete_band(loop)
-    return _proof(band, None if band is None else band.circle(), loop)
 
 
 def shown_delay(loop: Sampled, band: Band | None) -> Figure:
@@ -308,7 +301,10 @@ def shown_delay(loop: Sampled, band: Band | None) -> Figure:
     now = loop.chain.sampling.delay_samples
 
     def proof(more: float) -> Proof:
-        return (None, 0.0) if band is None or more < 0 else _proof_of(band.loop.with_delay(now + more))
+        if band is None or more < 0:
+            return None, 0.0
+        later = band.loop.with_delay(now + more)
+        return _proof(complete_band(later), later)
 
     def found(loop: Sampled) -> Figure:
         margin, modes, other = delay_margin(loop), loop.plant.count, _with_others(loop)
@@ -337,7 +333,8 @@ def shown_damping(loop: Sampled, count: int) -> Figure:
         return Figure(C, OTHER_DIGITS, None, count)
 
     def proof(value: float) -> Proof:
-        return _proof_of(whole_loop(bare.plant.arm.having(damping=value), law, loop.chain))
+        whole = whole_loop(bare.plant.arm.having(damping=value), law, loop.chain)
+        return _proof(complete_band(whole), whole)
 
     def holds(value: float) -> Proof:
         return log_radius_with(bare, value, another(count, MOST_EDGE_MODES)) < 0, math.inf

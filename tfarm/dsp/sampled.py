@@ -153,7 +153,9 @@ class Sampled:
     def weighted(self, weights: Sequence[float]) -> Sampled:
         """The same loop with other weights; plant and pulse transfer functions are shared."""
         other = replace(self, weights=tuple(weights))
-        vars(other).update(plant=self.plant, pulse=self.pulse, frame=self.frame)
+        vars(other).update(plant=self.plant, pulse=self.pulse)
+        if "frame" in vars(self):
+            vars(other)["frame"] = self.frame
         return other
 
     def having(self, **numbers: float) -> Sampled:
@@ -260,17 +262,16 @@ class Sampled:
     # ------------------------------------------------------------ poles
 
     @cached_property
-    def frame(self) -> tuple[Real, Real, Real]:
-        """M, b and K (parts, n) of the closed-loop matrix M - b weights K."""
+    def frame(self) -> tuple[Real, Real]:
+        """The matrix without feedback, and what the input adds to its states."""
         A, B, C = self.pulse.matrices()
-        own, Bk, Ck, Dk = self.in_z.matrices
-        states = np.zeros((len(A), len(own)))
-        return np.block([[A, states], [Bk @ C, own]]), np.r_[B, np.zeros(len(own))], np.hstack([Dk @ C, Ck])
+        own, Bk, _, _ = self.in_z.matrices
+        return np.block([[A, np.zeros((len(A), len(own)))], [Bk @ C, own]]), np.r_[B, np.zeros(len(own))]
 
     def matrix(self) -> Real:
         """The closed-loop matrix: states of `PulseTransfer.matrices`, then those of the law."""
-        M, b, K = self.frame
-        return M - np.outer(b, np.array(self.weights) @ K)
+        (M, b), (_, _, Ck, Dk), weights = self.frame, self.in_z.matrices, np.array([self.weights])
+        return M - np.outer(b, np.hstack([weights @ Dk @ self.pulse.matrices()[2], weights @ Ck]))
 
     @property
     def is_damped(self) -> bool:

@@ -157,7 +157,7 @@ def sampled_verdict(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count:
     largest = whole_loop(arm, law, chain)
     band = complete_band(largest)
     full = largest if band is None else band.full
-    proven, radius = None if band is None else band.circle().count(full.weights), full.poles.log_spectral_radius
+    proven, radius = None if band is None else band.circle.count(full.weights), full.poles.log_spectral_radius
 
     def agrees(fewer: Sampled) -> bool:
         is_near = abs(fewer.poles.log_spectral_radius - radius) <= RADIUS_AGREES * abs(radius) + RADIUS_NOISE
