@@ -12,7 +12,7 @@ from tfarm.arm import FED_BACK, HubFeedback, Law
 from tfarm.dsp import Chain, Converters, Sampling, pulse_transfer, sampled_loop, sampled_verdict
 from tfarm.dsp import circle as circle_module
 from tfarm.dsp.circle import Arcs, Circle, Discs, complete_band, product
-from tfarm.dsp.crossings import crossing_factors, stable_windows
+from tfarm.dsp.crossings import FACTOR, crossings_of, stable_windows
 from tfarm.dsp.edges import shown_delay, whole_loop
 from tfarm.reduced import modal_model
 
@@ -53,7 +53,7 @@ def test_a_law_without_zeros_at_rest_is_seen_to_cross_however_slowly():
     friction, T = 0.3, 0.01
     arm = replace(LAB, hub=replace(LAB.hub, friction=friction))
     law = Law({"hub_rate": -1.0, "hub_angle": 1e-10 * arm.total_inertia / friction})
-    (found,) = [each for each in crossing_factors(sampled_loop(arm, law, Chain(), count=2)) if each.at < 1e-3]
+    (found,) = [each for each in crossings_of(sampled_loop(arm, law, Chain(), count=2), FACTOR) if each.at < 1e-3]
     assert found.t == pytest.approx(friction, rel=1e-6)
     assert found.at == pytest.approx(1e-5 * T / math.sqrt(1 + friction * T / 2 / arm.total_inertia), rel=1e-6)
     assert found.change == 2
@@ -123,7 +123,7 @@ HELD = HubFeedback(K1=0.3, K2=0.3, Kp=1.0)
 def test_discs_hold_the_terms_of_the_loop(arm, chain):
     """x^n H, through the law, at the middle and at a point of arcs, by `Sampled.terms`; before and after a cut."""
     loop = whole_loop(arm, HELD, chain)
-    circle, rng = complete_band(loop).circle(), np.random.default_rng(3)
+    circle, rng = complete_band(loop).circle, np.random.default_rng(3)
     assert circle.is_slow.any() == (arm is not LAB)
     for share in (0.5, rng.uniform(0, 1, circle_module.ARCS)):
         arcs = np.flatnonzero(circle.low > 0.1)[: circle_module.ARCS]

@@ -14,7 +14,7 @@ from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.dsp import Chain, Sampling, sampled_loop, stable_windows
 from tfarm.dsp.circle import complete_band
-from tfarm.dsp.crossings import circle_grid, crossing_factors, number_crossings, stable_factors
+from tfarm.dsp.crossings import FACTOR, crossings_of
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.edges import shown_damping, whole_loop
 from tfarm.dsp.modes import mode_table
@@ -88,7 +88,7 @@ def test_what_is_proven_of_random_laws_is_the_count_of_their_poles(number, seed)
         if case is None or not case.arm.least_damping:
             continue
         band = complete_band(whole_loop(case.arm, case.law, case.chain))
-        proven = band.circle().count(band.loop.weights)
+        proven = band.circle.count(band.loop.weights)
         found.append(proven)
         assert proven in (None, (band.full.poles.log_radius > 0).sum())
     assert sum(each is not None for each in found) >= min(number, 3)
@@ -98,7 +98,7 @@ def test_what_is_proven_of_random_laws_is_the_count_of_their_poles(number, seed)
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_poles_cross_the_circle_at_the_factors_that_are_named(law):
     loop = sampled_loop(LAB, law, Chain(), count=6)
-    found = crossing_factors(loop)
+    found = crossings_of(loop, FACTOR)
     assert len(found)
     for factor, _, change in list(found)[:4]:
         before, after = (int((loop.times(factor * k).poles.log_radius > 0).sum()) for k in (1 - 1e-7, 1 + 1e-7))
@@ -110,7 +110,7 @@ def test_a_real_pole_crosses_where_the_law_s_stiffness_is_the_hub_spring_s(entry
     """2 N m/rad hold the hub: k + g C(0) = 0, and one pole passes z = 1, out or in."""
     held = replace(LAB, hub=replace(LAB.hub, stiffness=2.0))
     loop = sampled_loop(held, Law({"hub_angle": entry}), Chain(), count=6)
-    (found,) = [each for each in crossing_factors(loop) if each.at == 0.0]
+    (found,) = [each for each in crossings_of(loop, FACTOR) if each.at == 0.0]
     before, after = (int((loop.times(factor * k).poles.log_radius > 0).sum()) for k in (1 - 1e-7, 1 + 1e-7))
     assert found.t == pytest.approx(factor, rel=1e-9)
     assert found.change == after - before == change
@@ -120,8 +120,8 @@ def test_a_real_pole_crosses_where_the_law_s_stiffness_is_the_hub_spring_s(entry
 def test_a_law_whose_factor_moves_no_pole_across_is_stable_or_not_for_all(stiffness, entry, windows):
     arm = replace(LAB, hub=replace(LAB.hub, stiffness=stiffness))
     loop = sampled_loop(arm, Law({"hub_angle": entry}), Chain(), count=6)
-    assert stable_factors(loop) == windows
-    assert len(crossing_factors(loop)) == 0
+    assert stable_windows(loop, FACTOR) == windows
+    assert len(crossings_of(loop, FACTOR)) == 0
 
 
 def test_margins_end_where_the_verdict_turns():
@@ -250,7 +250,7 @@ def test_several_signals_at_once_are_discretised_as_each_alone():
 
 def test_between_crossings_along_one_part_the_count_is_theirs():
     """Random laws, integrators and unstable ones among them, at random factors of either sign."""
-    rng, compared = np.random.default_rng(77), 0
+    rng, compared, shown = np.random.default_rng(77), 0, 0
     for _ in range(6):
         case = some_case(rng)
         loop = case and sampled_loop(case.arm, case.law, case.chain, count=6)
@@ -258,11 +258,15 @@ def test_between_crossings_along_one_part_the_count_is_theirs():
             own = loop.number(name)
             values = own * np.r_[1.0, -(10 ** rng.uniform(-4, 3, 3)), 10 ** rng.uniform(-4, 3, 3)]
             loops = [loop.having(**{name: value}) for value in values.tolist()]
-            passed = number_crossings(circle_grid(loop), name, loop.row[None])[0].passed(values)
+            passed = crossings_of(loop, name).passed(values)
+            by_discs = [each.is_stable for each in loops]
+            shown += sum("poles" not in vars(each) for each in loops)  # without polishing
+            assert by_discs == [each.poles.is_stable for each in loops]
             counts = np.array([(each.poles.log_radius > 0).sum() for each in loops])
             assert (counts - counts[0] == passed - passed[0]).all(), name
             compared += 1
     assert compared > 5
+    assert shown > compared
 
 
 def test_gains_of_a_stiff_arm_have_the_jury_limits():

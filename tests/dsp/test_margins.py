@@ -16,7 +16,7 @@ from tests.similar import EITHER
 from tfarm import HubFeedback, Law, modes
 from tfarm.arm import as_law
 from tfarm.dsp import Chain, Converters, Sampling, delay_margin, required_damping, sampled_loop, sampled_map
-from tfarm.dsp.crossings import ENDS_AT, around, circle_grid, ends_of_K1, number_crossings, stable_windows
+from tfarm.dsp.crossings import ENDS_AT, around, crossings_of, ends_of_K1, stable_windows
 from tfarm.dsp.edges import Figure
 from tfarm.dsp.verdict import Analysis, Verdict, sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError
@@ -59,7 +59,7 @@ def test_where_the_feedback_outweighs_no_fast_modes_damping_all_delays_are_looke
 def test_a_long_delay_hides_no_crossing_between_two_points_of_the_grid(lab):
     """Sixty samples turn the loop's phase sixty times round the circle; a grid ten times coarser loses a pair."""
     loop = sampled_loop(lab, GAINS, Chain(sampling=Sampling(delay_samples=60.0)), count=6)
-    (found,) = number_crossings(circle_grid(loop), "K1", loop.having(K1=0.0, K2=0.3).row[None])
+    found = crossings_of(loop.having(K1=0.0, K2=0.3), "K1")
     gaps = np.nonzero(np.diff(found.gain) > 1e-6)[0]
     middles = np.r_[found.gain[0] - 1, (found.gain[gaps + 1] + found.gain[gaps]) / 2, found.gain[-1] + 1]
     passed = np.r_[0, np.cumsum(found.change)][np.searchsorted(found.gain, middles)]
@@ -104,7 +104,7 @@ def test_the_required_damping_is_where_the_verdict_turns(lossless):
 def test_at_a_crossing_the_closed_loop_matrix_has_an_eigenvalue_at_its_angle(lab, gain):
     """Not only the gain of a crossing is right, but the place on the circle, too."""
     loop = sampled_loop(lab, GAINS, count=6)
-    (found,) = number_crossings(circle_grid(loop), gain, loop.row[None])
+    found = crossings_of(loop, gain)
     assert found.gain.size > 3
     for value, angle in zip(found.gain.tolist(), found.at.tolist(), strict=True):
         eigenvalues = loop.having(**{gain: value}).eigenvalues

@@ -109,7 +109,7 @@ def test_poles_left_of_the_line_weigh_no_more_than_the_bound(delay):
     """Pulse transfer functions of the band's poles, and those of sixty modes, on the circle."""
     gains, chain = HubFeedback(K1=0.3, K2=0.3), Chain(sampling=Sampling(delay_samples=delay))
     band, many = complete_band(whole_loop(RINGING, gains, chain)), sampled_loop(RINGING, gains, chain, count=60)
-    circle = band.circle()
+    circle = band.circle
     z = np.exp(0.5j * (circle.low + circle.high))
     F = circle.characteristic(band.loop.weights).middle / (1 - 1 / z)  # of K1, whose plant has a simple pole at z = 1
     bound = gains.K1 * band.missing[1] + gains.K2 * band.missing[2]
@@ -122,7 +122,7 @@ def test_the_count_does_not_depend_on_the_arcs_to_begin_with(lab, coarser, monke
     monkeypatch.setattr("tfarm.dsp.circle.ARCS", 64 // coarser)
     slightly = replace(lab, link=replace(lab.link, damping=1e-12))
     loop = sampled_loop(slightly, HubFeedback(K1=0.3, K2=0.3), count=14)
-    circle = complete_band(loop).circle()
+    circle = complete_band(loop).circle
     for K2 in (0.3, -0.05, 1.3):
         other = loop.having(K1=0.3, K2=K2)
         assert circle.count(other.weights) == (other.poles.log_radius > 0).sum()
@@ -136,7 +136,7 @@ def test_the_count_is_that_of_the_eigenvalues_outside_odd_ones_too(lab, K1, K2, 
     """An odd number of them: F begins or ends on the negative real axis, and its turn is none of whole turns."""
     loop = sampled_loop(lab, HubFeedback(K1=K1, K2=K2, Kp=Kp), Chain())
     outside = abs(np.linalg.eigvals(loop.reduced_matrix())) > 1 + 1e-9
-    assert complete_band(loop).circle().count(loop.weights) == outside.sum()
+    assert complete_band(loop).circle.count(loop.weights) == outside.sum()
 
 
 @pytest.mark.parametrize(("damping", "K2", "off"), thinned([(0.3, 0.3, 1e-5), (0.3, 1.5, 1e-5), (12.0, 0.3, 0.05)], 3))

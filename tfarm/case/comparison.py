@@ -17,7 +17,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.crossing import Window
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual
-from tfarm.dsp.crossings import circle_grid, stable_factors
+from tfarm.dsp.crossings import FACTOR, circle_grid, stable_windows
 from tfarm.dsp.verdict import Analysis, SampledBrief, Verdict, brief_of, sampled_verdict
 from tfarm.errors import ConvergenceError, one_line, require
 from tfarm.loop.loop import Loop
@@ -143,7 +143,7 @@ class ComparedSide:
         if isinstance(self.loop, Analysis):
             sampling, late = self.loop.loop.chain.sampling, self.loop.loop.with_delay
             now = [late(sampling.delay_samples + more) for more in (delay / sampling.period).tolist()]
-            return [stable_factors(each) for each in now]
+            return [stable_windows(each, FACTOR) for each in now]
         loop, factors = Loop(self.arm, as_law(self.law)), between(0.0, MOST_FACTOR, FACTORS)
         return [*plane(loop, ("delay", "gain"), loop.law.delay + delay, factors).stable_intervals]
 

@@ -313,6 +313,7 @@ class Band:
         """The loop with all modes of the band, and at least one."""
         return resized(self.loop, max(1, self.modes))
 
+    @cached_property
     def circle(self) -> Circle:
         """The unit circle, for counts of the poles outside."""
         return Circle(self.loop, self.kept, self.missing)

@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,7 @@ NO_EFFECT = 1e-12  # of the terms without a gain: smaller terms of the gain are 
 COARSEST = 2000  # points of the uniform grid over the half circle
 STILL = 1e-8  # of the way from z = 1 to the nearest pole of a held arm: nearer than that the rate of the arm is
 # rounding, and a gain on it would have to be 1e8 times too large to move a pole
+FACTOR = "gain"  # the name of a factor on the whole law
 LEAST_FACTOR = 1e-9  # on a law, of those searched: with less it is none
 MOST_FACTOR = 1e9  # with more its gain is beyond any number
 MOST_GAINS = 4000  # of a map, along one gain
@@ -137,34 +138,36 @@ def geometric(edge: float, width: float) -> Real:
     return np.union1d(near, even[even < edge])
 
 
-def number_crossings(grid: CircleGrid, name: str, rows: Real) -> list[Crossings]:
-    """Return the crossings of the circle, at angles `at`, along all values of one number of the law, to rounding.
+class Line(NamedTuple):
+    """Weights `others` + g `alone` (1 + parts,) of the rows of `Sampled.terms`, g a number from `low` to `high`."""
 
-    The others are those of each of `rows` (lines, 1 + parts), as `Sampled.row`.  A gain at the hub ends at `most_gain`.
-    """
-    place = 1 + grid.loop.part(name)
-    others, alone = np.array(rows), np.zeros(rows.shape[1])
-    others[:, place], alone[place] = 0.0, 1.0
+    others: Real
+    alone: Real
+    low: float
+    high: float
+
+
+def line_of(loop: Sampled, name: str) -> Line:
+    """The line of one number of the law, or of `FACTOR`.  A gain at the hub ends at `most_gain`."""
+    others, alone = loop.row.copy(), np.zeros(loop.row.size)
+    if name == FACTOR:
+        others[1:], alone[1:] = 0.0, loop.weights
+        return Line(others, alone, LEAST_FACTOR, MOST_FACTOR)
+    place = 1 + loop.part(name)
     gain = ON.get(name, name)
-    most = most_gain(grid.loop.plant.arm, gain) if gain in NAMES else MOST_FACTOR * (abs(rows[0, place]) or 1.0)
-    return [Crossings.of(each for each in line if abs(each.t) <= most) for line in _crossed(grid, others, alone)]
+    most = most_gain(loop.plant.arm, gain) if gain in NAMES else MOST_FACTOR * (abs(others[place]) or 1.0)
+    others[place], alone[place] = 0.0, 1.0
+    return Line(others, alone, -most, most)
 
 
-def crossing_factors(loop: Sampled) -> Crossings:
-    """Return the positive factors on the law with poles on the circle, `at` angles [rad a sample]."""
-    whole, fed_back = loop.row.copy(), loop.row.copy()
-    whole[1:], fed_back[0] = 0.0, 0.0
-    (found,) = _crossed(circle_grid(loop), whole[None], fed_back)
-    return Crossings.of(each for each in found if LEAST_FACTOR < each.t < MOST_FACTOR)
+def crossings_along(grid: CircleGrid, lines: Sequence[Line]) -> list[Crossings]:
+    """Return the crossings of the circle, at angles `at`, along each of some lines, all solved for at once.
 
-
-def _crossed(grid: CircleGrid, others: Real, alone: Real) -> list[list[Crossing]]:
-    """The crossings of A + g B as g grows along each of some lines, all solved for at once.
-
-    A are the `terms` under the weights `others` (lines, 1 + parts) of each line, B those under `alone` (1 + parts,).
-    Each crossing is solved for by its angle from the next pole, to the last bit.  At z = 1 and z = -1, where a single
-    pole crosses, h = Im(A conj B) vanishes: it falls towards that end where it is positive just before.
+    Of A + g B, A are the `terms` under the weights `others`, B those under `alone`.  Each crossing is solved for by its
+    angle from the next pole, to the last bit.  At z = 1 and z = -1, where a single pole crosses, h = Im(A conj B)
+    vanishes: it falls towards that end where it is positive just before.
     """
+    others, alone = np.array([line.others for line in lines]), np.array([line.alone for line in lines])
     A, B = others @ grid.terms, alone @ grid.terms
     h = (A * B.conj()).imag
     (line, step), change = brackets(h)
@@ -173,20 +176,25 @@ def _crossed(grid: CircleGrid, others: Real, alone: Real) -> list[list[Crossing]
 
     def parts(shift: Real) -> tuple[Complex, Complex]:
         terms = grid.at(base, shift)
-        return (others[line].T * terms).sum(axis=0), alone @ terms
+        return (others[line].T * terms).sum(axis=0), (alone[line].T * terms).sum(axis=0)
 
     shift, gain = solved(parts, low, high)
-    found: list[list[Crossing]] = [[] for _ in others]
+    found: list[list[Crossing]] = [[] for _ in lines]
     for number, *each in zip(line.tolist(), gain, grid.angles[base] + shift, change, strict=True):
         found[number].append(Crossing(*each))
     at_end = grid.loop.terms(np.array([-1.0 + 0j]), None, np.ones(1))[:, 0]
-    least, moving = _lowest(grid.loop.near_one(alone))
-    for here, row, first, last in zip(found, others, h[:, 0], h[:, -1], strict=True):
-        here.append(Crossing(_real_gain(row @ at_end, alone @ at_end), math.pi, 1 if last >= 0 else -1))
-        lowest, at_one = _lowest(grid.loop.near_one(row))
+    for here, row, unit, first, last in zip(found, others, alone, h[:, 0], h[:, -1], strict=True):
+        here.append(Crossing(_real_gain(row @ at_end, unit @ at_end), math.pi, 1 if last >= 0 else -1))
+        (lowest, at_one), (least, moving) = (_lowest(grid.loop.near_one(each)) for each in (row, unit))
         if least <= lowest:  # A and B are of the same order in x = 1 - 1/z, or A is of a higher one: it crosses at 0
             static = _real_gain(at_one, moving) if least == lowest else 0.0
             here.append(Crossing(static, 0.0, -1 if first >= 0 else 1))
+    return [Crossings.of(here).within(each.low, each.high) for here, each in zip(found, lines, strict=True)]
+
+
+def crossings_of(loop: Sampled, name: str) -> Crossings:
+    """Return the crossings of the circle along one number of the law, or along `FACTOR`."""
+    (found,) = crossings_along(circle_grid(loop), [line_of(loop, name)])
     return found
 
 
@@ -204,15 +212,21 @@ def _real_gain(A: Any, B: Any) -> float:
 # ------------------------------------------------------------ windows
 
 
+def windows_of(loop: Sampled, names: Sequence[str]) -> dict[str, list[Window]]:
+    """Return every stability interval of some numbers of the law, the others constant, confirmed by the poles."""
+    lines, windows = [line_of(loop, name) for name in names], []
+    for name, line, found in zip(names, lines, crossings_along(circle_grid(loop), lines), strict=True):
+
+        def is_stable(value: float, line: Line = line) -> bool:
+            return loop.weighted((line.others + value * line.alone)[1:].tolist()).is_stable
+
+        windows.append(confirmed(found, 0.0 if name == FACTOR else -math.inf, math.inf, is_stable))
+    return dict(zip(names, windows, strict=True))
+
+
 def stable_windows(loop: Sampled, name: str) -> list[Window]:
-    """Return every stability interval of one number of the law, the others constant, confirmed by the poles."""
-    (found,) = number_crossings(circle_grid(loop), name, loop.row[None])
-    return confirmed(found, -math.inf, math.inf, lambda value: loop.having(**{name: value}).poles.is_stable)
-
-
-def stable_factors(loop: Sampled) -> list[Window]:
-    """Return every stability interval of positive factors on the law, confirmed by the poles."""
-    return confirmed(crossing_factors(loop), 0.0, math.inf, lambda factor: loop.times(factor).poles.is_stable)
+    """Return every stability interval of one number of the law, or of a positive factor on it (`FACTOR`)."""
+    return windows_of(loop, [name])[name]
 
 
 def around(windows: list[Window], gain: float) -> Window | None:
@@ -281,7 +295,7 @@ def sampled_map(
         return GainMap(loop, vary, x, y, np.array([[each.poles.unstable for each in row] for row in points]), [])
     at = _off_the_edge(y)
     there = np.array([each.having(**{vary[1]: at}).poles.unstable for each in loops])
-    found = [number_crossings(circle_grid(each), vary[1], each.row[None])[0] for each in loops]
+    found = [crossings_of(each, vary[1]) for each in loops]
     return GainMap(loop, vary, x, y, counts_over(y, found, at, there), found)
 
 
@@ -296,8 +310,8 @@ def _map_of_gains(loop: Sampled, x: Real, y: Real, vary: tuple[str, str]) -> Gai
 
     grid, start = circle_grid(loop), at(_off_the_edge(x), _off_the_edge(y))
     (across, up), there = (start.number(name) for name in vary), np.array([start.poles.unstable])
-    at_start = counts_over(x, number_crossings(grid, vary[0], start.row[None]), across, there)[0]
-    found = number_crossings(grid, vary[1], np.array([at(float(value), up).row for value in x]))
+    at_start = counts_over(x, crossings_along(grid, [line_of(start, vary[0])]), across, there)[0]
+    found = crossings_along(grid, [line_of(at(float(value), up), vary[1]) for value in x])
     plane = GainMap(loop, vary, x, y, counts_over(y, found, up, at_start), found)
     for i, j in ((0, 0), (-1, 0), (-1, -1)):
         corner = at(float(x[i]), float(y[j]))

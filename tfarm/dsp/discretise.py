@@ -208,12 +208,6 @@ class LawInZ:
         others = [np.concatenate(poles[: n + 1] + poles[n + 2 :]) for n in range(len(self.part_poles))]
         return [(part, row, gain, np.r_[zeros, others[part]]) for part, row, gain, zeros in self.columns]
 
-    def under(self, weights: Sequence[float]) -> Matrices:
-        """States of the law with a factor on each part."""
-        A, B, C, D = self.matrices
-        row = np.array([weights])
-        return A, B, row @ C, row @ D
-
     def ignores(self, turned: Real, weights: Sequence[float]) -> bool:
         """Whether its output tends to 0 where its signals stay at these values (signals,)."""
         out = []

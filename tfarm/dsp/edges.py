@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 from tfarm.arm import AnyLaw, Arm
 from tfarm.digits import general
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.circle import Band, Circle, complete_band
+from tfarm.dsp.circle import Band, complete_band
 from tfarm.dsp.crossings import stable_windows
 from tfarm.dsp.discretise import acting_law, with_all_gains
 from tfarm.dsp.plant import FORGOTTEN, held_amplitude
@@ -76,10 +76,6 @@ def delay_margin(loop: Sampled) -> DelayMargin:
     def log_radius(more: float) -> float:
         return loop.with_delay(now + more).poles.log_spectral_radius
 
-    def grows(more: float) -> bool:
-        later = loop.with_delay(now + more)
-        return bool((abs(later.eigenvalues) > 1 - CLEARLY).any()) and later.poles.log_spectral_radius >= 0
-
     if log_radius(0.0) >= 0:
         return DelayMargin(0.0, False)
     plant, T = loop.plant, loop.chain.sampling.period
@@ -89,7 +85,8 @@ def delay_margin(loop: Sampled) -> DelayMargin:
     step = float(min(LONGEST_SCAN_STEP, 2 * np.pi / fastest / STEPS_A_TURN))  # samples
     scanned = step * np.arange(min(MOST_STEPS, int(LONGEST_DELAY_SAMPLES / step)) + 1)
     for low, high in pairwise(scanned.tolist()):
-        if grows(high):
+        later = loop.with_delay(now + high)
+        if (abs(later.eigenvalues) > 1 - CLEARLY).any() and not later.is_stable:
             is_between = log_radius(low) < 0
             return DelayMargin(float(brentq(log_radius, low, high, xtol=DELAY_KNOWN)) if is_between else low, False)
     return DelayMargin(min(MOST_STEPS * step, LONGEST_DELAY_SAMPLES), True)
@@ -113,7 +110,7 @@ def damping_edge(loop: Sampled) -> float:
     def log_radius(C: float) -> float:
         return log_radius_with(loop, C, loop.plant.count)
 
-    if loop.poles.is_stable:
+    if loop.is_stable:
         return 0.0
     high = 2 * STRONGEST / first_frequency(loop.plant.arm)
     if log_radius(high) >= 0:
@@ -240,16 +237,15 @@ def figure(value: float, digits: int, modes: int, proven: Test, other: Test, *, 
 
 def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[Interval]:
     """Return the stability intervals of a number, with more and more modes until all digits are certified."""
-    circle = None if band is None else band.circle()
 
     def proof(value: float) -> Proof:
-        return _proof(band, circle, loop.having(**{name: value}))
+        return _proof(band, loop.having(**{name: value}))
 
     def found(loop: Sampled) -> list[Interval]:
         other, modes = _with_others(loop), loop.plant.count
 
         def confirmed(value: float) -> Proof:
-            return other().having(**{name: value}).poles.is_stable, math.inf
+            return other().having(**{name: value}).is_stable, math.inf
 
         def edge(value: float, opposite: float, *, below: bool) -> Figure:
             spare = DISTINCT_FROM_ZERO * (abs(opposite) if opposite and math.isfinite(opposite) else 1.0)
@@ -291,16 +287,10 @@ def _most(loop: Sampled) -> int:
     return min(MOST_EDGE_MODES, most_modes(loop.plant.arm, loop.chain))
 
 
-def _proof(band: Band | None, circle: Circle | None, loop: Sampled) -> Proof:
+def _proof(band: Band | None, loop: Sampled) -> Proof:
     """Whether a loop is stable with every mode of a band, by its discs on the circle."""
-    count = None if circle is None else circle.count(loop.weights)
+    count = None if band is None else band.circle.count(loop.weights)
     return None if count is None else count == 0, 0.0 if band is None else band.top
-
-
-def _proof_of(loop: Sampled) -> Proof:
-    """Whether a loop is stable with every mode of its own band."""
-    band = complete_band(loop)
-    return _proof(band, None if band is None else band.circle(), loop)
 
 
 def shown_delay(loop: Sampled, band: Band | None) -> Figure:
@@ -311,13 +301,16 @@ def shown_delay(loop: Sampled, band: Band | None) -> Figure:
     now = loop.chain.sampling.delay_samples
 
     def proof(more: float) -> Proof:
-        return (None, 0.0) if band is None or more < 0 else _proof_of(band.loop.with_delay(now + more))
+        if band is None or more < 0:
+            return None, 0.0
+        later = band.loop.with_delay(now + more)
+        return _proof(complete_band(later), later)
 
     def found(loop: Sampled) -> Figure:
         margin, modes, other = delay_margin(loop), loop.plant.count, _with_others(loop)
 
         def holds(more: float) -> Proof:
-            return None if more < 0 else other().with_delay(now + more).poles.is_stable, math.inf
+            return None if more < 0 else other().with_delay(now + more).is_stable, math.inf
 
         if margin.samples == 0.0:
             return Figure(0.0, OTHER_DIGITS, band.top if band else None, None if band else modes)
@@ -340,7 +333,8 @@ def shown_damping(loop: Sampled, count: int) -> Figure:
         return Figure(C, OTHER_DIGITS, None, count)
 
     def proof(value: float) -> Proof:
-        return _proof_of(whole_loop(bare.plant.arm.having(damping=value), law, loop.chain))
+        whole = whole_loop(bare.plant.arm.having(damping=value), law, loop.chain)
+        return _proof(complete_band(whole), whole)
 
     def holds(value: float) -> Proof:
         return log_radius_with(bare, value, another(count, MOST_EDGE_MODES)) < 0, math.inf

@@ -122,7 +122,11 @@ def followed_branches(poles: Sequence[Complex], values: Real) -> Complex:
     """
     rows: list[Complex] = []
     for number, z in enumerate(poles):
-        rows.append(z if not rows else z[_matched(_ahead(rows, values[max(0, number - 2) : number + 1]), z)])
+        ahead = rows[-1] if rows else z
+        if len(rows) > 2:
+            before, last, wanted = values[number - 2 : number + 1]
+            ahead = ahead + (wanted - last) / (last - before) * (rows[-1] - rows[-2])
+        rows.append(z[_matched(ahead, z)])
     return np.array(rows)
 
 
@@ -134,16 +138,12 @@ def origins(loop: Sampled) -> NDArray[np.int64]:
     0, and each pole is followed.
     """
     open_loop = np.r_[loop.pulse.multipliers, 1 + loop.in_z.poles]
-    labels = np.nonzero(np.r_[loop.pulse.poles != 0, loop.in_z.poles + 1 != 0])[0]
-    ahead, rows = open_loop[labels], []
-    scales = np.r_[FIRST_SCALE, np.arange(1, FOLLOWING_STEPS + 1) / FOLLOWING_STEPS, 1.0]
-    for number, scale in enumerate(scales[:-1]):
-        z = loop.times(float(scale)).eigenvalues
-        order = _matched(ahead, z)
-        rows.append(z[order])
-        ahead = _ahead(rows, scales[max(0, number - 1) : number + 2])
-    origin = np.full(z.size, -1)
-    origin[order] = labels
+    labels = np.flatnonzero(np.r_[loop.pulse.poles != 0, loop.in_z.poles + 1 != 0])
+    scales = np.r_[FIRST_SCALE, np.arange(1, FOLLOWING_STEPS) / FOLLOWING_STEPS, 1.0]
+    first, *others = (loop.times(scale).eigenvalues for scale in scales[:-1].tolist())
+    poles = [first[_matched(open_loop[labels], first)], *others, loop.eigenvalues]
+    origin = np.full(loop.eigenvalues.size, -1)
+    origin[_matched(followed_branches(poles, scales)[-1], loop.eigenvalues)] = labels
     origin.flags.writeable = False
     return origin
 
@@ -158,14 +158,6 @@ def dominant(loop: Sampled) -> str:
         return "a pole of the law"
     mode, rings = (int(loop.pulse.mode[origin]), loop.pulse.poles[origin].imag != 0) if origin >= 0 else (0, False)
     return f"mode {mode}" if mode else "an unassigned mode" if rings else "the hub"
-
-
-def _ahead(rows: list[Complex], values: Real) -> Complex:
-    """Extrapolation of the branches to the last of the values, from the rows at the others."""
-    if len(rows) < 3:
-        return rows[-1]
-    before, last, wanted = values
-    return rows[-1] + (wanted - last) / (last - before) * (rows[-1] - rows[-2])
 
 
 def _matched(ahead: Complex, z: Complex) -> NDArray[np.int64]:

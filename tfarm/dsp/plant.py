@@ -20,7 +20,7 @@ quotient.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, reduce
 from typing import TYPE_CHECKING, Any
@@ -317,17 +317,10 @@ class PulseTransfer:
         rows = np.empty(0, np.int64) if base is None else np.flatnonzero(base >= 0)
         near = (rows, rows if base is None else base[rows])
         gap[near] = 1.0
-        push = self.early + self.late / z[:, None]
-        weights = push * (offset[:, None] / gap)
-        weights[near] = push[near]
-        value = self.residues @ weights.T + np.outer(self.plant.static, offset / z)
-        if self.plant.rigid[:, 0].any():
-            distance = z - 1.0 if delta is None else delta
-            distance = distance if base is None else np.where(base == self.poles.size - 1, offset, distance)
-            ramp = self.ramps[0] + self.ramps[1] / z
-            twice = (self.sampling.period * push[:, -1] / distance + ramp) / distance
-            value = value + np.outer(self.plant.rigid[:, 0], twice * offset)
-        return value * z ** (-self.sampling.whole_delay)
+        share, distance = offset[:, None] / gap, z - 1.0 if delta is None else delta
+        share[near] = 1.0
+        distance = distance if base is None else np.where(base == self.poles.size - 1, offset, distance)
+        return self._summed(np.positive, share, z, offset, distance)
 
     def sizes(self, base: NDArray[np.int64], offset: Complex, delta: Complex) -> Real:
         """Sums (outputs, n) of the sizes of all terms of `scaled`, a bound on its rounding error in units of eps.
@@ -336,15 +329,22 @@ class PulseTransfer:
         """
         z = abs(1 + delta)
         gap, own = abs(delta[:, None] - self.shifts), base[:, None] == np.arange(self.poles.size)
-        push = abs(self.early) + abs(self.late) / z[:, None]
         with np.errstate(divide="ignore", invalid="ignore"):
-            weights = push * np.where(own, 1.0, abs(offset)[:, None] / gap * (1 + abs(delta)[:, None] / gap))
-        value = abs(self.residues) @ weights.T + np.outer(abs(self.plant.static), abs(offset) / z)
+            share = np.where(own, 1.0, abs(offset)[:, None] / gap * (1 + abs(delta)[:, None] / gap))
+        distance = abs(np.where(base == self.poles.size - 1, offset, delta))
+        return self._summed(np.abs, share, z, abs(offset), distance)
+
+    def _summed(self, size: Callable[[Any], Any], share: Any, z: Any, offset: Any, distance: Any) -> Any:
+        """The terms of `scaled`, or their sizes: shares (n, poles) of r (early + late/z), static and rigid terms."""
+        residues, early, late = (size(each) for each in (self.residues, self.early, self.late))
+        value = (residues * early) @ share.T + np.outer(size(self.plant.static), offset / z)
+        if self.sampling.fraction:
+            value = value + (residues * late) @ share.T / z
         if self.plant.rigid[:, 0].any():
-            distance = abs(np.where(base == self.poles.size - 1, offset, delta))
-            twice = (self.sampling.period * push[:, -1] / distance + sum(self.ramps) / z) / distance
-            value = value + np.outer(abs(self.plant.rigid[:, 0]), twice * abs(offset))
-        return np.asarray(value * z ** (-self.sampling.whole_delay))
+            push, ramp = early[-1] + late[-1] / z, self.ramps[0] + self.ramps[1] / z
+            twice = (self.sampling.period * push / distance + ramp) / distance
+            value = value + np.outer(size(self.plant.rigid[:, 0]), twice * offset)
+        return value * z ** (-self.sampling.whole_delay)
 
     def folded(self) -> PulseTransfer:
         """The same with every pole that decays within a sample as a static share."""

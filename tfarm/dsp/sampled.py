@@ -40,7 +40,6 @@ from tfarm.dsp.discretise import LawInZ, acting_law, law_in_z, lowest_power, wit
 from tfarm.dsp.plant import MODES_USED, USUAL_MODES, Plant, PulseTransfer, SensedPlant, is_analog, sensed_plant
 from tfarm.errors import ConvergenceError, ParameterError, did_you_mean
 from tfarm.records import record
-from tfarm.reduced.modal import closed
 from tfarm.response.signals import Controller, controller
 from tfarm.schema import Quantity
 
@@ -53,6 +52,7 @@ UNMOVED = 1e-50  # an offset this small is a pole that the loop does not move
 MACHINE_EPS = float(np.finfo(float).eps)
 ROUNDINGS = 8  # of each term of F: of its product of n factors they add up as the root of n
 LEAST_SQUARE = -1.0 + 1e-15  # for |z|^2 - 1 of a pole at z = 0, the base of no root
+CLEAR_BY, ROUNDED = 2.0, 1e-15  # radii of a disc, and more for the rounding of |z|, by which it is off the circle
 FADED_RADIUS = 0.2  # a pole nearer to z = 0 is stable and not polished
 OUTPUT_OF = {gain.name: gain.output for gain in GAINS}
 
@@ -154,6 +154,8 @@ class Sampled:
         """The same loop with other weights; plant and pulse transfer functions are shared."""
         other = replace(self, weights=tuple(weights))
         vars(other).update(plant=self.plant, pulse=self.pulse)
+        if "frame" in vars(self):
+            vars(other)["frame"] = self.frame
         return other
 
     def having(self, **numbers: float) -> Sampled:
@@ -171,7 +173,7 @@ class Sampled:
         """The same loop with another total delay."""
         chain = replace(self.chain, sampling=replace(self.chain.sampling, delay_samples=samples))
         other = replace(self, chain=chain)
-        vars(other).update(plant=self.plant)
+        vars(other).update(plant=self.plant, has_free_angle=self.has_free_angle, poles_at_one=self.poles_at_one)
         return other
 
     def with_modes(self, count: int) -> Sampled:
@@ -259,10 +261,17 @@ class Sampled:
 
     # ------------------------------------------------------------ poles
 
+    @cached_property
+    def frame(self) -> tuple[Real, Real]:
+        """The matrix without feedback, and what the input adds to its states."""
+        A, B, C = self.pulse.matrices()
+        own, Bk, _, _ = self.in_z.matrices
+        return np.block([[A, np.zeros((len(A), len(own)))], [Bk @ C, own]]), np.r_[B, np.zeros(len(own))]
+
     def matrix(self) -> Real:
         """The closed-loop matrix: states of `PulseTransfer.matrices`, then those of the law."""
-        A, B, C = self.pulse.matrices()
-        return closed((A, B[:, None], C, np.zeros((len(C), 1))), self.in_z.under(self.weights))
+        (M, b), (_, _, Ck, Dk), weights = self.frame, self.in_z.matrices, np.array([self.weights])
+        return M - np.outer(b, np.hstack([weights @ Dk @ self.pulse.matrices()[2], weights @ Ck]))
 
     @property
     def is_damped(self) -> bool:
@@ -278,10 +287,9 @@ class Sampled:
     def reduced_matrix(self) -> Real:
         """The closed-loop matrix without the pole z = 1 of a free hub angle, or of a hub that cannot drift."""
         A, first = self.matrix(), self.pulse.integrals_at
-        if not self.plant.arm.has_rigid_mode:
-            return np.delete(np.delete(A, [first, first + 1], 0), [first, first + 1], 1)
-        if self.is_damped:  # its angle is the single integral
-            A = np.delete(np.delete(A, first, 0), first, 1)
+        unfelt = 2 if not self.plant.arm.has_rigid_mode else int(self.is_damped)  # its angle is the single integral
+        felt = np.r_[np.arange(first), np.arange(first + unfelt, len(A))]
+        A = A[np.ix_(felt, felt)]
         if not self.has_free_angle:
             return A
         own, B, _, _ = self.in_z.matrices
@@ -325,26 +333,48 @@ class Sampled:
         return max(0, poles + min(n for n, _ in self.near_one(self.row)))
 
     @cached_property
-    def poles(self) -> SampledPoles:
-        """The closed-loop poles, each polished as an offset from its nearest open-loop pole; `poles_at_one` are 1."""
-        z, shifts, pulse = self.eigenvalues.copy(), self.open_loop, self.pulse
+    def near(self) -> tuple[Complex, Whole, Complex, Whole]:
+        """The closed-loop poles z, not polished, with base and offset of each, and the numbers of those to polish.
+
+        `poles_at_one` of them are 1; those next to z = 0 are stable.
+        """
+        z = self.eigenvalues.copy()
         z[np.argsort(abs(z - 1), kind="stable")[: self.poles_at_one]] = 1.0
         base = _nearest(self, z - 1)
-        offset, error = (z - 1) - shifts[base], np.zeros(z.size)
-        rows = np.flatnonzero((abs(z) > FADED_RADIUS) & (z != 1))
-        if rows.size:
-            error[rows] = _settle(base, offset, rows, self)
-            moved = _nearest(self, shifts[base] + offset)
-            if (moved[rows] != base[rows]).any():  # then all digits are kept from there
-                offset[rows] += shifts[base[rows]] - shifts[moved[rows]]
-                base[rows] = moved[rows]
-                error[rows] = _settle(base, offset, rows, self)
-        log_radius = np.log(np.maximum(abs(z), SMALLEST_RADIUS))
+        return z, base, (z - 1) - self.open_loop[base], np.flatnonzero((abs(z) > FADED_RADIUS) & (z != 1))
+
+    @cached_property
+    def is_stable(self) -> bool:
+        """Whether all poles lie inside the unit circle, by the discs around the eigenvalues where these show it.
+
+        As many poles lie outside as discs, where every disc is on one side of the circle.
+        """
+        z, base, offset, rows = self.near
+        if "poles" not in vars(self) and not (z == 1).any():
+            with np.errstate(all="ignore"):
+                f, slope, _ = _weierstrass(base, offset, rows, self)
+                radius = _radius(f, slope, base, offset, rows, self)
+            outside = abs(z[rows]) - 1
+            if (abs(outside) > CLEAR_BY * radius + ROUNDED).all():
+                return not (outside > 0).any()
+        return self.poles.is_stable
+
+    @cached_property
+    def poles(self) -> SampledPoles:
+        """The closed-loop poles, each polished as an offset from its nearest open-loop pole; `poles_at_one` are 1."""
+        z, base, offset, rows = self.near
+        shifts, pulse, log_radius = self.open_loop, self.pulse, np.log(np.maximum(abs(z), SMALLEST_RADIUS))
+        offset, error = _settled(base, offset, rows, self)
+        moved = _nearest(self, shifts[base] + offset)
+        if (moved[rows] != base[rows]).any():  # then all digits are kept from there
+            offset, error = _settled(moved, offset + (shifts[base] - shifts[moved]), rows, self)
+            base = moved
         own = 2 * self.in_z.poles.real + abs(self.in_z.poles) ** 2
         start = np.r_[pulse.poles.real * pulse.sampling.period, np.log1p(np.maximum(own, LEAST_SQUARE)) / 2]
         at, o = base[rows], offset[rows]
         ratio = o / (1 + shifts[at])
         log_radius[rows] = start[at] + np.log1p(2 * ratio.real + abs(ratio) ** 2) / 2
+        z = z.copy()
         z[rows] = (1 + shifts[at]) + o
         log_radius[abs(log_radius) * abs(z) < error] = 0.0
         mode = pulse.mode[abs(z[:, None] - pulse.multipliers).argmin(axis=1)]
@@ -384,11 +414,12 @@ def _nearest(loop: Sampled, delta: Complex) -> Whole:
     return np.asarray(away.argmin(axis=1))
 
 
-def _settle(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> Real:
-    """Iterate some roots, in place, until they converge or F is 0 but for rounding; return bounds on their errors.
+def _settled(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tuple[Complex, Real]:
+    """The offsets with some iterated until they converge or F is 0 but for rounding, and bounds on the errors of all.
 
-    These are the radii of Smith's discs, and the rounding of a pole of the law.
+    These are the radii of Smith's discs, and the rounding of a pole of the law; 0 of the others.
     """
+    offset, error = offset.copy(), np.zeros(offset.size)
     offset[rows] = np.where(offset[rows] == 0, OFF_POLE, offset[rows])
     with np.errstate(all="ignore"):  # a root on an open-loop pole, and one that diverges
         for _ in range(MOST_STEPS):
@@ -404,9 +435,15 @@ def _settle(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> Real:
                 break
         offset[abs(offset) <= UNMOVED] = 0.0
         f, slope, _ = _weierstrass(base, offset, rows, loop)
-        radius = offset.size * (abs(f) + loop.rounding(base[rows], offset[rows])) / abs(slope)
+        radius = _radius(f, slope, base, offset, rows, loop)
     own = np.where(base[rows] < loop.pulse.poles.size, 0.0, MACHINE_EPS * abs(loop.open_loop[base[rows]]))
-    return np.asarray(np.nan_to_num(radius, posinf=0.0) + own)  # of a pole that the loop does not move 0/0
+    error[rows] = np.nan_to_num(radius, posinf=0.0) + own  # of a pole that the loop does not move 0/0
+    return offset, error
+
+
+def _radius(f: Complex, slope: Complex, base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> Real:
+    """The radii of Smith's discs around some roots, with the rounding of F."""
+    return np.asarray(offset.size * (abs(f) + loop.rounding(base[rows], offset[rows])) / abs(slope))
 
 
 def _weierstrass(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tuple[Complex, Complex, Complex]:

@@ -13,7 +13,7 @@ from tfarm.arm.checks import whole
 from tfarm.crossing import Window
 from tfarm.dsp.chain import Chain, Sampling, chain_or_usual
 from tfarm.dsp.circle import Band, complete_band
-from tfarm.dsp.crossings import around, stable_factors, stable_windows
+from tfarm.dsp.crossings import FACTOR, around, stable_windows, windows_of
 from tfarm.dsp.discretise import RULE, rule_in_words
 from tfarm.dsp.edges import (
     DelayMargin,
@@ -157,7 +157,7 @@ def sampled_verdict(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count:
     largest = whole_loop(arm, law, chain)
     band = complete_band(largest)
     full = largest if band is None else band.full
-    proven, radius = None if band is None else band.circle().count(full.weights), full.poles.log_spectral_radius
+    proven, radius = None if band is None else band.circle.count(full.weights), full.poles.log_spectral_radius
 
     def agrees(fewer: Sampled) -> bool:
         is_near = abs(fewer.poles.log_spectral_radius - radius) <= RADIUS_AGREES * abs(radius) + RADIUS_NOISE
@@ -180,13 +180,6 @@ class SampledNumber(NamedTuple):
     interval: Annotated[Window | None, Quantity(help="the interval that contains the present value")]
 
 
-def sampled_numbers(loop: Sampled) -> list[SampledNumber]:
-    """Return the stability intervals of the gain of each part of the law, the others constant."""
-    values = {name: loop.number(name) for name in loop.law.part_gains}
-    found = {name: stable_windows(loop, name) for name, value in values.items() if value}
-    return [SampledNumber(name, values[name], each, around(each, values[name])) for name, each in found.items()]
-
-
 @dataclass(frozen=True)
 @record
 class Analysis:
@@ -204,7 +197,9 @@ class Analysis:
             help="stability intervals of each number of the controller, the others constant")]:  # fmt: skip
         """One row for each gain at the hub, or number of another law, the others constant."""
         if not self.loop.is_of_gains:
-            return sampled_numbers(self.loop)
+            found = {name: each for name, each in self.plain_windows.items() if name != FACTOR}
+            values = {name: self.loop.number(name) for name in found}
+            return [SampledNumber(n, values[n], each, around(each, values[n])) for n, each in found.items()]
         return [SampledNumber(n, self.loop.number(n), each, self.interval(n)) for n, each in self.shown.items()]
 
     @property
@@ -296,9 +291,16 @@ class Analysis:
         return shown_damping(self.loop, self.damping_modes) if self.loop.is_of_gains else None
 
     @cached_property
+    def plain_windows(self) -> Mapping[str, list[Window]]:
+        """Stability intervals with the modes of the verdict: of a factor on the law, and of the numbers of no gains."""
+        loop = self.loop
+        numbers = () if loop.is_of_gains else (name for name in loop.law.part_gains if loop.number(name))
+        return windows_of(loop, [*numbers, FACTOR])
+
+    @property
     def factors(self) -> list[Window]:
         """Every stability interval of a factor on the whole law, with the modes of the verdict."""
-        return stable_factors(self.loop)
+        return self.plain_windows[FACTOR]
 
     @property
     def stable_gain_factors(self) -> Annotated[list[Window] | None, Quantity("stable factors on the controller",
