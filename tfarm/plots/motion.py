@@ -27,7 +27,7 @@ from tfarm.fitting.recording import RunComparison
 from tfarm.loop.plane import Plane
 from tfarm.spectrum import Modes
 from tfarm.tuner import Tuning
-from tfarm.tuner.training import QUARTILES, LearningCurves
+from tfarm.tuner.training import LearningCurves
 
 from .regions import overlay
 from .style import (
@@ -319,7 +319,7 @@ def draw_curves(curves: LearningCurves, tuning: Tuning) -> Figure:
     """Learning curves: each seed, median and quartiles, and the baselines; diverged ones leave through the top."""
     trial, seeds = np.arange(1, curves.costs.shape[1] + 1), len(curves.costs)
     top = MOST_COST * tuning.without.cost
-    low, middle, high = (np.minimum(curves.quantile(share), 2 * top) for share in QUARTILES)
+    low, middle, high = (np.minimum(costs, 2 * top) for costs in curves.quartile_curves.values())
     with page(9.0, 4.4, f"{tuning.trial.arm.name}: learning, {how_many(seeds, 'seed')}") as (figure, ax):
         ax.plot(trial, np.minimum(curves.costs, 2 * top).T, color="#b9b9b9", lw=0.6, zorder=1)
         ax.fill_between(trial, low, high, color=BLUE, alpha=0.22, lw=0, zorder=2, label="middle half of the seeds")

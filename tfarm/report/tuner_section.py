@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Annotated, NamedTuple
 
@@ -22,6 +22,7 @@ from tfarm.schema import Column, Quantity, Table, table
 from tfarm.spectrum.table import first_frequency
 from tfarm.tuner import LearningCurves, Plan, Tuning, compare_controllers, learning_curves, tried_loops, tune
 from tfarm.tuner.baselines import CONSTANT_GAINS, Outcomes, quantised_chain, tried_gains
+from tfarm.tuner.trial import usual_rate_gain
 from tfarm.tuner.tuning import SlewEnd, usual_plan
 
 WITHOUT = f"without moment feedback, {MOMENT_GAIN} = 0"
@@ -116,8 +117,9 @@ def curve_seeds(samples: int) -> int:
 def _servo_tuning(arm: Arm, plan: Plan, chain: Chain) -> Tuning | None:
     """The same tuning with an angle loop a twentieth as fast as the first mode, or slower at a long period."""
     speed = min(SERVO_SPEED * first_frequency(arm), SERVO_TURN / chain.sampling.period)
+    Kp = float(f"{arm.turned_inertia * speed**2:.2g}")
     try:
-        return tune(arm, plan.holding(arm, float(f"{arm.turned_inertia * speed**2:.2g}")), chain)
+        return tune(arm, replace(plan, Kp=Kp, K1=usual_rate_gain(arm, Kp)), chain)
     except (CertificationError, ConvergenceError):
         return None
 
@@ -149,12 +151,12 @@ def section_of(data: TunerNumbers) -> PageSection:
 
 def saved_cost(data: TunerNumbers) -> float:
     """How much the median cost of the tuner is below that of the best constant gain [%]."""
-    return 100 * (1 - data.curves.final_quantile(0.5) / data.tuning.best_constant.cost)
+    return 100 * (1 - data.curves.final_quartiles[1] / data.tuning.best_constant.cost)
 
 
 def tuner_in_short(data: TunerNumbers) -> str:
     """The median cost of the tuner over its seeds, compared with the best constant gain."""
-    return prose("tuner_in_short", gain=saved_cost(data), same=100 * SAME_COST, median=data.curves.final_quantile(0.5),
+    return prose("tuner_in_short", gain=saved_cost(data), same=100 * SAME_COST, median=data.curves.final_quartiles[1],
                  best=data.tuning.best_constant.cost, final=data.curves.final)  # fmt: skip
 
 
@@ -203,7 +205,7 @@ class Cost(NamedTuple):
 
 def servo_table(data: TunerNumbers, servo: Tuning) -> Table:
     """The costs of the slew with the angle regulated too."""
-    law, error = servo.plan.servo, SlewEnd.of(servo).tip_error
+    law, error = servo.gain().servo, SlewEnd.of(servo).tip_error
     rows = [
         Cost("no moment feedback", servo.without.cost),
         Cost("best constant gain", servo.best_constant.cost),

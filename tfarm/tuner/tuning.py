@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple
 
@@ -18,13 +18,13 @@ from tfarm.dsp.chain import Reading, chain_or_usual
 from tfarm.dsp.results import Run, enough_modes, ideal_chain
 from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, described, torque_unit
 from tfarm.dsp.simulate import RESIDUAL
-from tfarm.errors import ParameterError
+from tfarm.errors import require
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import default_gains
 from tfarm.tuner.baselines import SHAPERS, BestConstant, Outcomes, best_constant, lq_bound, shaped_trial
 from tfarm.tuner.guard import Guard, GuardKind, find_guard
-from tfarm.tuner.kernel import PAPER_HIDDEN, PAPER_INPUTS, initial_network
+from tfarm.tuner.kernel import PAPER_HIDDEN, PAPER_INPUTS, Network, initial_network
 from tfarm.tuner.training import Learning, LearningCurves, Training, train
 from tfarm.tuner.trial import (
     FORMAT,
@@ -36,7 +36,6 @@ from tfarm.tuner.trial import (
     TunedGain,
     slew_trial,
     tip_off,
-    usual_rate_gain,
     weights_of,
     with_signals,
 )
@@ -77,22 +76,20 @@ class Plan:
     scale: float = 1.0
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.scale < np.inf:
-            raise ParameterError(key="scale", value=self.scale, remedy="a scale is a positive, finite number of N m")
+        remedy = "a scale is a positive, finite number of N m"
+        require(0.0 < self.scale < np.inf, "scale", self.scale, remedy)
 
-    @property
-    def servo(self) -> HubFeedback:
-        """The law without moment feedback."""
-        return HubFeedback(K1=self.K1, Kp=self.Kp)
+    def trial(self, arm: Arm, chain: Chain | None) -> Trial:
+        """The trial on an arm, with the weights of the cost on moments and torques in units of the scale."""
+        return slew_trial(
+            arm, chain, K1=self.K1, Kp=self.Kp, signals=self.signals, duration=self.duration, count=self.count,
+            cost=Cost(a=self.cost.a / self.scale**2, b=self.cost.b / self.scale**2),
+        )  # fmt: skip
 
-    def holding(self, arm: Arm, Kp: float) -> Plan:
-        """The plan with this gain on the hub's angle, and its usual rate gain."""
-        return replace(self, Kp=Kp, K1=usual_rate_gain(arm, Kp))
-
-    @property
-    def scales(self) -> np.ndarray[Any, Any]:
-        """The scales of the network's inputs."""
-        return np.r_[np.full(PAPER_INPUTS, self.scale), np.ones(int(self.seventh_input))]
+    def network(self, seed: int) -> Network:
+        """The network with the first weights of a seed."""
+        scales = np.r_[np.full(PAPER_INPUTS, self.scale), np.ones(int(self.seventh_input))]
+        return initial_network(seed, hidden=self.hidden, scales=scales)
 
 
 @dataclass(frozen=True)
@@ -159,33 +156,23 @@ def usual_plan(arm: Arm, chain: Chain | None = None) -> Plan:
     )
 
 
-def trial_of(arm: Arm, plan: Plan, chain: Chain | None) -> Trial:
-    """The trial of a plan."""
-    return slew_trial(
-        arm, chain, K1=plan.K1, Kp=plan.Kp, cost=plan.cost.in_units_of(plan.scale), signals=plan.signals,
-        duration=plan.duration, count=plan.count,
-    )  # fmt: skip
-
-
 def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuning:
     """Find the guard, train, and compute the baselines.
 
     Raises ParameterError for an invalid plan, arm or chain, and CertificationError where there is no guard.
     """
-    if not isinstance(plan, Plan | None):
-        raise ParameterError(key="plan", value=plan, remedy="give a tfarm.tuner.Plan, such as Plan(trials=50, K1=0.3)")
+    remedy = "give a tfarm.tuner.Plan, such as Plan(trials=50, K1=0.3)"
+    require(isinstance(plan, Plan | None), "plan", plan, remedy)
     must_be_arm(arm)
     plan = usual_plan(arm, chain) if plan is None else plan
-    network = initial_network(plan.seed, hidden=plan.hidden, scales=plan.scales)
-    trial = trial_of(arm, plan, chain)
+    network, trial = plan.network(plan.seed), plan.trial(arm, chain)
     best = best_constant(trial)
     guard = find_guard(trial.loop, plan.guard, best.gain)
-    training = train(trial, network, guard, plan.learning, plan.trials)
     shaped = {kind: shaped_trial(trial, kind) for kind in SHAPERS}
     return Tuning(
         trial=trial,
         plan=plan,
-        training=training,
+        training=train(trial, network, guard, plan.learning, plan.trials),
         without=trial.with_constant(0.0),
         best_constant=best,
         bound=lq_bound(trial),
@@ -202,8 +189,7 @@ def learning_curves(tuning: Tuning, seeds: int, advance: Advance | None = None) 
     plan, done = tuning.plan, [tuning.training]
 
     def training(seed: int) -> Training:
-        network = initial_network(seed, hidden=plan.hidden, scales=plan.scales)
-        return train(tuning.trial, network, tuning.training.guard, plan.learning, plan.trials)
+        return train(tuning.trial, plan.network(seed), tuning.training.guard, plan.learning, plan.trials)
 
     with ThreadPoolExecutor(TRAINING_THREADS) as pool:  # compiled loops let other threads run
         for each in pool.map(training, range(plan.seed + 1, plan.seed + seeds)):
@@ -296,14 +282,13 @@ class TuningResult:
         self,
     ) -> Annotated[list[Baseline], Quantity("compared with baselines", help="costs of the same slew")]:
         """The costs with the tuner and with the baselines."""
-        tuning, shaped = self.tuning, self.tuning.shaped_costs
-        constant = f"best constant gain, K = {tuning.best_constant.gain:.4g}"
-        late = tuning.shaped_delays
+        tuning, late = self.tuning, self.tuning.shaped_delays
+        best = tuning.best_constant
         return [
             Baseline("no moment feedback", tuning.without.cost),
-            Baseline(constant, tuning.best_constant.cost),
+            Baseline(f"best constant gain, K = {best.gain:.4g}", best.cost),
             Baseline(f"tuner, after {self.trials} trials", tuning.training.result.cost),
-            *(Baseline(f"input shaping, {kind}", cost, late[kind]) for kind, cost in shaped.items()),
+            *(Baseline(f"input shaping, {kind}", cost, late[kind]) for kind, cost in tuning.shaped_costs.items()),
             Baseline("linear-quadratic bound of the unshaped slew", tuning.bound.cost),
         ]
 
