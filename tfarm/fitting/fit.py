@@ -267,7 +267,8 @@ def fit(
             fitted, unknown = confidence_intervals(found, profile=profile, progress=progress)
             break
         except BetterError as better:
-            found = replace(nearest_minimum(better.found.problem, better.found.point), starts=found.starts)
+            (there,) = better.args
+            found = replace(nearest_minimum(there.problem, there.point), starts=found.starts)
     else:  # one valley after another: no end of it
         found = replace(found, converged=False)
         fitted, unknown = confidence_intervals(found, profile=False)
@@ -444,16 +445,17 @@ def repeats(fit: Fit, draws: int = DRAWS) -> Repeats | None:
     if len(records) < FEWEST_RECORDS:
         return None
     others = [n for n, name in enumerate(names) if name != most]
-    every = list(enumerate(fit.parameters))  # a key with a colon is of one record's sensor, which others do not know
-    known = [n for n, each in every if each.identified and each.deviation and ":" not in each.key]
-    keys, start = [fit.parameters[n].key for n in known], fit.solution.point
+    identified = {n: each for n, each in enumerate(fit.parameters) if each.identified}
+    # a key with a colon is of one record's sensor, which others do not know
+    known = {n: each for n, each in identified.items() if each.deviation and ":" not in each.key}
+    keys, start = [each.key for each in known.values()], fit.solution.point
 
     def numbers(chosen: Sequence[int]) -> Real:
         some = replace(own, responses=tuple(own.responses[n] for n in (*chosen, *others)))
-        used = {place for each in some.responses for place in (each.gain, each.delay) if place is not None}
-        sensors = range(len(own.of_the_arm), len(own.parameters))
-        held = [*(n for n in sensors if n not in used), *(n for n, each in every if not each.identified)]
-        point = nearest_minimum(some, start, {n: float(start[n]) for n in held}).point
+        sensors = {place for each in some.responses for place in (each.gain, each.delay)}
+        used = identified.keys() & (sensors | set(range(len(own.of_the_arm))))
+        held = {n: float(x) for n, x in enumerate(start) if n not in used}
+        point = nearest_minimum(some, start, held).point
         return np.array([own.parameters[n].value(float(point[n])) for n in known])
 
     drawn = bootstrap(
@@ -461,7 +463,7 @@ def repeats(fit: Fit, draws: int = DRAWS) -> Repeats | None:
         rng=FIT_SEED,
     )  # fmt: skip
     ends = np.array(drawn.confidence_interval).T
-    wider = drawn.standard_error / np.array([fit.parameters[n].deviation for n in known])
+    wider = drawn.standard_error / np.array([each.deviation for each in known.values()])
     return Repeats(
         response=most,
         each=[dict(zip(keys, numbers([n]).tolist(), strict=True)) for n in records],

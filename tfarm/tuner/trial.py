@@ -24,7 +24,7 @@ import os
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -319,11 +319,6 @@ def to_text(tuner: SavedTuner) -> str:
     """Text of a tuner's file; equal tuners give equal text, and it loads to the same bits."""
     content = tuner.model_dump(exclude_defaults=True)
     return json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
-
-
-def weights_of(network: Network) -> dict[str, Any]:
-    """scales, W1 and w2 as lists."""
-    return {name: getattr(network, name).tolist() for name in ("scales", "W1", "w2")}
 
 
 def save_tuner(tuner: SavedTuner, path: Path) -> None:

@@ -36,7 +36,6 @@ from tfarm.tuner.trial import (
     TunedGain,
     slew_trial,
     tip_off,
-    weights_of,
     with_signals,
 )
 
@@ -117,11 +116,12 @@ class Tuning:
 
     def saved(self) -> SavedTuner:
         """The record that `save_tuner` writes."""
-        guard, plan = self.training.guard, self.plan
+        guard, plan, network = self.training.guard, self.plan, self.training.network
         return SavedTuner(
             format=FORMAT, arm=self.trial.arm.name, period=self.trial.task.period, K1=plan.K1, Kp=plan.Kp,
             signals=plan.signals, a=plan.cost.a, b=plan.cost.b, guard_kind=guard.kind,
-            guard=None if guard.kind == "none" else (guard.lo, guard.hi), **weights_of(self.training.network),
+            guard=None if guard.kind == "none" else (guard.lo, guard.hi),
+            scales=network.scales.tolist(), W1=network.W1.tolist(), w2=network.w2.tolist(),
         )  # fmt: skip
 
     def gain(self) -> TunedGain:
@@ -352,7 +352,7 @@ class TuningResult:
     @property
     def weights(self) -> Annotated[dict[str, Any], Quantity(help="weights of the network and scales of its inputs")]:
         """Every weight of the network."""
-        return weights_of(self.tuning.training.network)
+        return self.tuning.saved().model_dump(include={"scales", "W1", "w2"})
 
 
 def controlled_run(
