@@ -122,7 +122,7 @@ def test_profiles_are_where_the_sum_of_squares_has_grown_by_the_quantile():
 
 @pytest.mark.parametrize("seed", thinned([0, 1], 2))  # E and the density; E and I
 def test_planted_pairs_are_known_by_one_combination(seed):
-    assert judged_pair(seed) == "right"
+    assert judged_pair(seed)[0] == "right"
 
 
 def test_what_does_not_matter_is_bounded_on_one_side():
@@ -275,23 +275,6 @@ def test_sensors_alone_may_be_fitted():
 )
 def test_an_assumption_names_a_number_by_label_symbol_or_value(key, value, text, is_it):
     assert is_named(key, value, text) == is_it
-
-
-def test_from_a_file_to_margins_in_three_commands(tmp_path, capsys):
-    """The README's example; the file's README has its source."""
-    save = tmp_path / "fitted.toml"
-    free = "link.youngs_modulus,link.damping,hub.inertia,payload.mass"
-    data = "tip_acceleration/hub_torque=tests/data/sweep/tip.csv"
-    given = ("fit", "sasaki2012-lab", "--data", data, "--free", free, "--save", str(save))
-    found = answer(capsys, *given, "--covariance")
-    truth = {"youngs_modulus": 6.3e10, "damping": 1.6e-4, "inertia": 0.085, "mass": 0.12}
-    for each in found["parameters"]:
-        assert abs(each["value"] - truth[each["key"].split(".")[1]]) < 4 * each["std"]
-    assert found["explained"]
-    assert found["unexplained_peaks_hz"] == []
-    assert answer(capsys, "margins", str(save))["verdict"] == "stable"
-    proven = answer(capsys, "poles", str(save), "--count", "3", "--certify")
-    assert proven["completeness"] == "certified"
 
 
 def test_rad_s_given_as_hz_are_refused(tmp_path, capsys):

@@ -133,7 +133,7 @@ def test_the_comparison_is_of_one_run():
     assert first.tuner.cost == pytest.approx(tuning.training.result.cost, rel=1e-10)
     assert first.bound.cost == pytest.approx(tuning.bound.cost, rel=1e-10)
     for kind in ("ZV", "EI"):
-        assert getattr(first, kind).cost == pytest.approx(tuning.shaped[kind][1].cost, rel=1e-10)
+        assert getattr(first, kind).cost == pytest.approx(tuning.shaped[kind].cost, rel=1e-10)
     loaded = replace(slew_trial(listed[4].arm, K1=0.3), task=tuning.trial.task)
     assert listed[4].name == "payload 0.1 kg"
     shaped_slew = replace(loaded, task=shaped_trial(tuning.trial, "ZV").task)  # by the poles of the arm it was made for

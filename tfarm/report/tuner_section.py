@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -173,9 +172,8 @@ def tuner_facts(data: TunerNumbers) -> tuple[Fact, ...]:
     ends = [
         off_target(data, float(traces.away(data.arm, run)[-1])) for run in (data.slews["with the tuner"], data.constant)
     ]
-    late, costs = tuning.shaped_delays, tuning.shaped_costs
-    shaped = [f"{kind} {significant(cost, 2)}, {significant(1e3 * late[kind], 3)} ms later"
-              for kind, cost in costs.items() if late[kind]]  # fmt: skip
+    shaped = [f"{kind} {significant(each.cost, 2)}, {significant(1e3 * each.later, 3)} ms later"
+              for kind, each in tuning.shaped.items() if each.later]  # fmt: skip
     certainty = "certified stable" if guard.is_proven else f"certified for the first {guard.modes_used} modes"
     saved = saved_cost(data)
     less = f"{significant(saved, 2)} % less cost" if saved > 100 * SAME_COST else "no improvement"
@@ -186,7 +184,7 @@ def tuner_facts(data: TunerNumbers) -> tuple[Fact, ...]:
              note=f"{MOMENT_GAIN} = {significant(tuning.best_constant.gain, 3)}"),
         Fact("tuner", median, note=f"half between {low} and {high}"),
         Fact("bound", significant(tuning.bound.cost, 4), note="linear-quadratic optimum"),
-        Fact("input shaping", significant(min(costs.values()), 3),
+        Fact("input shaping", significant(min(each.cost for each in tuning.shaped.values()), 3),
              note="; ".join(shaped) or "no mode slow enough to shape"),
         Fact("tip error at the end", ends[0], "mm", f"constant gain: {ends[1]} mm"),
         Fact("guard", f"{guard.lo:.3f} … {guard.hi:.3f}", note=f"any K(t) in it: {certainty}"),
@@ -210,7 +208,7 @@ def servo_table(data: TunerNumbers, servo: Tuning) -> Table:
         Cost("no moment feedback", servo.without.cost),
         Cost("best constant gain", servo.best_constant.cost),
         Cost("tuner", servo.training.result.cost),
-        *itertools.starmap(Cost, servo.shaped_costs.items()),
+        *(Cost(kind, each.cost) for kind, each in servo.shaped.items()),
         Cost("bound", servo.bound.cost),
     ]
     gains = ", ".join(law.gain_text(name, partial(significant, digits=3), data.arm) for name in (ANGLE_GAIN, RATE_GAIN))

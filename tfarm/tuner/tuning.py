@@ -96,8 +96,8 @@ class Plan:
 class Tuning:
     """A trained tuner and its baselines, all of one trial.
 
-    `shaped`: the slew through the ZV and the EI shaper without moment feedback.  It arrives later, and its x and e are
-    from its own reference, so that the bound of the unshaped slew is no bound of it.
+    `shaped`: costs of the slew through the ZV and the EI shaper without moment feedback.  It arrives later, and its x
+    and e are from its own reference, so that the bound of the unshaped slew is no bound of it.
     """
 
     trial: Trial
@@ -106,7 +106,7 @@ class Tuning:
     without: Record
     best_constant: BestConstant
     bound: Record
-    shaped: dict[str, tuple[Trial, Record]]
+    shaped: dict[str, Baseline]
 
     @property
     def finding(self) -> str:
@@ -127,17 +127,6 @@ class Tuning:
     def gain(self) -> TunedGain:
         """The trained controller."""
         return self.saved().gain()
-
-    @property
-    def shaped_costs(self) -> dict[str, float]:
-        """Cost of the slew through each shaper."""
-        return {kind: record.cost for kind, (_, record) in self.shaped.items()}
-
-    @property
-    def shaped_delays(self) -> dict[str, float]:
-        """Delay [s] of the slew through each shaper."""
-        arrives = self.trial.task.busy_until
-        return {kind: trial.task.busy_until - arrives for kind, (trial, _) in self.shaped.items()}
 
     @property
     def constant(self) -> HubFeedback:
@@ -168,7 +157,11 @@ def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuni
     network, trial = plan.network(plan.seed), plan.trial(arm, chain)
     best = best_constant(trial)
     guard = find_guard(trial.loop, plan.guard, best.gain)
-    shaped = {kind: shaped_trial(trial, kind) for kind in SHAPERS}
+    shaped: dict[str, Baseline] = {}
+    for kind in SHAPERS:
+        late = shaped_trial(trial, kind)
+        delay = late.task.busy_until - trial.task.busy_until
+        shaped[kind] = Baseline(f"input shaping, {kind}", late.with_constant(0.0).cost, delay)
     return Tuning(
         trial=trial,
         plan=plan,
@@ -176,7 +169,7 @@ def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuni
         without=trial.with_constant(0.0),
         best_constant=best,
         bound=lq_bound(trial),
-        shaped={kind: (each, each.with_constant(0.0)) for kind, each in shaped.items()},
+        shaped=shaped,
     )
 
 
@@ -282,21 +275,19 @@ class TuningResult:
         self,
     ) -> Annotated[list[Baseline], Quantity("compared with baselines", help="costs of the same slew")]:
         """The costs with the tuner and with the baselines."""
-        tuning, late = self.tuning, self.tuning.shaped_delays
-        best = tuning.best_constant
+        tuning, best = self.tuning, self.tuning.best_constant
         return [
             Baseline("no moment feedback", tuning.without.cost),
             Baseline(f"best constant gain, K = {best.gain:.4g}", best.cost),
             Baseline(f"tuner, after {self.trials} trials", tuning.training.result.cost),
-            *(Baseline(f"input shaping, {kind}", cost, late[kind]) for kind, cost in tuning.shaped_costs.items()),
+            *tuning.shaped.values(),
             Baseline("linear-quadratic bound of the unshaped slew", tuning.bound.cost),
         ]
 
     @property
     def numbers(self) -> Annotated[dict[str, Any], Quantity(flat=True, help="costs of tuner and baselines")]:
         """The same numbers by name."""
-        tuning = self.tuning
-        costs, late = tuning.shaped_costs, tuning.shaped_delays
+        tuning, shaped = self.tuning, self.tuning.shaped
         return {
             "cost_tuned": tuning.training.result.cost,
             "cost_without": tuning.without.cost,
@@ -304,8 +295,8 @@ class TuningResult:
             "best_constant_gain": tuning.best_constant.gain,
             "cost_lq_bound": tuning.bound.cost,
             "lq_bound_note": BOUND_NOTES[tuning.plan.signals],
-            "cost_shaped": min(costs.values()),
-            "shaped": {kind: {"cost": costs[kind], "arrives_later_by_s": late[kind]} for kind in costs},
+            "cost_shaped": min(each.cost for each in shaped.values()),
+            "shaped": {kind: {"cost": each.cost, "arrives_later_by_s": each.later} for kind, each in shaped.items()},
             "shaped_note": SHAPED_NOTE,
         }
 
