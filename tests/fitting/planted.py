@@ -77,7 +77,7 @@ def elements_response(arm, omega, pairs):
 
 def chi_squared_at(found, values):
     """The sum of squared residuals at other numbers, by key."""
-    problem = found.solution.problem
+    problem = found.problem
     residuals = problem.residuals(np.array([each.coordinate(values[each.key]) for each in problem.parameters]))
     return float(residuals @ residuals)
 
@@ -218,7 +218,7 @@ def judged_rig(seed):
     """Whether the sum of squares of one fit is at most the truth's."""
     arm, data, keys, truth, start = planted_rig(np.random.default_rng([852780, seed]))
     found = fit(arm, data, free=keys, start=start, profile=False)
-    at_truth, starts = chi_squared_at(found, truth), found.solution.starts
+    at_truth, starts = chi_squared_at(found, truth), found.starts
     is_worse = found.chi_squared > at_truth * (1 + 1e-9)
     words = f"above the truth: {found.chi_squared:.5g} > {at_truth:.5g} of {found.freedom}, {starts} starts: {keys}"
     return words if is_worse else "right", {}, found

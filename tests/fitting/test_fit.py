@@ -71,7 +71,7 @@ def test_a_resonance_between_two_lines_is_found():
 
 def test_equation_errors_have_one_minimum_where_squares_have_many():
     """Along Young's modulus, a factor of two to both sides; a wide `share` changes no minimum but its place."""
-    own = fit(tfarm.load(HUB_SPRING), [hub_spring_sweep()], free=HUB_SPRING_FREE, profile=False).solution
+    own = fit(tfarm.load(HUB_SPRING), [hub_spring_sweep()], free=HUB_SPRING_FREE, profile=False)
     along = [own.point + np.array([ln_E, 0, 0]) for ln_E in np.linspace(-0.7, 0.7, 301)]
 
     def minima(residuals):
@@ -90,9 +90,9 @@ def test_a_fit_that_leaves_a_number_open_is_tried_from_its_own_start_too(monkeyp
     right = fit(rig, [hub_spring_sweep()], free=HUB_SPRING_FREE, profile=False)
     start = {each.key: each.value for each in right.parameters}
     wrong = np.array([math.log(9.09e10 / 1.1e11), 0, 0, 0])
-    monkeypatch.setattr("tfarm.fitting.solve.start_by", lambda problem, shares: (problem, wrong))
+    monkeypatch.setattr("tfarm.fitting.solve.start_by", lambda problem, draws, shares: (problem, wrong))
     found = fit(rig, [hub_spring_sweep()], free=both, start=start, profile=False)
-    assert found.solution.starts == 3
+    assert found.starts == 4
     assert found.chi_squared == pytest.approx(right.chi_squared, rel=1e-6)
 
 
@@ -106,7 +106,7 @@ def test_no_fit_of_a_rig_ends_above_the_true_numbers(seed):
 
 def test_profiles_are_where_the_sum_of_squares_has_grown_by_the_quantile():
     found = fit(LAB, measured(), free=["link.youngs_modulus", "hub.inertia"])
-    own, best = found.solution.problem, found.solution.point
+    own, best = found.problem, found.point
     for n, each in enumerate(found.parameters):
         for end in (each.low, each.high):
             held = own.parameters[n].coordinate(end)
@@ -358,6 +358,6 @@ def test_the_form_of_a_decay():
 def test_a_search_out_of_evaluations_goes_on_once(monkeypatch):
     """From 6 % below Young's modulus nine evaluations lead to the minimum."""
     monkeypatch.setattr("tfarm.fitting.solve.MOST_EVALUATIONS", 7)
-    monkeypatch.setattr("tfarm.fitting.solve.start_by", lambda problem, shares: (problem, np.array([-0.06])))
+    monkeypatch.setattr("tfarm.fitting.solve.start_by", lambda problem, draws, shares: (problem, np.array([-0.06])))
     found = fit(LAB, measured(omega=OMEGA[::4]), free=["link.youngs_modulus"], profile=False)
     assert found.converged

@@ -38,8 +38,8 @@ from tfarm.schema import Quantity
 from .data import CONFIDENCE, in_parts
 from .model import Problem, ring_residuals, walled
 
-LADDERS = ((0.1,), (1.0, 0.3, 0.1))  # shares of w, one after another, of each start
 DRAWS = 300  # points about one that the equation errors lead to
+STARTS = ((0, (0.1,)), (DRAWS, (0.1,)), (DRAWS, (1.0, 0.3, 0.1)))  # draws, and shares of w one after another
 DRAWN = 2.0  # times the deviation that they know it with
 START_DEVIATION = 50.0  # of ln p, over that of an equation error: what the data do not know stays where it is
 LINES = 400  # of a response, at most
@@ -48,10 +48,10 @@ STEPS = 40  # evaluations, of each share
 FIT_SEED = 852780  # of all that a fit draws: the number of the paper's article, any would do
 
 
-def start_by(problem: Problem, shares: Sequence[float]) -> tuple[Problem, Real]:
+def start_by(problem: Problem, draws: int, shares: Sequence[float]) -> tuple[Problem, Real]:
     """The problem, its sensors' gains by the sign that they have, and the least equation errors next to the start.
 
-    Of draws about these, as wide as they are uncertain, that of the least squares: the true side of a line.
+    Of a number of draws about these, as wide as they are uncertain, that of the least squares: the true side of a line.
     """
     point = problem.start
     for share in shares:
@@ -68,7 +68,7 @@ def start_by(problem: Problem, shares: Sequence[float]) -> tuple[Problem, Real]:
         point = np.asarray(found.x)
     _, sizes, axes = np.linalg.svd(np.asarray(found.jac), full_matrices=False)
     deviation = math.sqrt(2 * found.cost / found.fun.size) / sizes
-    drawn = np.random.default_rng(FIT_SEED).standard_normal((DRAWS, point.size)) * DRAWN * deviation
+    drawn = np.random.default_rng(FIT_SEED).standard_normal((draws, point.size)) * DRAWN * deviation
     return whole, min((point, *map(thin.inside, point + drawn @ axes)), key=partial(sum_of_squares, thin))
 
 
@@ -138,11 +138,17 @@ class Solution:
     point: Real
     residuals: Real
     jacobian: Real
-    converged: bool
+    converged: Annotated[
+        bool, Quantity("converged", help="whether the search for the least sum of squares ended in a minimum")
+    ]
     starts: Annotated[int, Quantity(help="number of starting points that were tried")]
 
     @property
-    def chi_squared(self) -> float:
+    def chi_squared(
+        self,
+    ) -> Annotated[
+        float, Quantity("chi-squared", digits=4, help="sum of squared residuals over their standard deviations")
+    ]:
         """The sum of squared residuals."""
         return float(self.residuals @ self.residuals)
 
@@ -153,7 +159,15 @@ class Solution:
         return tuple(np.split(self.residuals, np.cumsum(sizes))[: len(sizes)])
 
     @property
-    def freedom(self) -> int:
+    def freedom(
+        self,
+    ) -> Annotated[
+        int,
+        Quantity(
+            "degrees of freedom",
+            help="residuals less free numbers; chi-squared is about as large where arm and noise explain the data",
+        ),
+    ]:
         """Residuals less parameters."""
         return self.residuals.size - self.point.size
 
@@ -182,8 +196,8 @@ def best_solution(problem: Problem) -> Solution:
     is there only between two lines.  Then the fit's own start is tried too.
     """
     found: list[Solution] = []
-    for shares in LADDERS:
-        found.append(_rescaled(nearest_minimum(*start_by(problem, shares))))
+    for draws, shares in STARTS:
+        found.append(_rescaled(nearest_minimum(*start_by(problem, draws, shares))))
         best = min(found, key=lambda each: each.misfit)
         if best.converged and is_explained(best):
             break
