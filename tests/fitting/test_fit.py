@@ -71,7 +71,7 @@ def test_a_resonance_between_two_lines_is_found():
 
 def test_equation_errors_have_one_minimum_where_squares_have_many():
     """Along Young's modulus, a factor of two to both sides; a wide `share` changes no minimum but its place."""
-    own = fit(tfarm.load(HUB_SPRING), [hub_spring_sweep()], free=HUB_SPRING_FREE, profile=False).solution
+    own = fit(tfarm.load(HUB_SPRING), [hub_spring_sweep()], free=HUB_SPRING_FREE, profile=False)
     along = [own.point + np.array([ln_E, 0, 0]) for ln_E in np.linspace(-0.7, 0.7, 301)]
 
     def minima(residuals):
@@ -90,9 +90,9 @@ def test_a_fit_that_leaves_a_number_open_is_tried_from_its_own_start_too(monkeyp
     right = fit(rig, [hub_spring_sweep()], free=HUB_SPRING_FREE, profile=False)
     start = {each.key: each.value for each in right.parameters}
     wrong = np.array([math.log(9.09e10 / 1.1e11), 0, 0, 0])
-    monkeypatch.setattr("tfarm.fitting.solve.starts", lambda problem: [(problem, wrong)])
+    monkeypatch.setattr("tfarm.fitting.solve.start_by", lambda problem, draws, shares: (problem, wrong))
     found = fit(rig, [hub_spring_sweep()], free=both, start=start, profile=False)
-    assert found.solution.starts == 2
+    assert found.starts == 4
     assert found.chi_squared == pytest.approx(right.chi_squared, rel=1e-6)
 
 
@@ -106,7 +106,7 @@ def test_no_fit_of_a_rig_ends_above_the_true_numbers(seed):
 
 def test_profiles_are_where_the_sum_of_squares_has_grown_by_the_quantile():
     found = fit(LAB, measured(), free=["link.youngs_modulus", "hub.inertia"])
-    own, best = found.solution.problem, found.solution.point
+    own, best = found.problem, found.point
     for n, each in enumerate(found.parameters):
         for end in (each.low, each.high):
             held = own.parameters[n].coordinate(end)
@@ -122,7 +122,7 @@ def test_profiles_are_where_the_sum_of_squares_has_grown_by_the_quantile():
 
 @pytest.mark.parametrize("seed", thinned([0, 1], 2))  # E and the density; E and I
 def test_planted_pairs_are_known_by_one_combination(seed):
-    assert judged_pair(seed) == "right"
+    assert judged_pair(seed)[0] == "right"
 
 
 def test_what_does_not_matter_is_bounded_on_one_side():
@@ -200,9 +200,8 @@ def test_unknown_noise_comes_from_the_residuals():
     assert abs(found.arm.link.youngs_modulus / LAB.link.youngs_modulus - 1) < 2e-3
 
 
-def test_a_wrong_arm_is_rejected(monkeypatch):
+def test_a_wrong_arm_is_rejected():
     """The data are those of an arm with a clamp that yields; with a rigid one the fit is rejected."""
-    monkeypatch.setattr("tfarm.fitting.solve.STRAYED", 1)  # no start makes a clamp yield
     soft = tfarm.Arm(link=LAB.link, hub=LAB.hub, clamp=tfarm.RotarySpring(stiffness=300.0), name="soft")
     found = fit(LAB, measured(soft, PAIRS[:1], omega=OMEGA[::3]), free=["link.youngs_modulus"], profile=False)
     assert found.is_explained is False
@@ -278,23 +277,6 @@ def test_an_assumption_names_a_number_by_label_symbol_or_value(key, value, text,
     assert is_named(key, value, text) == is_it
 
 
-def test_from_a_file_to_margins_in_three_commands(tmp_path, capsys):
-    """The README's example; the file's README has its source."""
-    save = tmp_path / "fitted.toml"
-    free = "link.youngs_modulus,link.damping,hub.inertia,payload.mass"
-    data = "tip_acceleration/hub_torque=tests/data/sweep/tip.csv"
-    given = ("fit", "sasaki2012-lab", "--data", data, "--free", free, "--save", str(save))
-    found = answer(capsys, *given, "--covariance")
-    truth = {"youngs_modulus": 6.3e10, "damping": 1.6e-4, "inertia": 0.085, "mass": 0.12}
-    for each in found["parameters"]:
-        assert abs(each["value"] - truth[each["key"].split(".")[1]]) < 4 * each["std"]
-    assert found["explained"]
-    assert found["unexplained_peaks_hz"] == []
-    assert answer(capsys, "margins", str(save))["verdict"] == "stable"
-    proven = answer(capsys, "poles", str(save), "--count", "3", "--certify")
-    assert proven["completeness"] == "certified"
-
-
 def test_rad_s_given_as_hz_are_refused(tmp_path, capsys):
     cells = [row.split(",") for row in Path("tests/data/sweep/tip.csv").read_text().splitlines()[2:]]
     wrong = tmp_path / "wrong.csv"
@@ -338,9 +320,8 @@ def test_young_s_modulus_takes_the_shear_modulus_along():
     assert KeyedArms(rig, list(both)).at(both).link.shear_modulus == rig.link.shear_modulus
 
 
-def test_a_step_to_no_arm_is_a_wall(monkeypatch):
+def test_a_step_to_no_arm_is_a_wall():
     """An attachment near the tip that would pass it where the link grows shorter: the search ends at an arm."""
-    monkeypatch.setattr("tfarm.fitting.solve.STRAYED", 1)
     rig = tfarm.load("tests/rigs/bench-rig.toml")
     omega = np.geomspace(20, 600, 20)
     H = tfarm.transfer(rig, "tip_acceleration")(1j * omega)
@@ -377,6 +358,6 @@ def test_the_form_of_a_decay():
 def test_a_search_out_of_evaluations_goes_on_once(monkeypatch):
     """From 6 % below Young's modulus nine evaluations lead to the minimum."""
     monkeypatch.setattr("tfarm.fitting.solve.MOST_EVALUATIONS", 7)
-    monkeypatch.setattr("tfarm.fitting.solve.starts", lambda problem: [(problem, np.array([-0.06]))])
+    monkeypatch.setattr("tfarm.fitting.solve.start_by", lambda problem, draws, shares: (problem, np.array([-0.06])))
     found = fit(LAB, measured(omega=OMEGA[::4]), free=["link.youngs_modulus"], profile=False)
     assert found.converged

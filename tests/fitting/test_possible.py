@@ -32,13 +32,13 @@ def test_intervals_by_the_covariance_reach_its_quantile_to_both_sides(known):
 
 def test_draws_are_spread_by_the_covariance(known):
     those = possible(known, count=400)
-    covariance = np.linalg.inv(known.solution.jacobian.T @ known.solution.jacobian)
+    covariance = np.linalg.inv(known.jacobian.T @ known.jacobian)
     spread = np.cov(those.points.T)
     deviation = np.sqrt(np.diag(covariance))
     assert np.sqrt(np.diag(spread)) == pytest.approx(deviation, rel=5 / np.sqrt(2 * 400))
     correlation = covariance[0, 1] / deviation.prod()
     assert spread[0, 1] / np.sqrt(spread[0, 0] * spread[1, 1]) == pytest.approx(correlation, abs=5 / np.sqrt(400))
-    assert those.arms[0].link.youngs_modulus == known.solution.problem.parameters[0].value(those.points[0, 0])
+    assert those.arms[0].link.youngs_modulus == known.problem.parameters[0].value(those.points[0, 0])
 
 
 def test_of_an_unknown_pair_the_product_hardly_varies():

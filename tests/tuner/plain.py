@@ -68,7 +68,7 @@ def gradient_of_sample(trial, network, guard, k):
     weights, (run, work) = network.weights, trial.room(network)
     kernel.forward(trial.setting(network, guard), weights, run, work)
     gradient, answer = np.zeros(weights.size), run.x[k + trial.numbers.lag]
-    kernel.sample_gradient(k, trial.numbers, trial.reply, answer, run, weights, gradient, work.by_input)
+    kernel.sample_gradient(k, trial.numbers, answer, run, weights, gradient, work.by_input)
     return gradient
 
 

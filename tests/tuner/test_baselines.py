@@ -25,7 +25,7 @@ from tfarm.tuner import (
     zero_vibration,
 )
 from tfarm.tuner.baselines import quantised_chain, shaped, shaper, tried_loops
-from tfarm.tuner.tuning import trial_of, usual_plan
+from tfarm.tuner.tuning import usual_plan
 
 
 def best_of(monkeypatch, cost, windows):
@@ -141,7 +141,7 @@ def test_the_scales_of_the_tuner_are_the_arms_own(name):
     assert 2 * torque < converters.torque_range < 5 * torque
     assert torque < converters.moment_range < 10 * torque
     assert 2 < torque / plan.scale < 4.5  # one digit of a third: the paper's 3 N m over its 1 N m
-    cost = trial_of(arm, plan, chain).cost
+    cost = plan.trial(arm, chain).cost
     assert (cost.a * plan.scale**2, cost.b * plan.scale**2) == pytest.approx((1.0, 2.6))
     conditioned = {each.name: each.arm for each in tried_loops(arm, chain)}
     loads = [each.payload.mass for key, each in conditioned.items() if key.startswith("payload")]

@@ -5,7 +5,6 @@ A tuner's file: there and back to the last bit, and everything else refused in o
 
 import json
 import math
-import os
 
 import numpy as np
 import pytest
@@ -128,9 +127,5 @@ def test_a_broken_file_is_one_line(tuning, tmp_path, broken):
 
 
 def test_no_file(tmp_path):
-    """Nothing, a folder, and a pipe without a writer, which is not waited for."""
-    pipe = tmp_path / "pipe.json"
-    os.mkfifo(pipe)
-    for path, why in ((tmp_path / "nothing.json", "cannot be read"), (tmp_path, "a folder"), (pipe, "no regular file")):
-        with pytest.raises(ParameterError, match=why):
-            load_tuner(path)
+    with pytest.raises(ParameterError, match="cannot be read"):
+        load_tuner(tmp_path / "nothing.json")

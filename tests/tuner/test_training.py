@@ -122,7 +122,7 @@ def test_a_gain_that_no_loop_bears_is_cut_off_in_the_first_trial(trial, guards, 
 
 def test_one_step_online_learning_switches_the_feedback_off(trial, guards):
     """The moment answers a torque at first with the wrong sign: one step ahead, less gain always looks better."""
-    assert trial.reply < 0
+    assert trial.numbers.reply < 0
     learning = Learning(mode="online")
     free = train(trial, initial_network(0), guards["none"], learning, 30)
     assert free.died

@@ -164,10 +164,8 @@ class Noise:
         str,
         Quantity(
             "noise by",
-            "",
-            6,
-            "origin of the standard deviation: sigma or coherence of the file, or scatter of the values",
-            "noise",
+            key="noise",
+            help="origin of the standard deviation: sigma or coherence of the file, or scatter of the values",
         ),
     ]
 

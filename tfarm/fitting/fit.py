@@ -14,7 +14,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
@@ -78,8 +78,8 @@ class FittedResponse:
 
 @dataclass(frozen=True, kw_only=True)
 @record
-class Fit:
-    """An arm fitted to measured responses.
+class Fit(Solution):
+    """The best point of the search with intervals: an arm fitted to measured responses.
 
     `parameters` are the free numbers with their intervals, `not_determined` the combinations that the data leave open;
     `chi_squared` over `freedom` is about 1 where the arm and the noise explain all.
@@ -87,28 +87,12 @@ class Fit:
 
     arm: Arm
     before: Arm
-    converged: Annotated[
-        bool, Quantity("converged", help="whether the search for the least sum of squares ended in a minimum")
-    ]
     parameters: Annotated[
         tuple[Fitted, ...], Quantity("fitted numbers", help="free numbers with their confidence intervals")
     ]
     not_determined: Annotated[
         tuple[str, ...], Quantity("not identifiable", help="numbers, or combinations of them, that the data leave open")
     ]
-    chi_squared: Annotated[
-        float, Quantity("chi-squared", digits=4, help="sum of squared residuals over their standard deviations")
-    ]
-    freedom: Annotated[
-        int,
-        Quantity(
-            "degrees of freedom",
-            "",
-            6,
-            "residuals less free numbers; chi-squared is about as large where arm and noise explain the data",
-        ),
-    ]
-    solution: Annotated[Solution, Quantity(help="best point of the search", flat=True)]
     interval_by: Annotated[
         str, Quantity("intervals by", help="profile likelihood, or covariance of the linearised residuals")
     ]
@@ -133,7 +117,7 @@ class Fit:
     @property
     def responses(self) -> tuple[Measured, ...]:
         """The measured responses."""
-        return tuple(each.data for each in self.solution.problem.responses)
+        return tuple(each.data for each in self.problem.responses)
 
     @property
     def response_list(
@@ -143,7 +127,7 @@ class Fit:
         Quantity("responses", key="responses", help="measured responses with their noise and residuals"),
     ]:
         """A row a response."""
-        pairs = zip(self.solution.problem.responses, self.solution.parts, self.responses, strict=True)
+        pairs = zip(self.problem.responses, self.parts, self.responses, strict=True)
         return [
             FittedResponse(of.name, of.label, of.unit, of.source, of.digest, of.points, *of.range_hz,
                            one.noise.source, float(residuals @ residuals))
@@ -158,7 +142,7 @@ class Fit:
         Quantity("resonances", help="measured peaks with the poles of the arm before and after the fit"),
     ]:
         """A row a measured peak."""
-        responses = [(each.data, each.noise) for each in self.solution.problem.responses]
+        responses = [(each.data, each.noise) for each in self.problem.responses]
         return resonance_shifts(self.before, self.arm, responses)
 
     @property
@@ -168,10 +152,8 @@ class Fit:
         list[float],
         Quantity(
             "peaks far from every pole of the arm [Hz]",
-            "",
-            6,
-            "measured peaks that the fitted arm does not have",
-            "unexplained_peaks_hz",
+            key="unexplained_peaks_hz",
+            help="measured peaks that the fitted arm does not have",
         ),
     ]:
         """Measured peaks that the fitted arm does not have."""
@@ -196,7 +178,7 @@ class Fit:
         """The root mean square of ln(computed/measured), complex, over all values; None where there are none."""
         if not self.responses:
             return None
-        computed = self.solution.problem.computed(self.solution.point)
+        computed = self.problem.computed(self.point)
         pairs = zip(computed, self.responses, strict=True)
         away = np.concatenate([np.log(H / each.values)[each.values != 0] for H, each in pairs])
         return float(np.sqrt((abs(away) ** 2).mean()))
@@ -212,7 +194,7 @@ class Fit:
         ),
     ]:
         """Whether noise alone is often so large; None where its size was taken from the residuals."""
-        return is_explained(self.solution)
+        return is_explained(self)
 
     @property
     def verdict(
@@ -267,19 +249,17 @@ def fit(
             fitted, unknown = confidence_intervals(found, profile=profile, progress=progress)
             break
         except BetterError as better:
-            found = replace(nearest_minimum(better.found.problem, better.found.point), starts=found.starts)
+            (there,) = better.args
+            found = replace(nearest_minimum(there.problem, there.point), starts=found.starts)
     else:  # one valley after another: no end of it
         found = replace(found, converged=False)
         fitted, unknown = confidence_intervals(found, profile=False)
     fit = Fit(
+        **{each.name: getattr(found, each.name) for each in fields(found)},
         arm=replace(found.problem.arm(found.point), name=f"{arm.name}-fitted"),
-        before=replace(subject.arm(np.zeros(len(subject.parameters))), name=arm.name),
-        converged=found.converged,
+        before=replace(subject.arm(np.zeros(found.point.size)), name=arm.name),
         parameters=fitted,
         not_determined=unknown,
-        chi_squared=found.chi_squared,
-        freedom=found.freedom,
-        solution=found,
         interval_by="profile likelihood" if profile else "covariance",
     )
     return replace(fit, arm=replace(fit.arm, assumptions=_assumptions(fit, arm.assumptions)))
@@ -287,7 +267,7 @@ def fit(
 
 def _assumptions(fit: Fit, before: Sequence[str]) -> tuple[str, ...]:
     """The arm's assumptions, those that name a fitted number marked as of the start, then the fit and its data."""
-    family = fit.solution.problem.family
+    family = fit.problem.family
     texts: list[str] = []
     for text in before:
         labels = [file_key(key).label for key in family.keys if is_named(key, family.value(key), text)]
@@ -364,17 +344,17 @@ def possible(fit: Fit, count: int) -> Possible:
 
     Raises ConvergenceError where the sum of squares is so far from a parabola that draws of one are none of it.
     """
-    found, rng = fit.solution, np.random.default_rng(FIT_SEED)
-    sizes, axes = principal_axes(found.jacobian)
+    rng = np.random.default_rng(FIT_SEED)
+    sizes, axes = principal_axes(fit.jacobian)
     spread = np.minimum(1.0 / np.maximum(sizes, LEAST_SIZE), OPEN_DEVIATION)
-    apart = 2.0 * float(gammaincinv(found.point.size / 2, DRAWS_KEPT))  # the quantile of chi squared
-    most = found.chi_squared + apart + 2 * int((sizes < 1 / OPEN_DEVIATION).sum())
+    apart = 2.0 * float(gammaincinv(fit.point.size / 2, DRAWS_KEPT))  # the quantile of chi squared
+    most = fit.chi_squared + apart + 2 * int((sizes < 1 / OPEN_DEVIATION).sum())
     kept: list[Real] = []
     for _ in range(DRAWS_EACH * count):
-        point = found.problem.inside(found.point + axes.T @ (spread * rng.standard_normal(spread.size)))
-        kept += [point] * (sum_of_squares(found.problem, point) <= most)
+        point = fit.problem.inside(fit.point + axes.T @ (spread * rng.standard_normal(spread.size)))
+        kept += [point] * (sum_of_squares(fit.problem, point) <= most)
         if len(kept) == count:
-            return Possible(fit, tuple(map(found.problem.arm, kept)), np.array(kept))
+            return Possible(fit, tuple(map(fit.problem.arm, kept)), np.array(kept))
     message = f"only {len(kept)} of {DRAWS_EACH * count} arms drawn explain the data: their likelihood is not normal"
     raise ConvergenceError(message, kept, len(kept))
 
@@ -407,9 +387,7 @@ class Repeats:
         dict[str, float],
         Quantity(
             "times wider than by noise",
-            "",
-            6,
-            "standard deviation over draws of records, over that by the noise within a record",
+            help="standard deviation over draws of records, over that by the noise within a record",
         ),
     ]
 
@@ -437,23 +415,24 @@ def repeats(fit: Fit, draws: int = DRAWS) -> Repeats | None:
     """
     from scipy.stats import bootstrap
 
-    own = fit.solution.problem
+    own = fit.problem
     names = [each.data.label for each in own.responses]
     most = max(names, key=names.count, default="")
     records = [n for n, name in enumerate(names) if name == most]
     if len(records) < FEWEST_RECORDS:
         return None
     others = [n for n, name in enumerate(names) if name != most]
-    every = list(enumerate(fit.parameters))  # a key with a colon is of one record's sensor, which others do not know
-    known = [n for n, each in every if each.identified and each.deviation and ":" not in each.key]
-    keys, start = [fit.parameters[n].key for n in known], fit.solution.point
+    identified = {n: each for n, each in enumerate(fit.parameters) if each.identified}
+    # a key with a colon is of one record's sensor, which others do not know
+    known = {n: each for n, each in identified.items() if each.deviation and ":" not in each.key}
+    keys, start = [each.key for each in known.values()], fit.point
 
     def numbers(chosen: Sequence[int]) -> Real:
         some = replace(own, responses=tuple(own.responses[n] for n in (*chosen, *others)))
-        used = {place for each in some.responses for place in (each.gain, each.delay) if place is not None}
-        sensors = range(len(own.of_the_arm), len(own.parameters))
-        held = [*(n for n in sensors if n not in used), *(n for n, each in every if not each.identified)]
-        point = nearest_minimum(some, start, {n: float(start[n]) for n in held}).point
+        sensors = {place for each in some.responses for place in (each.gain, each.delay)}
+        used = identified.keys() & (sensors | set(range(len(own.of_the_arm))))
+        held = {n: float(x) for n, x in enumerate(start) if n not in used}
+        point = nearest_minimum(some, start, held).point
         return np.array([own.parameters[n].value(float(point[n])) for n in known])
 
     drawn = bootstrap(
@@ -461,7 +440,7 @@ def repeats(fit: Fit, draws: int = DRAWS) -> Repeats | None:
         rng=FIT_SEED,
     )  # fmt: skip
     ends = np.array(drawn.confidence_interval).T
-    wider = drawn.standard_error / np.array([fit.parameters[n].deviation for n in known])
+    wider = drawn.standard_error / np.array([each.deviation for each in known.values()])
     return Repeats(
         response=most,
         each=[dict(zip(keys, numbers([n]).tolist(), strict=True)) for n in records],

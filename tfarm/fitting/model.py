@@ -102,32 +102,21 @@ def parameters(
     for known, what in ((start, "start"), (bounds, "bounds"), (priors, "prior")):
         for key in known:
             require(key in keys, what, key, f"is not free; {did_you_mean(key, keys)}")
-    family = KeyedArms(arm, keys)
-    return family, tuple(
-        _parameter(family, key, start.get(key), bounds.get(key), priors.get(key)) for key in family.keys
-    )
-
-
-def _parameter(
-    family: KeyedArms,
-    key: str,
-    start: float | None,
-    bounds: tuple[float, float] | None,
-    prior: tuple[float, float] | None,
-) -> Parameter:
-    name, own = key.split(".")[-1], family.value(key)
-    if start is None:
-        start = own if own and math.isfinite(own) else _typical(family.arm, key, own)
-    is_signed, length = name in SIGNED, family.arm.length
-    most = length if name == "x" else UPPER_ENDS.get(name, math.inf)
-    low, high = bounds or (-math.inf if is_signed else 0.0, most)
-    remedy = f"starts at {start:g}; give bounds low,high around it, or another start"
-    require(low <= start <= high and low < high, f"bounds of {key}", (low, high), remedy)
-    require(is_signed or start > 0, f"start of {key}", start, "a positive number in SI units")
-    is_prior = prior is None or (math.isfinite(prior[0]) and prior[1] > 0)
-    require(is_prior, f"prior of {key}", prior, "mean,deviation with a deviation above 0")
-    size = max(abs(start), 0.1 * length) if is_signed else start
-    return Parameter(key=key, start=start, low=low, high=high, by_logarithm=not is_signed, size=size, prior=prior)
+    family, found = KeyedArms(arm, keys), []
+    for key in family.keys:
+        name, own, prior = key.split(".")[-1], family.value(key), priors.get(key)
+        usual = own if key in start or (own and math.isfinite(own)) else _typical(arm, key, own)
+        at, is_signed = start.get(key, usual), name in SIGNED
+        most = arm.length if name == "x" else UPPER_ENDS.get(name, math.inf)
+        low, high = bounds.get(key, (-math.inf if is_signed else 0.0, most))
+        remedy = f"starts at {at:g}; give bounds low,high around it, or another start"
+        require(low <= at <= high and low < high, f"bounds of {key}", (low, high), remedy)
+        require(is_signed or at > 0, f"start of {key}", at, "a positive number in SI units")
+        is_prior = prior is None or (math.isfinite(prior[0]) and prior[1] > 0)
+        require(is_prior, f"prior of {key}", prior, "mean,deviation with a deviation above 0")
+        size = max(abs(at), 0.1 * arm.length) if is_signed else at
+        found.append(Parameter(key, at, low, high, by_logarithm=not is_signed, size=size, prior=prior))
+    return family, tuple(found)
 
 
 def _typical(arm: Arm, key: str, own: float) -> float:
@@ -277,6 +266,11 @@ class Problem:
         """Lowest and highest coordinates."""
         low, high = zip(*(each.bounds for each in self.parameters), strict=True)
         return np.array(low), np.array(high)
+
+    @property
+    def start(self) -> Real:
+        """Where the search starts."""
+        return self.inside(np.zeros(len(self.parameters)))
 
     def inside(self, point: Real) -> Real:
         """The point, or the nearest one by `INSIDE_BOUNDS` inside the bounds."""

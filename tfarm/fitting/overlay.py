@@ -203,11 +203,21 @@ class Counterpart:
     ]
     measured_damping: Annotated[
         float | None,
-        Quantity("measured damping ratio", "", 4, "of the pole fitted to the measured peak", "measured_damping_ratio"),
+        Quantity(
+            "measured damping ratio",
+            digits=4,
+            key="measured_damping_ratio",
+            help="of the pole fitted to the measured peak",
+        ),
     ]
     damping_std: Annotated[
         float | None,
-        Quantity("deviation", "", 2, "standard deviation of the measured damping ratio", "measured_damping_ratio_std"),
+        Quantity(
+            "deviation",
+            digits=2,
+            key="measured_damping_ratio_std",
+            help="standard deviation of the measured damping ratio",
+        ),
     ]
     level_db: Annotated[
         float | None,
@@ -274,10 +284,8 @@ class Overlay:
         list[float],
         Quantity(
             "measured peaks far from every pole of the arm [Hz]",
-            "",
-            6,
-            "measured peaks without a pole of the arm near them",
-            "unmatched_peaks_hz",
+            key="unmatched_peaks_hz",
+            help="measured peaks without a pole of the arm near them",
         ),
     ]:
         """Measured peaks that the arm does not have."""
@@ -316,10 +324,8 @@ class Overlay:
         tuple[RequiredChange, ...],
         Quantity(
             "single changes that explain a mode",
-            "",
-            6,
-            "change of one number that alone moves a mode to its measured frequency",
-            "required_percent",
+            key="required_percent",
+            help="change of one number that alone moves a mode to its measured frequency",
         ),
     ]:
         """A row a parameter of `Modes.sensitivity` and mode: the change of it that alone would explain the mode.

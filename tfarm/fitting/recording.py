@@ -269,7 +269,10 @@ class Estimate:
     independent: Annotated[
         float,
         Quantity(
-            "independent averages", "", 4, "segments that count as independent, by Welch (1967)", "independent_averages"
+            "independent averages",
+            digits=4,
+            key="independent_averages",
+            help="segments that count as independent, by Welch (1967)",
         ),
     ]
     note: Annotated[

@@ -227,7 +227,9 @@ class DecayMode(NamedTuple):
     ]
     option: Annotated[
         str,
-        Quantity("for tfarm fit --mode N=", "", 6, "value that passes the mode on to a fit of the arm", "mode_option"),
+        Quantity(
+            "for tfarm fit --mode N=", key="mode_option", help="value that passes the mode on to a fit of the arm"
+        ),
     ]
     first_half: Annotated[
         float | None, Quantity(key="frequency_first_half_hz", help="frequency by the first half of the record alone")
@@ -253,16 +255,20 @@ class Ring:
     samples: Annotated[int, Quantity("samples", help="number of samples that are used")]
     residual: Annotated[
         float,
-        Quantity("residual rms", "", 4, "root mean square of the residuals, in the unit of the signal", "residual_rms"),
+        Quantity(
+            "residual rms",
+            digits=4,
+            key="residual_rms",
+            help="root mean square of the residuals, in the unit of the signal",
+        ),
     ]
     white: Annotated[
         float,
         Quantity(
             "probability of white residuals",
-            "",
-            3,
-            "of correlations as large as these in white noise (Ljung and Box 1978)",
-            "whiteness_probability",
+            digits=3,
+            key="whiteness_probability",
+            help="of correlations as large as these in white noise (Ljung and Box 1978)",
         ),
     ]
     notes: Annotated[tuple[str, ...], Quantity("notes", help="limits of the intervals")]

@@ -20,8 +20,7 @@ Intervals are by the covariance or by the profile of the likelihood; some number
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Annotated
@@ -39,11 +38,9 @@ from tfarm.schema import Quantity
 from .data import CONFIDENCE, in_parts
 from .model import Problem, ring_residuals, walled
 
-LADDERS = ((0.1,), (1.0, 0.3, 0.1))  # shares of w, one after another, of the first starts
 DRAWS = 300  # points about one that the equation errors lead to
+STARTS = ((0, (0.1,)), (DRAWS, (0.1,)), (DRAWS, (1.0, 0.3, 0.1)))  # draws, and shares of w one after another
 DRAWN = 2.0  # times the deviation that they know it with
-STRAYED = 6  # starts beyond these, strayed from the first point by
-SPREAD = 0.3  # of ln p
 START_DEVIATION = 50.0  # of ln p, over that of an equation error: what the data do not know stays where it is
 LINES = 400  # of a response, at most
 LOSS = 0.1  # of an equation error: those beyond count less and less
@@ -51,24 +48,12 @@ STEPS = 40  # evaluations, of each share
 FIT_SEED = 852780  # of all that a fit draws: the number of the paper's article, any would do
 
 
-def starts(problem: Problem) -> Iterator[tuple[Problem, Real]]:
-    """Points that the complex residuals may be minimised from, the likeliest first, and the problem there."""
-    zero = np.zeros(len(problem.parameters))
-    yield _start_near(problem, zero, LADDERS[0], 0)
-    for shares in LADDERS:
-        yield _start_near(problem, zero, shares, DRAWS)
-    rng = np.random.default_rng(FIT_SEED)
-    for _ in range(STRAYED):
-        with suppress(ParameterError):  # no arm there
-            yield _start_near(problem, SPREAD * rng.standard_normal(zero.size), LADDERS[-1], DRAWS)
-
-
-def _start_near(problem: Problem, point: Real, shares: tuple[float, ...], draws: int) -> tuple[Problem, Real]:
-    """The problem, its sensors' gains by the sign that they have, and the least equation errors next to a point.
+def start_by(problem: Problem, draws: int, shares: Sequence[float]) -> tuple[Problem, Real]:
+    """The problem, its sensors' gains by the sign that they have, and the least equation errors next to the start.
 
     Of a number of draws about these, as wide as they are uncertain, that of the least squares: the true side of a line.
     """
-    point = problem.inside(point)
+    point = problem.start
     for share in shares:
         whole, first = with_gains(problem, point)
         thin = thinned(whole, LINES)
@@ -133,8 +118,8 @@ def thinned(problem: Problem, most: int) -> Problem:
 
 
 NOISE_ALONE = 1e-6  # probability of a sum of squares by noise alone below which another start is tried
-MUCH_MISFIT = 4.0  # times its degrees of freedom: a best sum beyond is tried from strayed starts too
 MOST_EVALUATIONS = 60  # evaluations from one start
+CONTINUED = 8  # times as many more from the best of the starts: along a narrow valley
 FIRM_POINT = 1e-7  # of the coordinates: a step that changes less ends a search
 FIRM_SUM = 1e-9  # of the sum, likewise
 OPEN_DEVIATION = 1.0  # of ln p: a combination with a larger deviation (a factor of e) is not determined by the data
@@ -153,11 +138,17 @@ class Solution:
     point: Real
     residuals: Real
     jacobian: Real
-    converged: bool
+    converged: Annotated[
+        bool, Quantity("converged", help="whether the search for the least sum of squares ended in a minimum")
+    ]
     starts: Annotated[int, Quantity(help="number of starting points that were tried")]
 
     @property
-    def chi_squared(self) -> float:
+    def chi_squared(
+        self,
+    ) -> Annotated[
+        float, Quantity("chi-squared", digits=4, help="sum of squared residuals over their standard deviations")
+    ]:
         """The sum of squared residuals."""
         return float(self.residuals @ self.residuals)
 
@@ -168,7 +159,15 @@ class Solution:
         return tuple(np.split(self.residuals, np.cumsum(sizes))[: len(sizes)])
 
     @property
-    def freedom(self) -> int:
+    def freedom(
+        self,
+    ) -> Annotated[
+        int,
+        Quantity(
+            "degrees of freedom",
+            help="residuals less free numbers; chi-squared is about as large where arm and noise explain the data",
+        ),
+    ]:
         """Residuals less parameters."""
         return self.residuals.size - self.point.size
 
@@ -191,24 +190,23 @@ class Solution:
 
 
 def best_solution(problem: Problem) -> Solution:
-    """The least sum of squares over all starts; those of noise alone end the search early.
+    """The least sum of squares over the starts; one of noise alone ends the search early.
 
     Where something is left open the valleys are wide, and the equation errors may lead into the wrong one: a pole that
     is there only between two lines.  Then the fit's own start is tried too.
     """
     found: list[Solution] = []
-    for subject, start in starts(problem):
-        found.append(_rescaled(nearest_minimum(subject, start)))
+    for draws, shares in STARTS:
+        found.append(_rescaled(nearest_minimum(*start_by(problem, draws, shares))))
         best = min(found, key=lambda each: each.misfit)
-        is_near = len(found) > len(LADDERS) and best.chi_squared < MUCH_MISFIT * best.freedom
-        if best.converged and (is_near or is_explained(best)):
+        if best.converged and is_explained(best):
             break
     if open_axes(best.jacobian).size:
-        at_start = _rescaled(nearest_minimum(*with_gains(problem, problem.inside(np.zeros(best.point.size)))))
+        at_start = _rescaled(nearest_minimum(*with_gains(problem, problem.start)))
         found.append(at_start)
         best = at_start if at_start.misfit < best.misfit - SAME_SUM else best
-    if not best.converged:
-        best = nearest_minimum(best.problem, best.point)
+    for _ in range(CONTINUED):
+        best = best if best.converged else nearest_minimum(best.problem, best.point)
     return replace(_nearest(best), starts=len(found))
 
 
@@ -329,11 +327,7 @@ class Fitted:
 
 
 class BetterError(Exception):
-    """A profile has come to a lower sum of squares than the best: carries where."""
-
-    def __init__(self, found: Solution) -> None:
-        super().__init__(found)
-        self.found = found
+    """A profile has come to a lower sum of squares than the best: its argument is the solution there."""
 
 
 def confidence_intervals(
@@ -348,20 +342,19 @@ def confidence_intervals(
     parameters, quantile = found.problem.parameters, found.quantile
     sizes, axes = principal_axes(found.jacobian)
     is_open = sizes < 1.0 / OPEN_DEVIATION
-    covariance = (axes[~is_open].T / sizes[~is_open] ** 2) @ axes[~is_open]
-    unsure: list[bool] = np.any(abs(axes[is_open]) > TAKES_PART, axis=0).tolist()
+    deviations = np.linalg.norm(axes[~is_open] / sizes[~is_open, None], axis=0).tolist()
+    part = abs(axes[is_open]) > TAKES_PART
     largest = abs(axes[is_open]).argmax(axis=1).tolist()
     held = {n: float(found.point[n]) for n in largest}
     words = [_undetermined(axis, [each.key for each in parameters]) for axis in axes[is_open]]
-    alone = {n: k for k, n in enumerate(largest) if (abs(axes[is_open][k]) > TAKES_PART).sum() == 1}
+    alone = {n: k for k, n in enumerate(largest) if part[k].sum() == 1}
     fitted = []
     for n, each in enumerate(parameters):
         if progress is not None:
             progress(n, len(parameters), f"interval of {each.key}")
         low = high = deviation = None
-        point = float(found.point[n])
-        if not unsure[n]:
-            own = math.sqrt(covariance[n, n])
+        point, own = float(found.point[n]), deviations[n]
+        if not part[:, n].any():
             ends = [_end(found, n, way, own, quantile, held) if profile else point + way * quantile * own
                     for way in (-1, 1)]  # fmt: skip
             (low, high), deviation = each.ends(ends), own * abs(each.value(point) if each.by_logarithm else each.size)

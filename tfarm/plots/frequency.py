@@ -346,10 +346,10 @@ def fitted(fit: Fit, *, ax: Sequence[Axes]) -> None:
 
     Phases are broken where they wrap.
     """
-    count, problem = len(fit.responses), fit.solution.problem
+    count, problem = len(fit.responses), fit.problem
     arms: tuple[tuple[Real, dict[str, Any]], ...] = (
-        (fit.solution.point * 0, {"color": GREY, "lw": 1.0, "label": "start"}),
-        (fit.solution.point, {"color": BLUE, "lw": 1.4, "label": "fitted, exact"}),
+        (fit.point * 0, {"color": GREY, "lw": 1.0, "label": "start"}),
+        (fit.point, {"color": BLUE, "lw": 1.4, "label": "fitted, exact"}),
     )
     for number, (one, upper, lower) in enumerate(zip(fit.responses, ax[:count], ax[count:], strict=False)):
         omega = np.unique(np.r_[np.geomspace(one.omega[0], one.omega[-1], 1200), one.omega])

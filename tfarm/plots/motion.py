@@ -27,7 +27,7 @@ from tfarm.fitting.recording import RunComparison
 from tfarm.loop.plane import Plane
 from tfarm.spectrum import Modes
 from tfarm.tuner import Tuning
-from tfarm.tuner.training import QUARTILES, LearningCurves
+from tfarm.tuner.training import LearningCurves
 
 from .regions import overlay
 from .style import (
@@ -315,13 +315,13 @@ def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap], *, 
 
 @picture(
     size=(9.0, 4.4),
-    title=lambda curves, tuning: f"{tuning.trial.arm.name}: learning, {how_many(curves.seeds, 'seed')}",
+    title=lambda curves, tuning: f"{tuning.trial.arm.name}: learning, {how_many(len(curves.costs), 'seed')}",
 )  # fmt: skip
 def draw_curves(curves: LearningCurves, tuning: Tuning, *, ax: Axes) -> None:
     """Learning curves: each seed, median and quartiles, and the baselines; diverged ones leave through the top."""
     trial = np.arange(1, curves.costs.shape[1] + 1)
     top = 1.25 * tuning.without.cost  # higher costs are drawn at the top edge
-    low, middle, high = (np.minimum(curves.quantile(share), 2 * top) for share in QUARTILES)
+    low, middle, high = (np.minimum(costs, 2 * top) for costs in curves.quartile_curves.values())
     ax.plot(trial, np.minimum(curves.costs, 2 * top).T, color="#b9b9b9", lw=0.6, zorder=1)
     ax.fill_between(trial, low, high, color=BLUE, alpha=0.22, lw=0, zorder=2, label="middle half of the seeds")
     ax.plot(trial, middle, color=BLUE, lw=1.8, zorder=3, label="median")

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Annotated, NamedTuple
 
@@ -21,6 +20,7 @@ from tfarm.schema import Column, Quantity, Table, table
 from tfarm.spectrum.table import first_frequency
 from tfarm.tuner import LearningCurves, Plan, Tuning, compare_controllers, learning_curves, tried_loops, tune
 from tfarm.tuner.baselines import CONSTANT_GAINS, Outcomes, quantised_chain, tried_gains
+from tfarm.tuner.trial import usual_rate_gain
 from tfarm.tuner.tuning import SlewEnd, usual_plan
 
 WITHOUT = f"without moment feedback, {MOMENT_GAIN} = 0"
@@ -110,8 +110,9 @@ def curve_seeds(samples: int) -> int:
 def _servo_tuning(arm: Arm, plan: Plan, chain: Chain) -> Tuning | None:
     """The same tuning with an angle loop a twentieth as fast as the first mode, or slower at a long period."""
     speed = min(first_frequency(arm) / 20, 0.03 / chain.sampling.period)  # it leaves the mode alone; rad a sample
+    Kp = float(f"{arm.turned_inertia * speed**2:.2g}")
     try:
-        return tune(arm, plan.holding(arm, float(f"{arm.turned_inertia * speed**2:.2g}")), chain)
+        return tune(arm, replace(plan, Kp=Kp, K1=usual_rate_gain(arm, Kp)), chain)
     except (CertificationError, ConvergenceError):
         return None
 
@@ -143,12 +144,12 @@ def section_of(data: TunerNumbers) -> PageSection:
 
 def saved_cost(data: TunerNumbers) -> float:
     """How much the median cost of the tuner is below that of the best constant gain [%]."""
-    return 100 * (1 - data.curves.final_quantile(0.5) / data.tuning.best_constant.cost)
+    return 100 * (1 - data.curves.final_quartiles[1] / data.tuning.best_constant.cost)
 
 
 def tuner_in_short(data: TunerNumbers) -> str:
     """The median cost of the tuner over its seeds, compared with the best constant gain."""
-    return prose("tuner_in_short", gain=saved_cost(data), same=100 * SAME_COST, median=data.curves.final_quantile(0.5),
+    return prose("tuner_in_short", gain=saved_cost(data), same=100 * SAME_COST, median=data.curves.final_quartiles[1],
                  best=data.tuning.best_constant.cost, final=data.curves.final)  # fmt: skip
 
 
@@ -165,9 +166,8 @@ def tuner_facts(data: TunerNumbers) -> tuple[Fact, ...]:
     ends = [
         off_target(data, float(traces.away(data.arm, run)[-1])) for run in (data.slews["with the tuner"], data.constant)
     ]
-    late, costs = tuning.shaped_delays, tuning.shaped_costs
-    shaped = [f"{kind} {significant(cost, 2)}, {significant(1e3 * late[kind], 3)} ms later"
-              for kind, cost in costs.items() if late[kind]]  # fmt: skip
+    shaped = [f"{kind} {significant(each.cost, 2)}, {significant(1e3 * each.later, 3)} ms later"
+              for kind, each in tuning.shaped.items() if each.later]  # fmt: skip
     certainty = "certified stable" if guard.is_proven else f"certified for the first {guard.modes_used} modes"
     saved = saved_cost(data)
     less = f"{significant(saved, 2)} % less cost" if saved > 100 * SAME_COST else "no improvement"
@@ -178,7 +178,7 @@ def tuner_facts(data: TunerNumbers) -> tuple[Fact, ...]:
              note=f"{MOMENT_GAIN} = {significant(tuning.best_constant.gain, 3)}"),
         Fact("tuner", median, note=f"half between {low} and {high}"),
         Fact("bound", significant(tuning.bound.cost, 4), note="linear-quadratic optimum"),
-        Fact("input shaping", significant(min(costs.values()), 3),
+        Fact("input shaping", significant(min(each.cost for each in tuning.shaped.values()), 3),
              note="; ".join(shaped) or "no mode slow enough to shape"),
         Fact("tip error at the end", ends[0], "mm", f"constant gain: {ends[1]} mm"),
         Fact("guard", f"{guard.lo:.3f} … {guard.hi:.3f}", note=f"any K(t) in it: {certainty}"),
@@ -197,12 +197,12 @@ class Cost(NamedTuple):
 
 def servo_table(data: TunerNumbers, servo: Tuning) -> Table:
     """The costs of the slew with the angle regulated too."""
-    law, error = servo.plan.servo, SlewEnd.of(servo).tip_error
+    law, error = servo.gain().servo, SlewEnd.of(servo).tip_error
     rows = [
         Cost("no moment feedback", servo.without.cost),
         Cost("best constant gain", servo.best_constant.cost),
         Cost("tuner", servo.training.result.cost),
-        *itertools.starmap(Cost, servo.shaped_costs.items()),
+        *(Cost(kind, each.cost) for kind, each in servo.shaped.items()),
         Cost("bound", servo.bound.cost),
     ]
     gains = ", ".join(law.gain_text(name, partial(significant, digits=3), data.arm) for name in (ANGLE_GAIN, RATE_GAIN))

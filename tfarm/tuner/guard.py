@@ -51,6 +51,7 @@ from tfarm.arrays import Real
 from tfarm.dsp import Sampled, sampled_loop, stable_windows
 from tfarm.dsp.crossings import around
 from tfarm.dsp.plant import held_amplitude
+from tfarm.dsp.sampled import first_distinct
 from tfarm.errors import CertificationError, ConvergenceError, must_be_known
 from tfarm.exact.rationals import as_integers, falls, is_positive_definite
 from tfarm.loop.margins import lowest
@@ -199,7 +200,6 @@ MOST_GAIN = 10.0  # where the frozen interval has no upper end
 MIDDLE_GAINS = 60  # gains of an interval that a sector is tried around
 NARROWEST_SECTOR = 1e-4  # a sector this narrow is none
 SECTORS_AGREE = 1e-3  # of the width: largest change by more modes
-SECTOR_TRIES, SECTOR_SHRINKS = 6, 0.9  # widths for which a proof is tried, and the ratio of each to the one before
 MIDDLE_HALVINGS = 12  # of the step between two middles, which leaves a part without effect
 TIMES_THE_MODES = (4, 3, 2)  # of a larger loop: the first number at which damped modes are distinguished
 GUARD_MODES_UNDAMPED = 20  # of the larger loop at C = 0
@@ -262,7 +262,8 @@ def find_guard(loop: Sampled, kind: GuardKind, best_constant: float) -> Guard:
     must_be_known("guard", kind, GUARD_KINDS)
     if kind == "none":
         return Guard("none", 0.0, math.inf, loop.plant.count, False)
-    guard = _guard(loop, kind, best_constant)
+    find = _frozen if kind == "frozen" else _moving
+    guard = find(_larger(loop), best_constant)
     if guard is not None:
         return guard
     arm = loop.plant.arm
@@ -273,16 +274,11 @@ def find_guard(loop: Sampled, kind: GuardKind, best_constant: float) -> Guard:
     for C in REMEDY_DAMPINGS[arm.damping < REMEDY_DAMPINGS]:
         with suppress(ConvergenceError):
             damped = sampled_loop(arm.having(damping=float(C)), loop.gains, loop.chain, count=loop.plant.count)
-            other = _guard(damped, kind, 0.0)
+            other = find(_larger(damped), 0.0)
             if other is not None and other.is_settled:
                 raise CertificationError(f"{start}; with a damping of C = {C:.1e} s there is one")
     remedy = f"take another {RATE_GAIN}, or a shorter period or delay"
     raise CertificationError(f"{start}, nor with any damping up to {REMEDY_DAMPINGS[-1]:g} s; {remedy}")
-
-
-def _guard(loop: Sampled, kind: GuardKind, best_constant: float) -> Guard | None:
-    """The guard that holds in a loop and in a larger model; None where there is none."""
-    return (_frozen if kind == "frozen" else _moving)(_larger(loop), best_constant)
 
 
 def constant_windows(loop: Sampled) -> list[tuple[float, float]]:
@@ -306,25 +302,20 @@ def _frozen(loops: list[Sampled], best_constant: float) -> Guard | None:
 
 
 def _moving(loops: list[Sampled], best_constant: float) -> Guard | None:
-    """The sector of the default rule, certified in every model; narrower where the proof needs it."""
+    """The sector of the default rule, certified in every model."""
     models = [MovingGain(loop) for loop in loops]
     m = _middle(models[0], best_constant)
     if m is None:
         return None
-    radii = [model.radius(m) for model in models]
-    found = [(m - radius, m + radius) for radius in radii]
-    share = RADIUS_SHARE
-    for _ in range(SECTOR_TRIES):
-        half = share * min(radii)
-        lo, hi = max(0.0, m - half), m + half
-        if half < NARROWEST_SECTOR:
-            return None
-        proofs = [model.proof(lo, hi) for model in models]
-        if None not in proofs:
-            whole = tuple(filter(None, proofs))
-            return Guard("time-varying", lo, hi, loops[-1].plant.count, _settled(loops, found), whole)
-        share *= SECTOR_SHRINKS
-    return None
+    radii = np.array([model.radius(m) for model in models])
+    half = RADIUS_SHARE * float(radii.min())
+    lo, hi = max(0.0, m - half), m + half
+    proofs = [model.proof(lo, hi) for model in models if half >= NARROWEST_SECTOR]
+    proven = tuple(filter(None, proofs))
+    if len(proven) < len(models):
+        return None
+    is_settled = _settled(loops, np.c_[m - radii, m + radii].tolist())
+    return Guard("time-varying", lo, hi, loops[-1].plant.count, is_settled, proven)
 
 
 def _middle(model: MovingGain, best_constant: float) -> float | None:
@@ -377,10 +368,7 @@ def _larger(loop: Sampled) -> list[Sampled]:
     A number at which two of the damped modes are not distinguished is left out.
     """
     arm, count = loop.plant.arm, loop.plant.count
-    wanted = tuple(times * count for times in TIMES_THE_MODES) if arm.damping else (GUARD_MODES_UNDAMPED,)
-    for number in (min(number, MOST_GUARD_MODES) for number in wanted):
-        if number <= count:
-            break
-        with suppress(ConvergenceError):
-            return [loop, loop.with_modes(number)]
-    return [loop]
+    wanted = [times * count for times in TIMES_THE_MODES] if arm.damping else [GUARD_MODES_UNDAMPED]
+    numbers = [min(number, MOST_GUARD_MODES) for number in wanted if number > count]
+    larger = first_distinct(lambda number: loop.with_modes(int(number)), [*numbers, count])
+    return [loop, larger] if larger.plant.count > count else [loop]

@@ -21,7 +21,7 @@ import numpy as np
 
 from tfarm.arm.checks import whole
 from tfarm.arrays import Real
-from tfarm.errors import ParameterError
+from tfarm.errors import ParameterError, require
 from tfarm.exact.compiled import compiled, inlined
 from tfarm.records import record
 
@@ -59,13 +59,17 @@ class Reference(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """Weights `a` and `b` of the cost, period `T` [s], the largest |moment| [N m], samples from a torque to its x."""
+    """Weights `a` and `b` of the cost, period `T` [s], the largest |moment| [N m], samples from a torque to its x.
+
+    `reply` is dx/d(torque) at that sample, the first where it is not 0: the one-step sensitivity of the plant.
+    """
 
     a: float
     b: float
     T: float
     bound: float
     lag: int
+    reply: float
 
 
 class Setting(NamedTuple):
@@ -239,7 +243,7 @@ def backward(setting: Setting, weights: Real, run: Run, work: Work, gradient: Re
     `back` is the derivative by the state of the next sample.  `late_e`, `late_u`, `late_x`, `late_K` are derivatives
     by e, u, x and K of this sample through the inputs of later ones, `later_e` by e of the sample before.
     """
-    model, (a, b, T, _, _) = setting.model, setting.numbers
+    model, (a, b, T, _, _, _) = setting.model, setting.numbers
     n, m = run.inputs.shape
     back, spare, by_input = work
     late_e = later_e = late_u = late_x = late_K = 0.0
@@ -263,10 +267,10 @@ def backward(setting: Setting, weights: Real, run: Run, work: Work, gradient: Re
 
 @compiled
 def sample_gradient(
-    k: int, numbers: Numbers, reply: float, x_next: float, run: Run, weights: Real, out: Real, by_input: Real
+    k: int, numbers: Numbers, x_next: float, run: Run, weights: Real, out: Real, by_input: Real
 ) -> None:
-    """Set the gradient of a x_next^2/2 + b e^2/2 by the weights of K at sample k; `reply` is dx_next/d(torque)."""
-    by_gain = -run.x[k] * (numbers.a * x_next * reply + numbers.b * run.e[k])
+    """Set the gradient of a x_next^2/2 + b e^2/2 by the weights of K at sample k."""
+    by_gain = -run.x[k] * (numbers.a * x_next * numbers.reply + numbers.b * run.e[k])
     out.fill(0.0)
     gain_gradient(weights, run.inputs[k], run.hidden[k], by_gain * run.slope[k], out, by_input)
 
@@ -291,20 +295,16 @@ class Network:
     def __post_init__(self) -> None:
         for name in ("W1", "w2", "scales"):
             value = np.array(getattr(self, name), dtype=float)
-            if not np.isfinite(value).all():
-                odd = float(value[~np.isfinite(value)][0])
+            for odd in value[~np.isfinite(value)].tolist():
                 raise ParameterError(key=name, value=odd, remedy="every weight and scale is a finite number")
-            value.setflags(write=False)
             object.__setattr__(self, name, value)
         remedy = f"W1 is (hidden, 6 or 7), hidden from 1 to {MOST_HIDDEN}, with as many columns as scales"
-        inputs = (PAPER_INPUTS, PAPER_INPUTS + 1)
-        if self.W1.ndim != 2 or self.W1.shape[1] not in inputs or not 1 <= self.W1.shape[0] <= MOST_HIDDEN:
-            raise ParameterError(key="W1", value=self.W1.shape, remedy=remedy)
-        if self.w2.shape != self.W1.shape[:1]:
-            raise ParameterError(key="w2", value=self.w2.shape, remedy=f"one weight a hidden neuron, {len(self.W1)}")
-        if self.scales.shape != self.W1.shape[1:] or not (self.scales > 0).all():
-            remedy = f"one positive scale an input, {self.W1.shape[1]}"
-            raise ParameterError(key="scales", value=self.scales.tolist(), remedy=remedy)
+        hidden, *inputs = self.W1.shape or (0,)
+        is_network = inputs in ([PAPER_INPUTS], [PAPER_INPUTS + 1]) and 1 <= hidden <= MOST_HIDDEN
+        require(is_network, "W1", self.W1.shape, remedy)
+        require(self.w2.shape == (hidden,), "w2", self.w2.shape, f"one weight a hidden neuron, {hidden}")
+        are_scales = self.scales.shape == (*inputs,) and (self.scales > 0).all()
+        require(are_scales, "scales", self.scales.tolist(), f"one positive scale an input, {inputs[0]}")
 
     @property
     def weights(self) -> Real:

@@ -23,7 +23,7 @@ import numpy as np
 
 from tfarm.arm.checks import not_negative, positive, whole
 from tfarm.arrays import Real
-from tfarm.errors import ParameterError, must_be_known
+from tfarm.errors import must_be_known, require
 from tfarm.exact.compiled import compiled, inlined
 from tfarm.records import record
 from tfarm.schema import Quantity
@@ -161,13 +161,13 @@ def derive(k: int, setting: Setting, weights: Real, run: Run, work: Work, S: Rea
 
 @compiled
 def learn_by_samples(
-    setting: Setting, steps: Steps, weights: Real, costs: Real, run: Run, work: Work, reply: float, is_whole: bool
+    setting: Setting, steps: Steps, weights: Real, costs: Real, run: Run, work: Work, is_whole: bool
 ) -> tuple[int, int]:
     """Learn at every sample, from x by the weights of its torque; return as `learn_by_trials`.
 
-    By the paper's delta rule x follows a torque `lag` samples later, with the derivative `reply`.  `is_whole` carries
-    the plant's whole sensitivity forward since the trial began: the gradient of a x^2/2 + b e^2/2 now, by weights that
-    are taken for constant (Williams and Zipser, 1989).
+    By the paper's delta rule x follows a torque `lag` samples later.  `is_whole` carries the plant's whole sensitivity
+    forward since the trial began: the gradient of a x^2/2 + b e^2/2 now, by weights that are taken for constant
+    (Williams and Zipser, 1989).
     """
     n, size, states, numbers = run.x.size, weights.size, work.state.size, setting.numbers
     gradient, change, past, kept = np.zeros(size), np.zeros(size), np.zeros((numbers.lag, size)), weights.copy()
@@ -191,7 +191,7 @@ def learn_by_samples(
                 continue
             made = past[k % numbers.lag]  # the weights of the torque that x follows now
             if k >= numbers.lag:
-                sample_gradient(k - numbers.lag, numbers, reply, run.x[k], run, made, gradient, work.by_input)
+                sample_gradient(k - numbers.lag, numbers, run.x[k], run, made, gradient, work.by_input)
                 _step(weights, change, gradient, steps, 1.0)
             copied(weights, made)
             act(k, setting, weights, run, work)
@@ -230,22 +230,18 @@ class Learning:
     def __post_init__(self) -> None:
         for key, kind in {"mode": Mode, "rule": Rule, "sensitivity": Sensitivity}.items():
             must_be_known(key, getattr(self, key), get_args(kind))
-        for rate in np.atleast_1d(np.asarray(self.eta, dtype=float)).ravel():
-            if not 0.0 < rate < math.inf:
-                remedy = "a learning rate is positive and finite, 0.8 in the paper"
-                raise ParameterError(key="eta", value=float(rate), remedy=remedy)
+        for rate in np.ravel(self.eta).astype(float).tolist():
+            require(0.0 < rate < math.inf, "eta", rate, "a learning rate is positive and finite, 0.8 in the paper")
         momentum = not_negative("alpha", self.alpha, "the momentum factor lies in [0, 1)")
-        if not momentum < 1.0:
-            raise ParameterError(key="alpha", value=momentum, remedy="the momentum factor lies in [0, 1), below 1")
+        require(momentum < 1.0, "alpha", momentum, "the momentum factor lies in [0, 1), below 1")
         positive("clip", self.clip, "the largest norm of a gradient is positive and finite")
         not_negative("enough", self.enough, "the error to stop at is zero or positive, in N m")
 
     def rates(self, size: int) -> Real:
         """The learning rate of each of `size` weights."""
-        rates = np.asarray(self.eta, dtype=float)
-        if rates.shape not in ((), (size,)):
-            raise ParameterError(key="eta", value=rates.shape, remedy=f"one learning rate, or one a weight, {size}")
-        return np.ascontiguousarray(np.broadcast_to(rates, (size,)), dtype=float).copy()
+        rates, shape = np.asarray(self.eta, dtype=float), (size,)
+        require(rates.shape in ((), shape), "eta", rates.shape, f"one learning rate, or one a weight, {size}")
+        return np.broadcast_to(rates, shape).copy()
 
 
 @dataclass(frozen=True)
@@ -308,8 +304,8 @@ class LearningCurves:
     ) -> Annotated[
         list[float], Quantity("final cost, quartiles and median", digits=4, help="over the seeds: 25 %, 50 % and 75 %")
     ]:
-        """Lower quartile, median and upper quartile of the final costs."""
-        return [self.final_quantile(share) for share in QUARTILES]
+        """Lower quartile, median and upper quartile of the final costs; always some of the costs."""
+        return np.quantile(self.final, QUARTILES, method="nearest").tolist()
 
     @property
     def quartile_curves(
@@ -317,9 +313,9 @@ class LearningCurves:
     ) -> Annotated[
         dict[str, Real], Quantity(flat=True, help="cost after each trial: 25 %, 50 % and 75 % over the seeds")
     ]:
-        """The same of the cost after each trial."""
+        """The same of the cost after each trial (trials,)."""
         names = ("lower_quartile", "median", "upper_quartile")
-        return {name: self.quantile(share) for name, share in zip(names, QUARTILES, strict=True)}
+        return dict(zip(names, np.quantile(self.costs, QUARTILES, axis=0, method="nearest"), strict=True))
 
     @classmethod
     def of(cls, trainings: Sequence[Training], trials: int) -> LearningCurves:
@@ -330,14 +326,6 @@ class LearningCurves:
         final = [math.inf if each.stopped is not None else each.result.cost for each in trainings]
         diverged = sum(each.stopped is not None for each in trainings)
         return cls(costs, np.array(final), diverged, sum(each.died for each in trainings))
-
-    def quantile(self, share: float) -> Real:
-        """The quantile of the costs over the seeds after each trial (trials,); always one of the costs."""
-        return np.asarray(np.quantile(self.costs, share, axis=0, method="nearest"))
-
-    def final_quantile(self, share: float) -> float:
-        """The same of the final costs."""
-        return float(np.quantile(self.final, share, method="nearest"))
 
 
 def train(trial: Trial, network: Network, guard: Guard, learning: Learning, trials: int) -> Training:
@@ -353,7 +341,7 @@ def train(trial: Trial, network: Network, guard: Guard, learning: Learning, tria
     if learning.mode == "trial":
         made, sample = learn_by_trials(*common, learning.rule == "dynamic")
     else:
-        made, sample = learn_by_samples(*common, trial.reply, learning.sensitivity == "whole")
+        made, sample = learn_by_samples(*common, learning.sensitivity == "whole")
     learnt = network.with_weights(weights)
     result = trial.with_network(learnt, guard.limits)
     stopped = Stopped(made - 1, int(sample), trial.numbers.bound) if sample >= 0 else None

@@ -24,7 +24,7 @@ import os
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -37,7 +37,7 @@ from tfarm.dsp import Chain, Measurement, Sampled, Scenario, Simulation, Simulat
 from tfarm.dsp.chain import Reading, chain_or_usual
 from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
 from tfarm.dsp.simulate import FOLDED_UP
-from tfarm.errors import MISSING, ParameterError, TfarmError, must_be_known
+from tfarm.errors import MISSING, ParameterError, must_be_known, naming, require
 from tfarm.files import read_file, write_file
 from tfarm.records import record
 from tfarm.spectrum.table import default_gains
@@ -47,7 +47,6 @@ from tfarm.tuner.kernel import PAPER_INPUTS, Limits, Network
 
 SILENT = Network(np.zeros((1, PAPER_INPUTS)), np.zeros(1), np.ones(PAPER_INPUTS))  # for a guard of one gain
 TRIAL_MODES = 6  # flexible modes of a trial, by default
-LAST_SAMPLE = 1e-9  # of a duration of whole samples, subtracted from it: their number includes both ends
 ANGLE_REMEDY = "the hub angle gain is zero or positive, in N m/rad"
 
 
@@ -61,12 +60,7 @@ class Cost:
     def __post_init__(self) -> None:
         meanings = {name: f"the weighting coefficient {name} is zero or positive" for name in ("a", "b")}
         check_fields(self, "", not_negative, **meanings)
-        if self.a == 0.0 == self.b:
-            raise ParameterError(key="a", value=self.a, remedy="a and b are both zero: one of them has to be positive")
-
-    def in_units_of(self, torque: float) -> Cost:
-        """The cost with these weights on moments and torques in units of `torque` [N m]."""
-        return Cost(a=self.a / torque**2, b=self.b / torque**2)
+        require(self.a or self.b, "a", self.a, "a and b are both zero: one of them has to be positive")
 
 
 @dataclass(frozen=True)
@@ -132,28 +126,19 @@ class Trial:
 
     @cached_property
     def numbers(self) -> kernel.Numbers:
-        """The cost's weights, the period, the largest moment, and the number of samples from a torque to its x."""
-        sampling = self.loop.chain.sampling
-        bound = float(FOLDED_UP * self.arm.bending_scale)
-        return kernel.Numbers(self.cost.a, self.cost.b, sampling.period, bound, 1 + sampling.whole_delay)
+        """The cost's weights, the period, the largest moment, and when and how x follows a torque."""
+        model, sampling = self.model, self.loop.chain.sampling
+        bound, delay = float(FOLDED_UP * self.arm.bending_scale), sampling.whole_delay
+        reply = float(model.moment @ np.linalg.matrix_power(model.A, delay) @ model.B)
+        return kernel.Numbers(self.cost.a, self.cost.b, sampling.period, bound, 1 + delay, reply)
 
     def setting(self, network: Network, guard: kernel.Limits) -> kernel.Setting:
         """Arguments of the compiled loops, without weights."""
         return kernel.Setting(self.model, self.reference, self.numbers, network.scales, guard)
 
-    @cached_property
-    def reply(self) -> float:
-        """dx/d(torque) at the first sample where it is not 0: the one-step sensitivity of the plant."""
-        model = self.model
-        return float(model.moment @ np.linalg.matrix_power(model.A, self.numbers.lag - 1) @ model.B)
-
     def on(self, arm: Arm, chain: Chain, servo: HubFeedback) -> Trial:
         """The same slew on another loop, with the references of this one's arm."""
-        here = slew_trial(
-            arm, chain, K1=servo.K1, Kp=servo.Kp, cost=self.cost, signals=self.signals, known=self.arm,
-            duration=self.n * self.task.period * (1 - LAST_SAMPLE), count=self.loop.plant.count,
-        )  # fmt: skip
-        return replace(here, task=self.task)
+        return replace(self, loop=sampled_loop(arm, replace(servo, K2=1.0), chain, count=self.loop.plant.count))
 
     def simulator(self, *, chain: Chain | None = None, task: Scenario | None = None) -> Simulator:
         """A simulator of the loop, with the converters of a chain, by default that of the trial."""
@@ -172,11 +157,10 @@ class Trial:
         """The trial with a fixed network; the cost is inf where it was stopped."""
         run, work = self.room(network)
         done = kernel.forward(self.setting(network, guard), network.weights, run, work)
-        x, u, e, K, moment = (signal[:done].copy() for signal in (run.x, run.u, run.e, run.K, run.moment))
-        cost, stopped = float(kernel.trial_cost(done, self.numbers, run)), None
+        t, x, u, e, K, moment = (each[:done] for each in (self.task.t, run.x, run.u, run.e, run.K, run.moment))
         if done < self.n:
-            cost, stopped = np.inf, int(done)
-        return Record(self.task.t[:done], x, u, e, K, moment, cost, stopped)
+            return Record(t, x, u, e, K, moment, np.inf, int(done))
+        return Record(t, x, u, e, K, moment, float(kernel.trial_cost(done, self.numbers, run)), None)
 
     def with_constant(self, K: float) -> Record:
         """The trial with a constant gain: a guard of one gain."""
@@ -193,27 +177,23 @@ def slew_trial(
     signals: Reading = "vibration",
     duration: float = TRIAL_DURATION,
     count: int = TRIAL_MODES,
-    known: Arm | None = None,
 ) -> Trial:
     """Return the slew of an arm with `count` flexible modes.
 
-    `known` is the arm of the references, by default the same.  `K1` is by default that of `default_gains` for that arm,
-    or with a `Kp` that of `usual_rate_gain`.  Raises ParameterError for an arm that cannot turn, a hub without inertia,
-    and numbers out of range.
+    `K1` is by default that of `default_gains`, or with a `Kp` that of `usual_rate_gain`.  Raises ParameterError for an
+    arm that cannot turn, a hub without inertia, and numbers out of range.
     """
     must_be_known("signals", signals, get_args(Reading))
     Kp = not_negative("Kp", Kp, ANGLE_REMEDY)
-    K1 = usual_rate_gain(known or arm, Kp) if K1 is None else K1
+    K1 = usual_rate_gain(arm, Kp) if K1 is None else K1
     rate_gain = number("K1", K1, "the hub rate gain is a finite number of N m s/rad")
     length = positive("duration", duration, "a trial lasts a positive number of seconds")
     chain = with_signals(chain_or_usual(chain), signals)
-    if length < chain.slew.rise_time:
-        remedy = f"a trial lasts at least as long as its slew, {chain.slew.rise_time:g} s"
-        raise ParameterError(key="duration", value=length, remedy=remedy)
+    rise = chain.slew.rise_time
+    require(length >= rise, "duration", length, f"a trial lasts at least as long as its slew, {rise:g} s")
     must_not_be_algebraic(arm, "hub.inertia", 0.0)
     loop = sampled_loop(arm, HubFeedback(K1=rate_gain, K2=1.0, Kp=Kp), chain, count=count)
-    task = scenario("slew", arm if known is None else known, chain, length)
-    return Trial(loop, task, Cost() if cost is None else cost, signals)
+    return Trial(loop, scenario("slew", arm, chain, length), Cost() if cost is None else cost, signals)
 
 
 def usual_rate_gain(arm: Arm, Kp: float) -> float:
@@ -322,19 +302,16 @@ class SavedTuner(StrictTable):
     @property
     def network(self) -> Network:
         """The network.  Raises ParameterError where its parts do not match."""
-        widths = {len(row) for row in self.W1}
-        if widths != {len(self.scales)}:
-            remedy = f"rows of {len(self.scales)}, one weight an input"
-            raise ParameterError(key="W1", value=sorted(widths), remedy=remedy)
+        widths, inputs = {len(row) for row in self.W1}, len(self.scales)
+        require(widths == {inputs}, "W1", sorted(widths), f"rows of {inputs}, one weight an input")
         return Network(np.array(self.W1), np.array(self.w2), np.array(self.scales))
 
     def gain(self) -> TunedGain:
         """The controller.  Raises ParameterError where the parts of the tuner do not match."""
-        if (self.guard is None) != (self.guard_kind == "none"):
-            raise ParameterError(key="guard", value=self.guard, remedy="two ends, or null with guard_kind none")
+        is_free = self.guard_kind == "none"
+        require((self.guard is None) == is_free, "guard", self.guard, "two ends, or null with guard_kind none")
         limits = Limits(*(self.guard or (0.0, math.inf)))
-        if not 0 <= limits.lo < limits.hi:
-            raise ParameterError(key="guard", value=self.guard, remedy="its lower end, from 0 on, comes first")
+        require(0 <= limits.lo < limits.hi, "guard", self.guard, "its lower end, from 0 on, comes first")
         return TunedGain(self.network, limits, HubFeedback(K1=self.K1, Kp=self.Kp), self.signals)
 
 
@@ -342,11 +319,6 @@ def to_text(tuner: SavedTuner) -> str:
     """Text of a tuner's file; equal tuners give equal text, and it loads to the same bits."""
     content = tuner.model_dump(exclude_defaults=True)
     return json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
-
-
-def weights_of(network: Network) -> dict[str, Any]:
-    """scales, W1 and w2 as lists."""
-    return {name: getattr(network, name).tolist() for name in ("scales", "W1", "w2")}
 
 
 def save_tuner(tuner: SavedTuner, path: Path) -> None:
@@ -357,17 +329,15 @@ def save_tuner(tuner: SavedTuner, path: Path) -> None:
 def load_tuner(path: str | os.PathLike[str]) -> SavedTuner:
     """Read the tuner of a file.  Raises ParameterError, in one line, for the first problem of the file."""
     text = read_file(path, MOST_TUNER_BYTES, key="controller", what="a tuner's file")
-    try:
-        found = SavedTuner.model_validate_json(text)
+    with naming(path):
+        try:
+            found = SavedTuner.model_validate_json(text)
+        except ValidationError as error:
+            problem = error.errors(include_url=False)[0]
+            key = ".".join(map(str, problem["loc"])) or "file"
+            value = {"json_invalid": os.fspath(path), "missing": MISSING}.get(problem["type"], problem["input"])
+            remedy = f"{problem['msg']}; save it again with tfarm tune ARM --save FILE.json"
+            raise ParameterError(key=key, value=value, remedy=remedy) from None
         found.gain()  # refuses parts that do not match
         Cost(a=found.a, b=found.b)
-    except ValidationError as error:
-        problem = error.errors(include_url=False)[0]
-        key = ".".join(map(str, problem["loc"])) or "file"
-        value = {"json_invalid": os.fspath(path), "missing": MISSING}.get(problem["type"], problem["input"])
-        message = f"{problem['msg'][:1].lower()}{problem['msg'][1:]}"
-        remedy = f"{message}; save it again with tfarm tune ARM --save FILE.json"
-        raise ParameterError(key=key, value=value, remedy=remedy, file=path) from None
-    except TfarmError as error:
-        raise error.in_file(path) if isinstance(error, ParameterError) else error from None
     return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple
 
@@ -18,13 +18,13 @@ from tfarm.dsp.chain import Reading, chain_or_usual
 from tfarm.dsp.results import Run, enough_modes, ideal_chain
 from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, described, torque_unit
 from tfarm.dsp.simulate import RESIDUAL
-from tfarm.errors import ParameterError
+from tfarm.errors import require
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import default_gains
 from tfarm.tuner.baselines import SHAPERS, BestConstant, Outcomes, best_constant, lq_bound, shaped_trial
 from tfarm.tuner.guard import Guard, GuardKind, find_guard
-from tfarm.tuner.kernel import PAPER_HIDDEN, PAPER_INPUTS, initial_network
+from tfarm.tuner.kernel import PAPER_HIDDEN, PAPER_INPUTS, Network, initial_network
 from tfarm.tuner.training import Learning, LearningCurves, Training, train
 from tfarm.tuner.trial import (
     FORMAT,
@@ -36,8 +36,6 @@ from tfarm.tuner.trial import (
     TunedGain,
     slew_trial,
     tip_off,
-    usual_rate_gain,
-    weights_of,
     with_signals,
 )
 
@@ -77,22 +75,20 @@ class Plan:
     scale: float = 1.0
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.scale < np.inf:
-            raise ParameterError(key="scale", value=self.scale, remedy="a scale is a positive, finite number of N m")
+        remedy = "a scale is a positive, finite number of N m"
+        require(0.0 < self.scale < np.inf, "scale", self.scale, remedy)
 
-    @property
-    def servo(self) -> HubFeedback:
-        """The law without moment feedback."""
-        return HubFeedback(K1=self.K1, Kp=self.Kp)
+    def trial(self, arm: Arm, chain: Chain | None) -> Trial:
+        """The trial on an arm, with the weights of the cost on moments and torques in units of the scale."""
+        return slew_trial(
+            arm, chain, K1=self.K1, Kp=self.Kp, signals=self.signals, duration=self.duration, count=self.count,
+            cost=Cost(a=self.cost.a / self.scale**2, b=self.cost.b / self.scale**2),
+        )  # fmt: skip
 
-    def holding(self, arm: Arm, Kp: float) -> Plan:
-        """The plan with this gain on the hub's angle, and its usual rate gain."""
-        return replace(self, Kp=Kp, K1=usual_rate_gain(arm, Kp))
-
-    @property
-    def scales(self) -> np.ndarray[Any, Any]:
-        """The scales of the network's inputs."""
-        return np.r_[np.full(PAPER_INPUTS, self.scale), np.ones(int(self.seventh_input))]
+    def network(self, seed: int) -> Network:
+        """The network with the first weights of a seed."""
+        scales = np.r_[np.full(PAPER_INPUTS, self.scale), np.ones(int(self.seventh_input))]
+        return initial_network(seed, hidden=self.hidden, scales=scales)
 
 
 @dataclass(frozen=True)
@@ -100,8 +96,8 @@ class Plan:
 class Tuning:
     """A trained tuner and its baselines, all of one trial.
 
-    `shaped`: the slew through the ZV and the EI shaper without moment feedback.  It arrives later, and its x and e are
-    from its own reference, so that the bound of the unshaped slew is no bound of it.
+    `shaped`: costs of the slew through the ZV and the EI shaper without moment feedback.  It arrives later, and its x
+    and e are from its own reference, so that the bound of the unshaped slew is no bound of it.
     """
 
     trial: Trial
@@ -110,7 +106,7 @@ class Tuning:
     without: Record
     best_constant: BestConstant
     bound: Record
-    shaped: dict[str, tuple[Trial, Record]]
+    shaped: dict[str, Baseline]
 
     @property
     def finding(self) -> str:
@@ -120,27 +116,17 @@ class Tuning:
 
     def saved(self) -> SavedTuner:
         """The record that `save_tuner` writes."""
-        guard, plan = self.training.guard, self.plan
+        guard, plan, network = self.training.guard, self.plan, self.training.network
         return SavedTuner(
             format=FORMAT, arm=self.trial.arm.name, period=self.trial.task.period, K1=plan.K1, Kp=plan.Kp,
             signals=plan.signals, a=plan.cost.a, b=plan.cost.b, guard_kind=guard.kind,
-            guard=None if guard.kind == "none" else (guard.lo, guard.hi), **weights_of(self.training.network),
+            guard=None if guard.kind == "none" else (guard.lo, guard.hi),
+            scales=network.scales.tolist(), W1=network.W1.tolist(), w2=network.w2.tolist(),
         )  # fmt: skip
 
     def gain(self) -> TunedGain:
         """The trained controller."""
         return self.saved().gain()
-
-    @property
-    def shaped_costs(self) -> dict[str, float]:
-        """Cost of the slew through each shaper."""
-        return {kind: record.cost for kind, (_, record) in self.shaped.items()}
-
-    @property
-    def shaped_delays(self) -> dict[str, float]:
-        """Delay [s] of the slew through each shaper."""
-        arrives = self.trial.task.busy_until
-        return {kind: trial.task.busy_until - arrives for kind, (trial, _) in self.shaped.items()}
 
     @property
     def constant(self) -> HubFeedback:
@@ -159,37 +145,31 @@ def usual_plan(arm: Arm, chain: Chain | None = None) -> Plan:
     )
 
 
-def trial_of(arm: Arm, plan: Plan, chain: Chain | None) -> Trial:
-    """The trial of a plan."""
-    return slew_trial(
-        arm, chain, K1=plan.K1, Kp=plan.Kp, cost=plan.cost.in_units_of(plan.scale), signals=plan.signals,
-        duration=plan.duration, count=plan.count,
-    )  # fmt: skip
-
-
 def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuning:
     """Find the guard, train, and compute the baselines.
 
     Raises ParameterError for an invalid plan, arm or chain, and CertificationError where there is no guard.
     """
-    if not isinstance(plan, Plan | None):
-        raise ParameterError(key="plan", value=plan, remedy="give a tfarm.tuner.Plan, such as Plan(trials=50, K1=0.3)")
+    remedy = "give a tfarm.tuner.Plan, such as Plan(trials=50, K1=0.3)"
+    require(isinstance(plan, Plan | None), "plan", plan, remedy)
     must_be_arm(arm)
     plan = usual_plan(arm, chain) if plan is None else plan
-    network = initial_network(plan.seed, hidden=plan.hidden, scales=plan.scales)
-    trial = trial_of(arm, plan, chain)
+    network, trial = plan.network(plan.seed), plan.trial(arm, chain)
     best = best_constant(trial)
     guard = find_guard(trial.loop, plan.guard, best.gain)
-    training = train(trial, network, guard, plan.learning, plan.trials)
-    shaped = {kind: shaped_trial(trial, kind) for kind in SHAPERS}
+    shaped: dict[str, Baseline] = {}
+    for kind in SHAPERS:
+        late = shaped_trial(trial, kind)
+        delay = late.task.busy_until - trial.task.busy_until
+        shaped[kind] = Baseline(f"input shaping, {kind}", late.with_constant(0.0).cost, delay)
     return Tuning(
         trial=trial,
         plan=plan,
-        training=training,
+        training=train(trial, network, guard, plan.learning, plan.trials),
         without=trial.with_constant(0.0),
         best_constant=best,
         bound=lq_bound(trial),
-        shaped={kind: (each, each.with_constant(0.0)) for kind, each in shaped.items()},
+        shaped=shaped,
     )
 
 
@@ -202,8 +182,7 @@ def learning_curves(tuning: Tuning, seeds: int, advance: Advance | None = None) 
     plan, done = tuning.plan, [tuning.training]
 
     def training(seed: int) -> Training:
-        network = initial_network(seed, hidden=plan.hidden, scales=plan.scales)
-        return train(tuning.trial, network, tuning.training.guard, plan.learning, plan.trials)
+        return train(tuning.trial, plan.network(seed), tuning.training.guard, plan.learning, plan.trials)
 
     with ThreadPoolExecutor(TRAINING_THREADS) as pool:  # compiled loops let other threads run
         for each in pool.map(training, range(plan.seed + 1, plan.seed + seeds)):
@@ -296,22 +275,19 @@ class TuningResult:
         self,
     ) -> Annotated[list[Baseline], Quantity("compared with baselines", help="costs of the same slew")]:
         """The costs with the tuner and with the baselines."""
-        tuning, shaped = self.tuning, self.tuning.shaped_costs
-        constant = f"best constant gain, K = {tuning.best_constant.gain:.4g}"
-        late = tuning.shaped_delays
+        tuning, best = self.tuning, self.tuning.best_constant
         return [
             Baseline("no moment feedback", tuning.without.cost),
-            Baseline(constant, tuning.best_constant.cost),
+            Baseline(f"best constant gain, K = {best.gain:.4g}", best.cost),
             Baseline(f"tuner, after {self.trials} trials", tuning.training.result.cost),
-            *(Baseline(f"input shaping, {kind}", cost, late[kind]) for kind, cost in shaped.items()),
+            *tuning.shaped.values(),
             Baseline("linear-quadratic bound of the unshaped slew", tuning.bound.cost),
         ]
 
     @property
     def numbers(self) -> Annotated[dict[str, Any], Quantity(flat=True, help="costs of tuner and baselines")]:
         """The same numbers by name."""
-        tuning = self.tuning
-        costs, late = tuning.shaped_costs, tuning.shaped_delays
+        tuning, shaped = self.tuning, self.tuning.shaped
         return {
             "cost_tuned": tuning.training.result.cost,
             "cost_without": tuning.without.cost,
@@ -319,8 +295,8 @@ class TuningResult:
             "best_constant_gain": tuning.best_constant.gain,
             "cost_lq_bound": tuning.bound.cost,
             "lq_bound_note": BOUND_NOTES[tuning.plan.signals],
-            "cost_shaped": min(costs.values()),
-            "shaped": {kind: {"cost": costs[kind], "arrives_later_by_s": late[kind]} for kind in costs},
+            "cost_shaped": min(each.cost for each in shaped.values()),
+            "shaped": {kind: {"cost": each.cost, "arrives_later_by_s": each.later} for kind, each in shaped.items()},
             "shaped_note": SHAPED_NOTE,
         }
 
@@ -367,7 +343,7 @@ class TuningResult:
     @property
     def weights(self) -> Annotated[dict[str, Any], Quantity(help="weights of the network and scales of its inputs")]:
         """Every weight of the network."""
-        return weights_of(self.tuning.training.network)
+        return self.tuning.saved().model_dump(include={"scales", "W1", "w2"})
 
 
 def controlled_run(
