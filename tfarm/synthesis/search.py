@@ -21,13 +21,14 @@ from scipy.optimize import differential_evolution, minimize
 from tfarm.arm import PLANE
 from tfarm.arrays import Real
 from tfarm.records import record
-from tfarm.synthesis.judge import LOST, Judge
+from tfarm.synthesis.judge import LOST, Judge, scores_of
 from tfarm.synthesis.structures import Bounds, Structure
 from tfarm.synthesis.worst_case import Tell
 
 FEWEST_RUNS, MOST_RUNS = 2, 8  # one more than coefficients within these: some minima are found by one of five alone
 USUAL_WORK = 4 * 20**2  # models times squared states of one arm's first model: with twice as much half the runs
 FEWEST_POINTS, POINTS_EACH = 32, 15  # of a run, at least, and for each coefficient: the next power of two
+LAWS_AT_ONCE = 256  # a limit of memory
 LAWS_EACH, MOST_LAWS = 800, 4000  # of a run for each coefficient, and at most; twice as many from the best points
 STRATEGIES = (("best1bin", 0.7), ("currenttobest1bin", 0.9))  # in turn, and the share of coefficients changed at once
 AROUND = 0.5  # of x: the spread of the points of a run around the best, half as wide in each one after
@@ -89,20 +90,18 @@ class Worst:
     @property
     def work(self) -> float:
         """The work of a law, relative to that of one arm and its first model."""
-        return sum((1 + len(judge.conditions)) * len(judge.model.plant[0]) ** 2 for judge in self.judges) / USUAL_WORK
+        return (
+            sum((4 if judge.is_sampled else 1) * len(judge.model.plant[0]) ** 2 for judge in self.judges) / USUAL_WORK
+        )
 
     def scores(self, form: Structure, x: Real, limits: Real | None = None) -> Real:
-        """The function to be minimised, at points x (n, laws), any value above the limit of a law (see `Judge`).
-
-        Arms after one with an unstable loop, or a score above the limit, are left out.
-        """
+        """The function to be minimised, at points x (n, laws), any value above the limit of a law (see `scores_of`)."""
         limits = np.full(x.shape[1], np.inf) if limits is None else limits
-        worst = self.judges[0].scores(form, x, limits)
-        for judge in self.judges[1:]:
-            left = np.flatnonzero((worst < LOST) & (worst <= limits))
-            if left.size:
-                worst[left] = np.maximum(worst[left], judge.scores(form, x[:, left], limits[left]))
-        return worst
+        parts = [slice(i, i + LAWS_AT_ONCE) for i in range(0, x.shape[1], LAWS_AT_ONCE)]
+        entries = [form.entries(form.coefficients(x[:, part])) for part in parts]
+        return np.concatenate(
+            [scores_of(self.judges, each, limits[part]) for each, part in zip(entries, parts, strict=True)]
+        )
 
 
 def search(judge: Worst, form: Structure, tell: Tell, near: Real | None = None) -> Search:
