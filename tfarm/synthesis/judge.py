@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -133,6 +133,7 @@ SEARCH_RESERVE = 1.002 * RESERVE  # in the search: edges of the model's few mode
 FEWEST_MODES = 8  # of the first model; more where its best laws are unstable
 SEARCHED_MODES = 32  # of the largest: with twice as many a law takes eight times as long
 CONTINUOUS_TIMES = 2  # times the modes where the continuous-time loop is designed
+MOST_JUDGES = 64  # kept: those of the arms inside a box, which are the same in each exchange
 LOST = 1e30  # score where a loop is unstable, and as much for each later condition: above any value in SI units
 
 
@@ -245,6 +246,7 @@ def model_sizes(arm: Arm, chain: Chain, modes: int, *, continuous: bool) -> list
     return [*(size for size in doubled if size < most), most]
 
 
+@lru_cache(MOST_JUDGES)
 def judge_of(
     arm: Arm, known: Arm, chain: Chain, objective: str, signals: tuple[str, ...], modes: int, count: int, *,
     continuous: bool = False,
@@ -273,12 +275,12 @@ def scores_of(judges: Sequence[Judge], entries: Sequence[Entry], limits: Real) -
     scores, of_stable = np.full(limits.size, -np.inf), limits < LOST
     _add_aims(judges, entries, of_stable, scores, limits)
     left = np.flatnonzero(scores <= limits)
-    for judge in judges:
-        for stage, (model, share) in enumerate(judge.conditions, -len(judge.conditions)):
-            if left.size:
-                growth = model.growth(model.poles(chosen(entries, left), share)).max(axis=1)
-                scores[left[growth >= 0]] = lost(1 - stage, growth[growth >= 0])
-                left = left[growth < 0]
+    conditions = [each for judge in judges for each in judge.conditions]
+    for stage, (model, share) in enumerate(conditions, -len(conditions)):
+        if left.size:
+            growth = model.growth(model.poles(chosen(entries, left), share)).max(axis=1)
+            scores[left[growth >= 0]] = lost(1 - stage, growth[growth >= 0])
+            left = left[growth < 0]
     _add_aims(judges, entries, np.isneginf(scores), scores, limits)
     return scores
 

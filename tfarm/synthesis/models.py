@@ -292,7 +292,7 @@ def squares(A: Real, B: Real, C: Real, D: Real, signals: Blocks) -> Real:
     )
     last = together[:, : signals.tail * seen] @ x[:, :, -1:]
     if size * seen > n + rank:
-        together = np.linalg.qr(together, mode="r")
+        together = np.asarray(np.linalg.qr(together, mode="r"))
     whole = together @ x[:, :, signals.first : -1]
     return np.asarray((whole**2).sum(axis=(1, 2)) + (last**2).sum(axis=(1, 2)))
 
