@@ -52,8 +52,8 @@ def designed(arm, chain, structure, objective, kind, rng):
     """The design, and the judges and the structure with its bounds that it was searched with at last."""
     last, search = [], room.search
 
-    def kept(worst, form, tell, near=None):
-        found = search(worst, form, tell, near)
+    def kept(worst, form, *options):
+        found = search(worst, form, *options)
         last[:] = worst, found.form
         return found
 

@@ -20,6 +20,7 @@ from tfarm.dsp.chain import Converters
 from tfarm.synthesis import judge, search
 from tfarm.synthesis.design import design
 from tfarm.synthesis.judge import LOST, RESERVE, entries_of
+from tfarm.synthesis.models import in_blocks, squares
 from tfarm.synthesis.structures import STRUCTURES, structure_of
 from tfarm.tuner.trial import slew_trial
 from tfarm.tuner.tuning import usual_plan
@@ -87,7 +88,7 @@ def test_it_damps_better_than_where_the_search_began(found):
     assert found.value == pytest.approx(-own.score(found.law), rel=1e-9)
     low, high = form.box
     x = low + (high - low) * np.random.default_rng(3).random((200, 3))
-    assert (-own.scores(form, x.T) <= found.value).all()
+    assert (-search.Worst((own,)).scores(form, x.T) <= found.value).all()
 
 
 def test_a_design_is_saved_and_read_back(capsys, monkeypatch, tmp_path):
@@ -167,7 +168,13 @@ def least_of(function, low, high, near=None):
     form = SimpleNamespace(name="test", size=low.size, box=(low, high), origin=low)
     lines = []
     found, of_runs = search.minimised(
-        lambda points, *_: np.array([function(each) for each in points.T]), form, form.box, 1.0, lines.append, near
+        lambda points, *_: np.array([function(each) for each in points.T]),
+        form,
+        form.box,
+        1.0,
+        lines.append,
+        near,
+        "whole" if near is None else "near",
     )
     assert list(found.scores) == sorted(found.scores)
     assert found.scores[0] == min(of_runs)
@@ -223,6 +230,22 @@ def test_a_score_up_to_its_limit_is_whole_and_one_above_stays_above(objective):
     assert (whole[is_within] < LOST).any()
     np.testing.assert_array_equal(found[is_within], whole[is_within])
     assert (found[~is_within] > limits[~is_within]).all()
+
+
+@pytest.mark.parametrize(("number", "first"), [(1, 0), (37, 0), (3000, 0), (3000, 2711), (4096, 4095)])
+def test_the_sum_of_squares_of_a_slew_is_that_of_its_samples(number, first):
+    """One sample after the other, under signals with corners as those of a slew."""
+    rng = np.random.default_rng(number)
+    A, B, C, D = (rng.normal(size=shape) for shape in ((2, 5, 5), (2, 5, 3), (2, 2, 5), (2, 2, 3)))
+    A *= 0.99 / abs(np.linalg.eigvals(A)).max(axis=1)[:, None, None]
+    t = np.linspace(0.0, 1.0, number)
+    signals = np.array([np.where(t < 0.4, 1.0, -1.0), np.minimum(t, 0.8 - t), 1e-3 * t**2])
+    x, total = np.zeros((2, 5)), 0.0
+    for k, r in enumerate(signals.T):
+        total += (k >= first) * ((C @ x[..., None])[..., 0] + D @ r) ** 2
+        x = (A @ x[..., None])[..., 0] + B @ r
+    found = squares(A, B, C, D, in_blocks(signals, first))
+    np.testing.assert_allclose(found, total.sum(axis=1), rtol=1e-9)
 
 
 def test_poles_of_a_rate_that_is_a_difference_are_those_of_the_sampled_loop():

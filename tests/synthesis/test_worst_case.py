@@ -32,15 +32,16 @@ def test_a_further_search_is_given_what_the_one_before_found():
     """Score 1 at masses between the ends, 0 at these, until an arm inside is among the arms: then 1 everywhere."""
     given, box = [], ArmBox(LAB, {"payload.mass": MASSES})
 
-    def find(arms, before):
-        given.append((len(arms), before))
+    def find(arms, before, effort):
+        given.append((len(arms), before, effort))
         return len(arms)
 
     def score_on(count, arm):
         return 1.0 if count > 3 or arm.payload.mass not in (0.0, *MASSES) else 0.0
 
     found, named, _ = for_the_worst(arms_of(LAB, (), box), box, find, score_on, lambda _: None)
-    assert (given, found, len(named)) == ([(3, None), (4, 3)], 4, 4)
+    assert given == [(3, None, "sketch"), (4, 3, "sketch"), (4, 4, "whole")]
+    assert (found, len(named)) == (4, 4)
 
 
 def test_every_arm_is_held_and_damped_as_by_another_model(found):

@@ -27,7 +27,7 @@ from tfarm.synthesis.judge import LOST, OBJECTIVES, Judge, judge_of, model_sizes
 from tfarm.synthesis.models import slew_and_after, trial_slew
 from tfarm.synthesis.search import Search, Worst, flat_part, search
 from tfarm.synthesis.structures import Bounds, Structure, check_bounds, structure_of
-from tfarm.synthesis.worst_case import ArmBox, NamedArm, Tell, WorstCase, arms_of, for_the_worst, same_input
+from tfarm.synthesis.worst_case import ArmBox, Effort, NamedArm, Tell, WorstCase, arms_of, for_the_worst, same_input
 
 LoopKind = Literal["sampled", "continuous"]
 
@@ -247,10 +247,10 @@ class _Task:
         return judge_of(on, self.arm, self.chain, self.objective, self.form.signals, self.modes, count,
                         continuous=self.loop == "continuous")  # fmt: skip
 
-    def find(self, named: Sequence[NamedArm], before: _Choice | None) -> _Choice:
-        """Return the best law that is stable on all arms, near the one `before` the last of them was added, if any.
+    def find(self, named: Sequence[NamedArm], before: _Choice | None, effort: Effort) -> _Choice:
+        """Return the best law that is stable on all arms, near the one found `before`, if any.
 
-        Raises ConvergenceError where none is found.
+        A sketch has the first models, and no exact verdict.  Raises ConvergenceError where none is found.
         """
         nearest: tuple[float, Any] | None = None
         sizes = [self.sizes(each.arm) for each in named]
@@ -259,11 +259,12 @@ class _Task:
             several = tuple(
                 self.judge(each.arm, own[min(step, len(own) - 1)]) for each, own in zip(named, sizes, strict=True)
             )
-            found = search(Worst(several), self.form, self.tell, near)
+            last_first = Worst(several[::-1])  # corners, and what was worst inside the box: most laws are lost there
+            found = search(last_first, self.form, self.tell, near, effort)
             nearest = min([*([nearest] if nearest else []), found.found[0]], key=itemgetter(0))
             for score, x in found.found:
                 law = found.form.record_at(x)
-                if score < LOST and all(judge.holds(law) for judge in several):
+                if effort == "sketch" or (score < LOST and all(judge.holds(law) for judge in several)):
                     return _Choice(Worst(several), found, score, x, law)
         assert nearest is not None  # there is at least one judge
         law = self.form.record_at(nearest[1])

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,7 +37,7 @@ from tfarm.loop.margins import lowest
 from tfarm.loop.stability import stability
 from tfarm.records import record
 from tfarm.synthesis.models import Model, Slews, continuous_model, sampled_model, slew_and_after
-from tfarm.synthesis.structures import Entry, Structure
+from tfarm.synthesis.structures import Entry
 
 REAL_ANGLE = 1e-9  # rad, of ln z or s: a pole at a smaller angle is real
 AS_NEAR = 4.0  # of the least distance to an open-loop pole: up to there a pole may be its own too
@@ -48,14 +48,15 @@ TIE = 1e-3  # weight of the damping ratio in a disk margin: without sampling rat
 class Objective(NamedTuple):
     """Its `scores` (laws,), small where laws are good, and the `value` of one law by a judge.
 
-    Scores are of a judge, the entries of laws, and their poles (laws, n) in its model.  `is_negated`: whether the value
-    is the negated score; `of_slew`: whether it is of a slew.
+    Scores are of a judge, the entries of laws, and if `of_poles` of their poles (laws, n) in its model.  `is_negated`:
+    whether the value is the negated score; `of_slew`: whether it is of a slew.
     """
 
-    scores: Callable[[Any, Sequence[Entry], Complex], Real]
+    scores: Callable[[Any, Sequence[Entry], Any], Real]
     value: Callable[[Any, AnyLaw], float]
     is_negated: bool = False
     of_slew: bool = False
+    of_poles: bool = False
 
     def worst(self, values: Sequence[float]) -> float:
         """The worst of its values."""
@@ -97,6 +98,7 @@ OBJECTIVES = {
         lambda judge, entries, poles: -damping_of(judge.model, poles),
         lambda judge, law: judge.exact_damping(law),
         is_negated=True,
+        of_poles=True,
     ),
     "margin": Objective(
         lambda judge, entries, poles: (
@@ -104,6 +106,7 @@ OBJECTIVES = {
         ),
         lambda judge, law: judge.lowest(law, disk_of),
         is_negated=True,
+        of_poles=True,
     ),
     "sensitivity": Objective(
         lambda judge, entries, poles: judge.peak(abs(1 + judge.model.loop(entries)).min(axis=1)),
@@ -130,7 +133,7 @@ SEARCH_RESERVE = 1.002 * RESERVE  # in the search: edges of the model's few mode
 FEWEST_MODES = 8  # of the first model; more where its best laws are unstable
 SEARCHED_MODES = 32  # of the largest: with twice as many a law takes eight times as long
 CONTINUOUS_TIMES = 2  # times the modes where the continuous-time loop is designed
-LAWS_AT_ONCE = 256  # a limit of memory
+MOST_JUDGES = 64  # kept: those of the arms inside a box, which are the same in each exchange
 LOST = 1e30  # score where a loop is unstable, and as much for each later condition: above any value in SI units
 
 
@@ -162,52 +165,31 @@ class Judge:
 
     @cached_property
     def conditions(self) -> list[tuple[Model, float]]:
-        """The models that have to be stable, each with a factor on the law: most unstable laws fail the first."""
-        own = (SEARCH_RESERVE, 1 / SEARCH_RESERVE) if self.is_sampled else ()
-        return [*((self.model, share) for share in own), *((each, 1.0) for each in self.also)]
+        """The models that have to be stable, each with a factor on the law: most unstable laws fail the first.
+
+        An objective of poles has the model itself.
+        """
+        shares = [*((SEARCH_RESERVE, 1 / SEARCH_RESERVE) if self.is_sampled else ())]
+        shares += [] if OBJECTIVES[self.objective].of_poles else [1.0]
+        return [*((self.model, share) for share in shares), *((each, 1.0) for each in self.also)]
 
     # ------------------------------------------------------------ in the model
 
-    def scores(self, form: Structure, x: Real, limits: Real | None = None) -> Real:
-        """The function to be minimised, at points x (n, laws); `LOST` and more where the loop is unstable.
-
-        A law whose score is above its one of the `limits` (laws,) may have any value above it.
-        """
-        limits = np.full(x.shape[1], np.inf) if limits is None else limits
-        starts = range(0, x.shape[1], LAWS_AT_ONCE)
-        parts = [(x[:, i : i + LAWS_AT_ONCE], limits[i : i + LAWS_AT_ONCE]) for i in starts]
-        return np.concatenate([self.scores_of(form.entries(form.coefficients(at)), ends) for at, ends in parts])
-
     def score(self, law: AnyLaw) -> float:
-        """The same of one law."""
-        return float(self.scores_of(entries_of(law), np.array([np.inf]))[0])
+        """The function to be minimised, of one law."""
+        return float(scores_of([self], entries_of(law), np.array([np.inf]))[0])
 
-    def scores_of(self, entries: Sequence[Entry], limits: Real) -> Real:
-        """The same of the entries of laws, one for each limit.
-
-        Where the limit is the score of a stable law, the objective is first: most laws have lost by it.
-        """
-        scores, first = np.full(limits.size, -np.inf), np.flatnonzero(limits < LOST)
-        if first.size:
-            scores[first] = self._aims(chosen(entries, first))
-        left = np.flatnonzero(scores <= limits)
-        for stage, (model, share) in enumerate(self.conditions, -len(self.conditions)):
-            if left.size:
-                growth = model.growth(model.poles(chosen(entries, left), share)).max(axis=1)
-                scores[left[growth >= 0]] = lost(1 - stage, growth[growth >= 0])
-                left = left[growth < 0]
-        last = left[np.isneginf(scores[left])]
-        if last.size:
-            scores[last] = self._aims(chosen(entries, last))
-        return scores
-
-    def _aims(self, entries: Sequence[Entry]) -> Real:
-        """The objective by the judge's own model alone, `LOST` and more where that is unstable."""
+    def aims(self, entries: Sequence[Entry]) -> Real:
+        """The objective by the judge's own model alone; of its poles `LOST` and more where one is unstable."""
+        objective = OBJECTIVES[self.objective]
+        if not objective.of_poles:
+            with np.errstate(all="ignore"):  # slews of unstable laws
+                return np.nan_to_num(objective.scores(self, entries, None), nan=np.inf)
         poles = self.model.poles(entries)
         growth = self.model.growth(poles).max(axis=1)
         scores, stable = lost(1, growth), growth < 0
         if stable.any():
-            scores[stable] = OBJECTIVES[self.objective].scores(self, chosen(entries, stable), poles[stable])
+            scores[stable] = objective.scores(self, chosen(entries, stable), poles[stable])
         return scores
 
     # ------------------------------------------------------------ beyond it
@@ -264,6 +246,7 @@ def model_sizes(arm: Arm, chain: Chain, modes: int, *, continuous: bool) -> list
     return [*(size for size in doubled if size < most), most]
 
 
+@lru_cache(MOST_JUDGES)
 def judge_of(
     arm: Arm, known: Arm, chain: Chain, objective: str, signals: tuple[str, ...], modes: int, count: int, *,
     continuous: bool = False,
@@ -281,6 +264,33 @@ def judge_of(
 def lost(stage: int, growth: Real) -> Real:
     """Scores of laws with a growth (laws,) of their fastest pole, above those of laws lost at a later stage."""
     return LOST * (stage + growth / (1 + abs(growth)))
+
+
+def scores_of(judges: Sequence[Judge], entries: Sequence[Entry], limits: Real) -> Real:
+    """The largest score of laws by any judge; `LOST` and more where a loop is unstable.
+
+    A law whose score is above its one of the `limits` (laws,) may have any value above it.  Where the limit is the
+    score of a stable law, the objective is first: most laws have lost by it.
+    """
+    scores, of_stable = np.full(limits.size, -np.inf), limits < LOST
+    _add_aims(judges, entries, of_stable, scores, limits)
+    left = np.flatnonzero(scores <= limits)
+    conditions = [each for judge in judges for each in judge.conditions]
+    for stage, (model, share) in enumerate(conditions, -len(conditions)):
+        if left.size:
+            growth = model.growth(model.poles(chosen(entries, left), share)).max(axis=1)
+            scores[left[growth >= 0]] = lost(1 - stage, growth[growth >= 0])
+            left = left[growth < 0]
+    _add_aims(judges, entries, np.isneginf(scores), scores, limits)
+    return scores
+
+
+def _add_aims(judges: Sequence[Judge], entries: Sequence[Entry], which: Any, scores: Real, limits: Real) -> None:
+    """Raise the scores of some laws to their objective by each judge in turn, up to their limits."""
+    for judge in judges:
+        left = np.flatnonzero(which & (scores <= limits) & (scores < LOST))
+        if left.size:
+            scores[left] = np.maximum(scores[left], judge.aims(chosen(entries, left)))
 
 
 def chosen(entries: Sequence[Entry], rows: Any) -> list[Entry]:

@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
@@ -40,6 +41,8 @@ AT_NYQUIST = 1e-12  # of z = -1, where Tustin's s is infinite
 POLE_OFFSETS = np.geomspace(1e-9, 0.5, 40)  # rad, to either side of the open loop's poles
 EVEN_ANGLES = 400  # points of the circle at equal distances
 LOST_GROWTH = 1e6  # of a matrix that is not finite
+RANK_LOST = 1e-11  # of the largest singular value: rounding of the signals of a slew
+OF_ROOT = 1.3  # the root of the number of samples by the length of a block, at least
 
 
 @dataclass(frozen=True)
@@ -232,33 +235,66 @@ def circle_angles(pulse: PulseTransfer) -> Real:
     return np.unique(np.r_[np.linspace(0, np.pi, EVEN_ANGLES + 1)[1:], close[(close > 0) & (close <= np.pi)]])
 
 
-def outputs(A: Real, B: Real, C: Real, signals: Real, first: int) -> Real:
-    """C x_k (outputs, samples, laws), k >= `first`, of x_{k+1} = A x_k + B r_k, x_0 = 0, signals r (inputs, samples).
+class Blocks(NamedTuple):
+    """Signals in blocks of samples: `basis` (inputs, size, rank) times `shares` (rank, blocks).
 
-    A block of samples, half the root of their number, is one product with its first state and its signals.  The last
-    block has zeros at its end.
+    Of the `counted` samples the first is that of the block `first`, the last the one before `tail` of the last block.
     """
-    (laws, n, inputs), seen, doublings = B.shape, C.shape[1], max(int(np.log2(signals.shape[1]) / 2) - 1, 0)
-    size = 2**doublings
-    blocks = signals.shape[1] // size + 1
-    r = np.zeros((inputs, blocks * size))
-    r[:, : signals.shape[1]] = signals
-    r = r.reshape(inputs, blocks, size).transpose(2, 0, 1).reshape(-1, blocks)
+
+    basis: Real
+    shares: Real
+    first: int
+    tail: int
+    counted: int
+
+
+def in_blocks(signals: Real, first: int) -> Blocks:
+    """The signals (inputs, samples) in blocks, before them zeros so that the sample `first` begins one.
+
+    Those of a slew are polynomials over each half: the blocks have a low rank, whatever their number.
+    """
+    inputs, number = signals.shape
+    size = 2 ** max(int(np.log2(number**0.5 / OF_ROOT)), 0)
+    before = -first % size
+    after = -(before + number) % size
+    scale = np.maximum(abs(signals).max(axis=1), LEAST_SIZE)[:, None, None]
+    r = np.pad(signals, ((0, 0), (before, after))).reshape(inputs, -1, size) / scale
+    basis, weights, shares = np.linalg.svd(np.moveaxis(r, 1, 2).reshape(inputs * size, -1), full_matrices=False)
+    rank = int((weights > RANK_LOST * weights[0]).sum())
+    basis = (basis * weights)[:, :rank].reshape(inputs, size, rank) * scale
+    return Blocks(basis, shares[:rank], (before + first) // size, size - after, number - first)
+
+
+def squares(A: Real, B: Real, C: Real, D: Real, signals: Blocks) -> Real:
+    """The sum of squares (laws,) of C x_k + D r_k over the counted samples, x_{k+1} = A x_k + B r_k from x = 0.
+
+    The outputs of a block are one product with its first state and the shares of its signals; of many rows a
+    triangular factor has the same sum.
+    """
+    (laws, n, inputs), seen, (_, size, rank) = B.shape, C.shape[1], signals.basis.shape
     rows, columns, power = C, B, A
-    for _ in range(doublings):  # C, C A, ...; ..., A B, B
+    while rows.shape[1] < size * seen:  # C, C A, ...; ..., A B, B
         rows = np.concatenate([rows, rows @ power], axis=1)
         columns = np.concatenate([power @ columns, columns], axis=2)
         power = power @ power
-    x, push = np.zeros((blocks, laws, n, 1)), np.moveaxis(columns @ r, 2, 0)[..., None]
-    for k in range(1, blocks):
+    basis = signals.basis.reshape(inputs, -1)
+    echo = np.concatenate([D, rows @ B], axis=1).reshape(laws, -1, seen, inputs)  # after each number of samples
+    direct = np.zeros((laws, seen, size, rank))
+    for k in range(size):
+        direct[:, :, k:] += (echo[:, k] @ basis[:, : (size - k) * rank]).reshape(laws, seen, -1, rank)
+    together = np.concatenate([rows, np.moveaxis(direct, 1, 2).reshape(laws, -1, rank)], axis=2)
+    push = np.moveaxis(columns @ np.moveaxis(signals.basis, 0, 1).reshape(-1, rank) @ signals.shares, 2, 0)[..., None]
+    x = np.zeros_like(push)
+    for k in range(1, len(x)):
         x[k] = power @ x[k - 1] + push[k - 1]
-    echo = np.zeros((laws, size + 1, seen, inputs))  # after each number of samples
-    echo[:, 1:] = (rows @ B).reshape(laws, size, seen, inputs)
-    late = np.maximum(np.subtract.outer(np.arange(size), np.arange(size)), 0)
-    through = np.moveaxis(echo[:, late], 3, 2).reshape(laws, -1, size * inputs)
-    own = slice(first // size, None)
-    found = rows @ np.moveaxis(x[own, ..., 0], 0, 2) + through @ r[:, own]
-    return found.reshape(laws, size, seen, -1).transpose(2, 3, 1, 0).reshape(seen, -1, laws)[:, first % size :]
+    x = np.concatenate(
+        [np.moveaxis(x[..., 0], 0, 2), np.broadcast_to(signals.shares, (laws, *signals.shares.shape))], axis=1
+    )
+    last = together[:, : signals.tail * seen] @ x[:, :, -1:]
+    if size * seen > n + rank:
+        together = np.asarray(np.linalg.qr(together, mode="r"))
+    whole = together @ x[:, :, signals.first : -1]
+    return np.asarray((whole**2).sum(axis=(1, 2)) + (last**2).sum(axis=(1, 2)))
 
 
 SAMPLES_LEFT = 16  # of the record after the slew, where a period of the first mode has fewer
@@ -289,41 +325,48 @@ class Slews:
     def residual(self, entries: Sequence[Entry]) -> Real:
         """Root mean square [N m] of the arm's own moment less the rigid arm's (laws,)."""
         if self.model.period is None:
-            left = self._left_in_time(entries)
-        else:
-            task = self._slew
-            first = int(task.is_after.argmax())
-            (moment,) = self._outputs(task, entries, [self.model.own_moment], first)
-            left = moment[: len(task.t) - first] - task.rigid_moment[first:, None]
-        return np.sqrt((left**2).mean(axis=0))
+            return np.sqrt((self._left_in_time(entries) ** 2).mean(axis=0))
+        A, B = self._driven(entries, 1)
+        C, D = np.zeros((len(A), 1, A.shape[1])), np.zeros((len(A), 1, B.shape[2]))
+        C[:, 0, : self.model.own_moment.size], D[:, 0, -1] = self.model.own_moment, -1.0
+        return np.sqrt(squares(A, B, C, D, self._after) / self._after.counted)
 
     def cost(self, entries: Sequence[Entry]) -> Real:
         """T sum of (a x^2 + b e^2)/2 (laws,)."""
-        model, task, (a, b) = self.model, trial_slew(self.known, self.chain), trial_weights(self.known, self.chain)
-        n = len(task.t)
-        rows = [model.plant[2][model.signals.index("root_moment")], np.eye(len(model.plant[0]))[model.last]]
-        moment, before = self._outputs(task, entries, rows)
-        off = moment[:n] - task.moment_reference[:, None]
-        added = before[1 : n + 1] - (self.chain.slew.reading == "vibration") * task.feedforward[:, None]
-        return task.period * (a * off**2 + b * added**2).sum(axis=0) / 2
+        model, n = self.model, len(self.model.plant[0])
+        A, B = self._driven(entries, 2)
+        C, D = np.zeros((len(A), 2, A.shape[1])), np.zeros((len(A), 2, B.shape[2]))
+        C[:, 0, :n], D[:, 0, -2] = model.plant[2][model.signals.index("root_moment")], -1.0
+        C[:, 1], D[:, 1] = A[:, model.last], B[:, model.last]
+        D[:, 1, -1] = -1.0
+        weights = np.sqrt(np.array(trial_weights(self.known, self.chain)) * self.chain.sampling.period / 2)[:, None]
+        return squares(A, B, weights * C, weights * D, self._trial)
 
     @cached_property
-    def _slew(self) -> Scenario:
-        return slew_and_after(self.arm, self.known, self.chain)
+    def _after(self) -> Blocks:
+        """The signals of a residual, and the moment of the rigid arm."""
+        task = slew_and_after(self.arm, self.known, self.chain)
+        return in_blocks(self._signals(task, task.rigid_moment), int(task.is_after.argmax()))
 
-    def _outputs(self, task: Scenario, entries: Sequence[Entry], rows: Sequence[Real], first: int = 0) -> Real:
-        """Outputs (rows, samples, laws), by rows of the plant's states, at the samples from `first` on, and some more.
+    @cached_property
+    def _trial(self) -> Blocks:
+        """The signals of a cost, what the controller is to read, and what is not to be added."""
+        task = trial_slew(self.known, self.chain)
+        own = (self.chain.slew.reading == "vibration") * task.feedforward
+        return in_blocks(self._signals(task, task.moment_reference, own), 0)
 
-        The signals are the feed-forward and the references.
-        """
+    def _signals(self, task: Scenario, *wanted: Real) -> Real:
+        """The feed-forward, the references, and signals that are wanted."""
+        references = (task.references.get(name, 0.0 * task.t) for name in self.model.signals)
+        return np.array([task.feedforward, *references, *wanted])
+
+    def _driven(self, entries: Sequence[Entry], wanted: int) -> tuple[Real, Real]:
+        """A and B of the closed loop with these signals."""
         model, n = self.model, len(self.model.plant[0])
         A, (_, Bk, _, Dk) = model.closed(entries), model.states(entries)
-        none = 0.0 * task.feedforward
-        signals = np.array([task.feedforward, *(task.references.get(name, none) for name in model.signals)])
-        B, C = np.zeros((*A.shape[:2], len(signals))), np.zeros((len(A), len(rows), A.shape[1]))
-        B[:, :n, :1], B[:, :n, 1:], B[:, n:, 1:] = model.plant[1], model.plant[1] @ Dk, -Bk
-        C[:, :, :n] = rows
-        return outputs(A, B, C, signals, first)
+        B = np.zeros((*A.shape[:2], 1 + len(model.signals) + wanted))
+        B[:, :n, :1], B[:, :n, 1:-wanted], B[:, n:, 1:-wanted] = model.plant[1], model.plant[1] @ Dk, -Bk
+        return A, B
 
     # ------------------------------------------------------------ in continuous time
 

@@ -21,13 +21,14 @@ from scipy.optimize import differential_evolution, minimize
 from tfarm.arm import PLANE
 from tfarm.arrays import Real
 from tfarm.records import record
-from tfarm.synthesis.judge import LOST, Judge
+from tfarm.synthesis.judge import LOST, Judge, scores_of
 from tfarm.synthesis.structures import Bounds, Structure
-from tfarm.synthesis.worst_case import Tell
+from tfarm.synthesis.worst_case import Effort, Tell
 
 FEWEST_RUNS, MOST_RUNS = 2, 8  # one more than coefficients within these: some minima are found by one of five alone
 USUAL_WORK = 4 * 20**2  # models times squared states of one arm's first model: with twice as much half the runs
 FEWEST_POINTS, POINTS_EACH = 32, 15  # of a run, at least, and for each coefficient: the next power of two
+LAWS_AT_ONCE = 256  # a limit of memory
 LAWS_EACH, MOST_LAWS = 800, 4000  # of a run for each coefficient, and at most; twice as many from the best points
 STRATEGIES = (("best1bin", 0.7), ("currenttobest1bin", 0.9))  # in turn, and the share of coefficients changed at once
 AROUND = 0.5  # of x: the spread of the points of a run around the best, half as wide in each one after
@@ -89,32 +90,30 @@ class Worst:
     @property
     def work(self) -> float:
         """The work of a law, relative to that of one arm and its first model."""
-        return sum((1 + len(judge.conditions)) * len(judge.model.plant[0]) ** 2 for judge in self.judges) / USUAL_WORK
+        return (
+            sum((4 if judge.is_sampled else 1) * len(judge.model.plant[0]) ** 2 for judge in self.judges) / USUAL_WORK
+        )
 
     def scores(self, form: Structure, x: Real, limits: Real | None = None) -> Real:
-        """The function to be minimised, at points x (n, laws), any value above the limit of a law (see `Judge`).
-
-        Arms after one with an unstable loop, or a score above the limit, are left out.
-        """
+        """The function to be minimised, at points x (n, laws), any value above the limit of a law (see `scores_of`)."""
         limits = np.full(x.shape[1], np.inf) if limits is None else limits
-        worst = self.judges[0].scores(form, x, limits)
-        for judge in self.judges[1:]:
-            left = np.flatnonzero((worst < LOST) & (worst <= limits))
-            if left.size:
-                worst[left] = np.maximum(worst[left], judge.scores(form, x[:, left], limits[left]))
-        return worst
+        parts = [slice(i, i + LAWS_AT_ONCE) for i in range(0, x.shape[1], LAWS_AT_ONCE)]
+        entries = [form.entries(form.coefficients(x[:, part])) for part in parts]
+        return np.concatenate(
+            [scores_of(self.judges, each, limits[part]) for each, part in zip(entries, parts, strict=True)]
+        )
 
 
-def search(judge: Worst, form: Structure, tell: Tell, near: Real | None = None) -> Search:
+def search(judge: Worst, form: Structure, tell: Tell, near: Real | None = None, effort: Effort = "whole") -> Search:
     """Return the best laws of a structure near its bounds, which are widened where the best lies beyond.
 
-    `near` (n,) is the best point of a judge with fewer arms: then one run begins there instead of several.
+    `near` (n,) is the best point of a judge with fewer arms, with which the first run begins.
     """
     given = [each.name in form.given for each in form.free]
     ends = [(place, end) for place in range(form.size) for end in (0, 1)]
     places = [each for each in ends if not (given[each[0]] or form.is_physical(*each))]
     region = form.wider(places, BEYOND)
-    (x, scores), of_runs = minimised(partial(judge.scores, region), form, region.box, judge.work, tell, near)
+    (x, scores), of_runs = minimised(partial(judge.scores, region), form, region.box, judge.work, tell, near, effort)
     for place, end in (each for each in ends if region.is_physical(*each)):  # there if the score is as good
         moved = x[:, :1].copy()
         moved[place] = region.box[end][place]
@@ -129,16 +128,16 @@ def search(judge: Worst, form: Structure, tell: Tell, near: Real | None = None) 
 
 
 def minimised(
-    score: Score, form: Structure, box: tuple[Real, Real], work: float, tell: Tell, near: Real | None
+    score: Score, form: Structure, box: tuple[Real, Real], work: float, tell: Tell, near: Real | None, effort: Effort
 ) -> tuple[Points, list[float]]:
     """Return the last points of all runs, and the best score of each.
 
     `score` takes points (n, k) of the box, and limits (k,) above which any value will do; `work` is that of a law,
-    relative to the usual one.  Runs begin within the bounds of `form`, the first also with its start, and are more
-    where no loop is stable yet; then follow one with the best points of all, some near the best as long as that gains,
-    and a simplex at the best of all.  With a point `near` the best one run begins with it, and the next near the best.
+    relative to the usual one.  Runs begin within the bounds of `form`, the first also with its start or a point `near`
+    the best, and are more where no loop is stable yet: the end of a sketch.  Then follow one with the best points of
+    all, not of a search near a point, some near the best as long as that gains, and a simplex at the best of all.
     """
-    runs = 1 if near is not None else min(max(int((form.size + 1) / max(1.0, work)), FEWEST_RUNS), MOST_RUNS)
+    runs = min(max(int((form.size + 1) / max(1.0, work)), FEWEST_RUNS), MOST_RUNS) if effort == "whole" else 1
     number = 1 << (max(FEWEST_POINTS, POINTS_EACH * form.size) - 1).bit_length()
     rounds = min(LAWS_EACH * form.size, MOST_LAWS) // number
     ended: list[Points] = []
@@ -155,16 +154,17 @@ def minimised(
         points[:, 0] = points[:, 0] if seed else form.origin if near is None else near
         run(points, rounds)
     runs = len(ended)
-    if near is None:
+    if effort == "whole":
         run(Points.of(ended).x[:, :number], 2 * rounds)
-    if form.size > len(PLANE):
+    if form.size > len(PLANE) and effort != "sketch":
         for n in range(MOST_REFINED):
             (best, *_), (least, *_) = Points.of(ended).x.T, Points.of(ended).scores
             spread = AROUND / 2**n * np.random.default_rng(runs + n).standard_normal((number, form.size))
             run(np.clip(best + spread, *box).T, rounds)
             if not ended[-1].scores[0] < least - WORTH * abs(least):
                 break
-    ended.append(simplex(score, box, Points.of(ended).x[:, 0]))
+    if effort != "sketch":
+        ended.append(simplex(score, box, Points.of(ended)))
     found = Points.of(ended)
     return found, [float(found.scores[0]), *(float(each.scores[0]) for each in ended[:runs])]
 
@@ -186,18 +186,18 @@ def evolved(score: Score, box: tuple[Real, Real], points: Real, rounds: int, see
     return Points.of([(done.population.T, done.population_energies)])
 
 
-def simplex(score: Score, box: tuple[Real, Real], start: Real) -> Points:
-    """The last point of a simplex of Nelder and Mead that begins at `start` (n,)."""
-    low, high = box
+def simplex(score: Score, box: tuple[Real, Real], found: Points) -> Points:
+    """The last point of a simplex of Nelder and Mead that begins at the best point found."""
+    (low, high), start, limit = box, found.x[:, 0], found.scores[:1]
     step = SIMPLEX * (high - low)
     corners = start + np.vstack([np.zeros(start.size), np.diag(np.where(start + step > high, -step, step))])
     options = {
         "initial_simplex": corners, "maxfev": STEPS_EACH * start.size, "adaptive": start.size > 1,
-        "xatol": CONVERGED * (high - low).max(), "fatol": CONVERGED * abs(score(start[:, None])[0]),
+        "xatol": CONVERGED * (high - low).max(), "fatol": CONVERGED * abs(limit[0]),
     }  # fmt: skip
     bounds = list(zip(low, high, strict=True))
     done = cast("Any", minimize)(
-        lambda x: float(score(x[:, None])[0]), start, method="Nelder-Mead", bounds=bounds, options=options
+        lambda x: float(score(x[:, None], limit)[0]), start, method="Nelder-Mead", bounds=bounds, options=options
     )
     return Points(done.x[:, None], np.array([done.fun]))
 

@@ -2,6 +2,7 @@
 
 The law is chosen for the arms of a list.  The box is then searched for an arm on which it is worse, which is added to
 the list, and the law is chosen again: the exchange method of semi-infinite programming (Hettich and Kortanek, 1993).
+The first arms are added by laws of a short search.
 That is no proof over the box: between the arms of the list nothing is certain.
 """
 
@@ -12,7 +13,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from tfarm.records import record
 from tfarm.synthesis.structures import Bounds
 
 _Found = TypeVar("_Found")
+Effort = Literal["whole", "near", "sketch"]  # of a search: all runs; one run, and all that follows; one run
 Tell = Callable[[str], None]  # is called with one line of progress
 
 MOST_RANGES = 4  # 16 corners: a search takes 16 times as long
@@ -34,7 +36,8 @@ ARMS_TRIED = 24  # arms at random inside the box
 ARMS_SEED = 0  # of those
 BOX_STEPS = (0.25, 0.125, 0.0625)  # of the box: from the worst of them on, along each of its numbers
 DOTTED = {f"{room}.{field}": name for name, (room, field) in ADJUSTABLE.items()}
-MOST_EXCHANGES = 4  # of the exchange, at most
+MOST_EXCHANGES = 4  # arms added after a whole search, at most
+MOST_SKETCHED = 2  # before the whole search
 MUCH_WORSE = 0.01  # of a score: an arm inside is added if it is worse by more
 
 
@@ -155,19 +158,21 @@ class WorstCase:
 
 
 def for_the_worst(
-    arms: Sequence[NamedArm], box: ArmBox | None, find: Callable[[Sequence[NamedArm], _Found | None], _Found],
+    arms: Sequence[NamedArm], box: ArmBox | None, find: Callable[[Sequence[NamedArm], _Found | None, Effort], _Found],
     score_on: Callable[[_Found, Arm], float], tell: Tell,
 ) -> tuple[_Found, list[NamedArm], WorstCase]:  # fmt: skip
     """Return the result of `find` for the arms and for worse ones inside the box, with all of these arms.
 
-    `find` is given the arms and what it found for all but the last of them, near which it may begin.
+    The first worse arms are those of sketches, so that the whole search already has them.  `find` is given the arms,
+    what it found before, near which it may begin, and its effort.
     `score_on` is the score of one arm, inf where the law is unstable.  Raises ConvergenceError where no law is found
     that is stable on all arms, or where it stays unstable on one inside the box.
     """
-    named, tried, found = list(arms), 0, None
+    named, tried, found, added = list(arms), 0, None, 0
+    effort: Effort = "sketch" if box else "whole"
     while True:
         try:
-            found = find(named, found)
+            found = find(named, found, effort)
         except ConvergenceError as error:
             if len(named) == 1:
                 raise
@@ -178,14 +183,21 @@ def for_the_worst(
         limit = max(score_on(found, each.arm) for each in named)
         worst, score, number = worst_inside(box, partial(score_on, found))
         tried += number
-        if score <= limit + MUCH_WORSE * abs(limit):
+        is_worse = score > limit + MUCH_WORSE * abs(limit)
+        if effort != "sketch" and not is_worse:
             return found, named, WorstCase(box.ranges, tried)
-        if len(named) == len(arms) + MOST_EXCHANGES:
+        if effort != "sketch" and added == MOST_EXCHANGES:
             if math.isinf(score):
                 raise ConvergenceError(f"no law found is stable on {worst.name}: narrow the ranges", None, None)
             return found, named, WorstCase(box.ranges, tried, worst.name)
-        tell(f"{worst.name} is worse than the other {len(named)} arms, and added")
-        named.append(worst)
+        if is_worse:
+            tell(f"{worst.name} is worse than the other {len(named)} arms, and added")
+            named.append(worst)
+            added += 1
+        if effort != "sketch":
+            effort = "near"
+        elif not is_worse or added == MOST_SKETCHED:
+            effort, added = "whole", 0
 
 
 def same_input(arms: Sequence[NamedArm]) -> None:
