@@ -28,13 +28,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import AnyLaw, Arm, arm_and_law, as_law
+from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
-from tfarm.reduced.modal import sensed_model
+from tfarm.reduced.modal import modal_model, sensed_model
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes, modes_below
+from tfarm.spectrum.naming import single_zeros
 
 from .loop import MOST_BAND_MODES, QUIET_REACH, Loop, band_of, quiet_places
 from .poles import Poles, box_of, poles_below, poles_of_model
@@ -327,10 +329,25 @@ def spill(arm: Arm, law: AnyLaw, most: int = USUAL_SPILL_MODES) -> Spill:
     verdict = stability(arm, law)
     loop, numbers, unstable, rightmost = verdict.loop, np.arange(1, most + 1), [], []
     slowest = REST_SHARE * float(modes(loop.arm, 1).natural_frequency[-1])
-    for number in numbers.tolist():
-        A, B, C, D = sensed_model(loop.arm, loop.law.signals, number)
-        poles = poles_of_model(loop, (A, B, C, 0 * D))
+    for model in _bare_models(loop, most):
+        poles = poles_of_model(loop, model)
         moving = poles[abs(poles) > slowest]
         unstable.append(int((moving.real > UNDAMPED_SHARE * abs(moving)).sum()))
         rightmost.append(moving[np.argmax(moving.real)])
     return Spill(verdict, numbers, np.array(unstable), np.array(rightmost))
+
+
+def _bare_models(loop: Loop, most: int) -> list[Matrices]:
+    """Models of 1 to `most` flexible modes without static remainder, each with the poles of its modes alone.
+
+    They are cut from the largest.  A search of more modes of a strongly damped arm may leave poles without a mode, which
+    no smaller model has: then each has a search of its own.
+    """
+    arm, signals, numbers = loop.arm, loop.law.signals, range(1, most + 1)
+    own, (A, B, C, D) = modal_model(arm, "hub_angle", most), sensed_model(arm, signals, most)
+    if own.index.tolist() == [*numbers] and own.single.size == len(single_zeros(modes(arm, 1))):
+        states, beyond = np.arange(len(A)), [own.rigid_states + 2 * number for number in numbers]
+        kept = [(states < end) | (states >= beyond[-1]) for end in beyond]
+        return [(A[np.ix_(each, each)], B[each], C[:, each], 0 * D) for each in kept]
+    models = [sensed_model(arm, signals, number) for number in numbers]
+    return [(A, B, C, 0 * D) for A, B, C, D in models]
