@@ -36,7 +36,6 @@ from tfarm.records import record
 from tfarm.reduced.modal import modal_model, sensed_model
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes, modes_below
-from tfarm.spectrum.naming import single_zeros
 
 from .loop import MOST_BAND_MODES, QUIET_REACH, Loop, band_of, quiet_places
 from .poles import Poles, box_of, poles_below, poles_of_model
@@ -340,13 +339,14 @@ def spill(arm: Arm, law: AnyLaw, most: int = USUAL_SPILL_MODES) -> Spill:
 def _bare_models(loop: Loop, most: int) -> list[Matrices]:
     """Models of 1 to `most` flexible modes without static remainder, each with the poles of its modes alone.
 
-    They are cut from the largest.  A search of more modes of a strongly damped arm may leave poles without a mode, which
-    no smaller model has: then each has a search of its own.
+    They are cut from the largest.  A search of more modes of a strongly damped arm may leave poles without a mode,
+    which no smaller model has: then each has a search of its own.
     """
     arm, signals, numbers = loop.arm, loop.law.signals, range(1, most + 1)
-    own, (A, B, C, D) = modal_model(arm, "hub_angle", most), sensed_model(arm, signals, most)
-    if own.index.tolist() == [*numbers] and own.single.size == len(single_zeros(modes(arm, 1))):
-        states, beyond = np.arange(len(A)), [own.rigid_states + 2 * number for number in numbers]
+    first, last = (modal_model(arm, "hub_angle", number) for number in (1, most))
+    if last.index.tolist() == [*numbers] and last.single.size == first.single.size:
+        A, B, C, D = sensed_model(arm, signals, most)
+        states, beyond = np.arange(len(A)), [last.rigid_states + 2 * number for number in numbers]
         kept = [(states < end) | (states >= beyond[-1]) for end in beyond]
         return [(A[np.ix_(each, each)], B[each], C[:, each], 0 * D) for each in kept]
     models = [sensed_model(arm, signals, number) for number in numbers]
