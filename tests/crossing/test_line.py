@@ -7,7 +7,6 @@ import pytest
 
 from tfarm.crossing import (
     Crossings,
-    Family,
     brackets,
     confirmed,
     counts_over,
@@ -196,8 +195,7 @@ def of(h):
 
 def found(grid, parts, with_dips=True):
     """Gain, place and change of all crossings, dips searched too."""
-    family = Family(lambda w: tuple(each[None] for each in parts(w)), lambda _, w: parts(w))
-    (line,) = crossings(family, grid, with_dips=with_dips)
+    (line,) = crossings(lambda _, w: parts(w), 1, grid, with_dips=with_dips)
     return np.array(sorted(line, key=lambda each: each.at)).T
 
 
