@@ -234,7 +234,7 @@ def test_all_dips_between_two_neighbours_are_searched_together():
     _, at, _ = found(places, parts)
     zeros = [each + off for each in (1.1, 4.1, 7.1) for off in (-0.05, 0.05)]
     np.testing.assert_allclose(at, zeros, rtol=1e-13)
-    assert set(sizes[1:15]) == {6}  # two places of each dip a step
+    assert set(sizes[1:8]) == {3}  # a place of each dip a step
 
 
 @pytest.mark.parametrize(

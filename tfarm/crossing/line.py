@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize.elementwise import find_root
+from scipy.optimize.elementwise import find_minimum, find_root
 
 from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
 from tfarm.errors import require
@@ -31,8 +31,7 @@ Parts = Callable[[Real], tuple[Complex, Complex]]  # A and B at places of a curv
 Family = Callable[[Whole, Places], tuple[Complex, Complex]]  # the same of lines by their numbers, broadcast with places
 
 LAST_BIT = 2.0**-53  # of a place, and of the narrowest bracket
-DIP_STEPS = 14  # of a golden section: a thousandth of two steps of the grid is left
-GOLDEN = (5.0**0.5 - 1.0) / 2.0
+DIP_STEPS = 14  # of a golden section leave a thousandth of two steps of the grid, of smooth functions far less
 ROUNDED = 1e-11  # of |A| |B|: an imaginary part that may be rounding
 Window = tuple[float, float]  # two values of a gain, the lower first
 SAME_EDGE = 1e-9  # relative: next to z = 1 one static crossing is read several times, each with an error near 1e-12
@@ -150,23 +149,21 @@ def _dips(family: Family, places: Real, share: Real) -> tuple[Whole, Real, Real,
     """Dips of |h| through 0 between three neighbours: the line, the first place, one beyond 0, the last, and the sign.
 
     Two crossings lie there, as near to each other as a resonance is narrow, and h has one sign at the points of the
-    grid.  Each dip is searched by golden section, all at once.
+    grid.  The least of all dips are found together, by SciPy's Chandrupatla (1998).
     """
-    inner, sign = share[:, 1:-1], np.sign(share[:, 1:-1])
-    lower = np.minimum(sign * share[:, :-2], sign * share[:, 2:])  # of the neighbours: below 0 where one is across
+    inner, signs = share[:, 1:-1], np.sign(share[:, 1:-1])
+    lower = np.minimum(signs * share[:, :-2], signs * share[:, 2:])  # of the neighbours: below 0 where one is across
     line, before = np.nonzero((abs(inner) <= lower) & (abs(inner) > ROUNDED))
-    sign = sign[line, before]
-    first, last = places[before], places[before + 2]
-    low, high, best, depth = first, last, places[before + 1], np.full(line.size, np.inf)
-    for _ in range(DIP_STEPS if line.size else 0):
-        left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-        at_left, at_right = np.split(np.tile(sign, 2) * _share(*family(np.tile(line, 2), np.r_[left, right])), 2)
-        is_left = at_left < at_right
-        here = np.minimum(at_left, at_right)
-        best, depth = np.where(here < depth, np.where(is_left, left, right), best), np.minimum(here, depth)
-        low, high = np.where(is_left, low, left), np.where(is_left, right, high)
-    through = depth < -ROUNDED
-    return line[through], first[through], best[through], last[through], sign[through].astype(np.int64)
+    sign, first, last = signs[line, before].astype(np.int64), places[before], places[before + 2]
+    if not line.size:
+        return line, first, first, last, sign
+
+    def depth(at: Real, which: Whole) -> Real:
+        return sign[which] * _share(*family(line[which], at))
+
+    dip = find_minimum(depth, (first, places[before + 1], last), args=(np.arange(line.size),), maxiter=DIP_STEPS)
+    through = dip.f_x < -ROUNDED
+    return line[through], first[through], dip.x[through], last[through], sign[through]
 
 
 def _share(A: Complex, B: Complex) -> Real:
