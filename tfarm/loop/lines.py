@@ -202,9 +202,8 @@ def _with_real_poles(line: Line, found: list[Crossing], N: Complex, P: Complex, 
         (zero, half), (whole, part) = abs((N + rest.t * P)[2:4]), abs(P[2:4])
         is_single = zero * part < SIMPLE * half * whole
         found.append(rest if is_single else rest._replace(change=_change_at(line, rest.t, found, band)))
-    if name.endswith(LEADING) and low < 0 < high:
-        far = through_infinity(N[4:], P[4:])
-        found += [] if far is None else [far._replace(t=0.0)]
+    if 0.0 in critical(name, (low, high))[1:-1] and (far := through_infinity(N[4:], P[4:])) is not None:
+        found.append(far._replace(t=0.0))
     return Crossings.of(e._replace(t=0.0) if abs(e.t) <= ROUNDED * (high - low) else e for e in found)
 
 
@@ -281,15 +280,15 @@ def unstable_below(loop: Loop, band: float) -> int:
     raise AssertionError("unreachable")
 
 
-def critical(name: str, limits: tuple[float, float]) -> tuple[float, ...]:
+def critical(name: str, limits: Window) -> tuple[float, ...]:
     """Values of a number at which the band must be sufficient: its limits, and 0 of a leading coefficient."""
     low, high = limits
     return (low, 0.0, high) if name.endswith(LEADING) and low < 0 < high else limits
 
 
-def turns_over(loop: Loop, name: str, limits: tuple[float, float]) -> bool:
+def turns_over(loop: Loop, name: str, limits: Window) -> bool:
     """Whether a leading coefficient passes through 0 between these values, where without it high modes are driven."""
-    return name.endswith(LEADING) and limits[0] < 0 < limits[1] and not is_known_without(loop, name)
+    return 0.0 in critical(name, limits)[1:-1] and not is_known_without(loop, name)
 
 
 def static_edge(loop: Loop, name: str, limits: Window) -> Crossing | None:

@@ -247,18 +247,16 @@ def margins(arm: Arm, law: AnyLaw, band: float | None = None) -> Margins:
 def _exact(verdict: Stability, found: LoopMargins) -> tuple[float | None, float | None, float | None]:
     """Delay margin, disk margin and peak sensitivity of the whole infinite-dimensional loop; None: not determined."""
     loop = verdict.loop
-    arm, gains = loop.arm, loop.gains
-    if arm.is_undamped:
-        if gains is None or theorem_of(loop).energy is None:
-            return None, None, None
+    arm, gains, of_disk = loop.arm, loop.gains, (found.disk, found.peak_sensitivity)
+    if not arm.is_undamped and is_quiet(loop, verdict.band):
+        return found.delay, *of_disk
+    if gains is not None and arm.is_undamped and theorem_of(loop).energy is not None:
         if gains.K2:
             return 0.0, 0.0, math.inf
         # 1 + L = 1 + (Kp + i K1 w) theta, theta real: no dip deepens with w
-        return 0.0 if loop.feeds_back else found.delay, found.disk, found.peak_sensitivity
-    if is_quiet(loop, verdict.band):
-        return found.delay, found.disk, found.peak_sensitivity
-    if gains is not None and gains.K2 == gains.Kp == 0 and not arm.input_lags:  # L in the right half-plane
-        return None, found.disk, found.peak_sensitivity
+        return 0.0 if loop.feeds_back else found.delay, *of_disk
+    if gains is not None and not arm.is_undamped and gains.K2 == gains.Kp == 0 and not arm.input_lags:
+        return None, *of_disk  # L is in the right half-plane
     return None, None, None
 
 

@@ -265,9 +265,7 @@ class Spill:
         lowest = float(self.driven[0].imag)
         table = modes(self.verdict.loop.arm, up_to=2.0 * max(lowest, 1.0) + self.verdict.band)
         flexible = table.natural_frequency[table.index > 0]
-        if lowest < flexible[0] / 2:
-            return 0
-        return int(np.argmin(abs(flexible - lowest))) + 1
+        return 0 if lowest < flexible[0] / 2 else int(np.argmin(abs(flexible - lowest))) + 1
 
     @property
     def shown_from(self) -> Annotated[int | None, SHOWN_FROM]:

@@ -9,8 +9,9 @@ own at each value.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -110,18 +111,17 @@ class Varied:
 
     def at(self, value: float) -> Loop:
         """The loop where the number has that value."""
-        if not self.is_of_arm:
-            return self.first.under(self.law_at(value))
-        if value not in self._arms:
-            if len(self._arms) > ARMS_KEPT:
-                self._arms.clear()
-            arm, _ = arm_and_law(self.arm.having(**{self.vary: value}), self.law)
-            self._arms[value] = Loop(arm, self.full)
-        return self._arms[value]
+        return self._of_arm(value) if self.is_of_arm else self.first.under(self.law_at(value))
 
     @cached_property
-    def _arms(self) -> dict[float, Loop]:
-        return {}
+    def _of_arm(self) -> Callable[[float], Loop]:
+        """The same of a number of the arm: of the last values it is kept."""
+
+        @lru_cache(ARMS_KEPT)
+        def of_arm(value: float) -> Loop:
+            return Loop(arm_and_law(self.arm.having(**{self.vary: value}), self.law)[0], self.full)
+
+        return of_arm
 
     @cached_property
     def first(self) -> Loop:
