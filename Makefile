@@ -32,7 +32,6 @@ SURVEYS := \
 	loop.loci \
 	loop.law_counts \
 	loop.number_windows \
-	loop.law_times \
 	synthesis.designs \
 	loop.nyquist_counts \
 	reduced.test_accuracy \

@@ -7,7 +7,6 @@ import pytest
 
 from tfarm.crossing import (
     Crossings,
-    Family,
     brackets,
     confirmed,
     counts_over,
@@ -196,8 +195,7 @@ def of(h):
 
 def found(grid, parts, with_dips=True):
     """Gain, place and change of all crossings, dips searched too."""
-    family = Family(lambda w: tuple(each[None] for each in parts(w)), lambda _, w: parts(w))
-    (line,) = crossings(family, grid, with_dips=with_dips)
+    (line,) = crossings(lambda _, w: parts(w), 1, grid, with_dips=with_dips)
     return np.array(sorted(line, key=lambda each: each.at)).T
 
 
@@ -236,7 +234,7 @@ def test_all_dips_between_two_neighbours_are_searched_together():
     _, at, _ = found(places, parts)
     zeros = [each + off for each in (1.1, 4.1, 7.1) for off in (-0.05, 0.05)]
     np.testing.assert_allclose(at, zeros, rtol=1e-13)
-    assert set(sizes[1:15]) == {6}  # two places of each dip a step
+    assert set(sizes[1:8]) == {3}  # a place of each dip a step
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ import pytest
 import tfarm
 from tests import caches
 from tests.loop.arms import some_loop
+from tests.loop.law_cases import some_case
 from tests.loop.law_counts import some_delay, some_law
-from tests.loop.law_times import of_margins, some_case
 from tests.shared import sized, thinned
 from tfarm import ConvergenceError, Hub, Law, Link, Payload, RotarySpring, Section
 from tfarm.arm.blocks import Rational
@@ -21,6 +21,7 @@ from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
 from tfarm.response.signals import Signals
+from tfarm.schema import to_dict
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], [0.02, 1.0])}, delay=0.002)
@@ -189,7 +190,7 @@ def test_margins_of_a_law_need_few_evaluations_of_the_rig(monkeypatch, number):
     monkeypatch.setattr(Signals, "parts", counted)
     monkeypatch.setattr("tfarm.spectrum.naming.follow", never)
     caches.empty()
-    of_margins(*case)
+    to_dict(tfarm.margins(*case[:2]))
     assert len(sizes) < 3000
     assert sum(sizes) < 1_200_000
 

@@ -24,6 +24,7 @@ from tfarm.loop.plane import between, plane
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import Spill, stability
 from tfarm.loop.theorem import absorbed, definite, is_hurwitz, on_axis, polynomial, signs_of
+from tfarm.reduced.modal import closed, sensed_model
 from tfarm.response.signals import Signals
 
 LAB, BARE, RIG = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "quanser-2dsfl"))
@@ -223,6 +224,19 @@ def test_a_law_stable_on_two_modes_drives_the_third():
     third = tfarm.modes(BARE, 3).natural_frequency[-1]
     assert abs(found.driven[0].imag - third) < 0.01 * third
     assert "models of 1 to 2 modes are stable" in found.in_words
+
+
+@pytest.mark.parametrize(("C", "most"), [(1e-3, 9), (2e-2, 12)])
+def test_models_of_a_strongly_damped_arm_have_no_poles_of_higher_modes(C, most):
+    """A search of nine modes has all of them at the first C; one of twelve at the second leaves real poles to none."""
+    arm, law = LAB.having(damping=C), Law({"hub_angle": 1.0, "root_moment": -2.0})
+    found = tfarm.spill(arm, law, most)
+    for number in (1, 2, 4, 7):
+        A, B, C, D = sensed_model(arm, law.signals, number)
+        poles = np.linalg.eigvals(closed((A, B, C, 0 * D), law.matrices()))
+        poles = poles[abs(poles) > 1e-6]
+        assert found.unstable[number - 1] == (poles.real > 0).sum()
+        assert found.rightmost[number - 1].real == pytest.approx(poles.real.max(), rel=1e-8)
 
 
 FOUND = {  # unstable poles of each model; driven poles of the exact loop; printed text

@@ -373,13 +373,6 @@ def test_the_gap_to_the_reduced_locus_shrinks_with_its_order(law, vary, stop):
     assert gaps[2] < 1e-7
 
 
-@pytest.mark.parametrize(("branches", "order"), [(3, 20), (10, 22), (12, 26)])
-def test_by_default_a_reduced_model_has_two_modes_beyond_the_last_branch(branches, order):
-    """Two poles a mode: those of the branches, one of them rigid, and two more; 20 at least."""
-    found = locus(PAPER, HubFeedback(), "K1", 0.0, 2.0, 3, branches)
-    assert order == max(20, 2 * (len(np.unique(found.mode)) + 2)) == reduced_locus(found).order
-
-
 @pytest.mark.parametrize("vary", ["K1", "K2"])
 def test_a_reduced_locus_includes_the_unobservable_pole_at_0(vary):
     """Friction leaves a pole at 0 and one near it; the model of python-control has the second alone."""

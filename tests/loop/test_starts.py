@@ -12,10 +12,7 @@ from scipy.interpolate import BarycentricInterpolator
 
 import tfarm
 from tests.loop.arms import window_arm
-from tests.loop.test_lossless import RIGS as REACTIVE
-from tests.loop.test_lossless import edges_of
 from tests.rigs import some_rig
-from tests.shared import thinned
 from tfarm import Hub, HubFeedback, Law, Payload
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.locus import BranchCrossing, Locus
@@ -23,30 +20,13 @@ from tfarm.loop.loop import Loop, band_of
 from tfarm.loop.nyquist import compressed, poles_on_axis
 from tfarm.loop.panels import CHEBYSHEV, Positions, loop_panels, positions, sensed_places
 from tfarm.loop.plane import Axis, moment_axis, rate_axis, stable_edge
-from tfarm.loop.poles import Poles, count_with_mirrors, first_poles, poles_below, quiet_edge
+from tfarm.loop.poles import Poles, count_with_mirrors, first_poles
 from tfarm.loop.stability import stability
 from tfarm.loop.theorem import lyapunov
-from tfarm.loop.windows import windows_of
 from tfarm.spectrum.box import Box
 from tfarm.spectrum.table import rate_unit
 
 LAB, STOCKY = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
-
-
-@pytest.mark.parametrize("K1", [0.3, -30.0])
-def test_a_box_reaches_right_to_where_no_pole_can_be(K1):
-    """From the first edge that is tried on: on the one that is taken Re L > -1/2, on the one before it was not."""
-    loop, height, first = Loop(LAB, HubFeedback(K1=K1)), 300.0, 30.0
-    right = quiet_edge(loop, first, height)
-    edge = 1j * np.linspace(0.0, height, 400)
-    assert loop.loop_function(right + edge).real.min() > -0.6
-    if right > first:
-        before = right / 1.7
-        near = np.r_[before + edge, before * np.array([2.0, 5.0, 20.0])]
-        assert loop.loop_function(near).real.min() <= -0.45
-    poles = poles_below(loop, height).values
-    assert (poles.real < right).all()
-    assert (right > first) == (poles.real.max() > first)
 
 
 def listed(*values):
@@ -79,30 +59,6 @@ def test_the_rightmost_pole_is_not_one_at_0():
     assert poles.spectral_abscissa == -1.0
     np.testing.assert_array_equal(poles.moving, [-3.0, -1 + 10j])
     assert (poles.unstable, listed(2.0, 3 + 1j, -1 + 2j).unstable) == (0, 3)
-
-
-@pytest.mark.parametrize("name", thinned(REACTIVE, 2))
-def test_of_a_rig_without_losses_each_driven_mode_of_the_box_is_two_unstable_poles(name):
-    """However near to the axis: as many as there are K2_n between 0 and the law's, of modes below the box's top."""
-    arm = REACTIVE[name]
-    gains, at = edges_of(arm)
-    K2 = 1.5 * float(max(gains[:3], key=abs))
-    law = HubFeedback(K1=1e-3 * rate_unit(arm), K2=K2)
-    poles = poles_below(Loop(arm, law), 1.3 * float(at[3]))
-    driven = (np.sign(gains) == np.sign(K2)) & (abs(gains) < abs(K2)) & (at < poles.box.im_max)
-    assert poles.unstable == 2 * driven.sum() > 0
-
-
-@pytest.mark.parametrize("friction", [0.0, 0.02])
-def test_a_hub_without_inertia_is_stable_from_where_it_loses_something_on(friction):
-    """The law is in its window, whose lower end is where K1 takes back what the hub loses: a pole passes infinity."""
-    pin = replace(LAB, hub=replace(LAB.hub, inertia=0.0, friction=friction))
-    for K1 in (0.3, -0.5 * friction) if friction else (0.3,):
-        verdict = stability(pin, HubFeedback(K1=K1))
-        assert verdict.is_stable
-        low, high = windows_of(verdict, ["K1"])["K1"].around
-        assert low == pytest.approx(-friction, abs=1e-12)
-        assert low < K1 < high
 
 
 LEAD = {"hub_angle": ([0.7, 3.0, 20.0], [0.002, 0.3, 1.0]), "root_moment": ([0.2], [1e-4, 2e-2, 1.0])}

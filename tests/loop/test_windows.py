@@ -79,14 +79,6 @@ def test_random_stability_intervals_agree_with_the_model(seed) -> None:
             assert any(a < middle < b for a, b in found.all) == (rightmost < 0)
 
 
-def test_a_held_arm_bears_a_negative_spring_down_to_its_stiffness() -> None:
-    for C in (0.0, 1e-4):
-        arm = held(C)
-        stiffness = held_stiffness(arm)
-        found = windows(arm, HubFeedback(K1=0.3, K2=0.25, Kp=-0.1 * stiffness), "Kp")
-        assert found.around[0] == pytest.approx(-0.75 * stiffness, rel=1e-10)
-
-
 def test_a_pin_without_inertia_has_no_k2_to_choose() -> None:
     arm = replace(LAB, hub=Hub(inertia=0.0))
     found = windows(arm, HubFeedback(K1=0.3), "K2")

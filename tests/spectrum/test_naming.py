@@ -7,7 +7,7 @@ import pytest
 
 import tfarm
 from tests import caches
-from tests.loop.law_times import some_case
+from tests.loop.law_cases import some_case
 from tests.rigs import some_rig
 from tfarm.errors import ConvergenceError
 from tfarm.reduced.modal import NAMING_STEPS

@@ -15,22 +15,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize.elementwise import find_root
+from scipy.optimize.elementwise import find_minimum, find_root
 
 from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
-from tfarm.errors import ParameterError
+from tfarm.errors import require
 from tfarm.records import record
 
 Places = NDArray[Any]  # of a curve, in any coordinate
 Parts = Callable[[Real], tuple[Complex, Complex]]  # A and B at places of a curve
+Family = Callable[[Whole, Places], tuple[Complex, Complex]]  # the same of lines by their numbers, broadcast with places
 
 LAST_BIT = 2.0**-53  # of a place, and of the narrowest bracket
-DIP_STEPS = 14  # of a golden section: a thousandth of two steps of the grid is left
-GOLDEN = (5.0**0.5 - 1.0) / 2.0
+DIP_STEPS = 14  # of a golden section leave a thousandth of two steps of the grid, of smooth functions far less
 ROUNDED = 1e-11  # of |A| |B|: an imaginary part that may be rounding
 Window = tuple[float, float]  # two values of a gain, the lower first
 SAME_EDGE = 1e-9  # relative: next to z = 1 one static crossing is read several times, each with an error near 1e-12
@@ -72,7 +73,11 @@ class Crossings:
         inside = (low < self.gain) & (self.gain < high)
         return Crossings(self.gain[inside], self.at[inside], self.change[inside])
 
-    def passed(self, gains: Real) -> Whole:
+    def spans(self, low: float, high: float) -> list[Window]:
+        """The intervals between two gains from each crossing to the next."""
+        return list(pairwise(np.unique(np.r_[low, self.within(low, high).gain, high]).tolist()))
+
+    def passed(self, gains: Real | float) -> Whole:
         """Number of zeros that pass beyond the curve between -infinity and each of the gains, inclusive."""
         return np.r_[0, np.cumsum(self.change)][np.searchsorted(self.gain, gains, side="right")]
 
@@ -120,41 +125,12 @@ def crossed(places: Real, parts: Parts) -> tuple[Real, Real, Whole]:
     return gain, at, change
 
 
-class Family(NamedTuple):
-    """Lines of loops, A + g B along each, at places of one curve.
-
-    `on` gives A and B of every line at each place, both (lines, n); `at` those of one line, by its number, at each of
-    some places of its own, both (n,).
-    """
-
-    on: Callable[[Places], tuple[Complex, Complex]]
-    at: Callable[[Whole, Places], tuple[Complex, Complex]]
-
-
-def family_of(corners: Callable[[Places], Complex], across: Callable[[Places], Complex], count: int) -> Family:
-    """The lines along y of  F = a + f b + y (c + f d),  one for each of `count` values of f.
-
-    `corners` gives a, b, c and d at places (4, n); `across` gives f (lines, n), or (lines, 1) if it is constant.
-    """
-
-    def on(places: Places) -> tuple[Complex, Complex]:
-        (a, b, c, d), f = corners(places), across(places)
-        return a + f * b, c + f * d
-
-    def at(line: Whole, places: Places) -> tuple[Complex, Complex]:
-        a, b, c, d = corners(places)
-        f = np.broadcast_to(across(places), (count, places.size))[line, np.arange(places.size)]
-        return a + f * b, c + f * d
-
-    return Family(on, at)
-
-
-def crossings(family: Family, places: Real, *, with_dips: bool) -> list[list[Crossing]]:
-    """The crossings of each line between neighbours of a grid of places, all solved for at once.
+def crossings(family: Family, count: int, places: Real, *, with_dips: bool) -> list[list[Crossing]]:
+    """The crossings of each of so many lines between neighbours of a grid of places, all solved for at once.
 
     `with_dips`: those too of which two lie between neighbours, where |h| dips through 0.
     """
-    A, B = family.on(places)
+    A, B = family(np.arange(count)[:, None], places[None])
     h = (A * B.conj()).imag
     (line, before), change = brackets(h)
     low, high = places[before], places[before + 1]
@@ -162,8 +138,8 @@ def crossings(family: Family, places: Real, *, with_dips: bool) -> list[list[Cro
         dip_line, first, middle, last, sign = _dips(family, places, _share(A, B))
         line, change = np.r_[line, dip_line, dip_line], np.r_[change, 2 * sign, -2 * sign]
         low, high = np.r_[low, first, middle], np.r_[high, middle, last]
-    at, gain = solved(lambda w: family.at(line, w), low, high)
-    found: list[list[Crossing]] = [[] for _ in range(len(h))]
+    at, gain = solved(lambda w: family(line, w), low, high)
+    found: list[list[Crossing]] = [[] for _ in range(count)]
     for number, *each in zip(line.tolist(), gain.tolist(), at.tolist(), change.tolist(), strict=True):
         found[number].append(Crossing(*each))
     return found
@@ -173,23 +149,21 @@ def _dips(family: Family, places: Real, share: Real) -> tuple[Whole, Real, Real,
     """Dips of |h| through 0 between three neighbours: the line, the first place, one beyond 0, the last, and the sign.
 
     Two crossings lie there, as near to each other as a resonance is narrow, and h has one sign at the points of the
-    grid.  Each dip is searched by golden section, all at once.
+    grid.  The least of all dips are found together, by SciPy's Chandrupatla (1998).
     """
-    inner, sign = share[:, 1:-1], np.sign(share[:, 1:-1])
-    lower = np.minimum(sign * share[:, :-2], sign * share[:, 2:])  # of the neighbours: below 0 where one is across
+    inner, signs = share[:, 1:-1], np.sign(share[:, 1:-1])
+    lower = np.minimum(signs * share[:, :-2], signs * share[:, 2:])  # of the neighbours: below 0 where one is across
     line, before = np.nonzero((abs(inner) <= lower) & (abs(inner) > ROUNDED))
-    sign = sign[line, before]
-    first, last = places[before], places[before + 2]
-    low, high, best, depth = first, last, places[before + 1], np.full(line.size, np.inf)
-    for _ in range(DIP_STEPS if line.size else 0):
-        left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-        at_left, at_right = np.split(np.tile(sign, 2) * _share(*family.at(np.tile(line, 2), np.r_[left, right])), 2)
-        is_left = at_left < at_right
-        here = np.minimum(at_left, at_right)
-        best, depth = np.where(here < depth, np.where(is_left, left, right), best), np.minimum(here, depth)
-        low, high = np.where(is_left, low, left), np.where(is_left, right, high)
-    through = depth < -ROUNDED
-    return line[through], first[through], best[through], last[through], sign[through].astype(np.int64)
+    sign, first, last = signs[line, before].astype(np.int64), places[before], places[before + 2]
+    if not line.size:
+        return line, first, first, last, sign
+
+    def depth(at: Real, which: Whole) -> Real:
+        return sign[which] * _share(*family(line[which], at))
+
+    dip = find_minimum(depth, (first, places[before + 1], last), args=(np.arange(line.size),), maxiter=DIP_STEPS)
+    through = dip.f_x < -ROUNDED
+    return line[through], first[through], dip.x[through], last[through], sign[through]
 
 
 def _share(A: Complex, B: Complex) -> Real:
@@ -219,9 +193,9 @@ def ascending(name: str, values: Any, least: int, most: int) -> Real:
         values = np.atleast_1d(np.asarray(values, dtype=float))
     except (TypeError, ValueError):  # no numbers
         values = np.empty(0)
-    if not (least <= values.size <= most and np.isfinite(values).all() and (np.diff(values) > 0).all()):
-        remedy = f"an ascending range of {least} to {most} finite values (give the law as law=, its numbers as vary=)"
-        raise ParameterError(key=name, value=f"{values.size} values", remedy=remedy)
+    ascends = least <= values.size <= most and np.isfinite(values).all() and (np.diff(values) > 0).all()
+    remedy = f"an ascending range of {least} to {most} finite values (give the law as law=, its numbers as vary=)"
+    require(ascends, name, f"{values.size} values", remedy)
     return np.asarray(values)
 
 
@@ -230,15 +204,15 @@ def counts_over(gains: Real, columns: Sequence[Crossings], reference: float, the
 
     `columns` are the crossings of each along the gain, `there` (columns,) the count at the gain `reference`.
     """
-    passed = np.array([each.passed(np.r_[gains, reference]) for each in columns]).reshape(len(columns), gains.size + 1)
-    return np.asarray(np.asarray(there)[:, None] + passed[:, :-1] - passed[:, -1:], dtype=np.int64)
+    counts = [count + each.passed(gains) - each.passed(reference) for each, count in zip(columns, there, strict=True)]
+    return np.array(counts, dtype=np.int64).reshape(len(columns), gains.size)
 
 
 def intervals(found: Crossings, low: float, high: float, reference: float, there: int) -> list[Window]:
     """Return the intervals between `low` and `high` without zeros beyond the curve; `there`: at `reference`."""
-    ends = np.r_[low, np.unique(found.within(low, high).gain), high]
-    (counts,) = counts_over((ends[1:] + ends[:-1]) / 2, [found], reference, np.array([there]))
-    return joined([(float(a), float(b)) for a, b, n in zip(ends[:-1], ends[1:], counts, strict=True) if n == 0 < b - a])
+    pairs = found.spans(low, high)
+    counts = there + found.passed(np.mean(pairs, axis=1)) - found.passed(reference)
+    return joined([pair for pair, count in zip(pairs, counts, strict=True) if not count])
 
 
 def confirmed(found: Crossings, low: float, high: float, is_stable: Callable[[float], bool]) -> list[Window]:

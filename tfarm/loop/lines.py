@@ -23,7 +23,7 @@ from tfarm.arm import Arm, Law
 from tfarm.arm.blocks import Rational
 from tfarm.arm.feedback import OUTPUT_OF
 from tfarm.arrays import Complex, Real, Whole
-from tfarm.crossing import Crossing, Crossings, Family, Window, crossings, family_of
+from tfarm.crossing import Crossing, Crossings, Family, Window, crossings
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import LoopParts
 from tfarm.spectrum.box import FIRST_POINTS, NEAREST_TO_ZERO, TRIED_HEIGHTS, turned
@@ -147,18 +147,8 @@ def _parts_at(loop: Loop, s: Complex) -> Parts:
 
 def along(loop: Loop, names: Iterable[str]) -> Family:
     """The lines of loops along each of some numbers of a law, the others constant, at places s."""
-    places = [place_of(loop.law, name) for name in names]
-    table = [np.array(column) for column in zip(*places, strict=True)]
-
-    def at(line: Whole, s: Complex) -> tuple[Complex, Complex]:
-        return _parts_at(loop, s).line(Place._make(column[line] for column in table))
-
-    def on(s: Complex) -> tuple[Complex, Complex]:
-        parts = _parts_at(loop, s)
-        A, B = zip(*(parts.line(place) for place in places), strict=True)
-        return np.array(A), np.array(B)
-
-    return Family(on, at)
+    table = [np.array(column) for column in zip(*(place_of(loop.law, name) for name in names), strict=True)]
+    return lambda line, s: _parts_at(loop, s).line(Place._make(column[line] for column in table))
 
 
 def columns(loop: Loop, names: tuple[str, str], x: Real, reach: float) -> Family:
@@ -170,15 +160,12 @@ def columns(loop: Loop, names: tuple[str, str], x: Real, reach: float) -> Family
     loop, reach = (loop.having("delay", 0.0), 1.0) if is_delay else (loop, reach)
     first, second = (place_of(loop.law, name) for name in ("gain" if is_delay else names[0], names[1]))
 
-    def corners(s: Complex) -> Complex:
-        parts = _parts_at(loop, s)
+    def on(line: Whole, s: Complex) -> tuple[Complex, Complex]:
+        parts, share = _parts_at(loop, s), (np.exp(-x[line] * s) if is_delay else x[line]) / reach
         (A, B), (far_A, far_B) = (parts.having(first, value).line(second) for value in (0.0, reach))
-        return np.array([A, (far_A - A) / reach, B, (far_B - B) / reach])
+        return A + share * (far_A - A), B + share * (far_B - B)
 
-    def factors(s: Complex) -> Complex:
-        return np.exp(-x[:, None] * s) if is_delay else x[:, None] + 0j
-
-    return family_of(corners, factors, x.size)
+    return on
 
 
 class Line(NamedTuple):
@@ -195,10 +182,10 @@ def crossed(arm: Arm, family: Family, lines: Sequence[Line], omega: Real) -> Ite
 
     It raises ConvergenceError where poles meet at s = 0 that cannot be counted.
     """
-    axis = Family(lambda w: family.on(1j * w), lambda line, w: family.at(line, 1j * w))
-    found = crossings(axis, omega, with_dips=bool(arm.least_damping))  # else h is rounding where modes rest
-    w1 = first_frequency(arm)
-    A, B = family.on(np.r_[float(omega[0]) * np.array(NEAR_ORIGIN), w1 * np.array([*ORDER_READ_AT, *FAR_RIGHT])] + 0j)
+    with_dips = bool(arm.least_damping)  # else h is rounding where modes rest
+    found = crossings(lambda line, w: family(line, 1j * w), len(lines), omega, with_dips=with_dips)
+    s = np.r_[float(omega[0]) * np.array(NEAR_ORIGIN), first_frequency(arm) * np.array([*ORDER_READ_AT, *FAR_RIGHT])]
+    A, B = family(np.arange(len(lines))[:, None], s[None] + 0j)
     for line, each, N, P in zip(lines, found, A, B, strict=True):
         yield partial(_with_real_poles, line, each, N, P, float(omega[-1]))
 
@@ -215,9 +202,8 @@ def _with_real_poles(line: Line, found: list[Crossing], N: Complex, P: Complex, 
         (zero, half), (whole, part) = abs((N + rest.t * P)[2:4]), abs(P[2:4])
         is_single = zero * part < SIMPLE * half * whole
         found.append(rest if is_single else rest._replace(change=_change_at(line, rest.t, found, band)))
-    if name.endswith(LEADING) and low < 0 < high:
-        far = through_infinity(N[4:], P[4:])
-        found += [] if far is None else [far._replace(t=0.0)]
+    if 0.0 in critical(name, (low, high))[1:-1] and (far := through_infinity(N[4:], P[4:])) is not None:
+        found.append(far._replace(t=0.0))
     return Crossings.of(e._replace(t=0.0) if abs(e.t) <= ROUNDED * (high - low) else e for e in found)
 
 
@@ -294,20 +280,20 @@ def unstable_below(loop: Loop, band: float) -> int:
     raise AssertionError("unreachable")
 
 
-def critical(name: str, limits: tuple[float, float]) -> tuple[float, ...]:
+def critical(name: str, limits: Window) -> tuple[float, ...]:
     """Values of a number at which the band must be sufficient: its limits, and 0 of a leading coefficient."""
     low, high = limits
     return (low, 0.0, high) if name.endswith(LEADING) and low < 0 < high else limits
 
 
-def turns_over(loop: Loop, name: str, limits: tuple[float, float]) -> bool:
+def turns_over(loop: Loop, name: str, limits: Window) -> bool:
     """Whether a leading coefficient passes through 0 between these values, where without it high modes are driven."""
-    return name.endswith(LEADING) and limits[0] < 0 < limits[1] and not is_known_without(loop, name)
+    return 0.0 in critical(name, limits)[1:-1] and not is_known_without(loop, name)
 
 
 def static_edge(loop: Loop, name: str, limits: Window) -> Crossing | None:
     """The value of a number at which a real pole passes through s = 0, if there is one."""
     near = SLOWEST * first_frequency(loop.arm) * np.array(NEAR_ORIGIN) + 0j
-    (A,), (B,) = along(loop, [name]).on(near)
+    A, B = along(loop, [name])(np.zeros(1, int), near)
     found = through_origin(A, B)
     return found._replace(t=0.0) if found and abs(found.t) <= ROUNDED * (limits[1] - limits[0]) else found

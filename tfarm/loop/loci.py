@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+from scipy.optimize import linear_sum_assignment, minimize_scalar
 
 from tfarm.arm import FED_BACK, NAMES, Arm, HubFeedback
 from tfarm.arm.blocks import Matrices
@@ -46,8 +46,7 @@ BRANCHES_NOTE = (
 LEAST_ORDER = 20  # of the model, ten modes, where no order is asked for
 MODES_BEYOND_BRANCHES = 2  # modes of the reduced model above the last branch, if no order is asked for
 REDUCED_VALUES = 9  # values at which an arm is reduced anew, where a parameter of it varies
-ROUND_POINTS = 17  # of each round between two neighbours, so that it is an eighth as wide as the one before
-NARROWEST_ROUND = 1e-7  # of the gain: where rounds end; a damping ratio, flat there, is known to 1e-14 of its curvature
+LEAST_STEP = 1e-7  # of the gain: a damping ratio, flat there, is known to 1e-14 of its curvature
 
 
 @dataclass(frozen=True)
@@ -147,8 +146,7 @@ class MostDamped:
 def most_damped(found: Locus) -> MostDamped | None:
     """Return the first mode's largest damping ratio along a gain; None where its branch is not followed all the way.
 
-    Between neighbours that oscillate too it is refined on ever narrower grids.  At an end of the range it is that of
-    the locus's own value.
+    Between neighbours that oscillate too it is solved for.  At an end of the range it is that of the locus's own value.
     """
     rows = found.branches[(found.mode == 1) & (found.branches.imag > 0).any(axis=1)]
     rows = rows[~np.isnan(rows).any(axis=1)]
@@ -158,15 +156,14 @@ def most_damped(found: Locus) -> MostDamped | None:
     at = int(np.argmax(ratios))
     best, near = (float(found.gain[at]), float(ratios[at])), slice(at - 1, at + 2)
     gain, branch = found.gain[near][::way], rows[0][near][::way]
-    inside = 0 < at < ratios.size - 1 and (branch.imag > 0).all()
-    while inside and gain[2] - gain[0] > NARROWEST_ROUND * abs(gain[1]):
-        grid = np.linspace(gain[0], gain[2], ROUND_POINTS)
-        found_there = between(found.varied, gain, branch[:, None], grid)[:, 0]
-        top = int(np.nanargmax(damping_ratios(found_there)))
-        if not 0 < top < ROUND_POINTS - 1:
-            break
-        gain, branch = grid[top - 1 : top + 2], found_there[top - 1 : top + 2]
-        best = float(gain[1]), float(damping_ratios(branch[1:2])[0])
+    if 0 < at < ratios.size - 1 and (branch.imag > 0).all():
+
+        def ratio(value: float) -> float:
+            return -float(damping_ratios(between(found.varied, gain, branch[:, None], np.array([value])))[0, 0])
+
+        ends, known = (float(gain[0]), float(gain[2])), float(LEAST_STEP * abs(gain[1]))
+        least = minimize_scalar(ratio, bounds=ends, method="bounded", options={"xatol": known})
+        best = float(least.x), -float(least.fun)
     return MostDamped(*best, bool((rows[0][at:].imag > 0).all()), found.varied.title)
 
 

@@ -25,7 +25,7 @@ from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.crossing import Crossing, crossed
 from tfarm.crossing.turning import loose
-from tfarm.errors import ConvergenceError, ParameterError, must_be_known
+from tfarm.errors import ConvergenceError, must_be_known, require
 from tfarm.records import record
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.response.signals import Controller, controller
@@ -161,15 +161,13 @@ def locus(
     Raises ParameterError for an invalid law, loop or range, ConvergenceError where branches cannot be distinguished.
     """
     (arm, plain), gains = arm_and_law(arm, law), as_law(law).gains
-    if not isinstance(vary, str):
-        raise ParameterError(key="vary", value=vary, remedy=f"the name of what varies, such as {PLANE[1]} or length")
+    require(isinstance(vary, str), "vary", vary, f"the name of what varies, such as {PLANE[1]} or length")
     known = (*OF_THE_LAW, *ARM_PARAMETERS)
     in_box = gains is None or vary not in known
     if gains is not None:
         must_be_known("vary", vary.partition(".")[0], (*known, "gain", "delay", *FED_BACK))
-        if vary == "all" and gains == HubFeedback():
-            remedy = f"every gain is 0: give {' or '.join(NAMES)} to be scaled"
-            raise ParameterError(key="vary", value="all", remedy=remedy)
+        remedy = f"every gain is 0: give {' or '.join(NAMES)} to be scaled"
+        require(vary != "all" or gains != HubFeedback(), "vary", "all", remedy)
     law = as_law(law) if in_box else plain
     points = (LAW_LOCUS_VALUES if in_box else LOCUS_VALUES) if points is None else points
     points = whole("points", points, 2, MOST_LOCUS_POINTS, f"a whole number from 2 to {MOST_LOCUS_POINTS}")
@@ -402,11 +400,12 @@ def _changes(branches: Complex) -> list[tuple[int, int, int]]:
     side = np.where(on_axis | np.isnan(branches), 0, np.sign(branches.real)).astype(int)
     found = []
     for number, (sides, poles) in enumerate(zip(side, branches, strict=True)):
-        across = [(a, b) for a, b in pairwise(np.flatnonzero(sides)) if sides[a] != sides[b]]
-        left = np.flatnonzero((sides[:-1] == 0) & (sides[1:] != 0))
-        away = [(n, n + 1) for n in left if poles[n].imag > 0 == poles[n + 1].imag]
-        listed = [(int(a), int(b)) for a, b in sorted({*across, *away}) if poles[a].imag >= 0 <= poles[b].imag]
-        found += [(number, a, b) for a, b in listed if not np.isnan(poles[a : b + 1]).any()]
+        pairs = {(a, b) for a, b in pairwise(np.flatnonzero(sides).tolist()) if sides[a] != sides[b]}
+        left = np.flatnonzero((sides[:-1] == 0) & (sides[1:] != 0) & (poles[:-1].imag > 0) & (poles[1:].imag == 0))
+        listed = sorted(pairs | {(n, n + 1) for n in left.tolist()})
+        found += [
+            (number, a, b) for a, b in listed if (poles[[a, b]].imag >= 0).all() and np.isfinite(poles[a:b]).all()
+        ]
     return found
 
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback, Law, as_law, cancelled, full_law, must_be_arm, must_not_be_algebraic
 from tfarm.arrays import Complex
-from tfarm.errors import ParameterError
+from tfarm.errors import require
 from tfarm.exact.characteristic import Analytic, Feedback, LoopParts, deflated, difference_steps, feedback
 from tfarm.exact.system import System
 from tfarm.records import record
@@ -73,12 +73,10 @@ class Loop:
         law = as_law(self.law)
         if law.input is not None and law.input != self.arm.input:
             object.__setattr__(self, "arm", replace(self.arm, input=law.input))  # type: ignore[arg-type]
-        if self.arm.is_locked:
-            remedy = "a locked hub (inertia = inf) has no loop: give the hub a finite inertia"
-            raise ParameterError(key="hub.inertia", value=self.arm.hub_inertia, remedy=remedy)
-        if law.is_discrete:
-            remedy = "a law in z has a sampled loop: ask for that, or leave the period out of a law in s"
-            raise ParameterError(key="period", value=law.period, remedy=remedy)
+        remedy = "a locked hub (inertia = inf) has no loop: give the hub a finite inertia"
+        require(not self.arm.is_locked, "hub.inertia", self.arm.hub_inertia, remedy)
+        remedy = "a law in z has a sampled loop: ask for that, or leave the period out of a law in s"
+        require(not law.is_discrete, "period", law.period, remedy)
         object.__setattr__(self, "law", full_law(law))
         given: Signals | None = self.signals
         if given is None or given.names != self.law.signals or given.arm != self.arm:
@@ -245,22 +243,21 @@ def _must_not_be_algebraic(loop: Loop) -> None:
     entries, whole = law.polynomials(far)
     with np.errstate(all="ignore"):
         size = abs((entries * numerators).sum(axis=0) / (drive * whole))  # L without its delay
-    if not (np.isfinite(size).all() and (size[1:] < FALL_FACTOR * size[:-1]).all()):
-        worst = next(p for p in law.parts if p.block.excess > 0)
-        remedy = "the degree of its numerator is too high for this signal, so the loop is algebraic; add a pole to den"
-        raise ParameterError(key=f"law.{worst.signals[0]}.num", value=worst.block.excess, remedy=remedy)
+    falls = np.isfinite(size).all() and (size[1:] < FALL_FACTOR * size[:-1]).all()
+    worst = next(p for p in law.parts if p.block.excess > 0)
+    remedy = "the degree of its numerator is too high for this signal, so the loop is algebraic; add a pole to den"
+    require(falls, f"law.{worst.signals[0]}.num", worst.block.excess, remedy)
 
 
 def _must_be_possible(arm: Arm, gains: HubFeedback) -> None:
     """Raise ParameterError for gains without a loop, and for gains beyond the range of doubles."""
-    if gains.K2 and arm.is_undamped and not (arm.hub_side_inertia or arm.reads_hub_moment):
-        remedy = "with hub.inertia = 0 and no damping K2 moves poles through infinity; use K2 = 0 or some inertia"
-        raise ParameterError(key="K2", value=gains.K2, remedy=remedy)
+    is_possible = not arm.is_undamped or arm.hub_side_inertia or arm.reads_hub_moment
+    remedy = "with hub.inertia = 0 and no damping K2 moves poles through infinity; use K2 = 0 or some inertia"
+    require(not gains.K2 or is_possible, "K2", gains.K2, remedy)
     least = LEAST_GAIN * max(1.0, arm.total_inertia if arm.has_rigid_mode else 1.0)
+    remedy = f"0, or at least {least:.1e} in size: the square of a slower pole is below the smallest double"
     for name, value in gains.by_name.items():
-        if 0 < abs(value) < least:
-            remedy = f"0, or at least {least:.1e} in size: the square of a slower pole is below the smallest double"
-            raise ParameterError(key=name, value=value, remedy=remedy)
+        require(not 0 < abs(value) < least, name, value, remedy)
     check_gains(arm, gains)
 
 

@@ -47,6 +47,7 @@ REST = 1e-3  # of the size of -1/L: largest imaginary part, and change from half
 BELOW_SLOWEST_POLE = 0.05  # of its size: so far down |L| may cross 1
 SLOW_POINTS = 400  # from there to the grid of the arm
 NEAR_POLES = np.geomspace(0.05, 20.0, 12)  # points about a pole, in its distances from the axis
+NEAR_POLES = np.r_[-NEAR_POLES, 0.0, NEAR_POLES]  # on both sides
 UNLIMITED = {"disk": 2.0, "peak_sensitivity": 1.0}  # sizes of a passive loop, at no frequency of its own; else inf
 SAME_SIZE = 1e-7  # of such a size: so much rounding leaves next to a narrow resonance
 NO_WINDOWS = "no stability intervals: with an undamped link all modes meet on the axis"
@@ -59,7 +60,9 @@ PHASE_LEAD = Quantity("phase margin for lead", "deg", key="phase_lead_deg", help
 DELAY_MARGIN = Quantity("delay margin", "s", help="smallest further loop delay that destabilises the loop")
 DISK_MARGIN = Quantity("disk margin", help="gain and phase together: factors (2 + d)/(2 - d), |d| < margin")
 PEAK_SENSITIVITY = Quantity("peak sensitivity Ms", key="peak_sensitivity", help="largest |1/(1 + L)|")
-IN_RANGE = Quantity("margins in the frequency range", help="of L(iw) up to the end of the verdict's frequency range")
+IN_RANGE = Quantity(
+    "margins in the frequency range", key="in_range", help="of L(iw) up to the end of the verdict's frequency range"
+)
 LYAPUNOV = Quantity("Lyapunov function of the paper", help="energy argument for constant gains at the hub")
 PASSIVITY = Quantity("passivity of the controller", help="sign of the controller from hub angle or rate to torque")
 INTERVALS = Quantity("stability intervals", help="of each gain or coefficient alone, the others constant")
@@ -74,6 +77,20 @@ EXACT_DELAY, EXACT_DISK, EXACT_PEAK, EXACT_COMPLEMENTARY = (  # of the infinite-
         PEAK_COMPLEMENTARY,
     )
 )  # fmt: skip
+
+
+class GainCrossover(NamedTuple):
+    """A frequency with |L| = 1."""
+
+    omega: Annotated[float, Quantity("frequency", "rad/s", 7, "gain crossover frequency, |L| = 1")]
+    phase_margin: Annotated[float, Quantity("phase margin", "deg", help="angle from -1 to L; above 0 for lag")]
+
+
+class PhaseCrossover(NamedTuple):
+    """A frequency with L < 0."""
+
+    omega: Annotated[float, Quantity("frequency", "rad/s", 7, "phase crossover frequency, L real and negative")]
+    factor: Annotated[float, Quantity("gain margin (factor)", help="-1/L: this factor on L puts a pole there")]
 
 
 @dataclass(frozen=True)
@@ -98,8 +115,8 @@ class LoopMargins:
     peak_sensitivity: float
     at: dict[str, float]
     peak_complementary: float
-    gain_crossovers: tuple[tuple[float, float], ...]
-    phase_crossovers: tuple[tuple[float, float], ...]
+    gain_crossovers: tuple[GainCrossover, ...]
+    phase_crossovers: tuple[PhaseCrossover, ...]
 
     def at_frequency(self, name: str) -> At:
         """The margin of that name, and its frequency; None where no frequency limits it."""
@@ -143,20 +160,6 @@ class LoopMargins:
         return self.at_frequency("peak_complementary")
 
 
-class GainCrossover(NamedTuple):
-    """A frequency with |L| = 1."""
-
-    omega: Annotated[float, Quantity("frequency", "rad/s", 7, "gain crossover frequency, |L| = 1")]
-    phase_margin: Annotated[float, Quantity("phase margin", "deg", help="angle from -1 to L; above 0 for lag")]
-
-
-class PhaseCrossover(NamedTuple):
-    """A frequency with L < 0."""
-
-    omega: Annotated[float, Quantity("frequency", "rad/s", 7, "phase crossover frequency, L real and negative")]
-    factor: Annotated[float, Quantity("gain margin (factor)", help="-1/L: this factor on L puts a pole there")]
-
-
 @dataclass(frozen=True)
 @record
 class Margins:
@@ -169,7 +172,7 @@ class Margins:
 
     stability: Annotated[Stability, Quantity(flat=True)]
     windows: dict[str, Windows]
-    in_band: LoopMargins | None
+    in_band: Annotated[LoopMargins | None, IN_RANGE]
     exact_delay: Annotated[float | None, EXACT_DELAY]
     exact_disk: Annotated[float | None, EXACT_DISK]
     exact_peak: Annotated[float | None, EXACT_PEAK]
@@ -184,11 +187,6 @@ class Margins:
     def gain_margin(self) -> Annotated[tuple[float, float] | None, GAIN_MARGIN]:
         """Factors on the whole law between which the loop is stable."""
         return None if self.in_band is None else self.in_band.gain
-
-    @property
-    def in_range(self) -> Annotated[LoopMargins | None, IN_RANGE]:
-        """The margins of L(i w) in the range of the verdict."""
-        return self.in_band
 
     @property
     def lyapunov(self) -> Annotated[Lyapunov | None, LYAPUNOV]:
@@ -222,14 +220,14 @@ class Margins:
         return words + (f"; poles not counted along {', '.join(uncounted)}" if uncounted else "") or None
 
     @property
-    def gain_crossovers(self) -> Annotated[list[GainCrossover], GAIN_CROSSOVERS]:
+    def gain_crossovers(self) -> Annotated[tuple[GainCrossover, ...], GAIN_CROSSOVERS]:
         """All in the frequency range, ascending; empty unless the loop is stable."""
-        return [] if self.in_band is None else [GainCrossover(*pair) for pair in self.in_band.gain_crossovers]
+        return () if self.in_band is None else self.in_band.gain_crossovers
 
     @property
-    def phase_crossovers(self) -> Annotated[list[PhaseCrossover], PHASE_CROSSOVERS]:
+    def phase_crossovers(self) -> Annotated[tuple[PhaseCrossover, ...], PHASE_CROSSOVERS]:
         """All in the frequency range, ascending; empty unless the loop is stable."""
-        return [] if self.in_band is None else [PhaseCrossover(*pair) for pair in self.in_band.phase_crossovers]
+        return () if self.in_band is None else self.in_band.phase_crossovers
 
 
 def margins(arm: Arm, law: AnyLaw, band: float | None = None) -> Margins:
@@ -249,46 +247,36 @@ def margins(arm: Arm, law: AnyLaw, band: float | None = None) -> Margins:
 def _exact(verdict: Stability, found: LoopMargins) -> tuple[float | None, float | None, float | None]:
     """Delay margin, disk margin and peak sensitivity of the whole infinite-dimensional loop; None: not determined."""
     loop = verdict.loop
-    arm, gains = loop.arm, loop.gains
-    if arm.is_undamped:
-        if gains is None or theorem_of(loop).energy is None:
-            return None, None, None
+    arm, gains, of_disk = loop.arm, loop.gains, (found.disk, found.peak_sensitivity)
+    if not arm.is_undamped and is_quiet(loop, verdict.band):
+        return found.delay, *of_disk
+    if gains is not None and arm.is_undamped and theorem_of(loop).energy is not None:
         if gains.K2:
             return 0.0, 0.0, math.inf
         # 1 + L = 1 + (Kp + i K1 w) theta, theta real: no dip deepens with w
-        return 0.0 if loop.feeds_back else found.delay, found.disk, found.peak_sensitivity
-    if is_quiet(loop, verdict.band):
-        return found.delay, found.disk, found.peak_sensitivity
-    if gains is not None and gains.K2 == gains.Kp == 0 and not arm.input_lags:  # L in the right half-plane
-        return None, found.disk, found.peak_sensitivity
+        return 0.0 if loop.feeds_back else found.delay, *of_disk
+    if gains is not None and not arm.is_undamped and gains.K2 == gains.Kp == 0 and not arm.input_lags:
+        return None, *of_disk  # L is in the right half-plane
     return None, None, None
 
 
 def loop_margins(verdict: Stability) -> LoopMargins:
     """The margins of a stable loop up to the verdict's band."""
-    loop, band = verdict.loop, verdict.band
-    omega = dense(verdict)
-
-    def disk(w: Real) -> Real:
-        drive, fed_back = loop.parts(1j * w)
-        return np.asarray(2 * abs(drive + fed_back) / np.maximum(abs(drive - fed_back), LEAST_SIZE))
-
+    loop, omega = verdict.loop, dense(verdict)
     crossed = unit_crossings(loop, omega)
     apart = _spread(lambda w: loop.loop_function(1j * w), crossed)  # of size 1: what its angle moves by [rad]
     minus = -loop.loop_function(1j * crossed)
     angle = held(np.degrees(np.angle(minus)), np.degrees(apart), CROSSOVER_DIGITS)  # 0 where L = -1
-    delay = held(
-        np.radians(np.mod(angle, 360)) / np.where(crossed == 0, 1, crossed), apart / np.where(crossed == 0, 1, crossed)
-    )
+    delay = held(np.radians(np.mod(angle, 360)) / crossed, apart / crossed)
     lag, lead = angle > 0, angle < 0
     least = {
         "phase": _least(angle, crossed),
         "phase_lag": _least(angle[lag], crossed[lag]),
         "phase_lead": _least(-angle[lead], crossed[lead]),
         "delay": _least(delay, crossed),
-        "disk": lowest(disk, omega),
-        "peak_sensitivity": highest(lambda w: inverse_peak(loop, w, of=0), omega),
-        "peak_complementary": highest(lambda w: inverse_peak(loop, w, of=1), omega),
+        "disk": lowest(_distance(loop, 0.5, -0.5), omega),
+        "peak_sensitivity": highest(_distance(loop, 1.0, 0.0), omega),
+        "peak_complementary": highest(_distance(loop, 0.0, 1.0), omega),
     }
     values = {name: float(f"{value:.{MARGIN_DIGITS}g}") for name, (value, _) in least.items()}
     values["peak_sensitivity"] = max(1.0, values["peak_sensitivity"])
@@ -296,8 +284,8 @@ def loop_margins(verdict: Stability) -> LoopMargins:
     by_phase = phase_crossovers(loop, omega)
     factors = gain_edges(loop, by_phase)
     gain = max((t for t in factors if 0 <= t < 1), default=0.0), min((t for t in factors if t > 1), default=math.inf)
-    by_gain = tuple(sorted(zip(crossed.tolist(), angle.tolist(), strict=True)))
-    return LoopMargins(band=band, gain=gain, **values, at=places, gain_crossovers=by_gain, phase_crossovers=by_phase)
+    by_gain = tuple(sorted(map(GainCrossover, crossed.tolist(), angle.tolist())))
+    return LoopMargins(verdict.band, gain, **values, at=places, gain_crossovers=by_gain, phase_crossovers=by_phase)
 
 
 def held(values: Real, spread: Real, most: int = MARGIN_DIGITS) -> Real:
@@ -319,13 +307,17 @@ def _spread(f: Callable[[Real], Real | Complex], omega: Real) -> Real:
     return np.asarray(abs(f(near.ravel()).reshape(near.shape) - f(omega)).max(axis=0))
 
 
-def inverse_peak(loop: Loop, omega: Real, of: int) -> Real:
-    """|1 + L| at i omega, or |1 + 1/L| for `of` 1: 1/|S| and 1/|T|, S = 1/(1 + L) and T = L/(1 + L)."""
-    parts = loop.parts(1j * omega)
-    return np.asarray(abs(parts[0] + parts[1]) / np.maximum(abs(parts[of]), LEAST_SIZE))
+def _distance(loop: Loop, of_1: float, of_L: float) -> Callable[[Real], Real]:
+    """|1 + L| over |of_1 + of_L L| at i omega: 1/|S|, 1/|T|, or a disk margin at one frequency."""
+
+    def at(omega: Real) -> Real:
+        drive, fed_back = loop.parts(1j * omega)
+        return np.asarray(abs(drive + fed_back) / np.maximum(abs(of_1 * drive + of_L * fed_back), LEAST_SIZE))
+
+    return at
 
 
-def phase_crossovers(loop: Loop, omega: Real) -> tuple[tuple[float, float], ...]:
+def phase_crossovers(loop: Loop, omega: Real) -> tuple[PhaseCrossover, ...]:
     """Frequencies [rad/s] with L real and below 0, and the factor -1/L; at rest too where L is finite there.
 
     Where L changes the side of the real axis at a pole or zero of its own, its denominator or numerator turns and not
@@ -333,25 +325,25 @@ def phase_crossovers(loop: Loop, omega: Real) -> tuple[tuple[float, float], ...]
     the place itself is not known.
     """
 
-    def h(w: Real) -> Real:
+    def turned(w: Real) -> Real:
         drive, fed_back = loop.parts(1j * w)
         return np.asarray((drive * fed_back.conj()).imag)
 
     factor, place, _ = crossed(omega, lambda w: loop.parts(1j * w))
     sides = place * (1 + np.multiply.outer([-1.0, 1.0], FARTHER)[..., None])  # (2, shares, n)
-    parts = np.array(loop.parts(1j * sides))
-    before, after = (parts[0] * parts[1].conj()).imag
-    decided = (before * after < 0) & (np.minimum(abs(before), abs(after)) > ABOVE_NOISE * _spread(h, place))
-    turned = ((parts[:, 0] * parts[:, 1].conj()).real < 0).any(axis=0)
+    own = np.array(loop.parts(1j * sides))
+    h = (own[0] * own[1].conj()).imag
+    decided = (h.prod(axis=0) < 0) & (abs(h).min(axis=0) > ABOVE_NOISE * _spread(turned, place))
+    opposite = ((own[:, 0] * own[:, 1].conj()).real < 0).any(axis=0)
     nearest = decided.argmax(axis=0)[None]
-    turns = np.take_along_axis(turned, nearest, 0)[0] | ~decided.any(axis=0)
+    turns = np.take_along_axis(opposite, nearest, 0)[0] | ~decided.any(axis=0)
     crosses = (factor > AT_POLE) & (factor < 1 / AT_POLE) & ~turns
     place, factor = place[crosses], factor[crosses]
     factor = held(factor, _spread(lambda w: _factor(loop, w), place), CROSSOVER_DIGITS)
-    found = list(zip(place.tolist(), factor.tolist(), strict=True))
+    found = list(map(PhaseCrossover, place.tolist(), factor.tolist()))
     low, lower = _factor(loop, omega[0] * np.array([1.0, 0.5]))
     if low.real > AT_POLE and max(abs(low.imag), abs(low - lower)) < REST * low.real:
-        found.append((0.0, float(low.real)))
+        found.append(PhaseCrossover(0.0, float(low.real)))
     return tuple(sorted(found))
 
 
@@ -362,19 +354,15 @@ def _factor(loop: Loop, omega: Real) -> Complex:
 
 
 def dense(verdict: Stability) -> Real:
-    """The grid of the arm, and points about every oscillating pole of the loop at its distance from the axis.
+    """The grid of the arm, and points about every pole of the loop and of its law at its distance from the axis.
 
     |1 + L| dips there, and not where the arm's own functions are steep; the less damping, the narrower the dip.
     """
-    poles = verdict.poles.values[verdict.poles.values.imag > 0]
-    away = np.concatenate([-NEAR_POLES[::-1], [0.0], NEAR_POLES])
-    own = verdict.loop.law.poles  # a law's own poles and zeros of |L| may be as narrow
-    poles = np.r_[poles, own[own.imag > 0]]
-    close = (poles.imag[:, None] + abs(poles.real[:, None]) * away).ravel()
-    omega = np.asarray(grid(verdict.loop.arm, verdict.band))
+    omega, poles = np.asarray(grid(verdict.loop.arm, verdict.band)), np.r_[verdict.poles.values, verdict.loop.law.poles]
+    close = poles.imag[:, None] + abs(poles.real[:, None]) * NEAR_POLES
     slowest = abs(verdict.poles.moving).min(initial=omega[0])
     slow = np.geomspace(BELOW_SLOWEST_POLE * slowest, omega[0], SLOW_POINTS) if slowest < omega[0] else omega[:0]
-    return np.unique(np.concatenate([omega, close[(close < omega[-1]) & (close > 0)], slow]))
+    return np.unique(np.r_[omega, close[(close > 0) & (close < omega[-1])], slow])
 
 
 def loop_curve(found: Margins) -> tuple[Real, NDArray[np.complex128]]:
@@ -391,7 +379,7 @@ def loop_curve(found: Margins) -> tuple[Real, NDArray[np.complex128]]:
     return omega[shown], L[shown]
 
 
-def gain_edges(loop: Loop, by_phase: tuple[tuple[float, float], ...]) -> list[float]:
+def gain_edges(loop: Loop, by_phase: tuple[PhaseCrossover, ...]) -> list[float]:
     """Factors on all of a law at which a pole reaches the axis, from where L < 0.
 
     Without damping all modes may reach it at one factor, where rounding alone decides whether L < 0.  There the factor

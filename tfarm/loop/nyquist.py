@@ -65,8 +65,7 @@ class Nyquist:
     def on_axis(self) -> Annotated[int, ON_AXIS]:
         """Number of poles of the box on the axis to working precision, apart from that at 0."""
         moving = self.verdict.poles.moving
-        near = abs(moving.real) <= AXIS_SHARE * abs(moving)
-        return count_with_mirrors(moving[near])
+        return count_with_mirrors(moving[abs(moving.real) <= AXIS_SHARE * abs(moving)])
 
     @property
     def clear(self) -> int:
@@ -130,28 +129,20 @@ def upper_contour(loop: Loop, poles: Real, band: float, closed: Complex) -> tupl
     `closed` are the closed-loop poles: each arc around a pole of L is smaller than its distance to the nearest of them.
     The radius is that where |L| is about 20, and at most a thousandth of the pole's frequency (at 0: of the first).
     """
-    omega = np.asarray(grid(loop.arm, band))
-    own = loop.law.poles[loop.law.poles.imag > 0]
+    own, omega = loop.law.poles[loop.law.poles.imag > 0], np.asarray(grid(loop.arm, band))
     near = (own.imag[:, None] + abs(own.real)[:, None] * AROUND_LAW_POLE).ravel()
-    omega = np.unique(np.r_[omega, near[(near > omega[0]) & (near < band)]])
-    s, is_arc = 1j * omega, np.zeros(omega.size, bool)
-    for pole in poles:
-        scale = float(pole) or band_of(loop.arm, 1)
-        step = RESIDUE_AT * scale
-        near = np.array([step + 0j if pole == 0 else 1j * (pole + step)])
-        of_residue = INDENT_RADIUS * float(abs(loop.loop_function(near)[0])) * step
-        away = abs(closed - 1j * pole)
-        nearest = float(away[away > AXIS_SHARE * pole].min(initial=math.inf))
-        radius = min(of_residue, WIDEST_INDENT * scale, NEARER * nearest)
-        if pole == 0:
-            slow = 1j * np.geomspace(radius, omega[0], SLOW_POINTS)[1:-1]
-            s, is_arc = np.r_[s, slow], np.r_[is_arc, np.zeros(slow.size, bool)]
-        clear = abs(s - 1j * pole) > radius
-        arc = 1j * pole + radius * np.exp(1j * (ARC[ARC >= 0] if pole == 0 else ARC))
-        approach = 1j * (pole + np.outer([-1.0, 1.0], radius * APPROACH).ravel())
-        approach = approach[(approach.imag > 0) & (approach.imag < band)]
-        s = np.r_[s[clear], arc, approach]
-        is_arc = np.r_[is_arc[clear], np.ones(arc.size, bool), np.zeros(approach.size, bool)]
+    scale, pole = np.where(poles == 0, band_of(loop.arm, 1), poles), poles[:, None]
+    step, away = RESIDUE_AT * scale, abs(closed - 1j * pole)
+    of_residue = INDENT_RADIUS * step * abs(loop.loop_function(np.where(poles == 0, step, 1j * (poles + step))))
+    nearest = np.where(away > AXIS_SHARE * pole, away, math.inf).min(axis=1, initial=math.inf)
+    radius = np.minimum(np.minimum(of_residue, WIDEST_INDENT * scale), NEARER * nearest)[:, None]
+    slow = np.geomspace(radius[0, 0], omega[0], SLOW_POINTS) if 0 in poles else omega[:0]
+    approach = (pole + radius * np.r_[-APPROACH, APPROACH]).ravel()
+    axis = np.unique(np.r_[omega, near[near > omega[0]], slow, approach])
+    axis = axis[(axis > 0) & (axis <= band) & (abs(axis - pole) > radius).all(axis=0)]
+    arcs = (1j * pole + radius * np.exp(1j * ARC)).ravel()
+    arcs = arcs[arcs.imag >= 0]
+    s, is_arc = np.r_[1j * axis, arcs], np.arange(axis.size + arcs.size) >= axis.size
     order = np.argsort(s.imag, kind="stable")
     return s[order], is_arc[order]
 

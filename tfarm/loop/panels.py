@@ -23,7 +23,7 @@ import numpy as np
 
 from tfarm.arm import AT_HUB, FED_BACK, Arm, must_turn
 from tfarm.arrays import Complex, Real
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError, require
 from tfarm.exact.characteristic import float_units, loop_parts
 from tfarm.exact.system import system_of
 from tfarm.records import record
@@ -68,8 +68,7 @@ def loop_panels(arm: Arm, band: float) -> Panels:
 
     Raises ParameterError for an arm that cannot turn freely, ConvergenceError where halving panels does not help.
     """
-    if not arm.has_rigid_mode:
-        raise ParameterError(key="arm", value=arm.name, remedy="samples of a loop are of an arm that turns freely")
+    require(arm.has_rigid_mode, "arm", arm.name, "samples of a loop are of an arm that turns freely")
     order = 1 if arm.rate_loss else 2
     places = np.asarray(steep_places(arm, band))[STEEP_A_PANEL - 1 :: STEEP_A_PANEL]
     edges = np.r_[0.0, places[places < band], band]

@@ -30,7 +30,7 @@ from tfarm.arm.feedback import ON
 from tfarm.arrays import Real
 from tfarm.crossing import Crossings, Window, ascending, counts_over, intervals
 from tfarm.crossing.shown import PlaneOfCounts
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError, ParameterError, require
 from tfarm.records import record
 from tfarm.response.signals import Controller, controller
 from tfarm.schema import Quantity
@@ -60,7 +60,6 @@ INFINITE = -1  # count of infinitely many unstable poles
 MOST_GRID_VALUES, MOST_LAW_VALUES = 2000, 400  # of a map, along one gain, and along one number of another law
 SHOWN_K1, SHOWN_K2 = (-1.0, 3.0), (-2.0, 2.0)  # of a map, by default: the stable region of the paper's arm, and around
 NOT_AFFINE = ("delay", ".den.")  # in the name of a number in which L is not affine: its size is not largest at corners
-LOG_BASE = math.log(10.0)
 LINEAR_SCALE = 0.5  # decades that the linear part of an axis takes on each side of 0, as matplotlib's `linscale` has it
 LINEAR_SHARE = LINEAR_SCALE / (1 - 1 / 10)  # factor on values there
 EVEN_GRID = 1e-9  # of its range: by less may the steps of an even grid differ
@@ -181,17 +180,15 @@ def gain_map(
     Raises ParameterError for an invalid law, loop or range, ConvergenceError where poles cannot be counted.
     """
     if law is None:
-        if vary is not None:
-            raise ParameterError(key="law", value=None, remedy="give the HubFeedback or Law whose numbers vary names")
+        require(vary is None, "law", None, "give the HubFeedback or Law whose numbers vary names")
         return plane(Loop(arm, as_law(HubFeedback(Kp=Kp))), PLANE, K1, K2)
     loop = Loop(arm, as_law(law))
-    if Kp:
-        raise ParameterError(key=ANGLE_GAIN, value=Kp, remedy="give Kp in the law, or no law")
-    if vary is None and loop.gains is not None:
-        vary = PLANE
-    if not isinstance(vary, tuple | list) or len(vary) != 2 or not all(isinstance(each, str) for each in vary):
-        raise ParameterError(key="vary", value=vary, remedy='two numbers of the law, such as ("gain", "delay")')
-    return plane(loop, (vary[0], vary[1]), K1, K2)
+    require(not Kp, ANGLE_GAIN, Kp, "give Kp in the law, or no law")
+    vary = PLANE if vary is None and loop.gains is not None else vary
+    match vary:
+        case (str() as across, str() as up):
+            return plane(loop, (across, up), K1, K2)
+    raise ParameterError(key="vary", value=vary, remedy='two numbers of the law, such as ("gain", "delay")')
 
 
 def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real) -> Plane:
@@ -200,8 +197,7 @@ def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real) -> Plane:
     Raises ParameterError for an unknown number, an invalid loop or range; ConvergenceError where poles cannot be
     counted.
     """
-    if vary[0] == vary[1]:
-        raise ParameterError(key="vary", value=list(vary), remedy="two different numbers of the law")
+    require(vary[0] != vary[1], "vary", list(vary), "two different numbers of the law")
     if vary == PLANE and loop.gains is not None:
         loop = loop.under(with_numbers(loop.law, dict.fromkeys(PLANE, 0.0)))
     most = MOST_LAW_VALUES if loop.gains is None else MOST_GRID_VALUES
@@ -246,13 +242,12 @@ def _known_counts(loop: Loop, K1: Real, K2: Real) -> NDArray[np.int64]:
     limits = float(K2[0]), float(K2[-1])
     static = static_edge(loop.having(RATE_GAIN, default_gains(loop.arm).K1), MOMENT_GAIN, limits)
     unstable = np.zeros((K2.size, K1.size), dtype=np.int64)
-    of_columns, of_rows = np.sign(K1 + loop.arm.rate_loss), np.sign(K2 - loop.arm.input_per_torque)
-    of_rows = of_rows if static is None else of_rows + 3 * (static.t < K2)
-    for across, up in itertools.product(np.unique(of_columns), np.unique(of_rows)):
-        columns, rows = np.flatnonzero(of_columns == across), np.flatnonzero(of_rows == up)
-        middle = float(K1[columns[columns.size // 2]]), float(K2[rows[rows.size // 2]])
-        found = verdict_on(_at(loop, PLANE, middle))
-        unstable[np.ix_(rows, columns)] = INFINITE if found.unstable_roots_infinite else found.unstable_roots
+    side = np.sign(K1 + loop.arm.rate_loss) + 3 * np.sign(K2 - loop.arm.input_per_torque)[:, None]
+    side += 0.0 if static is None else 9.0 * (static.t < K2)[:, None]
+    for each in np.unique(side):
+        row, column = (int(np.median(of)) for of in np.nonzero(side == each))
+        found = verdict_on(_at(loop, PLANE, (float(K1[column]), float(K2[row]))))
+        unstable[side == each] = INFINITE if found.unstable_roots_infinite else found.unstable_roots
     return unstable
 
 
@@ -264,8 +259,7 @@ def _counts_across(row: Loop, name: str, x: Real, band: float, *, one_by_one: bo
     start = float(x[-1] if name == RATE_GAIN else x[x.size // 2])
     if row.having(name, start).resting_zeros:
         start = float(x[_farthest(x, across.gain)])
-    begin = unstable_below(row.having(name, start), band)
-    return np.asarray(counts_over(x, [across], start, np.array([begin]))[0])
+    return unstable_below(row.having(name, start), band) + across.passed(x) - across.passed(start)
 
 
 def _farthest(values: Real, at: Real) -> int:
@@ -293,7 +287,7 @@ def boundary(loop: Loop, omega: Real) -> Real:
     if loop.arm.loses_at_hub_alone:
         return np.empty((0, 3))  # both equations are one
     apart = loop.under(with_numbers(loop.law, dict.fromkeys(PLANE, 0.0)))
-    (N, _), (a, b) = along(apart, PLANE).on(1j * omega)
+    (N, _), (a, b) = along(apart, PLANE)(np.arange(2)[:, None], 1j * omega[None])
     determinant = (a * b.conj()).imag
     with np.errstate(all="ignore"):  # where both equations are one, the point is far away
         K1 = -(N * b.conj()).imag / determinant
@@ -340,16 +334,15 @@ class Axis:
         y = between(low, high, number)
         if self.is_linear:
             return y
-        beyond = np.maximum(abs(y) - LINEAR_SHARE, 0.0)
-        return np.asarray(self.linear * np.where(beyond > 0, np.sign(y) * np.exp(beyond * LOG_BASE), y / LINEAR_SHARE))
+        size = abs(y) / LINEAR_SHARE, abs(y) - LINEAR_SHARE
+        return np.asarray(self.linear * np.sign(y) * np.minimum(size[0], 1.0) * 10.0 ** np.maximum(size[1], 0.0))
 
     def _stretched(self, x: Real) -> Real:
         """x where linear; else x over `linear` up to 1, then decades: matplotlib's "symlog"."""
         if self.is_linear:
             return x
         size = abs(x) / self.linear
-        decades = np.log(np.maximum(size, 1.0)) / LOG_BASE
-        return np.asarray(np.sign(x) * (LINEAR_SHARE * np.minimum(size, 1.0) + decades))
+        return np.asarray(np.sign(x) * (LINEAR_SHARE * np.minimum(size, 1.0) + np.log10(np.maximum(size, 1.0))))
 
     @classmethod
     def of(cls, values: Real) -> Axis:

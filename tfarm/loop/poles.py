@@ -19,7 +19,7 @@ from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
 from tfarm.arrays import LEAST_SIZE, Complex
 from tfarm.digits import DOUBLE_DIGITS
-from tfarm.errors import CertificationError, ConvergenceError, ParameterError
+from tfarm.errors import CertificationError, ConvergenceError, ParameterError, require
 from tfarm.records import record
 from tfarm.reduced.modal import closed, in_series, pade, sensed_model
 from tfarm.response.frequency import AXIS_SHARE
@@ -280,8 +280,8 @@ def first_poles(poles: Poles, count: int | None) -> Poles:
     values, real = poles.values, int((poles.values.imag == 0).sum())
     count = max(USUAL_POLES, real) if count is None else count
     kept = values[:count]
-    if count < values.size and values[count].imag == kept[-1].imag == 0:
-        raise ParameterError(key="count", value=count, remedy=f"more: {real} poles are real")
+    parts_real = count < values.size and values[count].imag == kept[-1].imag == 0
+    require(not parts_real, "count", count, f"more: {real} poles are real")
     top = poles.box.im_max if count == values.size else float((kept[-1].imag + values[count].imag) / 2)
     left, right, _, _ = poles.box
     return Poles(poles.loop, kept, Box(left, right, -top, top))

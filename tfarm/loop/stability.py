@@ -28,11 +28,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import AnyLaw, Arm, arm_and_law, as_law
+from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError, ParameterError, require
 from tfarm.records import record
-from tfarm.reduced.modal import sensed_model
+from tfarm.reduced.modal import modal_model, sensed_model
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes, modes_below
 
@@ -114,12 +115,8 @@ def verdict_on(loop: Loop, band: float | None = None) -> Stability:
     theorem = theorem_of(loop)
     height, quiet = (band, False) if band is not None else band_of_loop(loop, theorem)
     poles = poles_below(loop, height, LISTED_LEFT)
-    if theorem.energy is not None:
-        tail = theorem.reason
-    elif quiet:
-        tail = SMALL_GAIN
-    else:
-        tail = DELAYED if loop.arm.is_undamped and loop.law.delay and loop.feeds_back else ""
+    delayed = DELAYED if loop.arm.is_undamped and loop.law.delay and loop.feeds_back else ""
+    tail = theorem.reason if theorem.energy is not None else SMALL_GAIN if quiet else delayed
     is_infinite = theorem.energy == GIVES or tail == DELAYED
     verdict, words = _verdict(poles, theorem, is_infinite), tail or UNKNOWN_ABOVE.format(band=height)
     return Stability(loop, verdict, poles.unstable, is_infinite, poles.box.im_max, words, poles, bool(tail))
@@ -131,15 +128,15 @@ def _verdict(poles: Poles, theorem: Theorem, is_infinite: bool) -> str:
     Raises ConvergenceError where one of a damped loop may be on the axis, and none is right of it.
     """
     moving, arm = poles.moving, poles.loop.arm
-    if is_infinite or bool((moving.real > MARGIN_OF_ZERO * abs(moving)).any()):
+    share = moving.real / abs(moving)
+    if is_infinite or (share > MARGIN_OF_ZERO).any():
         return "unstable"
-    at_zero = poles.values.size - moving.size
-    if at_zero > 1 or (at_zero == 1 and not arm.has_rigid_mode):
+    if poles.values.size - moving.size > arm.has_rigid_mode:
         return "marginal"
+    on_axis = moving[share > -MARGIN_OF_ZERO]
     if arm.loses_at_hub_alone:
-        known = theorem.energy == TAKES or not (moving.real > -MARGIN_OF_ZERO * abs(moving)).any()
+        known = theorem.energy == TAKES or not on_axis.size
         return "stable" if known and is_controllable(arm.lossless_hub, poles.box.im_max) else "marginal"
-    on_axis = moving[moving.real > -MARGIN_OF_ZERO * abs(moving)]
     if on_axis.size:
         text = f"the pole at {on_axis[0]:.6g} 1/s is on the imaginary axis to working precision: not determined"
         raise ConvergenceError(text, complex(on_axis[0]), float(on_axis[0].real))
@@ -268,17 +265,13 @@ class Spill:
         lowest = float(self.driven[0].imag)
         table = modes(self.verdict.loop.arm, up_to=2.0 * max(lowest, 1.0) + self.verdict.band)
         flexible = table.natural_frequency[table.index > 0]
-        if lowest < flexible[0] / 2:
-            return 0
-        return int(np.argmin(abs(flexible - lowest))) + 1
+        return 0 if lowest < flexible[0] / 2 else int(np.argmin(abs(flexible - lowest))) + 1
 
     @property
     def shown_from(self) -> Annotated[int | None, SHOWN_FROM]:
         """Number of modes from which on the models are unstable too."""
-        content = np.flatnonzero(self.unstable == 0)
-        if content.size == 0:
-            return int(self.modes[0])
-        return None if content[-1] == self.modes.size - 1 else int(self.modes[content[-1] + 1])
+        beyond = self.modes[self.modes > self.content.max(initial=0)]
+        return int(beyond[0]) if beyond.size else None
 
     @property
     def models(self) -> Annotated[list[SpillModel], Quantity("design models", help="bare modes, without remainder")]:
@@ -321,16 +314,30 @@ def spill(arm: Arm, law: AnyLaw, most: int = USUAL_SPILL_MODES) -> Spill:
     """
     (arm, _), law = arm_and_law(arm, law), as_law(law)
     most = whole("modes", most, 1, MOST_SPILL_MODES, f"a whole number of modes, 1 to {MOST_SPILL_MODES}")
-    if law.is_improper:
-        remedy = "differentiates, and has no states; add a fast pole to den"
-        raise ParameterError(key="law", value=law.name, remedy=remedy)
+    require(not law.is_improper, "law", law.name, "differentiates, and has no states; add a fast pole to den")
     verdict = stability(arm, law)
     loop, numbers, unstable, rightmost = verdict.loop, np.arange(1, most + 1), [], []
     slowest = REST_SHARE * float(modes(loop.arm, 1).natural_frequency[-1])
-    for number in numbers.tolist():
-        A, B, C, D = sensed_model(loop.arm, loop.law.signals, number)
-        poles = poles_of_model(loop, (A, B, C, 0 * D))
+    for model in _bare_models(loop, most):
+        poles = poles_of_model(loop, model)
         moving = poles[abs(poles) > slowest]
         unstable.append(int((moving.real > UNDAMPED_SHARE * abs(moving)).sum()))
         rightmost.append(moving[np.argmax(moving.real)])
     return Spill(verdict, numbers, np.array(unstable), np.array(rightmost))
+
+
+def _bare_models(loop: Loop, most: int) -> list[Matrices]:
+    """Models of 1 to `most` flexible modes without static remainder, each with the poles of its modes alone.
+
+    They are cut from the largest.  A search of more modes of a strongly damped arm may leave poles without a mode,
+    which no smaller model has: then each has a search of its own.
+    """
+    arm, signals, numbers = loop.arm, loop.law.signals, range(1, most + 1)
+    first, last = (modal_model(arm, "hub_angle", number) for number in (1, most))
+    if last.index.tolist() == [*numbers] and last.single.size == first.single.size:
+        A, B, C, D = sensed_model(arm, signals, most)
+        states, beyond = np.arange(len(A)), [last.rigid_states + 2 * number for number in numbers]
+        kept = [(states < end) | (states >= beyond[-1]) for end in beyond]
+        return [(A[np.ix_(each, each)], B[each], C[:, each], 0 * D) for each in kept]
+    models = [sensed_model(arm, signals, number) for number in numbers]
+    return [(A, B, C, 0 * D) for A, B, C, D in models]

@@ -9,14 +9,15 @@ own at each value.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from tfarm.arm import LISTED, NAMES, RATE_GAIN, AnyLaw, Arm, Law, arm_and_law, full_law, unit_of
 from tfarm.arrays import Complex, Real, Whole
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError, require
 from tfarm.exact.characteristic import Analytic, LoopParts
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
@@ -64,17 +65,14 @@ class Varied:
     blur = 0.0
 
     def __post_init__(self) -> None:
-        if self.start == self.stop:
-            raise ParameterError(key="to", value=self.stop, remedy="the range is empty: a locus runs to another value")
+        require(self.start != self.stop, "to", self.stop, "the range is empty: a locus runs to another value")
         for key, value in (("from", self.start), ("to", self.stop)):
-            if not math.isfinite(value):
-                raise ParameterError(key=key, value=value, remedy="a finite number")
+            require(math.isfinite(value), key, value, "a finite number")
             loop = self.at(value)
             arm, K1 = loop.arm, loop.gains[RATE_GAIN] if loop.gains else 0.0
-            if arm.rate_loss and arm.lossless_hub.has_massless_hub and -arm.rate_loss >= K1:
-                remedy = f"with hub.inertia = 0 a pole passes through infinity at {RATE_GAIN} = {-arm.rate_loss:.6g}"
-                remedy = f"{remedy}: stay above it, or give the hub an inertia"
-                raise ParameterError(key=key, value=value, remedy=remedy)
+            passes = arm.rate_loss and arm.lossless_hub.has_massless_hub and -arm.rate_loss >= K1
+            remedy = f"with hub.inertia = 0 a pole passes through infinity at {RATE_GAIN} = {-arm.rate_loss:.6g}"
+            require(not passes, key, value, f"{remedy}: stay above it, or give the hub an inertia")
 
     # ------------------------------------------------------------ loops and functions
 
@@ -113,18 +111,17 @@ class Varied:
 
     def at(self, value: float) -> Loop:
         """The loop where the number has that value."""
-        if not self.is_of_arm:
-            return self.first.under(self.law_at(value))
-        if value not in self._arms:
-            if len(self._arms) > ARMS_KEPT:
-                self._arms.clear()
-            arm, _ = arm_and_law(self.arm.having(**{self.vary: value}), self.law)
-            self._arms[value] = Loop(arm, self.full)
-        return self._arms[value]
+        return self._of_arm(value) if self.is_of_arm else self.first.under(self.law_at(value))
 
     @cached_property
-    def _arms(self) -> dict[float, Loop]:
-        return {}
+    def _of_arm(self) -> Callable[[float], Loop]:
+        """The same of a number of the arm: of the last values it is kept."""
+
+        @lru_cache(ARMS_KEPT)
+        def of_arm(value: float) -> Loop:
+            return Loop(arm_and_law(self.arm.having(**{self.vary: value}), self.law)[0], self.full)
+
+        return of_arm
 
     @cached_property
     def first(self) -> Loop:

@@ -7,7 +7,6 @@ of the hub.  A real pole passes through 0 where stiffness or inertia vanishes.  
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, HubFeedback, shown_unit
-from tfarm.crossing import Crossing, Crossings, Window, counts_over, intervals, joined
+from tfarm.crossing import Crossing, Crossings, Window, intervals, joined
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.schema import Quantity
@@ -111,21 +110,20 @@ def windows_of(verdict: Stability, names: Iterable[str] | None = None) -> dict[s
     lines, band = _lines(verdict, solved)
     done: dict[str, Windows] = {}
     for name, limits in ranges.items():
-        value, unit = numbers[name], "" if loop.gains is None else shown_unit(name, loop.arm)
-        try:
-            found = lines[name]() if name in lines else theorem_edges(loop, name, limits)
-            stable = (
-                _stable(verdict, name, limits, found, band)
-                if name in lines
-                else theorem_windows(loop, name, limits, found)
-            )
-        except ConvergenceError:
-            continue  # poles cannot be counted: `Margins.intervals_note` names the number
+        value, unit, reach = numbers[name], "" if loop.gains is None else shown_unit(name, loop.arm), math.inf
+        if name in lines:
+            try:
+                found, reach = lines[name](), band
+                stable = _stable(verdict, name, limits, found, band)
+            except ConvergenceError:
+                continue  # poles cannot be counted: `Margins.intervals_note` names the number
+        else:
+            found = theorem_edges(loop, name, limits)
+            stable = theorem_windows(loop, name, limits, found)
         stable = [_with_proven_ends(loop, name, pair, limits) for pair in stable]
         # Kp = 0 is an end of its own interval: that is the pole at 0 which the verdict leaves out
         inside = (pair for pair in stable if pair[0] < value < pair[1] or (name == "Kp" and pair[0] == value == 0))
         around = next(inside, None) if verdict.is_stable else None
-        reach = band if name in lines else math.inf
         done[name] = Windows(name, value, unit, around, tuple(stable), limits, found.within(*limits), reach)
     return done
 
@@ -164,12 +162,6 @@ def _lines(verdict: Stability, ranges: dict[str, Window]) -> tuple[dict[str, Cal
     return dict(zip(ranges, found, strict=True)), band
 
 
-def spans(found: Crossings, limits: Window) -> list[Window]:
-    """The intervals from each crossing between the limits to the next."""
-    edges = np.unique([limits[0], *found.within(*limits).gain.tolist(), limits[1]])
-    return list(itertools.pairwise(edges.tolist()))
-
-
 def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, band: float) -> list[Window]:
     """The stability intervals, from the verdict's count.
 
@@ -179,7 +171,7 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
     loop, value = verdict.loop, verdict.loop.numbers[name]
     if loop.gains is not None and loop.arm.loses_at_hub_alone:
         found = _without_rounding(loop, loop.gains, name, found)
-    pairs, count, at = spans(found, limits), verdict.unstable_roots, value
+    pairs, count, at = found.spans(*limits), verdict.unstable_roots, value
     resting = [each.change for each in found if each.t == value and each.at == 0]
     is_known = verdict.verdict != "marginal"
     if is_known and resting in ([1], [-1]):  # the verdict leaves that pole out
@@ -194,7 +186,7 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
         def unstable_at(number: float) -> int:
             return unstable_below(loop.having(name, number), band)
 
-        (carried,) = counts_over(np.array(limits), [found], at, np.array([count]))
+        carried = count + found.passed(np.array(limits)) - found.passed(at)
         if carried.tolist() != [unstable_at(end) for end in limits]:
             stable = joined([pair for pair in pairs if unstable_at(sum(pair) / 2) == 0])
     if name == RATE_GAIN and loop.gains is not None and not loop.arm.hub_side_inertia:
@@ -236,7 +228,7 @@ def theorem_edges(loop: Loop, name: str, limits: Window) -> Crossings:
 
 def theorem_windows(loop: Loop, name: str, limits: Window, edges: Crossings) -> list[Window]:
     """The stability intervals of such a gain: there every mode is damped, and the static stiffness is positive."""
-    return joined([pair for pair in spans(edges, limits) if is_held(loop.having(name, sum(pair) / 2))])
+    return joined([pair for pair in edges.spans(*limits) if is_held(loop.having(name, sum(pair) / 2))])
 
 
 def is_held(loop: Loop) -> bool:

@@ -1,35 +1,27 @@
-"""CPU seconds of margins and of the sampled verdict under random laws:  python -m tests.loop.law_times SIZE SEED
+"""Random rigs of every kind (`tests.rigs`) and plausible arms (`tests.plausible.arms`), in turn, under random laws.
 
-Random rigs of every kind (`tests.rigs`) and plausible arms (`tests.plausible.arms`), in turn; laws of order 1 to 12 on
-one to three signals, with zeros and poles as in `tests.dsp.law_orders`, some with a delay; periods of 0.1 to 20 ms.
-Both commands' work is timed, to the JSON, in process, on empty caches of the package.
+Laws are of order 1 to 12 on one to three signals, with zeros and poles as in `tests.dsp.law_orders`, some with a delay;
+periods are of 0.1 to 20 ms.
 """
 
-import time
 from dataclasses import replace
 
 import numpy as np
 
-from tests import caches, survey
 from tests.dsp.law_orders import some_roots
 from tests.plausible.arms import draw, log
 from tests.rigs import some_rig
-from tests.survey import Finding
 from tfarm.arm import Law
 from tfarm.dsp import Chain, Sampling
-from tfarm.dsp.verdict import sampled
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.loop.margins import margins
 from tfarm.reduced.modal import closed, sensed_model
 from tfarm.response.signals import Signals
-from tfarm.schema import to_dict, to_json
 from tfarm.spectrum.table import first_frequency
 
 SIGNALS = ("hub_angle", "hub_rate", "hub_angle", "hub_rate", "root_moment", "tip_displacement", "tip_acceleration",
            "moment@")  # fmt: skip
 MODES_OF_MODEL = 8  # of the model by which some laws are made weaker until they work
 WEAKER = (1.0, 0.1, 0.01, 1e-3)  # times a law
-MEDIAN, MOST = 1.0, 5.0  # CPU s: what a median and a maximum may be
 
 
 def some_case(seed, number):
@@ -95,50 +87,3 @@ def is_stable(plant, law):
     """Whether the loop of a modal model is, but for a pole or two at s = 0."""
     s = np.linalg.eigvals(closed(plant, law.matrices()))
     return (s.real < 1e-9 * abs(s).max()).all()
-
-
-def of_margins(arm, law, chain):
-    """The work of `tfarm margins --law`."""
-    return to_dict(margins(arm, law))
-
-
-def of_sampled(arm, law, chain):
-    """The work of `tfarm sampled --law`."""
-    return to_dict(sampled(arm, law, chain))
-
-
-WORK = {"margins": of_margins, "sampled": of_sampled}
-
-
-def timed(work, case):
-    """A word, the answer as JSON or the reason that there is none, and CPU seconds."""
-    caches.empty()
-    start = time.process_time()
-    try:
-        word, text = "answered", to_json(work(*case))
-    except (ConvergenceError, ParameterError) as error:
-        word, text = "refused", str(error).splitlines()[0]
-    return word, text, time.process_time() - start
-
-
-def commands(size, seed):
-    """The work of each command under each law; wrong is what takes too long, once or in the median."""
-    spent = {name: [] for name in WORK}
-    for work in WORK.values():
-        timed(work, some_case(0, 0))  # kernels are compiled or read
-    for number in range(size):
-        case = some_case(seed, number)
-        for name, work in WORK.items():
-            word, text, seconds = timed(work, case)
-            spent[name].append(seconds)
-            is_late = seconds > MOST
-            words = f"{number} {seconds:.2f} s {text if word == 'refused' else word}"
-            figures = {f"{name} [CPU s]": seconds}
-            yield Finding(f"{name} {word}", words if is_late or word == "refused" else "", is_late, figures)
-    for name, each in spent.items():
-        if np.median(each) > MEDIAN:
-            yield Finding(f"{name} is slow", f"{np.median(each):.2f} CPU s in the median", is_wrong=True)
-
-
-if __name__ == "__main__":
-    survey.main(commands, size=200)
