@@ -34,9 +34,10 @@ from .system import (
 )
 
 SEGMENT, OFFSET, SPRING, BODY, MARK = range(5)
+KINDS: Mapping[type, int] = {Segment: SEGMENT, Offset: OFFSET, Spring: SPRING, Body: BODY, Mark: MARK}
 REACH = 0  # of an offset's row of the kernel: its length
-STIFFNESS, COMPLIANCE, LOSS = range(3)  # of a spring's row, the last the stiffness times the damping
-MASS, INERTIA, GROUND, TURNING_GROUND = range(4)  # of a body's row, in the order of `Body`
+STIFFNESS, COMPLIANCE, LOSS = range(3)  # of a spring's, in the order of `Spring`
+MASS, INERTIA, GROUND, TURNING_GROUND = range(4)  # of a body's, in the order of `Body`
 AT_JOINT = 2.0**-50  # of the length: rounding of a place at a joint, a quotient of float64 numbers
 ROW_KIND, ROW_WIDTH = 8, 15  # the kind in a row of the kernel, after the numbers of a segment (`waves`), and its width
 LENGTH, BENDING, CHAIN_A, CHAIN_B, CHAIN_G, CHAIN_SIGMA = range(9, 15)  # of a segment, in the chain's units
@@ -140,17 +141,14 @@ class Layout:
 def kernel_row(element: Element) -> Real:
     """Return an element as a row of the kernel."""
     row = np.zeros(ROW_WIDTH)
-    row[ROW_KIND] = {Segment: SEGMENT, Offset: OFFSET, Spring: SPRING, Body: BODY, Mark: MARK}[type(element)]
-    match element:
-        case Segment():
-            row[:6:2] = element[:3]
-            row[1:6:2] = [value - Fraction(float(value)) for value in element[:3]]
-            row[6:ROW_KIND] = element.sigma, element.damping
-            row[LENGTH:] = element.length, element.stiffness, *element.of_chain
-        case Spring():
-            row[:3] = *element[:2], element.stiffness * Fraction(element.damping)
-        case Offset() | Body():
-            row[: len(element)] = element
+    row[ROW_KIND] = KINDS[type(element)]
+    if isinstance(element, Segment):
+        row[:6:2] = element[:3]
+        row[1:6:2] = [value - Fraction(float(value)) for value in element[:3]]
+        row[6:ROW_KIND] = element.sigma, element.damping
+        row[LENGTH:] = element.length, element.stiffness, *element.of_chain
+    elif not isinstance(element, Mark):
+        row[: len(element)] = element
     return row
 
 

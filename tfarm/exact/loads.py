@@ -95,7 +95,7 @@ class _Loaded(Sweep):
         """Return the condition beyond an element, beyond a spring not times its stiffness."""
         f = super()._beyond(element, f)
         if isinstance(element, Spring):
-            stiffness, _ = self._parameters(element)
+            stiffness = self.s * element.damping + element.stiffness
             return f[0] / stiffness, f[1] / stiffness, f[2] / stiffness, f[3] / stiffness
         return f
 
