@@ -38,6 +38,7 @@ from .waves import (
     Plane,
     Row,
     Wave,
+    across_rows,
     across_waves,
     end_plane,
     magnitude,
@@ -67,13 +68,6 @@ def from_waves(one: Wave, two: Wave, gS: Number, d: Number, tip: Row) -> Row:
 
 
 @inlined
-def _of_tip(row: Row, tip: Row) -> tuple[Number, Number]:
-    """Return a row of the transition matrix times two states of the tip's conditions, one with W and Q alone."""
-    mass, shear, inertia, moment = tip
-    return shear * row[0] - mass * row[3], moment * row[1] - inertia * row[2]
-
-
-@inlined
 def from_transition(s: complex, row: Any, tip: Row) -> Plane:
     """Return (theta, M0, Q0, W1, W1 - theta) of the free response, up to one factor, without wave numbers.
 
@@ -81,12 +75,11 @@ def from_transition(s: complex, row: Any, tip: Row) -> Plane:
     """
     S, over_d, z_sum, z_product = wave_sums(s, row)
     F0, F1, F2, F3, F2_less_1, _ = transition_series(z_sum, z_product)
-    of_W, of_Psi, of_M, of_Q = transition_rows((F0, F1, F2, F3), S, over_d, row[CHAIN_A:])
-    (W1, W2), (Psi1, Psi2) = _of_tip(of_W, tip), _of_tip(of_Psi, tip)
-    (M1, M2), (Q1, Q2) = _of_tip(of_M, tip), _of_tip(of_Q, tip)
-    theta, M, Q = W1 * Psi2 - W2 * Psi1, W1 * M2 - W2 * M1, W1 * Q2 - W2 * Q1  # of that sum with W = 0 at the root
-    at_tip = -tip[1] * W2  # not theta F2 + rest: that cancels for a heavy payload
-    return theta, M, Q, at_tip, theta * F2_less_1 + of_W[2] * M - of_W[3] * Q
+    rows = transition_rows((F0, F1, F2, F3), S, over_d, row[CHAIN_A:])
+    theta, M, Q, _, _ = across_rows(*rows, end_plane(*tip))
+    (_, of_Psi, of_M, of_Q), (_, shear, inertia, moment) = rows[0], tip
+    at_tip = shear * (inertia * of_M - moment * of_Psi)  # not theta F2 + rest: that cancels for a heavy payload
+    return theta, M, Q, at_tip, theta * F2_less_1 + of_M * M - of_Q * Q
 
 
 @compiled
