@@ -18,9 +18,8 @@ import flint
 
 from . import sweep, waves
 from .compiled import python_of
-from .layout import KINDS, Layout, Reading, constant_of, readings
-from .outputs import Output
-from .system import Mark, Place, Segment, System
+from .layout import KINDS, Layout, Reading
+from .system import Mark, Place, Segment
 from .waves import Plane, Row
 
 _end_plane, _met, _across_rows, _row_across = map(
@@ -212,16 +211,3 @@ class Sweep:
     def _functions(self, z_sum: Any, z_product: Any) -> tuple[Any, ...]:
         """Return F0..F3 at the segment's end."""
         return transition(z_sum, z_product)
-
-
-def output_ball(system: System, wanted: Output, s: Ball, x: float = 0.0) -> Ball | None:
-    """Return an output for a unit input at s, in SI units; x is a share of the length.
-
-    None where the input of the free response may be zero, as at a pole.
-    """
-    layout, constant = readings(system, (wanted,), x), constant_of(system, wanted, x)
-    (one,) = layout.each
-    if constant is not None:
-        return s**one.power * constant * rational(one.unit) / (1 + rational(one.C) * s)
-    sweep = Sweep(layout, s)
-    return None if sweep.input.contains(0) else sweep.output(one) / sweep.input

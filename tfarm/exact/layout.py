@@ -207,28 +207,3 @@ def laid_out(chain: System, wanted: Sequence[Output], shares: Sequence[float]) -
     each = tuple(reading_of(chain, one, x) for one, x in zip(wanted, shares, strict=True))
     places = tuple(dict.fromkeys(one.place for one in each if one.place is not None))
     return Layout(chain, places, each)
-
-
-def constant_of(k: System, wanted: Output, x: float) -> int | None:
-    """Return the quantity for unit input, dimensionless, where an end condition fixes it: 0, 1 or -1; else None.
-
-    W, Phi and Y are 0 at the root, W at a pinned tip, M and Q at a free tip.  The hub angle is the input of a locked
-    hub, M(0) = -u of a hub without inertia.
-    """
-    at, locked = wanted.share(x), k.is_locked
-    if wanted.quantity == "theta":
-        return 1 if locked else None
-    if wanted.quantity == "current":
-        return 1 if k.drive.per_ampere and not (k.drive.back_emf or k.drive.lag) else None
-    if not k.is_uniform:
-        return None
-    pinned, clamped = (not isinstance(end, Fraction) for end in (k.tip_mass, k.tip_inertia))
-    if at == 0 and (wanted.quantity != "M" or not wanted.gauge or k.gauge.share == 0):
-        free_pin = not any(k.drive.of_angle) and not k.drive.lag
-        return {"M": -1 if free_pin else None, "Q": None, "Psi": 1 if locked else None}.get(wanted.quantity, 0)
-    if at != 1:
-        return None
-    is_zero = {"M": k.tip_inertia == 0, "Q": k.tip_mass == 0, "W": pinned, "centre": pinned, "Psi": clamped}
-    if is_zero.get(wanted.quantity, False):
-        return 0
-    return -1 if locked and {"Y": pinned, "Phi": clamped}.get(wanted.quantity, False) else None
