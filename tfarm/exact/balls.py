@@ -101,11 +101,17 @@ def summed(z_sum: Any, z_product: Any, count: int) -> list[Any]:
 
 
 class Sweep:
-    """The plane of a layout at the axis and at its marks, at one s (a ball or a series of balls)."""
+    """The plane of a layout at the axis and at its marks, at one s (a ball or a series of balls).
+
+    `exact` converts an exact number to the arithmetic of s.
+    """
+
+    exact: Callable[[Any], Any] = staticmethod(rational)
 
     def __init__(self, layout: Layout, s: Any, S: Any = None) -> None:
         self.layout, self.s, self.S = layout, s, s * s if S is None else S
-        self.elements, tip_mass, tip_inertia, self.A, self.B = self.numbers_of(layout)
+        key = self.exact, flint.ctx.prec
+        self.elements, tip_mass, tip_inertia, self.A, self.B = layout.numbers(key, self.exact)
         self._rows: dict[int, tuple[Row, ...]] = {}
         self.planes: dict[Place, Plane] = {}
         p = _end_plane(*self._end(tip_mass), *self._end(tip_inertia))
@@ -115,14 +121,6 @@ class Sweep:
             else:
                 p = self._inside(each, p)
         self.theta, self.M, self.Q = p[:3]
-
-    def numbers_of(self, layout: Layout) -> list[Any]:
-        """Return the layout's numbers in the arithmetic of s."""
-        return layout.numbers(flint.ctx.prec, rational)
-
-    def exact(self, number: Any) -> Any:
-        """Return an exact number in the arithmetic of s."""
-        return rational(number)
 
     @cached_property
     def input(self) -> Any:
