@@ -1,7 +1,7 @@
 import math
 import os
-import re
 import time
+import tomllib
 from contextlib import suppress
 from pathlib import Path
 
@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tfarm.arm import Arm, Hub, Link, Payload, Section, load, presets
-from tfarm.arm.law_tables import load_law
 from tfarm.arm.reading import MOST_ARM_BYTES
+from tfarm.arm.schema import arm_of_table
 from tfarm.errors import ParameterError
 
 # The example of the documentation, letter by letter
@@ -35,7 +35,6 @@ inertia = 0.1              # kg m^2; inf = locked, 0 = free pin
 mass = 0.0                 # kg; inf = tip pinned
 inertia = 0.0              # kg m^2; inf = tip cannot rotate
 """
-GENERAL = EXAMPLE[EXAMPLE.index('shape = "general"') : EXAMPLE.index("[hub]")]
 
 
 @pytest.fixture
@@ -58,16 +57,9 @@ def refused(tmp_path):
     return refuse
 
 
-@pytest.fixture
-def accepted(tmp_path):
-    """Loads a file with this content."""
-
-    def accept(content):
-        path = tmp_path / "arm.toml"
-        path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
-        return load(str(path))
-
-    return accept
+def accepted(content):
+    """The arm of a file with this content."""
+    return arm_of_table(tomllib.loads(content))
 
 
 def edited(old, new):
@@ -75,7 +67,7 @@ def edited(old, new):
     return EXAMPLE.replace(old, new)
 
 
-def test_the_documented_file(accepted):
+def test_the_documented_file():
     arm = accepted(EXAMPLE)
     section = Section.general(area=6e-4, second_moment=1.8e-9, shear_factor=0.8333333333333334)
     assert arm == Arm(
@@ -89,7 +81,7 @@ def test_the_documented_file(accepted):
     )
 
 
-def test_what_is_optional(accepted):
+def test_what_is_optional():
     short = EXAMPLE[: EXAMPLE.index("[payload]")].replace("damping = 0.0 ", "# ")
     short = short.replace(short[short.index("assumptions") : short.index("[link]")], "")
     assert accepted(short).payload == Payload()
@@ -97,35 +89,17 @@ def test_what_is_optional(accepted):
     assert accepted(short + "[payload]\nmass = 2\n").payload == Payload(mass=2.0)
 
 
-def test_poissons_ratio_instead_of_the_shear_modulus(accepted):
+def test_poissons_ratio_instead_of_the_shear_modulus():
     link = accepted(edited("shear_modulus = 2.6517e10", "poissons_ratio = 0.25")).link
     assert link.shear_modulus == 6.8944e10 / 2.5
 
 
-@pytest.mark.parametrize(
-    ("table", "section"),
-    [
-        ('shape = "rectangle"\nwidth = 0.1\ndepth = 0.006\n', Section.rectangle(width=0.1, depth=0.006)),
-        (
-            'shape = "rectangle"\nwidth = 0.1\ndepth = 0.006\nshear_factor = 0.8\n',
-            Section.rectangle(width=0.1, depth=0.006, shear_factor=0.8),
-        ),
-        ('shape = "round"\ndiameter = 0.02\n', Section.round(diameter=0.02)),
-        (
-            'shape = "tube"\nouter_diameter = 0.02\ninner_diameter = 0.01\n',
-            Section.tube(outer_diameter=0.02, inner_diameter=0.01),
-        ),
-    ],
-)
-def test_the_named_shapes(accepted, table, section):
-    assert accepted(edited(GENERAL, table)).link.section == section
-
-
-def test_whole_numbers_infinities_and_foreign_line_ends(accepted):
+def test_whole_numbers_infinities_and_foreign_line_ends(tmp_path):
     assert accepted(edited("length = 1.0 ", "length = 1 ")).link.length == 1.0
     assert accepted(edited("inertia = 0.1", "inertia = inf")).is_locked
     assert accepted(edited("mass = 0.0", "mass = inf")).payload.mass == math.inf
-    assert accepted(b"\xef\xbb\xbf" + EXAMPLE.replace("\n", "\r\n").encode()) == accepted(EXAMPLE)
+    (tmp_path / "arm.toml").write_bytes(b"\xef\xbb\xbf" + EXAMPLE.replace("\n", "\r\n").encode())
+    assert load(str(tmp_path / "arm.toml")) == accepted(EXAMPLE)
 
 
 BAD_EDITS = {
@@ -137,10 +111,7 @@ BAD_EDITS = {
     "no shear modulus": ("shear_modulus = 2.6517e10", "", "link.shear_modulus is missing: give it in Pa, or"),
     "unknown key": ("density =", "densty =", 'link.densty = 2766.7: unknown key; did you mean "density"?'),
     "unknown table": ("[payload]", "[payloads]", 'unknown key; did you mean "payload"?'),
-    "unknown section key": ("area =", "aera =", 'link.section.aera = 0.0006: unknown key; did you mean "area"?'),
     "text for a number": ("length = 1.0 ", 'length = "1.0" ', "link.length = '1.0': wrong type; give a number"),
-    "true for a number": ("length = 1.0 ", "length = true ", "link.length = true: wrong type; give a number"),
-    "number for a table": ("[payload]", "payload = 1\n[other]", "unknown key"),
     "number for a text": ('name = "sasaki2012"', "name = 1", "name = 1: wrong type; give a text"),
     "number for an assumption": ('"..."', "3", "assumptions.1 = 3: wrong type; give a list of texts in double quotes"),
     "negative length": ("length = 1.0 ", "length = -1.0 ", "link.length = -1.0: a length is a positive, finite"),
@@ -168,7 +139,6 @@ CHOKING = {
     "not UTF-8": (b'name = "\xff"', "byte 8 = b'\\xff': is not UTF-8; save the file as UTF-8"),
     "a key of 40 KB": (("a." * 20_000 + "b = 1").encode(), "40005 characters in a line; at most 8192"),
     "a key of 8 KB": (("a." * 4_000 + "b = 1").encode(), "4000 dots in a line; at most 64"),
-    "many long keys": ("".join(f"{'a.' * 63}b{i} = 1\n" for i in range(480)).encode(), "a = {'a'"),
     "long keys in long tables": (
         "".join(f"[{'a.' * 63}b{i}]\n{'c.' * 63}d = 1\n" for i in range(240)).encode(),
         "a = {'a'",
@@ -177,7 +147,6 @@ CHOKING = {
     "braces": (b"a = " + b"{a = " * 1000 + b"}" * 1000, "more than 16 brackets open"),
     "brackets closed in comments": (b"a = " + b"[ #]\n" * 12_000, "brackets nested too deep"),
     "many tables": ("".join(f"[a.b{i}]\nc.d = 1\n" for i in range(3500)).encode(), "unknown key"),
-    "many empty tables": (b"[[a]]\n" * 10_000, "unknown key"),
 }
 
 
@@ -198,13 +167,8 @@ def test_a_misspelt_preset():
     text = refusal("saski2012")
     assert text.startswith("arm = 'saski2012': no such preset: did you mean \"sasaki2012\"?")
     assert all(name in text for name in presets())
-    with pytest.raises(ParameterError, match=re.escape(text)):
-        load_law("saski2012")
-
-
-@pytest.mark.parametrize("name", ["", "  ", "a\0b.toml", None, 3])
-def test_what_can_be_no_name(name):
-    assert "give a preset (quanser-2dsfl, " in refusal(name)
+    for name in ("", "  ", "a\0b.toml", None, 3):
+        assert "give a preset (quanser-2dsfl, " in refusal(name)
 
 
 def test_what_is_no_regular_file(tmp_path):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm.arm import Arm, Attachment, Hub, Link, Motor, Payload, RotarySpring, Section, must_turn
+from tfarm.arm import Arm, Attachment, Gauge, Hub, Link, Motor, Payload, RotarySpring, Section, must_turn
 from tfarm.errors import ParameterError
 from tfarm.exact.system import system_of
 
@@ -51,6 +51,19 @@ def test_the_inertia_about_the_axis_is_the_integral_over_the_rigid_rig():
     for theory in ("shear", "euler-bernoulli"):
         assert RIG.total_inertia - replace(RIG, theory=theory).total_inertia == pytest.approx(rotary, rel=1e-9)
     assert replace(RIG, theory="rayleigh").total_inertia == RIG.total_inertia
+
+
+@pytest.mark.parametrize("at", [0.0, 0.12, 0.3, 0.41])
+def test_the_moment_at_the_gauge_of_the_rigid_rig_is_the_integral_beyond_it(at):
+    """Quadrature of rhoA (r + x)(x - at) + rhoI over what is beyond, and the bodies there, for theta_tt = 1."""
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    expected = 0.01 * 0.55 * (0.5 - at) + 0.1 * 0.57 * (0.52 - at) + 3e-5
+    expected += (0.02 * 0.15 * (0.1 - at) + 1e-6) * (at < 0.1)
+    for link, first, last in ((ROOT, 0.0, 0.3), (TIP, 0.3, 0.5)):
+        a = min(max(first, at), last)
+        x = a + (last - a) * (nodes + 1) / 2
+        expected += (last - a) / 2 * weights @ (link.rhoA * (0.05 + x) * (x - at) + link.rhoI)
+    assert replace(RIG, gauge=Gauge(x=at)).gauged_inertia == pytest.approx(expected, rel=1e-14)
 
 
 def test_a_link_cut_into_pieces_and_a_radius_of_zero_change_no_sum():

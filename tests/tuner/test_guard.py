@@ -8,6 +8,7 @@ from dataclasses import replace
 from itertools import product
 from types import SimpleNamespace
 
+import flint
 import numpy as np
 import pytest
 from scipy.linalg import eigh, solve_discrete_lyapunov
@@ -88,11 +89,12 @@ def test_positive_definite_in_whole_numbers():
     rng = np.random.default_rng(0)
     singular = np.array([[1, 1, 2], [1, 2, 3], [2, 3, 5]]) * 10**12
     grams = [M @ M.T + np.eye(len(M), dtype=int) for M in (rng.integers(-9, 10, (n, n)) for n in range(1, 9))]
-    for S in [(singular + np.diag([0, 0, 1])).tolist(), *(each.tolist() for each in grams)]:
-        assert is_positive_definite(S)
-        S[len(S) // 2][len(S) // 2] -= int(S[len(S) // 2][len(S) // 2]) + 1
-        assert not is_positive_definite(S)
-    assert not is_positive_definite(singular.tolist())
+    for S in (singular + np.diag([0, 0, 1]), *grams):
+        assert is_positive_definite(flint.fmpz_mat(S.tolist()))
+        S[len(S) // 2, len(S) // 2] = -1
+        assert not is_positive_definite(flint.fmpz_mat(S.tolist()))
+    assert not is_positive_definite(flint.fmpz_mat(singular.tolist()))
+    assert not is_positive_definite(flint.fmpz_mat([[0, 1], [1, 0]]))
 
 
 def test_a_planted_unstable_end_is_not_proven(loop):

@@ -322,13 +322,9 @@ class Hub:
             radius="a hub radius, from the axis to the clamp, is zero or a positive, finite number of metres",
             stiffness="a spring from hub to ground is zero or positive, finite, in N m/rad (inertia = inf locks)",
         )
-        for name in ("friction", "stiffness"):
-            require(
-                math.isfinite(self.inertia) or not getattr(self, name),
-                f"hub.{name}",
-                getattr(self, name),
-                f"no effect, as inertia = inf locks the hub; leave out the {name}, or give a finite inertia",
-            )
+        for name, value in (("friction", self.friction), ("stiffness", self.stiffness)):
+            remedy = f"no effect, as inertia = inf locks the hub; leave out the {name}, or give a finite inertia"
+            require(math.isfinite(self.inertia) or not value, f"hub.{name}", value, remedy)
 
     def __repr__(self) -> str:
         return brief_repr(self, always=1)

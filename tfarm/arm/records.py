@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
@@ -240,18 +240,27 @@ class Arm:
         A segment from a to a + L has rhoA (L^3/3 + a L (a + L)) + rhoI L, without rhoI where the theory has no rotary
         inertia.  inf where that of the hub or the payload is.
         """
-        beam = math.fsum(self._segment_inertias())
-        payload = self.payload.mass * self.centre_distance**2
-        attached = math.fsum(each.mass * (self.hub.radius + each.x) ** 2 + each.inertia for each in self.attachments)
-        return self.hub_side_inertia + beam + payload + self.payload.inertia + attached
+        return self._turned_about(-self.hub.radius, self.attachments, self.hub_side_inertia)
 
-    def _segment_inertias(self) -> Iterator[float]:
-        a = self.hub.radius
+    def _turned_about(self, place: float, bodies: Iterable[Attachment], own: float = 0.0) -> float:
+        """Return the moment about a place [m] from the clamp of links, bodies and payload beyond it, and its `own`.
+
+        It is that of a rigid rig for an angular acceleration of 1.
+
+        A mass at x has (r + x)(x - place): rhoA (L^3/3 + a L (a + L) + c L (a + L/2)) of a segment from a to a + L
+        beyond the place, which is at c from the axis.
+        """
+        c, start, beam = self.hub.radius + place, 0.0, []
         for link in self.links:
-            L = link.length
-            rotary = link.rhoI * L if self.theory in WITH_ROTARY_INERTIA else 0.0
-            yield link.rhoA * L**3 / 3 + rotary + link.rhoA * L * a * (a + L)
-            a += L
+            a = max(start, place) - place
+            start += link.length
+            L = start - place if a == 0 else link.length
+            if L > 0:
+                rotary = link.rhoI * L if self.theory in WITH_ROTARY_INERTIA else 0.0
+                beam += [link.rhoA * L**3 / 3, rotary, link.rhoA * L * a * (a + L), link.rhoA * c * L * (a + L / 2)]
+        payload = self.payload.mass * (self.centre_distance * (self.centre_distance - c))
+        attached = [each.mass * ((self.hub.radius + each.x) * (each.x - place)) + each.inertia for each in bodies]
+        return own + math.fsum(beam) + payload + self.payload.inertia + math.fsum(attached)
 
     @property
     def hub_side_inertia(self) -> float:
@@ -318,18 +327,8 @@ class Arm:
         """-M(0)/theta_tt [kg m^2] of the rigid rig: J without hub and rotor where the clamp is on the axis."""
         if self.reads_hub_moment:
             return self.carried_inertia
-        r, at = self.hub.radius, self.gauge.x
-        total = self.payload.inertia + self.payload.mass * self.centre_distance * (self.centre_distance - r - at)
-        beyond = [each for each in self.attachments if each.x > at or each.x == at > 0]
-        total += math.fsum(each.mass * (r + each.x) * (each.x - at) + each.inertia for each in beyond)
-        start = 0.0
-        for link in self.links:
-            a, b = max(start, at) - at, start + link.length - at  # from the gauge on
-            start += link.length
-            if b > a:
-                rotary = link.rhoI * (b - a) if self.theory in WITH_ROTARY_INERTIA else 0.0
-                total += link.rhoA * ((b**3 - a**3) / 3 + (r + at) * (b**2 - a**2) / 2) + rotary
-        return total
+        at = self.gauge.x
+        return self._turned_about(at, [each for each in self.attachments if each.x > at or each.x == at > 0])
 
     # ------------------------------------------------------------ other arms
 

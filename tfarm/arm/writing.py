@@ -36,7 +36,7 @@ def to_toml(arm: Arm) -> str:
 def arm_table(arm: Arm) -> dict[str, Any]:
     """Return the tables of the arm's file, as `arm_of_table` reads them."""
     links, motor = [_link_table(link) for link in arm.links], arm.motor
-    tables = {
+    tables: dict[str, Any] = {
         "name": arm.name,
         "assumptions": list(arm.assumptions),
         "theory": None if arm.theory == "timoshenko" else arm.theory,
@@ -45,16 +45,13 @@ def arm_table(arm: Arm) -> dict[str, Any]:
         "hub": differing(arm.hub, always=1),
         "clamp": differing(arm.clamp, always=0) or None,
         "joint": differing(arm.joint, always=0) or None,
-        "motor": motor
-        and {
-            key: value
-            for key, value in differing(motor, always=2).items()
-            if key != "back_emf_constant" or value != motor.torque_constant  # its default
-        },
+        "motor": motor and differing(motor, always=2),
         "attachment": [differing(each, always=1) for each in arm.attachments] or None,
         "gauge": {"x": arm.gauge.x, "side": arm.gauge.side} if arm.gauge.x else None,
         "payload": differing(arm.payload, always=2),
     }
+    if motor is not None and motor.back_emf_constant == motor.torque_constant:  # its default
+        del tables["motor"]["back_emf_constant"]
     return {key: value for key, value in tables.items() if value is not None}
 
 

@@ -22,8 +22,8 @@ from mpmath import mp, mpc, mpf
 from tfarm.arm import Arm
 from tfarm.errors import ConvergenceError, ParameterError
 
-from .layout import constant_of
 from .outputs import Output, output
+from .series import constant_of
 from .system import system_of
 
 Number = Any  # mpmath.mpf or mpmath.mpc, which come without types

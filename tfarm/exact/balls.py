@@ -16,20 +16,17 @@ from typing import Any, TypeVar
 
 import flint
 
-from . import waves
+from . import sweep, waves
 from .compiled import python_of
-from .layout import Layout, Reading, constant_of, readings
-from .outputs import Output
-from .system import Body, Mark, Offset, Place, Segment, Spring, System
+from .layout import KINDS, Layout, Reading
+from .system import Mark, Place, Segment
 from .waves import Plane, Row
 
 _end_plane, _met, _across_rows, _row_across = map(
     python_of, (waves.end_plane, waves.met, waves.across_rows, waves.row_across)
 )
 _transition_rows, across_waves, in_chain = map(python_of, (waves.transition_rows, waves.across_waves, waves.in_chain))
-_KINDS = (Offset, Spring, Body)
-_INSIDE = dict(zip(_KINDS, map(python_of, (waves.inside_offset, waves.inside_spring, waves.inside_body)), strict=True))
-_BEYOND = dict(zip(_KINDS, map(python_of, (waves.beyond_offset, waves.beyond_spring, waves.beyond_body)), strict=True))
+_inside_element, _beyond_element = python_of(sweep.inside), python_of(sweep.beyond)
 Ball = Any  # flint.acb or flint.arb, which come without types
 _Found = TypeVar("_Found")
 
@@ -104,11 +101,17 @@ def summed(z_sum: Any, z_product: Any, count: int) -> list[Any]:
 
 
 class Sweep:
-    """The plane of a layout at the axis and at its marks, at one s (a ball or a series of balls)."""
+    """The plane of a layout at the axis and at its marks, at one s (a ball or a series of balls).
+
+    `exact` converts an exact number to the arithmetic of s.
+    """
+
+    exact: Callable[[Any], Any] = staticmethod(rational)
 
     def __init__(self, layout: Layout, s: Any, S: Any = None) -> None:
         self.layout, self.s, self.S = layout, s, s * s if S is None else S
-        self.elements, tip_mass, tip_inertia, self.A, self.B = self.numbers_of(layout)
+        key = self.exact, flint.ctx.prec
+        self.elements, tip_mass, tip_inertia, self.A, self.B = layout.numbers(key, self.exact)
         self._rows: dict[int, tuple[Row, ...]] = {}
         self.planes: dict[Place, Plane] = {}
         p = _end_plane(*self._end(tip_mass), *self._end(tip_inertia))
@@ -118,14 +121,6 @@ class Sweep:
             else:
                 p = self._inside(each, p)
         self.theta, self.M, self.Q = p[:3]
-
-    def numbers_of(self, layout: Layout) -> list[Any]:
-        """Return the layout's numbers in the arithmetic of s."""
-        return layout.numbers(flint.ctx.prec, rational)
-
-    def exact(self, number: Any) -> Any:
-        """Return an exact number in the arithmetic of s."""
-        return rational(number)
 
     @cached_property
     def input(self) -> Any:
@@ -189,29 +184,19 @@ class Sweep:
     def _inside(self, element: Any, p: Plane) -> Plane:
         if isinstance(element, Segment):
             return _across_rows(*self._transition(element), p)
-        return _INSIDE[type(element)](*self._parameters(element), p)
+        return _inside_element(KINDS[type(element)], element, self.s, self.S, p)
 
     def _beyond(self, element: Any, f: Row) -> Row:
         if isinstance(element, Segment):
             return _row_across(*self._transition(element), f)
-        return _BEYOND[type(element)](*self._parameters(element), f)
-
-    def _parameters(self, element: Any) -> tuple[Any, ...]:
-        """Return the length of an offset, stiffness and compliance of a spring, or both conditions of a body."""
-        match element:
-            case Offset():
-                return (element.length,)
-            case Spring():
-                return self.s * (element.stiffness * element.damping) + element.stiffness, element.compliance
-        mass, inertia, stiffness, rotational_stiffness = element
-        return self.S * mass + stiffness, self.S * inertia + rotational_stiffness
+        return _beyond_element(KINDS[type(element)], element, self.s, self.S, f)
 
     def _transition(self, segment: Any) -> tuple[Row, ...]:
         if id(segment) not in self._rows:
             l, (over_d, z_sum, z_product) = segment.length, self._sums(segment)
             F0, F1, F2, F3 = self._functions(z_sum, z_product)
             functions = F0 * (l * l * l), F1 * (l * l), F2 * l, F3
-            rows = _transition_rows(*functions, self.S, over_d / segment.stiffness, *segment.of_chain)
+            rows = _transition_rows(functions, self.S, over_d / segment.stiffness, segment.of_chain)
             self._rows[id(segment)] = rows
         return self._rows[id(segment)]
 
@@ -224,16 +209,3 @@ class Sweep:
     def _functions(self, z_sum: Any, z_product: Any) -> tuple[Any, ...]:
         """Return F0..F3 at the segment's end."""
         return transition(z_sum, z_product)
-
-
-def output_ball(system: System, wanted: Output, s: Ball, x: float = 0.0) -> Ball | None:
-    """Return an output for a unit input at s, in SI units; x is a share of the length.
-
-    None where the input of the free response may be zero, as at a pole.
-    """
-    layout, constant = readings(system, (wanted,), x), constant_of(system, wanted, x)
-    (one,) = layout.each
-    if constant is not None:
-        return s**one.power * constant * rational(one.unit) / (1 + rational(one.C) * s)
-    sweep = Sweep(layout, s)
-    return None if sweep.input.contains(0) else sweep.output(one) / sweep.input

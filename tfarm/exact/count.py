@@ -22,9 +22,7 @@ from .compiled import compiled, inlined
 from .layout import (
     BENDING,
     CHAIN_A,
-    CHAIN_B,
     CHAIN_G,
-    CHAIN_SIGMA,
     LENGTH,
     OF_ANGLE,
     OF_MOMENT,
@@ -78,7 +76,7 @@ def chain_count(omega: float, rows: Any, ends: Any) -> int:
             number, p = _joined(number, omega, row, p, free)
             free = 2
         else:
-            p = inside(row, 0.0, S, p)
+            p = inside(row[ROW_KIND], row, 0.0, S, p)
         if row[ROW_KIND] == SPRING:
             number = _clamped(number, p[0], 1)
     if ends[OF_MOMENT] == 0.0:
@@ -94,17 +92,16 @@ def _joined(outside: int, omega: float, row: Any, plane: Plane, free: int) -> tu
     `outside` is the count of the outer part clamped at the joint, `free` the number of free motions there.
     """
     clamped = (0.0, 0.0, 0.0, 0.0, 1.0)  # W = Psi = 0
-    s, _, _, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(complex(0.0, omega), row)
+    (s, _, _), (z1, v1, t1, dt1), (z2, v2, t2, dt2) = dispersion(complex(0.0, omega), row)
     number = half_waves(z1, t1, dt1) + half_waves(z2, t2, dt2) + (z1.real < 0.0 and z2.real < 0.0)
     S, z1, z2, l, EI = s.real, z1.real, z2.real, row[LENGTH], row[BENDING]
-    a, b, g, sigma = row[CHAIN_A], row[CHAIN_B], row[CHAIN_G], row[CHAIN_SIGMA]
     if max(abs(z1), abs(z2)) < SERIES_RADIUS:
         F0, F1, F2, F3, _, _ = transition_series(z1 + z2, z1 * z2)
-        rows = transition_rows(F0 * (l * l * l), F1 * (l * l), F2 * l, F3, S, 1.0 / EI, a, b, g, sigma)
+        rows = transition_rows((F0 * (l * l * l), F1 * (l * l), F2 * l, F3), S, 1.0 / EI, row[CHAIN_A:])
         q, r = across_rows(*rows, plane), across_rows(*rows, clamped)
     else:
         one, two = in_chain(real_wave(z1, v1.real, t1, dt1), l), in_chain(real_wave(z2, v2.real, t2, dt2), l)
-        gS, gap = g * S, one[2] - two[2]
+        gS, gap = row[CHAIN_G] * S, one[2] - two[2]
         unit = 1.0 / (gS * EI * gap * gap)
         q = scaled(across_waves(one, two, gS, EI, plane), unit)
         r = scaled(across_waves(one, two, gS, EI, clamped), unit)

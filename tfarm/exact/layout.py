@@ -34,9 +34,10 @@ from .system import (
 )
 
 SEGMENT, OFFSET, SPRING, BODY, MARK = range(5)
+KINDS: Mapping[type, int] = {Segment: SEGMENT, Offset: OFFSET, Spring: SPRING, Body: BODY, Mark: MARK}
 REACH = 0  # of an offset's row of the kernel: its length
-STIFFNESS, COMPLIANCE, LOSS = range(3)  # of a spring's row, the last the stiffness times the damping
-MASS, INERTIA, GROUND, TURNING_GROUND = range(4)  # of a body's row, in the order of `Body`
+STIFFNESS, COMPLIANCE, LOSS = range(3)  # of a spring's, in the order of `Spring`
+MASS, INERTIA, GROUND, TURNING_GROUND = range(4)  # of a body's, in the order of `Body`
 AT_JOINT = 2.0**-50  # of the length: rounding of a place at a joint, a quotient of float64 numbers
 ROW_KIND, ROW_WIDTH = 8, 15  # the kind in a row of the kernel, after the numbers of a segment (`waves`), and its width
 LENGTH, BENDING, CHAIN_A, CHAIN_B, CHAIN_G, CHAIN_SIGMA = range(9, 15)  # of a segment, in the chain's units
@@ -140,17 +141,14 @@ class Layout:
 def kernel_row(element: Element) -> Real:
     """Return an element as a row of the kernel."""
     row = np.zeros(ROW_WIDTH)
-    row[ROW_KIND] = {Segment: SEGMENT, Offset: OFFSET, Spring: SPRING, Body: BODY, Mark: MARK}[type(element)]
-    match element:
-        case Segment():
-            row[:6:2] = element[:3]
-            row[1:6:2] = [value - Fraction(float(value)) for value in element[:3]]
-            row[6:ROW_KIND] = element.sigma, element.damping
-            row[LENGTH:] = element.length, element.stiffness, *element.of_chain
-        case Spring():
-            row[:3] = *element[:2], element.stiffness * Fraction(element.damping)
-        case Offset() | Body():
-            row[: len(element)] = element
+    row[ROW_KIND] = KINDS[type(element)]
+    if isinstance(element, Segment):
+        row[:6:2] = element[:3]
+        row[1:6:2] = [value - Fraction(float(value)) for value in element[:3]]
+        row[6:ROW_KIND] = element.sigma, element.damping
+        row[LENGTH:] = element.length, element.stiffness, *element.of_chain
+    elif not isinstance(element, Mark):
+        row[: len(element)] = element
     return row
 
 
@@ -209,28 +207,3 @@ def laid_out(chain: System, wanted: Sequence[Output], shares: Sequence[float]) -
     each = tuple(reading_of(chain, one, x) for one, x in zip(wanted, shares, strict=True))
     places = tuple(dict.fromkeys(one.place for one in each if one.place is not None))
     return Layout(chain, places, each)
-
-
-def constant_of(k: System, wanted: Output, x: float) -> int | None:
-    """Return the quantity for unit input, dimensionless, where an end condition fixes it: 0, 1 or -1; else None.
-
-    W, Phi and Y are 0 at the root, W at a pinned tip, M and Q at a free tip.  The hub angle is the input of a locked
-    hub, M(0) = -u of a hub without inertia.
-    """
-    at, locked = wanted.share(x), k.is_locked
-    if wanted.quantity == "theta":
-        return 1 if locked else None
-    if wanted.quantity == "current":
-        return 1 if k.drive.per_ampere and not (k.drive.back_emf or k.drive.lag) else None
-    if not k.is_uniform:
-        return None
-    pinned, clamped = (not isinstance(end, Fraction) for end in (k.tip_mass, k.tip_inertia))
-    if at == 0 and (wanted.quantity != "M" or not wanted.gauge or k.gauge.share == 0):
-        free_pin = not any(k.drive.of_angle) and not k.drive.lag
-        return {"M": -1 if free_pin else None, "Q": None, "Psi": 1 if locked else None}.get(wanted.quantity, 0)
-    if at != 1:
-        return None
-    is_zero = {"M": k.tip_inertia == 0, "Q": k.tip_mass == 0, "W": pinned, "centre": pinned, "Psi": clamped}
-    if is_zero.get(wanted.quantity, False):
-        return 0
-    return -1 if locked and {"Y": pinned, "Phi": clamped}.get(wanted.quantity, False) else None

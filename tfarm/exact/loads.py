@@ -24,7 +24,7 @@ from .compiled import python_of
 from .layout import Layout, M, Q, Reading, reading_of
 from .outputs import Output
 from .system import Place, Spring, System
-from .values import PROVEN_BITS, certified
+from .values import PROVEN_BITS, certified, known
 from .waves import Row, met
 
 _met = python_of(met)
@@ -82,8 +82,7 @@ def loaded_value(chain: System, load: Load, wanted: Output, s: complex, x: float
         value = sum(sign * part for sign, part in zip(signs, found, strict=True))
         value = value * point(s) ** one.power / (1 + rational(one.C) * point(s))
         value = value * rational(one.unit * chain.drive.unit * unit)
-        is_known = value.is_finite() and (value.rel_accuracy_bits() >= PROVEN_BITS or value.is_zero())
-        return value if is_known else None
+        return known(value, PROVEN_BITS) if value.is_finite() else None
 
     return certified(PROVEN_BITS, attempt, f"{PROVEN_BITS} bits", s)
 
@@ -95,7 +94,7 @@ class _Loaded(Sweep):
         """Return the condition beyond an element, beyond a spring not times its stiffness."""
         f = super()._beyond(element, f)
         if isinstance(element, Spring):
-            stiffness, _ = self._parameters(element)
+            stiffness = self.s * element.damping + element.stiffness
             return f[0] / stiffness, f[1] / stiffness, f[2] / stiffness, f[3] / stiffness
         return f
 

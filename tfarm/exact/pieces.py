@@ -3,7 +3,7 @@
 The steps of a block of points are loops of arithmetic alone, which vectorise, and one with the exponentials (as in
 `waves`).  The waves of each segment, or its transition functions where both are slow, are kept for the way back.
 
-Arrays of a block are flat buffers: component j of point i at `BLOCK` j + i.
+The numbers of a block are a flat buffer: component j of point i at `BLOCK` j + i.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tfarm.arrays import Complex
 
 from .compiled import compiled, inlined
-from .layout import BENDING, CHAIN_A, CHAIN_B, CHAIN_G, CHAIN_SIGMA, LENGTH
+from .layout import BENDING, CHAIN_A, LENGTH
 from .waves import (
     DAMPING,
     PARALLEL,
@@ -41,12 +41,12 @@ from .waves import (
 )
 
 BLOCK = 32  # points of a block: few for single points, many for the overhead of loops
-S_SQUARED, D, GS, Z1, V1, T1, DT1, Z2, V2, T2, DT2 = (BLOCK * j for j in range(11))
-C1, S1, E1, C2, S2, E2 = (BLOCK * j for j in range(6))
-F2_LESS_1, F3_LESS_1 = 4 * BLOCK, 5 * BLOCK  # of the transition functions, after F0..F3
-LIFT, TURN = 4 * BLOCK, 5 * BLOCK  # of a mark, after its state
-
-PLANE_SIZE, ROW_SIZE, NUMBERS_SIZE, FUNCTIONS_SIZE = (BLOCK * parts for parts in (6, 4, 11, 6))  # of the flat buffers
+# A plane, and next to it the one by series; on the way back of a mark its state, W - r theta and Psi - theta there.
+LIFT, TURN, BY_SERIES, PLANE_SIZE = (BLOCK * j for j in (4, 5, 7, 14))
+# Of a segment S, d and g S; z, v, t and dt of each wave, then its c, s, e and t + dt; F0..F3, F2 - 1 and F3 - 1.
+S_SQUARED, ONE, TWO, SERIES, WAVES_SIZE = (BLOCK * j for j in (0, 3, 11, 19, 25))
+FUNCTIONS, PHASE = (BLOCK * j for j in (4, 7))  # of a wave
+F1, F2_LESS_1, F3_LESS_1 = (SERIES + BLOCK * j for j in (1, 4, 5))
 SLOW_WAVE = 1.0  # |z_2| below which a wave has little phase along a segment: next to its shear cut-off
 FADED = 1e-140  # |e^{-t}| below which its reciprocal would overflow
 
@@ -54,28 +54,22 @@ FADED = 1e-140  # |e^{-t}| below which its reciprocal would overflow
 class Work(NamedTuple):
     """Scratch arrays of a block, many by the row j of an element.
 
-    `planes` j + 1 is inside of the element, 0 at the tip's end; that of a mark becomes its state on the way back, and
-    W - r theta and Psi - theta there.  It was divided by 2^`powers` after the element; a mark's state times e^`scales`
-    2^`shifts` has the scale of the plane at the axis.  Of a segment `low` are the slow points, the others have waves
-    (`numbers`, `functions`) and those a `series`.  `condition` is the row on the way back; `lift` and `turn` are
-    W - r theta and Psi - theta there, r the distance from the axis, nan beyond a segment that is not slow.  `watched`
-    are points next to a segment's shear cut-off.
+    `planes` j + 1 is inside of the element, 0 at the tip's end; that of a mark becomes its state on the way back.  It
+    was divided by 2^`powers` after the element; a mark's state times e^`scales` 2^`shifts` has the scale of the plane
+    at the axis.  Of a segment `low` are the slow points.  `back` is the condition on the way back, W - r theta and
+    Psi - theta, r the distance from the axis, nan beyond a segment that is not slow.  `watched` are points next to a
+    segment's shear cut-off.
     """
 
     planes: Complex
+    waves: Complex
     powers: NDArray[np.int64]
     scales: Complex
     shifts: NDArray[np.int64]
     low: NDArray[np.bool_]
-    numbers: Complex
-    functions: Complex
-    series: Complex
-    condition: Complex
-    faded: Complex
+    back: Complex
     scale: Complex
     theta: Complex
-    lift: Complex
-    turn: Complex
     watched: NDArray[np.bool_]
 
 
@@ -85,29 +79,45 @@ def times(z: complex, factor: float) -> complex:
     return complex(z.real * factor, z.imag * factor)
 
 
+@inlined
+def put(buffer: Any, i: int, numbers: tuple[complex, ...]) -> None:
+    """Write the numbers of a point."""
+    for j in range(len(numbers)):
+        buffer[BLOCK * j + i] = numbers[j]
+
+
+@inlined
+def row_at(buffer: Any, i: int) -> Row:
+    """Return four numbers of a point."""
+    return buffer[i], buffer[BLOCK + i], buffer[2 * BLOCK + i], buffer[3 * BLOCK + i]
+
+
+@inlined
+def plane_at(buffer: Any, i: int) -> Plane:
+    """Return the plane of a point."""
+    return buffer[i], buffer[BLOCK + i], buffer[2 * BLOCK + i], buffer[3 * BLOCK + i], buffer[4 * BLOCK + i]
+
+
 @compiled
 def cross(points: Any, row: Any, j: int, work: Work, lost: Any) -> None:
     """Compute the plane at the inner end of a segment, row j, from that at its outer one, at the points of a block.
 
     Scales are added to `work.scale`, lost digits and points next to the shear cut-off are marked.
     """
-    plane, inner, numbers = work.planes[j], work.planes[j + 1], work.numbers[j]
-    slow = mark_slow(points, row, work.low[j])
+    outer, inner, waves, low = work.planes[j], work.planes[j + 1], work.waves[j], work.low[j]
+    slow = mark_slow(points, row, low)
     if slow < BLOCK:
-        all_wave_numbers(points, row, numbers)
-        all_wave_functions(numbers, work.functions[j])
-        _by_waves(row, numbers, work.functions[j], plane, inner)
-        mark_parallel(numbers, work.low[j], lost)
+        fill_waves(points, row, waves)
+        _by_waves(row, waves, outer, inner)
+        mark_parallel(waves, low, lost)
         for i in range(BLOCK):
-            if not work.low[j, i]:
-                t1, t2 = phases(numbers, i)
-                work.scale[i] += t1 + t2
-                work.watched[i] = work.watched[i] or magnitude(numbers[Z2 + i]) < SLOW_WAVE
+            if not low[i]:
+                work.scale[i] += waves[ONE + PHASE + i] + waves[TWO + PHASE + i]
+                work.watched[i] = work.watched[i] or magnitude(waves[TWO + i]) < SLOW_WAVE
     if slow:
-        other = inner.copy() if slow < BLOCK else inner
-        _by_series(points, row, work.series[j], plane, other)
-        if slow < BLOCK:
-            take_where(work.low[j], other, inner)
+        at = 0 if slow == BLOCK else BY_SERIES
+        _by_series(points, row, waves, outer, inner[at:])
+        take_low(low, inner, at, 5)
 
 
 @compiled
@@ -121,120 +131,81 @@ def mark_slow(points: Any, row: Any, low: Any) -> int:
 
 
 @compiled
-def mark_parallel(numbers: Any, low: Any, lost: Any) -> None:
+def mark_parallel(waves: Any, low: Any, lost: Any) -> None:
     """Mark the points where both waves are nearly one (`PARALLEL`)."""
     for i in range(lost.size):
         if not low[i]:
-            z1, z2 = numbers[Z1 + i], numbers[Z2 + i]
+            z1, z2 = waves[ONE + i], waves[TWO + i]
             lost[i] = lost[i] or magnitude(z1 - z2) < PARALLEL * (magnitude(z1) + magnitude(z2))
 
 
 @compiled
-def all_wave_numbers(points: Any, row: Any, numbers: Any) -> None:
-    """Compute `dispersion` at every point of a block."""
+def fill_waves(points: Any, row: Any, waves: Any) -> None:
+    """Compute numbers and functions of both waves at every point of a block: the latter alone calls a library."""
     for i in range(BLOCK):
-        S, d, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(points[i], row)
-        numbers[S_SQUARED + i], numbers[D + i], numbers[GS + i] = S, d, gS
-        numbers[Z1 + i], numbers[V1 + i], numbers[T1 + i], numbers[DT1 + i] = z1, v1, t1, dt1
-        numbers[Z2 + i], numbers[V2 + i], numbers[T2 + i], numbers[DT2 + i] = z2, v2, t2, dt2
-
-
-@compiled
-def all_wave_functions(numbers: Any, functions: Any) -> None:
-    """Compute the two complex exponentials of each point, the only loop that calls a library."""
+        own, one, two = dispersion(points[i], row)
+        put(waves, S_SQUARED + i, own)
+        put(waves, ONE + i, one)
+        put(waves, TWO + i, two)
     for i in range(BLOCK):
-        c1, s1, e1 = wave_functions(numbers[Z1 + i], numbers[T1 + i], numbers[DT1 + i])
-        c2, s2, e2 = wave_functions(numbers[Z2 + i], numbers[T2 + i], numbers[DT2 + i])
-        functions[C1 + i], functions[S1 + i], functions[E1 + i] = c1, s1, e1
-        functions[C2 + i], functions[S2 + i], functions[E2 + i] = c2, s2, e2
+        (z1, _, t1, dt1), (z2, _, t2, dt2) = row_at(waves, ONE + i), row_at(waves, TWO + i)
+        put(waves, ONE + FUNCTIONS + i, wave_functions(z1, t1, dt1))
+        put(waves, TWO + FUNCTIONS + i, wave_functions(z2, t2, dt2))
 
 
 @compiled
-def take_where(low: Any, source: Any, target: Any) -> None:
-    """Copy the slow points of another buffer."""
-    for j in range(len(target) // BLOCK):
-        for i in range(BLOCK):
-            if low[i]:
-                target[BLOCK * j + i] = source[BLOCK * j + i]
+def take_low(low: Any, buffer: Any, at: int, parts: int) -> None:
+    """Copy the numbers of the slow points from another place of their buffer."""
+    if at:
+        for j in range(parts):
+            for i in range(BLOCK):
+                if low[i]:
+                    buffer[BLOCK * j + i] = buffer[at + BLOCK * j + i]
 
 
 @inlined
-def plane_at(buffer: Any, i: int) -> Plane:
-    """Return the plane of a point."""
-    return buffer[i], buffer[BLOCK + i], buffer[2 * BLOCK + i], buffer[3 * BLOCK + i], buffer[4 * BLOCK + i]
+def waves_at(waves: Any, i: int) -> tuple[Wave, Wave, complex, complex]:
+    """Return both waves of a point, g S and d."""
+    (z1, v1, _, _), (c1, s1, e1, _) = row_at(waves, ONE + i), row_at(waves, ONE + FUNCTIONS + i)
+    (z2, v2, _, _), (c2, s2, e2, _) = row_at(waves, TWO + i), row_at(waves, TWO + FUNCTIONS + i)
+    _, d, gS, _ = row_at(waves, S_SQUARED + i)
+    return (c1, s1, z1, v1, e1), (c2, s2, z2, v2, e2), gS, d
 
 
 @inlined
-def put_plane(buffer: Any, i: int, p: Plane) -> None:
-    """Write the plane of a point."""
-    buffer[i], buffer[BLOCK + i], buffer[2 * BLOCK + i], buffer[3 * BLOCK + i], buffer[4 * BLOCK + i] = p
-
-
-@inlined
-def row_at(buffer: Any, i: int) -> Row:
-    """Return the condition of a point."""
-    return buffer[i], buffer[BLOCK + i], buffer[2 * BLOCK + i], buffer[3 * BLOCK + i]
-
-
-@inlined
-def put_row(buffer: Any, i: int, f: Row) -> None:
-    """Write the condition, or the state, of a point."""
-    buffer[i], buffer[BLOCK + i], buffer[2 * BLOCK + i], buffer[3 * BLOCK + i] = f
-
-
-@inlined
-def waves_at(numbers: Any, functions: Any, i: int) -> tuple[Wave, Wave]:
-    """Return both waves of a point."""
-    return (
-        (functions[C1 + i], functions[S1 + i], numbers[Z1 + i], numbers[V1 + i], functions[E1 + i]),
-        (functions[C2 + i], functions[S2 + i], numbers[Z2 + i], numbers[V2 + i], functions[E2 + i]),
-    )
-
-
-@inlined
-def phases(numbers: Any, i: int) -> tuple[complex, complex]:
-    """Return t of both waves of a point."""
-    return numbers[T1 + i] + numbers[DT1 + i], numbers[T2 + i] + numbers[DT2 + i]
-
-
-@inlined
-def _chain_waves(row: Any, numbers: Any, functions: Any, i: int) -> tuple[Wave, Wave, complex, complex]:
-    """Return both waves of a point, g S and d in the chain's units."""
-    one, two = waves_at(numbers, functions, i)
-    l, EI = row[LENGTH], row[BENDING]
-    gS, d = times(numbers[GS + i], EI / (l * l * l * l)), times(numbers[D + i], EI)
-    return in_chain(one, l), in_chain(two, l), gS, d
+def _chain_waves(row: Any, waves: Any, i: int) -> tuple[Wave, Wave, complex, complex]:
+    """Return the same in the chain's units."""
+    (one, two, gS, d), l, EI = waves_at(waves, i), row[LENGTH], row[BENDING]
+    return in_chain(one, l), in_chain(two, l), times(gS, EI / (l * l * l * l)), times(d, EI)
 
 
 @compiled
-def _by_waves(row: Any, numbers: Any, functions: Any, plane: Any, inner: Any) -> None:
+def _by_waves(row: Any, waves: Any, outer: Any, inner: Any) -> None:
     """Compute `across_waves` at every point of a block."""
     for i in range(BLOCK):
-        one, two, gS, d = _chain_waves(row, numbers, functions, i)
-        p, gap = across_waves(one, two, gS, d, plane_at(plane, i)), one[2] - two[2]
-        put_plane(inner, i, scaled(p, reciprocal(gS * d * gap * gap)))
+        one, two, gS, d = _chain_waves(row, waves, i)
+        p, gap = across_waves(one, two, gS, d, plane_at(outer, i)), one[2] - two[2]
+        put(inner, i, scaled(p, reciprocal(gS * d * gap * gap)))
 
 
 @inlined
-def rows_at(s: complex, row: Any, series: Any, i: int) -> tuple[Row, Row, Row, Row]:
+def rows_at(s: complex, row: Any, waves: Any, i: int) -> tuple[Row, Row, Row, Row]:
     """Return the transition matrix of a slow segment at a point from F0..F3 in the chain's units."""
     over_d = times(reciprocal(1.0 + row[DAMPING] * s), 1.0 / row[BENDING])
-    return transition_rows(
-        *row_at(series, i), s * s, over_d, row[CHAIN_A], row[CHAIN_B], row[CHAIN_G], row[CHAIN_SIGMA]
-    )
+    return transition_rows(row_at(waves, SERIES + i), s * s, over_d, row[CHAIN_A:])
 
 
 @compiled
-def _by_series(points: Any, row: Any, series: Any, plane: Any, inner: Any) -> None:
+def _by_series(points: Any, row: Any, waves: Any, outer: Any, inner: Any) -> None:
     """Compute F0..F3, F2 - 1 and F3 - 1 of a slow segment in the chain's units, and `across_rows`, in a block."""
     l = row[LENGTH]
     for i in range(BLOCK):
         _, _, z_sum, z_product = wave_sums(points[i], row)
         F0, F1, F2, F3, F2_less_1, F3_less_1 = transition_series(z_sum, z_product)
-        put_row(series, i, (times(F0, l * l * l), times(F1, l * l), times(F2, l), F3))
-        series[F2_LESS_1 + i], series[F3_LESS_1 + i] = times(F2_less_1, l), F3_less_1
+        own = times(F0, l * l * l), times(F1, l * l), times(F2, l), F3, times(F2_less_1, l), F3_less_1
+        put(waves, SERIES + i, own)
     for i in range(BLOCK):
-        put_plane(inner, i, across_rows(*rows_at(points[i], row, series, i), plane_at(plane, i)))
+        put(inner, i, across_rows(*rows_at(points[i], row, waves, i), plane_at(outer, i)))
 
 
 @compiled
@@ -243,62 +214,39 @@ def cross_back(points: Any, row: Any, j: int, work: Work, scale: Any) -> None:
 
     The scales less those of the plane are added to `scale`.
     """
-    f, low, slow = work.condition, work.low[j], 0
-    for i in range(BLOCK):
-        slow += low[i]
-    other = f.copy() if 0 < slow < BLOCK else f
+    back, waves, low = work.back, work.waves[j], work.low[j]
+    slow = low.sum()
     if slow:
-        _row_by_series(points, row, work.series[j], other)
+        at = 0 if slow == BLOCK else BY_SERIES
+        for i in range(BLOCK):
+            put(back, at + i, row_across(*rows_at(points[i], row, waves, i), row_at(back, i)))
     if slow < BLOCK:
-        _fade(work.numbers[j], work.functions[j], work.faded, scale, low)
-        _row_by_waves(row, work.numbers[j], work.faded, f)
+        _fade(waves, low, scale)
+        for i in range(BLOCK):
+            one, two, gS, d = _chain_waves(row, waves, i)
+            W, Psi, M, Q = row_across_waves(one, two, gS, d, row_at(back, i))
+            unit = reciprocal(gS * d * (one[2] - two[2]))
+            put(back, i, (W * unit, Psi * unit, M * unit, Q * unit))
         if slow:
-            take_where(low, other, f)
-
-
-@inlined
-def _ratio(e1: complex, e2: complex, t1: complex, t2: complex) -> complex:
-    """Return e^{-t} of the faster wave over that of the slower one, also where both underflow."""
-    if t1.real < t2.real:
-        e1, e2, t1, t2 = e2, e1, t2, t1
-    if magnitude(e2) > FADED:
-        return e1 * reciprocal(e2)
-    decay, turn = math.exp(t2.real - t1.real), t2.imag - t1.imag
-    return complex(decay * math.cos(turn), decay * math.sin(turn))
+            take_low(low, back, at, 4)
 
 
 @compiled
-def _fade(numbers: Any, functions: Any, faded: Any, scale: Any, low: Any) -> None:
-    """Compute c and s of both waves in the scale of the faster one."""
+def _fade(waves: Any, low: Any, scale: Any) -> None:
+    """Bring c and s of the slower wave to the scale of the faster one, also where both e^{-t} underflow."""
     for i in range(BLOCK):
-        c1, s1, c2, s2 = functions[C1 + i], functions[S1 + i], functions[C2 + i], functions[S2 + i]
-        t1, t2 = phases(numbers, i)
-        left = t2 if t1.real >= t2.real else t1
-        ratio = _ratio(functions[E1 + i], functions[E2 + i], t1, t2)
-        if t1.real >= t2.real:
-            c2, s2 = c2 * ratio, s2 * ratio
+        one, two = ONE + FUNCTIONS + i, TWO + FUNCTIONS + i
+        is_first = waves[ONE + PHASE + i].real >= waves[TWO + PHASE + i].real
+        fast, slow = (one, two) if is_first else (two, one)
+        (_, _, e, t), (c, s, e_slow, t_slow) = row_at(waves, fast), row_at(waves, slow)
+        if magnitude(e_slow) > FADED:
+            ratio = e * reciprocal(e_slow)
         else:
-            c1, s1 = c1 * ratio, s1 * ratio
-        faded[C1 + i], faded[S1 + i], faded[C2 + i], faded[S2 + i] = c1, s1, c2, s2
+            decay, turn = math.exp(t_slow.real - t.real), t_slow.imag - t.imag
+            ratio = complex(decay * math.cos(turn), decay * math.sin(turn))
+        waves[slow], waves[slow + BLOCK] = c * ratio, s * ratio
         if not low[i]:
-            scale[i] -= left
-
-
-@compiled
-def _row_by_waves(row: Any, numbers: Any, faded: Any, f: Any) -> None:
-    """Compute `row_across_waves` in place, at every point of a block."""
-    for i in range(BLOCK):
-        one, two, gS, d = _chain_waves(row, numbers, faded, i)
-        own = row_across_waves(one, two, gS, d, row_at(f, i))
-        unit = reciprocal(gS * d * (one[2] - two[2]))
-        put_row(f, i, (own[0] * unit, own[1] * unit, own[2] * unit, own[3] * unit))
-
-
-@compiled
-def _row_by_series(points: Any, row: Any, series: Any, f: Any) -> None:
-    """Compute `row_across` in place, at every point of a block."""
-    for i in range(BLOCK):
-        put_row(f, i, row_across(*rows_at(points[i], row, series, i), row_at(f, i)))
+            scale[i] -= t_slow
 
 
 @inlined

@@ -1,6 +1,6 @@
 """Doubles as exact rational numbers (FLINT): definite matrices, and blocks of a law as polynomials in s and in z.
 
-A matrix is one of whole numbers over a power of two.  Zeros and poles in z of a block are in delta = z - 1:
+Zeros and poles in z of a block are in delta = z - 1:
 
     tustin   s - r = (c - r)(delta - 2 r/(c - r))/(delta + 2), and s - c = -2 c/(delta + 2)
     matched  delta = e^{rT} - 1, with the same value at rest
@@ -22,41 +22,25 @@ from tfarm.arrays import Complex, Real
 
 from .balls import exact_middle, fraction, precision
 
-IntegerMatrix = list[list[int]]
+Matrix = Any  # flint.fmpq_mat or flint.fmpz_mat, which come without types
 
 
-def as_integers(matrix: Real) -> tuple[IntegerMatrix, int]:
-    """Return the whole numbers N and the shift k with matrix = N / 2^k, exactly."""
-    pairs = [[float(value).as_integer_ratio() for value in row] for row in matrix]
-    shift = max(bottom.bit_length() - 1 for row in pairs for _, bottom in row)
-    return [[top << (shift - bottom.bit_length() + 1) for top, bottom in row] for row in pairs], shift
+def exact_matrix(matrix: Real) -> Matrix:
+    """Return a matrix of doubles over the rationals."""
+    rows, columns = matrix.shape
+    return flint.fmpq_mat(rows, columns, [fraction(each) for each in matrix.ravel().tolist()])
 
 
-def is_positive_definite(matrix: IntegerMatrix) -> bool:
-    """Whether a symmetric matrix of whole numbers has only positive leading minors (Bareiss' elimination).
-
-    With whole numbers of FLINT, as the minors have thousands of digits.
-    """
-    M, before = [[flint.fmpz(value) for value in row] for row in matrix], flint.fmpz(1)
-    n = len(M)
-    for k in range(n):
-        top = M[k]
-        pivot = top[k]
-        if pivot <= 0:
-            return False
-        for i in range(k + 1, n):
-            row, factor = M[i], top[i]
-            for j in range(i, n):
-                row[j] = (pivot * row[j] - factor * top[j]) // before
-        before = pivot
-    return True
+def is_positive_definite(matrix: Matrix) -> bool:
+    """Whether a symmetric matrix of integers has only positive leading minors, the pivots of Bareiss' elimination."""
+    permutation, _, _, upper = matrix.fflu()
+    return permutation.is_one() and all(upper[k, k] > 0 for k in range(matrix.nrows()))
 
 
-def falls(P: IntegerMatrix, A: Real) -> bool:
-    """Whether P - A^T P A > 0."""
-    numbers, shift = as_integers(A)
-    N, form = flint.fmpz_mat(numbers), flint.fmpz_mat(P)
-    return is_positive_definite((form * 4**shift - N.transpose() * form * N).tolist())
+def falls(P: Matrix, A: Real) -> bool:
+    """Whether P - A^T P A > 0, P of integers."""
+    numbers, unit = exact_matrix(A).numer_denom()
+    return is_positive_definite(P * unit**2 - numbers.transpose() * P * numbers)
 
 
 AT_MINUS_ONE = -2.0  # delta of z = -1, the image of s = infinity under Tustin's rule
@@ -97,20 +81,14 @@ def polynomials(block: LawBlock) -> tuple[list[Any], Any]:
     if isinstance(block, Rational):
         num, den = (flint.fmpq_poly([fraction(each) for each in reversed(of)]) for of in (block.num, block.den))
         return [num], den
-    A, _, C, D = map(_exact, block.matrices())
-    columns, den = [_exact(column[:, None]) for column in block.matrices()[1].T], A.charpoly()
+    A, _, C, D = map(exact_matrix, block.matrices())
+    columns, den = [exact_matrix(column[:, None]) for column in block.matrices()[1].T], A.charpoly()
     return [(A - each * C).charpoly() + (D[0, j] - 1) * den for j, each in enumerate(columns)], den
 
 
 def _zeros_at_0(polynomial: Any) -> int:
     """Return the order of the zero at 0 of a polynomial other than 0."""
     return next(n for n, each in enumerate(polynomial.coeffs()) if each)
-
-
-def _exact(matrix: Real) -> Any:
-    """Return a matrix of doubles over the rationals."""
-    rows, columns = matrix.shape
-    return flint.fmpq_mat(rows, columns, [fraction(each) for each in matrix.ravel().tolist()])
 
 
 def _roots(polynomial: Any) -> Complex:

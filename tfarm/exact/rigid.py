@@ -53,13 +53,7 @@ class RigidSweep(Sweep):
     def __init__(self, layout: Layout) -> None:
         super().__init__(layout, flint.fmpq_poly([0, 1]))
 
-    def exact(self, number: Any) -> Any:
-        """Return the rational number."""
-        return fraction(number)
-
-    def numbers_of(self, layout: Layout) -> list[Any]:
-        """Return the layout's numbers as rational ones."""
-        return layout.numbers("rational", self.exact)
+    exact = staticmethod(fraction)
 
     def _inside(self, element: Any, p: Plane) -> Plane:
         for each in _rigid(element):

@@ -46,6 +46,25 @@ def _quotient_at_zero(chain: System, output: Output, x: float) -> list[Ball]:
         return [found[n] for n in range(kept)]
 
 
+@lru_cache(SERIES_KEPT)
+def constant_of(chain: System, wanted: Output, x: float) -> int | None:
+    """Return the quantity for unit input, dimensionless, where that is 0, 1 or -1 at every s; else None.
+
+    An end condition fixes it, such as the moment at a free tip: its series is the input's times that number.
+    """
+    layout = readings(chain, (wanted.base,), x)
+    (one,) = layout.each
+    with precision(SERIES_BITS):
+        sweep = _swept(chain, layout.places)
+        unit, found = rational(one.unit), sweep.numerator(one)
+        size = max(abs((sweep.input * unit)[n]) for n in range(SERIES_ORDER))
+        for value in (0, 1, -1):
+            rest = found - sweep.input * (unit * value)
+            if all(abs(rest[n]) < KNOWN_ZERO * size for n in range(SERIES_ORDER)):
+                return value
+    return None
+
+
 def without_slow_pole(chain: System, wanted: Sequence[Output], x: float) -> list[tuple[float, float]]:
     """Return the coefficients of 1 and s in each output's expansion at s = 0, without those of a pole p next to 0.
 

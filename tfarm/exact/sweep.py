@@ -20,6 +20,7 @@ from tfarm.records import read_only
 from .compiled import compiled, inlined
 from .layout import (
     BENDING,
+    BODY,
     CHAIN_A,
     CHAIN_B,
     COMPLIANCE,
@@ -41,27 +42,28 @@ from .layout import (
 )
 from .pieces import (
     BLOCK,
+    BY_SERIES,
+    F1,
     F2_LESS_1,
     F3_LESS_1,
-    FUNCTIONS_SIZE,
     LIFT,
-    NUMBERS_SIZE,
     PLANE_SIZE,
-    ROW_SIZE,
     TURN,
+    WAVES_SIZE,
     Work,
     cross,
     cross_back,
     finish,
     plane_at,
-    put_plane,
-    put_row,
+    put,
     row_at,
     rows_at,
     times,
 )
 from .waves import (
+    Number,
     Plane,
+    Row,
     beyond_body,
     beyond_offset,
     beyond_spring,
@@ -87,20 +89,15 @@ AXIS = read_only(np.array([[1.0], [0.0], [0.0], [0.0]]))  # the condition W = 0 
 @compiled
 def _work(rows: int) -> Work:
     """Return the scratch arrays of a chain of that number of rows."""
-    number = np.complex128
+    number, by_row = np.complex128, (rows, BLOCK)
     return Work(
         np.empty((rows + 1, PLANE_SIZE), number),
-        np.empty((rows, BLOCK), np.int64),
-        np.empty((rows, BLOCK), number),
-        np.empty((rows, BLOCK), np.int64),
-        np.empty((rows, BLOCK), np.bool_),
-        np.empty((rows, NUMBERS_SIZE), number),
-        np.empty((rows, FUNCTIONS_SIZE), number),
-        np.empty((rows, FUNCTIONS_SIZE), number),
-        np.empty(ROW_SIZE, number),
-        np.empty(FUNCTIONS_SIZE, number),
-        np.empty(BLOCK, number),
-        np.empty(BLOCK, number),
+        np.empty((rows, WAVES_SIZE), number),
+        np.empty(by_row, np.int64),
+        np.empty(by_row, number),
+        np.empty(by_row, np.int64),
+        np.empty(by_row, np.bool_),
+        np.empty(PLANE_SIZE, number),
         np.empty(BLOCK, number),
         np.empty(BLOCK, number),
         np.empty(BLOCK, np.bool_),
@@ -113,30 +110,40 @@ def _sweep(points: Any, rows: Any, ends: Any, work: Work, lost: Any) -> None:
     for i in range(BLOCK):
         S = points[i] * points[i]
         mass, shear, inertia, moment = tip_conditions(ends, S)
-        put_plane(work.planes[0], i, end_plane(mass, shear + 0.0 * S, inertia, moment + 0.0 * S))
+        put(work.planes[0], i, end_plane(mass, shear + 0.0 * S, inertia, moment + 0.0 * S))
     work.scale[:], lost[:], work.watched[:], work.powers[:] = 0.0, False, False, 0
     for j in range(len(rows)):
-        if rows[j, ROW_KIND] == SEGMENT:
-            cross(points, rows[j], j, work, lost)
+        row, outer, inner = rows[j], work.planes[j], work.planes[j + 1]
+        if row[ROW_KIND] == SEGMENT:
+            cross(points, row, j, work, lost)
         else:
             for i in range(BLOCK):
-                p = inside(rows[j], points[i], points[i] * points[i], plane_at(work.planes[j], i))
-                put_plane(work.planes[j + 1], i, p)
-        _brought_back(work.planes[j + 1], 5, work.powers[j])
+                put(inner, i, inside(row[ROW_KIND], row, points[i], points[i] * points[i], plane_at(outer, i)))
+        _brought_back(inner, 5, work.powers[j])
         for i in range(BLOCK):
             work.scale[i] += work.powers[j, i] * LN_2
 
 
 @inlined
-def inside(row: Any, s: Any, S: Any, p: Plane) -> Plane:
+def inside(kind: int, row: Any, s: Number, S: Number, p: Plane) -> Plane:
     """Return the plane inside an offset, a spring, a body or a mark."""
-    if row[ROW_KIND] == OFFSET:
+    if kind == OFFSET:
         return inside_offset(row[REACH], p)
-    if row[ROW_KIND] == SPRING:
-        return inside_spring(row[STIFFNESS] + row[LOSS] * s, row[COMPLIANCE] + 0.0 * s, p)
-    if row[ROW_KIND] == MARK:
-        return p
-    return inside_body(row[MASS] * S + row[GROUND], row[INERTIA] * S + row[TURNING_GROUND], p)
+    if kind == SPRING:
+        return inside_spring(s * row[LOSS] + row[STIFFNESS], 0 * s + row[COMPLIANCE], p)
+    if kind == BODY:
+        return inside_body(S * row[MASS] + row[GROUND], S * row[INERTIA] + row[TURNING_GROUND], p)
+    return p
+
+
+@inlined
+def beyond(kind: int, row: Any, s: Number, S: Number, f: Row) -> Row:
+    """Return the condition beyond an offset, a spring or a body."""
+    if kind == OFFSET:
+        return beyond_offset(row[REACH], f)
+    if kind == SPRING:
+        return beyond_spring(s * row[LOSS] + row[STIFFNESS], 0 * s + row[COMPLIANCE], f)
+    return beyond_body(S * row[MASS] + row[GROUND], S * row[INERTIA] + row[TURNING_GROUND], f)
 
 
 @compiled
@@ -156,16 +163,16 @@ def _brought_back(buffer: Any, parts: int, powers: Any) -> None:
 @compiled
 def _go_back(points: Any, rows: Any, outermost: int, work: Work, differs: bool, lost: Any) -> None:
     """Compute the state at each mark, in place of its plane, from the condition of the axis carried outwards."""
-    axis, reach, is_root = work.planes[len(rows)], 0.0, True
+    axis, back, reach, is_root = work.planes[len(rows)], work.back, 0.0, True
     scale, shift = np.zeros(BLOCK, np.complex128), np.zeros(BLOCK, np.int64)
     for i in range(BLOCK):
-        _, work.theta[i], _, _ = met(row_at(work.condition, i), plane_at(axis, i))
-    work.lift[:], work.turn[:] = 0.0, 0.0  # W = 0 on the axis, of a mode also where another condition determines it
+        work.theta[i] = met(row_at(back, i), plane_at(axis, i))[1]
+    back[LIFT:BY_SERIES] = 0.0  # W = 0 on the axis, of a mode also where another condition determines it
     for j in range(len(rows) - 1, outermost - 1, -1):
         row = rows[j]
         if row[ROW_KIND] == MARK:
             work.scales[j], work.shifts[j] = scale, shift
-            _meet(work, j, is_root, reach, shift)
+            _meet(work.planes[j + 1], work, is_root, reach, shift)
             for i in range(BLOCK):
                 lost[i] = lost[i] or (work.watched[i] and not is_root)  # there W, M and Q may have lost digits
         elif row[ROW_KIND] == SEGMENT:
@@ -174,42 +181,38 @@ def _go_back(points: Any, rows: Any, outermost: int, work: Work, differs: bool, 
             cross_back(points, row, j, work, scale)
             reach, is_root = reach + row[LENGTH], False
         else:
-            _beyond(points, row, j, work, shift)
+            _beyond(points, row, work.planes[j + 1], back, shift)
             reach += row[REACH] if row[ROW_KIND] == OFFSET else 0.0
         shift -= work.powers[j]
-        _brought_back(work.condition, 4, shift)
+        _brought_back(back, 4, shift)
 
 
 @compiled
-def _meet(work: Work, j: int, is_root: bool, reach: float, shift: Any) -> None:
+def _meet(state: Any, work: Work, is_root: bool, reach: float, shift: Any) -> None:
     """Compute the state of a mark, its plane's with the condition there, and W - r theta and Psi - theta.
 
     At the root, inside of all segments, W is their sum, without a difference.
     """
-    state = work.planes[j + 1]
+    back = work.back
     for i in range(BLOCK):
-        put_row(state, i, met(row_at(work.condition, i), plane_at(state, i)))
-        state[LIFT + i], state[TURN + i] = work.lift[i], work.turn[i]
+        put(state, i, met(row_at(back, i), plane_at(state, i)))
         if is_root:
-            state[i] = times(times(work.theta[i], reach) + work.lift[i], math.ldexp(1.0, -shift[i]))
+            state[i] = times(times(work.theta[i], reach) + back[LIFT + i], math.ldexp(1.0, -shift[i]))
+    state[LIFT:BY_SERIES] = back[LIFT:BY_SERIES]
 
 
 @compiled
-def _beyond(points: Any, row: Any, j: int, work: Work, shift: Any) -> None:
+def _beyond(points: Any, row: Any, inner: Any, back: Any, shift: Any) -> None:
     """Compute condition, W - r theta and Psi - theta beyond an offset, a spring or a body, in place."""
+    kind = row[ROW_KIND]
     for i in range(BLOCK):
-        s, S, f = points[i], points[i] * points[i], row_at(work.condition, i)
-        if row[ROW_KIND] == OFFSET:
-            work.lift[i] += row[REACH] * work.turn[i]
-            f = beyond_offset(row[REACH], f)
-        elif row[ROW_KIND] == SPRING:
-            _, _, moment, _ = met(f, plane_at(work.planes[j + 1], i))
-            stiffness = row[STIFFNESS] + row[LOSS] * s
-            work.turn[i] += row[COMPLIANCE] * reciprocal(stiffness) * times(moment, math.ldexp(1.0, shift[i]))
-            f = beyond_spring(stiffness, row[COMPLIANCE] + 0.0 * s, f)
-        else:
-            f = beyond_body(row[MASS] * S + row[GROUND], row[INERTIA] * S + row[TURNING_GROUND], f)
-        put_row(work.condition, i, f)
+        s, f = points[i], row_at(back, i)
+        if kind == OFFSET:
+            back[LIFT + i] += row[REACH] * back[TURN + i]
+        elif kind == SPRING:
+            moment = times(met(f, plane_at(inner, i))[2], math.ldexp(1.0, shift[i]))
+            back[TURN + i] += row[COMPLIANCE] * reciprocal(s * row[LOSS] + row[STIFFNESS]) * moment
+        put(back, i, beyond(kind, row, s, s * s, f))
 
 
 @compiled
@@ -218,21 +221,21 @@ def _beyond_segment(points: Any, row: Any, j: int, work: Work, reach: float, shi
 
     It is `waves.transition_rows` from the other end, with the other sign of Psi and Q, minus the identity.
     """
-    series = work.series[j]
+    inner, waves, back = work.planes[j + 1], work.waves[j], work.back
     for i in range(BLOCK):
         if not work.low[j, i]:
-            work.lift[i] = complex(np.nan, 0.0)
+            back[LIFT + i] = complex(np.nan, 0.0)
             continue
-        _, _, M, Q = met(row_at(work.condition, i), plane_at(work.planes[j + 1], i))
-        M, Q = times(M, math.ldexp(1.0, shift[i])), times(Q, math.ldexp(1.0, shift[i]))
-        W, Psi = times(work.theta[i], reach) + work.lift[i], work.theta[i] + work.turn[i]
-        of_W, of_Psi, _, _ = rows_at(points[i], row, series, i)
-        S, F1 = points[i] * points[i], series[BLOCK + i]
-        even = series[F3_LESS_1 + i] - row[CHAIN_A] * S * of_W[2]
-        odd = series[F3_LESS_1 + i] - row[CHAIN_B] * S * F1
-        work.lift[i] += row[LENGTH] * work.turn[i]
-        work.lift[i] += even * W + series[F2_LESS_1 + i] * Psi + of_W[2] * M - of_W[3] * Q
-        work.turn[i] += odd * Psi - of_Psi[0] * W - of_Psi[2] * M + of_Psi[3] * Q
+        unit, (_, _, M, Q) = math.ldexp(1.0, shift[i]), met(row_at(back, i), plane_at(inner, i))
+        M, Q, lift, turn = times(M, unit), times(Q, unit), back[LIFT + i], back[TURN + i]
+        W, Psi = times(work.theta[i], reach) + lift, work.theta[i] + turn
+        of_W, of_Psi, _, _ = rows_at(points[i], row, waves, i)
+        S = points[i] * points[i]
+        even = waves[F3_LESS_1 + i] - row[CHAIN_A] * S * of_W[2]
+        odd = waves[F3_LESS_1 + i] - row[CHAIN_B] * S * waves[F1 + i]
+        lift += row[LENGTH] * turn
+        back[LIFT + i] = lift + (even * W + waves[F2_LESS_1 + i] * Psi + of_W[2] * M - of_W[3] * Q)
+        back[TURN + i] = turn + (odd * Psi - of_Psi[0] * W - of_Psi[2] * M + of_Psi[3] * Q)
 
 
 @inlined
@@ -270,7 +273,8 @@ def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, l
         _sweep(points, rows, ends, work, lost_here)
         for i in range(BLOCK):
             at = min(first + min(i, n - 1), axis.shape[1] - 1)
-            put_row(work.condition, i, (axis[0, at], axis[1, at], axis[2, at], axis[3, at]))
+            for j in range(4):
+                work.back[BLOCK * j + i] = axis[j, at]
         _drive(points, segment, ends, work.planes[len(rows)], values[0], lost_here)
         _go_back(points, rows, outermost, work, differs, lost_here)
         for o in range(len(table)):

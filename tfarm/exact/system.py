@@ -75,11 +75,11 @@ class Offset(NamedTuple):
 
 
 class Spring(NamedTuple):
-    """A rotational spring with a dashpot, k (1 + c s): stiffness = k/(1 + k), compliance = 1/(1 + k), c [s]."""
+    """A rotational spring with a dashpot, k (1 + c s): k/(1 + k), 1/(1 + k) and k c/(1 + k) [s]."""
 
     stiffness: Fraction
     compliance: Fraction
-    damping: float
+    damping: Fraction | float
 
 
 class Body(NamedTuple):
@@ -372,7 +372,7 @@ def _springs(spring: RotarySpring, rotation: Fraction) -> list[Element]:
     if math.isinf(spring.stiffness):
         return []
     k = Fraction(spring.stiffness) * rotation
-    return [Spring(k / (1 + k), 1 / (1 + k), spring.damping)]
+    return [Spring(k / (1 + k), 1 / (1 + k), k * Fraction(spring.damping) / (1 + k))]
 
 
 def shear_flexibility(k: System, x: Real) -> Real:

@@ -14,34 +14,31 @@ from typing import Any
 import numpy as np
 
 from .compiled import compiled, inlined
-from .layout import OF_ANGLE
+from .layout import CHAIN_A, OF_ANGLE
 from .pieces import (
     BLOCK,
-    FUNCTIONS_SIZE,
-    GS,
-    NUMBERS_SIZE,
+    BY_SERIES,
+    ONE,
+    PHASE,
+    PLANE_SIZE,
     S_SQUARED,
-    D,
-    all_wave_functions,
-    all_wave_numbers,
+    TWO,
+    WAVES_SIZE,
+    fill_waves,
     finish,
     mark_parallel,
     mark_slow,
-    phases,
-    put_plane,
-    take_where,
+    put,
+    take_low,
     waves_at,
 )
 from .sweep import POLE, drive_at, innermost
 from .waves import (
-    SIGMA,
-    A,
-    B,
-    G,
     Number,
     Plane,
     Row,
     Wave,
+    across_rows,
     across_waves,
     end_plane,
     magnitude,
@@ -53,8 +50,7 @@ from .waves import (
 )
 
 LIFT = 2.0**100  # factor of W at the tip, which would underflow where s^2 W does not
-TIP = 3  # its index among the numbers at the ends
-DRIVE, SCALE, PARTS = 5, 6, 7  # the indices of drive and scale, and the number of all
+TIP, DRIVE, SCALE, PARTS = 3, 5, 6, 7  # the indices of W at the tip, drive and scale among the numbers at the ends
 
 
 @inlined
@@ -72,13 +68,6 @@ def from_waves(one: Wave, two: Wave, gS: Number, d: Number, tip: Row) -> Row:
 
 
 @inlined
-def _of_tip(row: Row, tip: Row) -> tuple[Number, Number]:
-    """Return a row of the transition matrix times two states of the tip's conditions, one with W and Q alone."""
-    mass, shear, inertia, moment = tip
-    return shear * row[0] - mass * row[3], moment * row[1] - inertia * row[2]
-
-
-@inlined
 def from_transition(s: complex, row: Any, tip: Row) -> Plane:
     """Return (theta, M0, Q0, W1, W1 - theta) of the free response, up to one factor, without wave numbers.
 
@@ -86,12 +75,11 @@ def from_transition(s: complex, row: Any, tip: Row) -> Plane:
     """
     S, over_d, z_sum, z_product = wave_sums(s, row)
     F0, F1, F2, F3, F2_less_1, _ = transition_series(z_sum, z_product)
-    of_W, of_Psi, of_M, of_Q = transition_rows(F0, F1, F2, F3, S, over_d, row[A], row[B], row[G], row[SIGMA])
-    (W1, W2), (Psi1, Psi2) = _of_tip(of_W, tip), _of_tip(of_Psi, tip)
-    (M1, M2), (Q1, Q2) = _of_tip(of_M, tip), _of_tip(of_Q, tip)
-    theta, M, Q = W1 * Psi2 - W2 * Psi1, W1 * M2 - W2 * M1, W1 * Q2 - W2 * Q1  # of that sum with W = 0 at the root
-    at_tip = -tip[1] * W2  # not theta F2 + rest: that cancels for a heavy payload
-    return theta, M, Q, at_tip, theta * F2_less_1 + of_W[2] * M - of_W[3] * Q
+    rows = transition_rows((F0, F1, F2, F3), S, over_d, row[CHAIN_A:])
+    theta, M, Q, _, _ = across_rows(*rows, end_plane(*tip))
+    (_, of_Psi, of_M, of_Q), (_, shear, inertia, moment) = rows[0], tip
+    at_tip = shear * (inertia * of_M - moment * of_Psi)  # not theta F2 + rest: that cancels for a heavy payload
+    return theta, M, Q, at_tip, theta * F2_less_1 + of_M * M - of_Q * Q
 
 
 @compiled
@@ -102,8 +90,7 @@ def fill_ends(s: Any, rows: Any, ends: Any, table: Any, per_input: bool, found: 
     power of s, unit, C of its gauge.  Outputs are those of a unit input with `per_input`, else times e^{-scale}.
     """
     points, low, flags = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.bool_), np.empty(BLOCK, np.bool_)
-    numbers, functions = np.empty(NUMBERS_SIZE, np.complex128), np.empty(FUNCTIONS_SIZE, np.complex128)
-    parts, row = np.empty(PARTS * BLOCK, np.complex128), innermost(rows)
+    parts, waves, row = np.empty(PLANE_SIZE, np.complex128), np.empty(WAVES_SIZE, np.complex128), innermost(rows)
     small = 1.0 / max(1.0, ends[OF_ANGLE + 1], ends[OF_ANGLE + 2])  # against overflow of squares of a heavy hub's drive
     for first in range(0, s.size, BLOCK):
         n = min(BLOCK, s.size - first)
@@ -111,17 +98,15 @@ def fill_ends(s: Any, rows: Any, ends: Any, table: Any, per_input: bool, found: 
         points[:n], points[n:] = s[here], s[first]
         slow = mark_slow(points, row, low)
         if slow < BLOCK:
-            all_wave_numbers(points, row, numbers)
-            all_wave_functions(numbers, functions)
-            _by_waves(ends, numbers, functions, parts)
+            fill_waves(points, row, waves)
+            _by_waves(ends, waves, parts)
         if slow:
-            other = parts.copy() if slow < BLOCK else parts
-            _by_series(points, row, ends, other)
-            if slow < BLOCK:
-                take_where(low, other, parts)
+            at = 0 if slow == BLOCK else BY_SERIES
+            _by_series(points, row, ends, parts[at:])
+            take_low(low, parts, at, PARTS)
         _driven(points, row, ends, small, per_input, parts, flags)
         if slow < BLOCK:
-            mark_parallel(numbers, low, flags)
+            mark_parallel(waves, low, flags)
         lost[here] = flags[:n]
         found[0, here], found[1, here] = parts[DRIVE * BLOCK :][:n], parts[SCALE * BLOCK :][:n]
         for o in range(len(table)):
@@ -131,17 +116,15 @@ def fill_ends(s: Any, rows: Any, ends: Any, table: Any, per_input: bool, found: 
 
 
 @compiled
-def _by_waves(ends: Any, numbers: Any, functions: Any, parts: Any) -> None:
+def _by_waves(ends: Any, waves: Any, parts: Any) -> None:
     """Compute theta, M, Q, W and W - theta times e^{-scale}, and scale, by the two waves."""
     for i in range(BLOCK):
-        S, d, gS = numbers[S_SQUARED + i], numbers[D + i], numbers[GS + i]
-        one, two = waves_at(numbers, functions, i)
-        theta, M, Q, W = from_waves(one, two, gS, d, tip_conditions(ends, S))
+        one, two, gS, d = waves_at(waves, i)
+        theta, M, Q, W = from_waves(one, two, gS, d, tip_conditions(ends, waves[S_SQUARED + i]))
         gap = one[2] - two[2]
         unit = reciprocal(gS * d * gap * gap)
-        put_plane(parts, i, (theta * unit, M * unit, Q * unit, (LIFT * W) * unit, (W - theta) * unit))
-        t1, t2 = phases(numbers, i)
-        parts[SCALE * BLOCK + i] = t1 + t2
+        put(parts, i, (theta * unit, M * unit, Q * unit, (LIFT * W) * unit, (W - theta) * unit))
+        parts[SCALE * BLOCK + i] = waves[ONE + PHASE + i] + waves[TWO + PHASE + i]
 
 
 @compiled
@@ -149,7 +132,7 @@ def _by_series(points: Any, row: Any, ends: Any, parts: Any) -> None:
     """Compute the same by the series of the transition functions, at slow points."""
     for i in range(BLOCK):
         theta, M, Q, W, Y = from_transition(points[i], row, tip_conditions(ends, points[i] * points[i]))
-        put_plane(parts, i, (theta, M, Q, LIFT * W, Y))
+        put(parts, i, (theta, M, Q, LIFT * W, Y))
     parts[SCALE * BLOCK : PARTS * BLOCK] = 0.0  # in the loop above it would prevent vectorisation
 
 

@@ -10,6 +10,7 @@ appendix      the paper's 4x4 determinant and Cramer's rule with mpmath, at a pr
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -27,10 +28,10 @@ from tfarm.records import record
 from tfarm.schema import Quantity
 
 from . import appendix
-from .balls import Ball, first_success, nearest_float, output_ball, point, rational
-from .layout import Layout, Reading, constant_of, readings
+from .balls import Ball, Sweep, first_success, nearest_float, point, rational
+from .layout import Layout, Reading, readings
 from .outputs import Output
-from .series import expansion_at_zero
+from .series import constant_of, expansion_at_zero
 from .sweep import AXIS, fill_free
 from .system import Place, System
 from .uniform import fill_ends
@@ -69,16 +70,18 @@ def free_of(layout: Layout, s: Complex) -> Free:
     return Free(found[0], found[2:], found[1], lost)
 
 
-def _filled(layout: Layout, s: Complex, *, per_input: bool = False) -> tuple[Complex, NDArray[np.bool_]]:
+def _filled(
+    layout: Layout, s: Complex, axis: Real = AXIS, *, per_input: bool = False
+) -> tuple[Complex, NDArray[np.bool_]]:
     """Return drive, scale and outputs (rows), for a unit input if `per_input`; the fast path where it applies."""
     found, lost = np.empty((2 + len(layout.each), s.size), complex), np.empty(s.size, bool)
     s, ends = np.ascontiguousarray(s, dtype=complex), layout.ends_table
-    if ends is None:
-        fill_free(s, layout.rows, layout.ends, AXIS, layout.table, found, lost)
-        if per_input:
-            found[2:] /= found[0]
-    else:
+    if ends is not None:
         fill_ends(s, layout.rows, layout.ends, ends, per_input, found, lost)
+        return found, lost
+    fill_free(s, layout.rows, layout.ends, axis, layout.table, found, lost)
+    if per_input:
+        found[2:] /= found[0]
     return found, lost
 
 
@@ -118,15 +121,12 @@ def free_fields(
     """
     places = tuple(places)
     if places not in chain.kept:
-        unit = 0, Fraction(1)  # power of s, and factor
-        each = [Reading(place, field, Fraction(0), *unit) for place in places for field in range(4)]
-        angle = Reading(None, -1, Fraction(1), *unit)
-        chain.kept[places] = Layout(chain, tuple(dict.fromkeys(places)), (*each, angle))
-    layout = chain.kept[places]
-    found, lost = np.empty((2 + len(layout.each), s.size), complex), np.empty(s.size, bool)
-    fill_free(np.ascontiguousarray(s, dtype=complex), layout.rows, layout.ends, axis, layout.table, found, lost)
-    fields = found[2:-1].reshape(len(places), 4, s.size).transpose(1, 2, 0)
-    return fields, found[-1], found[1]
+        zero, one = Fraction(0), Fraction(1)
+        each = [Reading(place, field, zero, 0, one) for place in places for field in range(4)]
+        layout = Layout(chain, tuple(dict.fromkeys(places)), (*each, Reading(None, -1, one, 0, one)))
+        chain.kept[places] = layout
+    found, _ = _filled(chain.kept[places], s, axis)
+    return found[2:-1].reshape(len(places), 4, s.size).transpose(1, 2, 0), found[-1], found[1]
 
 
 # ------------------------------------------------------------ outputs for a unit input
@@ -190,17 +190,27 @@ def _refuse_pole(k: System, wanted: Output, s: complex, x: float) -> None:
 # ------------------------------------------------------------ enclosures, at a growing precision
 
 
+def output_ball(k: System, wanted: Output, s: Ball, x: float) -> Ball | None:
+    """Return an output for a unit input at s, in SI units; None where the input of the free response may be zero."""
+    layout, constant = readings(k, (wanted,), x), constant_of(k, wanted, x)
+    (one,) = layout.each
+    if constant is not None:
+        return s**one.power * constant * rational(one.unit) / (1 + rational(one.C) * s)
+    sweep = Sweep(layout, s)
+    return None if sweep.input.contains(0) else sweep.output(one) / sweep.input
+
+
+def known(value: Ball | None, bits: int) -> Ball | None:
+    """Return a ball with that many right bits, or of 0 alone; None for any other."""
+    return value if value is not None and (value.rel_accuracy_bits() >= bits or value.is_zero()) else None
+
+
 def enclose(k: System, wanted: Output, s: complex, *, bits: int, x: float = 0.0) -> Ball:
     """Return a ball around the output at s with a relative radius below 2^-bits.
 
     Raises CertificationError where that needs more than `MOST_ENCLOSURE_BITS`: at a pole or an exact zero.
     """
-
-    def attempt() -> Ball | None:
-        value = output_ball(k, wanted, point(s), x)
-        return value if value is not None and (value.rel_accuracy_bits() >= bits or value.is_zero()) else None
-
-    return certified(bits, attempt, f"{bits} bits", s)
+    return certified(bits, lambda: known(output_ball(k, wanted, point(s), x), bits), f"{bits} bits", s)
 
 
 def slope(k: System, wanted: Output, s: complex, *, bits: int = 60, x: float = 0.0) -> Ball:
@@ -233,12 +243,14 @@ def digits_of(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0
         value = output_ball(k, wanted, point(s), x)
         if value is None:
             return None
-        parts = zip(vanish, (value.real, value.imag), strict=True)
-        known = [flint.arb(0) if is_zero else part for is_zero, part in parts]
-        if not all(each.is_zero() or each.rel_accuracy_bits() >= 3.33 * digits + 8 for each in known):
+        zero, bits = flint.arb(0), math.ceil(3.33 * digits) + 8
+        re, im = (zero if is_zero else part for is_zero, part in zip(vanish, (value.real, value.imag), strict=True))
+        if known(re, bits) is None or known(im, bits) is None:
             return None
-        re, im = ("0.0" if each.is_zero() else str(each.mid().str(digits, radius=False)) for each in known)
-        return re, im
+        return written(re), written(im)
+
+    def written(part: Ball) -> str:
+        return "0.0" if part.is_zero() else str(part.mid().str(digits, radius=False))
 
     return certified(4 * digits, attempt, f"{digits} digits", s)
 
@@ -304,7 +316,7 @@ class ByMethod:
         self,
     ) -> Annotated[str, Quantity("methods", help="methods compared, and whether they differ by rounding alone")]:
         """The agreement of the methods in words."""
-        word = "agree to rounding" if self.agree else "differ by more than rounding"
+        word = "agree to rounding" if self.largest_difference <= METHODS_AGREE else "differ by more than rounding"
         return f"{', '.join(self.values)}: {word}"
 
     def rows(self, at: Sequence[Any]) -> list[MethodRow]:
@@ -312,11 +324,6 @@ class ByMethod:
         values, apart = self.values["closed-form"].tolist(), {k: v.tolist() for k, v in self.differences.items()}
         balls, appendix = (apart.get(name, [None] * len(values)) for name in ("balls", "appendix"))
         return list(map(MethodRow, at, values, balls, appendix))
-
-    @property
-    def agree(self) -> bool:
-        """Whether they differ by rounding alone."""
-        return self.largest_difference <= METHODS_AGREE
 
 
 def by_method(value: Callable[[Method], NDArray[Any]], no_appendix: str) -> ByMethod:

@@ -52,6 +52,7 @@ import numpy as np
 from .compiled import compiled, fma, inlined
 
 Number = Any  # float, complex, ndarray, series or ball
+Double = tuple[complex, complex]  # a number as a sum of two, the second below the last place of the first
 
 # The indices of a segment's row of the kernel: a, b, g as two doubles each, sigma and C (`layout.kernel_row`).
 A, A_LOW, B, B_LOW, G, G_LOW, SIGMA, DAMPING = range(8)
@@ -63,7 +64,7 @@ PARALLEL = 0.15  # |z_1 - z_2| below this share of |z_1| + |z_2|: flagged
 
 
 @inlined
-def _two_sum(a: complex, b: complex) -> tuple[complex, complex]:
+def _two_sum(a: complex, b: complex) -> Double:
     """Return total and error with a + b = total + error exactly (Knuth 1969), real and imaginary part each."""
     total = a + b
     shadow = total - a
@@ -71,7 +72,7 @@ def _two_sum(a: complex, b: complex) -> tuple[complex, complex]:
 
 
 @inlined
-def _two_product(a: complex, b: complex) -> tuple[complex, complex]:
+def _two_product(a: complex, b: complex) -> Double:
     """Return product and error of a b, the error to about 2^-100 of |a b|."""
     rr, ii, ri, ir = a.real * b.real, a.imag * b.imag, a.real * b.imag, a.imag * b.real
     product, rest = _two_sum(complex(rr, ri), complex(-ii, ir))
@@ -83,11 +84,18 @@ def _two_product(a: complex, b: complex) -> tuple[complex, complex]:
 
 
 @inlined
-def _scaled(high: float, low: float, x: complex, x_low: complex) -> tuple[complex, complex]:
-    """Return (high + low) (x + x_low) for a real double-double and a complex one."""
-    product = high * x
-    split = complex(fma(high, x.real, -product.real), fma(high, x.imag, -product.imag))
+def _scaled(high: float, low: float, number: Double) -> Double:
+    """Return (high + low) times a double-double."""
+    x, x_low = number
+    product, split = _times_real(high, x)
     return product, split + (high * x_low + low * x)
+
+
+@inlined
+def _times_real(a: float, x: complex) -> Double:
+    """Return product and error of a x exactly."""
+    product = a * x
+    return product, complex(fma(a, x.real, -product.real), fma(a, x.imag, -product.imag))
 
 
 @inlined
@@ -114,53 +122,39 @@ def magnitude(z: complex) -> float:
 
 
 @inlined
-def dispersion(s: complex, k: Any) -> tuple[complex, ...]:
-    """Return S, d, g S and for both waves z, v = z - b S, t with its correction dt:  e^{-t_j} = e^{-t} (1 - dt).
+def dispersion(s: complex, k: Any) -> tuple[tuple[complex, complex, complex], Row, Row]:
+    """Return S, d, g S, and for both waves z, v = z - b S, t with its correction dt:  e^{-t_j} = e^{-t} (1 - dt).
 
     `k` is the row of a segment: a, b, g as double-doubles, then sigma and C.
     """
-    S, S_low = _two_product(s, s)
-    C = k[DAMPING]
-    d, d_low = _two_sum(complex(1.0, 0.0), C * s)
-    d_low = d_low + complex(fma(C, s.real, -(C * s.real)), fma(C, s.imag, -(C * s.imag)))
-    aS, aS_low = _scaled(k[A], k[A_LOW], S, S_low)
-    bS, bS_low = _scaled(k[B], k[B_LOW], S, S_low)
-    gS, gS_low = _scaled(k[G], k[G_LOW], S, S_low)
+    S = _two_product(s, s)
+    Cs, Cs_low = _times_real(k[DAMPING], s)
+    d, d_low = _two_sum(complex(1.0, 0.0), Cs)
+    d_low = d_low + Cs_low
+    aS, bS, gS = _scaled(k[A], k[A_LOW], S), _scaled(k[B], k[B_LOW], S), _scaled(k[G], k[G_LOW], S)
 
     over_d = reciprocal(d)
-    bend, couple = aS * over_d, gS * over_d
-    mean = 0.5 * (bend + bS)
-    spread = _square_root(0.25 * (bend - bS) * (bend - bS) - couple)
+    bend, couple, shear = aS[0] * over_d, gS[0] * over_d, bS[0]
+    mean = 0.5 * (bend + shear)
+    spread = _square_root(0.25 * (bend - shear) * (bend - shear) - couple)
     spread = spread * (1.0 if mean.real * spread.real + mean.imag * spread.imag >= 0.0 else -1.0)
     z1 = mean + spread  # the larger root; the other from the product, without cancellation
-    z2 = (bend * bS + couple) * reciprocal(z1)
-
-    z1, v1, t1, dt1 = _corrected(z1, d, d_low, aS, aS_low, bS, bS_low, gS, gS_low)
-    z2, v2, t2, dt2 = _corrected(z2, d, d_low, aS, aS_low, bS, bS_low, gS, gS_low)
-    return S, d, gS, z1, v1, t1, dt1, z2, v2, t2, dt2
+    z2 = (bend * shear + couple) * reciprocal(z1)
+    return (S[0], d, gS[0]), _corrected(z1, (d, d_low), aS, bS, gS), _corrected(z2, (d, d_low), aS, bS, gS)
 
 
 @inlined
-def _corrected(
-    z: complex,
-    d: complex,
-    d_low: complex,
-    aS: complex,
-    aS_low: complex,
-    bS: complex,
-    bS_low: complex,
-    gS: complex,
-    gS_low: complex,
-) -> tuple[complex, complex, complex, complex]:
-    """Return z, v, t, dt after a Newton step on (d z - a S)(z - b S) + g S, a double-double residual."""  # fmt: skip
+def _corrected(z: complex, damper: Double, aS: Double, bS: Double, gS: Double) -> Row:
+    """Return z, v, t, dt after a Newton step on (d z - a S)(z - b S) + g S, a double-double residual."""
+    (d, d_low), (gS_high, gS_low) = damper, gS
     dz, dz_low = _two_product(d, z)
     dz_low = dz_low + d_low * z
-    u, u_low = _two_sum(dz, -aS)
-    u_low = u_low + (dz_low - aS_low)
-    v, v_low = _two_sum(z, -bS)
-    v_low = v_low - bS_low
+    u, u_low = _two_sum(dz, -aS[0])
+    u_low = u_low + (dz_low - aS[1])
+    v, v_low = _two_sum(z, -bS[0])
+    v_low = v_low - bS[1]
     uv, uv_low = _two_product(u, v)
-    residual = (uv + gS) + (uv_low + (u * v_low + u_low * v) + gS_low)
+    residual = (uv + gS_high) + (uv_low + (u * v_low + u_low * v) + gS_low)
     step = -residual * reciprocal(d * v + u)
     t = _square_root(z)
     square, square_low = _two_product(t, t)
@@ -171,24 +165,24 @@ def _corrected(
 
 @compiled
 def fill_wave_numbers(s: Any, k: Any, found: Any) -> None:
-    """Compute z, v and t of both waves at s (1-D), the larger z first: rows of `found` (6, n)."""
+    """Compute z, v and t of both waves at s (1-D), the larger z first: `found` (2, 3, n)."""
     for i in range(s.size):
-        _, _, _, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(s[i], k)
-        found[0, i], found[1, i], found[2, i] = z1, v1, t1 + dt1
-        found[3, i], found[4, i], found[5, i] = z2, v2, t2 + dt2
+        _, one, two = dispersion(s[i], k)
+        for n, (z, v, t, dt) in enumerate((one, two)):
+            found[n, 0, i], found[n, 1, i], found[n, 2, i] = z, v, t + dt
 
 
 @inlined
-def wave_functions(z: complex, t: complex, dt: complex) -> tuple[complex, complex, complex]:
-    """Return c = cosh t e^{-t}, S = sinh t / t e^{-t} and e = e^{-t}, with t + dt for t."""
-    decay = math.exp(-t.real)
+def wave_functions(z: complex, t: complex, dt: complex) -> Row:
+    """Return c = cosh t e^{-t}, S = sinh t / t e^{-t}, e = e^{-t} and t, with t + dt for t."""
+    decay, phase = math.exp(-t.real), t + dt
     e = decay * complex(math.cos(t.imag), -math.sin(t.imag))
     if abs(z.real) + abs(z.imag) < 1.0:  # 1 - e^2 would cancel; here e is a common factor
         c, s = even_functions(z)
-        return e * c, e * s, e
+        return e * c, e * s, e, phase
     e = e - e * dt
     half_square = 0.5 * (e * e)
-    return 0.5 + half_square, (0.5 - half_square) * reciprocal(t + dt), e
+    return 0.5 + half_square, (0.5 - half_square) * reciprocal(phase), e, phase
 
 
 @inlined
@@ -220,7 +214,7 @@ def _series(shift: int, z_sum: Number, z_product: Number) -> tuple[Number, Numbe
 
 
 @inlined
-def transition_series(z_sum: Number, z_product: Number) -> tuple[Number, Number, Number, Number, Number, Number]:
+def transition_series(z_sum: Number, z_product: Number) -> tuple[Number, ...]:
     """Return F0, F1, F2, F3 at the tip, F2 - 1 and F3 - 1 as series, to 1e-17 for |z| < 6."""
     F0, _ = _series(3, z_sum, z_product)
     F1, _ = _series(2, z_sum, z_product)
@@ -240,7 +234,7 @@ def even_functions(z: Number) -> tuple[Number, Number]:
 
 
 @inlined
-def tip_conditions(ends: Any, S: Number) -> tuple[Number, Number, Number, Number]:
+def tip_conditions(ends: Any, S: Number) -> Row:
     """Return tip_mass, shear, tip_inertia and moment of the tip's conditions at S = s^2 from the vector of ends.
 
     Rest, inertia and force of the mass come first and those of the inertia next (see `system.end_condition`).
@@ -342,20 +336,13 @@ def across_waves(one: Wave, two: Wave, gS: Number, d: Number, p: Plane) -> Plane
 
 
 @inlined
-def transition_rows(
-    F0: Number,
-    F1: Number,
-    F2: Number,
-    F3: Number,
-    S: Number,
-    over_d: Number,
-    a: Number,
-    b: Number,
-    g: Number,
-    sigma: Number,
-) -> tuple[Row, Row, Row, Row]:
-    """Return the matrix from the state at the outer end of a segment to that at the inner end, by F0..F3."""
-    aS, bS, gS = a * S, b * S, g * S
+def transition_rows(F: Row, S: Number, over_d: Number, k: Any) -> tuple[Row, Row, Row, Row]:
+    """Return the matrix from the state at the outer end of a segment to that at the inner end, by F0..F3.
+
+    `k` are a, b, g and sigma.
+    """
+    (F0, F1, F2, F3), sigma = F, k[3]
+    aS, bS, gS = k[0] * S, k[1] * S, k[2] * S
     even, odd = F3 - aS * over_d * F1, F3 - bS * F1
     bend, lift = F2 - bS * F0, F2 - aS * over_d * F0
     return (
@@ -369,9 +356,7 @@ def transition_rows(
 @inlined
 def _minor(i: Row, j: Row, p: Plane) -> Number:
     """Return q_ij of the carried plane: the minors of rows i and j times p."""
-    WPsi, WM, WQ, PsiQ, MQ = p
-    i0, i1, i2, i3 = i
-    j0, j1, j2, j3 = j
+    (i0, i1, i2, i3), (j0, j1, j2, j3), (WPsi, WM, WQ, PsiQ, MQ) = i, j, p
     return (
         (i0 * j1 - i1 * j0) * WPsi
         + (i0 * j2 - i2 * j0) * WM
@@ -441,10 +426,11 @@ def row_across_waves(one: Wave, two: Wave, gS: Number, d: Number, f: Row) -> Row
 @inlined
 def row_across(W: Row, Psi: Row, M: Row, Q: Row, f: Row) -> Row:
     """Return the condition carried outwards by `transition_rows`, f T^-1."""
-    f_W, f_Psi, f_M, f_Q = f
-    return (
-        f_W * W[0] + f_Psi * Psi[0] + f_M * M[0] + f_Q * Q[0],
-        f_W * W[1] + f_Psi * Psi[1] + f_M * M[1] + f_Q * Q[1],
-        f_W * W[2] + f_Psi * Psi[2] + f_M * M[2] + f_Q * Q[2],
-        f_W * W[3] + f_Psi * Psi[3] + f_M * M[3] + f_Q * Q[3],
-    )
+    T = W, Psi, M, Q
+    return _column(f, T, 0), _column(f, T, 1), _column(f, T, 2), _column(f, T, 3)
+
+
+@inlined
+def _column(f: Row, T: tuple[Row, Row, Row, Row], j: int) -> Number:
+    """Return entry j of the row f T."""
+    return f[0] * T[0][j] + f[1] * T[1][j] + f[2] * T[2][j] + f[3] * T[3][j]

@@ -28,9 +28,9 @@ from tfarm.arm.blocks import Matrices, Rational
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, require
-from tfarm.exact.layout import constant_of, unit_scale
+from tfarm.exact.layout import unit_scale
 from tfarm.exact.outputs import OUTPUTS, Output
-from tfarm.exact.series import without_slow_pole
+from tfarm.exact.series import constant_of, without_slow_pole
 from tfarm.exact.system import System
 from tfarm.exact.values import evaluate_outputs, free_slopes
 from tfarm.response import TransferFunction, Wanted, transfer

@@ -22,10 +22,9 @@ from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import MISSING, require
 from tfarm.exact.balls import nearest_float
 from tfarm.exact.characteristic import Analytic, characteristic, deflated, off_rest
-from tfarm.exact.layout import constant_of
 from tfarm.exact.loads import is_load, load_of, loaded_value
 from tfarm.exact.outputs import Output, output
-from tfarm.exact.series import expansion_at_zero, order_at_zero
+from tfarm.exact.series import constant_of, expansion_at_zero, order_at_zero
 from tfarm.exact.system import System, system_of
 from tfarm.exact.values import (
     ByMethod,

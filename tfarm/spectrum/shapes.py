@@ -264,23 +264,23 @@ def _of_segment(segment: Segment, row: Real, omega: Real, ends: Real, own: Real,
 
     `row` is the segment for compiled code, `own` are its units.
     """
-    numbers = np.empty((6, omega.size), complex)
+    numbers = np.empty((2, 3, omega.size), complex)
     fill_wave_numbers(1j * omega, row, numbers)
     inner, outer = ends[..., 0] * own, ends[..., 1] * own
-    low = np.maximum(abs(numbers[0]), abs(numbers[3])) < SERIES_RADIUS
+    low = abs(numbers[:, 0]).max(axis=0) < SERIES_RADIUS
     result = np.empty((4, omega.size, x.size))
     result[:, low] = _by_series(segment, omega[low], inner[:, low], x)
-    result[:, ~low] = _by_waves(segment, omega[~low], numbers[:, ~low], inner[:, ~low], outer[:, ~low], x)
+    result[:, ~low] = _by_waves(segment, omega[~low], numbers[..., ~low], inner[:, ~low], outer[:, ~low], x)
     result[:, :, x == 0.0], result[:, :, x == 1.0] = inner[..., None], outer[..., None]
     return result / own[..., None]
 
 
 def _by_series(segment: Segment, omega: Real, inner: Real, x: Real) -> Real:
     """Return W, Psi, M, Q in a slow segment's own units, carried outwards, with the other sign of Psi and Q."""
-    a, b, g, sigma = (float(each) for each in segment[:4])
+    a, b, g, _ = k = [float(each) for each in segment[:4]]
     S, outwards = -(omega[:, None] ** 2), np.array([1.0, -1.0, 1.0, -1.0])[:, None]
     F0, F1, F2, F3, _, _ = _series(S * (a + b) * x**2, S * (a * b * S + g) * x**4)
-    rows = _rows(x**3 * F0, x**2 * F1, x * F2, F3, S, 1.0, a, b, g, sigma)
+    rows = _rows((x**3 * F0, x**2 * F1, x * F2, F3), S, 1.0, k)
     state = (inner * outwards)[..., None]
     carried = [sum(entry * part for entry, part in zip(row, state, strict=True)) for row in rows]
     return np.array(carried).reshape(4, omega.size, x.size) * outwards[..., None]
@@ -289,7 +289,7 @@ def _by_series(segment: Segment, omega: Real, inner: Real, x: Real) -> Real:
 def _by_waves(segment: Segment, omega: Real, numbers: Complex, inner: Real, outer: Real, x: Real) -> Real:
     """Return W, Psi, M, Q in a fast segment's own units, of both waves."""
     gS = -float(segment.g) * omega**2
-    pairs = (numbers[:3], numbers[3:]), (numbers[3:], numbers[:3])
+    pairs = zip(numbers, numbers[::-1], strict=True)
     fields: Any = np.zeros((4, omega.size, x.size), complex)
     for (z, v, t), (other, v_other, _) in pairs:
         (W0, s0), (W1, s1) = (

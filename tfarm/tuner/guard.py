@@ -53,7 +53,7 @@ from tfarm.dsp.crossings import around
 from tfarm.dsp.plant import held_amplitude
 from tfarm.dsp.sampled import first_distinct
 from tfarm.errors import CertificationError, ConvergenceError, must_be_known
-from tfarm.exact.rationals import as_integers, falls, is_positive_definite
+from tfarm.exact.rationals import exact_matrix, falls, is_positive_definite
 from tfarm.loop.margins import lowest
 from tfarm.records import record
 from tfarm.schema import Quantity
@@ -92,7 +92,7 @@ class CommonLyapunov:
             return False
         units = 2.0 ** np.round(-np.log2(diagonal) / 2)
         scaled = self.P * units * units[:, None]
-        P, _ = as_integers(np.round(np.ldexp(scaled / abs(scaled).max(), BITS_OF_P)))
+        P, _ = exact_matrix(np.round(np.ldexp(scaled / abs(scaled).max(), BITS_OF_P))).numer_denom()
         ends = (A * units / units[:, None] for A in (self.low, self.high))
         return is_positive_definite(P) and all(falls(P, A) for A in ends)
 
