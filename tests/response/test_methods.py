@@ -9,24 +9,11 @@ import pytest
 import tfarm
 from tests.shell import refused, run
 from tfarm.errors import ParameterError
-from tfarm.exact.values import METHODS, METHODS_AGREE
+from tfarm.exact.values import METHODS
 
 S = np.array([0.3 + 57.1j, 57.1j, -3.0 + 400.0j, 2.0 + 0j])
 EPS = np.finfo(float).eps
 FLOAT64 = 8 * EPS  # of a frequency polished in float64: a bracket of 15 digits is wider
-
-
-@pytest.mark.parametrize("preset", ["sasaki2012", "sasaki2012-lab", "stocky-steel"])
-def test_three_methods_give_one_number(preset):
-    arm = tfarm.load(preset)
-    for output, x in (("root_moment", None), ("tip_displacement", None), ("moment", 0.3 * arm.link.length)):
-        fast, *slow = (tfarm.transfer(arm, output, x=x, method=method)(S) for method in METHODS)
-        for each in slow:
-            assert each == pytest.approx(fast, rel=METHODS_AGREE, abs=0)
-    table = tfarm.modes(arm, 5)
-    balls, determinant = (table.frequencies(method) for method in METHODS[1:])
-    assert balls == pytest.approx(determinant, rel=EPS, abs=0)  # both are more than 15 digits, rounded once
-    assert table.natural_frequency == pytest.approx(balls, rel=FLOAT64, abs=0)
 
 
 def test_a_method_with_an_error_is_detected(monkeypatch, capsys):

@@ -81,17 +81,6 @@ def test_zeros_are_zeros_and_as_many_as_the_argument_turns(arm: str, wanted: Out
     assert round(turns) == inside[0] - inside[1]
 
 
-def test_reduced_models_take_them() -> None:
-    model, G = tfarm.reduce(STOCKY, [TURN, "hub_rate"], order=8, band=(100.0, 3000.0)), tfarm.transfer(STOCKY, TURN)
-    assert model.outputs == ("tip_rotation", "hub_rate")
-    w = np.linspace(100, 3000, 20)
-    size = abs(G(1j * w)) + abs(w * G.derivative(1j * w))
-    assert (abs(model(1j * w)[0] - G(1j * w)) <= model.worst_error * size).all()
-    assert model.worst_error < 1e-3
-    with pytest.raises(ParameterError, match="lower derivative"):
-        tfarm.reduce(STOCKY, JERK, order=10)
-
-
 HELD = [
     ("lab", "rotation", 0.0, 0.0),
     ("lab", "deflection", 0.0, 0.0),

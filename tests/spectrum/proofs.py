@@ -18,7 +18,7 @@ from tests.survey import Finding, each_of
 from tfarm import CertificationError
 
 MODES = 20
-TERMS = 64  # j_64(w L/c / 2)^2 is below rounding for the waves of twenty modes (test_discretisations)
+TERMS = 64  # j_64(w L/c / 2)^2 is below rounding for the waves of twenty modes
 ROUNDING = 256
 EPS = np.finfo(float).eps
 

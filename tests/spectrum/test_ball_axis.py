@@ -12,7 +12,7 @@ from tests.strategies import BOUNDARY_CASES, some_arm
 from tfarm.arm import THEORIES
 from tfarm.exact import balls
 from tfarm.exact.system import system_of
-from tfarm.spectrum.frequencies import Counter, RealAxis, pinned_count, secant
+from tfarm.spectrum.frequencies import Counter, RealAxis, pinned_count
 
 COUNT = 7
 
@@ -58,17 +58,3 @@ def test_half_waves_are_counted_in_closed_form():
     assert pinned_count([flint.arb(3), flint.arb(2)]) == 0
     assert pinned_count([-flint.arb(pi**2, 1e-9), flint.arb(3)]) is None
     assert pinned_count([flint.arb(0, 1e-9), flint.arb(3)]) is None
-
-
-@pytest.mark.parametrize("arm", list(some_systems())[-3:])
-def test_a_secant_ends_next_to_its_start_with_all_digits(arm):
-    """From a start that has nine digits; a start between two frequencies has no root close by."""
-    omega = tfarm.modes(arm, 3).natural_frequency[-3:]
-    with balls.precision(400):
-        axis = RealAxis(undamped(arm))
-        for each in map(float, omega):
-            root = secant(axis, each, 60)
-            assert abs(root / each - 1) < 4e-16
-            tenth = root * flint.arb(10) ** -61
-            assert axis.drive(root - tenth) * axis.drive(root + tenth) < 0
-        assert secant(axis, float(omega[1] * 0.6 + omega[2] * 0.4), 60) is None

@@ -6,14 +6,10 @@ import re
 import numpy as np
 import pytest
 
-import tfarm
-from tests.spectrum.damped import some_damped_arm
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.spectrum import box as room
 from tfarm.spectrum.box import Box, complete, complete_box, distinct, filled_box, newton, winding_number, zeros_in_box
-from tfarm.spectrum.damped import damped_modes
-from tfarm.spectrum.naming import function_of
 
 UNITS = (2.0**-30, 1.0, 2.0**30)  # of time, which matter nowhere: every tolerance is a share of a size
 
@@ -55,11 +51,6 @@ def with_zeros(zeros, turning=0.0):
         return Analytic(value, slope + 2 * turning * s * value, turning * s**2)
 
     return function
-
-
-def test_a_start_where_the_function_is_flat_is_no_zero():
-    starts = np.array([1e-3, -2e-4, 1.9], dtype=complex)
-    assert newton(polynomial(2.0, -3.0, flat=0.01), starts) == pytest.approx([2.0], rel=1e-14)
 
 
 def test_flat_starts_do_not_stand_in_for_zeros_not_yet_found():
@@ -171,20 +162,6 @@ def test_a_fast_turning_function_is_not_aliased(monkeypatch: pytest.MonkeyPatch)
     assert winding_number(function, box, points=40) == 3
     monkeypatch.setattr(room, "FORESEEN", np.inf)
     assert winding_number(function, box, points=40) != 3
-
-
-def test_the_arm_that_was_miscounted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """18 of 20 zeros: a piece across the real axis may turn by 4 pi while the ends show no phase, nor a rate of it."""
-    rng = np.random.default_rng(1)
-    for _ in range(70):
-        arm, count = some_damped_arm(rng)
-    damped = damped_modes(tfarm.modes(arm, count))
-    function = function_of(damped.undamped.system)
-    inside = damped.box.holds(damped.eigenvalues[damped.index > 0]).sum()
-    points = (5, 10, 20, 25, 40, 83)
-    assert [winding_number(function, damped.box, number) for number in points] == [inside] * len(points)
-    monkeypatch.setattr(room, "FORESEEN", np.inf)
-    assert winding_number(function, damped.box, 40) == inside - 2
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -55,6 +55,18 @@ def test_shapes_are_orthogonal_and_of_unit_mass(seed):
         assert pytest.approx(arm.hub.radius * Psi, rel=1e-9, abs=1e-9 * abs(Psi).max()) == W
 
 
+def test_an_attachment_a_rounding_off_a_joint_is_at_that_joint():
+    """0.1 + 0.2 is not 0.3 in binary: the piece of 4e-17 between the two has states of its own."""
+    steel = tfarm.load("stocky-steel")
+    links = [replace(steel.link, length=length) for length in (0.1, 0.2, 0.3)]
+    first, second = (
+        tfarm.modes(replace(steel, link=links[0], outer=tuple(links[1:]), attachments=(Attachment(x=x, mass=1.0),)), 6)
+        for x in (0.3, 0.1 + 0.2)
+    )
+    assert first.sensitivity["length"] == pytest.approx(second.sensitivity["length"], rel=1e-12)
+    assert abs(first._shapes.mass_matrix() - np.eye(6)).max() < 1e-12
+
+
 def residue_of(arm, p, names):
     """Residues at a simple pole next to p, from values of the oracle on both sides of it."""
     with mpmath.workdps(40):

@@ -10,7 +10,7 @@ import pytest
 import tfarm
 from tests.shared import thinned
 from tests.spectrum.damped import judge, pairs, some_damped_arm
-from tests.spectrum.independent import newton_step, pinned, ritz_eigenvalues, sine_waves
+from tests.spectrum.independent import newton_step, pinned, sine_waves
 from tests.strategies import arm_of, some_arm
 from tfarm import Arm
 from tfarm.spectrum.damped import DampedModes, damped_modes
@@ -60,15 +60,6 @@ def test_extreme_ends(damping: tuple[float, float], ends: tuple[float, float, fl
     for count in (1, 8):
         found = judge(arm, count, certify=False, model=slenderness < 100)
         assert found.outcome == "right", (count, found.words)
-
-
-@pytest.mark.parametrize("seed", thinned(range(6), 3))
-def test_a_galerkin_model_has_the_low_modes(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    arm = some_arm(rng, damping=0.0, slenderness=(5, 100))
-    omega = tfarm.modes(arm, 6).natural_frequency[-1]
-    arm = arm.having(damping=float(10 ** rng.uniform(-3, 0.3)) / omega)  # up to the edge of overdamping
-    assert nearest_apart(pairs(listed(arm, 6)), ritz_eigenvalues(arm)).max() < 1e-8
 
 
 @pytest.mark.parametrize("overdamping", thinned([3.0, 0.05, 30.0], 3))

@@ -2,7 +2,6 @@
 
 import math
 
-import flint
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -10,8 +9,6 @@ from scipy.optimize import brentq
 import tfarm
 from tests.spectrum.test_frequencies import brackets
 from tests.strategies import arm_of
-from tfarm.exact import balls
-from tfarm.exact.layout import Layout
 from tfarm.exact.system import system_of
 from tfarm.spectrum.frequencies import count_below, natural_frequencies
 
@@ -133,20 +130,3 @@ def test_a_true_crossing_of_symmetric_and_antisymmetric_modes():
     at = tfarm.modes(clamped(crossing), 22)
     assert at.natural_frequency[-1] / at.natural_frequency[-2] - 1 < 8 * EPS
     assert orthogonality(at) < 1e4 * EPS
-
-
-def test_a_double_frequency_is_a_double_zero_of_the_drive():
-    """By balls: D(i w) has the same sign on both sides, and its slope in w^2 vanishes against its curvature."""
-
-    def gap(slenderness):
-        return pinned_pinned(steel(slenderness), 3)[0] / pinned_pinned(steel(slenderness), 1)[1] - 1
-
-    arm = steel(brentq(gap, 1.0, 40.0, xtol=1e-15))
-    k, omega = system_of(arm), pinned_pinned(arm, 3)[0]
-    with balls.precision(200):
-        low, middle, high = (
-            balls.Sweep(Layout(k), flint.acb(0, flint.arb(omega) * (1 + flint.arb(step)))).input.real
-            for step in (-1e-5, 0.0, 1e-5)
-        )
-        assert bool(low * high > 0)
-        assert bool(abs(middle) < abs(low) * 1e-9)

@@ -11,7 +11,7 @@ import pytest
 import tfarm
 from tests.shared import sized, thinned
 from tests.spectrum.damped import pairs
-from tests.spectrum.independent import newton_root, newton_step, pinned, ritz_eigenvalues, sine_waves
+from tests.spectrum.independent import newton_root, pinned, sine_waves
 from tests.spectrum.test_damped import damped_arm, listed
 from tfarm import CertificationError
 from tfarm.exact.balls import point, precision
@@ -52,25 +52,6 @@ def test_discs_of_real_zeros_are_real() -> None:
             root = newton_root(arm, zero, 30)
             with mpmath.workdps(60):
                 assert abs(mpmath.mpf(disc.re) - root) < mpmath.mpf(disc.radius)
-
-
-def test_without_shear_forty_digits_follow_from_the_undamped_frequency() -> None:
-    """s^2 + w^2 (1 + C s) = 0 with the forty digits that `Modes.digits` has of w."""
-    arm = damped_arm(1e-5, hub=0.7, mass=0.5, inertia=2.0)
-    damped = listed(arm, 3, "euler-bernoulli")
-    with mpmath.workdps(60):
-        C = mpmath.mpf(arm.link.damping)
-        for text, (disc,) in zip(damped.undamped.digits(45)[1:], damped.certify(40), strict=True):
-            w = mpmath.mpf(text)
-            s = -C * w**2 / 2 + 1j * w * mpmath.sqrt(1 - (C * w / 2) ** 2)
-            assert abs(mpmath.mpc(disc.re, disc.im) - s) < mpmath.mpf(disc.radius)
-
-
-def test_a_poor_start_ends_in_a_disc_around_some_zero() -> None:
-    k = system_of(LAB)
-    for start in (0.9 + 70j, -5 + 74j, 300 + 300j, -3 - 71j):
-        disc = enclosed(k, start, 15)
-        assert newton_step(LAB, complex(float(disc.re), float(disc.im))) < 1e-13
 
 
 def test_a_double_eigenvalue_has_no_disc(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -137,19 +118,6 @@ def test_counts_of_sine_waves_are_those_of_the_closed_form(theory: str, boxes: i
             box = box_of(height, min(reach, 0.9 * float(first) / Cw) if Cw else reach)
             inside = int(box.holds(exact).sum()) + k.at_rest
             assert proven_count(k, box) == inside, (Cw, box)
-
-
-@pytest.mark.parametrize("boxes", sized(1, 2))
-@pytest.mark.parametrize(("hub", "mass"), thinned([(0.0, 0.4), (math.inf, 0.0), (0.5, math.inf)], 3))
-def test_counts_are_those_of_a_galerkin_model(hub: float, mass: float, boxes: int) -> None:
-    rng = np.random.default_rng(32)
-    arm = damped_arm(4e-5, hub=hub, mass=mass, inertia=0.2, slenderness=12.0)
-    k = system_of(arm)
-    theirs = ritz_eigenvalues(arm, 48)
-    for _ in range(boxes):
-        height = float(10 ** rng.uniform(2.5, 4.2))
-        box = Box(-min(0.9 / 4e-5, height * float(rng.uniform(0.2, 3))), height * 0.3, -height, height)
-        assert proven_count(k, box) == box.holds(theirs).sum() + k.at_rest
 
 
 def one_line(error) -> str:

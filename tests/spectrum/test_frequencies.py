@@ -1,12 +1,8 @@
 """Every natural frequency and no other: against a Ritz model, against ball arithmetic, against the count."""
 
-import math
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-import tfarm
 from tests.spectrum.ritz import (
     SLENDERNESS,
     against_count,
@@ -17,7 +13,6 @@ from tests.spectrum.ritz import (
     random_arms,
 )
 from tests.strategies import some_arm
-from tfarm import Hub
 from tfarm.arm import THEORIES
 from tfarm.exact.system import system_of
 from tfarm.spectrum.frequencies import Counter, natural_frequencies
@@ -60,22 +55,3 @@ def test_the_thousandth_mode():
     k = system_of(arm)
     for omega in natural_frequencies(k, 1000, 1004):
         assert brackets(k, float(omega), 8)
-
-
-def test_poles_and_zeros_of_the_hub_angle_interlace():
-    """Holding the hub moves every frequency up, but not beyond the next one."""
-    for arm in random_arms(300, 27):
-        if not arm.is_locked:
-            locked = replace(arm, hub=Hub(inertia=math.inf))
-            poles, zeros = (natural_frequencies(system_of(each), 1, 25) for each in (arm, locked))
-            slack = 1 + 16 * EPS  # a mode that the hub does not feel is both
-            assert (poles <= zeros * slack).all()
-            assert (zeros[:-1] <= poles[1:] * slack).all()
-
-
-def test_only_a_zero_of_the_hub_angle_vanishes_there():
-    """At a hub-locked frequency the hub does not answer a torque: theta is as small there as its slope allows."""
-    arm = some_arm(np.random.default_rng(8), ("some", "some", "zero"), damping=0.0)
-    G = tfarm.transfer(arm, "hub_angle")
-    for omega in natural_frequencies(system_of(replace(arm, hub=Hub(inertia=math.inf))), 1, 8):
-        assert abs(G(1j * omega)) <= 16 * EPS * omega * abs(G.derivative(1j * omega))

@@ -84,7 +84,7 @@ class Layout:
         marks = []
         for place in places:
             joint = joints[abs(ends - float(place.share)).argmin()]
-            share = joint if abs(place.share - joint) <= AT_JOINT else place.share
+            share = joint if place.share not in joints and abs(place.share - joint) <= AT_JOINT else place.share
             marks.append((share, order[place.side], Mark(place)))
         self.elements = cut([*marks, *elements])
         self._numbers: dict[Any, list[Any]] = {}

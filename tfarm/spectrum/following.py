@@ -12,14 +12,15 @@ The functions are real on the real axis: both of a conjugate pair have a column,
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arrays import Complex, Real, Whole
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
+from tfarm.exact.compiled import compiled
 
 NEWTON_STEPS = 8  # from a close guess: others are followed in shorter steps
 SETTLED = 1e-10  # of its size: the largest last step of a converged zero
@@ -97,7 +98,7 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
         at = np.array([value for value, _ in block])
         guess = predicted(np.array([value for value, _ in past]), np.array([row for _, row in past]), at, last)
         found = corrected(family, at, guess, last)
-        are_plain = which_plain(family, at, guess, found, last)
+        are_plain = which_plain(guess, found, last, family.singular(at), family.blur)
         good = int(np.argmin(np.r_[are_plain.all(axis=1), False]))
         if not good and len(block) == 1:
             stray = ~are_plain[0]
@@ -132,14 +133,13 @@ def are_alone(
         found[stray] = follow(family, np.array([before, value]), last[stray])[1]
     except ConvergenceError as lost:
         raise ConvergenceError(str(lost), (before, last), stray) from None
-    return not (distances(found).min(axis=1) <= SAME_ROOT * abs(found)).any()
+    return not (nearest(found)[1] <= SAME_ROOT * abs(found)).any()
 
 
 def with_partners(stray: NDArray[np.bool_], last: Complex) -> NDArray[np.bool_]:
     """Return these roots and the partners of each in a couple or conjugate pair."""
-    both, (first, second) = stray.copy(), couples(last)
-    both[first] |= stray[second]
-    both[second] |= stray[first]
+    both, partner = stray.copy(), couples(last)
+    both[partner[stray & (partner >= 0)]] = True
     mirrored = (last[:, None] == last[stray].conj()).any(axis=1)
     return both | mirrored
 
@@ -156,7 +156,8 @@ def between(family: Family, values: Real, rows: Complex, wanted: Real) -> Comple
         here, near = np.flatnonzero(right == n), slice(low, low + PAST)
         guess = predicted(values[near], rows[near], wanted[here], rows[n - 1])
         found[here] = corrected(family, wanted[here], guess, rows[n - 1])
-        for each in here[~which_plain(family, wanted[here], guess, found[here], rows[n - 1]).all(axis=1)]:
+        singular = family.singular(wanted[here])
+        for each in here[~which_plain(guess, found[here], rows[n - 1], singular, family.blur).all(axis=1)]:
             found[each] = follow(family, np.array([values[n - 1], wanted[each]]), rows[n - 1])[1]
     return found
 
@@ -180,75 +181,113 @@ def assigned(family: Family, value: float, guess: Complex) -> Complex:
     return found
 
 
-def predicted(at: Real, rows: Complex, wanted: Real, base: Complex) -> Complex:
-    """Return guesses (m, b) by polynomials through known roots (k, b) at k values; `base` (b,) has the couples."""
-    own = np.eye(at.size, dtype=bool)
-    ratios = (wanted[:, None, None] - at) / np.where(own, 1.0, at[:, None] - at)
-    weights = np.where(own, 1.0, ratios).prod(axis=2)
-    guess = weights @ np.where((rows.imag == 0) == (base.imag == 0), rows, np.nan)  # without values from before two met
-    first, second = couples(base)
-    mean, half = (rows[:, first] + rows[:, second]) / 2, (rows[:, first] - rows[:, second]) / 2
-    mean = np.where((mean.imag == 0) == ((base[first] + base[second]).imag == 0), mean, np.nan)
-    apart = (base[first] - base[second]) / 2
-    root = np.sqrt(weights @ (half * half))
-    way = (root * apart.conj()).real
-    turned = abs(way) < TURNED * abs(root) * abs(apart)  # then the first is the upper one, or the larger real one
-    root = np.where(np.where(turned, (root.real + root.imag) * (apart.real + apart.imag), way) < 0, -root, root)
-    middle = weights @ mean
-    guess[:, first], guess[:, second] = middle + root, middle - root
-    lost = np.isnan(guess) & ~np.isnan(base)
-    if lost.any() and at.size > 1:  # known at the last of the values alone
-        return np.where(lost, predicted(at[1:], rows[1:], wanted, base), guess)
+@compiled
+def nearest(row: Any) -> Any:
+    """Return the index of the nearest other root of each of the roots (b,), and its distance, inf for none."""
+    index, away = np.zeros(row.size, np.int64), np.full(row.size, np.inf)
+    for i in range(row.size):
+        for j in range(row.size):
+            distance = abs(row[i] - row[j])
+            if j != i and distance < away[i]:
+                index[i], away[i] = j, distance
+    return index, away
+
+
+@compiled
+def couples(row: Any) -> Any:
+    """Return the partner of each root (b,) or -1: two nearest to each other, conjugates or of one half-plane."""
+    index, away = nearest(row)
+    partner = np.full(row.size, -1)
+    for i in range(row.size):
+        j = index[i]
+        alike = row[i] == row[j].conjugate() or np.sign(row[i].imag) == np.sign(row[j].imag)
+        if np.isfinite(away[i]) and index[j] == i and alike:
+            partner[i] = j
+    return partner
+
+
+@compiled
+def predicted(at: Any, rows: Any, wanted: Any, base: Any) -> Any:
+    """Return guesses (m, b) by polynomials through known roots (k, b) at k values; `base` (b,) has the couples.
+
+    Roots from before two of them met are left out.
+    """
+    partner, guess = couples(base), np.full((wanted.size, base.size), LOST)
+    for m in range(wanted.size):
+        for low in range(at.size):
+            weights = np.ones(at.size)
+            for k in range(low, at.size):
+                for n in range(low, at.size):
+                    weights[k] *= (wanted[m] - at[n]) / (at[k] - at[n]) if n != k else 1.0
+            for i in range(base.size):
+                j = partner[i]
+                if j >= i and np.isnan(guess[m, i]):
+                    guess[m, i], guess[m, j] = _of_couple(weights[low:], rows[low:, i], rows[low:, j], base[i], base[j])
+                elif j < 0 and np.isnan(guess[m, i]):
+                    guess[m, i] = _of_one(weights[low:], rows[low:, i], base[i])
     return guess
 
 
-def couples(row: Complex) -> tuple[Whole, Whole]:
-    """Return first and second of each two roots (b,) nearest to each other: conjugates, or of one half-plane."""
-    away = distances(row)
-    nearest, every = away.argmin(axis=1), np.arange(row.size)
-    alike = (row == row[nearest].conj()) | (np.sign(row.imag) == np.sign(row[nearest].imag))
-    first = np.flatnonzero((nearest[nearest] == every) & (every < nearest) & alike & np.isfinite(away.min(axis=1)))
-    return first, nearest[first]
+@compiled
+def _of_one(weights: Any, past: Any, base: Any) -> Any:
+    """Return the value of the polynomial through a root's past values (k,), NaN where some are on the axis."""
+    total = 0j
+    for k in range(weights.size):
+        total += weights[k] * past[k] if (past[k].imag == 0.0) == (base.imag == 0.0) else LOST
+    return total
+
+
+@compiled
+def _of_couple(weights: Any, first: Any, second: Any, base: Any, other: Any) -> Any:
+    """Return both of a couple by polynomials of their mean and of the square of half their distance."""
+    square, apart = 0j, (base - other) / 2.0
+    for k in range(weights.size):
+        half = (first[k] - second[k]) / 2.0
+        square += weights[k] * (half * half)
+    root = np.sqrt(square)
+    way = (root * apart.conjugate()).real
+    if abs(way) < TURNED * abs(root) * abs(apart):  # they have met: the first is the upper one, or the larger real one
+        way = (root.real + root.imag) * (apart.real + apart.imag)
+    middle = _of_one(weights, (first + second) / 2.0, (base + other) / 2.0)
+    return (middle - root, middle + root) if way < 0.0 else (middle + root, middle - root)
 
 
 def corrected(family: Family, values: Real, guess: Complex, base: Complex) -> Complex:
     """Return the roots (m, b) next to the guesses, those below the real axis as mirror images."""
-    partner = np.arange(base.size)
-    first, second = couples(np.where(base.imag == 0, base, np.nan))
-    partner[first], partner[second] = second, first
-    mirrors = (base[:, None] == base.conj()) & (base.imag < 0)[:, None]
-    lower, upper = np.nonzero(mirrors)
+    own = np.arange(base.size)
+    partner = couples(np.where(base.imag == 0, base, np.nan))
+    partner = np.where(partner < 0, own, partner)
+    lower, upper = np.nonzero((base[:, None] == base.conj()) & (base.imag < 0)[:, None])
     partner[lower] = upper
-    is_lower = (guess.imag < 0) & (partner != np.arange(base.size))
+    is_lower = (guess.imag < 0) & (partner != own)
     found = family.near(values, np.where(is_lower, np.nan, guess))
     return np.where(is_lower, found[:, partner].conj(), found)
 
 
-def distances(row: Complex) -> Real:
-    """Return the distances (..., b, b) of the roots (..., b); inf from themselves and from NaN."""
-    away = abs(row[..., :, None] - row[..., None, :])
-    away[..., np.arange(row.shape[-1]), np.arange(row.shape[-1])] = np.inf
-    away[np.isnan(away)] = np.inf
-    return np.asarray(away)
-
-
-def which_plain(family: Family, values: Real, guess: Complex, found: Complex, base: Complex) -> NDArray[np.bool_]:
+@compiled
+def which_plain(guess: Any, found: Any, base: Any, singular: Any, blur: float) -> Any:
     """Return which roots (m, b) are close to their prediction, compared with the distance to any other.
 
-    Others include the mirror image of a root without one in the base (b,).
+    Others include `singular` points (m, p) and the mirror image of a root without one in the base (b,).
     """
-    away, moved = distances(found), abs(found - guess)
-    nearest = away.argmin(axis=2)[..., None]
-    own = np.take_along_axis(away, nearest, 2)[..., 0]
-    is_couple = np.take_along_axis(nearest[..., 0], nearest[..., 0], 1) == np.arange(found.shape[1])
-    np.put_along_axis(away, nearest, np.where(is_couple, np.inf, own)[..., None], 2)
-    room = away.min(axis=2, initial=np.inf)
-    for point in family.singular(values).T:
-        room = np.minimum(room, abs(found - point[:, None]))
-    has_mirror = (base[:, None] == base.conj()).any(axis=1) | (base.imag == 0)
-    room = np.where(has_mirror, room, np.minimum(room, 2 * np.minimum(abs(found.imag), abs(base.imag))))
-    near = (moved <= np.where(is_couple, PLAIN_IN_COUPLE, PLAIN_MOVE) * own) & (
-        np.sign(found.imag) == np.sign(guess.imag)
-    )
-    same = (near | (guess == 0) | (found == 0)) & (moved <= PLAIN_MOVE * room)
-    return np.asarray(np.isnan(guess) | same | (moved <= family.blur))
+    is_plain, alone = np.isnan(guess), np.empty(base.size, np.bool_)
+    for i in range(base.size):
+        alone[i] = base[i].imag != 0.0 and not np.any(base == base[i].conjugate())
+    for m in range(len(found)):
+        index, away = nearest(found[m])
+        for i in range(base.size):
+            here, is_couple = found[m, i], index[index[i]] == i
+            room, moved = np.inf, abs(here - guess[m, i])
+            for j in range(base.size):
+                if j != i and not (is_couple and j == index[i]) and abs(here - found[m, j]) < room:
+                    room = abs(here - found[m, j])
+            for point in singular[m]:
+                room = min(room, abs(here - point))
+            if alone[i]:
+                room = min(room, 2.0 * min(abs(here.imag), abs(base[i].imag)))
+            same_side = np.sign(here.imag) == np.sign(guess[m, i].imag)
+            near = same_side and moved <= (PLAIN_IN_COUPLE if is_couple else PLAIN_MOVE) * away[i]
+            is_plain[m, i] |= moved <= blur or (
+                (near or guess[m, i] == 0.0 or here == 0.0) and moved <= PLAIN_MOVE * room
+            )
+    return is_plain

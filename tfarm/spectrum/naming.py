@@ -20,7 +20,6 @@ from tfarm.exact.compiled import compiled
 from tfarm.exact.layout import Reading, readings
 from tfarm.exact.sweep import AXIS, fill_free
 from tfarm.exact.system import Spring, System
-from tfarm.exact.uniform import fill_ends
 
 from .box import REAL_SHARE, Function, newton
 from .following import LOST, NEWTON_STEPS, SETTLED, follow, settled
@@ -32,19 +31,20 @@ HALVINGS = (250, *[80] * 8)  # of steps, after which stray branches are lost and
 LATE_HALVINGS = 8  # after the steps that there are in all: roots that are stray are soon lost
 AROUND = np.array([1, 1.02, 0.98, 1 + 0.02j, 1 - 0.02j, 1.2, 0.8, 1 + 0.2j, 1 - 0.2j])  # starts next to a guess, of it
 NEAR_REAL = 1e-7  # of its size: the imaginary part of a double zero is rounding
-NO_ENDS = np.empty((0, 4))  # the table of no output of a uniform link
-NO_OUTPUT = np.empty((0, len(Reading._fields)))  # and that of a chain
+NO_OUTPUT = np.empty((0, len(Reading._fields)))  # the table of no output
 
 
 def function_of(k: System) -> Function:
     """Return the characteristic function without its zeros at the origin."""
-    return lambda s: quick_characteristics(k, s, k.at_rest)
+    at_rest = k.at_rest
+    return lambda s: quick_characteristics(k, s, at_rest)
 
 
 @compiled
-def _newton(s: Any, rows: Any, ends: Any, is_uniform: bool, at_rest: int, singular: Any) -> None:
+def _newton(s: Any, rows: Any, ends: Any, at_rest: int, singular: Any) -> None:
     """Replace guesses s (n,) by the zeros of D/s^at_rest next to them, or NaN, as `following.settled` does."""
-    moving, count = np.arange(s.size), s.size
+    moving = np.flatnonzero(~np.isnan(s))
+    count = moving.size
     at, h = np.empty(3 * s.size, np.complex128), np.empty(s.size)
     found, lost = np.empty((2, 3 * s.size), np.complex128), np.empty(3 * s.size, np.bool_)
     for _ in range(NEWTON_STEPS):
@@ -54,10 +54,7 @@ def _newton(s: Any, rows: Any, ends: Any, is_uniform: bool, at_rest: int, singul
                 near = min(near, abs(1.0 - here / each))
             h[i] = DIFFERENCE_STEP * max(abs(here) * near, 1e-300)
             at[3 * i], at[3 * i + 1], at[3 * i + 2] = here, here + h[i], here - h[i]
-        if is_uniform:
-            fill_ends(at[: 3 * count], rows, ends, NO_ENDS, False, found, lost)
-        else:
-            fill_free(at[: 3 * count], rows, ends, AXIS, NO_OUTPUT, found, lost)
+        fill_free(at[: 3 * count], rows, ends, AXIS, NO_OUTPUT, found, lost)
         kept = 0
         for i in range(count):
             n, j = moving[i], 3 * i
@@ -103,7 +100,7 @@ class Damping:
         still, layout = (readings(k, (), 0.0) for k in (self.k.with_damping(0.0), self.k))
         self.rows = still.rows, layout.rows - still.rows
         self.ends = still.ends, layout.ends - still.ends
-        self.is_uniform = layout.ends_table is not None
+        self.at_rest, self.points = self.k.at_rest, np.array(self.k.singular)
 
     def near(self, values: Real, guess: Complex) -> Complex:
         """Return the roots next to the guesses (see `Family`)."""
@@ -111,14 +108,9 @@ class Damping:
         if self.steps_left < 0:
             self.most_halvings = min(self.most_halvings, LATE_HALVINGS)
         units = (values * self.level)[:, None]
-        found, wanted, singular = guess / units, ~np.isnan(guess), np.array(self.k.singular)
-        (rows, of_rows), (ends, of_ends) = self.rows, self.ends
-        for n, share in enumerate(values.tolist()):
-            here = found[n, wanted[n]]
-            _newton(
-                here, rows + share * of_rows, ends + share * of_ends, self.is_uniform, self.k.at_rest, singular / share
-            )
-            found[n, wanted[n]] = here
+        found, (rows, of_rows), (ends, of_ends) = guess / units, self.rows, self.ends
+        for here, share in zip(found, values.tolist(), strict=True):
+            _newton(here, rows + share * of_rows, ends + share * of_ends, self.at_rest, self.points / share)
         return found * units
 
     def complete(self, value: float, guess: Complex) -> Complex:
@@ -134,7 +126,7 @@ class Damping:
 
     def singular(self, values: Real) -> Real:
         """Return -1/C of the damped segments in these units."""
-        return np.tile(np.array(self.k.singular) * self.level, (values.size, 1))
+        return np.ones((values.size, 1)) * self.points * self.level
 
 
 def single_zeros(undamped: Modes, share: float = 1.0) -> list[float]:

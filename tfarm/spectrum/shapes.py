@@ -32,23 +32,23 @@ from bisect import bisect
 from collections.abc import Iterator
 from copy import copy
 from fractions import Fraction
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import characteristic
 from tfarm.exact.compiled import python_of
 from tfarm.exact.layout import kernel_row, segment_at
 from tfarm.exact.system import Body, Place, Segment, System
 from tfarm.exact.values import free_fields
-from tfarm.exact.waves import SERIES_RADIUS, even_functions, fill_wave_numbers, transition_rows, transition_series
+from tfarm.exact.waves import SERIES_RADIUS, fill_wave_numbers, transition_rows, transition_series
 
-_even, _rows, _series = python_of(even_functions), python_of(transition_rows), python_of(transition_series)
+_rows, _series = python_of(transition_rows), python_of(transition_series)
 
 GAUSS_POINTS = 16  # of a panel; exact for products of waves over a few radians
 PANEL_WAVES = 4.0  # rad of the fastest wave in a panel, integrated to the last digit
@@ -70,41 +70,48 @@ class Shapes:
 
     def __init__(self, system: System, omega: Real) -> None:
         self.system, self.omega = system, omega
-        inner = list(reversed(system.segments))
-        edges = np.cumsum([0.0, *(float(each.length) for each in inner)])
-        self._segments, self._edges = inner, edges / edges[-1]
-        self._rows = [np.array(kernel_row(each)) for each in inner]
+        self._segments = list(reversed(system.segments))
+        joints = list(accumulate((each.length for each in self._segments), initial=Fraction(0)))
+        self._ends = [(Place(low, "outer"), Place(min(high, Fraction(1)), "inner")) for low, high in pairwise(joints)]
+        edges = np.array([float(each) for each in joints])
+        self._edges = edges / edges[-1]
         # Each mode is a sum of four responses, two of its own and two of a close neighbour below, for orthogonality:
-        # frequency, condition on the axis (`_condition`), scale and factor of each, of shape (4, modes).
+        # frequency, condition on the axis (`_conditions`), scale and factor of each, the modes last.
         gap = np.r_[np.inf, np.diff(omega) / omega[1:], np.inf]
         is_first, is_second = gap[1:] < DOUBLE, gap[:-1] < DOUBLE
         close = np.minimum(gap[1:], gap[:-1]) < CLOSE_MODES
-        left = np.array([self._at_axis(which) for which in (0, 1)])
+        conditions = self._conditions()
+        left = np.array([self._at_axis(axis) for axis in conditions[:2]])
         best = (abs(left[1]).max(axis=0) > abs(left[0]).max(axis=0)).astype(int)  # the larger one
         Psi, M, Q = np.where(best, left[1], left[0])
         own = np.array([Q, -Psi if system.drive.turns else -M])
         own = np.where(is_first, [[1.0], [0.0]], np.where(is_second, [[0.0], [1.0]], own))
-        which = np.array([np.where(close, 2, best), np.full(omega.size, 3)])
         self._factors = np.concatenate([np.where(close, own, [[1.0], [0.0]]), np.zeros((2, omega.size))])
-        self._which = np.concatenate([which, np.roll(which, 1, axis=1)])
+        axes = [np.where(close, conditions[2], np.where(best, conditions[1], conditions[0])), conditions[3]]
+        self._axes = np.array([*axes, *np.roll(axes, 1, axis=-1)])
         self._omegas = np.array([omega, omega, np.roll(omega, 1), np.roll(omega, 1)])
         size = free_fields(system, 1j * omega, ())[2].real  # a cut system has other scales
         self._sizes = np.array([size, size, np.roll(size, 1), np.roll(size, 1)])
         self._normalise()
 
     def __call__(self, x: Real) -> Real:
-        number = np.clip(np.searchsorted(self._edges, x, side="right") - 1, 0, len(self._segments) - 1)
         result = np.empty((4, self.omega.size, x.size))
-        for n in np.unique(number):
-            here, (low, high) = number == n, self._edges[n : n + 2]
-            result[:, :, here] = self._along(int(n), np.clip((x[here] - low) / (high - low), 0.0, 1.0))
+        for number, here, share in self._by_segment(x):
+            result[:, :, here] = self._along(number, share)
         return result
 
-    def part(self, first: int, last: int) -> Shapes:
-        """Return the modes first..last - 1."""
+    def at(self, mode: Whole, x: Real) -> Real:
+        """Return W, Psi, M, Q (4, n), those of mode[i] at x[i]."""
+        result = np.empty((4, x.size))
+        for number, here, share in self._by_segment(x):
+            result[:, here] = self.part(mode[here])._along(number, share[:, None])[..., 0]
+        return result
+
+    def part(self, modes: slice | Whole) -> Shapes:
+        """Return some of the modes."""
         part = copy(self)
-        for name in ("omega", "_omegas", "_which", "_sizes", "_factors"):
-            setattr(part, name, getattr(self, name)[..., first:last])
+        for name in ("omega", "_omegas", "_axes", "_sizes", "_factors"):
+            setattr(part, name, getattr(self, name)[..., modes])
         return part
 
     def blocks(self) -> Iterator[Shapes]:
@@ -112,9 +119,9 @@ class Shapes:
         first = 0
         while first < self.omega.size:
             last = min(2 * first + FIRST_BLOCK, self.omega.size)
-            while last > first + 1 and (last - first) * sum(self.part(first, last)._counts) > PANELS_AT_ONCE:
+            while last > first + 1 and (last - first) * sum(self.part(slice(first, last))._counts) > PANELS_AT_ONCE:
                 last = (first + last) // 2
-            yield self.part(first, last)
+            yield self.part(slice(first, last))
             first = last
 
     def tip(self) -> Real:
@@ -146,11 +153,9 @@ class Shapes:
     def states(self, places: tuple[Place, ...]) -> tuple[Real, Real]:
         """Return W, Psi, M, Q (fields, modes, places) and the hub angle (modes,)."""
         fields, theta = np.zeros((4, self.omega.size, len(places))), np.zeros(self.omega.size)
-        for row in range(len(self._factors)):
-            (used,) = np.nonzero(self._factors[row])
-            if used.size:
-                more, turned = self._raw(row, used, places)
-                fields[:, used], theta[used] = fields[:, used] + more, theta[used] + turned
+        for modes, _, more, turned in self._responses(places):
+            fields[:, modes] += more
+            theta[modes] += turned
         return fields, theta
 
     def panels(self) -> Iterator[tuple[Segment, Real, Real]]:
@@ -162,6 +167,14 @@ class Shapes:
 
     # ------------------------------------------------------------ inside
 
+    def _by_segment(self, x: Real) -> Iterator[tuple[int, Whole, Real]]:
+        """Yield each segment with points, the indices of these, and their shares of its length."""
+        segment = np.clip(np.searchsorted(self._edges, x, side="right") - 1, 0, len(self._segments) - 1)
+        for number in np.unique(segment).tolist():
+            (here,) = np.nonzero(segment == number)
+            low, high = self._edges[number : number + 2]
+            yield number, here, np.clip((x[here] - low) / (high - low), 0.0, 1.0)
+
     @property
     def _counts(self) -> list[int]:
         """Numbers of panels of the segments, short against every wave of these modes."""
@@ -169,48 +182,35 @@ class Shapes:
         waves = [(float(each.g) * S) ** 0.25 + math.sqrt(S * float(each.a + each.b)) for each in self._segments]
         return [LEAST_PANELS + math.ceil(each / PANEL_WAVES) for each in waves]
 
-    def _at_axis(self, which: int) -> Real:
+    def _at_axis(self, axis: Real) -> Real:
         """Return Psi, M and Q (3, modes) on the axis, of the state with a condition at each frequency."""
-        axis = self._condition(which, self.omega)
         fields, theta, _ = free_fields(self.system, 1j * self.omega, (AT_HUB,), axis)
         _, _, M, Q = fields[..., 0]
         return np.array([theta, M + float(self.system.radius) * Q, Q]).real
 
-    def _condition(self, which: int, omega: Real) -> Real:
-        """Return a condition (4, modes) on the axis: W = 0, the balance A Psi = M, or one of two for close modes."""
-        A = float(self.system.drive.stiffness) - float(self.system.drive.inertia) * omega**2
-        moment = 1.0 if self.system.drive.turns else 0.0
-        size = np.maximum(abs(A), moment) if moment else np.ones(omega.size)
-        balance = np.array([0.0 * A, A / size if moment else size, -moment / size, 0.0 * A])
-        units = np.eye(4)[:, :, None] * np.ones(omega.size)
-        return (units[0], balance, units[1] if moment else units[2], units[3])[which]
+    def _conditions(self) -> Real:
+        """Return conditions (4, 4, modes) on the axis: W = 0, the balance A Psi = M, and two for close modes."""
+        A, none = float(self.system.drive.stiffness) - float(self.system.drive.inertia) * self.omega**2, 0 * self.omega
+        units = np.eye(4)[:, :, None] + none
+        size = np.maximum(abs(A), 1.0)
+        balance = [none, A / size, -1.0 / size, none]
+        return np.array([units[0], balance, units[1], units[3]]) if self.system.drive.turns else units
 
-    def _raw(self, row: int, modes: Any, places: tuple[Place, ...]) -> tuple[Real, Real]:
-        """Return states and hub angles of those modes in one of their four responses."""
-        omega, which = self._omegas[row, modes], self._which[row, modes]
-        fields, theta = np.empty((4, omega.size, len(places))), np.empty(omega.size)
-        for number in np.unique(which):
-            here, axis = which == number, self._condition(int(number), omega)
-            if here.any():
-                states, turned, scale = free_fields(self.system, 1j * omega[here], places, axis[:, here])
-                unit = np.exp(scale - self._sizes[row, modes][here]) * self._factors[row, modes][here]
-                fields[:, here], theta[here] = (states * unit[:, None]).real, (turned * unit).real  # real on the axis
-        return fields, theta
+    def _responses(self, places: tuple[Place, ...]) -> Iterator[tuple[Whole, Real, Real, Real]]:
+        """Yield each response: the modes that have it, its frequencies, states (4, modes, places) and hub angles."""
+        for omega, axes, size, factor in zip(self._omegas, self._axes, self._sizes, self._factors, strict=True):
+            (modes,) = np.nonzero(factor)
+            if modes.size:
+                states, theta, scale = free_fields(self.system, 1j * omega[modes], places, axes[:, modes])
+                unit = np.exp(scale - size[modes]) * factor[modes]
+                yield modes, omega[modes], (states * unit[:, None]).real, (theta * unit).real  # real on the axis
 
     def _along(self, number: int, x: Real) -> Real:
-        """Return W, Psi, M, Q (4, modes, x) at the shares x of a segment, in the units of the system."""
-        segment, ends = self._segments[number], Fraction(0)
-        for each in self._segments[:number]:
-            ends += each.length
-        places = Place(ends, "outer"), Place(min(ends + segment.length, Fraction(1)), "inner")
-        units = np.array([float(each) for each in segment.units])
-        own = np.array([units[0], 1.0, units[1], units[2]])[:, None]
-        result = np.zeros((4, self.omega.size, x.size))
-        for row in range(len(self._factors)):
-            (used,) = np.nonzero(self._factors[row])
-            if used.size:
-                states, _ = self._raw(row, used, places)
-                result[:, used] += _of_segment(segment, self._rows[number], self._omegas[row, used], states, own, x)
+        """Return W, Psi, M, Q (4, modes, n) at the shares x, (n,) or (modes, n), of a segment."""
+        x = np.broadcast_to(x, (self.omega.size, x.shape[-1]))
+        result = np.zeros((4, *x.shape))
+        for modes, omega, states, _ in self._responses(self._ends[number]):
+            result[:, modes] += _of_segment(self._segments[number], omega, states, x[modes])
         return result
 
     def _moving(self) -> list[tuple[Real, Real]]:
@@ -250,28 +250,31 @@ class Shapes:
             worst = float(self.omega[lost][0])
             raise ConvergenceError(f"the mode at {worst:.10g} rad/s has no shape", worst, 0.0)
         for lower in map(int, np.flatnonzero(np.diff(self.omega) < CLOSE_MODES * self.omega[1:])):
-            overlap = self.part(lower, lower + 2).mass_matrix()[0, 1]
+            overlap = self.part(slice(lower, lower + 2)).mass_matrix()[0, 1]
             self._factors[2:, lower + 1] = -overlap * self._factors[:2, lower]
-            self._factors[:, lower + 1] /= math.sqrt(self.part(lower + 1, lower + 2).masses()[0])
+            self._factors[:, lower + 1] /= math.sqrt(self.part(slice(lower + 1, lower + 2)).masses()[0])
         tip, theta = self.tip(), self.theta()
         turned = np.where(abs(tip[1]) > NO_MOTION * abs(theta), tip[1], theta)
         motion = np.where(abs(tip[0]) > NO_MOTION * abs(tip[1]), tip[0], turned)
         self._factors = self._factors * np.where(motion < 0, -1.0, 1.0)
 
 
-def _of_segment(segment: Segment, row: Real, omega: Real, ends: Real, own: Real, x: Real) -> Real:
-    """Return W, Psi, M, Q (4, modes, x) from the states (4, modes, 2) at both ends.
-
-    `row` is the segment for compiled code, `own` are its units.
-    """
-    numbers = np.empty((2, 3, omega.size), complex)
-    fill_wave_numbers(1j * omega, row, numbers)
+def _of_segment(segment: Segment, omega: Real, ends: Real, x: Real) -> Real:
+    """Return W, Psi, M, Q (4, modes, n) at the shares x (modes, n) from the states (4, modes, 2) at both ends."""
+    numbers, result = np.empty((2, 3, omega.size), complex), np.empty((4, *x.shape))
+    fill_wave_numbers(1j * omega, np.array(kernel_row(segment)), numbers)
+    units = [float(each) for each in segment.units]
+    own = np.array([units[0], 1.0, *units[1:]])[:, None]
     inner, outer = ends[..., 0] * own, ends[..., 1] * own
     low = abs(numbers[:, 0]).max(axis=0) < SERIES_RADIUS
-    result = np.empty((4, omega.size, x.size))
-    result[:, low] = _by_series(segment, omega[low], inner[:, low], x)
-    result[:, ~low] = _by_waves(segment, omega[~low], numbers[..., ~low], inner[:, ~low], outer[:, ~low], x)
-    result[:, :, x == 0.0], result[:, :, x == 1.0] = inner[..., None], outer[..., None]
+    if low.any():
+        result[:, low] = _by_series(segment, omega[low], inner[:, low], x[low])
+    if not low.all():
+        fast = ~low
+        result[:, fast] = _by_waves(segment, omega[fast], numbers[..., fast], inner[:, fast], outer[:, fast], x[fast])
+    for end, state in ((0.0, inner), (1.0, outer)):
+        mode, point = np.nonzero(x == end)
+        result[:, mode, point] = state[:, mode]
     return result / own[..., None]
 
 
@@ -283,28 +286,36 @@ def _by_series(segment: Segment, omega: Real, inner: Real, x: Real) -> Real:
     rows = _rows((x**3 * F0, x**2 * F1, x * F2, F3), S, 1.0, k)
     state = (inner * outwards)[..., None]
     carried = [sum(entry * part for entry, part in zip(row, state, strict=True)) for row in rows]
-    return np.array(carried).reshape(4, omega.size, x.size) * outwards[..., None]
+    return np.array(carried) * outwards[..., None]
 
 
 def _by_waves(segment: Segment, omega: Real, numbers: Complex, inner: Real, outer: Real, x: Real) -> Real:
-    """Return W, Psi, M, Q in a fast segment's own units, of both waves."""
+    """Return W, Psi, M, Q in a fast segment's own units, of both waves: without damping their z and v are real."""
     gS = -float(segment.g) * omega**2
-    pairs = zip(numbers, numbers[::-1], strict=True)
-    fields: Any = np.zeros((4, omega.size, x.size), complex)
-    for (z, v, t), (other, v_other, _) in pairs:
-        (W0, s0), (W1, s1) = (
-            ((M - v_other * W) / (z - other), (Psi - v_other * Q / gS) / (z - other)) for W, Psi, M, Q in (inner, outer)
-        )
-        slow = abs(z) < 1.0  # little phase along the segment: P and R would cancel
-        z, t = (np.where(is_used, part, 1.0)[:, None] for is_used, part in ((slow, z), (~slow, t)))
-        from_inner = (W0 - t[:, 0] * s0)[:, None] / 2 * np.exp(-t * x)
-        from_outer = (W1 + t[:, 0] * s1)[:, None] / 2 * np.exp(-t * (1 - x))
-        c, s = _even(z * x**2)
-        even, odd, is_slow = W0[:, None], s0[:, None], slow[:, None]
-        W = np.where(is_slow, even * c + z * odd * x * s, from_inner + from_outer)
-        slope = np.where(is_slow, odd * c + even * x * s, (from_outer - from_inner) / t)
-        fields += np.array([W, v[:, None] * slope, v[:, None] * W, gS[:, None] * slope])
-    return np.asarray(fields.real)
+    z, v, k = numbers[:, 0].real, numbers[:, 1].real, abs(numbers[:, 2])
+    fields = np.zeros((4, *x.shape))
+    for n, other in ((0, 1), (1, 0)):
+        gap = z[n] - z[other]
+        states = [((M - v[other] * W) / gap, (Psi - v[other] * Q / gS) / gap) for W, Psi, M, Q in (inner, outer)]
+        wave, slope = _wave(z[n], k[n], states, x)
+        fields += np.array([wave, v[n, :, None] * slope, v[n, :, None] * wave, gS[:, None] * slope])
+    return fields
+
+
+def _wave(z: Real, k: Real, ends: list[tuple[Real, Real]], x: Real) -> tuple[Real, Real]:
+    """Return W_j and s_j (modes, n) of a wave with real z = -k^2 or k^2, from those (modes,) at both ends."""
+    z, k = z[:, None], np.maximum(k, LEAST_SIZE)[:, None]
+    (W0, s0), (W1, s1) = ((each[:, None] for each in end) for end in ends)
+    wave, slope = np.empty((2, *x.shape))
+    for kind, even, odd in ((z < 0, np.cos, np.sin), ((z >= 0) & (z < 1), np.cosh, np.sinh)):
+        rows = kind[:, 0]
+        c, s = even(k[rows] * x[rows]), odd(k[rows] * x[rows]) / k[rows]
+        wave[rows], slope[rows] = W0[rows] * c + (z * s0)[rows] * s, s0[rows] * c + W0[rows] * s
+    rows = z[:, 0] >= 1
+    from_inner = ((W0 - k * s0)[rows] / 2) * np.exp(-k[rows] * x[rows])
+    from_outer = ((W1 + k * s1)[rows] / 2) * np.exp(-k[rows] * (1 - x[rows]))
+    wave[rows], slope[rows] = from_inner + from_outer, (from_outer - from_inner) / k[rows]
+    return wave, slope
 
 
 def mode_field(k: System, s: complex, quantity: str, x: NDArray[np.float64]) -> Complex:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import GAINS, THEORIES, Arm, HubFeedback, Theory, input_words, load, must_be_arm, written_unit
 from tfarm.arm.checks import on_the_arm, whole
-from tfarm.arrays import Real
+from tfarm.arrays import Real, Whole
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.appendix import natural_frequency, roots_near
@@ -168,8 +168,12 @@ class Modes:
     @cached_property
     def nodes(self) -> tuple[Real, ...]:
         """Points x [m] strictly inside the arm where the displacement of each mode vanishes."""
-        rigid: tuple[Real, ...] = (np.empty(0),) * self._rigid
-        return rigid + tuple(self._nodes(mode) * float(self._k.length) for mode in range(len(self) - self._rigid))
+        found, first = [np.empty(0)] * self._rigid, 0
+        for block in self._shapes.blocks():
+            first += block.omega.size
+            mode, x = self._nodes(block, first)
+            found += np.split(x * float(self._k.length), np.searchsorted(mode, range(1, block.omega.size)))
+        return tuple(found)
 
     # ------------------------------------------------------------ sensitivities
 
@@ -208,25 +212,26 @@ class Modes:
             values = np.vstack([rigid, values])
         return values.reshape(len(values), *share.shape)
 
-    def _nodes(self, mode: int) -> Real:
-        """Return interior zeros of W, bracketed on a fine grid and refined by Newton (W' = Psi + sigma Q)."""
-        shape = self._shapes.part(mode, mode + 1)
-        even = NODE_POINTS * (mode + HALF_WAVES_BEYOND)
+    def _nodes(self, shapes: Shapes, last: int) -> tuple[Whole, Real]:
+        """Return modes (n,) up to number `last` and the interior zeros x (n,) of their W.
+
+        They are bracketed on a fine grid and refined by Newton's method, W' = Psi + sigma Q.
+        """
+        even = NODE_POINTS * (last - 1 + HALF_WAVES_BEYOND)
         ends = np.geomspace(NEAREST_NODE, FIRST_EVEN / even, END_POINTS)  # a heavy hub has a node close to it
         grid = np.r_[ends, np.linspace(0.0, 1.0, even)[1:-1], 1.0 - ends[::-1]]
-        W, Psi, *_ = shape(grid)[:, 0]
-        least = NO_DEFLECTION * max(abs(W).max(), abs(Psi).max())
+        W, Psi, *_ = shapes(grid)
+        least = NO_DEFLECTION * abs(np.hstack([W, Psi])).max(axis=1, keepdims=True)
         W = np.where(abs(W) < least, 0.0, W)  # a cut-off mode has W = 0 throughout
-        (start,) = np.nonzero(W[:-1] * W[1:] < 0)
+        mode, start = np.nonzero(W[:, :-1] * W[:, 1:] < 0)
         low, high = grid[start], grid[start + 1]
-        x = low + (high - low) * W[start] / (W[start] - W[start + 1])
-        before = low
+        before, x = low, low + (high - low) * W[mode, start] / (W[mode, start] - W[mode, start + 1])
         for _ in range(NODE_STEPS):
             if (abs(x - before) <= np.spacing(1.0)).all():
                 break
-            W, Psi, _, Q = shape(x)[:, 0]
-            before, x = x, np.clip(x - W / (Psi + shear_flexibility(self._k, x) * Q), low, high)
-        return x
+            at, slope, _, Q = shapes.at(mode, x)
+            before, x = x, np.clip(x - at / (slope + shear_flexibility(self._k, x) * Q), low, high)
+        return mode, x
 
 
 def modes(arm: Arm, count: int | None = None, *, up_to: float | None = None, theory: Theory | None = None) -> Modes:
