@@ -20,6 +20,7 @@ from tfarm.exact.compiled import compiled
 from tfarm.exact.layout import Reading, readings
 from tfarm.exact.sweep import AXIS, fill_free
 from tfarm.exact.system import Spring, System
+from tfarm.exact.uniform import fill_ends
 
 from .box import REAL_SHARE, Function, newton
 from .following import LOST, NEWTON_STEPS, SETTLED, follow, settled
@@ -31,7 +32,8 @@ HALVINGS = (250, *[80] * 8)  # of steps, after which stray branches are lost and
 LATE_HALVINGS = 8  # after the steps that there are in all: roots that are stray are soon lost
 AROUND = np.array([1, 1.02, 0.98, 1 + 0.02j, 1 - 0.02j, 1.2, 0.8, 1 + 0.2j, 1 - 0.2j])  # starts next to a guess, of it
 NEAR_REAL = 1e-7  # of its size: the imaginary part of a double zero is rounding
-NO_OUTPUT = np.empty((0, len(Reading._fields)))  # the table of no output
+NO_ENDS = np.empty((0, 4))  # the table of no output of a uniform link
+NO_OUTPUT = np.empty((0, len(Reading._fields)))  # and that of a chain
 
 
 def function_of(k: System) -> Function:
@@ -41,7 +43,7 @@ def function_of(k: System) -> Function:
 
 
 @compiled
-def _newton(s: Any, rows: Any, ends: Any, at_rest: int, singular: Any) -> None:
+def _newton(s: Any, rows: Any, ends: Any, is_uniform: bool, at_rest: int, singular: Any) -> None:
     """Replace guesses s (n,) by the zeros of D/s^at_rest next to them, or NaN, as `following.settled` does."""
     moving = np.flatnonzero(~np.isnan(s))
     count = moving.size
@@ -54,7 +56,10 @@ def _newton(s: Any, rows: Any, ends: Any, at_rest: int, singular: Any) -> None:
                 near = min(near, abs(1.0 - here / each))
             h[i] = DIFFERENCE_STEP * max(abs(here) * near, 1e-300)
             at[3 * i], at[3 * i + 1], at[3 * i + 2] = here, here + h[i], here - h[i]
-        fill_free(at[: 3 * count], rows, ends, AXIS, NO_OUTPUT, found, lost)
+        if is_uniform:
+            fill_ends(at[: 3 * count], rows, ends, NO_ENDS, False, found, lost)
+        else:
+            fill_free(at[: 3 * count], rows, ends, AXIS, NO_OUTPUT, found, lost)
         kept = 0
         for i in range(count):
             n, j = moving[i], 3 * i
@@ -100,6 +105,7 @@ class Damping:
         still, layout = (readings(k, (), 0.0) for k in (self.k.with_damping(0.0), self.k))
         self.rows = still.rows, layout.rows - still.rows
         self.ends = still.ends, layout.ends - still.ends
+        self.is_uniform = layout.ends_table is not None
         self.at_rest, self.points = self.k.at_rest, np.array(self.k.singular)
 
     def near(self, values: Real, guess: Complex) -> Complex:
@@ -110,7 +116,8 @@ class Damping:
         units = (values * self.level)[:, None]
         found, (rows, of_rows), (ends, of_ends) = guess / units, self.rows, self.ends
         for here, share in zip(found, values.tolist(), strict=True):
-            _newton(here, rows + share * of_rows, ends + share * of_ends, self.at_rest, self.points / share)
+            moved = rows + share * of_rows, ends + share * of_ends
+            _newton(here, *moved, self.is_uniform, self.at_rest, self.points / share)
         return found * units
 
     def complete(self, value: float, guess: Complex) -> Complex:
