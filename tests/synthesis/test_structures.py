@@ -22,7 +22,7 @@ from tfarm.synthesis.design import design
 from tfarm.synthesis.judge import LOST, RESERVE, entries_of
 from tfarm.synthesis.models import in_blocks, squares
 from tfarm.synthesis.structures import STRUCTURES, structure_of
-from tfarm.tuner.trial import slew_trial
+from tfarm.tuner.trial import Cost, slew_trial
 from tfarm.tuner.tuning import usual_plan
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -266,7 +266,8 @@ def test_the_cost_is_that_of_the_tuners_trial_with_a_constant_gain(arm, gain):
         {"hub_angle": 4.0, "hub_rate": 2.0, "root_moment": gain}, references=("hub_angle", "hub_rate", "root_moment")
     )
     plan = usual_plan(arm)
-    trial = slew_trial(arm, K1=2.0, Kp=4.0, cost=plan.cost.in_units_of(plan.scale), duration=plan.duration)
+    cost = Cost(a=plan.cost.a / plan.scale**2, b=plan.cost.b / plan.scale**2)
+    trial = slew_trial(arm, K1=2.0, Kp=4.0, cost=cost, duration=plan.duration)
     score = judge_of(arm, law, "cost", count=6).score(law)
     assert score == pytest.approx(trial.with_constant(gain).cost, rel=1e-9)
 
