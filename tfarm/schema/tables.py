@@ -219,9 +219,15 @@ def sections(record: Any, title: str = "") -> list[Section]:
 # ------------------------------------------------------------------------------------------------------------ files
 
 
-def to_json(answer: Any) -> str:
-    """One JSON object in ASCII, which every pipe takes; a table in it is a list of its rows.  NaN raises ValueError."""
-    return json.dumps(json_value(answer), allow_nan=False)
+def to_json(answer: Any, **how: Any) -> str:
+    """One JSON object in ASCII, which every pipe takes; a table in it is a list of its rows.  NaN raises ValueError.
+
+    `how` are further options of `json.dumps`.
+    """
+    try:
+        return json.dumps(answer, allow_nan=False, default=list, **how)
+    except ValueError:  # of an infinity, which is a text in JSON, or of a NaN
+        return json.dumps(json_value(answer), allow_nan=False, **how)
 
 
 def json_value(value: Any) -> Any:
@@ -241,7 +247,7 @@ def as_json(table: Table) -> str:
     """{"table", "units", "rows": [{key: value}, ...]}."""
     units = {column.key: column.unit for column in table.columns if column.unit}
     whole = {"table": table.title, "units": units, "rows": table}
-    return f"{json.dumps(json_value(whole), ensure_ascii=False, allow_nan=False)}\n"
+    return f"{to_json(whole, ensure_ascii=False)}\n"
 
 
 def as_csv(table: Table, *, units: bool = False) -> str:
