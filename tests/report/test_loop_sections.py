@@ -27,7 +27,6 @@ from tfarm.report import loop_section as map_room
 from tfarm.report import page as cases
 from tfarm.report import write, writing
 from tfarm.report.loop_section import (
-    beyond_table,
     draw_map_of_arm,
     map_data,
     map_of_arm,
@@ -136,16 +135,6 @@ def test_the_verdict_comes_before_any_margin():
 def test_the_answer_of_the_loci_names_the_crossing():
     data = loci(LAB, PAPER_GAINS, "K2", -1.0, 1.6)
     assert "unstable from K2 = 1.0305; mode 1" in prose("locus_lead", found={"K2": data}, gains={"K2": "K1 = 0.3"})
-
-
-def test_beyond_one_infinitely_many_poles_are_unstable_without_damping():
-    """And at K2 = 1 exactly none is: the modes with the hub at rest stay on the axis."""
-    table = beyond_table(PURE, PAPER_GAINS)
-    columns = {column.key: column.values for column in table.columns}
-    assert columns["verdict"] == ["stable", "marginal", "unstable", "unstable", "unstable"]
-    assert columns["unstable_poles"][2:] == ["infinitely many"] * 3
-    held = tfarm.modes(replace(PURE, hub=Hub(inertia=math.inf)), 1).natural_frequency[0]
-    assert f"{held:.5g}" in columns["first_pairs"][1]
 
 
 # ------------------------------------------------------------ Nyquist
