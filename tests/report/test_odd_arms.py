@@ -214,12 +214,6 @@ def test_a_margin_without_end_has_no_frequency(monkeypatch):
 # ------------------------------------------------------------ what the assumptions do
 
 
-@pytest.mark.parametrize(("hub", "words"), [(math.inf, "a hub that is locked"), (0.1, "the two values assumed")])
-def test_what_the_paper_leaves_open_is_what_the_arm_has(hub, words):
-    arm = replace(tfarm.load("sasaki2012"), hub=tfarm.Hub(inertia=hub))
-    assert words in assumptions_section(Case(arm, Chain())).words[0]
-
-
 def test_frequencies_over_the_hub_inertia_are_those_of_arms_that_have_it():
     """The arm's own value once."""
     arm = tfarm.load("sasaki2012-lab")

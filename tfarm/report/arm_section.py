@@ -1,4 +1,4 @@
-"""The arm: its headline numbers, its parameters, what follows from these, its assumptions and the paper's slips."""
+"""The arm: its headline numbers, its parameters, what follows from these, and its assumptions."""
 
 from __future__ import annotations
 
@@ -119,61 +119,6 @@ def derived_table(arm: Arm) -> Table:
     return sheet("derived", table([row for row in rows if row.value is not False]), arm=arm)
 
 
-# ------------------------------------------------------------ the paper
-
-
-class PaperValue(NamedTuple):
-    """A row of Table 1: its value, None where the table has none, and unit, as printed; and those used here."""
-
-    quantity: Annotated[str, Quantity("quantity", help="entry of the paper's Table 1")]
-    symbol: Annotated[str, Quantity("symbol", help="letter of the quantity in the paper")]
-    printed: Annotated[
-        float | None, Quantity("printed in Table 1", help="value as printed; none where the table has no such entry")
-    ]
-    printed_unit: Annotated[str, Quantity("unit, as printed", help="unit as printed")]
-    used: Annotated[float, Quantity("used here", help="value of this arm, in the unit of the next column")]
-    unit: Annotated[str, Quantity("unit", help="SI unit of the value used here")]
-
-    @property
-    def remark(self) -> Annotated[str, Quantity("remark", help="reason where the value used is not the printed one")]:
-        """The reason why the value used is not the printed one, or is an odd one; empty of any other."""
-        return prose("paper_remark", row=self)
-
-    @property
-    def is_as_printed(self) -> bool:
-        """Whether the number used is the printed one."""
-        return self.printed is not None and math.isclose(self.used, self.printed)
-
-
-def paper_values(arm: Arm) -> tuple[PaperValue, ...]:
-    """Table 1 of the paper, and the values of an arm."""
-    link, payload = arm.link, arm.payload
-    return (
-        PaperValue("length of the arm", "L", 1.0, "m", link.length, "m"),
-        PaperValue("cross-sectional area", "A", 6.0e-4, "m²", link.section.area, "m²"),
-        PaperValue("density", "ρ", 2.7667, "kg/m³", link.density, "kg/m³"),
-        PaperValue("Young's modulus", "E", 6.8944e10, "Pa", link.youngs_modulus, "Pa"),
-        PaperValue("internal damping", "C", 0.0, "kg/s", link.damping, "s"),
-        PaperValue("payload inertia", "I_c", 0.0, "kg m²", payload.inertia, "kg m²"),
-        PaperValue("payload mass", "m", 0.0, "kg", payload.mass, "kg"),
-        PaperValue("shear factor", "κ", 5 / 6, "", link.shear_factor, ""),
-        PaperValue("shear modulus", "G", 2.6517e10, "Pa", link.shear_modulus, "Pa"),
-        PaperValue("second moment of area", "I", None, "", link.section.second_moment, "m⁴"),
-        PaperValue("hub inertia", "I_h", None, "", arm.hub.inertia, "kg m²"),
-    )
-
-
-def is_from_paper(arm: Arm) -> bool:
-    """Whether length, section and moduli are those of Table 1."""
-    return all(row.is_as_printed for row in paper_values(arm) if row.symbol in "L A E κ G")
-
-
-def paper_section(case: Case) -> PageSection:
-    """Table 1 and its corrections."""
-    values = sheet("paper_values", table(paper_values(case.arm)))
-    return PageSection(title="The paper's values, corrected", words=(prose("paper"),), blocks=(values,))
-
-
 # ------------------------------------------------------------ assumptions
 
 
@@ -185,5 +130,5 @@ def assumptions_section(case: Case) -> PageSection:
     if arm.is_uniform and has_hub_inertia(arm):
         found["assumptions_hub"] = hub_study(arm)
     blocks = [sheet(kind, table(study.candidates), study=study) for kind, study in found.items()]
-    words = (prose("assumptions", arm=arm, is_from_paper=is_from_paper(arm), has_hub=has_hub_inertia(arm)),)
+    words = (prose("assumptions", arm=arm, has_hub=has_hub_inertia(arm)),)
     return PageSection(title="What the assumptions do", words=words, blocks=blocks)

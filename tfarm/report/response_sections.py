@@ -7,12 +7,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from decimal import Decimal, localcontext
 from functools import lru_cache, partial
-from typing import Annotated, Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 import tfarm
-from tfarm.arm import MOMENT_GAIN, Arm, Theory
+from tfarm.arm import Arm, Theory
 from tfarm.arrays import Real
 from tfarm.digits import fixed, kept_digits, lined, listed, plain
 from tfarm.errors import CertificationError, ConvergenceError
@@ -24,7 +24,7 @@ from tfarm.plots import frequency, motion
 from tfarm.plots.style import gains_words
 from tfarm.report.page import Case, PageSection, Picture, has_loop, picture, prose, sheet, upper
 from tfarm.response.frequency import AXIS_SHARE, Bode, bode
-from tfarm.schema import Column, Quantity, Table, curve_table, table
+from tfarm.schema import Column, Table, curve_table, table
 from tfarm.spectrum import DampedModes, Modes, damped_modes, modes
 from tfarm.spectrum.listing import SHAPE_DIGITS, ListedMode, beyond_the_box, listed_modes
 from tfarm.spectrum.proofs import Certificate
@@ -259,15 +259,6 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
     return PageSection(title="Fitted to measurements", answer=answer, words=words, blocks=blocks)
 
 
-class MarginSpan(NamedTuple):
-    """A margin over the possible arms."""
-
-    margin: Annotated[str, Quantity("of the loop", help="stability margin of the default loop")]
-    unit: Annotated[str, Quantity("unit", help="unit of the margin")]
-    lowest: Annotated[float, Quantity("lowest", digits=4, help="least over the arms on which the loop is stable")]
-    highest: Annotated[float, Quantity("highest", digits=4, help="largest over the arms on which the loop is stable")]
-
-
 def _of_all_arms(those: Possible, every: list[Margins]) -> Iterator[Picture | Table]:
     """The band of a response, and of an arm with a loop the share of arms over its gains, and the margins over all."""
     if those.fit.responses:
@@ -275,15 +266,9 @@ def _of_all_arms(those: Possible, every: list[Margins]) -> Iterator[Picture | Ta
     if not every:
         return
     yield picture("fit_map", frequency.draw_share.figure(those, ranges_of(those.fit.arm)))
-    stable = [each for each in every if each.in_band is not None]
-    ends = (each.windows[MOMENT_GAIN].around for each in stable)
-    found = {(f"{MOMENT_GAIN} up to", ""): [pair[1] for pair in ends if pair is not None]}
-    titles = {"phase": ("phase margin", "deg"), "delay": ("delay margin", "s"), "disk": ("disk margin", "")}
-    found |= {title: [getattr(each.in_band, name) for each in stable] for name, title in titles.items()}
-    known = {title: [value for value in values if value is not None] for title, values in found.items()}
-    rows = [MarginSpan(*title, min(values), max(values)) for title, values in known.items() if values]
-    gains = gains_words(default_gains(those.fit.arm))
-    yield sheet("fit_margins", table(rows), gains=gains, stable=stable)
+    stable = [each.in_band for each in every if each.in_band is not None]
+    columns = table(stable, ("phase_margin", "delay_margin", "disk_margin"))
+    yield sheet("fit_margins", columns, gains=gains_words(default_gains(those.fit.arm)))
 
 
 # ------------------------------------------------------------ measured
