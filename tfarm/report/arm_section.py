@@ -45,15 +45,13 @@ def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
 
     modes = tfarm.modes(arm, count=3)  # the rigid body's 0 is not shown
     slenderness = arm.link.slenderness if arm.is_uniform else arm.length / arm.link.section.radius_of_gyration
-    depth = f"depth/length {significant(math.sqrt(12) / slenderness, 3)} as a rectangle"
     numbered = zip(modes.index, modes.natural_frequency, strict=True)
     return (
         *(frequency(f"natural frequency {number}", omega, 8) for number, omega in numbered if number > 0),
         Fact("total inertia J about the hub", significant(arm.total_inertia, 8), "kg m²",
              "the arm cannot turn as a rigid body" * (not arm.has_rigid_mode)),
-        Fact("slenderness L/√(I/A)", significant(slenderness, 5), note=depth),
+        Fact("slenderness L/√(I/A)", significant(slenderness, 5)),
         *([frequency("shear cut-off √(κGA/ρI)", arm.shear_cutoff, 6)] if arm.has_cutoff else []),
-        Fact("mass of the link", significant(arm.own_mass, 5), "kg"),
         Fact("damping C", plain(arm.damping), "s", prose("damping_note", arm=arm)),
     )  # fmt: skip
 

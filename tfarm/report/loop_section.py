@@ -168,8 +168,6 @@ class Entry(NamedTuple):
     variable: Annotated[str, Quantity("in powers of", help="s in continuous time, z at the samples")]
     numerator: Annotated[list[float] | str, Quantity("numerator", help="coefficients in descending powers")]
     denominator: Annotated[list[float] | str, Quantity("denominator", help="coefficients in descending powers")]
-    delay: Annotated[float, Quantity("delay", "s", help="delay of the controller itself")]
-    period: Annotated[float | None, Quantity("period", "s", help="sampling period of a discrete-time controller")]
 
 
 def entries_of(each: Controller) -> Iterator[Entry]:
@@ -185,7 +183,7 @@ def entries_of(each: Controller) -> Iterator[Entry]:
             enters = "less its reference" if name in law.references else "as it is"
             enters = enters if is_measured(name) else "its reference alone"
             unit = Signals(each.arm, (signal,)).units[0]
-            yield Entry(each.name, signal, unit, enters, sign, variable, num, den, law.delay, law.period)
+            yield Entry(each.name, signal, unit, enters, sign, variable, num, den)
 
 
 # ------------------------------------------------------------ the map of both gains
@@ -263,21 +261,13 @@ def draw_map_of_arm(data: MapOfArm, *, ax: Axes) -> None:
 
 
 def map_data(data: MapOfArm) -> Sequence[Column]:
-    """The grid with counts and damping, the boundary with its frequencies, then the ends of the sampled intervals.
-
-    Ends that are cut by the picture are left out.
-    """
+    """The grid with counts and damping, then the boundary with its frequencies; the sampled region has its own file."""
     points = zip(*map(np.ravel, np.meshgrid(*data.axes)), data.counts.ravel(), data.damping.ravel(), strict=True)
     grid = [("grid", K1, K2, math.inf if count < 0 else int(count), damping, "") for K1, K2, count, damping in points]
     line = [("boundary", K1, K2, "", "", omega) for K1, K2, omega in data.edge.tolist() if not math.isnan(K1)]
-    columns = () if data.sampled is None else zip(data.sampled.axes[0], data.sampled.stable_intervals, strict=True)
-    sampled = [
-        ("sampled boundary", across, end, "", "", "")
-        for across, windows in columns for window in windows for end in window if data.y.low <= end <= data.y.high
-    ]  # fmt: skip
     rate = "_".join([PLANE[0], *shown_unit(PLANE[0], data.case.arm).replace("/", " ").split()])
     keys = ("what", rate, PLANE[1], "unstable_poles", "least_damping_ratio", "omega_rad_s")
-    return [Column(key, of=own) for key, own in zip(keys, zip(*grid, *line, *sampled, strict=True), strict=True)]
+    return [Column(key, of=own) for key, own in zip(keys, zip(*grid, *line, strict=True), strict=True)]
 
 
 def map_section(case: Case) -> PageSection:

@@ -158,22 +158,20 @@ def slews(case: Case) -> tuple[list[Picture | Table], list[str]]:
         return [], [f"{prose('what_holds', arm=case.arm)}: no slew is simulated."]
     if all(each.given.measured is not None for each in case.controllers):
         return [], []
-    bare = [] if case.laws else [default_gains(case.arm).having(MOMENT_GAIN, 0.0)]
-    controllers = *(on_hub(case.arm, gains, f"{MOMENT_GAIN} = 0", "without") for gains in bare), *case.controllers
+    bare = on_hub(case.arm, default_gains(case.arm).having(MOMENT_GAIN, 0.0), f"{MOMENT_GAIN} = 0", "without")
     runs: dict[str, Simulation] = {}
-    words, task = [], case.chain.slew
-    for each in controllers:
+    words, task, simulated = [], case.chain.slew, []
+    for each in (*([] if case.laws else [bare]), *case.controllers):
         try:
-            runs[each.name] = results.drawn(
-                each.arm, each.law, case.chain, "slew", traces.RECORD_LENGTH * task.rise_time
-            )
+            duration = traces.RECORD_LENGTH * task.rise_time
+            runs[each.name] = results.drawn(each.arm, each.law, case.chain, "slew", duration)
+            simulated.append(each)
         except ParameterError as error:
             words.append(f"No slew of {each.name} is simulated: {error}.")
-    if len({each.arm.input_unit for each in controllers}) > 1:
+    if len({each.arm.input_unit for each in simulated}) > 1:
         return [], [*words, "The controllers drive inputs of different units: their slews are not drawn together."]
     if not runs:
         return [], words
-    simulated = [each for each in controllers if each.name in runs]
     arm, title = simulated[0].arm, prose("slew_title", task=task, reach=case.arm.reach)
     figure = motion.slew.figure(arm, {style.safe(name): run for name, run in runs.items()}, title)
     columns = response_columns(arm, {each.key: runs[each.name] for each in simulated})
@@ -197,8 +195,8 @@ def piece_of_bands(runs: Mapping[str, Simulation]) -> float | None:
 def response_columns(arm: Arm, each: Mapping[str, Simulation]) -> Sequence[Column]:
     """The curves of some simulations of one scenario as they are drawn: a row a point, or a piece of the bands.
 
-    Torques and gains are those held at that time, the rigid arm's moment that of the sample after it.  Numbers have
-    `CURVE_DIGITS` digits: a page's folder is no place for six thousand rows of eleven columns to the last bit.
+    Torques are those held at that time, the rigid arm's moment that of the sample after it.  Numbers have
+    `CURVE_DIGITS` digits: a page's folder is no place for six thousand rows of so many columns to the last bit.
     """
     moments = {key: traces.curve_of(run, "root_moment") for key, run in each.items()}
     t, first = min((moment.t for moment in moments.values()), key=len), next(iter(each.values()))
@@ -207,12 +205,9 @@ def response_columns(arm: Arm, each: Mapping[str, Simulation]) -> Sequence[Colum
     driven, unit = "torque" if arm.input_unit == "N m" else "input", arm.input_unit
     for key, run in each.items():
         columns += moments[key].at(t).columns(f"root_moment_{key}", "N m")
-        columns += traces.curve_of(run, "tip_displacement").at(t).columns(f"tip_{key}", "m")
         columns += traces.tip_deviation(arm, run).at(t).columns(f"tip_error_{key}", "m")
         name = f"{driven}_{key}_{unit.replace(' ', '_')}"
         columns.append(Column(name, unit=unit, of=traces.held_at(run, run.torque, t)))
-        if run.gain is not None and np.ptp(run.gain):
-            columns.append(Column(f"K_{key}", of=traces.held_at(run, run.gain, t)))
     return [replace(each, of=kept_digits(map(float, each.values), CURVE_DIGITS)) for each in columns]
 
 
