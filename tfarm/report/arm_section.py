@@ -40,18 +40,18 @@ def arm_section(case: Case) -> PageSection:
 def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
     """First natural frequencies (at C = 0), total inertia, slenderness, shear cut-off, damping."""
 
-    def frequency(label: str, omega: float, digits: int) -> Fact:
-        return Fact(label, significant(omega, 8), "rad/s", f"{significant(omega / (2 * math.pi), digits)} Hz")
+    def frequency(label: str, omega: float) -> Fact:
+        return Fact(label, significant(omega, 8), "rad/s", f"{significant(omega / (2 * math.pi), 8)} Hz")
 
     modes = tfarm.modes(arm, count=3)  # the rigid body's 0 is not shown
     slenderness = arm.link.slenderness if arm.is_uniform else arm.length / arm.link.section.radius_of_gyration
     numbered = zip(modes.index, modes.natural_frequency, strict=True)
     return (
-        *(frequency(f"natural frequency {number}", omega, 8) for number, omega in numbered if number > 0),
+        *(frequency(f"natural frequency {number}", omega) for number, omega in numbered if number > 0),
         Fact("total inertia J about the hub", significant(arm.total_inertia, 8), "kg m²",
              "the arm cannot turn as a rigid body" * (not arm.has_rigid_mode)),
         Fact("slenderness L/√(I/A)", significant(slenderness, 5)),
-        *([frequency("shear cut-off √(κGA/ρI)", arm.shear_cutoff, 6)] if arm.has_cutoff else []),
+        *([frequency("shear cut-off √(κGA/ρI)", arm.shear_cutoff)] if arm.has_cutoff else []),
         Fact("damping C", plain(arm.damping), "s", prose("damping_note", arm=arm)),
     )  # fmt: skip
 

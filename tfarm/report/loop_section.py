@@ -164,15 +164,13 @@ class Entry(NamedTuple):
     signal: Annotated[str, Quantity("signal", help="output of the arm that the controller reads")]
     unit: Annotated[str, Quantity("unit", help="unit of the signal")]
     enters: Annotated[str, Quantity("enters", help="whether the reference is subtracted from the signal")]
-    sign: Annotated[str, Quantity("sign in the input", help="sign of the signal's part in the control law")]
-    variable: Annotated[str, Quantity("in powers of", help="s in continuous time, z at the samples")]
     numerator: Annotated[list[float] | str, Quantity("numerator", help="coefficients in descending powers")]
     denominator: Annotated[list[float] | str, Quantity("denominator", help="coefficients in descending powers")]
 
 
 def entries_of(each: Controller) -> Iterator[Entry]:
     """Every signal of a law with every digit; matrices are in its file alone."""
-    law, sign, variable = each.law, "−" if each.law.sign < 0 else "+", "z" if each.law.is_discrete else "s"
+    law = each.law
     for part in law.parts:
         num: list[float] | str = "matrices, in its file"
         den: list[float] | str = ""
@@ -183,7 +181,7 @@ def entries_of(each: Controller) -> Iterator[Entry]:
             enters = "less its reference" if name in law.references else "as it is"
             enters = enters if is_measured(name) else "its reference alone"
             unit = Signals(each.arm, (signal,)).units[0]
-            yield Entry(each.name, signal, unit, enters, sign, variable, num, den)
+            yield Entry(each.name, signal, unit, enters, num, den)
 
 
 # ------------------------------------------------------------ the map of both gains
