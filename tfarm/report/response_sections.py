@@ -222,13 +222,13 @@ def bode_facts(data: Bode) -> dict[str, Any]:
 
 
 def _boxes(data: Bode) -> list[str]:
-    """The widths in which poles and zeros are complete, one where both are the same."""
-    pairs = {"poles": data.pole_width, "zeros": data.zero_width}
-    found = {name: f"{plain(left, 5)} < Re s < {plain(right, 5)} 1/s"
-             for name, (left, right) in pairs.items() if not math.isinf(left)}  # fmt: skip
-    if len(found) == len(pairs) and len(set(found.values())) == 1:
-        return [found["poles"]]
-    return [f"{name} {width}" for name, width in found.items()]
+    """The widths in which poles and zeros are complete."""
+    widths = {"poles": data.pole_width, "zeros": data.zero_width}
+    return [
+        f"{name} in {plain(left, 5)} < Re s < {plain(right, 5)} 1/s"
+        for name, (left, right) in widths.items()
+        if not math.isinf(left)
+    ]
 
 
 # ------------------------------------------------------------ fitted to measurements
