@@ -49,23 +49,11 @@ def contradictions(folder: Path) -> list[str]:
 
 
 def _of_the_loop(folder: Path) -> list[str]:
-    found = [
+    return [
         f"{law}: {of[BY_NYQUIST]} by Nyquist, {of['unstable poles']} in a box"
         for law, of in _across(folder, "nyquist-count").items()
         if not of["poles on the axis to working precision"] and of[BY_NYQUIST] != of["unstable poles"]
     ]
-    edges = [
-        float(row["interval"]["high"])
-        for row in _rows(folder, "default-windows")
-        if row["number"] == "K2" and row["interval"] is not None
-    ]
-    found += [
-        f"K2 = {row['value']} is {row['verdict']}, below the edge at {edge}"
-        for edge in edges
-        for row in _rows(folder, "beyond")
-        if float(row["value"]) < edge * (1 - 1e-9) and row["verdict"] != "stable"
-    ]
-    return found
 
 
 def _across(folder: Path, stem: str) -> dict[str, dict[str, Any]]:

@@ -23,7 +23,7 @@ from tfarm.fitting.recording import compare_run, load_run, overshoot
 from tfarm.report import writing
 from tfarm.report.loop_section import law_section, margins_section
 from tfarm.report.page import Case, GivenLaw
-from tfarm.report.sampled_section import measured_step, sampled_section
+from tfarm.report.sampled_section import sampled_section, step_rows
 from tfarm.report.writing import PIECES, file_of, pieces_of
 from tfarm.schema import to_json
 
@@ -191,9 +191,9 @@ def test_what_is_measured_and_computed_of_the_real_controllers():
         goal = measured.reference[-1]
         assert 100 * overshoot(measured.hub_angle, measured.step, goal) == pytest.approx(over, abs=1e-3)
         assert np.degrees(measured.hub_angle[-1] - goal) == pytest.approx(end, abs=1e-4)
-        row = measured_step(name, found)
-        assert row.overshoot_measured == pytest.approx(over, abs=1e-3)
-        assert row.end_computed == pytest.approx(np.degrees(found.hub_angle[-1] - goal))
+        on_rig, computed = step_rows(name, found)
+        assert on_rig.overshoot == pytest.approx(over, abs=1e-3)
+        assert computed.end == pytest.approx(np.degrees(found.hub_angle[-1] - goal))
         first = [
             np.flatnonzero(abs(moment) > 0.5)[0] for moment in (measured.root_moment, found.run.at_samples.root_moment)
         ]

@@ -186,9 +186,6 @@ def test_a_plain_script_starts_no_processes(monkeypatch):
 # ------------------------------------------------------------ all or nothing
 
 
-# ------------------------------------------------------------ all or nothing
-
-
 @pytest.mark.parametrize("where", ["file", "file/below/it", "taken"])
 def test_an_unwritable_out_is_refused_before_any_work_and_left_alone(tmp_path, monkeypatch, where):
     (tmp_path / "file").write_text("mine")

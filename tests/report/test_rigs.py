@@ -32,7 +32,7 @@ def values_of(table):
 @pytest.mark.parametrize("name", RIGS)
 def test_every_number_of_the_file_is_in_the_table_of_parameters(name):
     arm = RIGS[name]
-    _, given, derived = arm_section(Case(arm, Chain())).blocks
+    _, given, _ = arm_section(Case(arm, Chain())).blocks
     shown = values_of(given)
     numbers = [getattr(link, key) for link in arm.links for key in ("length", "density", "youngs_modulus", "damping")]
     numbers += [arm.hub.inertia, arm.hub.friction, arm.payload.mass, arm.payload.inertia]
@@ -40,7 +40,6 @@ def test_every_number_of_the_file_is_in_the_table_of_parameters(name):
     if arm.motor is not None:
         numbers += [arm.motor.resistance, arm.motor.torque_constant, arm.motor.gear_ratio, arm.motor.rotor_inertia]
     assert set(numbers) - {0.0} <= set(shown.values())
-    assert values_of(derived)["total inertia about the axis"] == arm.total_inertia
 
 
 def test_the_page_has_the_gauge_s_place_and_the_shear_cut_off():
@@ -50,7 +49,7 @@ def test_the_page_has_the_gauge_s_place_and_the_shear_cut_off():
         section = arm_section(Case(arm, Chain()))
         _, given, derived = section.blocks
         assert values_of(given).get("gauge.x", 0.0) == arm.gauge.x
-        labels = [fact.label for fact in section.facts] + list(values_of(derived))
+        labels = [fact.label for fact in section.facts]
         assert any("shear cut-off" in each for each in labels) == (arm.theory == "timoshenko")
         assert ("no shear cut-off" in derived.caption) == (arm.theory == "rayleigh")
 
@@ -65,14 +64,13 @@ def test_the_sketch_has_each_segment_where_it_is_and_the_payload_at_its_centre()
     assert complaints(ax.get_figure()) == []
 
 
-def test_free_lossy_and_locked_frequencies_are_those_of_the_commands():
+def test_free_and_locked_frequencies_are_those_of_the_commands():
     arm = RIGS["quanser-2dsfl"]
-    columns = {each.key: np.array(each.values) for each in locked_table(tfarm.modes(arm, 2)).columns}
-    np.testing.assert_array_equal(columns["hub_free_rad_s"][:2], tfarm.modes(arm, 2).natural_frequency[1:])
+    columns = {each.key: list(each.values) for each in locked_table(tfarm.modes(arm, 6)).columns}
+    assert columns["index"] == list(range(1, 7))
+    assert columns["natural_frequency_rad_s"] == tfarm.modes(arm, 6).natural_frequency[1:].tolist()
     held = tfarm.modes(arm.having(hub_inertia=math.inf), 6)
-    np.testing.assert_array_equal(columns["hub_locked_rad_s"], held.natural_frequency)
-    found = tfarm.damped_modes(tfarm.modes(arm, 6))  # whose only loss is at its hub
-    np.testing.assert_allclose(columns["with_losses_rad_s"], found.eigenvalues[1:, 0].imag, rtol=1e-9)
+    assert columns["hub_locked_rad_s"] == held.natural_frequency.tolist()
 
 
 def test_words_of_a_rig_are_true_of_it():

@@ -12,7 +12,7 @@ from tests.odd_arms import odd_arms
 from tests.report.written import blocks_of, values_of
 from tfarm.arm import HubFeedback
 from tfarm.digits import kept_digits, plain, significant
-from tfarm.dsp import Chain, Simulator, sampled_loop, sampled_verdict, scenario, stable_windows, verdict
+from tfarm.dsp import Chain, Simulator, sampled_loop, scenario, verdict
 from tfarm.dsp.chain import Converters, Sampling
 from tfarm.dsp.modes import dominant, mode_table
 from tfarm.loop.stability import stability
@@ -104,14 +104,6 @@ def test_facts_and_words_are_the_analysis(section):
     assert "stable for K2 in (< -50, 1.031), the sampled one for K2 in (-0.1526, 1.16388)" in section.blocks[0].caption
 
 
-def test_the_table_of_periods_is_each_period_by_itself(section):
-    table = values_of(blocks_of(section)["sampled-periods"])
-    assert table["period_ms"] == [1.0, 5.0, 10.0, 20.0, 50.0]
-    late = sampled_verdict(LAB, GAINS, Chain(sampling=Sampling(period=0.05)))
-    assert table["time_constant_s"][-1] == -0.05 / late.log_radius
-    assert table["stable_K2"][-1] in stable_windows(late.full, "K2")
-
-
 def test_a_delay_margin_that_is_a_lower_bound_is_shown_so():
     """That of the 2-DOF rig, which the search of its first 20 modes does not reach."""
     rig = tfarm.load("quanser-2dsfl")
@@ -177,7 +169,6 @@ def test_the_slew_is_the_simulators_own(section):
 def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
     monkeypatch.setattr("tfarm.plots.regions.OVERLAY_COLUMNS", 8)
     monkeypatch.setattr("tfarm.dsp.crossings.MOST_COLUMNS", 0)
-    monkeypatch.setattr("tfarm.dsp.verdict.PERIOD_SHARES", (1.0,))
     section = sampled_section(Case(replace(LAB, payload=tfarm.Payload(mass=math.inf)), Chain()))
     assert "no slew" in section.words[-1]
     assert "sampled-overlay" in blocks_of(section)

@@ -19,7 +19,6 @@ from tfarm.report import response_sections, write, writing
 from tfarm.report import trust as trust_proofs
 from tfarm.report.response_sections import how_proven, modal_table, rounds_to
 from tfarm.report.trust import (
-    anchor,
     compared_formulas,
     in_letters,
     proof_tables,
@@ -327,11 +326,6 @@ def test_what_differs_is_marked_and_nothing_else(equation, printed, corrected):
     assert changed(right) == corrected
 
 
-def test_the_same_formula_has_no_marks():
-    typeset = tex(claim_of("(15)").printed)
-    assert [changed(side) for side in compared_formulas(typeset, typeset)] == [[], []]
-
-
 def test_a_determinant_has_bars_as_high_as_it():
     claim = claim_of("Delta, Delta k_i")
     bars = [leaf for leaf in leaves(formulas(tex(claim.printed))) if leaf.text == "|"]
@@ -358,9 +352,3 @@ def test_infinity_is_no_operator_and_plus_minus_is_one():
 )
 def test_plain_text_in_letters(text, shown):
     assert in_letters(text) == shown
-
-
-def test_every_equation_has_an_anchor_of_its_own():
-    anchors = [anchor(claim.equation) for claim in CLAIMS]
-    assert len(set(anchors)) == len(anchors)
-    assert anchor("(A.1)") == "eq-a-1"

@@ -8,6 +8,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from urllib.parse import unquote
 
 import pytest
@@ -265,9 +266,10 @@ def test_every_text_is_used():
 
 def test_line_breaks_of_a_text_are_spaces_and_a_table_has_title_and_caption():
     assert prose("fit", verdict="fitted", found="3 numbers").startswith("Fitted: 3 numbers. The interval holds")
-    table = sheet("matrices", [Column("row", "", of=["x1"])], stem="of-a-law", name="A ¶ <law>")
-    assert (table.stem, table.title) == ("of-a-law", "Matrices of A ¶ <law>")
-    assert table.caption.startswith("A ¶ <law>: A and C under the states, B and D under")
+    controller = SimpleNamespace(name="A ¶ <law>")
+    table = sheet("intervals", [Column("row", "", of=["x1"])], stem="of-a-law", each=controller, note="B ¶")
+    assert (table.stem, table.title) == ("of-a-law", "Stability intervals of A ¶ <law>")
+    assert table.caption.endswith("B ¶.")
 
 
 # ------------------------------------------------------------ the index

@@ -15,9 +15,6 @@ import pytest
 import tfarm
 from tests.hostile import NAME
 from tests.report.written import ARM
-from tfarm.dsp import Chain
-from tfarm.report.arm_section import is_from_paper, paper_section
-from tfarm.report.page import Case
 from tfarm.report.response_sections import sensitivity_table
 from tfarm.spectrum.table import default_gains
 
@@ -87,20 +84,6 @@ def test_parameters_that_change_nothing_are_left_out_with_a_word():
         "Left out, as one per cent more of it changes no frequency here: payload mass and payload inertia."
         in table.caption
     )
-
-
-def test_the_paper_is_corrected_where_the_arm_is_its_own():
-    assert not is_from_paper(ARM)
-    for name, density in (("sasaki2012", 2766.7), ("sasaki2012-as-printed", 2.7667)):
-        arm = tfarm.load(name)
-        assert is_from_paper(arm)
-        (table,) = paper_section(Case(arm, Chain())).blocks
-        rows = list(zip(*(column.values for column in table.columns), strict=True))
-        (row,) = (row for row in rows if row[1] == "ρ")
-        assert row[2:6] == (2.7667, "kg/m³", density, "kg/m³")
-        assert row[6]
-        assert [row[6] for row in rows if row[1] in ("I", "I_h")] == ["needed, but not in the paper: an assumption"] * 2
-        assert next(row for row in rows if row[1] == "C")[2:6] == (0.0, "kg/s", 0.0, "s")
 
 
 # ------------------------------------------------------------ numbers in cells

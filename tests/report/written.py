@@ -19,7 +19,6 @@ from tfarm.arm import to_toml
 from tfarm.audit.published import validate
 from tfarm.dsp import crossings as sampled_regions
 from tfarm.dsp import modes as sampled_loci
-from tfarm.dsp import verdict
 from tfarm.loop import loci
 from tfarm.plots import regions
 from tfarm.report import live, loop_section, writing
@@ -33,7 +32,6 @@ COARSE = (
     (sampled_regions, "MOST_COLUMNS", 0),  # with the corners that so few have
     (loci, "LOCUS_POINTS", 60),
     (sampled_loci, "SAMPLED_LOCUS_VALUES", 31),
-    (verdict, "PERIOD_SHARES", (1.0, 5.0)),
     (writing, "MOST_WORKERS", 1),  # a second process would have its own grids
     (regions, "sampled_region", regions.sampled_region.__wrapped__),  # what is kept of it is of other grids
     (live, "sampled_region", regions.sampled_region.__wrapped__),

@@ -16,7 +16,6 @@ from tfarm import Attachment, Hub, Payload, RotarySpring
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.exact.system import system_of
 from tfarm.reduced.modal import end_residues, undamped_residues
-from tfarm.spectrum.damped import damped_at_hub
 
 NAMES = ("hub_angle", "root_moment", "root_shear", "tip_displacement", "tip_deflection")
 
@@ -159,14 +158,3 @@ def test_a_rigid_body_turns_about_the_axis_with_the_field_s_root_moment(name):
     tip = tfarm.transfer(arm, "tip_displacement")(s) * s**2
     assert table.shape(arm.length)[0] * table.hub_participation[0] == pytest.approx(tip.real, rel=1e-6)
     np.testing.assert_allclose(table.modal_moment, table.moment(0.0), rtol=1e-9, atol=1e-12)
-
-
-def test_with_the_losses_of_the_hub_alone_clamp_and_link_lose_nothing():
-    """A clamp and a link that lose nothing have the rig's own poles; what they would lose changes nothing."""
-    rig = tfarm.load("quanser-2dsfl")
-    yielding = replace(rig, clamp=replace(rig.clamp, stiffness=300.0))
-    lossy = replace(yielding, clamp=replace(yielding.clamp, damping=1e-3)).having(damping=1e-3)
-    found, expected = damped_at_hub(lossy, 3), tfarm.damped_modes(tfarm.modes(yielding, 3))
-    np.testing.assert_allclose(found.eigenvalues, expected.eigenvalues, rtol=1e-9)
-    assert (tfarm.damped_modes(tfarm.modes(lossy, 3)).eigenvalues[1:, 0].real < 2 * found.eigenvalues[1:, 0].real).any()
-    assert damped_at_hub(tfarm.load("sasaki2012-lab"), 3) is None

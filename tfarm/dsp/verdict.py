@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, NamedTuple
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, PLANE, AnyLaw, Arm, HubFeedback, arm_and_law, as_law, cancelled
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, AnyLaw, Arm, arm_and_law, as_law, cancelled
 from tfarm.arm.checks import whole
 from tfarm.crossing import Window
 from tfarm.dsp.chain import Chain, Sampling, chain_or_usual
 from tfarm.dsp.circle import Band, complete_band
-from tfarm.dsp.crossings import FACTOR, around, stable_windows, windows_of
+from tfarm.dsp.crossings import FACTOR, around, windows_of
 from tfarm.dsp.discretise import RULE, rule_in_words
 from tfarm.dsp.edges import (
     DelayMargin,
@@ -40,7 +40,6 @@ RADIUS_AGREES = 1e-4  # of ln of the spectral radius: its largest error with few
 RADIUS_NOISE = 1e-12  # and its rounding error
 MOST_COUNT = 400  # modes that may be asked for
 DEFAULT_PERIOD, LAWS_PERIOD = "tfarm's default period", "the controller's period"  # origins of a sampling period
-PERIOD_SHARES = (0.1, 0.5, 1.0, 2.0, 5.0)  # of the chain's own period
 
 
 @dataclass(frozen=True)
@@ -384,21 +383,3 @@ def brief_of(found: Verdict | ConvergenceError, law: AnyLaw, chain: Chain) -> Sa
         spectral_radius=None if verdict is None else verdict.spectral_radius,
         words=f"{word if is_stable else word.upper()} {rest}, {at}",
     )
-
-
-class AtPeriod(NamedTuple):
-    """The verdict at one sample period [s], and every stable interval of each gain, by name."""
-
-    period: float
-    verdict: Verdict
-    windows: Mapping[str, list[Window]]
-
-
-def at_periods(arm: Arm, gains: HubFeedback, chain: Chain) -> tuple[AtPeriod, ...]:
-    """Return the verdicts at a tenth to five times the chain's period.  Raises ParameterError without a loop."""
-    rows = []
-    for share in PERIOD_SHARES:
-        period = float(f"{share * chain.sampling.period:.12g}")  # 1 ms, and no 1.0000000000000002 ms
-        verdict = sampled_verdict(arm, gains, replace(chain, sampling=replace(chain.sampling, period=period)))
-        rows.append(AtPeriod(period, verdict, {name: stable_windows(verdict.full, name) for name in PLANE}))
-    return tuple(rows)

@@ -1,4 +1,4 @@
-"""The arm itself, to scale; its mode shapes, and the error of simpler beam theories; the arm over time.
+"""The arm itself, to scale; its mode shapes; the arm over time.
 
 Root moment, tip and motor are lines or, where these ring too fast for a page, bands.  Measured runs on a rig are drawn
 under the exact sampled loop with the same reference.  Of the tuner its gain and its guard on the map and over time, and
@@ -41,7 +41,6 @@ from .style import (
     PURPLE,
     by_name,
     picture,
-    plain_ticks,
     safe,
 )
 
@@ -100,28 +99,6 @@ def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
         one.set_title(f"Mode {number}:  {omega} rad/s  ({hertz} Hz)\nnodes [m]: {places}", fontsize=9.5)
         if not one.figure.get_supylabel():
             one.set(xlabel=ALONG, ylabel=DISPLACEMENT)
-
-
-@picture(
-    size=(9.0, 3.6), title=lambda name, _: f"{name}: simpler beam theories against the Timoshenko theory",
-)  # fmt: skip
-def draw_differences(name: str, differences: Mapping[str, Real], *, ax: Axes) -> None:
-    """How far each simpler theory's frequencies lie above the Timoshenko theory's [%], mode by mode."""
-    looks = {"euler-bernoulli": (ORANGE, "s"), "rayleigh": (PURPLE, "D"), "shear": (GREEN, "o")}
-    for theory, values in differences.items():
-        color, marker = looks[theory]
-        number = np.arange(1, len(values) + 1)
-        ax.plot(number, values, marker=marker, ms=5, lw=1.2, color=color, label=theory_name(theory))
-    if all((values > 0).all() for values in differences.values()):
-        ax.set_yscale("log")
-        plain_ticks(ax.yaxis)
-    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-    ax.set(xlabel="mode number", ylabel="frequency above Timoshenko's [%]")
-
-
-def theory_name(theory: str) -> str:
-    """As a person writes it: Euler-Bernoulli, Rayleigh, shear, Timoshenko."""
-    return theory if theory == "shear" else theory.title()
 
 
 # ------------------------------------------------------------ the arm

@@ -11,11 +11,11 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import GAINS, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, cancelled, shown_unit, unit_of
-from tfarm.arm.blocks import Rational, StateSpace
+from tfarm.arm import GAINS, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, cancelled, shown_unit, unit_of
+from tfarm.arm.blocks import Rational
 from tfarm.arm.law import REFERENCE, is_measured
 from tfarm.arrays import Real
-from tfarm.digits import plain, significant, singly
+from tfarm.digits import plain, significant
 from tfarm.dsp import GainMap as SampledMap
 from tfarm.dsp.discretise import rule_in_words
 from tfarm.errors import ConvergenceError, TfarmError
@@ -40,14 +40,13 @@ from tfarm.report.page import (
     upper,
 )
 from tfarm.response.signals import Signals, sign_convention
-from tfarm.schema import Column, Quantity, Table, across, curve_table, quantities, roots_table, table, text
+from tfarm.schema import Column, Quantity, Table, across, curve_table, quantities, roots_table, table
 from tfarm.spectrum.table import default_gains, default_words, first_frequency, rate_unit
 from tfarm.synthesis import judge, models, structures
 
 GRID_COLUMNS, GRID_ROWS = 240, 200  # of the coloured grid
 DAMPING_EVERY = 4  # of them, the damping is computed at one in four
 DAMPING_MODES = 8  # of the model whose poles that is of: it is right to a few digits, more than a contour shows
-LISTED_MOMENT_GAINS = (0.9, 1.0, 1.01, 1.1, 1.5)  # values of K2 whose exact poles are listed
 RANGE_OF_K2 = (-1.0, 1.6)  # of the locus, times what balances a torque: both sides of 0, and beyond 1
 shortly = partial(plain, digits=4)  # how a gain is written in a title
 
@@ -153,7 +152,7 @@ def law_section(case: Case) -> PageSection:
     ]  # fmt: skip
     words.append(prose("not_on_page", discrete=[each.name for each in named if each.law.is_discrete]))
     entries = [entry for each in named for entry in entries_of(each)]
-    blocks = [sheet("law_entries", table(entries)), *(own for each in named for own in matrices_tables(each))]
+    blocks = [sheet("law_entries", table(entries))]
     title = "The controller" if len(named) == 1 else "The controllers"
     return PageSection(title=title, answer=prose("laws", each=named), words=words, blocks=blocks)
 
@@ -165,19 +164,15 @@ class Entry(NamedTuple):
     signal: Annotated[str, Quantity("signal", help="output of the arm that the controller reads")]
     unit: Annotated[str, Quantity("unit", help="unit of the signal")]
     enters: Annotated[str, Quantity("enters", help="whether the reference is subtracted from the signal")]
-    sign: Annotated[str, Quantity("sign in the input", help="sign of the signal's part in the control law")]
-    variable: Annotated[str, Quantity("in powers of", help="s in continuous time, z at the samples")]
     numerator: Annotated[list[float] | str, Quantity("numerator", help="coefficients in descending powers")]
     denominator: Annotated[list[float] | str, Quantity("denominator", help="coefficients in descending powers")]
-    delay: Annotated[float, Quantity("delay", "s", help="delay of the controller itself")]
-    period: Annotated[float | None, Quantity("period", "s", help="sampling period of a discrete-time controller")]
 
 
 def entries_of(each: Controller) -> Iterator[Entry]:
-    """Every signal of a law with every digit; matrices have tables of their own."""
-    law, sign, variable = each.law, "−" if each.law.sign < 0 else "+", "z" if each.law.is_discrete else "s"
+    """Every signal of a law with every digit; matrices are in its file alone."""
+    law = each.law
     for part in law.parts:
-        num: list[float] | str = "matrices, below"
+        num: list[float] | str = "matrices, in its file"
         den: list[float] | str = ""
         if isinstance(part.block, Rational):
             num, den = (list(map(float, row)) for row in (part.block.num, part.block.den))
@@ -186,27 +181,7 @@ def entries_of(each: Controller) -> Iterator[Entry]:
             enters = "less its reference" if name in law.references else "as it is"
             enters = enters if is_measured(name) else "its reference alone"
             unit = Signals(each.arm, (signal,)).units[0]
-            yield Entry(each.name, signal, unit, enters, sign, variable, num, den, law.delay, law.period)
-
-
-def matrices_tables(each: Controller) -> Iterator[Table]:
-    """A, B, C and D of each part of a law that has matrices, as [A B; C D]; columns without a signal are left out."""
-    for number, part in enumerate(each.law.parts, 1):
-        if not isinstance(part.block, StateSpace):
-            continue
-        A, B, C, D = part.block.matrices()
-        led = [i for i, name in enumerate(part.signals) if name]
-        whole = np.block([[A, B[:, led]], [C, D[:, led]]])
-        states = [f"x{i}" for i in range(1, len(A) + 1)]
-        titles = {x: x for x in states} | {f"{i + 1}_{part.signals[i]}": part.signals[i] for i in led}
-        step = "next " if each.law.is_discrete else "d/dt "
-        columns = (
-            Column("row", "", of=[*(step + x for x in states), "input"]),
-            *(Column(key, title, of=values, digits=singly(plain, 5))
-              for (key, title), values in zip(titles.items(), whole.T, strict=True)),
-        )  # fmt: skip
-        stem = each.stem("matrices") + f"-{number}" * (number > 1)
-        yield sheet("matrices", columns, stem=stem, name=each.name)
+            yield Entry(each.name, signal, unit, enters, num, den)
 
 
 # ------------------------------------------------------------ the map of both gains
@@ -284,21 +259,13 @@ def draw_map_of_arm(data: MapOfArm, *, ax: Axes) -> None:
 
 
 def map_data(data: MapOfArm) -> Sequence[Column]:
-    """The grid with counts and damping, the boundary with its frequencies, then the ends of the sampled intervals.
-
-    Ends that are cut by the picture are left out.
-    """
+    """The grid with counts and damping, then the boundary with its frequencies; the sampled region has its own file."""
     points = zip(*map(np.ravel, np.meshgrid(*data.axes)), data.counts.ravel(), data.damping.ravel(), strict=True)
     grid = [("grid", K1, K2, math.inf if count < 0 else int(count), damping, "") for K1, K2, count, damping in points]
     line = [("boundary", K1, K2, "", "", omega) for K1, K2, omega in data.edge.tolist() if not math.isnan(K1)]
-    columns = () if data.sampled is None else zip(data.sampled.axes[0], data.sampled.stable_intervals, strict=True)
-    sampled = [
-        ("sampled boundary", across, end, "", "", "")
-        for across, windows in columns for window in windows for end in window if data.y.low <= end <= data.y.high
-    ]  # fmt: skip
     rate = "_".join([PLANE[0], *shown_unit(PLANE[0], data.case.arm).replace("/", " ").split()])
     keys = ("what", rate, PLANE[1], "unstable_poles", "least_damping_ratio", "omega_rad_s")
-    return [Column(key, of=own) for key, own in zip(keys, zip(*grid, *line, *sampled, strict=True), strict=True)]
+    return [Column(key, of=own) for key, own in zip(keys, zip(*grid, *line, strict=True), strict=True)]
 
 
 def map_section(case: Case) -> PageSection:
@@ -328,29 +295,8 @@ def intervals(arm: Arm) -> str:
 # ------------------------------------------------------------ root loci
 
 
-class AtGain(NamedTuple):
-    """The exact loop at one value of a gain; its verdict may be undecided on the axis."""
-
-    value: Annotated[float, Quantity("value", digits=4, help="value of the gain that varies, the other one fixed")]
-    verdict: Annotated[str, Quantity("stability", help="verdict on the exact loop with that gain")]
-    unstable_poles: Annotated[
-        int | str | None,
-        Quantity("unstable poles", help="closed-loop poles right of the imaginary axis, conjugates counted"),
-    ]
-    spectral_abscissa: Annotated[
-        float | None,
-        Quantity(
-            "spectral abscissa",
-            "1/s",
-            4,
-            help="largest real part of the poles in the box; 0 where it is on the axis to working precision",
-        ),
-    ]
-    first_pairs: Annotated[str, Quantity("first pairs of poles", "1/s", help="poles with Im s > 0 of least frequency")]
-
-
 def locus_section(case: Case) -> PageSection:
-    """Poles of the controllers; of an arm's own page root loci along each gain too, and poles at K2 = 1 and beyond."""
+    """Poles of the controllers; of an arm's own page root loci along each gain too."""
     words, tables = poles_tables(case)
     if case.laws:
         return PageSection(title="Closed-loop poles", words=words, blocks=tables)
@@ -365,11 +311,6 @@ def locus_section(case: Case) -> PageSection:
             blocks += locus_blocks(found[name])
         except ConvergenceError:
             words.append(prose("not_followed", name=name))
-            blocks += [rates_table(arm, gains)] * (name == RATE_GAIN)
-    if found:
-        along = {f"along {name}": each for name, each in found.items()}
-        blocks.append(sheet("loci", across(along, keys=list(found))))
-    blocks += [beyond_table(arm, gains)] if has_loop(arm) else []
     others = {name: gains.gain_text(other, shortly, arm) for name, other in zip(PLANE, reversed(PLANE), strict=True)}
     answer = prose("locus_lead", found=found, gains=others)
     return PageSection(title="Root loci", answer=answer, words=words, blocks=[*blocks, *tables])
@@ -394,43 +335,3 @@ def locus_data(data: loci.Loci) -> Sequence[Column]:
             for part, values in (("re", row.real), ("im", row.imag))
         ),
     ]
-
-
-def beyond_table(arm: Arm, gains: HubFeedback) -> Table:
-    """Verdict and poles of the exact loop for a few K2 around 1 and beyond."""
-    edge, unit = edge_of_K2(arm, gains) or 0.0, arm.input_per_torque
-    last = LISTED_MOMENT_GAINS[-1] * unit
-    more = [float(f"{share * edge:.3g}") for share in (0.9, 1.1) if edge > last]
-    values = [*(share * unit for share in LISTED_MOMENT_GAINS), *(value for value in more if last < value)]
-    undecided = [] if arm.is_undamped else [edge]  # no list of poles ends there
-    one = gains.having(MOMENT_GAIN, unit).gain_text(MOMENT_GAIN, shortly, arm)
-    rows = [at_gain(arm, gains.having(MOMENT_GAIN, value), value, undecided) for value in values]
-    return sheet("beyond", table(rows), arm=arm, one=one, at=gains.gain_text(RATE_GAIN, shortly))
-
-
-def edge_of_K2(arm: Arm, law: HubFeedback) -> float | None:
-    """The moment gain at which the loop loses its stability as it grows alone; None where none was found."""
-    windows = margins_of(arm, law).windows[MOMENT_GAIN]
-    return windows.around[1] if windows.around and windows.end(windows.around[1]) == "edge" else None
-
-
-def rates_table(arm: Arm, gains: HubFeedback) -> Table:
-    """Verdict and poles of the exact loop for a few rate gains."""
-    values = [float(f"{share * rate_unit(arm):.3g}") for share in (0.0, 0.05, 0.2, 0.5, 1.0, 2.0)]
-    rows = [at_gain(arm, gains.having(RATE_GAIN, value), value) for value in values]
-    return sheet("rates", table(rows), at=gains.gain_text(MOMENT_GAIN, shortly))
-
-
-def at_gain(arm: Arm, law: HubFeedback, value: float, undecided: Sequence[float] = ()) -> AtGain:
-    """The row of one value; a pole may be on the axis to working precision, and is on it at those undecided."""
-    try:
-        found = None if np.isclose(value, undecided, rtol=1e-9, atol=0.0).any() else stability.stability(arm, law)
-    except ConvergenceError:
-        found = None
-    if found is None:
-        return AtGain(value, "on the axis, not determined", None, None, "")
-    poles, moving, rightmost = found.poles.values, found.poles.moving, found.poles.spectral_abscissa
-    rounding = stability.MARGIN_OF_ZERO * abs(moving[moving.real == rightmost]).max(initial=0.0)
-    pairs = text(poles[poles.imag > 0][:3].tolist(), 5)
-    count = "infinitely many" if found.unstable_roots_infinite else found.unstable_roots
-    return AtGain(value, found.verdict, count, rightmost if abs(rightmost) > rounding else 0.0, pairs)

@@ -7,12 +7,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from decimal import Decimal, localcontext
 from functools import lru_cache, partial
-from typing import Annotated, Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 import tfarm
-from tfarm.arm import MOMENT_GAIN, Arm, Theory
+from tfarm.arm import Arm, Theory
 from tfarm.arrays import Real
 from tfarm.digits import fixed, kept_digits, lined, listed, plain
 from tfarm.errors import CertificationError, ConvergenceError
@@ -24,17 +24,16 @@ from tfarm.plots import frequency, motion
 from tfarm.plots.style import gains_words
 from tfarm.report.page import Case, PageSection, Picture, has_loop, picture, prose, sheet, upper
 from tfarm.response.frequency import AXIS_SHARE, Bode, bode
-from tfarm.schema import Column, Quantity, Table, curve_table, table
+from tfarm.schema import Column, Table, curve_table, table
 from tfarm.spectrum import DampedModes, Modes, damped_modes, modes
-from tfarm.spectrum.damped import damped_at_hub
 from tfarm.spectrum.listing import SHAPE_DIGITS, ListedMode, beyond_the_box, listed_modes
 from tfarm.spectrum.proofs import Certificate
-from tfarm.spectrum.table import default_gains, hub_locked
+from tfarm.spectrum.table import default_gains
 
 PROVEN_MODES, BRACKET_DIGITS = 10, 20  # flexible modes of each arm, as its page lists them; beyond a double's digits
 PROVEN_DIGITS = 12  # of an eigenvalue: more than a page prints of any
 TWO_PI = Decimal("6.2831853071795864769252867665590057683943387987502")
-TABLED_MODES, DRAWN_MODES, LOCKED_MODES = 10, 6, 6  # as `tfarm modes` lists them; shapes in three rows of two
+TABLED_MODES, DRAWN_MODES = 10, 6  # as `tfarm modes` lists them; shapes in three rows of two
 SIMPLER: tuple[Theory, ...] = ("shear", "rayleigh", "euler-bernoulli")
 
 
@@ -50,7 +49,7 @@ def modes_section(case: Case) -> PageSection:
             blocks += damped_tables(found)
         except (ConvergenceError, CertificationError) as error:
             words.append(prose("no_damped_table", why=error))
-    blocks += [_shapes(tfarm.modes(arm, count=DRAWN_MODES)), *theories(arm), sensitivity_table(found)]
+    blocks += [_shapes(tfarm.modes(arm, count=DRAWN_MODES)), theories(arm), sensitivity_table(found)]
     return PageSection(title="Modes", words=words, blocks=blocks)
 
 
@@ -136,48 +135,10 @@ def damped_tables(undamped: Modes) -> list[Table]:
     ]  # fmt: skip
 
 
-FREE = "natural frequency, the hub free to turn and without losses"
-LOCKED = "natural frequency, the hub fixed"
-
-
-class LockedMode(NamedTuple):
-    """A mode with the hub free, with the losses of the hub where it has any, and with the hub locked."""
-
-    mode: Annotated[int, Quantity("mode", help="number of the flexible mode")]
-    free: Annotated[float, Quantity("hub free", "rad/s", 8, FREE, "hub_free_rad_s")]
-    free_hz: Annotated[float, Quantity("hub free", "Hz", 8, FREE, "hub_free_hz")]
-    with_losses: Annotated[
-        float | None,
-        Quantity(
-            "with its own losses, Im s", "rad/s", 8, "frequency of the free hub with its own friction and back-EMF"
-        ),
-    ]
-    damping: Annotated[
-        float | None,
-        Quantity(
-            "damping ratio",
-            "%",
-            4,
-            "share of critical damping by the losses of the hub alone",
-            "with_losses_damping_percent",
-        ),
-    ]
-    locked: Annotated[float, Quantity("hub locked", "rad/s", 8, LOCKED, "hub_locked_rad_s")]
-    locked_hz: Annotated[float, Quantity("hub locked", "Hz", 8, LOCKED, "hub_locked_hz")]
-
-
 def locked_table(found: Modes) -> Table:
-    """A row a mode: hub free, with its losses where it has any, and locked."""
-    arm, numbers = found.arm, range(1, LOCKED_MODES + 1)
-    own = tfarm.modes(arm, LOCKED_MODES, theory=found.theory)
-    free, held = _flexible(own), _flexible(hub_locked(own))
-    lossy = None if arm.is_locked else damped_at_hub(arm, LOCKED_MODES)
-    losses: list[Any] = [[None] * LOCKED_MODES] * 2
-    if lossy is not None and not lossy.left_out and lossy.is_assigned.all():
-        losses = [each[lossy.index > 0].tolist() for each in (lossy.eigenvalues[:, 0].imag, 100 * lossy.damping_ratio)]
-    columns = zip(numbers, free, free / (2 * math.pi), *losses, held, held / (2 * math.pi), strict=True)
-    rows = [LockedMode(*row) for row in columns]
-    return sheet("hub_locked", table(rows), has_losses=lossy is not None)
+    """A row a mode: natural frequency with the hub free, and with the hub locked."""
+    rows = [row for row in listed_modes(found).modes if row.index > 0]
+    return sheet("hub_locked", table(rows, ("index", "natural_frequency", "hub_locked")))
 
 
 # ------------------------------------------------------------ shapes, theories, sensitivities
@@ -193,24 +154,19 @@ def _shapes(modes: Modes) -> Picture:
     return picture("mode_shapes", motion.modes.figure(modes), data=columns, nodes=nodes)
 
 
-def theories(arm: Arm) -> tuple[Table, Picture]:
+def theories(arm: Arm) -> Table:
     """Natural frequencies by the four beam theories, and differences from the first in per cent."""
     names: tuple[Theory, ...] = ("timoshenko", *SIMPLER)
     omega = {theory: _flexible(tfarm.modes(arm, TABLED_MODES, theory=theory)) for theory in names}
     differences = {theory: 100 * (omega[theory] / omega["timoshenko"] - 1) for theory in SIMPLER}
-    named = {motion.theory_name(theory): each for theory, each in differences.items()}
     columns = (
         Column("mode", "mode", of=range(1, TABLED_MODES + 1)),
-        *(Column(f"{theory.replace('-', '_')}_rad_s", motion.theory_name(theory), "rad/s", of=each, digits=lined(8, 7))
+        *(Column(f"{theory.replace('-', '_')}_rad_s", theory.title(), "rad/s", of=each, digits=lined(8, 7))
           for theory, each in omega.items()),
-        *(Column(f"{name.lower().replace('-', '_')}_difference_percent", f"{name}, difference", "%", of=each,
-                 digits=lined(5, 3)) for name, each in named.items()),
+        *(Column(f"{theory.replace('-', '_')}_difference_percent", f"{theory.title()}, difference", "%", of=each,
+                 digits=lined(5, 3)) for theory, each in differences.items()),
     )  # fmt: skip
-    return (
-        sheet("theories", columns, worst=differences["euler-bernoulli"]),
-        picture("theory_differences", motion.draw_differences.figure(arm.name, dict(reversed(differences.items()))),
-                differences=named),
-    )  # fmt: skip
+    return sheet("theories", columns, worst=differences["euler-bernoulli"])
 
 
 def sensitivity_table(modes: Modes) -> Table:
@@ -266,13 +222,13 @@ def bode_facts(data: Bode) -> dict[str, Any]:
 
 
 def _boxes(data: Bode) -> list[str]:
-    """The widths in which poles and zeros are complete, one where both are the same."""
-    pairs = {"poles": data.pole_width, "zeros": data.zero_width}
-    found = {name: f"{plain(left, 5)} < Re s < {plain(right, 5)} 1/s"
-             for name, (left, right) in pairs.items() if not math.isinf(left)}  # fmt: skip
-    if len(found) == len(pairs) and len(set(found.values())) == 1:
-        return [found["poles"]]
-    return [f"{name} {width}" for name, width in found.items()]
+    """The widths in which poles and zeros are complete."""
+    widths = {"poles": data.pole_width, "zeros": data.zero_width}
+    return [
+        f"{name} in {plain(left, 5)} < Re s < {plain(right, 5)} 1/s"
+        for name, (left, right) in widths.items()
+        if not math.isinf(left)
+    ]
 
 
 # ------------------------------------------------------------ fitted to measurements
@@ -303,15 +259,6 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
     return PageSection(title="Fitted to measurements", answer=answer, words=words, blocks=blocks)
 
 
-class MarginSpan(NamedTuple):
-    """A margin over the possible arms."""
-
-    margin: Annotated[str, Quantity("of the loop", help="stability margin of the default loop")]
-    unit: Annotated[str, Quantity("unit", help="unit of the margin")]
-    lowest: Annotated[float, Quantity("lowest", digits=4, help="least over the arms on which the loop is stable")]
-    highest: Annotated[float, Quantity("highest", digits=4, help="largest over the arms on which the loop is stable")]
-
-
 def _of_all_arms(those: Possible, every: list[Margins]) -> Iterator[Picture | Table]:
     """The band of a response, and of an arm with a loop the share of arms over its gains, and the margins over all."""
     if those.fit.responses:
@@ -319,15 +266,9 @@ def _of_all_arms(those: Possible, every: list[Margins]) -> Iterator[Picture | Ta
     if not every:
         return
     yield picture("fit_map", frequency.draw_share.figure(those, ranges_of(those.fit.arm)))
-    stable = [each for each in every if each.in_band is not None]
-    ends = (each.windows[MOMENT_GAIN].around for each in stable)
-    found = {(f"{MOMENT_GAIN} up to", ""): [pair[1] for pair in ends if pair is not None]}
-    titles = {"phase": ("phase margin", "deg"), "delay": ("delay margin", "s"), "disk": ("disk margin", "")}
-    found |= {title: [getattr(each.in_band, name) for each in stable] for name, title in titles.items()}
-    known = {title: [value for value in values if value is not None] for title, values in found.items()}
-    rows = [MarginSpan(*title, min(values), max(values)) for title, values in known.items() if values]
-    gains = gains_words(default_gains(those.fit.arm))
-    yield sheet("fit_margins", table(rows), gains=gains, stable=stable)
+    stable = [each.in_band for each in every if each.in_band is not None]
+    columns = table(stable, ("phase_margin", "delay_margin", "disk_margin"))
+    yield sheet("fit_margins", columns, gains=gains_words(default_gains(those.fit.arm)))
 
 
 # ------------------------------------------------------------ measured

@@ -12,9 +12,9 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, shown_unit
-from tfarm.digits import kept_digits, plain, significant, singly
-from tfarm.dsp import Analysis, Chain, Simulation, crossings, modes, results, sampled_verdict, traces, verdict
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm
+from tfarm.digits import kept_digits, plain, significant
+from tfarm.dsp import Analysis, Chain, Simulation, modes, results, sampled_verdict, traces, verdict
 from tfarm.dsp.chain import MOST_DELAY
 from tfarm.errors import ParameterError
 from tfarm.fitting.recording import RunComparison, compare_run, overshoot
@@ -37,7 +37,7 @@ def sampled_section(case: Case) -> PageSection:
     planes, along = list[Picture | Table](), list[Picture | Table]()
     if not case.laws:
         planes = [overlay_picture(regions.stable_regions(arm, first.loop.gains, chain), first)]
-        along = [periods_table(arm, first.loop.gains, chain), loci_picture(first)]
+        along = [loci_picture(first)]
     numbers = across({each.title: it for each, it in found}, keys=[each.key for each, _ in found])
     pictures, words = slews(case)
     return PageSection(
@@ -101,21 +101,6 @@ def delays_table(found: Sequence[tuple[Controller, Analysis]], chain: Chain) -> 
     return sheet("sampled_delays", (*first, *table(verdicts, VERDICT_COLUMNS).columns), free=is_free)
 
 
-def periods_table(arm: Arm, gains: HubFeedback, chain: Chain) -> Table:
-    """The gains at other sampling periods, with their stability intervals there."""
-    rows = verdict.at_periods(arm, gains, chain)
-    windows = {name: [list(row.windows[name]) for row in rows] for name in PLANE}
-    columns = (
-        Column("period_ms", "period", "ms", of=[1e3 * row.period for row in rows], digits=singly(plain)),
-        Column("half_rate_hz", "aliased above", "Hz", of=[0.5 / row.period for row in rows], digits=singly(plain)),
-        *table([row.verdict for row in rows], VERDICT_COLUMNS).columns,
-        *(Column(f"stable_{name}", f"stable {name}", shown_unit(name, arm),
-                 of=[crossings.around(each, gains[name]) or tuple(np.ravel(each).tolist()) for each in own],
-                 shown=[text(each, 4) or "none" for each in own]) for name, own in windows.items()),
-    )  # fmt: skip
-    return sheet("sampled_periods", columns, gains=[gains.gain_text(name, plain) for name in PLANE])
-
-
 # ------------------------------------------------------------ pictures of gains
 
 
@@ -164,46 +149,6 @@ def loci_data(data: modes.SampledLoci) -> Sequence[Column]:
 # ------------------------------------------------------------ in time
 
 
-class SlewRow(NamedTuple):
-    """A slew under one controller in numbers; what is not reached in the record, or of an unstable loop, is None."""
-
-    law: Annotated[str, Quantity("controller", help="controller of the slew")]
-    residual: Annotated[
-        float | None,
-        Quantity(
-            "residual root moment",
-            "N m rms",
-            3,
-            key="residual_moment_rms",
-            help="rms of root moment less the rigid arm's, from the end of the slew on",
-        ),
-    ]
-    settling_time: Annotated[
-        float | None,
-        Quantity(
-            "settling time (5 %)",
-            "s",
-            3,
-            help="time from which on the root moment stays within 5 % of its largest value",
-        ),
-    ]
-    hub_error: Annotated[
-        float | None, Quantity("hub error at the end", "deg", 3, help="hub angle less reference at the last sample")
-    ]
-    stopped: Annotated[
-        float | None,
-        Quantity("unstable, stopped at", "s", 3, help="time at which the simulation of an unstable loop was stopped"),
-    ]
-
-
-def slew_row(name: str, run: Simulation) -> SlewRow:
-    """The numbers of a slew."""
-    if run.stopped is not None:
-        return SlewRow(name, None, None, None, run.stopped.time)
-    error = math.degrees(run.at_samples.hub_angle[-1] - run.scenario.hub_angle[-1])
-    return SlewRow(name, run.residual_moment, run.settling_time, error, None)
-
-
 def slews(case: Case) -> tuple[list[Picture | Table], list[str]]:
     """The slew of the chain under each controller, and why one is not simulated; without one where runs are measured.
 
@@ -213,29 +158,31 @@ def slews(case: Case) -> tuple[list[Picture | Table], list[str]]:
         return [], [f"{prose('what_holds', arm=case.arm)}: no slew is simulated."]
     if all(each.given.measured is not None for each in case.controllers):
         return [], []
-    bare = [] if case.laws else [default_gains(case.arm).having(MOMENT_GAIN, 0.0)]
-    controllers = *(on_hub(case.arm, gains, f"{MOMENT_GAIN} = 0", "without") for gains in bare), *case.controllers
+    bare = on_hub(case.arm, default_gains(case.arm).having(MOMENT_GAIN, 0.0), f"{MOMENT_GAIN} = 0", "without")
     runs: dict[str, Simulation] = {}
-    words, task = [], case.chain.slew
-    for each in controllers:
+    words, task, simulated = [], case.chain.slew, []
+    for each in (*([] if case.laws else [bare]), *case.controllers):
         try:
-            runs[each.name] = results.drawn(
-                each.arm, each.law, case.chain, "slew", traces.RECORD_LENGTH * task.rise_time
-            )
+            duration = traces.RECORD_LENGTH * task.rise_time
+            runs[each.name] = results.drawn(each.arm, each.law, case.chain, "slew", duration)
+            simulated.append(each)
         except ParameterError as error:
             words.append(f"No slew of {each.name} is simulated: {error}.")
-    if len({each.arm.input_unit for each in controllers}) > 1:
+    if len({each.arm.input_unit for each in simulated}) > 1:
         return [], [*words, "The controllers drive inputs of different units: their slews are not drawn together."]
     if not runs:
         return [], words
-    simulated = [each for each in controllers if each.name in runs]
     arm, title = simulated[0].arm, prose("slew_title", task=task, reach=case.arm.reach)
     figure = motion.slew.figure(arm, {style.safe(name): run for name, run in runs.items()}, title)
     columns = response_columns(arm, {each.key: runs[each.name] for each in simulated})
-    rows = [slew_row(name, run) for name, run in runs.items()]
+    numbers = (
+        Column("law", "controller", of=list(runs)),
+        *table(list(runs.values()), ("residual_moment", "settling_time")).columns,
+        Column("finding", "finding", of=[run.finding for run in runs.values()]),
+    )
     return [
         picture("sampled_slew", figure, data=columns, runs=runs, piece=piece_of_bands(runs), task=title),
-        sheet("slew_numbers", table(rows), stem="sampled-slew-numbers"),
+        sheet("slew_numbers", numbers, stem="sampled-slew-numbers"),
     ], words
 
 
@@ -248,8 +195,8 @@ def piece_of_bands(runs: Mapping[str, Simulation]) -> float | None:
 def response_columns(arm: Arm, each: Mapping[str, Simulation]) -> Sequence[Column]:
     """The curves of some simulations of one scenario as they are drawn: a row a point, or a piece of the bands.
 
-    Torques and gains are those held at that time, the rigid arm's moment that of the sample after it.  Numbers have
-    `CURVE_DIGITS` digits: a page's folder is no place for six thousand rows of eleven columns to the last bit.
+    Torques are those held at that time, the rigid arm's moment that of the sample after it.  Numbers have
+    `CURVE_DIGITS` digits: a page's folder is no place for six thousand rows of so many columns to the last bit.
     """
     moments = {key: traces.curve_of(run, "root_moment") for key, run in each.items()}
     t, first = min((moment.t for moment in moments.values()), key=len), next(iter(each.values()))
@@ -258,59 +205,38 @@ def response_columns(arm: Arm, each: Mapping[str, Simulation]) -> Sequence[Colum
     driven, unit = "torque" if arm.input_unit == "N m" else "input", arm.input_unit
     for key, run in each.items():
         columns += moments[key].at(t).columns(f"root_moment_{key}", "N m")
-        columns += traces.curve_of(run, "tip_displacement").at(t).columns(f"tip_{key}", "m")
         columns += traces.tip_deviation(arm, run).at(t).columns(f"tip_error_{key}", "m")
         name = f"{driven}_{key}_{unit.replace(' ', '_')}"
         columns.append(Column(name, unit=unit, of=traces.held_at(run, run.torque, t)))
-        if run.gain is not None and np.ptp(run.gain):
-            columns.append(Column(f"K_{key}", of=traces.held_at(run, run.gain, t)))
     return [replace(each, of=kept_digits(map(float, each.values), CURVE_DIGITS)) for each in columns]
 
 
 # ------------------------------------------------------------ measured in time
 
 
-BEYOND = "beyond the last reference, as a share of the step; below 0 it is not reached"
-AT_END = "hub angle less reference at the last sample"
-
-
-class MeasuredStep(NamedTuple):
-    """A step under one controller in numbers, measured and computed."""
+class StepRow(NamedTuple):
+    """A step under one controller in numbers, measured or computed."""
 
     law: Annotated[str, Quantity("controller", help="controller under which the step was measured")]
-    step: Annotated[float, Quantity("step", "deg", 4, help="change of the reference")]
-    overshoot_measured: Annotated[float, Quantity("overshoot, measured", "%", 3, BEYOND, "overshoot_measured_percent")]
-    overshoot_computed: Annotated[float, Quantity("overshoot, computed", "%", 3, BEYOND, "overshoot_computed_percent")]
-    end_measured: Annotated[float, Quantity("error at the end, measured", "deg", 3, AT_END)]
-    end_computed: Annotated[float, Quantity("error at the end, computed", "deg", 3, AT_END)]
-    moment_measured: Annotated[
-        float | None,
-        Quantity("largest |moment|, measured", "N m", 3, help="largest size of the root moment in the record"),
-    ]
-    moment_computed: Annotated[
+    origin: Annotated[str, Quantity("origin", help="measured on the rig, or computed")]
+    overshoot: Annotated[
         float,
-        Quantity("largest |moment|, computed", "N m", 3, help="largest size of the root moment in the simulation"),
+        Quantity(
+            "overshoot",
+            "%",
+            3,
+            "beyond the last reference, as a share of the step; below 0 it is not reached",
+            "overshoot_percent",
+        ),
     ]
-    difference: Annotated[
-        float,
-        Quantity("difference, rms", "deg", 3, key="apart_rms_deg", help="rms of computed less measured hub angle"),
-    ]
+    end: Annotated[float, Quantity("error at the end", "deg", 3, "hub angle less reference at the last sample")]
 
 
-def measured_step(name: str, found: RunComparison) -> MeasuredStep:
-    """The numbers of a measured step."""
-    measured, step, end = found.measured, found.measured.step, float(found.measured.reference[-1])
-    return MeasuredStep(
-        name,
-        math.degrees(step),
-        100 * overshoot(measured.hub_angle, step, end),
-        100 * overshoot(found.hub_angle, step, end),
-        math.degrees(measured.hub_angle[-1] - end),
-        math.degrees(found.hub_angle[-1] - end),
-        float(abs(measured.root_moment).max()) if measured.root_moment.size else None,
-        float(abs(found.run.at_samples.root_moment).max()),
-        math.degrees(found.difference_rms),
-    )
+def step_rows(name: str, found: RunComparison) -> Iterator[StepRow]:
+    """The measured step, and the computed one."""
+    step, end = found.measured.step, float(found.measured.reference[-1])
+    for origin, angle in (("measured", found.measured.hub_angle), ("computed", found.hub_angle)):
+        yield StepRow(name, origin, 100 * overshoot(angle, step, end), math.degrees(angle[-1] - end))
 
 
 def measured_blocks(case: Case) -> Iterator[Picture | Table]:
@@ -322,7 +248,7 @@ def measured_blocks(case: Case) -> Iterator[Picture | Table]:
     figure = motion.draw_measured_runs.figure(found)
     columns = compared_data({each.key: found[each.name] for each, _ in runs})
     yield picture("sampled_measured", figure, data=columns, found=found)
-    rows = [measured_step(name, it) for name, it in found.items() if it.measured.hub_angle.size]
+    rows = [row for name, it in found.items() if it.measured.hub_angle.size for row in step_rows(name, it)]
     yield sheet("sampled_overshoot", table(rows))
 
 

@@ -75,7 +75,7 @@ class ArmProof:
     """Of one arm: brackets (lower, upper) [rad/s] of its first flexible frequencies, the count that completes them.
 
     `count` frequencies lie below `below` [rad/s], a rigid-body mode included if `has_rigid_mode`.  `errors` has
-    (output, worst |G_64/G - 1| / (1 + |s G'/G|)) over `points` frequencies from `band`.  `failure` is what could
+    (output, worst |G_64/G - 1| / (1 + |s G'/G|)) over frequencies in `band`.  `failure` is what could
     not be proven; then there are no brackets.  `boxes` are damped modes and poles of the default loop.  `sha256` is
     that of the arm's file.
     """
@@ -92,7 +92,6 @@ class ArmProof:
     ] = 0
     below: str = ""
     failure: str = ""
-    points: int = BAND_POINTS
     band: tuple[float, float]
     errors: tuple[tuple[str, float], ...]
     boxes: tuple[Boxed, ...] = ()
@@ -333,9 +332,7 @@ def write_trust(
                 for name, own in tables.items()}  # fmt: skip
     save_table(table(audited, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation"), folder / DATA)
     errors = [error for proof in proofs for _, error in proof.errors]
-    preset = {proof.name: proof.source == "preset" for proof in proofs}
-    is_usual = set(preset) == set(presets()) and all(preset.values())
-    names = "" if is_usual else "".join(f" {argument(*each)}" for each in preset.items())
+    names = " ".join(argument(proof.name, proof.source == "preset") for proof in proofs)
     page = render(
         "trust.html",
         title="Why trust this",
@@ -349,6 +346,6 @@ def write_trust(
         anchor=anchor,
         in_letters=in_letters,
         is_zero=is_zero,
-        command=f"tfarm report{names} --out reports",
+        command=f"tfarm report {names} --out reports",
     )
     write_text(folder / "index.html", page)

@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
-from typing import Annotated, NamedTuple
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, Arm
-from tfarm.digits import lined, plain, significant
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm
+from tfarm.digits import plain, significant
 from tfarm.dsp import Chain, Simulation, results, scenarios, traces
-from tfarm.errors import CertificationError, ConvergenceError
+from tfarm.errors import CertificationError
 from tfarm.plots import motion, regions
 from tfarm.records import record
 from tfarm.report.page import Case, Fact, PageSection, Picture, has_loop, picture, prose, sheet
 from tfarm.report.sampled_section import chain_words, piece_of_bands, response_columns
-from tfarm.schema import Column, Quantity, Table, table
-from tfarm.spectrum.table import first_frequency
-from tfarm.tuner import LearningCurves, Plan, Tuning, compare_controllers, learning_curves, tried_loops, tune
-from tfarm.tuner.baselines import CONSTANT_GAINS, Outcomes, quantised_chain, tried_gains
-from tfarm.tuner.trial import usual_rate_gain
-from tfarm.tuner.tuning import SlewEnd, usual_plan
+from tfarm.schema import Column, table
+from tfarm.tuner import LearningCurves, Tuning, compare_controllers, learning_curves, tried_loops, tune
+from tfarm.tuner.baselines import Outcomes, quantised_chain
+from tfarm.tuner.tuning import usual_plan
 
 WITHOUT = f"without moment feedback, {MOMENT_GAIN} = 0"
 CURVE_SEEDS = 20  # of the learning curves
@@ -30,10 +26,6 @@ LONG_TRIAL = 16_000  # samples: the comparison of a longer one is of the arm its
 LONGEST_TRIAL = 70_000  # samples: a page has no longer one
 QUANTISED_AND_LATE = 3  # row of the comparison, which begins with those of the arm itself
 SAME_COST = 1e-4  # relative difference of two costs below which they are called the same
-CONTROLLERS = {
-    "without": "none", "best_constant": "constant", "own_constant": "own constant", "tuner": "tuner", "bound": "bound",
-    "ZV": "ZV", "EI": "EI",
-}  # fmt: skip
 TITLE = "The gain tuner against baselines"
 
 
@@ -66,18 +58,15 @@ def why_not(arm: Arm, chain: Chain) -> str:
 class TunerNumbers:
     """One tuning and what is compared with it.
 
-    `slews` and `coarse` hold two simulations each, without and with the tuner; `constant` is the slew with the best
-    constant gain; `servo` the tuning with the angle held, None where no range of gains is proven there.
+    `slews` and `coarse` hold two simulations each, without and with the tuner.
     """
 
     arm: Arm
     tuning: Tuning
     slews: Mapping[str, Simulation]
-    constant: Simulation
     coarse: Mapping[str, Simulation]
     curves: LearningCurves
     rows: tuple[Outcomes, ...]
-    servo: Tuning | None
 
 
 def tuner_numbers(arm: Arm, chain: Chain) -> TunerNumbers:
@@ -94,27 +83,15 @@ def tuner_numbers(arm: Arm, chain: Chain) -> TunerNumbers:
         arm=arm,
         tuning=tuning,
         slews=_simulated(tuning, ideal),
-        constant=trial.simulator(chain=ideal).linear(tuning.constant),
         coarse=_simulated(tuning, listed[QUANTISED_AND_LATE].chain),
         curves=learning_curves(tuning, curve_seeds(plan.trials * trial.n)),
         rows=tuple(compare_controllers(trial, tuning.gain(), guard, listed, tuning.best_constant.gain)),
-        servo=_servo_tuning(arm, plan, ideal),
     )
 
 
 def curve_seeds(samples: int) -> int:
     """Number of seeds of the learning curves, for trainings of that length."""
     return min(CURVE_SEEDS, max(1, CURVE_SAMPLES // samples))
-
-
-def _servo_tuning(arm: Arm, plan: Plan, chain: Chain) -> Tuning | None:
-    """The same tuning with an angle loop a twentieth as fast as the first mode, or slower at a long period."""
-    speed = min(first_frequency(arm) / 20, 0.03 / chain.sampling.period)  # it leaves the mode alone; rad a sample
-    Kp = float(f"{arm.turned_inertia * speed**2:.2g}")
-    try:
-        return tune(arm, replace(plan, Kp=Kp, K1=usual_rate_gain(arm, Kp)), chain)
-    except (CertificationError, ConvergenceError):
-        return None
 
 
 def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
@@ -132,14 +109,10 @@ def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
 
 def section_of(data: TunerNumbers) -> PageSection:
     """The section on numbers that were computed already."""
-    n = data.tuning.trial.n
-    limits = prose("tuner_limits", data=data, usual_seeds=CURVE_SEEDS, long=LONG_TRIAL, usual_gains=CONSTANT_GAINS,
-                   gains=tried_gains(n))  # fmt: skip
-    words = [prose("tuner", guard=data.tuning.training.guard.sentence), *filter(None, [limits])]
-    servo = [] if data.servo is None else [servo_table(data, data.servo)]
-    blocks = [_gain_picture(data), *slew_pictures(data), *cost_tables(data), *servo, _curves_picture(data)]
-    answer, facts = tuner_in_short(data), tuner_facts(data)
-    return PageSection(title=TITLE, answer=answer, facts=facts, words=words, blocks=blocks)
+    costs = sheet("tune_comparison", table(data.rows), data=data)
+    blocks = [_gain_picture(data), *slew_pictures(data), costs, _curves_picture(data)]
+    words = [prose("tuner", guard=data.tuning.training.guard.sentence)]
+    return PageSection(title=TITLE, answer=tuner_in_short(data), facts=tuner_facts(data), words=words, blocks=blocks)
 
 
 def saved_cost(data: TunerNumbers) -> float:
@@ -153,84 +126,20 @@ def tuner_in_short(data: TunerNumbers) -> str:
                  best=data.tuning.best_constant.cost, final=data.curves.final)  # fmt: skip
 
 
-def off_target(data: TunerNumbers, error: float) -> str:
-    """How far from its target the tip ends [mm]; 0 where rounding is all there is of it."""
-    travel = data.arm.reach * float(abs(data.constant.scenario.hub_angle).max())
-    return significant(1e3 * abs(error) * (abs(error) > 1e-10 * travel), 2)
-
-
 def tuner_facts(data: TunerNumbers) -> tuple[Fact, ...]:
-    """The costs, from no moment feedback to the bound."""
-    tuning, seeds, guard = data.tuning, data.curves.seeds, data.tuning.training.guard
+    """The costs, from no moment feedback to the bound, and where the tuner leaves the tip."""
+    tuning, saved = data.tuning, saved_cost(data)
     low, median, high = (significant(cost, 4) for cost in data.curves.final_quartiles)
-    ends = [
-        off_target(data, float(traces.away(data.arm, run)[-1])) for run in (data.slews["with the tuner"], data.constant)
-    ]
-    shaped = [f"{kind} {significant(each.cost, 2)}, {significant(1e3 * each.later, 3)} ms later"
-              for kind, each in tuning.shaped.items() if each.later]  # fmt: skip
-    certainty = "certified stable" if guard.is_proven else f"certified for the first {guard.modes_used} modes"
-    saved = saved_cost(data)
+    left = float(traces.away(data.arm, data.slews["with the tuner"])[-1])
     less = f"{significant(saved, 2)} % less cost" if saved > 100 * SAME_COST else "no improvement"
     return (
-        Fact("tuner against the best constant gain", less, note=f"median of {seeds} seeds"),
+        Fact("tuner against the best constant gain", less, note=f"median of {data.curves.seeds} seeds"),
         Fact("cost without moment feedback", significant(tuning.without.cost, 4)),
         Fact("best constant gain", significant(tuning.best_constant.cost, 4),
              note=f"{MOMENT_GAIN} = {significant(tuning.best_constant.gain, 3)}"),
         Fact("tuner", median, note=f"half between {low} and {high}"),
         Fact("bound", significant(tuning.bound.cost, 4), note="linear-quadratic optimum"),
-        Fact("input shaping", significant(min(each.cost for each in tuning.shaped.values()), 3),
-             note="; ".join(shaped) or "no mode slow enough to shape"),
-        Fact("tip error at the end", ends[0], "mm", f"constant gain: {ends[1]} mm"),
-        Fact("guard", f"{guard.lo:.3f} … {guard.hi:.3f}", note=f"any K(t) in it: {certainty}"),
-    )  # fmt: skip
-
-
-# ------------------------------------------------------------ tables
-
-
-class Cost(NamedTuple):
-    """The cost of the slew under one controller."""
-
-    controller: Annotated[str, Quantity("controller", help="what sets the moment gain")]
-    cost: Annotated[float, Quantity("cost", digits=4, help="cost of the slew, the integral that the tuner minimises")]
-
-
-def servo_table(data: TunerNumbers, servo: Tuning) -> Table:
-    """The costs of the slew with the angle regulated too."""
-    law, error = servo.gain().servo, SlewEnd.of(servo).tip_error
-    rows = [
-        Cost("no moment feedback", servo.without.cost),
-        Cost("best constant gain", servo.best_constant.cost),
-        Cost("tuner", servo.training.result.cost),
-        *(Cost(kind, each.cost) for kind, each in servo.shaped.items()),
-        Cost("bound", servo.bound.cost),
-    ]
-    gains = ", ".join(law.gain_text(name, partial(significant, digits=3), data.arm) for name in (ANGLE_GAIN, RATE_GAIN))
-    left = None if error is None else off_target(data, error)
-    return sheet("tune_servo", table(rows), gains=gains, guard=servo.training.guard, error=left)
-
-
-def cost_tables(data: TunerNumbers) -> list[Table]:
-    """Cost of a slew and root moment after it: a row a condition, a column a controller, and where the guard holds."""
-    proven = Column("guard_proven", "guard proven", of=["yes" if row.proven else "no" for row in data.rows])
-    is_unstable = any(row.tuner.residual is None for row in data.rows)
-    return [
-        sheet("tune_comparison", (*_of_each(data.rows, "cost", 4), proven), data=data),
-        sheet("tune_residual", _of_each(data.rows, "residual", 3), is_unstable=is_unstable),
-    ]
-
-
-def _of_each(rows: Sequence[Outcomes], name: str, digits: int) -> tuple[Column, ...]:
-    """The condition, then one number of every controller."""
-
-    def cells(values: Sequence[float | None]) -> list[str]:
-        shown = iter(lined(digits, 2)([value for value in values if value is not None]))
-        return ["–" if value is None else next(shown) for value in values]
-
-    return (
-        Column("condition", "condition", of=[row.condition for row in rows]),
-        *(Column(f"{key}_{name}", title, of=[getattr(getattr(row, key), name) for row in rows], digits=cells)
-          for key, title in CONTROLLERS.items()),
+        Fact("tip error at the end", significant(1e3 * abs(left), 2), "mm"),
     )  # fmt: skip
 
 

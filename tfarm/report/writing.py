@@ -32,7 +32,7 @@ from tfarm.plots.frequency import draw_card
 from tfarm.plots.regions import comparison
 from tfarm.plots.style import save_figure
 from tfarm.processes import shared
-from tfarm.report.arm_section import arm_section, assumptions_section, headline_numbers, is_from_paper, paper_section
+from tfarm.report.arm_section import arm_section, assumptions_section, headline_numbers
 from tfarm.report.live import ASSETS, LIVE_PAGE, is_live, save_live, write_assets
 from tfarm.report.loop_section import (
     law_section,
@@ -146,7 +146,6 @@ PIECES = (
     Piece("fit to measurements", "fit", fit_section, lambda case: case.fit),
     Piece("stability region of both gains", "margins-map", map_section, _of_gains, task=LOOP_TASK),
     Piece("the arm", "arm", arm_section, is_also_on=lambda page: True),
-    Piece("the paper's values", "paper", paper_section, lambda case: is_from_paper(case.arm)),
     Piece("response of the root moment", "bode-root-moment", partial(bode_section, output="root_moment"),
           title="Bode plots"),
     Piece("response of the tip", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),

@@ -213,21 +213,6 @@ def _searched_once(arm: Arm, theory: Theory, count: int, steps: float) -> Damped
         return _searched_once(arm, theory, count // 2, steps)
 
 
-def damped_at_hub(arm: Arm, count: int) -> DampedModes | None:
-    """Return the first `count` flexible modes with the dissipation at the hub alone.
-
-    None without any, or where they cannot be followed.
-    """
-    clamp, joint = replace(arm.clamp, damping=0.0), replace(arm.joint, damping=0.0)
-    hub_alone = replace(arm.elastic, clamp=clamp, joint=joint)
-    if hub_alone.is_undamped:
-        return None
-    try:
-        return damped_modes(modes(hub_alone, count))
-    except ConvergenceError:
-        return None
-
-
 def _searched(undamped: Modes, steps: float) -> DampedModes:
     """Return all eigenvalues in a box, assigned to their modes where that is certain."""
     k, count, function = undamped.system, int(undamped.index.max()), function_of(undamped.system)
