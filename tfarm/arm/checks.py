@@ -3,8 +3,6 @@
 Each check runs once, where a record is built.  `key` is the name in the TOML file, `meaning` the legal values in words.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable

@@ -13,8 +13,6 @@
 or `matrices = "file.mat"` with A, B, C, D and `signals = [...]`, a name for each column of B.
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Any

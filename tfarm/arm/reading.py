@@ -3,8 +3,6 @@
 The size and nesting of a file are checked before it is parsed.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import re

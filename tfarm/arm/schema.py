@@ -4,8 +4,6 @@ Types and names are checked here, physics in the records.  The first problem of 
 Label, unit and meaning of every key are in `keys.toml` and read by `file_key`.
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace

@@ -3,8 +3,6 @@
 The numbers of an arm have keys, those of its TOML file, such as "link.2.section.width".
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy

@@ -5,8 +5,6 @@ in (8)-(14), its dispersion relation, its a_ij and Cramer's rule, and, as a whol
 the same beam's state.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from functools import cache, partial

@@ -16,8 +16,6 @@ A dimension is a product of powers of kg, m and s, as SymPy has it; those of the
 equations need them.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from functools import cache

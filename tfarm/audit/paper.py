@@ -5,8 +5,6 @@ the motion (1)-(5), which `equations` has checked against Hamilton's principle, 
 for every motion at once.  Table 1: its values and units.  (21)-(23), and the network's inputs of section 5.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

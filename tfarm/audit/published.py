@@ -4,8 +4,6 @@
 printed digit, is what they printed.  One that does not must give a reason (`Case.why`), and one that does must not.
 """
 
-from __future__ import annotations
-
 import math
 import tomllib
 from collections.abc import Mapping

@@ -9,8 +9,6 @@ reads either of them.  So a check has no input but the formula, and the verdict 
   at that place.  Then `corrected` is the reading used here.
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass

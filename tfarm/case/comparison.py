@@ -1,7 +1,5 @@
 """Two loops compared; each is computed by the functions for one, and `tfarm.schema.compare` finds the differences."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A plane of two numbers of a law with its counts of unstable poles, as files and terminals have it."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from typing import Any
 

@@ -3,8 +3,6 @@
 By default everything is ideal.  Frozen records, checked once, SI units.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -8,8 +8,6 @@ points at geometric distances around each, and A, B are computed without loss fr
 z = -1 a single pole crosses (see also Ackermann, Robust Control, 1993, ch. 4).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

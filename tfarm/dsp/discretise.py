@@ -16,8 +16,6 @@ those of the given numbers (`tfarm.exact.rationals`), and an integrator has the 
 encoder, where a chain estimates the hub rate, is (1 - a)/T (z - 1)/(z - a) times the angle, a part of the law.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -5,8 +5,6 @@ unstable at the other, for every mode of the band.  Else the number is converged
 that a loop of twice as many (or half as many, of many) confirms in the same way.
 """
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_right
 from collections.abc import Callable

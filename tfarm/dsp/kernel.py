@@ -4,8 +4,6 @@ All compiled functions are in this one file, for numba's cache does not notice a
 named tuples: a `Model` of the arm, its `State`, the `Forcing` of a scenario and the `Electronics` of a chain.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -11,8 +11,6 @@ never destabilises.  At finite gains the closed-loop pole itself is followed fro
 enough values to be smooth, and each branch is named after the mode where it begins.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache

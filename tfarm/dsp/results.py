@@ -6,8 +6,6 @@ bound: without damping the moment after an impulse converges slowly (of 70 rando
 left).  Instability of high modes is decided by `dsp.verdict`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

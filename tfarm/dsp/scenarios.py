@@ -1,7 +1,5 @@
 """Scenarios of a sampled loop: references, feedforward, disturbances and initial state."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Annotated, Any

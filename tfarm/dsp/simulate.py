@@ -8,8 +8,6 @@ A signal is rounded to the nearest step (mid-tread) and clipped to the codes of 
 -2^(b-1) .. 2^(b-1) - 1 steps of 2 R / 2^b.  An ideal converter has step 0.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from copy import copy

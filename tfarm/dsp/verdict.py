@@ -1,7 +1,5 @@
 """Stability of the sampled loop: certified for every mode of a band, or converged for the first N modes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -8,8 +8,6 @@ The arm's float64 parameters are exact numbers.  Every public function doubles i
 evaluations agree to the required digits, and returns the better one.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import cached_property

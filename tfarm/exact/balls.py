@@ -6,8 +6,6 @@ waves and low frequencies cost digits alone, and the precision is raised until t
 sweeps are those of `sweep`, with the error of every number enclosed.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from fractions import Fraction

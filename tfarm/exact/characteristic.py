@@ -20,8 +20,6 @@ itself would cancel over a wide s, at any precision.  For a slow one the power s
 used, with a bounded tail.  Where two waves may be one, the form of `balls` is used.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from fractions import Fraction

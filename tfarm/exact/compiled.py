@@ -5,8 +5,6 @@ cache of this package is in a folder named by a hash of all sources of compiled 
 import this module.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable
 from pathlib import Path

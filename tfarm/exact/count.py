@@ -9,8 +9,6 @@ part these are p_WPsi where it is clamped and, with the numbers r of the plane o
 r_PsiQ p_WPsi - r_WPsi p_PsiQ where W is free and Psi clamped.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

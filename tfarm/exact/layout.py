@@ -1,7 +1,5 @@
 """Layouts of a system: cut and marked at places, as rows of the kernel, with the weights of each output."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property

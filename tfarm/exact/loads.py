@@ -11,8 +11,6 @@ satisfy all of them: w is the symplectic form of two states,  W Q' - Q W' + Psi 
 of a plane, and f* the state with  w(f*, z) = f z.  All numbers are balls, as f and g become nearly parallel far out.
 """
 
-from __future__ import annotations
-
 import re
 from fractions import Fraction
 from typing import Any, NamedTuple

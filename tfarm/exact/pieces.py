@@ -6,8 +6,6 @@ The steps of a block of points are loops of arithmetic alone, which vectorise, a
 The numbers of a block are a flat buffer: component j of point i at `BLOCK` j + i.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

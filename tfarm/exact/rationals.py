@@ -10,8 +10,6 @@ Zeros and poles in z of a block are in delta = z - 1:
 Each has an error of some last bits of delta, also in a cluster, and one at z = 1 is 0.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import flint

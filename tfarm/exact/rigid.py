@@ -5,8 +5,6 @@ inertia rho A l^3/12 + rho I l, and the other half of the offset.  So it is a ra
 computed exactly: a deflection at low frequency is a small difference of motions.
 """
 
-from __future__ import annotations
-
 from fractions import Fraction
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Power series of drive and outputs in s at 0, in balls: expansions, and the order of each zero there."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any

@@ -8,8 +8,6 @@ segments inside of it alone, as a difference of two sums over all segments would
 Points are processed in blocks, component by component (`pieces`).
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

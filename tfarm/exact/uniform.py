@@ -7,8 +7,6 @@ Points are processed in blocks, each in loops of arithmetic alone, which vectori
 exponentials of each point, the limit of speed.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -8,8 +8,6 @@ appendix      the paper's 4x4 determinant and Cramer's rule with mpmath, at a pr
               results agree, without a formula of the other two
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

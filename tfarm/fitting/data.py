@@ -14,8 +14,6 @@ A response is read from CSV or from UFF 58:
 Values are in SI units, sigma (of the real and of the imaginary part, each) in those of the response.
 """
 
-from __future__ import annotations
-
 import hashlib
 import itertools
 import math

@@ -10,8 +10,6 @@ A measured response is compared with the exact one mode by mode: the differences
 numbers that would explain them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from contextlib import suppress

@@ -27,8 +27,6 @@ Random excitation wants a window that tapers ("hann"); a sine that is swept agai
 its sweep, "boxcar" and no overlap, and no window leaks.  A resonance narrower than 1/T of the segment is flattened.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 import os

@@ -17,8 +17,6 @@ interval rests on Gaussian residuals alone.
 Intervals are by the covariance or by the profile of the likelihood; some numbers the data do not determine.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

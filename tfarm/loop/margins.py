@@ -12,8 +12,6 @@ Disk margin: the largest alpha for which the loop is stable with every factor (2
 (Seiler, Packard and Gahinet 2020, symmetric disks), which is 2 min |(1 + L)/(1 - L)|.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace

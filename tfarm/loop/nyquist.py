@@ -5,8 +5,6 @@ the edges of the box in which the verdict's poles were counted.  L is evaluated 
 are counted.  Clockwise ones are closed-loop poles inside the contour, as no pole of L is in there.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Annotated

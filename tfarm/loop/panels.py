@@ -13,8 +13,6 @@ The zeros from the hub's input to a sensor are listed for each place of it: a la
 changes the drive alone.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
 from typing import Literal

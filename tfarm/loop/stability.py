@@ -17,8 +17,6 @@ Spillover: a law is designed on a model of a few modes, and may destabilise a mo
 (Balas 1978).  The verdict of the exact loop, which has all modes, is compared with those of ever larger models.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ Along a gain at the hub of a rig without damping, whose gauge reads the hub's mo
 of the hub.  A real pole passes through 0 where stiffness or inertia vanishes.  A delay has its margin instead.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

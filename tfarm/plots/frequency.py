@@ -4,8 +4,6 @@ At an infinite resonance a Bode plot is broken and leaves the picture.  A Nyquis
 poles on the axis are arcs beyond it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial

@@ -5,8 +5,6 @@ under the exact sampled loop with the same reference.  Of the tuner its gain and
 its learning curves.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import cycle

@@ -4,8 +4,6 @@ Each region is a list of intervals of one gain at each value of the other, with 
 and in `dsp`); nothing is read off a raster.  Edges are rounded as they are seen in a picture of that plane.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from functools import lru_cache

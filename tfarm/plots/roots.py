@@ -1,7 +1,5 @@
 """Root loci: exact branches, those of python-control on a reduced model, and where they cross the axis."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

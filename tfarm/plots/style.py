@@ -5,8 +5,6 @@ figure of pyplot, so that a notebook shows it.  The same figure gives the same b
 salt, no dates.
 """
 
-from __future__ import annotations
-
 import io
 import re
 import textwrap

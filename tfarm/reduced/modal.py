@@ -13,8 +13,6 @@ around p for C > 0.
 State spaces from the input to the signals of a controller, in series and in a loop with it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace

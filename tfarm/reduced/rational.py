@@ -9,8 +9,6 @@ and statics stay exact.  Rounding can add spurious poles (Froissart doublets): o
 and with a positive residue of the hub angle are used.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

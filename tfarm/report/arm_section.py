@@ -1,7 +1,5 @@
 """The arm: its headline numbers, its parameters, what follows from these, and its assumptions."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """The live page of an arm's loop: what it carries as numbers, and the scripts that all such pages share."""
 
-from __future__ import annotations
-
 import base64
 import json
 import math

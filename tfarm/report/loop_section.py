@@ -1,7 +1,5 @@
 """The continuous loops of a case: margins, Nyquist plots, poles, laws; and of both gains the map and the root loci."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Texts are in templates/prose.txt, pages in the other templates; here is how both are filled in.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import shlex

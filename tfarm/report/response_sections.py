@@ -1,7 +1,5 @@
 """The arm without a controller: modes, shapes, theories, sensitivities; frequency responses, computed and measured."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

@@ -3,8 +3,6 @@
 In time: slews, and steps that were measured with the exact sampled loop over them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Why trust this: one page for all reports, with proofs, published numbers, the audit and how to make it all again."""
 
-from __future__ import annotations
-
 import hashlib
 import platform
 import re

@@ -1,7 +1,5 @@
 """The gain tuner on an arm's page: costs against baselines, what it learns, and where it is proven."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

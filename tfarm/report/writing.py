@@ -3,8 +3,6 @@
 The sections of an arm's page in their order, its page by templates, the index, and the page of a comparison.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import re

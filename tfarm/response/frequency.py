@@ -13,8 +13,6 @@ slope of ln |G| may vanish where it changes, from one interval to the next, by m
 halved until no extremum above `LEAST` fits in them.  A parabola through three points then gives the frequency.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable

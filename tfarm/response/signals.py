@@ -4,8 +4,6 @@ A transfer function is numerator over drive, both analytic.  The characteristic 
 The results of loops describe their controller by its gains or transfer functions, signals, units, sign convention.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any

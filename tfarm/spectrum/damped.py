@@ -6,8 +6,6 @@ Im s = (n - 1/2) pi c/L for a free tip, c^2 = kappa G/rho, with a damping that v
 modes is complete in a box only, and no box contains -1/C.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from fractions import Fraction

@@ -9,8 +9,6 @@ is short enough the complete set of the family is assigned to the predictions.
 The functions are real on the real axis: both of a conjugate pair have a column, the lower being the mirror image.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, Protocol
 

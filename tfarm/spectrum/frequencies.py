@@ -14,8 +14,6 @@ rounding: in float64 a pair with a relative gap of 1e-9 has errors of 1e-11.  Su
 real balls, in which each sign is either certain or not determined.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache

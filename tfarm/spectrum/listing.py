@@ -1,7 +1,5 @@
 """The list of modes of commands and pages: undamped, damped and hub-locked frequencies, mode by mode."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

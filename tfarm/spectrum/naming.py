@@ -5,8 +5,6 @@ to a neighbour.  A damped Timoshenko beam has a third, real zero for each bendin
 meets the fast zero of the overdamped mode, and the two oscillate again, in shear.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -22,8 +22,6 @@ into pieces so short that D, enclosed over each, is off zero.  Then it is in a h
 argument is the principal argument of end over start.  The sum over the half contour encloses pi times one integer.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

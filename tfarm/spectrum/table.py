@@ -4,8 +4,6 @@ The natural unit of a rate gain K1 is J w1 and that of an angle gain Kp is J w1^
 hub and w1 its first flexible frequency.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace

@@ -4,8 +4,6 @@ A search within bounds by a judge of few modes is followed by exact verdicts, wh
 has the number of searches that agreed, the width of the optimum, and whether the bounds cut the search off.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter

@@ -16,8 +16,6 @@ every gain a quarter larger and smaller, and in continuous time: the best dampin
 instability of a higher one.  The result is checked by the exact verdicts; a model is only for the search.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache

@@ -13,8 +13,6 @@ A is that of the closed loop, r the feed-forward, w the input, D_k the direct te
 reference has states: its angle, rate and acceleration, constant over each half of the slew.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -6,8 +6,6 @@ The first arms are added by laws of a short search.
 That is no proof over the box: between the arms of the list nothing is certain.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Sequence

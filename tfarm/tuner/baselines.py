@@ -26,8 +26,6 @@ Feedforward, references, shapers, gains and weights of every controller are thos
 moving arm.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal, NamedTuple

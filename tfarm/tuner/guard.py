@@ -34,8 +34,6 @@ The larger the middle gain, the wider is the sector.  The default is the widest 
 least a tenth of its width away from its ends, or the one nearest to it.
 """
 
-from __future__ import annotations
-
 import math
 from contextlib import suppress
 from dataclasses import dataclass
