@@ -205,12 +205,6 @@ class RunComparison:
         """The computed hub angle [rad] at the samples, from the first reference on."""
         return self.run.at_samples.hub_angle + self.measured.reference[0]
 
-    @property
-    def difference_rms(self) -> float:
-        """Root mean square of computed less measured hub angle [rad], at the samples."""
-        there = np.interp(self.run.t, self.measured.t, self.measured.hub_angle)
-        return float(np.sqrt(np.mean((self.hub_angle - there) ** 2)))
-
 
 def compare_run(arm: Arm, law: AnyLaw, chain: Chain, measured: MeasuredRun) -> RunComparison:
     """The sampled loop under the reference of a measured run, with as many modes as its signals take.
