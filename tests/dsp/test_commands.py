@@ -78,14 +78,10 @@ def test_a_dsp_file_given_with_the_arm(capsys, tmp_path):
 LAB = tfarm.load("sasaki2012-lab")
 BAD = [
     (["sampled", "sasaki2012", "--period", "0"], "sampling.period = 0.0"),
-    (["sampled", "sasaki2012", "--K1", "nan"], "K1 = nan"),
-    (["sampled", "sasaki2012", "--modes", "0"], "--modes = '0'"),
-    (["sampled", "nowhere"], "no such preset"),
     (["simulate", "sasaki2012", "--scenario", "slow"], 'did you mean "slew"'),
     (["simulate", "sasaki2012", "--duration", "0"], "duration = 0.0"),
     (["simulate", "sasaki2012", "--duration", "1e300"], "duration"),
     (["simulate", "sasaki2012", "--between", "-1"], "--between = '-1'"),
-    (["simulate", "sasaki2012", "--csv", "/no/such/folder/a.csv"], "--csv"),
     (["simulate", "sasaki2012", "--dsp", "./nothing.toml"], "No such file"),
 ]
 
