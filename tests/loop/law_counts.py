@@ -125,22 +125,6 @@ def exact(arm, law):
     return value
 
 
-def returned(arm, law, count):
-    """1 + L of a modal model under the law, as a function of s."""
-    A, B, C, D = sensed_model(arm, law.signals, count)
-    turns_freely = A[0, 1] == 1 and not A[1].any()  # the first two states are then a double integrator: no eigenvectors
-    first = 2 * turns_freely
-    p, R = np.linalg.eig(A[first:, first:])
-    residues = (C[:, first:] @ R) * np.linalg.solve(R, B[first:].astype(complex))[:, 0]
-
-    def value(s):
-        G = np.array([D[n, 0] + (residues[n] / (s[:, None] - p)).sum(axis=1) for n in range(len(C))])
-        G = G + B[1, 0] * C[:, :2] @ np.array([1 / s**2, 1 / s]) if turns_freely else G
-        return 1 + np.exp(-s * law.delay) * (law.values(s) * G).sum(axis=0)
-
-    return value
-
-
 def judge(arm, law):
     """ "right", "refused: ...", "wrong: ..." or "no second count"."""
     try:

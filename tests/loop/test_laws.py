@@ -13,7 +13,7 @@ import pytest
 
 import tfarm
 from tests.loop.arms import some_loop
-from tests.loop.law_counts import judge, returned, some_delay, some_law
+from tests.loop.law_counts import judge, some_delay, some_law
 from tests.shared import remember, sized, thinned
 from tests.shell import run
 from tfarm import ConvergenceError, HubFeedback, Law, ParameterError
@@ -46,7 +46,8 @@ def test_margins_of_a_law_are_those_of_python_control_on_a_model(delay):
     s = control.tf("s")
     law = Law({"hub_angle": (2 * s + 1) / (0.01 * s + 1), "tip_acceleration": 0.05 / (s / 50 + 1)}, delay=delay)
     omega = np.unique(np.r_[np.geomspace(0.05, 1000, 900), np.linspace(40, 260, 1200)])
-    L = returned(LAB, law, 20)(1j * omega) - 1
+    G = control.ss(*sensed_model(LAB, law.signals, 20))(1j * omega)[:, 0]
+    L = np.exp(-1j * omega * delay) * (law.values(1j * omega) * G).sum(axis=0)
     gm, pm, _, wpc, wgc, _ = control.stability_margins(control.FRD(L, omega), returnall=True)
     mine = loop_margins(stability(LAB, law))
     by_phase = [pair for pair in mine.phase_crossovers if omega[0] < pair[0] < omega[-1]]

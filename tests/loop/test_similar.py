@@ -1,7 +1,6 @@
 """The same loop in other units of mass, length and time: no answer may compare a quantity with a plain number."""
 
 import math
-from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
@@ -98,20 +97,6 @@ def test_a_law_with_dynamics_has_the_same_margins(name):
     assert apart(here.in_band, there.in_band, units) == []
     here, there = tfarm.closed_loop_poles(LAB, tfarm.Law(LEAD), 9), tfarm.closed_loop_poles(other, law, 9)
     np.testing.assert_allclose(there.values * units.time, here.values, rtol=1e-9)
-
-
-WAYS = {"K2": (-1.0, 1.5), "K1": (0.0, 40.0), "Kp": (0.0, 300.0)}
-
-
-@pytest.mark.parametrize(("vary", "units"), thinned(product(WAYS, EITHER), 3))
-def test_a_locus_has_the_same_branches(vary, units):
-    ends, units = WAYS[vary], EITHER[units]
-    law, other = HubFeedback(K1=0.3, K2=0.3), units.arm(LAB)
-    unit = units.law(LAB, HubFeedback(**{vary: 1.0}))[vary]
-    here = tfarm.locus(LAB, law, vary, *ends, points=12, branches=5)
-    there = tfarm.locus(other, units.law(LAB, law), vary, *(unit * end for end in ends), points=12, branches=5)
-    np.testing.assert_allclose(there.gain, here.gain * unit, rtol=1e-9)
-    np.testing.assert_allclose(there.branches * units.time, here.branches, rtol=1e-7, atol=1e-9)
 
 
 BARE = tfarm.load("sasaki2012")
