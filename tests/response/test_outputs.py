@@ -97,11 +97,9 @@ def test_what_is_held_constant_has_its_value_at_a_resonance_too(name: str, wante
     [
         ({"quantity": "Chi"}, "quantity"),
         ({"quantity": "Phi", "place": "root"}, "known at: tip, x"),
-        ({"quantity": "strain", "place": "tip"}, "known at: x"),
         ({"quantity": "theta"}, "known at: root"),
         ({"place": "middle"}, "known at: tip"),
         ({"power": 5}, "0 to 4"),
-        ({"power": -1}, "0 to 4"),
         ({"power": True}, "0 to 4"),
         ({"power": 1.0}, "0 to 4"),
         ({"power": 1}, 'here "m/s"'),
