@@ -23,15 +23,10 @@ SURVEYS := \
 	exact.accuracy \
 	response.test_rigid \
 	response.test_extrema \
-	spectrum.proofs \
-	spectrum.ritz \
 	spectrum.damped \
 	spectrum.chains \
-	loop.counts \
 	loop.agreement \
-	loop.loci \
 	loop.law_counts \
-	loop.number_windows \
 	synthesis.designs \
 	loop.nyquist_counts \
 	reduced.test_accuracy \
@@ -40,7 +35,6 @@ SURVEYS := \
 	fitting.planted \
 	tuner.bounded \
 	cli.fuzz \
-	cli.kills \
 	cli.stops \
 	report.plausible \
 	report.twice

@@ -11,6 +11,7 @@ Each runs in a fork of this process, which the system ends at that time.
 import json
 import os
 import resource
+import sys
 import tempfile
 from pathlib import Path
 
@@ -18,10 +19,9 @@ import numpy as np
 
 import tfarm
 from tests import survey
-from tests.cli.kills import started
 from tests.shell import heard
 from tests.survey import Finding
-from tfarm.cli.running import whole_command
+from tfarm.cli.running import run, whole_command
 
 CPU_SECONDS = 20
 OPTIONS_PER_FILE = 17  # 5,000 files go with 300 sets of options
@@ -40,9 +40,6 @@ WORDS = (
     "2,1", "0,0", "nan,inf", "1e-12,1e12", "1j", "1e300j", "0.3+57.1j,10j", "-", "--", "é", "\x00", "a" * 5000, "/",
     "..", "0.01", "0.1", "10", "100",
 )  # fmt: skip
-
-
-# ---------------------------------------------------------------- drawing
 
 
 def odd_file(rng):
@@ -121,7 +118,20 @@ def cases(number, seed, folder):
     return drawn + [odd_options(rng, options) for _ in range(-(-number // OPTIONS_PER_FILE))]
 
 
-# ---------------------------------------------------------------- running
+def started(arguments, folder, *files):
+    """The process id of a fork that runs the command in that folder, with files for its output and errors."""
+    child = os.fork()
+    if child:
+        return child
+    try:
+        os.chdir(folder)
+        for number, file in enumerate(files, 1):
+            os.dup2(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+        os._exit(run(list(arguments)))
+    except BaseException as error:
+        print(f"{type(error).__name__}: {error}", file=sys.stderr, flush=True)
+    finally:
+        os._exit(1)
 
 
 def outcome(arguments, folder):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.shell import answer, run
+from tests.shell import answer, refused, run
 from tfarm.arm.reading import PRESETS
 
 
@@ -68,19 +68,14 @@ BAD = [
     (["modes", "sasaki2021"], 'did you mean "sasaki2012"'),
     (["modes", "sasaki2012", "--count", "0"], "--count = '0'"),
     (["modes", "sasaki2012", "--count", "1001"], "less than or equal to 1000"),
-    (["modes", "sasaki2012", "--count", "2.5"], "--count = '2.5'"),
     (["modes", "sasaki2012", "--count", "5_0"], "--count = '5_0'"),
-    (["modes", "sasaki2012", "--count=5_0"], "--count = '5_0'"),
     (["margins", "sasaki2012", "--law="], "--law = '': give a path"),
-    (["bode", "sasaki2012", "--png", ""], "--png = '': give a path"),
     (["report", "sasaki2012", "--out= "], "--out = ' ': give a path"),
     (["design", "sasaki2012", "--K1", "0,1_0"], "write numbers as 50"),
-    (["response", "sasaki2012", "--output", "root_moment", "--s", "1_0j"], "write numbers as 50"),
     (["sampled", "sasaki2012", "--Ts", "0.01"], "Did you mean --period?"),
     (["modes", "sasaki2012", "--n", "3"], "Did you mean --count?"),
     (["rlocus", "sasaki2012"], 'Did you mean "locus"?'),
     (["response", "sasaki2012", "--output", "tip"], 'did you mean "tip_displacement"'),
-    (["modes", "sasaki2012", "--digits", "1001"], "--digits = '1001'"),
     (["modes", "sasaki2012", "--cuont", "3"], "Possible options: --count"),
     (["modes", "sasaki2012", "--theory", "timo"], "'timoshenko', 'shear', 'rayleigh', 'euler-bernoulli'"),
     (["mode", "sasaki2012"], "Did you mean 'modes'"),
@@ -93,30 +88,28 @@ BAD = [
     (["response", "sasaki2012", "--output", "root_moment", "--points", "1e12"], "a valid integer"),
     (["response", "sasaki2012", "--output", "root_moment", "--from", "10", "--to", "1"], "--to = 1.0"),
     (["response", "sasaki2012", "--output", "root_moment", "--from", "0"], "--from = 0.0"),
-    (["response", "sasaki2012", "--output", "root_moment", "--to", "inf"], "--to = inf"),
     (["response", "sasaki2012", "--output", "root_moment", "--s", "abc"], "--s: 'abc': write"),
-    (["response", "sasaki2012", "--output", "root_moment", "--s", "nan"], "write numbers in 1/s"),
     (["response", "sasaki2012", "--output", "root_moment", "--s", "1j", "--omega", "1"], "not both"),
     (["response", "sasaki2012", "--output", "hub_angle", "--s", "0"], "rigid body"),
     (["response", "sasaki2012", "--output", "hub_angle", "--s", "1e300j"], "at most 1e+20 1/s"),
-    (["response", "sasaki2012", "--output", "hub_angle", "--s", "-1e300", "--digits", "20"], "at most 1e+20 1/s"),
     (["response", "sasaki2012", "--output", "root_moment", "--s", "71.50568246689015j"], "a natural frequency"),
     (["response", "sasaki2012", "--output", "root_moment", "--csv", "/no/such/folder/a.csv"], "--csv"),
     (["response", "sasaki2012", "--output", "root_moment", "--omega", "1", "--csv", "."], "--csv = '.'"),
     (["bode", "sasaki2012-lab", "--from", "-1"], "--from = -1.0: a positive frequency"),
-    (["bode", "sasaki2012-lab", "--to", "100", "--png", "no/such/folder/b.png"], "--png"),
     (["nyquist", "sasaki2012-lab", "--law", "no-such.toml"], "no-such.toml"),
     (["margins", "sasaki2012", "--K1", "nan"], "K1 = nan"),
     (["margins", "sasaki2012", "--Kp", "1e30"], "Kp = 1e+30"),
     (["margins", "sasaki2012", "--K1", "much"], "--K1 = 'much'"),
     (["map", "sasaki2012", "--K1", "3,-1"], "'3,-1': write LOW,HIGH"),
-    (["map", "sasaki2012", "--K2", "nan,1"], "'nan,1': write LOW,HIGH"),
     (["map", "sasaki2012", "--K1", "-1e300,1e300"], "at most 1e+150"),
+    (["sampled", "sasaki2012", "--period", "0"], "sampling.period = 0.0"),
+    (["simulate", "sasaki2012", "--duration", "1e300"], "duration"),
+    (["simulate", "sasaki2012", "--between", "-1"], "--between = '-1'"),
+    (["simulate", "sasaki2012", "--dsp", "./nothing.toml"], "No such file"),
     (["design", "sasaki2012", "--objective", "beauty"], "'beauty'"),
     (["design", "sasaki2012", "--K1", "0,1e300"], "K1"),
     (["assumptions", "sasaki2012", "--count", "many"], "--count = 'many': should be "),
     (["assumptions", BENCH], "one Timoshenko beam on a hub"),
-    (["modes", BENCH, "--method", "appendix"], "one Timoshenko beam on a hub"),
     (["response", "sasaki2012-lab", "--s", "1j", "--theory", "shear", "--method", "appendix"], "Timoshenko"),
     (["completion", "fsh"], "'fish'"),
     (["compare", "sasaki2012"], "give a second arm, or --law FILE twice"),
@@ -129,18 +122,12 @@ BAD = [
 
 @pytest.mark.parametrize(("arguments", "message"), BAD, ids=[" ".join(arguments) for arguments, _ in BAD])
 def test_bad_input_is_one_line_and_exit_2(capsys, arguments, message):
-    code, out, err = run(capsys, *arguments)
-    assert (code, out) == (2, "")
-    assert err.count("\n") == 1
-    assert message in err
+    assert message in refused(capsys, *arguments)
 
 
 def test_an_unproven_digit_is_exit_3(capsys, monkeypatch):
     monkeypatch.setattr("tfarm.spectrum.table.roots_near", lambda *_: 0)
-    code, _, err = run(capsys, "modes", "sasaki2012", "--digits", "20", "--json")
-    assert code == 3
-    assert "no root" in err
-    assert err.count("\n") == 1
+    assert "no root" in refused(capsys, "modes", "sasaki2012", "--digits", "20", "--json", code=3)
 
 
 def test_files_get_the_usual_permissions(capsys, tmp_path):

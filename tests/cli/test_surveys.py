@@ -1,4 +1,4 @@
-"""Small cases of the surveys of this room, in processes of their own, which fork."""
+"""A small case of the survey of this room, in a process of its own, which forks."""
 
 import subprocess
 import sys
@@ -7,20 +7,14 @@ import pytest
 
 from tests.cli import fuzz
 
-ONE = "from tests.cli import kills; kills.COMMANDS = {'csv': kills.COMMANDS['csv']}; kills.survey.main(kills.kills)"
 
-
-@pytest.mark.parametrize(
-    ("words", "printed"),
-    [
-        # a file that is read, one that is not, and an odd option; the whole surveys are `make survey`
-        (("-m", "tests.cli.fuzz", "2", "4"), "commands: {'exit 2': 1, 'exit 0': 2}, 0 wrong"),
-        (("-c", ONE, "4", "1"), "kills: {'whole': 4, 'clean': 1}, 0 wrong"),
-    ],
-)
-def test_nothing_is_wrong(words, printed):
-    done = subprocess.run([sys.executable, *words], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout[: len(printed)]) == (0, printed)
+def test_nothing_is_wrong():
+    """A file that is read, one that is not, and an odd option; the whole survey is `make survey`."""
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.cli.fuzz", "2", "4"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0
+    assert done.stdout.startswith("commands: {'exit 2': 1, 'exit 0': 2}, 0 wrong")
 
 
 @pytest.mark.parametrize(

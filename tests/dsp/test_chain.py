@@ -91,11 +91,9 @@ BAD = [
     ("converters", {"hub_rate": "guess"}, "converters.hub_rate = 'guess'"),
     ("converters", {"arithmetic": "float16"}, "'float32'"),
     ("actuator", {"torque_limit": 0.0}, "a torque limit is positive"),
-    ("actuator", {"torque_limit": -1.0}, "in V or A where that is the arm's input"),
     ("actuator", {"hub_damping": -1.0}, "hub damping is zero or positive"),
     ("actuator", {"motor_constant": 0.0}, "a motor constant is a positive number"),
     ("slew", {"travel": 0.0}, "slew.travel"),
-    ("slew", {"rise_time": 0.0}, "a rise time is a positive"),
     ("slew", {"reading": "both"}, "slew.reading"),
     ("slew", 3, "give a table, headed [slew]"),
 ]  # fmt: skip

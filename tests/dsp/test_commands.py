@@ -12,7 +12,7 @@ from scipy.io import loadmat
 
 import tfarm
 from tests.shared import remember, thinned
-from tests.shell import answer, refused, run
+from tests.shell import answer, run
 from tfarm import HubFeedback, Law
 from tfarm.cli.app import load_chain
 from tfarm.dsp import Chain
@@ -73,26 +73,6 @@ def test_a_dsp_file_given_with_the_arm(capsys, tmp_path):
     assert result["saturated_samples"]["torque"] > 0
     assert result["volts"] == [u / 2 for u in result["torque"]]
     assert answer(capsys, "simulate", "sasaki2012-lab", "--dsp", str(file), "--period", "0.01")["period_s"] == 0.01
-
-
-LAB = tfarm.load("sasaki2012-lab")
-BAD = [
-    (["sampled", "sasaki2012", "--period", "0"], "sampling.period = 0.0"),
-    (["sampled", "sasaki2012", "--K1", "nan"], "K1 = nan"),
-    (["sampled", "sasaki2012", "--modes", "0"], "--modes = '0'"),
-    (["sampled", "nowhere"], "no such preset"),
-    (["simulate", "sasaki2012", "--scenario", "slow"], 'did you mean "slew"'),
-    (["simulate", "sasaki2012", "--duration", "0"], "duration = 0.0"),
-    (["simulate", "sasaki2012", "--duration", "1e300"], "duration"),
-    (["simulate", "sasaki2012", "--between", "-1"], "--between = '-1'"),
-    (["simulate", "sasaki2012", "--csv", "/no/such/folder/a.csv"], "--csv"),
-    (["simulate", "sasaki2012", "--dsp", "./nothing.toml"], "No such file"),
-]
-
-
-@pytest.mark.parametrize(("arguments", "message"), BAD)
-def test_bad_input_is_one_line_and_exit_2(capsys, arguments, message):
-    assert message in refused(capsys, *arguments)
 
 
 def test_gains_that_fail_when_sampled_are_not_recommended_without_a_word(capsys, monkeypatch):

@@ -17,7 +17,6 @@ from tfarm.dsp.circle import complete_band
 from tfarm.dsp.crossings import FACTOR, crossings_of
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.edges import shown_damping, whole_loop
-from tfarm.dsp.modes import mode_table
 from tfarm.dsp.verdict import sampled_verdict
 
 T = 0.01
@@ -47,12 +46,6 @@ def test_a_law_on_the_moment_alone_leaves_the_hub_adrift():
     assert (verdict.word, verdict.log_radius) == ("marginal", 0.0)
 
 
-def test_what_stays_at_one_is_left_out_of_what_is_proven():
-    verdict = sampled_verdict(LAB, Law({"hub_rate": 0.3, "root_moment": ([0.001, 0.0], [1.0, -1.0])}, period=T))
-    assert (verdict.word, verdict.log_radius, verdict.is_settled) == ("marginal", 0.0, True)
-    assert verdict.slowest == "a pole of the law"
-
-
 def test_an_unstable_cancellation_in_the_law_is_reported_and_grows(capsys, tmp_path):
     law = Law({"hub_angle": {"zeros": [1.2], "poles": [1.2, 0.5], "gain": 0.1}, "hub_rate": 0.3}, period=T)
     found = tfarm.sampled(LAB, law, count=4)
@@ -63,20 +56,6 @@ def test_an_unstable_cancellation_in_the_law_is_reported_and_grows(capsys, tmp_p
     text = "[law]\nperiod = 0.01\n[law.hub_angle]\nzeros = [1.2]\npoles = [1.2, 0.5]\ngain = 0.1\n"
     (tmp_path / "law.toml").write_text(text)
     assert "the law cancels" in run(capsys, "sampled", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"))[1]
-
-
-def test_filtered_signals_are_what_the_analog_filter_makes_of_them():
-    """At a slow z the sampled filter is the continuous one: H(z) times z^d is nearly G(s) of the filtered signal."""
-    names = ("tip_acceleration", "moment@0.3", "hub_angle", "hub_rate")
-    chain = Chain(sampling=Sampling(period=1e-4, antialias_corner=200.0))
-    law = Law(dict.fromkeys(names, 1.0))
-    loop = sampled_loop(LAB, law, chain, count=8)
-    assert loop.analog == (True, True, False, True)
-    s = 30j
-    wanted = loop.exact(np.array([s]))[:, 0] * np.where(loop.analog, 200 / (s + 200), 1.0) * np.exp(-s * 0.5e-4)
-    np.testing.assert_allclose(
-        loop.pulse(np.exp(s * 1e-4)), wanted, rtol=2e-3
-    )  # (s T)^2/24 of the hold, modes left out
 
 
 @pytest.mark.parametrize(("number", "seed"), [(2, 3), pytest.param(4, 6, marks=pytest.mark.survey)])
@@ -93,16 +72,6 @@ def test_what_is_proven_of_random_laws_is_the_count_of_their_poles(number, seed)
         assert proven in (None, (band.full.poles.log_radius > 0).sum())
     assert sum(each is not None for each in found) >= min(number, 3)
     assert any(found)
-
-
-@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-def test_poles_cross_the_circle_at_the_factors_that_are_named(law):
-    loop = sampled_loop(LAB, law, Chain(), count=6)
-    found = crossings_of(loop, FACTOR)
-    assert len(found)
-    for factor, _, change in list(found)[:4]:
-        before, after = (int((loop.times(factor * k).poles.log_radius > 0).sum()) for k in (1 - 1e-7, 1 + 1e-7))
-        assert after - before == change, factor
 
 
 @pytest.mark.parametrize(("entry", "factor", "change"), [(-1.0, 2.0, 1), (([1.0], [1.0, -0.5]), 1.0, -1)])
@@ -170,15 +139,6 @@ def test_next_to_z_1_the_loop_goes_as_the_powers_that_are_named(arm, law):
     assert away[1] < 0.2 * away[0] < 0.1
 
 
-@pytest.mark.parametrize("law", [LAWS["lead"], LAWS["along"]], ids=["lead", "along"])
-def test_a_law_moves_each_mode_to_first_order_as_its_poles_move(law):
-    """The difference over both signs of a law that is weak: right to the square of its size."""
-    size, loop = 1e-4, sampled_loop(LAB, law, Chain(), count=5)
-    radii = [mode_table(loop.times(sign * size)).log_radius for sign in (1, -1)]
-    found = mode_table(loop).first_order
-    np.testing.assert_allclose((radii[0] - radii[1]) / (2 * size), found, rtol=1e-4, atol=1e-6 * abs(found).max())
-
-
 def test_from_the_required_damping_on_a_law_is_stable():
     law = Law({"hub_rate": ([6.0], [0.02, 1.0]), "moment@0.5": 0.2}, delay=0.004)
     found = shown_damping(sampled_verdict(LAB, law).loop, 20)
@@ -236,16 +196,6 @@ def test_tustins_derivative_is_the_trapezoidal_rule_backwards():
     law = discretised(Law({"hub_angle": ([1.0, 0.0], [1.0])}), T)
     z = np.exp(1j * np.array([0.3, 2.0]))
     np.testing.assert_allclose(law.values(z)[0], 2 / T * (z - 1) / (z + 1), rtol=1e-13)
-
-
-def test_several_signals_at_once_are_discretised_as_each_alone():
-    A, B, C, D = [[-3.0, 40.0], [-40.0, -3.0]], [[1.0, 0.5], [2.0, -1.0]], [[1.0, 2.0]], [[0.3, 0.0]]
-    both = Law.of_matrices(A, B, C, D, ["hub_angle", "root_moment"], rule="zoh")
-    z = np.exp(1j * np.array([0.3, 2.0]))
-    for column, values in enumerate(discretised(both, T).values(z)):
-        own = np.array(B)[:, [column]], C, np.array(D)[:, [column]]
-        alone = discretised(Law.of_matrices(A, *own, ["hub_rate"], rule="zoh"), T)
-        np.testing.assert_allclose(values, alone.values(z)[0], rtol=1e-12)
 
 
 def test_between_crossings_along_one_part_the_count_is_theirs():

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.odd_arms import odd_arms
 from tfarm.arm import Hub, HubFeedback
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, sampled_loop
 from tfarm.dsp.modes import STRONGER, dominant, mode_table, sampled_loci, sampled_locus
@@ -117,17 +116,6 @@ def test_a_locked_hub_has_no_loop_and_a_free_pin_none_by_moment(lab):
     with pytest.raises(ParameterError, match="algebraic loop"):
         sampled_loop(pin, HubFeedback(K1=0.3, K2=0.3))
     assert sampled_loop(pin, HubFeedback(K1=0.1, K2=0.0), count=6).poles.z.size > 10
-
-
-def test_a_hub_that_cannot_drift_has_the_poles_of_its_modes_alone():
-    """Its tip is pinned: the two integrals of the torque are felt by nothing, their poles at z = 1 are left out."""
-    loop = sampled_loop(odd_arms()["pinned"], HubFeedback(K1=0.0374, K2=0.3), count=6)
-    whole = np.linalg.eigvals(loop.matrix())
-    kept = np.linalg.eigvals(loop.reduced_matrix())
-    assert len(kept) == len(whole) - 2
-    left = sorted(whole, key=lambda z: abs(kept - z).min())[len(kept) :]
-    np.testing.assert_allclose(left, 1.0, atol=1e-6)
-    assert max(abs(kept - z).min() for z in sorted(whole, key=lambda z: abs(kept - z).min())[: len(kept)]) < 1e-6
 
 
 @pytest.mark.parametrize("period", [0.003, 0.01, 0.04])

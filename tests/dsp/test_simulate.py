@@ -219,28 +219,26 @@ def test_a_settling_time_has_a_tenth_of_the_record_after_it(lab, more):
     assert settled == (pytest.approx(k * T, rel=1e-12) if more else None)
 
 
-def test_what_cannot_be_simulated_is_refused(lab):
-    from tfarm.arm import Payload
+PINNED = {"payload_mass": np.inf}
 
-    pinned = replace(lab, payload=Payload(mass=np.inf))
-    with pytest.raises(ParameterError, match=r"payload\.mass = inf: .*no slew"):
-        scenario("slew", pinned, Chain(), 1.0)
-    with pytest.raises(ParameterError, match=r"payload\.inertia = inf: .*no slew"):
-        scenario("slew", replace(lab, payload=Payload(inertia=np.inf)), Chain(), 1.0)
-    with pytest.raises(ParameterError, match="no free decay"):
-        simulator(pinned, "decay", 1.0, count=3).linear(GAINS)
-    with pytest.raises(ParameterError, match='did you mean "slew"'):
-        scenario("slow", lab, Chain(), 1.0)
-    with pytest.raises(ParameterError, match="at most 4000000 samples"):
-        scenario("step", lab, Chain(), 1e9)
-    with pytest.raises(ParameterError, match="duration"):
-        scenario("step", lab, Chain(), -1.0)
-    with pytest.raises(ParameterError, match="0 to 1000"):
-        simulator(lab, between=-1)
-    with pytest.raises(ParameterError, match="not finite"):
-        simulator(lab).controller(lambda m: np.nan)
-    with pytest.raises(ParameterError, match="one finite gain a sample"):
-        simulator(lab).linear(GAINS, np.ones(300))
+
+@pytest.mark.parametrize(
+    ("run", "words"),
+    [
+        (lambda lab: simulator(lab.having(**PINNED)), r"payload\.mass = inf: .*no slew"),
+        (lambda lab: simulator(lab.having(payload_inertia=np.inf)), r"payload\.inertia = inf: .*no slew"),
+        (lambda lab: simulator(lab.having(**PINNED), "decay", 1.0, count=3).linear(GAINS), "no free decay"),
+        (lambda lab: simulator(lab, "slow"), 'did you mean "slew"'),
+        (lambda lab: simulator(lab, "step", 1e9), "at most 4000000 samples"),
+        (lambda lab: simulator(lab, "step", -1.0), "duration"),
+        (lambda lab: simulator(lab, between=-1), "0 to 1000"),
+        (lambda lab: simulator(lab).controller(lambda m: np.nan), "not finite"),
+        (lambda lab: simulator(lab).linear(GAINS, np.ones(300)), "one finite gain a sample"),
+    ],
+)
+def test_what_cannot_be_simulated_is_refused(lab, run, words):
+    with pytest.raises(ParameterError, match=words):
+        run(lab)
 
 
 def test_what_an_ideal_chain_leaves_decides_while_signals_are_clipped(lab):

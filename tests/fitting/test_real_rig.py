@@ -2,10 +2,6 @@
 
 Nothing is tuned.  The inertia of the load about the hub's axis and the place of its centre of mass are as the preset
 assumes them; how the inertia splits is not published, and the whole range of what it leaves possible is looked at.
-
-A real flexible arm under a sine swept again and again: tests/data/daisy-robot-arm, without units or sample time.
-
-A black box: no arm of ours is laid over it, and a hertz here is one turn a sample.
 """
 
 import math
@@ -13,13 +9,12 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import tfarm
 from tests.shell import answer, run
 from tfarm.fitting.model import mode_of
-from tfarm.fitting.recording import frequency_response, read_recording
+from tfarm.fitting.recording import read_recording
 
 DATA = Path(__file__).parent.parent / "data" / "quanser-2dsfl"
 RUNS = ("ring-20deg.csv", "ring-neg-10deg.csv")
@@ -65,7 +60,6 @@ def test_the_held_arm_of_the_published_numbers_is_in_that_range_and_so_are_other
     assert first(0.079) == pytest.approx(1.83, abs=0.005)
     ends = first(0.0), first(farthest * (1 - 1e-9))
     assert ends == pytest.approx((1.65, 1.96), abs=0.005)
-    print(f"held rig, all legal offsets: {ends[0]:.3f} to {ends[1]:.3f} Hz; at 0.079 m {first(0.079):.3f} Hz")
 
 
 def test_the_text_of_a_ring_has_the_limits_of_its_interval(capsys):
@@ -73,27 +67,3 @@ def test_the_text_of_a_ring_has_the_limits_of_its_interval(capsys):
     assert (code, err) == (0, "")
     assert "the residuals are correlated" in out
     assert re.search(r"^from +2 s\nto +3.99 s\nsamples +200$", out, re.MULTILINE)
-
-
-RECORD = read_recording(Path(__file__).parent.parent / "data" / "daisy-robot-arm" / "robot_arm.csv")
-SWEEP = 512  # samples
-
-
-def estimate(**how):
-    names = "tip_acceleration", "hub_torque"
-    return frequency_response(RECORD, *names, columns=("acceleration", "torque"), **how).measured
-
-
-def test_segments_of_a_sweep_are_coherent_and_tapered_ones_are_not():
-    """What repeats leaks from no period; a window that tapers a sweep weighs its frequencies by when they come."""
-    whole, tapered = estimate(segment=SWEEP, window="boxcar"), estimate()
-    assert np.median(whole.coherence) > 0.999
-    assert np.median(tapered.coherence) < 0.9
-
-
-def test_the_estimators_agree_where_the_sweep_is_coherent():
-    H1, H2 = (estimate(segment=SWEEP, window="boxcar", estimator=kind) for kind in ("H1", "H2"))
-    good = H1.coherence > 0.999
-    assert good.mean() > 0.5
-    assert H2.values[good] == pytest.approx(H1.values[good], rel=1.1e-3)
-    assert np.all(abs(H1.values) <= abs(H2.values) * (1 + 1e-12))

@@ -9,13 +9,13 @@ everything converges as fast as the frequencies do.
 """
 
 import numpy as np
-from scipy.linalg import expm, solve
+from scipy.linalg import solve
 
 from tests.models import Ritz
 
 
 class RitzLoop:
-    """The arm's matrices; for each law a state matrix, its eigenvalues, and the growth of its energy."""
+    """The arm's matrices; for each law a state matrix and its eigenvalues."""
 
     def __init__(self, arm, terms=24):
         self.ritz = ritz = Ritz(arm, terms)
@@ -56,34 +56,3 @@ class RitzLoop:
         if self.damping or largest > 1e-9 * abs(s).max():
             return largest
         return float(s.real[abs(s) < 8 * self.ritz.natural_frequencies(1)[0]].max())
-
-    def energy_growth(self, law, rate, rng, time_constants=20):
-        """ln of the energy after `time_constants` times 1/|rate|, over that at half the time: simulated.
-
-        One step's matrix exponential, squared until the end: the state every 2^k steps, exactly.
-        """
-        A, root = self.state_matrix(law), self._root_of_energy()
-        A = root @ A @ np.linalg.inv(root)
-        end = time_constants / abs(rate)
-        doublings = max(1, int(np.ceil(np.log2(end * np.linalg.norm(A, 2)))))
-        P = expm(A * end / 2**doublings)
-        for _ in range(doublings - 1):
-            P = P @ P
-        z = [P @ rng.standard_normal(A.shape[0])]
-        z.append(P @ z[0])
-        early, late = (self._energy(np.linalg.solve(root, each), law) for each in z)
-        return float(np.log(late / early))
-
-    def _energy(self, z, law):
-        q, rate = z[: self.n], z[self.n : 2 * self.n]
-        return q @ self.K @ q + rate @ self.M @ rate + abs(law.Kp) * (self.b @ q) ** 2
-
-    def _root_of_energy(self):
-        """A root of the energy's matrix, with a small part of theta^2 and m^2: coordinates in which nothing is huge."""
-        K = self.K + 1e-6 * np.trace(self.M) * self.ritz.natural_frequencies(1)[0] ** 2 * np.outer(self.b, self.b)
-        n, size = self.n, 2 * self.n + (self.damping > 0)
-        root = np.zeros((size, size))
-        root[:n, :n], root[n : 2 * n, n : 2 * n] = np.linalg.cholesky(K).T, np.linalg.cholesky(self.M).T
-        if self.damping:
-            root[-1, -1] = np.sqrt(self.arm.link.length / self.arm.link.EI)
-        return root

@@ -25,7 +25,6 @@ from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.schema import curve_table
 from tfarm.spectrum.damped import damped_modes
-from tfarm.spectrum.proofs import enclosed
 from tfarm.spectrum.table import default_gains, rate_unit
 
 EPS = np.finfo(float).eps
@@ -49,17 +48,13 @@ PLASTIC = Arm(  # a hub of next to no inertia and a heavy tip: K1 makes mode 1 t
 )  # fmt: skip
 RANGES = [
     (PAPER, HubFeedback(), "K1", 0.0, 10.0),
-    (LAB, HubFeedback(), "K1", -3.0, 3.0),
     (LAB, K2, "K1", 0.0, 30.0),
     (PAPER, K1, "K2", -5.0, 5.0),
     (STOCKY, K1, "K2", -5.0, 5.0),
-    (PAPER, HubFeedback(), "K2", 0.0, 5.0),
     (LAB, HUB, "Kp", 0.0, 100.0),
-    (LAB, K1, "Kp", -5.0, 5.0),
     (PAPER, HUB, "all", 0.0, 10.0),
     (LAB, HubFeedback(K1=0.3, K2=0.3, Kp=3.0), "all", -2.0, 2.0),
     (LAB, HUB, "payload_mass", 0.0, 2.0),
-    (STOCKY, HUB, "payload_inertia", 0.0, 0.1),
     (PAPER, HUB, "hub_inertia", 0.01, 2.0),
     (LAB, HUB, "length", 0.4, 1.2),
     (PAPER, HUB, "damping", 0.0, 1e-3),
@@ -168,11 +163,6 @@ def test_zeros_at_the_origin_stay_exactly_there():
     assert np.all(ends[0, 1:].imag > 0)
 
 
-def test_a_pinned_payload_leaves_no_rigid_mode():
-    found = locus(replace(LAB, payload=Payload(mass=math.inf)), HubFeedback(), "K1", 0.0, 1.0, 11, 4)
-    assert list(found.mode) == [1, 2, 3, 4]
-
-
 CHANGED = {"hub_inertia": (0.02, 3.0), "payload_mass": (0.0, 2.0), "payload_inertia": (0.0, 0.05), "length": (0.5, 1.1),
            "damping": (0.0, 3e-4)}  # fmt: skip
 
@@ -198,19 +188,6 @@ def test_the_circuits_pole_and_the_turning_hubs_are_one_pair_at_a_high_gain():
     assert circuit[0] == pytest.approx(-MOTOR.resistance / MOTOR.inductance, rel=0.02)
     assert (turning.imag[0], circuit.imag[0]) == (0, 0)
     assert not np.isnan(found.branches).any()
-
-
-def test_a_pair_that_meets_on_the_axis_is_listed_as_conjugates():
-    """To the last digit, and each a zero of the loop."""
-    found = locus(LAB, HubFeedback(K1=0.3, Kp=0.5), "K1", 0.05, 4.0, points=30, branches=4)
-    lower = np.argwhere(found.branches.imag < 0)
-    assert lower.size
-    assert (found.branches.imag[np.unique(lower[:, 0])] == 0).any()
-    for row, column in lower:
-        pole = found.branches[row, column]
-        assert pole.conjugate() in found.branches[:, column]
-        at = found.varied.at(float(found.gain[column])).function(np.array([pole]))
-        assert abs(at.value / at.slope)[0] < 1e-12 * abs(pole)
 
 
 def test_a_branch_that_comes_to_the_accumulation_point_ends_there_and_the_others_go_on(capsys):
@@ -243,19 +220,6 @@ def test_modes_that_leave_the_imaginary_axis_as_a_quadruple_are_followed():
     poles = poles_below(found.varied.at(0.0), 1.1 * first.imag.max()).values
     assert np.sort_complex(first.round(6)) == pytest.approx(np.sort_complex(poles.round(6)), rel=1e-9, abs=2e-6)
     assert (abs(first.real) > 13).sum() == 2
-
-
-def test_the_known_edge_of_the_lab_arm_to_its_last_digits():
-    """K1 = 0.3: K2 = 1.0305, at 27.8 rad/s.  By proven 30-digit discs around the pole on either side."""
-    (found,) = locus(LAB, K1, "K2", 0.5, 1.1, 40, 8).crossings
-    assert (round(found.gain, 4), round(found.omega, 1), found.direction) == (1.0305, 27.8, "unstable")
-    side = []
-    for value in (found.gain * (1 - 1e-13), found.gain * (1 + 1e-13)):
-        loop = Loop(LAB, HubFeedback(K1=0.3, K2=value))
-        disc = enclosed(loop.k, 1j * found.omega, 30, loop.exact)
-        assert found.omega == pytest.approx(float(disc.im), rel=1e-12)
-        side.append(float(disc.re))
-    assert side[0] < 0 < side[1]
 
 
 DEEP = window_arm()

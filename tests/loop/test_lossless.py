@@ -56,23 +56,15 @@ def edges_of(arm):
     return found.gain[kept][order], found.at[kept][order]
 
 
-@pytest.mark.parametrize("r", [0.0, 0.05, 0.2])
-def test_closed_form_of_a_slender_cantilever(r):
-    """K2_n = 1 + r k_n (cosh + cos)/(sinh + sin) of k_n L: the root shear over the root moment of a clamped beam."""
-    slender = replace(with_radius(r), theory="euler-bernoulli", payload=Payload())
-    kL = CANTILEVER
+@pytest.mark.parametrize(("r", "x"), [(0.0, 0.0), (0.05, 0.0), (0.2, 0.0), (0.0, 0.02), (0.0, 0.3)])
+def test_closed_form_of_a_slender_cantilever(r, x):
+    """K2_n = 1 + r k_n (cosh + cos)/(sinh + sin) of k_n L, or W''(0)/W''(x), of the clamped beam's modes."""
+    slender = replace(with_radius(r, x), theory="euler-bernoulli", payload=Payload())
+    kL, kx = CANTILEVER, CANTILEVER * x / ARM.link.length
     sigma = (np.cosh(kL) + np.cos(kL)) / (np.sinh(kL) + np.sin(kL))
-    assert edges_of(slender)[0][:4] == pytest.approx(1 + r * kL / ARM.link.length * sigma, rel=DIFFERENCE)
-
-
-@pytest.mark.parametrize("x", [0.02, 0.3])
-def test_closed_form_of_a_gauge_on_a_slender_cantilever(x):
-    """K2_n = W''(0)/W''(x) of the clamped beam's modes."""
-    slender = replace(with_radius(0.0, x), theory="euler-bernoulli", payload=Payload())
-    kL = CANTILEVER
-    sigma, kx = (np.cosh(kL) + np.cos(kL)) / (np.sinh(kL) + np.sin(kL)), kL * x / ARM.link.length
     bending = (np.cosh(kx) + np.cos(kx) - sigma * (np.sinh(kx) + np.sin(kx))) / 2
-    assert edges_of(slender)[0][:4] == pytest.approx(1 / bending, rel=DIFFERENCE)
+    expected = (1 + r * kL / ARM.link.length * sigma) / bending
+    assert edges_of(slender)[0][:4] == pytest.approx(expected, rel=DIFFERENCE)
 
 
 @pytest.mark.parametrize("name", thinned(RIGS, 5))
@@ -109,21 +101,6 @@ def test_verdict_windows_and_map_follow_the_edges(name):
     assert plane.unstable.tolist() == [[n, n] for n in (0, 0, 0, 2)]
     ((low, top),) = plane.stable_intervals[-1]
     assert (low, top) == (0.0, pytest.approx(high, rel=DIFFERENCE))
-
-
-@pytest.mark.parametrize(("name", "K2", "count"), [("r = 0.05", 1.6, 8), ("r = 0.2", 3.5, 8)])
-def test_so_many_poles_of_the_elements_are_unstable(name, K2, count):
-    """Two for each edge below K2, by Nyquist's criterion too; as many to the left with K1 < 0."""
-    arm = RIGS[name]
-    law, model = HubFeedback(K1=0.3, K2=K2), RigLoop(arm, reached(arm, 8))
-    verdict = stability(arm, law)
-    assert verdict.unstable_roots == nyquist_of(verdict).unstable_by_nyquist == model.unstable(law) == count
-    assert 2 * ((edges_of(arm)[0] < K2) & (edges_of(arm)[0] > 0)).sum() == count
-    mirrored = stability(arm, HubFeedback(K1=-0.3, K2=0.5))
-    assert mirrored.verdict == "unstable"
-    assert np.sort(abs(mirrored.poles.values.real)) == pytest.approx(
-        np.sort(abs(stability(arm, HubFeedback(K1=0.3, K2=0.5)).poles.values.real)), rel=1e-6, abs=1e-12
-    )
 
 
 def test_what_a_mode_far_above_the_band_does_is_not_determined():
@@ -173,11 +150,7 @@ def test_the_window_of_K1_ends_where_the_hub_loses_nothing(arm, K2):
     for K1, side in ((-1.02 * LOSS, 1), (-0.98 * LOSS, -1), (1.0, -1)):
         s = loop.eigenvalues(HubFeedback(K1=K1, K2=K2))
         assert (np.sign(s.real[(abs(s) > 1e-3) & (abs(s) < omega[6])]) == side).all()
-
-
-@pytest.mark.parametrize("arm", [ROOT, CLAMP], ids=lambda arm: arm.name)
-def test_where_nothing_is_lost_the_loop_is_marginal(arm):
-    assert stability(arm, HubFeedback(K1=-LOSS, K2=0.3)).verdict == "marginal"
+    assert stability(arm, HubFeedback(K1=-LOSS, K2=K2)).verdict == "marginal"
 
 
 @pytest.mark.parametrize("arm", [ROOT, CLAMP, LAGGING], ids=lambda arm: arm.name)
@@ -193,16 +166,6 @@ def test_the_map_agrees_with_the_verdict(arm):
             assert count in (-1, there.unstable_roots) or (
                 arm is CLAMP and count > there.unstable_roots
             )  # of more modes
-
-
-def test_the_gain_margin_is_where_elements_turn():
-    """K1 < 0 that the friction outweighs: at b/|K1| every mode turns at once, before K2 does."""
-    law = HubFeedback(K1=-0.2, K2=0.1, Kp=0.5)
-    found = margins(ROOT, law).in_band.gain
-    assert found[1] == pytest.approx(LOSS / 0.2, rel=1e-12)
-    loop = RigLoop(ROOT, tfarm.modes(ROOT, 12).natural_frequency[-1])
-    below, above = (loop.eigenvalues(HubFeedback(K1=-0.2 * t, K2=0.1 * t, Kp=0.5 * t)).real.max() for t in (2.49, 2.51))
-    assert below < 0 < above
 
 
 @pytest.mark.parametrize("seed", thinned([516, 261], 2))

@@ -11,8 +11,7 @@ import pytest
 from scipy.optimize import brentq
 
 import tfarm
-from tests.loop.arms import held, held_stiffness, window_arm
-from tests.loop.counts import turns
+from tests.loop.arms import held, window_arm
 from tests.loop.test_stability import exceptional
 from tests.odd_arms import odd_arms
 from tests.shared import thinned
@@ -96,6 +95,19 @@ def test_the_disk_margin_is_that_of_python_control_for_a_modal_model(arm, law) -
     assert found.disk == pytest.approx(alpha, rel=5e-3)
 
 
+def turns(function, path) -> int:
+    """How often a function turns around 0 along a closed path, whose steps are halved while it turns fast."""
+    angle = np.angle(function(path))
+    for _ in range(40):
+        turn = np.angle(np.exp(1j * np.diff(angle)))
+        (rough,) = np.nonzero(abs(turn) > 0.5)
+        if not rough.size:
+            return round(float(turn.sum()) / (2 * np.pi))
+        middle = (path[rough] + path[rough + 1]) / 2
+        path, angle = np.insert(path, rough + 1, middle), np.insert(angle, rough + 1, np.angle(function(middle)))
+    raise AssertionError("the phase does not settle on the contour")
+
+
 def unstable(arm, law, delay, height) -> int:
     """Zeros right of the axis of 1 + L e^{-s delay}: its turns around a half-disc, L's own poles at 0 left out."""
     loop, small = Loop(arm, law), 1e-7 * height
@@ -153,17 +165,6 @@ def test_resonances_too_narrow_for_any_grid_bound_the_exact_delay_margin() -> No
     assert found.exact_delay == found.in_band.delay == pytest.approx(min(borne), rel=1e-6)
 
 
-@pytest.mark.parametrize(("C", "K2"), [(1e-10, 0.3), (1e-10, -1.0), (1e-9, -1.0)])
-def test_no_resonance_beyond_a_band_that_is_called_quiet_is_loud(C, K2) -> None:
-    arm = BARE.having(damping=C)
-    found = margins(arm, HubFeedback(K1=0.3, K2=K2))
-    omega = tfarm.modes(arm, 200).natural_frequency
-    beyond = 1j * omega[omega > found.stability.band]
-    rate, moment = tfarm.transfer(arm, ["hub_rate", "root_moment"])(beyond)
-    assert found.stability.is_known_beyond
-    assert abs(0.3 * rate + K2 * moment).max() < 0.5
-
-
 def scaled(law, factor) -> HubFeedback:
     return HubFeedback(K1=factor * law.K1, K2=factor * law.K2, Kp=factor * law.Kp)
 
@@ -177,11 +178,6 @@ def test_the_loop_bears_just_less_than_the_gain_margin(arm, law) -> None:
         assert stability(arm, scaled(law, high * (1 + 1e-6))).verdict == "unstable"
     if low > 0:
         assert stability(arm, scaled(law, low * (1 - 1e-6))).verdict == "unstable"
-
-
-def test_a_spring_that_pushes_limits_the_gain_of_an_undamped_held_arm() -> None:
-    law = HubFeedback(K1=0.3, K2=0.1, Kp=-0.4 * held_stiffness(held(0.0)))
-    assert margins(held(0.0), law, 1e3).in_band.gain[1] == pytest.approx(1 / (0.1 + 0.4), rel=1e-9)
 
 
 def test_without_damping_the_exact_margins_are_zero_and_those_in_range_positive() -> None:

@@ -16,16 +16,15 @@ from tfarm import Arm, Hub, HubFeedback, Law, Link, Payload, Section
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.loop.loop import Loop
-from tfarm.loop.poles import closed_loop_poles, poles_below
+from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import band_of_loop, hub_shares, is_controllable, is_quiet, stability
 from tfarm.loop.theorem import lyapunov
-from tfarm.spectrum import modes_below
 from tfarm.spectrum.box import turned
 
 LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
 
 
-def test_map_count_and_simulation_agree_on_random_loops() -> None:
+def test_map_count_and_model_agree_on_random_loops() -> None:
     """`python -m tests.loop.agreement 2000` for more, of three times as many arms."""
     found = list(loops(6, 4, arms=4))
     assert [each.words for each in found if each.is_wrong] == []
@@ -62,14 +61,6 @@ def test_what_lyapunov_proves_is_stable_however_slowly_it_decays(K1) -> None:
     """Of a stocky arm some modes decay by less than 1e-11 of their frequency, too little for double precision."""
     found = stability(STOCKY, HubFeedback(K1=K1, K2=0.3))
     assert found.verdict == "stable"
-
-
-def test_both_signs_wrong_leave_one_real_pole_to_a_negative_hub_inertia() -> None:
-    found = stability(BARE, HubFeedback(K1=-0.3, K2=1.5))
-    assert (found.unstable_roots, found.unstable_roots_infinite) == (1, False)
-    unstable = found.poles.values[found.poles.values.real > 1e-9 * abs(found.poles.values)]
-    model = RitzLoop(BARE, 20).eigenvalues(HubFeedback(K1=-0.3, K2=1.5))
-    assert unstable[0].real == pytest.approx(model[model.real > 1e-6 * abs(model)].real[0], rel=1e-6)
 
 
 HELD_TIPS = (Payload(mass=math.inf), Payload(inertia=math.inf), Payload(mass=math.inf, inertia=math.inf))
@@ -172,18 +163,12 @@ HELD = replace(LAB, hub=Hub(inertia=0.1, stiffness=SPRING, friction=0.1))
 PUSHES = Law({"hub_angle": ([-SPRING], [1e-2, 1.0])})
 
 
-@pytest.mark.parametrize("law", [HubFeedback(Kp=-SPRING), PUSHES])
-def test_the_verdict_is_marginal_and_its_pole_listed_at_0(law):
-    assert tfarm.margins(HELD, law).stability.verdict == "marginal"
-    poles = tfarm.closed_loop_poles(HELD, law, 3)
-    assert (poles.values == 0).sum() == 1
-    assert poles.unstable == 0
-
-
-@pytest.mark.parametrize(("more", "verdict"), [(1e-6, "unstable"), (-1e-6, "stable")])
-def test_next_to_it_stable_and_unstable_are_distinguished(more, verdict):
+@pytest.mark.parametrize(("more", "verdict"), [(0.0, "marginal"), (1e-6, "unstable"), (-1e-6, "stable")])
+def test_a_law_as_stiff_as_the_spring_has_its_pole_at_0_and_none_next_to_it(more, verdict):
     for law in (HubFeedback(Kp=-SPRING * (1 + more)), PUSHES.having("gain", 1 + more)):
         assert tfarm.margins(HELD, law).stability.verdict == verdict
+        poles = tfarm.closed_loop_poles(HELD, law, 3)
+        assert ((poles.values == 0).sum(), poles.unstable) == (more == 0, more > 0)
 
 
 def test_without_losses_two_poles_meet_there():
@@ -260,18 +245,6 @@ def test_a_negative_spring_is_proven_up_to_the_stiffness_of_a_held_tip() -> None
         assert lyapunov(arm, law(K2=K2, Kp=Kp)).proven is proven
     assert unstable(arm, law(K2=K2, Kp=0.999 * edge)) == 0
     assert unstable(arm, law(K2=K2, Kp=1.001 * edge)) == 1
-
-
-@pytest.mark.parametrize("K2", [1.001, 1.05])
-def test_beyond_one_every_flexible_mode_is_unstable(K2: float) -> None:
-    loop = Loop(BARE, law(K2=K2))
-    for height in (1e3, 1e4):
-        poles = poles_below(loop, height)
-        flexible = poles.values.imag > 0
-        assert (poles.values.real[flexible] > 0).all()
-        assert poles.unstable == 2 * flexible.sum()
-        held = modes_below(replace(BARE, hub=Hub(inertia=math.inf)), height)
-        assert flexible.sum() == held  # none is missing, and there are ever more
 
 
 @pytest.mark.parametrize("seed", thinned(range(3), 2))

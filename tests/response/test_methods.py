@@ -13,7 +13,6 @@ from tfarm.exact.values import METHODS
 
 S = np.array([0.3 + 57.1j, 57.1j, -3.0 + 400.0j, 2.0 + 0j])
 EPS = np.finfo(float).eps
-FLOAT64 = 8 * EPS  # of a frequency polished in float64: a bracket of 15 digits is wider
 
 
 def test_a_method_with_an_error_is_detected(monkeypatch, capsys):

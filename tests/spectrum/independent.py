@@ -67,13 +67,17 @@ def delta(arm, s, Kp=0.0, K1=0.0, K2=0.0):
     return _determinant(rows)
 
 
+def _newton(arm, s, digits, **gains):
+    """A step of Newton's method on the paper's Delta, over s; its slope by a difference of so many digits."""
+    step = abs(s) * mpmath.mpf(10) ** -digits
+    here, up, down = (delta(arm, at, **gains) for at in (s, s + step, s - step))
+    return here / ((up - down) / (2 * step)) / s
+
+
 def newton_step(arm, s, digits=50, **gains):
     """How far Newton's method on the paper's Delta moves s, relative to it."""
     with mpmath.workdps(digits + 30 + _guard(arm, s)):
-        s = mpmath.mpc(s)
-        step = abs(s) * mpmath.mpf(10) ** (-digits // 2)
-        here, up, down = (delta(arm, at, **gains) for at in (s, s + step, s - step))
-        return float(abs(here / ((up - down) / (2 * step)) / s))
+        return float(abs(_newton(arm, mpmath.mpc(s), digits // 2, **gains)))
 
 
 def newton_root(arm, s, digits):
@@ -81,11 +85,9 @@ def newton_root(arm, s, digits):
     with mpmath.workdps(2 * digits + 30 + _guard(arm, s)):
         s = mpmath.mpc(s)
         for _ in range(12):
-            step = abs(s) * mpmath.mpf(10) ** (-digits)
-            here, up, down = (delta(arm, at) for at in (s, s + step, s - step))
-            move = here / ((up - down) / (2 * step))
-            s -= move
-            if abs(move) < abs(s) * mpmath.mpf(10) ** (-digits - 10):
+            move = _newton(arm, s, digits)
+            s *= 1 - move
+            if abs(move) < mpmath.mpf(10) ** (-digits - 10):
                 return s
     raise AssertionError("Newton's method on Delta did not settle")
 

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.spectrum.proofs import arms
-from tests.survey import each_of, tally
 from tfarm import Arm, CertificationError, Hub, Payload
 from tfarm.exact import appendix
 from tfarm.exact.system import system_of
@@ -67,10 +65,3 @@ def test_the_cut_off_mode_is_certified() -> None:
     modes = tfarm.modes(arm, 12)
     assert np.isclose(modes.natural_frequency, arm.shear_cutoff, rtol=1e-14).any()
     assert modes.certify(20).count == 12
-
-
-def test_random_arms_are_proven_and_none_wrongly() -> None:
-    """`python -m tests.spectrum.proofs 60` for more."""
-    outcomes, figures, _ = tally(each_of(arms), 4, 77)
-    assert outcomes == {"proven": 4}
-    assert figures["gaps counted, of 19"] == [19] * 4

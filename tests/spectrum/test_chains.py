@@ -84,18 +84,6 @@ def test_residues_of_an_undamped_rig(drive):
         assert found[drive == "hub_angle" :, n] == pytest.approx(exact.real, rel=1e-9, abs=1e-12 * abs(exact).max())
 
 
-def test_shapes_are_the_residues_along_the_link():
-    """w(x) b in s^2, with b the hub's part in the mode."""
-    arm, x = lossless(rig()), 0.375
-    table = tfarm.modes(arm, 3)
-    for n in np.flatnonzero(table.index > 0):
-        p = 1j * table.natural_frequency[n]
-        W, Psi = 2 * p * residue_of(arm, p, [("displacement", x), ("rotation", x)])
-        b = table.hub_participation[n]
-        assert table.shape(x)[n] * b == pytest.approx(W.real, rel=1e-9)
-        assert table.rotation(x)[n] * b == pytest.approx(Psi.real, rel=1e-9)
-
-
 @pytest.mark.parametrize("drive", thinned(["motor_voltage", "hub_torque", "hub_angle"], 2))
 def test_residues_and_shapes_of_a_damped_rig(drive):
     """Residues are c b/(2 s): w(x) b over the input, b^2 of what the input works on.

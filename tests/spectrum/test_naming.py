@@ -7,7 +7,6 @@ import pytest
 
 import tfarm
 from tests import caches
-from tests.loop.law_cases import some_case
 from tests.rigs import some_rig
 from tfarm.errors import ConvergenceError
 from tfarm.reduced.modal import NAMING_STEPS
@@ -103,7 +102,7 @@ def test_zeros_that_ring_are_a_pair(single, pairs, expected_single, expected):
 
 def test_names_are_given_up_and_the_box_is_complete_all_the_same(monkeypatch):
     """128 modes of a rig that took 24,000 steps to name, 32 s: those that are lost are listed without a name."""
-    arm, steps, near = some_case(1, 24)[0], [], naming.Damping.near
+    arm, steps, near = tfarm.load("tests/data/reproductions/laws_24.toml"), [], naming.Damping.near
 
     def counted(self, values, guess):
         steps.append(values.size)

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 import tfarm
 from tests.chain_elements import eigenvalues
-from tests.rigs import some_rig
 from tests.shared import sized, thinned
 from tests.spectrum.damped import judge_rig
-from tfarm import Arm, Hub
+from tfarm import Hub
 from tfarm.arm import Motor
 from tfarm.cli.running import run
 from tfarm.errors import ConvergenceError
@@ -25,18 +24,8 @@ from tfarm.spectrum import damped as damped_module
 from tfarm.spectrum.damped import NOT_ASSIGNED, origins_of
 
 STIFF_FRICTION = Path("tests/data/reproductions/stiff-friction.toml")
-REFUSED_ONCE = {28: 2, 83: 2, 227: 8}  # rigs of `some_rig` at seed 1, and their requested number of modes
-
-
-def refused_once() -> dict[int, tuple[Arm, int]]:
-    """Those rigs, drawn as they were."""
-    rng = np.random.default_rng(1)
-    drawn = [(some_rig(rng), int(rng.integers(1, 9))) for _ in range(max(REFUSED_ONCE) + 1)]
-    assert {number: drawn[number][1] for number in REFUSED_ONCE} == REFUSED_ONCE
-    return {number: drawn[number] for number in REFUSED_ONCE}
-
-
-RIGS = refused_once()
+COUNTS = {28: 2, 83: 2, 227: 8}  # of modes that were requested of rigs once refused
+RIGS = {n: (tfarm.load(f"tests/data/reproductions/stray_{n}.toml"), count) for n, count in COUNTS.items()}
 
 
 @pytest.mark.parametrize("number", thinned([83, 28, 227], 3))
