@@ -26,6 +26,7 @@ SURVEYS := \
 	spectrum.damped \
 	spectrum.chains \
 	loop.agreement \
+	loop.loci \
 	loop.law_counts \
 	synthesis.designs \
 	loop.nyquist_counts \
