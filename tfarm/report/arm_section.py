@@ -8,9 +8,12 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Annotated, Any, Literal, NamedTuple
 
+import numpy as np
+
 import tfarm
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, implausible, input_words, unit_of
 from tfarm.arm.schema import file_key
+from tfarm.arrays import Real
 from tfarm.audit.assumptions import Study, has_hub_inertia, hub_study, section_study
 from tfarm.digits import fixed, plain, significant, singly, unit
 from tfarm.dsp.chain import file_text
@@ -197,15 +200,16 @@ def assumptions_section(case: Case) -> PageSection:
 def candidate_blocks(study: Study, kind: str, label: str) -> Iterator[Picture | Table]:
     """Natural frequencies over the candidates as a picture, and with the sensitivities, a column a mode, as a table."""
     stem, rows = f"{kind.replace('_', '-')}-frequencies", study.candidates
-    yield picture("assumed_frequencies", draw_candidates.figure(study, label), stem=stem, label=label,
-                  omega=study.natural_frequency)  # fmt: skip
+    omega = np.array([row.natural_frequency for row in rows])
+    yield picture("assumed_frequencies", draw_candidates.figure(study, label, omega), stem=stem, label=label,
+                  omega=omega)  # fmt: skip
     own = ("is_own", "depth", "width", "second_moment", "hub_inertia")
     columns = (
         *table(rows, [name for name in own if getattr(rows[0], name) is not None]).columns,
         *(Column(f"mode_{n}_rad_s", f"mode {n}", "rad/s", of=each, digits=singly(significant, 6))
-          for n, each in enumerate(study.natural_frequency.T, 1)),
+          for n, each in enumerate(omega.T, 1)),
         *(Column(f"sensitivity_{n}", f"sensitivity of mode {n}", "%/%", of=each, digits=partial(fixed, decimals=3))
-          for n, each in enumerate(study.sensitivity.T, 1)),
+          for n, each in enumerate(np.array([row.sensitivity for row in rows]).T, 1)),
         *table(rows, ("verdict", "K2_below", "K2_below_is_edge")).columns,
     )  # fmt: skip
     yield sheet(kind, columns, study=study)
@@ -213,13 +217,14 @@ def candidate_blocks(study: Study, kind: str, label: str) -> Iterator[Picture | 
 
 @style.picture(
     size=(9.0, 4.6),
-    title=lambda study, label: f"{study.arm.name}: natural frequencies over the {label.partition(' [')[0]}",
+    title=lambda study, label, omega: f"{study.arm.name}: natural frequencies over the {label.partition(' [')[0]}",
 )  # fmt: skip
-def draw_candidates(study: Study, label: str, *, ax: Axes) -> None:
+def draw_candidates(study: Study, label: str, omega: Real, *, ax: Axes) -> None:
     """Natural frequencies over the candidates of an assumed parameter, both axes logarithmic; the arm's own filled."""
-    own = study.is_own
-    ax.axvline(study.values[own][0], color=GREY, lw=1.0, ls=(0, (4, 3)))
-    for number, (colour, omega) in enumerate(zip(COLOURS, study.natural_frequency.T, strict=False), 1):
-        ax.plot(study.values, omega, "o-", color=colour, mfc="white", label=f"mode {number}")
-        ax.plot(study.values[own], omega[own], "o", color=colour, ms=7.0, zorder=4)
+    values = [row.depth or row.hub_inertia for row in study.candidates]
+    own = [row.is_own for row in study.candidates].index(True)
+    ax.axvline(values[own], color=GREY, lw=1.0, ls=(0, (4, 3)))
+    for number, (colour, of_mode) in enumerate(zip(COLOURS, omega.T, strict=False), 1):
+        ax.plot(values, of_mode, "o-", color=colour, mfc="white", label=f"mode {number}")
+        ax.plot(values[own], of_mode[own], "o", color=colour, ms=7.0, zorder=4)
     ax.set(xscale="log", yscale="log", xlabel=label, ylabel="natural frequency [rad/s]")
