@@ -30,7 +30,7 @@ FORMULAS = {
     for name, claim in CLAIMS.items()
     if not name.startswith("Table") and name not in NOT_FORMULAS and "order of" not in name
 }
-CACHES = (formulas.parsed, equations.solved_motion, paper.energy_of, equations.wave_determinant, equations.relation)
+CACHES = (formulas.parsed, equations.accelerations, paper.energy_of, equations.wave_determinant, equations.relation)
 
 
 def flips(text):

@@ -12,18 +12,20 @@ Calculus on jets: total derivatives, and identities between integrals along the 
 
 A small checker of dimensions: every sum must add like to like, every exponential must be of a pure number.
 
-A dimension is a product of powers of kg, m and s, as SymPy has it; those of the paper's symbols are as its
-equations need them.
+A dimension is a product of powers of kg, m and s, as SymPy has it; those of the paper's symbols are in
+`claims.toml`.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from typing import Any
 
 import sympy as sp
+
+from .rows import DATA
 
 Expression = Any  # sympy comes without types
 OF_TIME = ("theta", "Theta", "V", "K2", "a1")
@@ -206,17 +208,7 @@ def unit_dimension(text: str) -> Expression:
     return sp.parse_expr(text.replace("^", "**").replace(" ", "*") or "1", local_dict=UNITS)
 
 
-NEEDED = {
-    "L": "m", "A": "m^2", "rho": "kg/m^3", "E": "Pa", "C": "s", "I_c": "kg m^2", "m": "kg", "kappa": "1", "G": "Pa",
-    "I": "m^4", "I_h": "kg m^2",
-}  # fmt: skip
-OTHERS = {
-    "s": "1/s", "x": "m", "pm": "1", "u": "N m", "U": "N m s", "K1": "N m s", "K2": "1", "a1": "1", "a2": "1",
-    "a3": "1", "lambda_1": "1/m", "lambda_2": "1/m", "lambda_": "1/m", "k1": "m s", "k2": "m s", "k3": "m s",
-    "k4": "m s",
-}  # fmt: skip
-FIELD_UNITS = {"y": "m", "phi": "1", "theta": "1", "V": "N m", "Y": "m s", "Phi": "s", "Theta": "s"}
-PAPER_UNITS: dict[str, Expression] = {name: unit_dimension(text) for name, text in (NEEDED | OTHERS).items()}
+PAPER_UNITS: dict[str, Expression] = {name: unit_dimension(text) for name, text in DATA["units"].items()}
 
 
 def spelled(dimension: Expression) -> str:
@@ -226,52 +218,42 @@ def spelled(dimension: Expression) -> str:
     return " ".join(name if n == 1 else f"{name}^{n}" for name, n in each if n) or "1"
 
 
-def dimension(f: Expression, units: dict[str, Expression]) -> Expression | None:
-    """Expression of an expression, None of a zero.  Raises MismatchError."""
+def dimension(f: Expression, units: dict[str, Expression]) -> Expression:
+    """The dimension of an expression.  Raises MismatchError."""
     if f.is_Symbol:
         return units[f.name]
     if f.is_number:
-        return None if f == 0 else sp.Integer(1)
-    if f.is_Add:
-        return _like([dimension(each, units) for each in f.args])
+        return sp.Integer(1)
+    parts = [dimension(each, units) for each in f.args]
     if f.is_Mul:
-        factors = [dimension(each, units) for each in f.args]
-        return None if None in factors else sp.Mul(*factors)
+        return sp.Mul(*parts)
     if f.is_Pow:
-        return (dimension(f.base, units) or sp.Integer(1)) ** f.exp
-    if isinstance(f, sp.exp):
-        return _like([dimension(f.args[0], units), sp.Integer(1)])
+        return parts[0] ** f.exp
     if f.func.__name__ == "integral":  # over x
-        inside = dimension(f.args[0], units)
-        return None if inside is None else inside * METRE
-    raise TypeError(f"no dimension of {f}")
-
-
-def _like(found: list[Expression | None]) -> Expression | None:
-    kinds = {each for each in found if each is not None}
+        return parts[0] * METRE
+    kinds = {*parts, sp.Integer(1)} if isinstance(f, sp.exp) else set(parts)
     if len(kinds) > 1:
         raise MismatchError(" + ".join(sorted(spelled(each) for each in kinds)))
-    return kinds.pop() if kinds else None
+    return kinds.pop()
 
 
 def mismatch(f: Expression, units: dict[str, Expression]) -> str:
-    """The terms of different dimensions in a sum: "0" if there are none."""
+    """The terms of different dimensions in a sum: "0" if there are none.
+
+    The dimension of a derivative is that of its field by x and t.
+    """
+    of_fields = {
+        s.name: unit_dimension(DATA["field_units"][field]) / METRE**i / SECOND**j
+        for s, field, i, j, _ in jets(f)
+        if s.name not in units
+    }
     try:
-        dimension(f, units)
+        dimension(f, units | of_fields)
     except MismatchError as found:
         return str(found)
     return "0"
 
 
-def unlike(text: str, units: dict[str, Expression]) -> str:
-    """The terms of different dimensions in a text's equations: "0" if all sides and sums are of one dimension.
-
-    The dimension of a derivative is that of its field by x and t.
-    """
-    for left, right in sides(text).items():
-        fields = (each for each in jets(left - right) if each[0].name not in units)
-        own = {s.name: unit_dimension(FIELD_UNITS[field]) / METRE**i / SECOND**j for s, field, i, j, _ in fields}
-        found = mismatch(left - right, units | own)
-        if found != "0":
-            return found
-    return "0"
+def listed(found: Iterable[str]) -> str:
+    """Residuals that are not "0", in one text."""
+    return "; ".join(each for each in found if each != "0") or "0"

@@ -24,9 +24,10 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
 from . import equations
-from .equations import TIME, solved_motion
+from .equations import TIME, accelerations
 from .formulas import (
-    NEEDED,
+    AT_ROOT,
+    AT_TIP,
     PAPER_UNITS,
     Expression,
     clauses,
@@ -34,6 +35,8 @@ from .formulas import (
     difference,
     integral_parts,
     jet,
+    jets,
+    listed,
     mismatch,
     parsed,
     remainder,
@@ -43,9 +46,8 @@ from .formulas import (
     symbols,
     unbalanced,
     unit_dimension,
-    unlike,
 )
-from .rows import TEXTS, AuditRow, Claim, formula_of, printed
+from .rows import TEXTS, AuditRow, Claim, formula_of
 
 # ------------------------------------------------------------ (15)-(20) and the feedback
 K1 = 0.3  # N m s/rad
@@ -54,11 +56,10 @@ MODES = 8  # of the arm whose gain is switched
 
 def pumped(*switched: tuple[float, float]) -> float:
     """Growth per period of the loop (19) on the default arm when K2 is switched: each value with its duration [s]."""
-    A, B, C, D = modal_model(load("sasaki2012"), ["hub_rate", "root_moment"], MODES).matrices()
-    period = np.eye(len(A))
+    model = modal_model(load("sasaki2012"), ["hub_rate", "root_moment"], MODES)
+    period = np.eye(model.order)
     for K2, duration in switched:
-        gains = np.array([K1, K2])
-        period = expm((A - np.outer(B, gains @ C / (1 + gains @ D))) * duration) @ period
+        period = expm(model.closed([K1, K2])[0] * duration) @ period
     return float(abs(np.linalg.eigvals(period)).max())
 
 
@@ -84,7 +85,7 @@ def pumped_text() -> str:
     )
 
 
-V_PRINTED = printed("(15)")
+V_PRINTED = TEXTS["(15)"]["printed"]
 V = formula_of("(15)")
 RATE = formula_of("(16)")
 POWER_FLOW = formula_of("(18)")
@@ -96,12 +97,11 @@ M0 = parsed("E*I*phi_x(0,t)")
 
 def rate(energy_of: Expression, damping: Expression = 0) -> Expression:
     """dV/dt with the accelerations of (1)-(5); with damping, E phi_x becomes E (phi_x + C phi_xt) in them."""
-    E, places = symbol("E"), [(i, at) for i in (1, 2) for at in ("", "(L,t)", "(0,t)")]
-    rates = {jet("phi", i, 0, at): jet("phi", i, 0, at) + damping * jet("phi", i, 1, at) for i, at in places}
+    E = symbol("E")
     arm, tip, hub = (
-        {s: sp.expand(f).coeff(E, 0) + E * sp.expand(f).coeff(E, 1).subs(rates, simultaneous=True)
-         for s, f in solved.items()}
-        for solved in solved_motion()
+        {s: sp.expand(f).subs({E * p: E * (p + damping * jet(of, i, j + 1, at)) for p, of, i, j, at in jets(f) if i})
+         for s, f in accelerations(place).items()}
+        for place in ("", AT_TIP, AT_ROOT)
     )  # fmt: skip
     inside, outside = integral_parts(d_dt(energy_of))
     outside = sp.expand(sp.expand(outside.subs(tip)).subs(hub))
@@ -134,11 +134,9 @@ def is_derivative(text: str) -> str:
 
 def is_substituted(text: str) -> str:
     """(17): (16) with the accelerations of (1)-(3)."""
-    value, _ = claimed(text)
-    arm, _, hub = solved_motion()
     inside, outside = integral_parts(claimed(RATE)[0])
-    there, beyond = integral_parts(value)
-    return remainder(inside.subs(arm) - there, outside.subs(hub) - beyond)
+    there, beyond = integral_parts(claimed(text)[0])
+    return remainder(inside.subs(accelerations()) - there, outside.subs(accelerations(AT_ROOT)) - beyond)
 
 
 def is_power(text: str) -> str:
@@ -237,17 +235,15 @@ def is_unit_of_damping(text: str) -> str:
 def are_units(text: str) -> str:
     """Every sum in (1), (2), (4), (5) and (A.2) with the units of the text."""
     given = {name: unit_dimension(of) for name, of in (clause.split(": ") for clause in clauses(text))}
-    found = [
-        unlike(formula, PAPER_UNITS | given) for formula in (*(TIME[n] for n in (1, 2, 4, 5)), formula_of("(A.2)"))
-    ]
-    return "; ".join(each for each in found if each != "0") or "0"
+    formulas = (*(TIME[n] for n in (1, 2, 4, 5)), formula_of("(A.2)"))
+    return listed(mismatch(difference(formula), PAPER_UNITS | given) for formula in formulas)
 
 
 def is_given(name: str, text: str) -> str:
     """Whether a parameter that (2), (3) and the a_ij need has a value of the right dimension."""
     for clause in (clause for clause in clauses(text) if clause.startswith(f"{name} = ")):
         _, value, dimension = quantity(clause)
-        return "0" if value > 0 and dimension == unit_dimension(NEEDED[name]) else f"{name} in {spelled(dimension)}"
+        return "0" if value > 0 and dimension == PAPER_UNITS[name] else f"{name} in {spelled(dimension)}"
     return f"{name} has no value"
 
 

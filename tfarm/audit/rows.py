@@ -24,14 +24,9 @@ DATA = tomllib.loads((files("tfarm.audit") / "claims.toml").read_text("utf-8"))
 TEXTS: dict[str, dict[str, str]] = {each["equation"]: each for each in DATA["claim"]}  # in the order of the paper
 
 
-def printed(equation: str) -> str:
-    """The formula of an equation as the paper prints it."""
-    return TEXTS[equation]["printed"]
-
-
 def formula_of(equation: str) -> str:
     """The formula that passes the check of its equation: as corrected, or as printed."""
-    return TEXTS[equation].get("corrected") or printed(equation)
+    return TEXTS[equation].get("corrected") or TEXTS[equation]["printed"]
 
 
 def tex(text: str) -> str:

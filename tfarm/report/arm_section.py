@@ -221,7 +221,7 @@ def candidate_blocks(study: Study, kind: str, label: str) -> Iterator[Picture | 
 )  # fmt: skip
 def draw_candidates(study: Study, label: str, omega: Real, *, ax: Axes) -> None:
     """Natural frequencies over the candidates of an assumed parameter, both axes logarithmic; the arm's own filled."""
-    values = [row.depth or row.hub_inertia for row in study.candidates]
+    values = np.array([row.depth or row.hub_inertia for row in study.candidates], dtype=float)
     own = [row.is_own for row in study.candidates].index(True)
     ax.axvline(values[own], color=GREY, lw=1.0, ls=(0, (4, 3)))
     for number, (colour, of_mode) in enumerate(zip(COLOURS, omega.T, strict=False), 1):
