@@ -93,7 +93,9 @@ def _read(text: str, jet_of: Callable[[re.Match[str]], Expression], integral: An
 
 
 def tex(text: str) -> str:
-    """The TeX of a text by SymPy, in the text's own order; derivatives are indices, as in the text."""
+    """The TeX of a statement, or of a formula by SymPy, in its own order; derivatives are indices, as in the text."""
+    if text in DATA["tex"]:
+        return str(DATA["tex"][text])
 
     def written(part: str) -> str:
         if part.startswith("|"):

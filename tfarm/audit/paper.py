@@ -18,6 +18,7 @@ import sympy as sp
 from scipy.linalg import expm
 
 from tfarm.arm import HubFeedback, load
+from tfarm.errors import CertificationError
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.reduced import modal_model
 from tfarm.schema import Quantity
@@ -44,10 +45,11 @@ from .formulas import (
     spelled,
     symbol,
     symbols,
+    tex,
     unbalanced,
     unit_dimension,
 )
-from .rows import TEXTS, AuditRow, Claim, formula_of
+from .rows import TEXTS, AuditRow, formula_of, is_zero
 
 # ------------------------------------------------------------ (15)-(20) and the feedback
 K1 = 0.3  # N m s/rad
@@ -347,6 +349,41 @@ MEASURED = {
     "(18)-(20): constant gains, varied by the tuner": pumped_text,
     "Table 1 (rho)": density_in_numbers,
 }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Claim:
+    """A statement about an equation.
+
+    `check` gives the residual of a text, "0" or a number below RESIDUAL_NOISE if it is right.
+    """
+
+    equation: str
+    printed: str
+    check: Callable[[str], str]
+    evidence: str
+    corrected: str = ""  # empty: the print is right
+    doubt: str = ""  # what cannot be decided
+    measured: Callable[[], str] = str  # numbers that go with the evidence
+
+    def row(self) -> AuditRow:
+        """Run the check on both texts.  Raises CertificationError where the corrected one leaves a residual."""
+        corrected = self.corrected or self.printed
+        residual_printed = self.check(self.printed)
+        residual_corrected = self.check(corrected) if self.corrected else residual_printed
+        if not is_zero(residual_corrected):
+            raise CertificationError(f"{self.equation}, as corrected, leaves {residual_corrected}")
+        return AuditRow(
+            equation=self.equation,
+            verdict="undecided" if self.doubt else "ok" if is_zero(residual_printed) else "corrected",
+            printed=self.printed,
+            corrected=corrected,
+            evidence=" ".join(part for part in (self.evidence, self.doubt, self.measured()) if part),
+            residual_printed=residual_printed,
+            residual_corrected=residual_corrected,
+            printed_tex=tex(self.printed),
+            corrected_tex=tex(corrected),
+        )
 
 
 def claims() -> tuple[Claim, ...]:
