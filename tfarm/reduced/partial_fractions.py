@@ -41,10 +41,9 @@ class PartialFractions:
     (outputs, n, 2) belong to them.  `index` (n,) numbers the arm's own flexible modes from 1, and is 0 for a pole in
     place of omitted modes; `natural_frequency` (n,) is undamped [rad/s].  `rigid` (outputs, 2) and `static` (outputs,)
     make the model exact at s -> 0.  `participation` (n,) is that of the input in each pair: |b| at C = 0, for a locked
-    hub the root moment of the mode.  `relaxation` (outputs,) is E of E/(1 + C s), in place of the omitted bending modes
-    at C > 0 (see `relaxed_model`); None without.  `single` (m,) [1/s] are real poles of a rig that belong to no
-    flexible mode, with `single_residues` (outputs, m): about -b/J of a hub with friction (then rigid[:,0] is 0) and
-    -R/L_a of a motor's circuit.
+    hub the root moment of the mode.  `single` (m,) [1/s] are real poles that belong to no flexible mode, with
+    `single_residues` (outputs, m): about -b/J of a hub with friction (then rigid[:,0] is 0), -R/L_a of a motor's
+    circuit, and last, where the model `relaxes`, -1/C in place of the omitted bending modes (see `relaxed_model`).
     """
 
     arm: Arm
@@ -57,9 +56,9 @@ class PartialFractions:
     rigid: Real
     static: Real
     participation: Real
-    relaxation: Real | None = None
     single: Real
     single_residues: Real
+    relaxes: bool = False
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -78,8 +77,8 @@ class PartialFractions:
 
     @property
     def order(self) -> int:
-        """The number of states: two a mode, those of the rigid body, one a single pole, one for a relaxation."""
-        return 2 * self.index.size + self.rigid_states + self.single.size + (self.relaxation is not None)
+        """The number of states: two a mode, those of the rigid body, and one a single pole."""
+        return 2 * self.index.size + self.rigid_states + self.single.size
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -88,8 +87,8 @@ class PartialFractions:
         tails = iter(range(1, self.index.size + 1))
         names = [f"mode{k}" if k else f"tail{next(tails)}" for k in self.index]
         pairs = tuple(f"{name}_{part}" for name in names for part in ("position", "rate"))
-        alone = tuple(f"single{i}" for i in range(1, self.single.size + 1))
-        return rigid + pairs + alone + (("relaxation",) if self.relaxation is not None else ())
+        alone = tuple(f"single{i}" for i in range(1, self.single.size + 1 - self.relaxes))
+        return rigid + pairs + alone + ("relaxation",) * self.relaxes
 
     @property
     def input(self) -> str:
@@ -130,10 +129,7 @@ class PartialFractions:
         total = part(s) * (n1 @ share) + n0 @ share + part(self.static)[:, None]
         if self.has_rigid_states:
             total = total + part(self.rigid[:, :1] / (s * s)) + part(self.rigid[:, 1:] / s)
-        total = total + part(self.single_residues) @ part(1 / (s - self.single[:, None]))
-        if self.relaxation is not None:
-            total = total + part(self.relaxation[:, None] / (1 + self.arm.damping * s))
-        return total
+        return total + part(self.single_residues) @ part(1 / (s - self.single[:, None]))
 
     def matrices(self) -> Matrices:
         """Return A, B, C, D of x' = A x + B u, y = C x + D u: arrays (n, n), (n, 1), (outputs, n), (outputs, 1).
@@ -146,13 +142,14 @@ class PartialFractions:
         b = np.where(self.participation > 0, self.participation, 1.0)
         n1, n0 = self.numerators
         pairs = np.array([[0 * w, w], [-w, self.eigenvalues.sum(axis=1).real]]).transpose(2, 0, 1)
-        slow = np.empty(0) if self.relaxation is None else np.array([1 / self.arm.damping])
+        alone = np.ones(self.single.size)
+        if self.relaxes:
+            alone[-1] = -self.single[-1]
         J = self.arm.total_inertia
-        A = block_diag(np.eye(first, k=1), *pairs, np.diag(self.single), np.diag(-slow))
-        B = np.r_[np.zeros(first)[1:], np.ones(first)[:1] / J, np.c_[0 * b, b].ravel(), np.ones(self.single.size), slow]
+        A = block_diag(np.eye(first, k=1), *pairs, np.diag(self.single))
+        B = np.r_[np.zeros(first)[1:], np.ones(first)[:1] / J, np.c_[0 * b, b].ravel(), alone]
         of_pairs = np.stack([n0 / (w * b), n1 / b], axis=-1).reshape(len(n0), -1)
-        of_slow = np.empty((len(n0), 0)) if self.relaxation is None else self.relaxation[:, None]
-        C = np.hstack([self.rigid[:, 2 - first :] * J, of_pairs, self.single_residues, of_slow])
+        C = np.hstack([self.rigid[:, 2 - first :] * J, of_pairs, self.single_residues / alone])
         return A, B[:, None], C, self.static[:, None].copy()
 
     def first(self, count: int) -> PartialFractions:
@@ -168,6 +165,18 @@ class PartialFractions:
             residues=self.residues[:, kept],
             static=self.static - (self.residues[:, beyond] / self.eigenvalues[beyond]).real.sum(axis=(1, 2)),
             participation=self.participation[kept],
+        )
+
+    def with_pairs(self, p: Real | Complex, residues: Real | Complex, static: Real, share: Real) -> PartialFractions:
+        """Return the model with more pairs of poles (n, 2), the tails, and their share of the input (n,)."""
+        return replace(
+            self,
+            index=np.r_[self.index, np.zeros(len(p), np.int64)],
+            natural_frequency=np.r_[self.natural_frequency, np.sqrt(abs(p.prod(axis=1)))],
+            eigenvalues=np.r_[self.eigenvalues, p],
+            residues=np.concatenate([self.residues, residues], axis=1),
+            static=static,
+            participation=np.r_[self.participation, share],
         )
 
     def closed(self, gains: ArrayLike) -> Matrices:

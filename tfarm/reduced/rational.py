@@ -12,7 +12,7 @@ and with a positive residue of the hub angle are used.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
@@ -195,17 +195,6 @@ def _assembled(inside: PartialFractions, rest: _Remainders, poles: Real, shares:
     ends = np.stack([s, s.conj()], axis=1)
     static = inside.static + (added / ends).real.sum(axis=(1, 2))
     strict = rest.by_S & (power[:, 0] < 2)  # the poles above replace the static remainder
-    return PartialFractions(
-        arm=inside.arm,
-        rows=inside.rows[1:],
-        x=inside.x,
-        index=np.r_[inside.index, np.zeros(poles.size, dtype=np.int64)],
-        natural_frequency=np.r_[inside.natural_frequency, poles],
-        eigenvalues=np.concatenate([inside.eigenvalues, ends]),
-        residues=np.concatenate([inside.residues, added], axis=1)[1:],
-        rigid=inside.rigid[1:],
-        static=np.where(strict, 0.0, static)[1:],
-        participation=np.r_[inside.participation, np.sqrt(abs(in_S[0]))],
-        single=inside.single,
-        single_residues=inside.single_residues[1:],
-    )
+    model = inside.with_pairs(ends, added, np.where(strict, 0.0, static), np.sqrt(abs(in_S[0])))
+    own = {name: getattr(model, name)[1:] for name in ("rows", "residues", "rigid", "static", "single_residues")}
+    return replace(model, **own)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -115,9 +115,7 @@ class ReducedModel:
     @property
     def poles(self) -> Annotated[Complex, Quantity("s", "1/s", 10, "poles of the model", key="poles")]:
         """The poles of the model with Im s >= 0 and their mirror images."""
-        model = self.model
-        slow = [-1 / model.arm.damping] if model.relaxation is not None else []
-        return np.r_[model.eigenvalues.ravel(), model.single, slow].astype(complex)
+        return np.r_[self.model.eigenvalues.ravel(), self.model.single].astype(complex)
 
     @property
     def x(self) -> Annotated[float | None, Quantity(help="place of outputs along the arm [m]")]:
@@ -279,15 +277,13 @@ class _Bench:
 
     def _few_poles(self, error: float) -> ReducedModel | None:
         """Return the smallest model by AAA within an error, or None."""
-        if not self.by_aaa:
-            return None
-        for pairs in range(self.inside + 1, min(self.inside + MOST_TAILS, self.most) + 1):
-            model = rational_model(self.arm, self.rows, pairs, self.band[1], self.x)
-            if self.ruler.rough(model) <= error:
-                measured = self._measured(model, "aaa", "")
-                if measured.worst_error <= error:
-                    return measured
-        return None
+        sizes = range(self.inside + 1, min(self.inside + MOST_TAILS, self.most) + 1) if self.by_aaa else ()
+        models = (rational_model(self.arm, self.rows, pairs, self.band[1], self.x) for pairs in sizes)
+        return self._first_within(error, models, "aaa")
+
+    def _first_within(self, error: float, models: Iterable[PartialFractions], method: Reduction) -> ReducedModel | None:
+        measured = (self._measured(model, method, "") for model in models if self.ruler.rough(model) <= error)
+        return next((each for each in measured if each.worst_error <= error), None)
 
     def _few_modes(self, error: float, make: Callable[..., PartialFractions], most: int) -> ReducedModel | None:
         """Return the smallest model of up to `most` modes within an error, or None.  By bisection, as errors fall."""
@@ -308,11 +304,8 @@ class _Bench:
         while good - bad > 1:
             middle = (good + bad) // 2
             good, bad = (middle, bad) if rough(middle) <= error else (good, middle)
-        for count in range(good, min(good + COUNTS_TRIED, most + 1)):
-            measured = self._measured(make(self.arm, self.rows, count, self.x), "modal", "")
-            if measured.worst_error <= error:
-                return measured
-        return None
+        counts = range(good, min(good + COUNTS_TRIED, most + 1))
+        return self._first_within(error, (make(self.arm, self.rows, count, self.x) for count in counts), "modal")
 
     def _measured(self, model: PartialFractions, method: Reduction, note: str) -> ReducedModel:
         return ReducedModel(model, method, self.band, *self.ruler.measure(model), *first_mode_lacking(model), note)
