@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import sympy as sp
@@ -56,35 +56,30 @@ K1 = 0.3  # N m s/rad
 MODES = 8  # of the arm whose gain is switched
 
 
-def pumped(*switched: tuple[float, float]) -> float:
-    """Growth per period of the loop (19) on the default arm when K2 is switched: each value with its duration [s]."""
+SWITCHED = ((0.1, 27.0), (0.6, 25.0))  # K2, and for how long [ms]
+
+
+def pumped(switched: tuple[tuple[float, float], ...]) -> float:
+    """Growth per period of the loop (19) on the default arm when K2 is switched: each value with its duration [ms]."""
     model = modal_model(load("sasaki2012"), ["hub_rate", "root_moment"], MODES)
     period = np.eye(model.order)
     for K2, duration in switched:
-        period = expm(model.closed([K1, K2])[0] * duration) @ period
+        period = expm(model.closed([K1, K2])[0] * duration / 1e3) @ period
     return float(abs(np.linalg.eigvals(period)).max())
 
 
-def growth_text() -> str:
-    """The sharpness of K2 < 1 in numbers."""
+def growth() -> dict[str, Any]:
+    """The sharpness of K2 < 1 in numbers: a root within and one beyond."""
     laws = (HubFeedback(K1=K1, K2=K2) for K2 in (0.5, 1.1))
     roots = (closed_loop_poles(load("sasaki2012"), law, 3).values[-1] for law in laws)
-    within, beyond = (f"{s.real:.4f} + {s.imag:.4f}j" for s in roots)
-    return (
-        f"Default arm, K1 = {K1}: a root at s = {within} 1/s for K2 = 0.5, at {beyond} 1/s for K2 = 1.1 (closed-loop "
-        "poles)."
-    )
+    return {"K1": K1, **dict(zip(("within", "beyond"), roots, strict=True))}
 
 
-def pumped_text() -> str:
+def pumping() -> dict[str, Any]:
     """A gain that varies between two stable values and drives the arm unstable."""
-    low, high = (0.1, 0.027), (0.6, 0.025)
-    constant = max(pumped(low), pumped(high))
-    return (
-        f"Counterexample: default arm, K1 = {K1}, {MODES} modes, continuous time: K2 = {low[0]} for "
-        f"{1e3 * low[1]:.0f} ms and {high[0]} for {1e3 * high[1]:.0f} ms grows by {pumped(low, high):.3f} a "
-        f"period, either gain alone by {constant:.6f}, which is the angle at rest."
-    )
+    low, high = SWITCHED
+    constant = max(pumped((each,)) for each in SWITCHED)
+    return {"K1": K1, "modes": MODES, "low": low, "high": high, "grows": pumped(SWITCHED), "constant": constant}
 
 
 V_PRINTED = TEXTS["(15)"]["printed"]
@@ -260,16 +255,11 @@ def is_section(text: str) -> str:
     return f"{off:.2g}" if off > 1e-12 else "0"  # doubles read from decimals
 
 
-def density_in_numbers() -> str:
+def density() -> dict[str, Any]:
     """What the density printed would mean."""
     printed, used = (modes(load(name), 3).natural_frequency[1:] for name in ("sasaki2012-as-printed", "sasaki2012"))
-    ratios = ", ".join(f"{ratio:.1f}" for ratio in printed / used)
     speeds = [math.sqrt(PRINTED_E / rho) / 1e3 for rho in (2.7667, 2766.7)]
-    return (
-        f"E/(2 G) - 1 = {PRINTED_E / (2 * PRINTED_G) - 1:.4f}, Poisson's ratio of aluminium. As printed, sound would "
-        f"run along the arm at {speeds[0]:.0f} km/s (corrected: {speeds[1]:.2f}; diamond: about 18), and the first "
-        f"natural frequencies would be {ratios} times as high (hub inertia 0.1 kg m^2)."
-    )
+    return {"poisson": PRINTED_E / (2 * PRINTED_G) - 1, "speeds": speeds, "ratios": printed / used}
 
 
 INCREMENT = formula_of("(21)")
@@ -305,13 +295,11 @@ def is_cost(text: str) -> str:
 
 def are_gain_units(text: str) -> str:
     """(20), (23): each gain's dimension by its equation; one name cannot have two."""
-    x, theta_t = symbol("x"), jet("theta", t=1)
     needs: dict[str, set[Expression]] = {}
-    places = {jet("V", t=1): (theta_t**2, unit_dimension("N m s")), symbol("e"): (x, unit_dimension("1"))}
-    for left, right in sides(text).items():
-        factor, dimension = places[left]
-        for name in (s.name for s in right.coeff(factor).free_symbols if s.name.startswith("K")):
-            needs.setdefault(name, {PAPER_UNITS[name]} if name in PAPER_UNITS else set()).add(dimension)
+    for left, factor, unit in ((jet("V", t=1), theta_t**2, "N m s"), (symbol("e"), symbol("x"), "1")):
+        of = unit_dimension(unit)
+        for name in (s.name for s in sides(text)[left].coeff(factor).free_symbols if s.name.startswith("K")):
+            needs.setdefault(name, {PAPER_UNITS.get(name, of)}).add(of)
     clashes = [f"{name}: {' and '.join(sorted(map(spelled, two)))}" for name, two in needs.items() if len(two) > 1]
     return "; ".join(clashes) or "0"
 
@@ -345,9 +333,9 @@ CHECKS: dict[str, Callable[[str], str]] = {
     "Table 1 (I_h)": partial(is_given, "I_h"),
 }
 MEASURED = {
-    "(19)": growth_text,
-    "(18)-(20): constant gains, varied by the tuner": pumped_text,
-    "Table 1 (rho)": density_in_numbers,
+    "(19)": growth,
+    "(18)-(20): constant gains, varied by the tuner": pumping,
+    "Table 1 (rho)": density,
 }
 
 
@@ -364,7 +352,7 @@ class Claim:
     evidence: str
     corrected: str = ""  # empty: the print is right
     doubt: str = ""  # what cannot be decided
-    measured: Callable[[], str] = str  # numbers that go with the evidence
+    measured: Callable[[], dict[str, Any]] = dict  # numbers that the evidence has
 
     def row(self) -> AuditRow:
         """Run the check on both texts.  Raises CertificationError where the corrected one leaves a residual."""
@@ -378,7 +366,7 @@ class Claim:
             verdict="undecided" if self.doubt else "ok" if is_zero(residual_printed) else "corrected",
             printed=self.printed,
             corrected=corrected,
-            evidence=" ".join(part for part in (self.evidence, self.doubt, self.measured()) if part),
+            evidence=f"{self.evidence.format(**self.measured())} {self.doubt}".strip(),
             residual_printed=residual_printed,
             residual_corrected=residual_corrected,
             printed_tex=tex(self.printed),
@@ -388,7 +376,7 @@ class Claim:
 
 def claims() -> tuple[Claim, ...]:
     """Every claim, in the order of the paper."""
-    return tuple(Claim(**texts, check=CHECKS[name], measured=MEASURED.get(name, str)) for name, texts in TEXTS.items())
+    return tuple(Claim(**texts, check=CHECKS[name], measured=MEASURED.get(name, dict)) for name, texts in TEXTS.items())
 
 
 @cache

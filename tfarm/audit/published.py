@@ -66,7 +66,6 @@ def arm_of_case(case: Mapping[str, Any]) -> Arm:
 
 def _source(table: dict[str, Any]) -> Source:
     """The source of a table, whose theory and quantity are those of its cases but where these have others."""
-    own = {key: table.pop(key) for key in ("key", "citation", "reached")}
     cases = tuple(
         Case(
             arm=arm_of_case(case),
@@ -76,7 +75,7 @@ def _source(table: dict[str, Any]) -> Source:
         )
         for case in (table | each for each in table["case"])
     )
-    return Source(cases=cases, **own)
+    return Source(cases=cases, **{key: table[key] for key in ("key", "citation", "reached")})
 
 
 ALL = tuple(map(_source, tomllib.loads((files("tfarm.audit") / "literature.toml").read_text("utf-8"))["source"]))
