@@ -159,9 +159,8 @@ def are_proven_gains(text: str) -> str:
         low, name, high = clause.split(" < ")
         allowed = sp.Interval.open(parsed(low), parsed(high))
         sets = {"allowed, not proven": allowed - proven[name], "proven, not allowed": proven[name] - allowed}
-        for what, rest in ((what, rest) for what, rest in sets.items() if rest is not sp.S.EmptySet):
-            ends = "(" if rest.left_open else "[", ")" if rest.right_open else "]"
-            wrong.append(f"{what}: {name} in {ends[0]}{rest.start}, {rest.end}{ends[1]}")
+        left = {what: rest for what, rest in sets.items() if rest is not sp.S.EmptySet}
+        wrong += [f"{what}: {name} in {sp.pretty(rest, use_unicode=False)}" for what, rest in left.items()]
     return "; ".join(wrong) or "0"
 
 
@@ -200,11 +199,6 @@ PAPER = (
     "Self-Tuning Vibration Control of a Rotational Flexible Timoshenko Arm Using Neural Networks, "
     "Advances in Acoustics and Vibration, 2012, article 852780"
 )
-
-
-def statements_beyond_the_first(text: str) -> str:
-    """How many statements follow the first."""
-    return str(len(clauses(text)) - 1)
 
 
 def quantity(clause: str) -> tuple[str, float, Expression]:
@@ -304,9 +298,9 @@ def are_gain_units(text: str) -> str:
     return "; ".join(clashes) or "0"
 
 
-def signals_beyond_the_neurons(text: str) -> str:
-    """How many signals are named beyond the neurons of the input layer."""
-    return str(len(text.split(", ")) - INPUT_NEURONS)
+def beyond(known: int, separator: str, text: str) -> str:
+    """How many statements, signals of section 5 or the like are in a text beyond those known."""
+    return str(len(text.split(separator)) - known)
 
 
 CHECKS: dict[str, Callable[[str], str]] = {
@@ -323,9 +317,9 @@ CHECKS: dict[str, Callable[[str], str]] = {
     "(22)": lambda text: descends(INCREMENT, text),
     "(23)": is_cost,
     "(20), (23): K": are_gain_units,
-    "section 5: inputs": signals_beyond_the_neurons,
-    "section 5: alpha_c": statements_beyond_the_first,
-    "section 5: eta_c": statements_beyond_the_first,
+    "section 5: inputs": partial(beyond, INPUT_NEURONS, ", "),
+    "section 5: alpha_c": partial(beyond, 1, ";"),
+    "section 5: eta_c": partial(beyond, 1, ";"),
     "Table 1 (rho)": is_aluminium,
     "Table 1 (C's unit)": is_unit_of_damping,
     "Table 1 (other units)": are_units,

@@ -299,16 +299,15 @@ def sensed_model(arm: Arm, signals: Sequence[str], count: int) -> Matrices:
     Raises ParameterError for an unknown or improper signal and a count out of range.
     """
     read = Signals(arm, tuple(signals))
-    extra = [] if arm.is_locked else ["hub_angle"]  # so that every model has the states of the rigid body
+    extra = [] if arm.is_locked else [OUTPUTS["hub_angle"]]  # so that every model has the states of the rigid body
     rows: dict[int, Real] = {}  # of C and D side by side
-    A, B = np.empty((0, 0)), np.empty((0, 1))
     for share in dict.fromkeys(read.places):
         mine = [n for n, place in enumerate(read.places) if place == share]
-        wanted = [read.outputs[n] for n in mine]
-        along = any(each.place == "x" for each in wanted)
-        A, B, C, D = modal_model(arm, [*extra, *wanted], count, share * arm.length if along else None).matrices()
+        wanted = [*extra, *(read.outputs[n] for n in mine)]
+        x = share * arm.length if any(each.place == "x" for each in wanted) else None
+        A, B, C, D = modal_model(arm, wanted, count, x).matrices()
         rows |= zip(mine, np.hstack([C, D])[len(extra) :], strict=True)
-    both = np.array([rows[n] for n in range(len(read.names))])
+    both = np.array([rows[n] for n in range(len(rows))])
     return A, B, both[:, :-1], both[:, -1:]
 
 

@@ -125,8 +125,7 @@ def _best_poles(rest: _Remainders, most: int) -> tuple[Real, Real, float]:
     best = np.empty(0), np.empty((len(rest.F), 0))
     least, idle = float((abs(rest.F) * rest.weight).max()), 0
     for square in aaa_poles(rest.S, rest.F, rest.weight, most):
-        square, shares = _checked(rest, square[square > rest.beyond**2])
-        error = float((abs(shares @ _basis(rest, square).T - rest.F) * rest.weight).max())
+        square, shares, error = _checked(rest, square[square > rest.beyond**2])
         idle += 1
         if error < least:
             best, least, idle = (np.sqrt(square), shares), error, 0
@@ -135,26 +134,22 @@ def _best_poles(rest: _Remainders, most: int) -> tuple[Real, Real, float]:
     return *best, least
 
 
-def _checked(rest: _Remainders, square: Real) -> tuple[Real, Real]:
-    """Return the poles with the right sign of their residue in the hub's output, and their shares (outputs, poles).
+def _checked(rest: _Remainders, square: Real) -> tuple[Real, Real, float]:
+    """Return the poles with the right sign of their residue in the hub's output, their shares, and the error.
 
-    Shares are those of weighted least squares for each output.
+    Shares (outputs, poles) are those of weighted least squares for each output.
     """
     sign = 1.0 if rest.by_S[0] else -1.0
     while True:
-        basis, shares = _basis(rest, square), np.empty((len(rest.F), square.size))
+        basis, shares = rest.S[:, None] / (rest.S[:, None] + square), np.empty((len(rest.F), square.size))
         for row, (F, weight) in enumerate(zip(rest.F, rest.weight, strict=True)):
             columns = basis * weight[:, None]
             size = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
             shares[row] = np.linalg.lstsq(columns / size, F * weight)[0] / size
         wrong = np.flatnonzero(sign * shares[0] < 0)
         if not wrong.size:
-            return square, shares
+            return square, shares, float((abs(shares @ basis.T - rest.F) * rest.weight).max())
         square = np.delete(square, wrong[-1])
-
-
-def _basis(rest: _Remainders, square: Real) -> Real:
-    return rest.S[:, None] / (rest.S[:, None] + square)
 
 
 def aaa_poles(S: Real, F: Real, weight: Real, degree: int) -> Iterator[Real]:
