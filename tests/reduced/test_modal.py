@@ -134,7 +134,7 @@ def crossing(arm):
 def test_locked_hub(arm):
     locked = replace(arm, hub=Hub(inertia=math.inf))
     model = modal_model(locked, ("root_moment", "hub_angle"), 10)
-    assert not model.has_rigid_states
+    assert model.rigid_states == 0
     np.testing.assert_allclose(model.participation, abs(tfarm.modes(locked, 10).modal_moment), rtol=1e-10)
     np.testing.assert_allclose(model(3.0j)[1], 1.0, rtol=1e-14)
     with pytest.raises(ParameterError, match="hub_rate"):

@@ -47,8 +47,10 @@ DENSITY = (  # kinetic minus potential energy a length, from w = y + x theta and
 )
 PAYLOAD = "m/2*(y_t(L,t) + L*theta_t)^2 + I_c/2*(phi_t(L,t) + theta_t)^2"
 
-TIME = {n: formula_of(f"({n})") for n in range(1, 8)}
-LAPLACE = {n: formula_of(f"({n})") for n in range(8, 15)}
+
+def equation(number: int) -> Expression:
+    """Left minus right side of one of (1)-(14), as corrected."""
+    return difference(formula_of(f"({number})"))
 
 
 def euler(field: str) -> Expression:
@@ -93,14 +95,14 @@ def transformed(f: Expression) -> Expression:
 
 def is_transform(number: int, text: str) -> str:
     """(8)-(14): against the transform of (1)-(7)."""
-    return remainder(transformed(difference(TIME[number - 7])) - difference(text))
+    return remainder(transformed(equation(number - 7)) - difference(text))
 
 
 @cache
 def accelerations(at: str = "") -> dict[Expression, Expression]:
     """Those of y and phi by (1), (2) along the arm, or by (4), (5) at the tip; of the hub that of theta by (3)."""
     fields, numbers = {"": ("y phi", (1, 2)), AT_TIP: ("y phi", (4, 5)), AT_ROOT: ("theta", (3,))}[at]
-    found = sp.solve([difference(TIME[n]) for n in numbers], [jet(each, t=2, at=at) for each in fields.split()])
+    found = sp.solve([equation(n) for n in numbers], [jet(each, t=2, at=at) for each in fields.split()])
     return dict(found)
 
 
@@ -110,16 +112,12 @@ def places_after_time(text: str) -> str:
 
 
 WAVES = formula_of("(A.1)")
-ENTRIES = formula_of("a_ij")
 BEAM_DIGITS = 50  # of both methods; RESIDUAL_NOISE leaves half of them to rounding
-BEAM_NAMES = ("rho", "A", "L", "E", "I", "kappa", "G", "C", "m", "I_c", "I_h", "s")
+BEAM_NAMES = ["rho", "A", "L", "E", "I", "kappa", "G", "C", "m", "I_c", "I_h", "s"]
 BEAMS = (  # payload and damping, orders of one, so that no term hides; s on and off the axis
-    (1.3, 0.7, 1.1, 2.9, 0.31, 0.83, 1.7, 0.013, 0.37, 0.053, 0.23, 0.9 + 2.3j),
-    (2.1, 0.45, 0.8, 5.3, 0.12, 0.77, 2.2, 0.21, 0.0, 0.11, 0.61, 4.7j),
+    "1.3 0.7 1.1 2.9 0.31 0.83 1.7 0.013 0.37 0.053 0.23 0.9+2.3j",
+    "2.1 0.45 0.8 5.3 0.12 0.77 2.2 0.21 0.0 0.11 0.61 4.7j",
 )
-
-
-DETERMINANTS = formula_of("Delta, Delta k_i")
 STIFFNESS = formula_of("(1)-(14): damping C")
 
 
@@ -132,9 +130,9 @@ def waves_of(text: str) -> dict[str, Expression]:
 def inserted(number: int, waves: dict[str, Expression], stiffness: str = STIFFNESS) -> Expression:
     """An equation (8)-(14) with Y and Phi, and E as it is in the appendix."""
     places = {"": x, "(0,s)": sp.Integer(0), "(L,s)": L}
-    equation = difference(LAPLACE[number]).subs(symbol("E"), parsed(stiffness) / symbol("I"))
-    fields = (each for each in jets(equation) if each[1] in waves)
-    return equation.subs({s: sp.diff(waves[field], x, i).subs(x, places[at]) for s, field, i, _, at in fields})
+    read = equation(number).subs(symbol("E"), parsed(stiffness) / symbol("I"))
+    fields = (each for each in jets(read) if each[1] in waves)
+    return read.subs({s: sp.diff(waves[field], x, i).subs(x, places[at]) for s, field, i, _, at in fields})
 
 
 @cache
@@ -210,7 +208,7 @@ def are_determinants(text: str) -> str:
 def disagreement(text: str) -> str:
     """Largest relative difference of hub angle, tip motion and root moment between the two methods."""
     with mpmath.workdps(BEAM_DIGITS):
-        beams = [{n: mpmath.mpmathify(str(v).strip("()")) for n, v in zip(BEAM_NAMES, b, strict=True)} for b in BEAMS]
+        beams = [dict(zip(BEAM_NAMES, map(mpmath.mpmathify, beam.split()), strict=True)) for beam in BEAMS]
         pairs = (pair for v in beams for pair in zip(by_appendix(text, v), by_transition(v), strict=True))
         return str(mpmath.nstr(max(abs(one / other - 1) for one, other in pairs), 2))
 
@@ -237,8 +235,8 @@ def by_appendix(text: str, v: dict[str, Any]) -> list[Any]:
 
     square = sp.expand((sides(text)[symbol("lambda_")] / symbol("pm")) ** 2)
     values |= {symbol(f"lambda_{i}"): number(sp.sqrt(square.subs(symbol("pm"), sign))) for i, sign in ((1, 1), (2, -1))}
-    values |= {name: number(right) for name, right in sides(ENTRIES).items()}
-    Delta, *Delta_k = map(number, determinants(DETERMINANTS).values())
+    values |= {name: number(right) for name, right in sides(formula_of("a_ij")).items()}
+    Delta, *Delta_k = map(number, determinants(formula_of("Delta, Delta k_i")).values())
     values |= {symbol(f"k{i}"): each / Delta for i, each in enumerate(Delta_k, start=1)}
     Y, Phi = waves_of(text).values()
     Theta = symbol("Theta")
@@ -256,7 +254,7 @@ CHECKS: dict[str, Callable[[str], str]] = {
     "(5)": partial(at_tip, "phi"),
     "(6)": partial(at_clamp, "y"),
     "(7)": partial(at_clamp, "phi"),
-    **{f"({number})": partial(is_transform, number) for number in LAPLACE},
+    **{f"({number})": partial(is_transform, number) for number in range(8, 15)},
     "(3), (10), (18), (19): order of arguments": places_after_time,
     "(1)-(14): damping C": partial(solves, WAVES),
     "(A.1)": solves,

@@ -5,7 +5,7 @@
 
 Clauses are separated by semicolons.  y_xt is a derivative of y at the running x, y_xt(L,t) the same at the tip, and
 each is a symbol of its own (a jet coordinate).  theta, V and the gains do not depend on x, so that theta_x is 0.
-Of the two arguments the one that is a place (0, L, x) is taken as the place, in whatever order they come.
+Of the two arguments the one that is a place (0, L) is taken as the place, in whatever order they come.
 integral(f) is the integral of f over x from 0 to L.
 
 Calculus on jets: total derivatives, and identities between integrals along the arm and values at its ends.
@@ -19,7 +19,7 @@ A dimension is a product of powers of kg, m and s, as SymPy has it; those of the
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import cache
 from typing import Any
 
@@ -28,22 +28,13 @@ import sympy as sp
 from .rows import DATA
 
 Expression = Any  # sympy comes without types
+symbol = sp.Symbol
+symbols: Any = sp.symbols
 OF_TIME = ("theta", "Theta", "V", "K2", "a1")
-JET = re.compile(r"\b(y|phi|theta|Y|Phi|Theta|V|K2|a1)(?:_(x*t*))?(?!\w)(?:\(([0Lxts]), ?([0Lxts])\))?")
+JET = re.compile(r"\b(y|phi|theta|Y|Phi|Theta|V|K2|a1)(?:_(x*t*))?(?!\w)(?:\(([0Lts]), ?([0Lts])\))?")
 NAME = re.compile(r"[A-Za-z]\w*")
 LETTERS = {"pm": r"\pm", "lambda_": r"\lambda", **{f"Delta_k{i}": rf"\Delta k_{{{i}}}" for i in (1, 2, 3, 4)}}
 FUNCTIONS = {"sqrt": sp.sqrt, "exp": sp.exp, "oo": sp.oo}
-
-
-@cache
-def symbol(name: str) -> Expression:
-    """The one symbol of that name."""
-    return sp.Symbol(name)
-
-
-def symbols(names: str) -> list[Expression]:
-    """Several, their names separated by blanks."""
-    return [symbol(name) for name in names.split()]
 
 
 def jet(field: str, x: int = 0, t: int = 0, at: str = "") -> Expression:
@@ -58,8 +49,14 @@ def jets(f: Expression) -> list[tuple[Expression, str, int, int, str]]:
     """(symbol, field, order in x, order in t, place) of each jet in an expression."""
     found = ((s, match.groups(default="")) for s in f.free_symbols if (match := JET.fullmatch(s.name)))
     return [
-        (s, field, orders.count("x"), orders.count("t"), f"({place},{time})" if place else "")
-        for s, (field, orders, place, time) in found
+        (
+            s,
+            field,
+            orders.count("x"),
+            orders.count("t"),
+            f"({','.join(sorted(at))})" if at[0] else "",
+        )  # the place first
+        for s, (field, orders, *at) in found
     ]
 
 
@@ -70,20 +67,16 @@ x, L = symbol("x"), symbol("L")
 def parsed(text: str) -> Expression:
     """The SymPy expression of a text without = or ;."""
 
-    def normal(match: re.Match[str]) -> Expression:
-        field, orders, first, second = match.groups(default="")
-        place, time = (first, second) if first in ("", "0", "L", "x") else (second, first)
-        return jet(field, orders.count("x"), orders.count("t"), f"({place},{time})" if place else "")
-
-    return _read(text, normal, sp.Function("integral"))
+    read = _read(text, sp.Function("integral"))
+    return read.xreplace({s: jet(field, i, j, at) for s, field, i, j, at in jets(read)})
 
 
-def _read(text: str, jet_of: Callable[[re.Match[str]], Expression], integral: Any, **how: Any) -> Expression:
+def _read(text: str, integral: Any, **how: Any) -> Expression:
     names: dict[str, Expression] = {**FUNCTIONS, "integral": integral}
 
     def stand_in(match: re.Match[str]) -> str:
         name = f"jet{len(names)}"
-        names[name] = jet_of(match)
+        names[name] = symbol(match[0])
         return name
 
     code = JET.sub(stand_in, text).replace("^", "**")
@@ -100,7 +93,7 @@ def tex(text: str) -> str:
     def written(part: str) -> str:
         if part.startswith("|"):
             return str(sp.latex(determinant(part), mat_str="vmatrix", mat_delim=""))
-        read = _read(part, lambda match: symbol(match[0]), lambda f: sp.Integral(f, (x, 0, L)), evaluate=False)
+        read = _read(part, lambda f: sp.Integral(f, (x, 0, L)), evaluate=False)
         heads = {s: s.name.partition("(") for s in read.free_symbols}
         names = {
             s: LETTERS.get(s.name, sp.latex(symbol(name)) + place + end) for s, (name, place, end) in heads.items()

@@ -25,7 +25,7 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
 from . import equations
-from .equations import TIME, accelerations
+from .equations import accelerations, equation
 from .formulas import (
     AT_ROOT,
     AT_TIP,
@@ -82,13 +82,10 @@ def pumping() -> dict[str, Any]:
     return {"K1": K1, "modes": MODES, "low": low, "high": high, "grows": pumped(SWITCHED), "constant": constant}
 
 
-V_PRINTED = TEXTS["(15)"]["printed"]
 V = formula_of("(15)")
-RATE = formula_of("(16)")
-POWER_FLOW = formula_of("(18)")
 CONTROL_LAW = formula_of("(19)")
-DECAY = formula_of("(20)")
-a1, a2, a3, u, theta_t = (*symbols("a1 a2 a3 u"), jet("theta", t=1))
+a1, a2, a3, u = symbols("a1 a2 a3 u")
+theta_t = jet("theta", t=1)
 M0 = parsed("E*I*phi_x(0,t)")
 
 
@@ -126,12 +123,12 @@ def is_total_energy(text: str) -> str:
 def is_derivative(text: str) -> str:
     """(16): against d/dt of (15) as printed, before any equation of motion."""
     value, _ = claimed(text)
-    return remainder(*integral_parts(d_dt(energy_of(V_PRINTED)) - value))
+    return remainder(*integral_parts(d_dt(energy_of(TEXTS["(15)"]["printed"])) - value))
 
 
 def is_substituted(text: str) -> str:
     """(17): (16) with the accelerations of (1)-(3)."""
-    inside, outside = integral_parts(claimed(RATE)[0])
+    inside, outside = integral_parts(claimed(formula_of("(16)"))[0])
     there, beyond = integral_parts(claimed(text)[0])
     return remainder(inside.subs(accelerations()) - there, outside.subs(accelerations(AT_ROOT)) - beyond)
 
@@ -145,7 +142,7 @@ def is_power(text: str) -> str:
 def proven_gains(law: Expression) -> dict[str, Expression]:
     """The intervals of K1 and K2 for which some a1, a2 > 0 make the true dV/dt (a3 = a1) a negative square."""
     M, slope = symbol("M(0)"), parsed("phi_x(0,t)")
-    power = sp.expand(claimed(POWER_FLOW)[0].subs(u, law)).subs(slope, M / parsed("E*I"))
+    power = sp.expand(claimed(formula_of("(18)"))[0].subs(u, law)).subs(slope, M / parsed("E*I"))
     weight = sp.solve(power.coeff(M), a1)[0] / a2  # a1/a2, which must be positive
     damping = -sp.expand(power.subs(M, 0)) / (a2 * theta_t**2)
     positive = {"K1": damping, "K2": weight}
@@ -167,7 +164,7 @@ def are_proven_gains(text: str) -> str:
 def is_decay(text: str) -> str:
     """(20): (19) in the true dV/dt."""
     value, stated = claimed(text)
-    weights = stated or claimed(DECAY)[1]
+    weights = stated or claimed(formula_of("(20)"))[1]
     change = rate(energy_of(V)).subs(u, sides(CONTROL_LAW)[u]) - value
     return unbalanced(change.subs(a3, weights[a3]).subs(a1, weights[a1]))
 
@@ -226,8 +223,8 @@ def is_unit_of_damping(text: str) -> str:
 def are_units(text: str) -> str:
     """Every sum in (1), (2), (4), (5) and (A.2) with the units of the text."""
     given = {name: unit_dimension(of) for name, of in (clause.split(": ") for clause in clauses(text))}
-    formulas = (*(TIME[n] for n in (1, 2, 4, 5)), formula_of("(A.2)"))
-    return listed(mismatch(difference(formula), PAPER_UNITS | given) for formula in formulas)
+    formulas = (*map(equation, (1, 2, 4, 5)), difference(formula_of("(A.2)")))
+    return listed(mismatch(formula, PAPER_UNITS | given) for formula in formulas)
 
 
 def is_given(name: str, text: str) -> str:
@@ -256,8 +253,6 @@ def density() -> dict[str, Any]:
     return {"poisson": PRINTED_E / (2 * PRINTED_G) - 1, "speeds": speeds, "ratios": printed / used}
 
 
-INCREMENT = formula_of("(21)")
-UPDATE = formula_of("(22)")
 INPUT_NEURONS = 6  # neurons, section 5
 
 
@@ -313,8 +308,8 @@ CHECKS: dict[str, Callable[[str], str]] = {
     "(20)": is_decay,
     "(18)-(20): damping C > 0": is_damped_decay,
     "(18)-(20): constant gains, varied by the tuner": is_varied_decay,
-    "(21)": lambda text: descends(text, UPDATE),
-    "(22)": lambda text: descends(INCREMENT, text),
+    "(21)": lambda text: descends(text, formula_of("(22)")),
+    "(22)": lambda text: descends(formula_of("(21)"), text),
     "(23)": is_cost,
     "(20), (23): K": are_gain_units,
     "section 5: inputs": partial(beyond, INPUT_NEURONS, ", "),

@@ -175,11 +175,7 @@ class Validation:
     rows: Annotated[
         tuple[PublishedRow, ...], Quantity("published numbers", help="printed and exact value of each number")
     ]
-
-    @property
-    def sources(self) -> Annotated[list[Source], Quantity("sources", help="publications that the numbers are from")]:
-        """The publications."""
-        return [each for each in ALL if any(row.source == each.key for row in self.rows)]
+    sources: Annotated[tuple[Source, ...], Quantity("sources", help="publications that the numbers are from")] = ALL
 
     @property
     def differences(

@@ -68,8 +68,8 @@ RADII_TRIED, RADIUS_FALLS = 9, 3  # circles after the first, each a third of the
 OF_SHAPES = ("theta", "W", "Y", "Phi", "M", "Q")  # quantities of a table of modes
 AT_HUB = (  # moment and shear force of the link at the hub, and the hub's angle
     Output(quantity="M", place="root", unit="N m", label="moment at the root"),
-    Output(quantity="Q", place="root", unit="N", label="shear at the root"),
-    Output(quantity="theta", place="root", unit="rad", label="angle of the hub"),
+    OUTPUTS["root_shear"],
+    OUTPUTS["hub_angle"],
 )
 RADII_AGREE = 1e-11  # of the largest value on the circle: the largest difference of two radii
 
@@ -123,9 +123,8 @@ def contour_residues(k: System, wanted: Sequence[Output], p: Complex, x: float) 
     Raises ConvergenceError where none does: two eigenvalues are one to the last digits.
     """
     apart = abs(p[:, None] - p) + np.where(np.eye(p.size, dtype=bool), np.inf, 0.0)
-    radius = np.minimum(apart.min(axis=1, initial=np.inf), abs(p)) / POLES_AWAY
-    for point in k.singular:
-        radius = np.minimum(radius, abs(p - point) / POLES_AWAY)
+    away = [apart.min(axis=1, initial=np.inf), abs(p), *(abs(p - point) for point in k.singular)]
+    radius = np.min(away, axis=0) / POLES_AWAY
     falls = float(RADIUS_FALLS) ** -np.arange(RADII_TRIED + 1)
     arrow = falls[:, None, None] * radius[:, None] * UNIT_CIRCLE
     values = evaluate_outputs(k, wanted, (p[:, None] + arrow).ravel(), x).reshape(len(wanted), *arrow.shape) * arrow

@@ -66,14 +66,9 @@ class PartialFractions:
         return tuple(wanted.name for wanted in self.rows)
 
     @property
-    def has_rigid_states(self) -> bool:
-        """Whether an output depends on the rigid body; then angle and rate are two of the states."""
-        return bool(self.rigid.any())
-
-    @property
     def rigid_states(self) -> int:
-        """The number of states of the rigid body: two, one with friction at the hub, or none."""
-        return self.has_rigid_states * (1 if self.arm.rate_loss else 2)
+        """The number of states of the rigid body: angle and rate where an output has it, with friction one of them."""
+        return bool(self.rigid.any()) * (1 if self.arm.rate_loss else 2)
 
     @property
     def order(self) -> int:
@@ -94,11 +89,6 @@ class PartialFractions:
     def input(self) -> str:
         """The input of the arm, "hub_angle" [rad] where the hub is locked."""
         return "hub_angle" if self.arm.is_locked else self.arm.input
-
-    @property
-    def stiffness(self) -> Real:
-        """p1 p2 of each mode [1/s^2]: its natural frequency squared at C = 0."""
-        return (self.eigenvalues[:, 0] * self.eigenvalues[:, 1]).real
 
     @property
     def numerators(self) -> tuple[Real, Real]:
@@ -122,12 +112,12 @@ class PartialFractions:
         """Return the sum of all terms (outputs, s) at s (1-D), or with `part` abs that of their magnitudes."""
         p1, p2 = self.eigenvalues.T[:, :, None]
         product = (s - p1) * (s - p2)
-        is_pole = (product == 0).any(axis=0) | (self.has_rigid_states & (s == 0))
+        is_pole = (product == 0).any(axis=0) | ((self.rigid_states > 0) & (s == 0))
         for pole in s[is_pole][:1].tolist():
             require(False, "s", pole, "a pole of the reduced model; move s")
         (n1, n0), share = map(part, self.numerators), part(1 / product)
         total = part(s) * (n1 @ share) + n0 @ share + part(self.static)[:, None]
-        if self.has_rigid_states:
+        if self.rigid_states:
             total = total + part(self.rigid[:, :1] / (s * s)) + part(self.rigid[:, 1:] / s)
         return total + part(self.single_residues) @ part(1 / (s - self.single[:, None]))
 
@@ -138,7 +128,7 @@ class PartialFractions:
         block [[0, w], [-w, -a]]; at C = 0 half the sum of their squares is the mode's energy [J].
         """
         first = self.rigid_states
-        w = np.sqrt(self.stiffness)
+        w = np.sqrt(self.eigenvalues.prod(axis=1).real)
         b = np.where(self.participation > 0, self.participation, 1.0)
         n1, n0 = self.numerators
         pairs = np.array([[0 * w, w], [-w, self.eigenvalues.sum(axis=1).real]]).transpose(2, 0, 1)
@@ -180,15 +170,11 @@ class PartialFractions:
         )
 
     def closed(self, gains: ArrayLike) -> Matrices:
-        """Return A, B, C, D under the law  u = r - gains . y, r the new input; gains are (outputs,) or (n, outputs).
-
-        For n laws every matrix has a leading axis.
-        """
+        """Return A, B, C, D under the law  u = r - gains . y, r the new input; gains are (outputs,)."""
         A, B, C, D = self.matrices()
-        law = np.asarray(gains, dtype=float)
-        share = (1.0 / (1.0 + law @ D[:, 0]))[..., None, None]
-        row = share * (law @ C)[..., None, :]
-        return A - B * row, B * share, C - D * row, D * share
+        row = np.atleast_2d(np.asarray(gains, dtype=float))
+        share = 1 / (1 + row @ D)
+        return A - B @ (share * row @ C), B * share, C - D @ (share * row @ C), D * share
 
     def state_space(self, name: str | None = None) -> control.StateSpace:
         """Return the model as a `control.StateSpace` with named inputs, outputs and states."""
