@@ -53,15 +53,11 @@ def equation(number: int) -> Expression:
     return difference(formula_of(f"({number})"))
 
 
-def euler(field: str) -> Expression:
-    """Left side of the Euler-Lagrange equation of y or phi along the arm."""
-    l, rate, slope = parsed(DENSITY), jet(field, t=1), jet(field, x=1)
-    return d_dt(sp.diff(l, rate)) + d_dx(sp.diff(l, slope)) - sp.diff(l, jet(field))
-
-
 def along_arm(field: str, text: str) -> str:
-    """(1), (2): against the Euler-Lagrange equation."""
-    return remainder(euler(field) - difference(text))
+    """(1), (2): against the Euler-Lagrange equation of y or phi along the arm."""
+    l, rate, slope = parsed(DENSITY), jet(field, t=1), jet(field, x=1)
+    euler = d_dt(sp.diff(l, rate)) + d_dx(sp.diff(l, slope)) - sp.diff(l, jet(field))
+    return remainder(euler - difference(text))
 
 
 def at_tip(field: str, text: str) -> str:
@@ -86,16 +82,11 @@ def at_clamp(field: str, text: str) -> str:
     return remainder(reaction * (solved[0] if solved else free))
 
 
-def transformed(f: Expression) -> Expression:
-    """Laplace transform of a linear expression that starts from rest."""
-    names = {"y": "Y", "phi": "Phi", "theta": "Theta"}
-    images = {s: symbol("s") ** j * jet(names[field], i, 0, at.replace(",t)", ",s)")) for s, field, i, j, at in jets(f)}
-    return f.subs(images | {symbol("u"): symbol("U")}, simultaneous=True)
-
-
 def is_transform(number: int, text: str) -> str:
-    """(8)-(14): against the transform of (1)-(7)."""
-    return remainder(transformed(equation(number - 7)) - difference(text))
+    """(8)-(14): against the Laplace transform of (1)-(7), which are linear, from rest."""
+    f, names = equation(number - 7), {"y": "Y", "phi": "Phi", "theta": "Theta"}
+    images = {s: symbol("s") ** j * jet(names[field], i, 0, at.replace(",t)", ",s)")) for s, field, i, j, at in jets(f)}
+    return remainder(f.subs(images | {symbol("u"): symbol("U")}, simultaneous=True) - difference(text))
 
 
 @cache
@@ -173,17 +164,15 @@ def is_dispersion(text: str) -> str:
     return listed([mismatch(right, PAPER_UNITS), root])
 
 
-def conditions() -> list[Expression]:
-    """(11), (12), (13), (10) with the waves, Theta = Psi(0) by (14): zero, zero, zero, U."""
-    theta = sp.solve(inserted(14, waves_of(WAVES)), symbol("Theta"))[0]
-    rows = [inserted(number, waves_of(WAVES)) for number in (11, 12, 13, 10)]
-    return [sp.expand(row.subs(symbol("Theta"), theta)) for row in rows]
-
-
 def are_entries(text: str) -> str:
-    """a_ij: against the coefficients of k_j in the end conditions, and U against the rest there."""
-    given, left = sides(text), []
-    for i, row in enumerate(conditions(), start=1):
+    """a_ij: against the coefficients of k_j in (11), (12), (13), (10), and U against the rest there.
+
+    Theta is Psi(0) by (14).
+    """
+    given, waves, left = sides(text), waves_of(WAVES), []
+    theta = sp.solve(inserted(14, waves), symbol("Theta"))[0]
+    for i, number in enumerate((11, 12, 13, 10), start=1):
+        row = sp.expand(inserted(number, waves).subs(symbol("Theta"), theta))
         left.append(row.subs(dict.fromkeys(symbols("k1 k2 k3 k4"), 0)) + (symbol("U") if i == 4 else 0))
         for j in (1, 2, 3, 4):
             gap = sp.together(sp.expand(row.coeff(symbol(f"k{j}")) - given[symbol(f"a{i}{j}")]))

@@ -172,13 +172,6 @@ def at_running_point(f: Expression) -> Expression:
     return f.subs({s: jet(field, i, j) for s, field, i, j, at in jets(f) if at == AT_TIP}).subs(L, x)
 
 
-def at_root(f: Expression) -> Expression:
-    """f at x = 0, where y = phi = 0 at all times (6), (7)."""
-    fields = [each for each in jets(f) if each[4] in ("", AT_ROOT) and each[1] in ("y", "phi")]
-    ends = {s: jet(field, i, j, AT_ROOT) if i else sp.Integer(0) for s, field, i, j, _ in fields}
-    return f.subs(ends).subs(x, 0)
-
-
 def unbalanced(f: Expression) -> str:
     """The rest of f = integral(g) + h(tip, root), which should vanish for every motion: "0" if it does.
 
@@ -187,7 +180,9 @@ def unbalanced(f: Expression) -> str:
     """
     inside, outside = integral_parts(f)
     at_length = at_running_point(outside)
-    return remainder(inside + d_dx(at_length), at_root(at_length))
+    fields = [each for each in jets(at_length) if each[4] in ("", AT_ROOT) and each[1] in ("y", "phi")]
+    at_root = {s: jet(field, i, j, AT_ROOT) if i else sp.Integer(0) for s, field, i, j, _ in fields}  # (6), (7)
+    return remainder(inside + d_dx(at_length), at_length.subs(at_root).subs(x, 0))
 
 
 KG, METRE, SECOND = sp.symbols("kg m s", positive=True)  # so that the root of a square is the unit itself

@@ -164,8 +164,7 @@ def computed(case: Case) -> NDArray[np.float64]:
 def agrees(ours: float, printed: str) -> bool:
     """Whether ours lies within half a unit of the last printed digit."""
     number = Decimal(printed)
-    unit = Decimal(1).scaleb(int(number.as_tuple().exponent))
-    return abs(Decimal(ours) - number) <= unit / 2
+    return abs(Decimal(ours) - number) <= Decimal("0.5").scaleb(int(number.as_tuple().exponent))
 
 
 @dataclass(frozen=True)

@@ -79,8 +79,8 @@ class PartialFractions:
     def states(self) -> tuple[str, ...]:
         """Names of the states, in the order of `matrices`."""
         rigid = ("rigid_angle", "rigid_rate")[2 - self.rigid_states :]
-        tails = iter(range(1, self.index.size + 1))
-        names = [f"mode{k}" if k else f"tail{next(tails)}" for k in self.index]
+        tails = np.cumsum(self.index == 0)
+        names = [f"mode{k}" if k else f"tail{n}" for k, n in zip(self.index, tails, strict=True)]
         pairs = tuple(f"{name}_{part}" for name in names for part in ("position", "rate"))
         alone = tuple(f"single{i}" for i in range(1, self.single.size + 1 - self.relaxes))
         return rigid + pairs + alone + ("relaxation",) * self.relaxes
