@@ -17,7 +17,7 @@ import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback, Section
 from tfarm.arrays import Real
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError, require
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
 from tfarm.schema import Quantity
@@ -129,11 +129,11 @@ def assumptions(arm: Arm, count: int) -> Assumptions:
 
     Raises ParameterError for a rig: the paper leaves section and hub of one beam open.
     """
-    if not arm.is_uniform:
-        remedy = "the assumptions studied are the paper's, of one Timoshenko beam on a hub; this is a rig"
-        raise ParameterError(key="arm", value=arm.name, remedy=remedy)
-    law, hub = default_gains(arm), hub_study(arm, count) if has_hub_inertia(arm) else None
-    return Assumptions(arm.name, count, {name: law[name] for name in PLANE}, section_study(arm, count), hub)
+    remedy = "the assumptions studied are the paper's, of one Timoshenko beam on a hub; this is a rig"
+    require(arm.is_uniform, "arm", arm.name, remedy)
+    gains = {name: default_gains(arm)[name] for name in PLANE}
+    hub = hub_study(arm, count) if has_hub_inertia(arm) else None
+    return Assumptions(arm.name, count, gains, section_study(arm, count), hub)
 
 
 def has_hub_inertia(arm: Arm) -> bool:

@@ -70,9 +70,9 @@ def pumped(switched: tuple[tuple[float, float], ...]) -> float:
 
 def growth() -> dict[str, Any]:
     """The sharpness of K2 < 1 in numbers: a root within and one beyond."""
-    laws = (HubFeedback(K1=K1, K2=K2) for K2 in (0.5, 1.1))
-    roots = (closed_loop_poles(load("sasaki2012"), law, 3).values[-1] for law in laws)
-    return {"K1": K1, **dict(zip(("within", "beyond"), roots, strict=True))}
+    arm = load("sasaki2012")
+    within, beyond = (closed_loop_poles(arm, HubFeedback(K1=K1, K2=K2), 3).values[-1] for K2 in (0.5, 1.1))
+    return {"K1": K1, "within": within, "beyond": beyond}
 
 
 def pumping() -> dict[str, Any]:
@@ -122,8 +122,7 @@ def is_total_energy(text: str) -> str:
 
 def is_derivative(text: str) -> str:
     """(16): against d/dt of (15) as printed, before any equation of motion."""
-    value, _ = claimed(text)
-    return remainder(*integral_parts(d_dt(energy_of(TEXTS["(15)"]["printed"])) - value))
+    return remainder(*integral_parts(d_dt(energy_of(TEXTS["(15)"]["printed"])) - claimed(text)[0]))
 
 
 def is_substituted(text: str) -> str:

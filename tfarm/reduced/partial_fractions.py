@@ -229,7 +229,8 @@ class Ruler:
             low, high = self._brackets(error)
             for _ in range(REFINEMENTS):
                 inner = np.linspace(low, high, REFINED_POINTS)
-                found = self._error_at(model, inner, row)
+                found, clear = np.zeros(inner.shape), self._is_clear(inner)
+                found[clear] = _errors(model, inner[clear], *values_and_norm(self.G, inner[clear]))[row]
                 best = np.unravel_index(found.argmax(), found.shape)
                 if found[best] > worst[row]:
                     worst[row], at[row] = found[best], inner[best]
@@ -243,12 +244,6 @@ class Ruler:
         (peaks,) = np.nonzero((error >= padded[:-2]) & (error >= padded[2:]) & (error >= HIGH_PEAK * error.max()))
         peaks = peaks[np.argsort(-error[peaks])][:MOST_PEAKS]
         return self.w[np.maximum(peaks - 1, 0)], self.w[np.minimum(peaks + 1, self.w.size - 1)]
-
-    def _error_at(self, model: PartialFractions, w: Real, row: int) -> Real:
-        """Return the error of one output at w of any shape, zero next to a pole."""
-        errors, clear = np.zeros(w.shape), self._is_clear(w)
-        errors[clear] = _errors(model, w[clear], *values_and_norm(self.G, w[clear]))[row]
-        return errors
 
     def _dips(self, w: Real) -> Real:
         """Return points around the dips of |G| and |G'|, where the norm is small."""

@@ -81,16 +81,18 @@ def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float 
     hub = "root_moment" if arm.is_locked else "hub_rate"
     G = transfer(arm, (hub, *rows), x=x)
     frequencies = frequencies_around(arm, high)
-    found: list[tuple[tuple[float, int], PartialFractions]] = []
+    best = np.inf, 0
     for _ in range(SHARING_ROUNDS):  # first with all poles, then with the used ones
         inside = modal_model(arm, G.rows, exact, x)
         rest = _remainders(G, inside, high, frequencies)
         poles, shares, error = _best_poles(rest, pairs - exact)
-        found.append(((max(error, ERRORS_ALIKE), -exact - poles.size), _assembled(inside, rest, poles, shares)))
+        rank = max(error, ERRORS_ALIKE), -exact - poles.size
+        if rank < best:
+            best, model = rank, _assembled(inside, rest, poles, shares)
         if exact + poles.size == pairs:
             break
         exact = pairs - poles.size
-    return min(found, key=lambda entry: entry[0])[1]
+    return model
 
 
 def _remainders(G: TransferFunction, inside: PartialFractions, high: float, frequencies: Real) -> _Remainders:

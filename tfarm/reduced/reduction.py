@@ -318,7 +318,7 @@ def first_mode_lacking(model: PartialFractions) -> tuple[int, float]:
     return first + 1, float(omega[first])
 
 
-WRITTEN_BY = ": written by tfarm."  # ends the first line of every script
+WRITTEN_BY = ": written by tfarm."  # in the first line of every script
 MAT_POINTS = 1000  # of the exact response in the file, even in ln w
 
 
@@ -336,8 +336,7 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
     text = ""
     with suppress(OSError):  # a file that cannot be read is not ours
         text = script.read_text("utf-8", errors="replace") if script.is_file() else ""
-    first, _, rest = text.partition("\n")
-    is_ours = not os.path.exists(script) or (first.endswith(WRITTEN_BY) and _loads(path) in rest)
+    is_ours = not os.path.exists(script) or (WRITTEN_BY in text and _loads(path) in text)
     remedy = f"{script.name} in that folder is not its script and would be replaced; choose another name"
     require(is_ours, key, str(path), remedy)
     write_file(script, _script(reduced, path).encode(), key=key)
@@ -353,16 +352,12 @@ def _loads(path: Path) -> str:
 
 def _contents(reduced: ReducedModel) -> dict[str, Any]:
     """Return the variables of the MATLAB file."""
-    A, B, C, D = reduced.matrices()
     model = reduced.model
     omega = np.geomspace(*reduced.band, MAT_POINTS)
     omega = omega[distance(omega, frequencies_around(model.arm, reduced.band[1])) > CLEAR_OF_POLES * omega]
     response = transfer(model.arm, model.rows, x=model.x)(1j * omega)
     return {
-        "A": A,
-        "B": B,
-        "C": C,
-        "D": D,
+        **reduced.named_matrices,
         "omega": omega,
         "response": response[:, None, :],
         "input_name": np.array([model.input], dtype=object),
