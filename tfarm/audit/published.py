@@ -6,7 +6,6 @@ printed digit, is what they printed.  One that does not must give a reason (`Cas
 
 from __future__ import annotations
 
-import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,7 +24,7 @@ from tfarm.errors import CertificationError
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
-SLENDERNESS = 100.0  # L/r of the beam of a case that has no other
+DATA = tomllib.loads((files("tfarm.audit") / "literature.toml").read_text("utf-8"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,13 +54,13 @@ class Source:
 
 
 def arm_of_case(case: Mapping[str, Any]) -> Arm:
-    """The arm of a case: a clamped beam of L = rhoA = EI = 1 with the case's own tables in the place of its own."""
-    slenderness = case.get("slenderness", SLENDERNESS)
-    section = {"shape": "general", "area": 1.0, "second_moment": slenderness**-2, "shear_factor": 5 / 6}
-    link = {"length": 1.0, "density": 1.0, "youngs_modulus": slenderness**2, "poissons_ratio": 0.3, "section": section}
+    """The arm of a case: the beam of the file with the case's own tables in the place of its own."""
+    beam = DATA["beam"]
+    slenderness = case.get("slenderness", beam["slenderness"])
+    section = beam["section"] | {"second_moment": slenderness**-2}
+    link = beam["link"] | {"youngs_modulus": slenderness**2, "section": section} | case.get("link", {})
     parts = {key: case[key] for key in ("clamp", "payload", "attachment") if key in case}
-    hub = {"inertia": math.inf} | case.get("hub", {})
-    return arm_of_table({"name": "arm", "link": link | case.get("link", {}), "hub": hub, **parts})
+    return arm_of_table({"name": "arm", "link": link, "hub": beam["hub"] | case.get("hub", {}), **parts})
 
 
 def _source(table: dict[str, Any]) -> Source:
@@ -78,7 +77,7 @@ def _source(table: dict[str, Any]) -> Source:
     return Source(cases=cases, **{key: table[key] for key in ("key", "citation", "reached")})
 
 
-ALL = tuple(map(_source, tomllib.loads((files("tfarm.audit") / "literature.toml").read_text("utf-8"))["source"]))
+ALL = tuple(map(_source, DATA["source"]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

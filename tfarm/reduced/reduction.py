@@ -130,7 +130,7 @@ class ReducedModel:
     @property
     def states(self) -> Annotated[tuple[str, ...], Quantity(help="names of the states")]:
         """Names of the states."""
-        return tuple(self.model.states)
+        return self.model.states
 
     @property
     def named_matrices(self) -> Annotated[dict[str, Real], Quantity(help="matrix of the state space", flat=True)]:
