@@ -163,6 +163,9 @@ def test_a_relaxed_model_is_exact_to_first_order(lab):
     np.testing.assert_allclose(model(1e-6), G.static, rtol=1e-9)
     np.testing.assert_allclose(slope, G.derivative(0.0), rtol=1e-4, atol=1e-9)
     assert (model.order, model.states[-1]) == (9, "relaxation")
+    assert model.matrices()[1][-1, 0] == pytest.approx(
+        1 / lab.damping, rel=1e-15
+    )  # E/(1 + C s) has the state C x' = u - x
     s = np.array([3 + 200j])
     np.testing.assert_allclose(by_matrices(model, s), model(s), rtol=1e-11)
 
