@@ -20,6 +20,7 @@ from tfarm.arrays import Real
 from tfarm.errors import ConvergenceError, require
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
+from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import default_gains
@@ -80,7 +81,8 @@ class Candidate:
     ] = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
+@record
 class Study:
     """Candidates of one assumed parameter, and the limits of every frequency where it is the hub's inertia."""
 
