@@ -134,7 +134,7 @@ def crossing(arm):
 def test_locked_hub(arm):
     locked = replace(arm, hub=Hub(inertia=math.inf))
     model = modal_model(locked, ("root_moment", "hub_angle"), 10)
-    assert not model.has_rigid_states
+    assert model.rigid_states == 0
     np.testing.assert_allclose(model.participation, abs(tfarm.modes(locked, 10).modal_moment), rtol=1e-10)
     np.testing.assert_allclose(model(3.0j)[1], 1.0, rtol=1e-14)
     with pytest.raises(ParameterError, match="hub_rate"):
@@ -163,6 +163,9 @@ def test_a_relaxed_model_is_exact_to_first_order(lab):
     np.testing.assert_allclose(model(1e-6), G.static, rtol=1e-9)
     np.testing.assert_allclose(slope, G.derivative(0.0), rtol=1e-4, atol=1e-9)
     assert (model.order, model.states[-1]) == (9, "relaxation")
+    assert model.matrices()[1][-1, 0] == pytest.approx(
+        1 / lab.damping, rel=1e-15
+    )  # E/(1 + C s) has the state C x' = u - x
     s = np.array([3 + 200j])
     np.testing.assert_allclose(by_matrices(model, s), model(s), rtol=1e-11)
 

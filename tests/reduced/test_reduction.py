@@ -61,17 +61,6 @@ def test_odd_orders_are_for_damped_arms():
     np.testing.assert_allclose(odd.state_space()(s)[:, 0], odd(s), rtol=1e-9)
 
 
-def test_deviation_holds_the_exact_curve(arm):
-    reduced = reduce(arm, ["root_moment", "tip_displacement"], order=10)
-    w = np.geomspace(0.1, 1000, 777)
-    gap = abs(reduced(1j * w) - tfarm.transfer(arm, reduced.outputs)(1j * w))
-    deviation = reduced.deviation(w)
-    assert (gap <= deviation).all()
-    assert deviation.shape == (2, 777)
-    with pytest.raises(ParameterError, match="omega"):
-        reduced.deviation([2000.0])
-
-
 @pytest.mark.parametrize(
     ("given", "key"),
     [

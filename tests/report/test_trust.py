@@ -13,8 +13,8 @@ import tfarm
 from tests.report import written
 from tfarm.arm import to_toml
 from tfarm.audit import claims, published
+from tfarm.audit.formulas import tex
 from tfarm.audit.published import PublishedRow
-from tfarm.audit.rows import tex
 from tfarm.report import response_sections, write, writing
 from tfarm.report import trust as trust_proofs
 from tfarm.report.response_sections import how_proven, modal_table, rounds_to

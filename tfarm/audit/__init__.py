@@ -9,10 +9,10 @@ What needs SymPy is loaded when it is asked for: a report's processes want this 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from .rows import AuditRow, Claim, is_zero
+from .rows import AuditRow, is_zero
 
 if TYPE_CHECKING:
-    from .paper import PAPER, Audit, audit, claims
+    from .paper import PAPER, Audit, Claim, audit, claims
 
 __all__ = ["PAPER", "Audit", "AuditRow", "Claim", "audit", "claims", "is_zero"]
 

@@ -12,11 +12,10 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tfarm.arm import MOMENT_GAIN, PLANE, Arm, Section
+from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback, Section
 from tfarm.arrays import Real
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError, require
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
 from tfarm.records import record
@@ -80,24 +79,12 @@ class Candidate:
     ] = False
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True)
 @record
 class Study:
-    """Frequencies over the candidates of one assumed parameter, a row a candidate.
-
-    `values` (n,) are depths [m] of rectangles of the arm's own area, in the plane of bending, or hub inertias [kg m^2].
-    `natural_frequency` [rad/s] and `sensitivity`, d ln w/d ln of the second moment (area, shear factor and all else
-    held) or of the inertia, are (n, count), flexible modes from the first.  `is_own` marks the arm's own value, or for
-    another shape the rectangle with its area and second moment: only these two and the shear factor enter.  `pinned`
-    and `locked` [rad/s] are the limits of every column for a free pin and for the locked hub; empty of a section.
-    """
+    """Candidates of one assumed parameter, and the limits of every frequency where it is the hub's inertia."""
 
     arm: Arm
-    arms: tuple[Arm, ...]
-    values: Real
-    natural_frequency: Real
-    sensitivity: Real
-    is_own: NDArray[np.bool_]
     held: Annotated[str, Quantity("sensitivity", help="what is kept constant where a frequency is differentiated")]
     locked: Annotated[
         Real,
@@ -115,48 +102,13 @@ class Study:
             "free pin (I_h = 0) [rad/s]", "", 6, "limits of the frequencies for a hub without inertia", "pinned_rad_s"
         ),
     ]
-
-    @property
-    def area(
-        self,
-    ) -> Annotated[
+    area: Annotated[
         float, Quantity("area", "m^2", key="area_m2", help="cross-section of the link, the same for every candidate")
-    ]:
-        """The area of the section."""
-        return self.arm.link.section.area
-
-    @property
-    def shear_factor(
-        self,
-    ) -> Annotated[float, Quantity("shear factor", help="of the arm's own section, kept for every candidate")]:
-        """The shear factor of the section."""
-        return self.arm.link.shear_factor
-
-    @property
-    def candidates(
-        self,
-    ) -> Annotated[
+    ]
+    shear_factor: Annotated[float, Quantity("shear factor", help="of the arm's own section, kept for every candidate")]
+    candidates: Annotated[
         list[Candidate], Quantity("candidates", help="frequencies, sensitivities and stability, a row a candidate")
-    ]:
-        """A row a candidate; the moment has no loop where the hub is locked or a free pin."""
-        law, found = default_gains(self.arm), []
-        for n, (arm, value) in enumerate(zip(self.arms, self.values.tolist(), strict=True)):
-            own: dict[str, Any] = {"depth": value, "width": self.area / value,
-                                   "second_moment": self.area * value**2 / 12}  # fmt: skip
-            if self.pinned.size:
-                own = {"hub_inertia": value}
-            if has_hub_inertia(arm):
-                own["verdict"] = "undecided"
-                with suppress(ConvergenceError):
-                    stable = stability(arm, law)
-                    windows = windows_of(stable, [MOMENT_GAIN])[MOMENT_GAIN]
-                    own["verdict"] = stable.verdict
-                    if windows.around is not None:
-                        end = windows.around[1]
-                        own |= {"K2_below": end, "K2_below_is_edge": windows.end(end) == "edge"}
-            omega, slopes = self.natural_frequency[n].tolist(), self.sensitivity[n].tolist()
-            found.append(Candidate(is_own=bool(self.is_own[n]), natural_frequency=omega, sensitivity=slopes, **own))
-        return found
+    ]
 
 
 @dataclass(frozen=True)
@@ -177,16 +129,11 @@ def assumptions(arm: Arm, count: int) -> Assumptions:
 
     Raises ParameterError for a rig: the paper leaves section and hub of one beam open.
     """
-    if not arm.is_uniform:
-        remedy = "the assumptions studied are the paper's, of one Timoshenko beam on a hub; this is a rig"
-        raise ParameterError(key="arm", value=arm.name, remedy=remedy)
-    law, hub = default_gains(arm), hub_study(arm, count=count) if has_hub_inertia(arm) else None
-    return Assumptions(arm.name, count, {name: law[name] for name in PLANE}, section_study(arm, count=count), hub)
-
-
-def own_depth(arm: Arm) -> float:
-    """sqrt(12 I/A) [m], the depth of the rectangle with the arm's area and second moment."""
-    return math.sqrt(12.0) * arm.link.section.radius_of_gyration
+    remedy = "the assumptions studied are the paper's, of one Timoshenko beam on a hub; this is a rig"
+    require(arm.is_uniform, "arm", arm.name, remedy)
+    gains = {name: default_gains(arm)[name] for name in PLANE}
+    hub = hub_study(arm, count) if has_hub_inertia(arm) else None
+    return Assumptions(arm.name, count, gains, section_study(arm, count), hub)
 
 
 def has_hub_inertia(arm: Arm) -> bool:
@@ -194,60 +141,60 @@ def has_hub_inertia(arm: Arm) -> bool:
     return 0.0 < arm.hub.inertia < math.inf
 
 
-def section_study(arm: Arm, depths: Sequence[float] = (), *, count: int = STUDIED_MODES) -> Study:
-    """The first `count` flexible frequencies over rectangles of the arm's area with these depths [m].
+def section_study(arm: Arm, count: int = STUDIED_MODES) -> Study:
+    """The first `count` flexible frequencies over rectangles of the arm's area.
 
-    Without depths 2 to 60 mm for the paper's area, scaled with the root of the area to two digits, and the arm's own.
-    The shear factor is the arm's own throughout.
+    Depths are 2 to 60 mm for the paper's area, scaled with the root of the area to two digits, and that of the
+    rectangle with the arm's own second moment.  The shear factor is the arm's own throughout.
     """
-    area, own = arm.link.section.area, own_depth(arm)
-    usual = [float(f"{depth * math.sqrt(area / AREA):.2g}") for depth in DEPTHS]
-    values = list(depths) or _with_own(usual, own)
-    sections = [Section.general(area=area, second_moment=area * depth**2 / 12, shear_factor=arm.link.shear_factor)
-                for depth in values]  # fmt: skip
-    arms = [replace(arm, link=replace(arm.link, section=section)) for section in sections]
-    return _study(
-        arm,
-        arms,
-        values,
-        own,
-        count,
-        "second_moment",
-        held=HELD,
-    )
+    section, shear_factor, law = arm.link.section, arm.link.shear_factor, default_gains(arm)
+    own = math.sqrt(12.0) * section.radius_of_gyration
+    rows = []
+    for depth in _with_own([float(f"{each * math.sqrt(section.area / AREA):.2g}") for each in DEPTHS], own):
+        second_moment = section.area * depth**2 / 12
+        other = Section.general(area=section.area, second_moment=second_moment, shear_factor=shear_factor)
+        known = {"depth": depth, "width": section.area / depth, "second_moment": second_moment}
+        candidate = replace(arm, link=replace(arm.link, section=other))
+        rows.append(_candidate(candidate, law, count, "second_moment", is_own=depth == own, **known))
+    return Study(arm, HELD, np.empty(0), np.empty(0), section.area, shear_factor, rows)
 
 
-def hub_study(arm: Arm, inertias: Sequence[float] = (), *, count: int = STUDIED_MODES) -> Study:
-    """The first `count` flexible frequencies over hub inertias [kg m^2] of a hub that has one.
+def hub_study(arm: Arm, count: int = STUDIED_MODES) -> Study:
+    """The first `count` flexible frequencies over inertias of a hub that has one.
 
-    Without inertias 0.01 to 1, moved by whole decades if the arm's own lies outside, and the arm's own.
+    Inertias are 0.01 to 1 kg m^2, moved by whole decades if the arm's own lies outside, and the arm's own.
     """
-    own, values = arm.hub.inertia, list(inertias)
-    if not values:
-        decades = min(0, math.floor(math.log10(own / INERTIAS[0]) + OWN_VALUE))
-        decades += max(0, math.ceil(math.log10(own / INERTIAS[-1]) - OWN_VALUE))
-        values = _with_own([inertia * 10.0**decades for inertia in INERTIAS], own)
-    arms = [arm.having(hub_inertia=inertia) for inertia in values]
+    own, law = arm.hub.inertia, default_gains(arm)
+    decades = min(0, math.floor(math.log10(own / INERTIAS[0]) + OWN_VALUE))
+    decades += max(0, math.ceil(math.log10(own / INERTIAS[-1]) - OWN_VALUE))
+    rows = [
+        _candidate(arm.having(hub_inertia=I), law, count, "hub_inertia", is_own=own == I, hub_inertia=I)
+        for I in _with_own([inertia * 10.0**decades for inertia in INERTIAS], own)
+    ]
     pinned, locked = (
         modes(arm.having(hub_inertia=limit), count).natural_frequency[-count:] for limit in (0.0, math.inf)
     )
     if not arm.having(hub_inertia=1.0).has_rigid_mode:  # the first falls to 0, a heavy hub on the arm's own stiffness
         locked = np.r_[0.0, locked[:-1]]
-    return _study(arm, arms, values, own, count, "hub_inertia", held="all else held", locked=locked, pinned=pinned)
+    return Study(arm, "all else held", locked, pinned, arm.link.section.area, arm.link.shear_factor, rows)
 
 
-def _study(
-    arm: Arm, arms: Sequence[Arm], values: Sequence[float], own: float, count: int, parameter: str, **more: Any
-) -> Study:
-    tables = [modes(each, count) for each in arms]
-    return Study(
-        arm=arm,
-        arms=tuple(arms),
-        values=np.array(values),
-        natural_frequency=np.array([table.natural_frequency[-count:] for table in tables]),
-        sensitivity=np.array([table.sensitivity[parameter][-count:] + 0.0 for table in tables]),
-        is_own=abs(np.array(values) / own - 1) < OWN_VALUE,
-        **{"locked": np.empty(0), "pinned": np.empty(0)} | more,
+def _candidate(arm: Arm, law: HubFeedback, count: int, parameter: str, **known: Any) -> Candidate:
+    """A row of a study; the moment has no loop where the hub is locked or a free pin."""
+    table = modes(arm, count)
+    if has_hub_inertia(arm):
+        known["verdict"] = "undecided"
+        with suppress(ConvergenceError):
+            stable = stability(arm, law)
+            windows = windows_of(stable, [MOMENT_GAIN])[MOMENT_GAIN]
+            known["verdict"] = stable.verdict
+            if windows.around is not None:
+                end = windows.around[1]
+                known |= {"K2_below": end, "K2_below_is_edge": windows.end(end) == "edge"}
+    return Candidate(
+        natural_frequency=table.natural_frequency[-count:].tolist(),
+        sensitivity=(table.sensitivity[parameter][-count:] + 0.0).tolist(),
+        **known,
     )
 
 

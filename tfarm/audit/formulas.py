@@ -5,41 +5,34 @@
 
 Clauses are separated by semicolons.  y_xt is a derivative of y at the running x, y_xt(L,t) the same at the tip, and
 each is a symbol of its own (a jet coordinate).  theta, V and the gains do not depend on x, so that theta_x is 0.
-Of the two arguments the one that is a place (0, L, x) is taken as the place, in whatever order they come.
+Of the two arguments the one that is a place (0, L) is taken as the place, in whatever order they come.
 integral(f) is the integral of f over x from 0 to L.
 
 Calculus on jets: total derivatives, and identities between integrals along the arm and values at its ends.
 
 A small checker of dimensions: every sum must add like to like, every exponential must be of a pure number.
 
-A dimension is a product of powers of kg, m and s, as SymPy has it; those of the paper's symbols are as its
-equations need them.
+A dimension is a product of powers of kg, m and s, as SymPy has it; those of the paper's symbols are in
+`claims.toml`.
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Iterable
 from functools import cache
 from typing import Any
 
 import sympy as sp
 
+from .rows import DATA
+
 Expression = Any  # sympy comes without types
+symbol = sp.Symbol
+symbols: Any = sp.symbols
 OF_TIME = ("theta", "Theta", "V", "K2", "a1")
-JET = re.compile(r"\b(y|phi|theta|Y|Phi|Theta|V|K2|a1)(?:_(x*t*))?(?!\w)(?:\(([0Lxts]), ?([0Lxts])\))?")
+JET = re.compile(r"\b(y|phi|theta|Y|Phi|Theta|V|K2|a1)(?:_(x*t*))?(?!\w)(?:\(([0Lts]), ?([0Lts])\))?")
 NAME = re.compile(r"[A-Za-z]\w*")
 LETTERS = {"pm": r"\pm", "lambda_": r"\lambda", **{f"Delta_k{i}": rf"\Delta k_{{{i}}}" for i in (1, 2, 3, 4)}}
 FUNCTIONS = {"sqrt": sp.sqrt, "exp": sp.exp, "oo": sp.oo}
-
-
-@cache
-def symbol(name: str) -> Expression:
-    """The one symbol of that name."""
-    return sp.Symbol(name)
-
-
-def symbols(names: str) -> list[Expression]:
-    """Several, their names separated by blanks."""
-    return [symbol(name) for name in names.split()]
 
 
 def jet(field: str, x: int = 0, t: int = 0, at: str = "") -> Expression:
@@ -54,8 +47,14 @@ def jets(f: Expression) -> list[tuple[Expression, str, int, int, str]]:
     """(symbol, field, order in x, order in t, place) of each jet in an expression."""
     found = ((s, match.groups(default="")) for s in f.free_symbols if (match := JET.fullmatch(s.name)))
     return [
-        (s, field, orders.count("x"), orders.count("t"), f"({place},{time})" if place else "")
-        for s, (field, orders, place, time) in found
+        (
+            s,
+            field,
+            orders.count("x"),
+            orders.count("t"),
+            f"({','.join(sorted(at))})" if at[0] else "",
+        )  # the place first
+        for s, (field, orders, *at) in found
     ]
 
 
@@ -66,20 +65,16 @@ x, L = symbol("x"), symbol("L")
 def parsed(text: str) -> Expression:
     """The SymPy expression of a text without = or ;."""
 
-    def normal(match: re.Match[str]) -> Expression:
-        field, orders, first, second = match.groups(default="")
-        place, time = (first, second) if first in ("", "0", "L", "x") else (second, first)
-        return jet(field, orders.count("x"), orders.count("t"), f"({place},{time})" if place else "")
-
-    return _read(text, normal, sp.Function("integral"))
+    read = _read(text, sp.Function("integral"))
+    return read.xreplace({s: jet(field, i, j, at) for s, field, i, j, at in jets(read)})
 
 
-def _read(text: str, jet_of: Callable[[re.Match[str]], Expression], integral: Any, **how: Any) -> Expression:
+def _read(text: str, integral: Any, **how: Any) -> Expression:
     names: dict[str, Expression] = {**FUNCTIONS, "integral": integral}
 
     def stand_in(match: re.Match[str]) -> str:
         name = f"jet{len(names)}"
-        names[name] = jet_of(match)
+        names[name] = symbol(match[0])
         return name
 
     code = JET.sub(stand_in, text).replace("^", "**")
@@ -89,12 +84,14 @@ def _read(text: str, jet_of: Callable[[re.Match[str]], Expression], integral: An
 
 
 def tex(text: str) -> str:
-    """The TeX of a text by SymPy, in the text's own order; derivatives are indices, as in the text."""
+    """The TeX of a statement, or of a formula by SymPy, in its own order; derivatives are indices, as in the text."""
+    if text in DATA["tex"]:
+        return str(DATA["tex"][text])
 
     def written(part: str) -> str:
         if part.startswith("|"):
             return str(sp.latex(determinant(part), mat_str="vmatrix", mat_delim=""))
-        read = _read(part, lambda match: symbol(match[0]), lambda f: sp.Integral(f, (x, 0, L)), evaluate=False)
+        read = _read(part, lambda f: sp.Integral(f, (x, 0, L)), evaluate=False)
         heads = {s: s.name.partition("(") for s in read.free_symbols}
         names = {
             s: LETTERS.get(s.name, sp.latex(symbol(name)) + place + end) for s, (name, place, end) in heads.items()
@@ -173,13 +170,6 @@ def at_running_point(f: Expression) -> Expression:
     return f.subs({s: jet(field, i, j) for s, field, i, j, at in jets(f) if at == AT_TIP}).subs(L, x)
 
 
-def at_root(f: Expression) -> Expression:
-    """f at x = 0, where y = phi = 0 at all times (6), (7)."""
-    fields = [each for each in jets(f) if each[4] in ("", AT_ROOT) and each[1] in ("y", "phi")]
-    ends = {s: jet(field, i, j, AT_ROOT) if i else sp.Integer(0) for s, field, i, j, _ in fields}
-    return f.subs(ends).subs(x, 0)
-
-
 def unbalanced(f: Expression) -> str:
     """The rest of f = integral(g) + h(tip, root), which should vanish for every motion: "0" if it does.
 
@@ -188,7 +178,9 @@ def unbalanced(f: Expression) -> str:
     """
     inside, outside = integral_parts(f)
     at_length = at_running_point(outside)
-    return remainder(inside + d_dx(at_length), at_root(at_length))
+    fields = [each for each in jets(at_length) if each[4] in ("", AT_ROOT) and each[1] in ("y", "phi")]
+    at_root = {s: jet(field, i, j, AT_ROOT) if i else sp.Integer(0) for s, field, i, j, _ in fields}  # (6), (7)
+    return remainder(inside + d_dx(at_length), at_length.subs(at_root).subs(x, 0))
 
 
 KG, METRE, SECOND = sp.symbols("kg m s", positive=True)  # so that the root of a square is the unit itself
@@ -204,17 +196,7 @@ def unit_dimension(text: str) -> Expression:
     return sp.parse_expr(text.replace("^", "**").replace(" ", "*") or "1", local_dict=UNITS)
 
 
-NEEDED = {
-    "L": "m", "A": "m^2", "rho": "kg/m^3", "E": "Pa", "C": "s", "I_c": "kg m^2", "m": "kg", "kappa": "1", "G": "Pa",
-    "I": "m^4", "I_h": "kg m^2",
-}  # fmt: skip
-OTHERS = {
-    "s": "1/s", "x": "m", "pm": "1", "u": "N m", "U": "N m s", "K1": "N m s", "K2": "1", "a1": "1", "a2": "1",
-    "a3": "1", "lambda_1": "1/m", "lambda_2": "1/m", "lambda_": "1/m", "k1": "m s", "k2": "m s", "k3": "m s",
-    "k4": "m s",
-}  # fmt: skip
-FIELD_UNITS = {"y": "m", "phi": "1", "theta": "1", "V": "N m", "Y": "m s", "Phi": "s", "Theta": "s"}
-PAPER_UNITS: dict[str, Expression] = {name: unit_dimension(text) for name, text in (NEEDED | OTHERS).items()}
+PAPER_UNITS: dict[str, Expression] = {name: unit_dimension(text) for name, text in DATA["units"].items()}
 
 
 def spelled(dimension: Expression) -> str:
@@ -224,52 +206,42 @@ def spelled(dimension: Expression) -> str:
     return " ".join(name if n == 1 else f"{name}^{n}" for name, n in each if n) or "1"
 
 
-def dimension(f: Expression, units: dict[str, Expression]) -> Expression | None:
-    """Expression of an expression, None of a zero.  Raises MismatchError."""
+def dimension(f: Expression, units: dict[str, Expression]) -> Expression:
+    """The dimension of an expression.  Raises MismatchError."""
     if f.is_Symbol:
         return units[f.name]
     if f.is_number:
-        return None if f == 0 else sp.Integer(1)
-    if f.is_Add:
-        return _like([dimension(each, units) for each in f.args])
+        return sp.Integer(1)
+    parts = [dimension(each, units) for each in f.args]
     if f.is_Mul:
-        factors = [dimension(each, units) for each in f.args]
-        return None if None in factors else sp.Mul(*factors)
+        return sp.Mul(*parts)
     if f.is_Pow:
-        return (dimension(f.base, units) or sp.Integer(1)) ** f.exp
-    if isinstance(f, sp.exp):
-        return _like([dimension(f.args[0], units), sp.Integer(1)])
+        return parts[0] ** f.exp
     if f.func.__name__ == "integral":  # over x
-        inside = dimension(f.args[0], units)
-        return None if inside is None else inside * METRE
-    raise TypeError(f"no dimension of {f}")
-
-
-def _like(found: list[Expression | None]) -> Expression | None:
-    kinds = {each for each in found if each is not None}
+        return parts[0] * METRE
+    kinds = {*parts, sp.Integer(1)} if isinstance(f, sp.exp) else set(parts)
     if len(kinds) > 1:
         raise MismatchError(" + ".join(sorted(spelled(each) for each in kinds)))
-    return kinds.pop() if kinds else None
+    return kinds.pop()
 
 
 def mismatch(f: Expression, units: dict[str, Expression]) -> str:
-    """The terms of different dimensions in a sum: "0" if there are none."""
+    """The terms of different dimensions in a sum: "0" if there are none.
+
+    The dimension of a derivative is that of its field by x and t.
+    """
+    of_fields = {
+        s.name: unit_dimension(DATA["field_units"][field]) / METRE**i / SECOND**j
+        for s, field, i, j, _ in jets(f)
+        if s.name not in units
+    }
     try:
-        dimension(f, units)
+        dimension(f, units | of_fields)
     except MismatchError as found:
         return str(found)
     return "0"
 
 
-def unlike(text: str, units: dict[str, Expression]) -> str:
-    """The terms of different dimensions in a text's equations: "0" if all sides and sums are of one dimension.
-
-    The dimension of a derivative is that of its field by x and t.
-    """
-    for left, right in sides(text).items():
-        fields = (each for each in jets(left - right) if each[0].name not in units)
-        own = {s.name: unit_dimension(FIELD_UNITS[field]) / METRE**i / SECOND**j for s, field, i, j, _ in fields}
-        found = mismatch(left - right, units | own)
-        if found != "0":
-            return found
-    return "0"
+def listed(found: Iterable[str]) -> str:
+    """Residuals that are not "0", in one text."""
+    return "; ".join(each for each in found if each != "0") or "0"

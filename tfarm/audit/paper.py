@@ -9,22 +9,24 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import sympy as sp
 from scipy.linalg import expm
 
 from tfarm.arm import HubFeedback, load
+from tfarm.errors import CertificationError
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.reduced import modal_model
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
 from . import equations
-from .equations import TIME, solved_motion
+from .equations import accelerations, equation
 from .formulas import (
-    NEEDED,
+    AT_ROOT,
+    AT_TIP,
     PAPER_UNITS,
     Expression,
     clauses,
@@ -32,6 +34,8 @@ from .formulas import (
     difference,
     integral_parts,
     jet,
+    jets,
+    listed,
     mismatch,
     parsed,
     remainder,
@@ -39,67 +43,57 @@ from .formulas import (
     spelled,
     symbol,
     symbols,
+    tex,
     unbalanced,
     unit_dimension,
-    unlike,
 )
-from .rows import TEXTS, AuditRow, Claim, formula_of, printed
+from .rows import TEXTS, AuditRow, formula_of, is_zero
 
 # ------------------------------------------------------------ (15)-(20) and the feedback
 K1 = 0.3  # N m s/rad
 MODES = 8  # of the arm whose gain is switched
 
 
-def pumped(*switched: tuple[float, float]) -> float:
-    """Growth per period of the loop (19) on the default arm when K2 is switched: each value with its duration [s]."""
-    A, B, C, D = modal_model(load("sasaki2012"), ["hub_rate", "root_moment"], MODES).matrices()
-    period = np.eye(len(A))
+SWITCHED = ((0.1, 27.0), (0.6, 25.0))  # K2, and for how long [ms]
+
+
+def pumped(switched: tuple[tuple[float, float], ...]) -> float:
+    """Growth per period of the loop (19) on the default arm when K2 is switched: each value with its duration [ms]."""
+    model = modal_model(load("sasaki2012"), ["hub_rate", "root_moment"], MODES)
+    period = np.eye(model.order)
     for K2, duration in switched:
-        gains = np.array([K1, K2])
-        period = expm((A - np.outer(B, gains @ C / (1 + gains @ D))) * duration) @ period
+        period = expm(model.closed([K1, K2])[0] * duration / 1e3) @ period
     return float(abs(np.linalg.eigvals(period)).max())
 
 
-def growth_text() -> str:
-    """The sharpness of K2 < 1 in numbers."""
-    laws = (HubFeedback(K1=K1, K2=K2) for K2 in (0.5, 1.1))
-    roots = (closed_loop_poles(load("sasaki2012"), law, 3).values[-1] for law in laws)
-    within, beyond = (f"{s.real:.4f} + {s.imag:.4f}j" for s in roots)
-    return (
-        f"Default arm, K1 = {K1}: a root at s = {within} 1/s for K2 = 0.5, at {beyond} 1/s for K2 = 1.1 (closed-loop "
-        "poles)."
-    )
+def growth() -> dict[str, Any]:
+    """The sharpness of K2 < 1 in numbers: a root within and one beyond."""
+    arm = load("sasaki2012")
+    within, beyond = (closed_loop_poles(arm, HubFeedback(K1=K1, K2=K2), 3).values[-1] for K2 in (0.5, 1.1))
+    return {"K1": K1, "within": within, "beyond": beyond}
 
 
-def pumped_text() -> str:
+def pumping() -> dict[str, Any]:
     """A gain that varies between two stable values and drives the arm unstable."""
-    low, high = (0.1, 0.027), (0.6, 0.025)
-    constant = max(pumped(low), pumped(high))
-    return (
-        f"Counterexample: default arm, K1 = {K1}, {MODES} modes, continuous time: K2 = {low[0]} for "
-        f"{1e3 * low[1]:.0f} ms and {high[0]} for {1e3 * high[1]:.0f} ms grows by {pumped(low, high):.3f} a "
-        f"period, either gain alone by {constant:.6f}, which is the angle at rest."
-    )
+    low, high = SWITCHED
+    constant = max(pumped((each,)) for each in SWITCHED)
+    return {"K1": K1, "modes": MODES, "low": low, "high": high, "grows": pumped(SWITCHED), "constant": constant}
 
 
-V_PRINTED = printed("(15)")
 V = formula_of("(15)")
-RATE = formula_of("(16)")
-POWER_FLOW = formula_of("(18)")
 CONTROL_LAW = formula_of("(19)")
-DECAY = formula_of("(20)")
-a1, a2, a3, u, theta_t = (*symbols("a1 a2 a3 u"), jet("theta", t=1))
+a1, a2, a3, u = symbols("a1 a2 a3 u")
+theta_t = jet("theta", t=1)
 M0 = parsed("E*I*phi_x(0,t)")
 
 
 def rate(energy_of: Expression, damping: Expression = 0) -> Expression:
     """dV/dt with the accelerations of (1)-(5); with damping, E phi_x becomes E (phi_x + C phi_xt) in them."""
-    E, places = symbol("E"), [(i, at) for i in (1, 2) for at in ("", "(L,t)", "(0,t)")]
-    rates = {jet("phi", i, 0, at): jet("phi", i, 0, at) + damping * jet("phi", i, 1, at) for i, at in places}
+    E = symbol("E")
     arm, tip, hub = (
-        {s: sp.expand(f).coeff(E, 0) + E * sp.expand(f).coeff(E, 1).subs(rates, simultaneous=True)
-         for s, f in solved.items()}
-        for solved in solved_motion()
+        {s: sp.expand(f).subs({E * p: E * (p + damping * jet(of, i, j + 1, at)) for p, of, i, j, at in jets(f) if i})
+         for s, f in accelerations(place).items()}
+        for place in ("", AT_TIP, AT_ROOT)
     )  # fmt: skip
     inside, outside = integral_parts(d_dt(energy_of))
     outside = sp.expand(sp.expand(outside.subs(tip)).subs(hub))
@@ -126,17 +120,14 @@ def is_total_energy(text: str) -> str:
 
 def is_derivative(text: str) -> str:
     """(16): against d/dt of (15) as printed, before any equation of motion."""
-    value, _ = claimed(text)
-    return remainder(*integral_parts(d_dt(energy_of(V_PRINTED)) - value))
+    return remainder(*integral_parts(d_dt(energy_of(TEXTS["(15)"]["printed"])) - claimed(text)[0]))
 
 
 def is_substituted(text: str) -> str:
     """(17): (16) with the accelerations of (1)-(3)."""
-    value, _ = claimed(text)
-    arm, _, hub = solved_motion()
-    inside, outside = integral_parts(claimed(RATE)[0])
-    there, beyond = integral_parts(value)
-    return remainder(inside.subs(arm) - there, outside.subs(hub) - beyond)
+    inside, outside = integral_parts(claimed(formula_of("(16)"))[0])
+    there, beyond = integral_parts(claimed(text)[0])
+    return remainder(inside.subs(accelerations()) - there, outside.subs(accelerations(AT_ROOT)) - beyond)
 
 
 def is_power(text: str) -> str:
@@ -148,7 +139,7 @@ def is_power(text: str) -> str:
 def proven_gains(law: Expression) -> dict[str, Expression]:
     """The intervals of K1 and K2 for which some a1, a2 > 0 make the true dV/dt (a3 = a1) a negative square."""
     M, slope = symbol("M(0)"), parsed("phi_x(0,t)")
-    power = sp.expand(claimed(POWER_FLOW)[0].subs(u, law)).subs(slope, M / parsed("E*I"))
+    power = sp.expand(claimed(formula_of("(18)"))[0].subs(u, law)).subs(slope, M / parsed("E*I"))
     weight = sp.solve(power.coeff(M), a1)[0] / a2  # a1/a2, which must be positive
     damping = -sp.expand(power.subs(M, 0)) / (a2 * theta_t**2)
     positive = {"K1": damping, "K2": weight}
@@ -162,16 +153,15 @@ def are_proven_gains(text: str) -> str:
         low, name, high = clause.split(" < ")
         allowed = sp.Interval.open(parsed(low), parsed(high))
         sets = {"allowed, not proven": allowed - proven[name], "proven, not allowed": proven[name] - allowed}
-        for what, rest in ((what, rest) for what, rest in sets.items() if rest is not sp.S.EmptySet):
-            ends = "(" if rest.left_open else "[", ")" if rest.right_open else "]"
-            wrong.append(f"{what}: {name} in {ends[0]}{rest.start}, {rest.end}{ends[1]}")
+        left = {what: rest for what, rest in sets.items() if rest is not sp.S.EmptySet}
+        wrong += [f"{what}: {name} in {sp.pretty(rest, use_unicode=False)}" for what, rest in left.items()]
     return "; ".join(wrong) or "0"
 
 
 def is_decay(text: str) -> str:
     """(20): (19) in the true dV/dt."""
     value, stated = claimed(text)
-    weights = stated or claimed(DECAY)[1]
+    weights = stated or claimed(formula_of("(20)"))[1]
     change = rate(energy_of(V)).subs(u, sides(CONTROL_LAW)[u]) - value
     return unbalanced(change.subs(a3, weights[a3]).subs(a1, weights[a1]))
 
@@ -205,11 +195,6 @@ PAPER = (
 )
 
 
-def statements_beyond_the_first(text: str) -> str:
-    """How many statements follow the first."""
-    return str(len(clauses(text)) - 1)
-
-
 def quantity(clause: str) -> tuple[str, float, Expression]:
     """Name, value and dimension of a text such as "rho = 2766.7 kg/m^3"."""
     name, _, rest = clause.partition(" = ")
@@ -235,17 +220,15 @@ def is_unit_of_damping(text: str) -> str:
 def are_units(text: str) -> str:
     """Every sum in (1), (2), (4), (5) and (A.2) with the units of the text."""
     given = {name: unit_dimension(of) for name, of in (clause.split(": ") for clause in clauses(text))}
-    found = [
-        unlike(formula, PAPER_UNITS | given) for formula in (*(TIME[n] for n in (1, 2, 4, 5)), formula_of("(A.2)"))
-    ]
-    return "; ".join(each for each in found if each != "0") or "0"
+    formulas = (*map(equation, (1, 2, 4, 5)), difference(formula_of("(A.2)")))
+    return listed(mismatch(formula, PAPER_UNITS | given) for formula in formulas)
 
 
 def is_given(name: str, text: str) -> str:
     """Whether a parameter that (2), (3) and the a_ij need has a value of the right dimension."""
     for clause in (clause for clause in clauses(text) if clause.startswith(f"{name} = ")):
         _, value, dimension = quantity(clause)
-        return "0" if value > 0 and dimension == unit_dimension(NEEDED[name]) else f"{name} in {spelled(dimension)}"
+        return "0" if value > 0 and dimension == PAPER_UNITS[name] else f"{name} in {spelled(dimension)}"
     return f"{name} has no value"
 
 
@@ -260,20 +243,13 @@ def is_section(text: str) -> str:
     return f"{off:.2g}" if off > 1e-12 else "0"  # doubles read from decimals
 
 
-def density_in_numbers() -> str:
+def density() -> dict[str, Any]:
     """What the density printed would mean."""
     printed, used = (modes(load(name), 3).natural_frequency[1:] for name in ("sasaki2012-as-printed", "sasaki2012"))
-    ratios = ", ".join(f"{ratio:.1f}" for ratio in printed / used)
     speeds = [math.sqrt(PRINTED_E / rho) / 1e3 for rho in (2.7667, 2766.7)]
-    return (
-        f"E/(2 G) - 1 = {PRINTED_E / (2 * PRINTED_G) - 1:.4f}, Poisson's ratio of aluminium. As printed, sound would "
-        f"run along the arm at {speeds[0]:.0f} km/s (corrected: {speeds[1]:.2f}; diamond: about 18), and the first "
-        f"natural frequencies would be {ratios} times as high (hub inertia 0.1 kg m^2)."
-    )
+    return {"poisson": PRINTED_E / (2 * PRINTED_G) - 1, "speeds": speeds, "ratios": printed / used}
 
 
-INCREMENT = formula_of("(21)")
-UPDATE = formula_of("(22)")
 INPUT_NEURONS = 6  # neurons, section 5
 
 
@@ -305,20 +281,18 @@ def is_cost(text: str) -> str:
 
 def are_gain_units(text: str) -> str:
     """(20), (23): each gain's dimension by its equation; one name cannot have two."""
-    x, theta_t = symbol("x"), jet("theta", t=1)
     needs: dict[str, set[Expression]] = {}
-    places = {jet("V", t=1): (theta_t**2, unit_dimension("N m s")), symbol("e"): (x, unit_dimension("1"))}
-    for left, right in sides(text).items():
-        factor, dimension = places[left]
-        for name in (s.name for s in right.coeff(factor).free_symbols if s.name.startswith("K")):
-            needs.setdefault(name, {PAPER_UNITS[name]} if name in PAPER_UNITS else set()).add(dimension)
+    for left, factor, unit in ((jet("V", t=1), theta_t**2, "N m s"), (symbol("e"), symbol("x"), "1")):
+        of = unit_dimension(unit)
+        for name in (s.name for s in sides(text)[left].coeff(factor).free_symbols if s.name.startswith("K")):
+            needs.setdefault(name, {PAPER_UNITS.get(name, of)}).add(of)
     clashes = [f"{name}: {' and '.join(sorted(map(spelled, two)))}" for name, two in needs.items() if len(two) > 1]
     return "; ".join(clashes) or "0"
 
 
-def signals_beyond_the_neurons(text: str) -> str:
-    """How many signals are named beyond the neurons of the input layer."""
-    return str(len(text.split(", ")) - INPUT_NEURONS)
+def beyond(known: int, separator: str, text: str) -> str:
+    """How many statements, signals of section 5 or the like are in a text beyond those known."""
+    return str(len(text.split(separator)) - known)
 
 
 CHECKS: dict[str, Callable[[str], str]] = {
@@ -331,13 +305,13 @@ CHECKS: dict[str, Callable[[str], str]] = {
     "(20)": is_decay,
     "(18)-(20): damping C > 0": is_damped_decay,
     "(18)-(20): constant gains, varied by the tuner": is_varied_decay,
-    "(21)": lambda text: descends(text, UPDATE),
-    "(22)": lambda text: descends(INCREMENT, text),
+    "(21)": lambda text: descends(text, formula_of("(22)")),
+    "(22)": lambda text: descends(formula_of("(21)"), text),
     "(23)": is_cost,
     "(20), (23): K": are_gain_units,
-    "section 5: inputs": signals_beyond_the_neurons,
-    "section 5: alpha_c": statements_beyond_the_first,
-    "section 5: eta_c": statements_beyond_the_first,
+    "section 5: inputs": partial(beyond, INPUT_NEURONS, ", "),
+    "section 5: alpha_c": partial(beyond, 1, ";"),
+    "section 5: eta_c": partial(beyond, 1, ";"),
     "Table 1 (rho)": is_aluminium,
     "Table 1 (C's unit)": is_unit_of_damping,
     "Table 1 (other units)": are_units,
@@ -345,15 +319,50 @@ CHECKS: dict[str, Callable[[str], str]] = {
     "Table 1 (I_h)": partial(is_given, "I_h"),
 }
 MEASURED = {
-    "(19)": growth_text,
-    "(18)-(20): constant gains, varied by the tuner": pumped_text,
-    "Table 1 (rho)": density_in_numbers,
+    "(19)": growth,
+    "(18)-(20): constant gains, varied by the tuner": pumping,
+    "Table 1 (rho)": density,
 }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Claim:
+    """A statement about an equation.
+
+    `check` gives the residual of a text, "0" or a number below RESIDUAL_NOISE if it is right.
+    """
+
+    equation: str
+    printed: str
+    check: Callable[[str], str]
+    evidence: str
+    corrected: str = ""  # empty: the print is right
+    doubt: str = ""  # what cannot be decided
+    measured: Callable[[], dict[str, Any]] = dict  # numbers that the evidence has
+
+    def row(self) -> AuditRow:
+        """Run the check on both texts.  Raises CertificationError where the corrected one leaves a residual."""
+        corrected = self.corrected or self.printed
+        residual_printed = self.check(self.printed)
+        residual_corrected = self.check(corrected) if self.corrected else residual_printed
+        if not is_zero(residual_corrected):
+            raise CertificationError(f"{self.equation}, as corrected, leaves {residual_corrected}")
+        return AuditRow(
+            equation=self.equation,
+            verdict="undecided" if self.doubt else "ok" if is_zero(residual_printed) else "corrected",
+            printed=self.printed,
+            corrected=corrected,
+            evidence=f"{self.evidence.format(**self.measured())} {self.doubt}".strip(),
+            residual_printed=residual_printed,
+            residual_corrected=residual_corrected,
+            printed_tex=tex(self.printed),
+            corrected_tex=tex(corrected),
+        )
 
 
 def claims() -> tuple[Claim, ...]:
     """Every claim, in the order of the paper."""
-    return tuple(Claim(**texts, check=CHECKS[name], measured=MEASURED.get(name, str)) for name, texts in TEXTS.items())
+    return tuple(Claim(**texts, check=CHECKS[name], measured=MEASURED.get(name, dict)) for name, texts in TEXTS.items())
 
 
 @cache

@@ -4,7 +4,6 @@
 printed digit, is what they printed.  One that does not must give a reason (`Case.why`), and one that does must not.
 """
 
-import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,7 +22,7 @@ from tfarm.errors import CertificationError
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
-SLENDERNESS = 100.0  # L/r of the beam of a case that has no other
+DATA = tomllib.loads((files("tfarm.audit") / "literature.toml").read_text("utf-8"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,18 +52,17 @@ class Source:
 
 
 def arm_of_case(case: Mapping[str, Any]) -> Arm:
-    """The arm of a case: a clamped beam of L = rhoA = EI = 1 with the case's own tables in the place of its own."""
-    slenderness = case.get("slenderness", SLENDERNESS)
-    section = {"shape": "general", "area": 1.0, "second_moment": slenderness**-2, "shear_factor": 5 / 6}
-    link = {"length": 1.0, "density": 1.0, "youngs_modulus": slenderness**2, "poissons_ratio": 0.3, "section": section}
+    """The arm of a case: the beam of the file with the case's own tables in the place of its own."""
+    beam = DATA["beam"]
+    slenderness = case.get("slenderness", beam["slenderness"])
+    section = beam["section"] | {"second_moment": slenderness**-2}
+    link = beam["link"] | {"youngs_modulus": slenderness**2, "section": section} | case.get("link", {})
     parts = {key: case[key] for key in ("clamp", "payload", "attachment") if key in case}
-    hub = {"inertia": math.inf} | case.get("hub", {})
-    return arm_of_table({"name": "arm", "link": link | case.get("link", {}), "hub": hub, **parts})
+    return arm_of_table({"name": "arm", "link": link, "hub": beam["hub"] | case.get("hub", {}), **parts})
 
 
 def _source(table: dict[str, Any]) -> Source:
     """The source of a table, whose theory and quantity are those of its cases but where these have others."""
-    own = {key: table.pop(key) for key in ("key", "citation", "reached")}
     cases = tuple(
         Case(
             arm=arm_of_case(case),
@@ -74,10 +72,10 @@ def _source(table: dict[str, Any]) -> Source:
         )
         for case in (table | each for each in table["case"])
     )
-    return Source(cases=cases, **own)
+    return Source(cases=cases, **{key: table[key] for key in ("key", "citation", "reached")})
 
 
-ALL = tuple(map(_source, tomllib.loads((files("tfarm.audit") / "literature.toml").read_text("utf-8"))["source"]))
+ALL = tuple(map(_source, DATA["source"]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,8 +161,7 @@ def computed(case: Case) -> NDArray[np.float64]:
 def agrees(ours: float, printed: str) -> bool:
     """Whether ours lies within half a unit of the last printed digit."""
     number = Decimal(printed)
-    unit = Decimal(1).scaleb(int(number.as_tuple().exponent))
-    return abs(Decimal(ours) - number) <= unit / 2
+    return abs(Decimal(ours) - number) <= Decimal("0.5").scaleb(int(number.as_tuple().exponent))
 
 
 @dataclass(frozen=True)
@@ -174,11 +171,7 @@ class Validation:
     rows: Annotated[
         tuple[PublishedRow, ...], Quantity("published numbers", help="printed and exact value of each number")
     ]
-
-    @property
-    def sources(self) -> Annotated[list[Source], Quantity("sources", help="publications that the numbers are from")]:
-        """The publications."""
-        return [each for each in ALL if any(row.source == each.key for row in self.rows)]
+    sources: Annotated[tuple[Source, ...], Quantity("sources", help="publications that the numbers are from")] = ALL
 
     @property
     def differences(

@@ -1,4 +1,4 @@
-"""A claim about one equation, and the row that its check makes of it.
+"""The texts of the claims about equations, and the row that a check makes of one.
 
 The printed and the corrected formula are texts of `claims.toml` in one small language (`formulas`), and one check
 reads either of them.  So a check has no input but the formula, and the verdict is not written down but follows:
@@ -10,33 +10,19 @@ reads either of them.  So a check has no input but the formula, and the verdict 
 """
 
 import tomllib
-from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
 from typing import Annotated
 
-from tfarm.errors import CertificationError
 from tfarm.schema import Quantity
 
 DATA = tomllib.loads((files("tfarm.audit") / "claims.toml").read_text("utf-8"))
 TEXTS: dict[str, dict[str, str]] = {each["equation"]: each for each in DATA["claim"]}  # in the order of the paper
 
 
-def printed(equation: str) -> str:
-    """The formula of an equation as the paper prints it."""
-    return TEXTS[equation]["printed"]
-
-
 def formula_of(equation: str) -> str:
     """The formula that passes the check of its equation: as corrected, or as printed."""
-    return TEXTS[equation].get("corrected") or printed(equation)
-
-
-def tex(text: str) -> str:
-    """The TeX of a statement, or of a text in the language of `formulas`."""
-    from .formulas import tex as written  # SymPy takes half a second to load, and rows are shown without it
-
-    return DATA["tex"].get(text) or written(text)
+    return TEXTS[equation].get("corrected") or TEXTS[equation]["printed"]
 
 
 RESIDUAL_NOISE = 1e-25  # relative: numbers are compared at 50 digits
@@ -61,41 +47,6 @@ class AuditRow:
     ]
     printed_tex: str
     corrected_tex: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Claim:
-    """A statement about an equation.
-
-    `check` gives the residual of a text, "0" or a number below RESIDUAL_NOISE if it is right.
-    """
-
-    equation: str
-    printed: str
-    check: Callable[[str], str]
-    evidence: str
-    corrected: str = ""  # empty: the print is right
-    doubt: str = ""  # what cannot be decided
-    measured: Callable[[], str] = str  # numbers that go with the evidence
-
-    def row(self) -> AuditRow:
-        """Run the check on both texts.  Raises CertificationError where the corrected one leaves a residual."""
-        corrected = self.corrected or self.printed
-        residual_printed = self.check(self.printed)
-        residual_corrected = self.check(corrected) if self.corrected else residual_printed
-        if not is_zero(residual_corrected):
-            raise CertificationError(f"{self.equation}, as corrected, leaves {residual_corrected}")
-        return AuditRow(
-            equation=self.equation,
-            verdict="undecided" if self.doubt else "ok" if is_zero(residual_printed) else "corrected",
-            printed=self.printed,
-            corrected=corrected,
-            evidence=" ".join(part for part in (self.evidence, self.doubt, self.measured()) if part),
-            residual_printed=residual_printed,
-            residual_corrected=residual_corrected,
-            printed_tex=tex(self.printed),
-            corrected_tex=tex(corrected),
-        )
 
 
 def is_zero(residual: str) -> bool:

@@ -66,8 +66,8 @@ RADII_TRIED, RADIUS_FALLS = 9, 3  # circles after the first, each a third of the
 OF_SHAPES = ("theta", "W", "Y", "Phi", "M", "Q")  # quantities of a table of modes
 AT_HUB = (  # moment and shear force of the link at the hub, and the hub's angle
     Output(quantity="M", place="root", unit="N m", label="moment at the root"),
-    Output(quantity="Q", place="root", unit="N", label="shear at the root"),
-    Output(quantity="theta", place="root", unit="rad", label="angle of the hub"),
+    OUTPUTS["root_shear"],
+    OUTPUTS["hub_angle"],
 )
 RADII_AGREE = 1e-11  # of the largest value on the circle: the largest difference of two radii
 
@@ -121,31 +121,17 @@ def contour_residues(k: System, wanted: Sequence[Output], p: Complex, x: float) 
     Raises ConvergenceError where none does: two eigenvalues are one to the last digits.
     """
     apart = abs(p[:, None] - p) + np.where(np.eye(p.size, dtype=bool), np.inf, 0.0)
-    radius = np.minimum(apart.min(axis=1, initial=np.inf), abs(p)) / POLES_AWAY
-    for point in k.singular:
-        radius = np.minimum(radius, abs(p - point) / POLES_AWAY)
-    residues, size = _around(k, wanted, p, radius, x)
-    todo = np.arange(p.size)
-    for _ in range(RADII_TRIED):
-        radius[todo] /= RADIUS_FALLS
-        again, smaller = _around(k, wanted, p[todo], radius[todo], x)
-        right = (abs(again - residues[:, todo]) <= RADII_AGREE * np.maximum(size[:, todo], smaller)).all(axis=0)
-        residues[:, todo[~right]], size[:, todo[~right]] = again[:, ~right], smaller[:, ~right]
-        todo = todo[~right]
-        if not todo.size:
-            return residues
-    worst = complex(p[todo[0]])
-    raise ConvergenceError(f"no residue at the eigenvalue {worst:.10g} 1/s: another one is too close", worst, 0.0)
-
-
-def _around(
-    k: System, wanted: Sequence[Output], p: Complex, radius: Real, x: float
-) -> tuple[Complex, NDArray[np.float64]]:
-    """Return Cauchy's integral on the circles, and the largest |G| radius on each."""
-    arrow = radius[:, None] * UNIT_CIRCLE
-    values = evaluate_outputs(k, wanted, (p[:, None] + arrow).ravel(), x)
-    values = values.reshape(len(wanted), *arrow.shape) * arrow
-    return values.mean(axis=2), abs(values).max(axis=2)
+    away = [apart.min(axis=1, initial=np.inf), abs(p), *(abs(p - point) for point in k.singular)]
+    radius = np.min(away, axis=0) / POLES_AWAY
+    falls = float(RADIUS_FALLS) ** -np.arange(RADII_TRIED + 1)
+    arrow = falls[:, None, None] * radius[:, None] * UNIT_CIRCLE
+    values = evaluate_outputs(k, wanted, (p[:, None] + arrow).ravel(), x).reshape(len(wanted), *arrow.shape) * arrow
+    residues, size = values.mean(axis=-1), abs(values).max(axis=-1)  # (outputs, radii, p)
+    larger = np.maximum(size[:, 1:], size[:, :-1])
+    agree = (abs(np.diff(residues, axis=1)) <= RADII_AGREE * larger).all(axis=0)
+    for worst in p[~agree.any(axis=0)].tolist():
+        raise ConvergenceError(f"no residue at the eigenvalue {worst:.10g} 1/s: another one is too close", worst, 0.0)
+    return residues[:, agree.argmax(axis=0), np.arange(p.size)]
 
 
 def _from_shapes(table: Modes, wanted: Sequence[Output], k: System, x: float) -> Real:
@@ -220,7 +206,13 @@ def relaxed_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None)
     exact, kept = _at_rest(transfer(arm, model.rows, x=x), model.single, modes(arm, 1))
     slope = exact[:, 3] + (model.residues / model.eigenvalues**2).real.sum(axis=(1, 2))
     slope += (model.single_residues / model.single**2)[:, kept].sum(axis=1)
-    return replace(model, static=model.static + slope / C, relaxation=-slope / C)
+    return replace(
+        model,
+        static=model.static + slope / C,
+        single=np.r_[model.single, -1 / C],
+        single_residues=np.c_[model.single_residues, -slope / C**2],
+        relaxes=True,
+    )
 
 
 def slow_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) -> ModalModel:
@@ -232,17 +224,8 @@ def slow_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) ->
     require(C, "link.damping", C, "without damping nothing is slow; take modal_model")
     exact = transfer(arm, outputs, x=x)
     corners, shares = slow_remainder(C, lambda s: exact(s).reshape(-1, s.size) - model(s))
-    p, none = -corners.reshape(-1, 2), np.zeros(corners.size // 2, np.int64)
     residues = (shares * corners).reshape(len(shares), -1, 2)
-    return replace(
-        model,
-        index=np.r_[model.index, none],
-        natural_frequency=np.r_[model.natural_frequency, np.sqrt(p.prod(axis=1))],
-        eigenvalues=np.r_[model.eigenvalues, p],
-        residues=np.concatenate([model.residues, residues], axis=1),
-        static=model.static - shares.sum(axis=1),
-        participation=np.r_[model.participation, 0.0 * none],
-    )
+    return model.with_pairs(-corners.reshape(-1, 2), residues, model.static - shares.sum(axis=1), np.zeros(SLOW_PAIRS))
 
 
 def _at_rest(G: TransferFunction, single: Real, table: Modes) -> tuple[Real, NDArray[np.bool_]]:
@@ -289,24 +272,19 @@ def _residues(
     table: Modes, k: System, wanted: list[Output], share: float, p: Complex, single: Real
 ) -> tuple[Complex, Real]:
     """Return residues (outputs, n, 2) at pairs of eigenvalues (n, 2), and at single real ones (outputs, m)."""
-    none = np.empty((len(wanted), 0))
     if table.arm.is_undamped and not single.size:
         powers, s = np.array([[each.power] for each in wanted]), p[:, 0]
-        upper = undamped_residues(table, wanted, k, share)[:, : s.size] * s**powers / (2 * s)
-        return np.stack([upper, upper.conj()], axis=2), none
-    residues, doubtful = end_residues(k, wanted, p.ravel(), share)
+        upper = undamped_residues(table, wanted, k, share) * s**powers / (2 * s)
+        return np.stack([upper, upper.conj()], axis=2), np.empty((len(wanted), 0))
+    s = np.r_[p.ravel(), single]
+    found, doubtful = end_residues(k, wanted, s, share)
+    doubtful[p.size :] |= table.arm.is_undamped  # the pole of the circuit, where the current is 0 over 0
     if doubtful.any():
-        residues[:, doubtful] = contour_residues(k, wanted, p.ravel()[doubtful], share)
-    residues = residues.reshape(len(wanted), *p.shape)
-    pair = p[:, 0].imag > 0
+        found[:, doubtful] = contour_residues(k, wanted, s[doubtful], share)
+    residues, pair = found[:, : p.size].reshape(len(wanted), *p.shape), p[:, 0].imag > 0
     residues[:, pair, 1] = residues[:, pair, 0].conj()
     residues[:, ~pair] = residues[:, ~pair].real
-    if not single.size:
-        return residues, none
-    at = single.astype(complex)
-    if table.arm.is_undamped:  # only the pole of the circuit, where the current is 0 over 0
-        return residues, contour_residues(k, wanted, at, share).real.astype(float)
-    return residues, end_residues(k, wanted, at, share)[0].real.astype(float)
+    return residues, found[:, p.size :].real.astype(float)
 
 
 ALGEBRAIC = 1e-9  # distance from -1 of a feedthrough of the loop that leaves its input undetermined
@@ -318,16 +296,15 @@ def sensed_model(arm: Arm, signals: Sequence[str], count: int) -> Matrices:
     Raises ParameterError for an unknown or improper signal and a count out of range.
     """
     read = Signals(arm, tuple(signals))
-    extra = [] if arm.is_locked else ["hub_angle"]  # so that every model has the states of the rigid body
+    extra = [] if arm.is_locked else [OUTPUTS["hub_angle"]]  # so that every model has the states of the rigid body
     rows: dict[int, Real] = {}  # of C and D side by side
-    A, B = np.empty((0, 0)), np.empty((0, 1))
     for share in dict.fromkeys(read.places):
         mine = [n for n, place in enumerate(read.places) if place == share]
-        wanted = [read.outputs[n] for n in mine]
-        along = any(each.place == "x" for each in wanted)
-        A, B, C, D = modal_model(arm, [*extra, *wanted], count, share * arm.length if along else None).matrices()
+        wanted = [*extra, *(read.outputs[n] for n in mine)]
+        x = share * arm.length if any(each.place == "x" for each in wanted) else None
+        A, B, C, D = modal_model(arm, wanted, count, x).matrices()
         rows |= zip(mine, np.hstack([C, D])[len(extra) :], strict=True)
-    both = np.array([rows[n] for n in range(len(read.names))])
+    both = np.array([rows[n] for n in range(len(rows))])
     return A, B, both[:, :-1], both[:, -1:]
 
 

@@ -41,10 +41,9 @@ class PartialFractions:
     (outputs, n, 2) belong to them.  `index` (n,) numbers the arm's own flexible modes from 1, and is 0 for a pole in
     place of omitted modes; `natural_frequency` (n,) is undamped [rad/s].  `rigid` (outputs, 2) and `static` (outputs,)
     make the model exact at s -> 0.  `participation` (n,) is that of the input in each pair: |b| at C = 0, for a locked
-    hub the root moment of the mode.  `relaxation` (outputs,) is E of E/(1 + C s), in place of the omitted bending modes
-    at C > 0 (see `relaxed_model`); None without.  `single` (m,) [1/s] are real poles of a rig that belong to no
-    flexible mode, with `single_residues` (outputs, m): about -b/J of a hub with friction (then rigid[:,0] is 0) and
-    -R/L_a of a motor's circuit.
+    hub the root moment of the mode.  `single` (m,) [1/s] are real poles that belong to no flexible mode, with
+    `single_residues` (outputs, m): about -b/J of a hub with friction (then rigid[:,0] is 0), -R/L_a of a motor's
+    circuit, and last, where the model `relaxes`, -1/C in place of the omitted bending modes (see `relaxed_model`).
     """
 
     arm: Arm
@@ -57,9 +56,9 @@ class PartialFractions:
     rigid: Real
     static: Real
     participation: Real
-    relaxation: Real | None = None
     single: Real
     single_residues: Real
+    relaxes: bool = False
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -67,39 +66,29 @@ class PartialFractions:
         return tuple(wanted.name for wanted in self.rows)
 
     @property
-    def has_rigid_states(self) -> bool:
-        """Whether an output depends on the rigid body; then angle and rate are two of the states."""
-        return bool(self.rigid.any())
-
-    @property
     def rigid_states(self) -> int:
-        """The number of states of the rigid body: two, one with friction at the hub, or none."""
-        return self.has_rigid_states * (1 if self.arm.rate_loss else 2)
+        """The number of states of the rigid body: angle and rate where an output has it, with friction one of them."""
+        return bool(self.rigid.any()) * (1 if self.arm.rate_loss else 2)
 
     @property
     def order(self) -> int:
-        """The number of states: two a mode, those of the rigid body, one a single pole, one for a relaxation."""
-        return 2 * self.index.size + self.rigid_states + self.single.size + (self.relaxation is not None)
+        """The number of states: two a mode, those of the rigid body, and one a single pole."""
+        return 2 * self.index.size + self.rigid_states + self.single.size
 
     @property
     def states(self) -> tuple[str, ...]:
         """Names of the states, in the order of `matrices`."""
         rigid = ("rigid_angle", "rigid_rate")[2 - self.rigid_states :]
-        tails = iter(range(1, self.index.size + 1))
-        names = [f"mode{k}" if k else f"tail{next(tails)}" for k in self.index]
+        tails = np.cumsum(self.index == 0)
+        names = [f"mode{k}" if k else f"tail{n}" for k, n in zip(self.index, tails, strict=True)]
         pairs = tuple(f"{name}_{part}" for name in names for part in ("position", "rate"))
-        alone = tuple(f"single{i}" for i in range(1, self.single.size + 1))
-        return rigid + pairs + alone + (("relaxation",) if self.relaxation is not None else ())
+        alone = tuple(f"single{i}" for i in range(1, self.single.size + 1 - self.relaxes))
+        return rigid + pairs + alone + ("relaxation",) * self.relaxes
 
     @property
     def input(self) -> str:
         """The input of the arm, "hub_angle" [rad] where the hub is locked."""
         return "hub_angle" if self.arm.is_locked else self.arm.input
-
-    @property
-    def stiffness(self) -> Real:
-        """p1 p2 of each mode [1/s^2]: its natural frequency squared at C = 0."""
-        return (self.eigenvalues[:, 0] * self.eigenvalues[:, 1]).real
 
     @property
     def numerators(self) -> tuple[Real, Real]:
@@ -123,17 +112,14 @@ class PartialFractions:
         """Return the sum of all terms (outputs, s) at s (1-D), or with `part` abs that of their magnitudes."""
         p1, p2 = self.eigenvalues.T[:, :, None]
         product = (s - p1) * (s - p2)
-        is_pole = (product == 0).any(axis=0) | (self.has_rigid_states & (s == 0))
+        is_pole = (product == 0).any(axis=0) | ((self.rigid_states > 0) & (s == 0))
         for pole in s[is_pole][:1].tolist():
             require(False, "s", pole, "a pole of the reduced model; move s")
         (n1, n0), share = map(part, self.numerators), part(1 / product)
         total = part(s) * (n1 @ share) + n0 @ share + part(self.static)[:, None]
-        if self.has_rigid_states:
+        if self.rigid_states:
             total = total + part(self.rigid[:, :1] / (s * s)) + part(self.rigid[:, 1:] / s)
-        total = total + part(self.single_residues) @ part(1 / (s - self.single[:, None]))
-        if self.relaxation is not None:
-            total = total + part(self.relaxation[:, None] / (1 + self.arm.damping * s))
-        return total
+        return total + part(self.single_residues) @ part(1 / (s - self.single[:, None]))
 
     def matrices(self) -> Matrices:
         """Return A, B, C, D of x' = A x + B u, y = C x + D u: arrays (n, n), (n, 1), (outputs, n), (outputs, 1).
@@ -142,17 +128,18 @@ class PartialFractions:
         block [[0, w], [-w, -a]]; at C = 0 half the sum of their squares is the mode's energy [J].
         """
         first = self.rigid_states
-        w = np.sqrt(self.stiffness)
+        w = np.sqrt(self.eigenvalues.prod(axis=1).real)
         b = np.where(self.participation > 0, self.participation, 1.0)
         n1, n0 = self.numerators
         pairs = np.array([[0 * w, w], [-w, self.eigenvalues.sum(axis=1).real]]).transpose(2, 0, 1)
-        slow = np.empty(0) if self.relaxation is None else np.array([1 / self.arm.damping])
+        alone = np.ones(self.single.size)
+        if self.relaxes:
+            alone[-1] = -self.single[-1]
         J = self.arm.total_inertia
-        A = block_diag(np.eye(first, k=1), *pairs, np.diag(self.single), np.diag(-slow))
-        B = np.r_[np.zeros(first)[1:], np.ones(first)[:1] / J, np.c_[0 * b, b].ravel(), np.ones(self.single.size), slow]
+        A = block_diag(np.eye(first, k=1), *pairs, np.diag(self.single))
+        B = np.r_[np.zeros(first)[1:], np.ones(first)[:1] / J, np.c_[0 * b, b].ravel(), alone]
         of_pairs = np.stack([n0 / (w * b), n1 / b], axis=-1).reshape(len(n0), -1)
-        of_slow = np.empty((len(n0), 0)) if self.relaxation is None else self.relaxation[:, None]
-        C = np.hstack([self.rigid[:, 2 - first :] * J, of_pairs, self.single_residues, of_slow])
+        C = np.hstack([self.rigid[:, 2 - first :] * J, of_pairs, self.single_residues / alone])
         return A, B[:, None], C, self.static[:, None].copy()
 
     def first(self, count: int) -> PartialFractions:
@@ -170,16 +157,24 @@ class PartialFractions:
             participation=self.participation[kept],
         )
 
-    def closed(self, gains: ArrayLike) -> Matrices:
-        """Return A, B, C, D under the law  u = r - gains . y, r the new input; gains are (outputs,) or (n, outputs).
+    def with_pairs(self, p: Real | Complex, residues: Real | Complex, static: Real, share: Real) -> PartialFractions:
+        """Return the model with more pairs of poles (n, 2), the tails, and their share of the input (n,)."""
+        return replace(
+            self,
+            index=np.r_[self.index, np.zeros(len(p), np.int64)],
+            natural_frequency=np.r_[self.natural_frequency, np.sqrt(abs(p.prod(axis=1)))],
+            eigenvalues=np.r_[self.eigenvalues, p],
+            residues=np.concatenate([self.residues, residues], axis=1),
+            static=static,
+            participation=np.r_[self.participation, share],
+        )
 
-        For n laws every matrix has a leading axis.
-        """
+    def closed(self, gains: ArrayLike) -> Matrices:
+        """Return A, B, C, D under the law  u = r - gains . y, r the new input; gains are (outputs,)."""
         A, B, C, D = self.matrices()
-        law = np.asarray(gains, dtype=float)
-        share = (1.0 / (1.0 + law @ D[:, 0]))[..., None, None]
-        row = share * (law @ C)[..., None, :]
-        return A - B * row, B * share, C - D * row, D * share
+        row = np.atleast_2d(np.asarray(gains, dtype=float))
+        share = 1 / (1 + row @ D)
+        return A - B @ (share * row @ C), B * share, C - D @ (share * row @ C), D * share
 
     def state_space(self, name: str | None = None) -> control.StateSpace:
         """Return the model as a `control.StateSpace` with named inputs, outputs and states."""
@@ -234,7 +229,8 @@ class Ruler:
             low, high = self._brackets(error)
             for _ in range(REFINEMENTS):
                 inner = np.linspace(low, high, REFINED_POINTS)
-                found = self._error_at(model, inner, row)
+                found, clear = np.zeros(inner.shape), self._is_clear(inner)
+                found[clear] = _errors(model, inner[clear], *values_and_norm(self.G, inner[clear]))[row]
                 best = np.unravel_index(found.argmax(), found.shape)
                 if found[best] > worst[row]:
                     worst[row], at[row] = found[best], inner[best]
@@ -248,12 +244,6 @@ class Ruler:
         (peaks,) = np.nonzero((error >= padded[:-2]) & (error >= padded[2:]) & (error >= HIGH_PEAK * error.max()))
         peaks = peaks[np.argsort(-error[peaks])][:MOST_PEAKS]
         return self.w[np.maximum(peaks - 1, 0)], self.w[np.minimum(peaks + 1, self.w.size - 1)]
-
-    def _error_at(self, model: PartialFractions, w: Real, row: int) -> Real:
-        """Return the error of one output at w of any shape, zero next to a pole."""
-        errors, clear = np.zeros(w.shape), self._is_clear(w)
-        errors[clear] = _errors(model, w[clear], *values_and_norm(self.G, w[clear]))[row]
-        return errors
 
     def _dips(self, w: Real) -> Real:
         """Return points around the dips of |G| and |G'|, where the norm is small."""

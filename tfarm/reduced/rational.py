@@ -10,7 +10,7 @@ and with a positive residue of the hub angle are used.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
@@ -79,16 +79,18 @@ def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float 
     hub = "root_moment" if arm.is_locked else "hub_rate"
     G = transfer(arm, (hub, *rows), x=x)
     frequencies = frequencies_around(arm, high)
-    found: list[tuple[tuple[float, int], PartialFractions]] = []
+    best = np.inf, 0
     for _ in range(SHARING_ROUNDS):  # first with all poles, then with the used ones
         inside = modal_model(arm, G.rows, exact, x)
         rest = _remainders(G, inside, high, frequencies)
         poles, shares, error = _best_poles(rest, pairs - exact)
-        found.append(((max(error, ERRORS_ALIKE), -exact - poles.size), _assembled(inside, rest, poles, shares)))
+        rank = max(error, ERRORS_ALIKE), -exact - poles.size
+        if rank < best:
+            best, model = rank, _assembled(inside, rest, poles, shares)
         if exact + poles.size == pairs:
             break
         exact = pairs - poles.size
-    return min(found, key=lambda entry: entry[0])[1]
+    return model
 
 
 def _remainders(G: TransferFunction, inside: PartialFractions, high: float, frequencies: Real) -> _Remainders:
@@ -123,8 +125,7 @@ def _best_poles(rest: _Remainders, most: int) -> tuple[Real, Real, float]:
     best = np.empty(0), np.empty((len(rest.F), 0))
     least, idle = float((abs(rest.F) * rest.weight).max()), 0
     for square in aaa_poles(rest.S, rest.F, rest.weight, most):
-        square, shares = _checked(rest, square[square > rest.beyond**2])
-        error = float((abs(shares @ _basis(rest, square).T - rest.F) * rest.weight).max())
+        square, shares, error = _checked(rest, square[square > rest.beyond**2])
         idle += 1
         if error < least:
             best, least, idle = (np.sqrt(square), shares), error, 0
@@ -133,26 +134,22 @@ def _best_poles(rest: _Remainders, most: int) -> tuple[Real, Real, float]:
     return *best, least
 
 
-def _checked(rest: _Remainders, square: Real) -> tuple[Real, Real]:
-    """Return the poles with the right sign of their residue in the hub's output, and their shares (outputs, poles).
+def _checked(rest: _Remainders, square: Real) -> tuple[Real, Real, float]:
+    """Return the poles with the right sign of their residue in the hub's output, their shares, and the error.
 
-    Shares are those of weighted least squares for each output.
+    Shares (outputs, poles) are those of weighted least squares for each output.
     """
     sign = 1.0 if rest.by_S[0] else -1.0
     while True:
-        basis, shares = _basis(rest, square), np.empty((len(rest.F), square.size))
+        basis, shares = rest.S[:, None] / (rest.S[:, None] + square), np.empty((len(rest.F), square.size))
         for row, (F, weight) in enumerate(zip(rest.F, rest.weight, strict=True)):
             columns = basis * weight[:, None]
             size = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
             shares[row] = np.linalg.lstsq(columns / size, F * weight)[0] / size
         wrong = np.flatnonzero(sign * shares[0] < 0)
         if not wrong.size:
-            return square, shares
+            return square, shares, float((abs(shares @ basis.T - rest.F) * rest.weight).max())
         square = np.delete(square, wrong[-1])
-
-
-def _basis(rest: _Remainders, square: Real) -> Real:
-    return rest.S[:, None] / (rest.S[:, None] + square)
 
 
 def aaa_poles(S: Real, F: Real, weight: Real, degree: int) -> Iterator[Real]:
@@ -193,17 +190,6 @@ def _assembled(inside: PartialFractions, rest: _Remainders, poles: Real, shares:
     ends = np.stack([s, s.conj()], axis=1)
     static = inside.static + (added / ends).real.sum(axis=(1, 2))
     strict = rest.by_S & (power[:, 0] < 2)  # the poles above replace the static remainder
-    return PartialFractions(
-        arm=inside.arm,
-        rows=inside.rows[1:],
-        x=inside.x,
-        index=np.r_[inside.index, np.zeros(poles.size, dtype=np.int64)],
-        natural_frequency=np.r_[inside.natural_frequency, poles],
-        eigenvalues=np.concatenate([inside.eigenvalues, ends]),
-        residues=np.concatenate([inside.residues, added], axis=1)[1:],
-        rigid=inside.rigid[1:],
-        static=np.where(strict, 0.0, static)[1:],
-        participation=np.r_[inside.participation, np.sqrt(abs(in_S[0]))],
-        single=inside.single,
-        single_residues=inside.single_residues[1:],
-    )
+    model = inside.with_pairs(ends, added, np.where(strict, 0.0, static), np.sqrt(abs(in_S[0])))
+    own = {name: getattr(model, name)[1:] for name in ("rows", "residues", "rigid", "static", "single_residues")}
+    return replace(model, **own)

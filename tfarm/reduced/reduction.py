@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_args
 
@@ -37,7 +38,6 @@ from .partial_fractions import (
     Ruler,
     distance,
     frequencies_around,
-    values_and_norm,
 )
 from .rational import has_rational, modes_in, rational_model
 
@@ -115,9 +115,7 @@ class ReducedModel:
     @property
     def poles(self) -> Annotated[Complex, Quantity("s", "1/s", 10, "poles of the model", key="poles")]:
         """The poles of the model with Im s >= 0 and their mirror images."""
-        model = self.model
-        slow = [-1 / model.arm.damping] if model.relaxation is not None else []
-        return np.r_[model.eigenvalues.ravel(), model.single, slow].astype(complex)
+        return np.r_[self.model.eigenvalues.ravel(), self.model.single].astype(complex)
 
     @property
     def x(self) -> Annotated[float | None, Quantity(help="place of outputs along the arm [m]")]:
@@ -132,7 +130,7 @@ class ReducedModel:
     @property
     def states(self) -> Annotated[tuple[str, ...], Quantity(help="names of the states")]:
         """Names of the states."""
-        return tuple(self.model.states)
+        return self.model.states
 
     @property
     def named_matrices(self) -> Annotated[dict[str, Real], Quantity(help="matrix of the state space", flat=True)]:
@@ -167,17 +165,6 @@ class ReducedModel:
     def __call__(self, s: ArrayLike) -> Complex:
         """Return values (outputs, *s.shape) at complex s [1/s]."""
         return self.model(s)
-
-    def deviation(self, omega: ArrayLike) -> Real:
-        """Return the bound on |dG| (outputs, omega) of each output's error, errors times (|G| + |w G'|).
-
-        omega [rad/s] is 1-D.  Raises ParameterError for frequencies out of the range.
-        """
-        w, (low, high) = np.atleast_1d(np.asarray(omega, dtype=float)), self.band
-        remedy = f"the error is known from {low:g} to {high:g} rad/s; stay in this range"
-        require(((w >= low) & (w <= high)).all(), "omega", omega, remedy)
-        G = transfer(self.arm, self.model.rows, x=self.model.x)
-        return self.errors[:, None] * values_and_norm(G, w)[1]
 
     def matrices(self) -> Matrices:
         """Return A, B, C, D as NumPy arrays (see `PartialFractions.matrices`)."""
@@ -241,33 +228,32 @@ class _Bench:
 
     def of_order(self, order: int) -> ReducedModel:
         """Return the better model of that many states."""
-        pairs = self._pairs(order)
+        pairs, of = self._pairs(order), (self.arm, self.rows)
         if (order - self.fixed) % 2 and self.arm.damping:
-            return self._measured(relaxed_model(self.arm, self.rows, pairs, self.x), "modal", "")
+            return self._measured(relaxed_model(*of, pairs, self.x), "modal")
         found: list[ReducedModel] = []
         if self.by_aaa and pairs > self.inside:
-            model = rational_model(self.arm, self.rows, pairs, self.band[1], self.x)
+            model = rational_model(*of, pairs, self.band[1], self.x)
             few = "" if model.order == order else f"order below {order}: no more poles passed the checks of AAA"
             found.append(self._measured(model, "aaa", few))
         if self.by_modes or not found:
             note = "" if self.by_modes else f"method modal: AAA needs more than the {self.inside} modes in the range"
-            found.append(self._measured(modal_model(self.arm, self.rows, pairs, self.x), "modal", note))
+            found.append(self._measured(modal_model(*of, pairs, self.x), "modal", note))
             less = pairs - SLOW_PAIRS  # modes: slow poles replace omitted ones that are overdamped
             if less >= 1 and self.arm.damping * modes(self.arm, less).natural_frequency[-1] >= SLOW_POLES_FROM:
-                found.append(self._measured(slow_model(self.arm, self.rows, less, self.x), "modal", ""))
+                found.append(self._measured(slow_model(*of, less, self.x), "modal"))
         return min(found, key=lambda each: each.worst_error)
 
     def within(self, error: float) -> ReducedModel:
         """Return the smallest model whose error is within that one."""
-        tried, most = [self._few_poles(error)], self.most
+        found, most = [*self._few_poles(error)], self.most
         if self.arm.damping:
-            tried.append(self._few_modes(error, relaxed_model, most))
-            most = most if tried[-1] is None else tried[-1].model.index.size
+            found += self._few_modes(error, relaxed_model, most)
+            most = found[-1].model.index.size if found else most
         if self.by_modes:
-            tried.append(self._few_modes(error, modal_model, most))
-        found = [each for each in tried if each is not None]
+            found += self._few_modes(error, modal_model, most)
         if not found and self.arm.damping:
-            found = [each for each in [self._few_modes(error, slow_model, self.most - SLOW_PAIRS)] if each]
+            found += self._few_modes(error, slow_model, self.most - SLOW_PAIRS)
         if not found:
             best = self.of_order(2 * min(self.inside + MOST_TAILS, self.most) + self.fixed)
             message = (
@@ -277,20 +263,18 @@ class _Bench:
             raise ConvergenceError(message, best, best.worst_error)
         return min(found, key=lambda each: (each.order, each.worst_error))
 
-    def _few_poles(self, error: float) -> ReducedModel | None:
-        """Return the smallest model by AAA within an error, or None."""
-        if not self.by_aaa:
-            return None
-        for pairs in range(self.inside + 1, min(self.inside + MOST_TAILS, self.most) + 1):
-            model = rational_model(self.arm, self.rows, pairs, self.band[1], self.x)
-            if self.ruler.rough(model) <= error:
-                measured = self._measured(model, "aaa", "")
-                if measured.worst_error <= error:
-                    return measured
-        return None
+    def _few_poles(self, error: float) -> list[ReducedModel]:
+        """Return the smallest model by AAA within an error, if there is one."""
+        sizes = range(self.inside + 1, min(self.inside + MOST_TAILS, self.most) + 1) if self.by_aaa else ()
+        models = (rational_model(self.arm, self.rows, pairs, self.band[1], self.x) for pairs in sizes)
+        return self._first_within(error, models, "aaa")
 
-    def _few_modes(self, error: float, make: Callable[..., PartialFractions], most: int) -> ReducedModel | None:
-        """Return the smallest model of up to `most` modes within an error, or None.  By bisection, as errors fall."""
+    def _first_within(self, error: float, models: Iterable[PartialFractions], method: Reduction) -> list[ReducedModel]:
+        measured = (self._measured(model, method) for model in models if self.ruler.rough(model) <= error)
+        return list(islice((each for each in measured if each.worst_error <= error), 1))
+
+    def _few_modes(self, error: float, make: Callable[..., PartialFractions], most: int) -> list[ReducedModel]:
+        """Return the smallest model of up to `most` modes within an error, if any.  By bisection, as errors fall."""
 
         def rough(count: int) -> float:
             return self.ruler.rough(make(self.arm, self.rows, count, self.x))
@@ -301,20 +285,17 @@ class _Bench:
             while (size := rough(good)) > error:
                 sizes += [size] * (good > self.inside)
                 if good == most or (len(sizes) > 2 and sizes[-1] > LEAST_FALL * sizes[-3]):
-                    return None
+                    return []
                 good, bad = min(good + max(good // 2, 2), most), good
         except ConvergenceError:  # at C > 0 no more damped modes can be separated
-            return None
+            return []
         while good - bad > 1:
             middle = (good + bad) // 2
             good, bad = (middle, bad) if rough(middle) <= error else (good, middle)
-        for count in range(good, min(good + COUNTS_TRIED, most + 1)):
-            measured = self._measured(make(self.arm, self.rows, count, self.x), "modal", "")
-            if measured.worst_error <= error:
-                return measured
-        return None
+        counts = range(good, min(good + COUNTS_TRIED, most + 1))
+        return self._first_within(error, (make(self.arm, self.rows, count, self.x) for count in counts), "modal")
 
-    def _measured(self, model: PartialFractions, method: Reduction, note: str) -> ReducedModel:
+    def _measured(self, model: PartialFractions, method: Reduction, note: str = "") -> ReducedModel:
         return ReducedModel(model, method, self.band, *self.ruler.measure(model), *first_mode_lacking(model), note)
 
     def _pairs(self, order: object) -> int:
@@ -337,7 +318,7 @@ def first_mode_lacking(model: PartialFractions) -> tuple[int, float]:
     return first + 1, float(omega[first])
 
 
-WRITTEN_BY = ": written by tfarm."  # ends the first line of every script
+WRITTEN_BY = ": written by tfarm."  # in the first line of every script
 MAT_POINTS = 1000  # of the exact response in the file, even in ln w
 
 
@@ -355,8 +336,7 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
     text = ""
     with suppress(OSError):  # a file that cannot be read is not ours
         text = script.read_text("utf-8", errors="replace") if script.is_file() else ""
-    first, _, rest = text.partition("\n")
-    is_ours = not os.path.exists(script) or (first.endswith(WRITTEN_BY) and _loads(path) in rest)
+    is_ours = not os.path.exists(script) or (WRITTEN_BY in text and _loads(path) in text)
     remedy = f"{script.name} in that folder is not its script and would be replaced; choose another name"
     require(is_ours, key, str(path), remedy)
     write_file(script, _script(reduced, path).encode(), key=key)
@@ -372,16 +352,12 @@ def _loads(path: Path) -> str:
 
 def _contents(reduced: ReducedModel) -> dict[str, Any]:
     """Return the variables of the MATLAB file."""
-    A, B, C, D = reduced.matrices()
     model = reduced.model
     omega = np.geomspace(*reduced.band, MAT_POINTS)
     omega = omega[distance(omega, frequencies_around(model.arm, reduced.band[1])) > CLEAR_OF_POLES * omega]
     response = transfer(model.arm, model.rows, x=model.x)(1j * omega)
     return {
-        "A": A,
-        "B": B,
-        "C": C,
-        "D": D,
+        **reduced.named_matrices,
         "omega": omega,
         "response": response[:, None, :],
         "input_name": np.array([model.input], dtype=object),
