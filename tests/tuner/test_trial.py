@@ -15,7 +15,6 @@ from tests.shell import answer, refused
 from tfarm.arm import Hub, HubFeedback
 from tfarm.dsp import Chain, Converters, Sampling, Simulator, pulse_transfer, sampled_loop
 from tfarm.errors import ParameterError
-from tfarm.report import tuner_section
 from tfarm.tuner import (
     Cost,
     Plan,
@@ -173,16 +172,6 @@ def test_the_usual_rate_gain_damps_the_rigid_arm():
     assert usual_rate_gain(LAB, 0.0) == tfarm.default_gains(LAB).K1
     with pytest.raises(ParameterError, match="Kp"):
         usual_rate_gain(LAB, -1.0)
-
-
-def test_the_servo_of_a_page_is_slow_for_the_first_mode_and_the_period(monkeypatch):
-    """sqrt(Kp/J), to two digits of Kp: a twentieth of the first frequency, or 0.03 rad a sample where that is less."""
-    monkeypatch.setattr(tuner_section, "tune", lambda arm, plan, chain: plan)
-    first = tfarm.modes(LAB, 1).natural_frequency[-1]
-    for period, speed in ((0.002, first / 20), (0.02, 0.03 / 0.02)):
-        plan = tuner_section._servo_tuning(LAB, Plan(), Chain(sampling=Sampling(period=period)))
-        assert np.sqrt(plan.Kp / LAB.total_inertia) == pytest.approx(speed, rel=0.03)
-        assert usual_rate_gain(LAB, plan.Kp) == plan.K1
 
 
 def test_the_command_reports_where_the_tip_ends(capsys):
