@@ -281,3 +281,14 @@ def test_a_filter_has_its_pole_at_the_frequency_of_its_coefficient(name, signal)
     pole = form.coefficients(x)[[each.name for each in form.free].index("pole_rad_s")]
     poles = next(part.block.poles for part in as_law(form.record_at(x)).parts if part.signals == (signal,))
     assert abs(poles + pole).min() == pytest.approx(0.0, abs=1e-9 * pole)
+
+
+def test_positive_position_feedback_is_a_sum_of_filters():
+    """g w^2/(s^2 + 2 zeta w s + w^2) of each mode, on the root moment, at a point off the axis."""
+    form, s = form_of("PPF"), 30 + 80j
+    x = np.clip(form.origin + 0.3, *form.box)
+    law, filters = as_law(form.record_at(x)), form.coefficients(x)[1:].reshape(2, 3)
+    own = next(part.block for part in law.parts if part.signals == ("root_moment",))
+    assert np.polyval(own.num, s) / np.polyval(own.den, s) == pytest.approx(
+        sum(g * w**2 / (s**2 + 2 * zeta * w * s + w**2) for g, w, zeta in filters), rel=1e-9
+    )
