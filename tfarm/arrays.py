@@ -1,4 +1,4 @@
-"""Types of arrays: real, complex and whole numbers in double precision."""
+"""Types of arrays, real, complex and whole numbers in double precision, and the limits of these."""
 
 from typing import Any
 
@@ -10,3 +10,4 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 Whole = NDArray[np.int64]
 
 LEAST_SIZE = 1e-300  # in place of 0 in a denominator or logarithm
+MACHINE_EPS = float(np.finfo(float).eps)  # of a double, to be multiplied by counts of operations

@@ -22,9 +22,9 @@ from tfarm.errors import one_line
 from tfarm.fitting.recording import compare_run, load_run, overshoot
 from tfarm.report import writing
 from tfarm.report.loop_section import law_section, margins_section
-from tfarm.report.page import Case, GivenLaw
+from tfarm.report.page import Case, GivenLaw, file_of
 from tfarm.report.sampled_section import sampled_section, step_rows
-from tfarm.report.writing import PIECES, file_of, pieces_of
+from tfarm.report.writing import PIECES, pieces_of
 from tfarm.schema import to_json
 
 LAB, BARE, PRESET = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "quanser-2dsfl"))

@@ -47,7 +47,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import MACHINE_EPS, Complex, Real
 from tfarm.dsp.plant import SLOW, phi
 from tfarm.dsp.sampled import Sampled, resized
 from tfarm.errors import ConvergenceError
@@ -56,7 +56,6 @@ from tfarm.spectrum import modes
 from tfarm.spectrum.box import TOWARD_SINGULAR, Box, winding_number
 from tfarm.spectrum.naming import function_of
 
-MACHINE_EPS = float(np.finfo(float).eps)  # of a float64, to be multiplied by counts of operations
 ARCS = 64  # of half the circle to begin with
 SHORTEST_ARC = 1e-13  # rad: no arc is cut further, as its ends are known to a few last bits
 PIECES_OF_ARC = 4  # into which one is cut that is too long

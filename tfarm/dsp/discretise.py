@@ -20,14 +20,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, AnyLaw, Arm, as_law, full_law, must_not_be_algebraic
 from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace
 from tfarm.arm.law import Law, Part, is_measured
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import MACHINE_EPS, Complex, Real
 from tfarm.dsp.chain import MOST_DELAY, Chain
 from tfarm.errors import ParameterError, require
 from tfarm.exact.rationals import block_factors
@@ -36,6 +36,7 @@ from tfarm.schema import Quantity
 from tfarm.spectrum.table import check_gains
 
 SAME_PERIOD = 1e-9  # relative: 1/100 s in two files may differ in its last digits
+ROUNDINGS = 8  # of each term of F: of its product of n factors they add up as the root of n
 VANISHED = 1e-12  # of its terms: a sum over several signals that cancel
 RULE = Quantity("discretisation", help="rule by which the continuous-time controller is made discrete")
 
@@ -86,11 +87,11 @@ def tustin(block: LawBlock, period: float, prewarp: float = 0.0) -> LawBlock:
     c = prewarped(period, prewarp)
     remedy = f"the law has a pole at {c:g} 1/s, which this rule maps to infinity; take another rule or period"
     if isinstance(block, Rational) and block.excess > 0:
-        least = np.finfo(float).eps * np.polyval(np.abs(block.den), c)
+        least = MACHINE_EPS * np.polyval(np.abs(block.den), c)
         require(abs(np.polyval(block.den, c)) > least, "rule", "tustin", remedy)
         return by_factors(block, "tustin", period, c)
     A = block.matrices()[0]
-    require(np.linalg.cond(np.eye(len(A)) - A / c) <= 1 / np.finfo(float).eps, "rule", "tustin", remedy)
+    require(np.linalg.cond(np.eye(len(A)) - A / c) <= 1 / MACHINE_EPS, "rule", "tustin", remedy)
     return by_scipy(block, 2 / c, "bilinear")
 
 
@@ -253,3 +254,17 @@ def _factors(part: Part, law: Law, chain: Chain) -> tuple[Complex, list[tuple[st
         ("hub_angle", -g * lag / T, np.r_[zeros, 0.0]) if name == "hub_rate" else (name, g, np.r_[zeros, lag])
         for name, g, zeros in columns
     ]
+
+
+def root_product(start: Complex, roots: Complex, more: Any = 0.0) -> Complex:
+    """prod(delta - roots) at delta = start + more (n,), without loss where a root is the start."""
+    return np.asarray(((start[:, None] - roots) + np.reshape(more, (-1, 1))).prod(axis=1))
+
+
+def root_product_error(start: Complex, roots: Complex, more: Any) -> Real:
+    """Bound on the rounding error of that product; a root that is the start is exact."""
+    away = start[:, None] - roots
+    sizes = abs(away + np.reshape(more, (-1, 1)))
+    blur = np.where(away == 0, 0.0, MACHINE_EPS * (abs(start)[:, None] + abs(roots)))
+    most = (sizes + blur).prod(axis=1)
+    return np.asarray(most - sizes.prod(axis=1) + MACHINE_EPS * ROUNDINGS * most)

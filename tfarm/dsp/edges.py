@@ -22,8 +22,8 @@ from tfarm.dsp.chain import Chain
 from tfarm.dsp.circle import Band, complete_band
 from tfarm.dsp.crossings import stable_windows
 from tfarm.dsp.discretise import acting_law, with_all_gains
-from tfarm.dsp.plant import FORGOTTEN, held_amplitude
-from tfarm.dsp.sampled import Sampled, first_distinct, resized, sampled_loop
+from tfarm.dsp.plant import FORGOTTEN, first_distinct, held_amplitude
+from tfarm.dsp.sampled import Sampled, resized, sampled_loop
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes_below

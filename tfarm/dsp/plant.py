@@ -21,9 +21,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, reduce
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,7 +32,7 @@ from numpy.typing import ArrayLike, NDArray
 from tfarm.arm import Arm
 from tfarm.arrays import Complex, Real
 from tfarm.dsp.chain import Chain, Sampling
-from tfarm.errors import require
+from tfarm.errors import ConvergenceError, require
 from tfarm.exact.outputs import Output
 from tfarm.records import record
 from tfarm.reduced import ModalModel, modal_model
@@ -453,3 +454,15 @@ def held_amplitude(p: Complex, duration: float) -> Complex:
     """(e^{p t} - 1)/p: the amplitude of a unit torque after `duration` t [s]."""
     safe = np.where(p * duration == 0, 1.0, p)
     return np.where(p * duration == 0, duration, np.expm1(p * duration) / safe)
+
+
+Made = TypeVar("Made")
+
+
+def first_distinct(make: Callable[[float], Made], candidates: Sequence[float]) -> Made:
+    """What is made of the first of some candidates at which no two damped modes are one; the error of the last one."""
+    *others, last = candidates
+    for each in others:
+        with suppress(ConvergenceError):
+            return make(each)
+    return make(last)

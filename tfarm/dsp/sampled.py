@@ -24,21 +24,35 @@ rounding error of F in W that bounds the error of the root: where |ln|z|| is les
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
 
-from tfarm.arm import FED_BACK, GAINS, AnyLaw, Arm, HubFeedback
-from tfarm.arm.feedback import law_of
-from tfarm.arm.law import Law
-from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
+from tfarm.arm import FED_BACK, GAINS, AnyLaw, Arm, HubFeedback, Law, law_of
+from tfarm.arrays import LEAST_SIZE, MACHINE_EPS, Complex, Real, Whole
 from tfarm.dsp.chain import Chain, Sampling, chain_or_usual
-from tfarm.dsp.discretise import LawInZ, acting_law, law_in_z, lowest_power, with_all_gains
-from tfarm.dsp.plant import MODES_USED, USUAL_MODES, Plant, PulseTransfer, SensedPlant, is_analog, sensed_plant
-from tfarm.errors import ConvergenceError, ParameterError, did_you_mean
+from tfarm.dsp.discretise import (
+    LawInZ,
+    acting_law,
+    law_in_z,
+    lowest_power,
+    root_product,
+    root_product_error,
+    with_all_gains,
+)
+from tfarm.dsp.plant import (
+    MODES_USED,
+    USUAL_MODES,
+    Plant,
+    PulseTransfer,
+    SensedPlant,
+    first_distinct,
+    is_analog,
+    sensed_plant,
+)
+from tfarm.errors import ParameterError, did_you_mean
 from tfarm.records import record
 from tfarm.response.signals import Controller, controller
 from tfarm.schema import Quantity
@@ -49,8 +63,6 @@ OFF_POLE = 1e-17  # for an offset of 0: next to 1 that is none
 MOST_STEPS = 200  # of all roots together: a cluster of nine takes 24
 LAST_STEP = 1e-12  # of the offset: below its rounding
 UNMOVED = 1e-50  # an offset this small is a pole that the loop does not move
-MACHINE_EPS = float(np.finfo(float).eps)
-ROUNDINGS = 8  # of each term of F: of its product of n factors they add up as the root of n
 LEAST_SQUARE = -1.0 + 1e-15  # for |z|^2 - 1 of a pole at z = 0, the base of no root
 CLEAR_BY, ROUNDED = 2.0, 1e-15  # radii of a disc, and more for the rounding of |z|, by which it is off the circle
 FADED_RADIUS = 0.2  # a pole nearer to z = 0 is stable and not polished
@@ -209,8 +221,8 @@ class Sampled:
         delta = np.exp(1j * self.plant.poles.imag * self.chain.sampling.period) - 1
         entries = np.zeros(self.plant.residues.shape, complex)
         for part, row, gain, zeros in self.in_z.terms:
-            entries[row] += self.weights[part] * gain * _product(delta, zeros)
-        whole = np.maximum(abs(_product(delta, self.in_z.poles)), LEAST_SIZE)
+            entries[row] += self.weights[part] * gain * root_product(delta, zeros)
+        whole = np.maximum(abs(root_product(delta, self.in_z.poles)), LEAST_SIZE)
         return np.asarray(abs(entries * self.plant.residues).sum(axis=0) / whole)
 
     # ------------------------------------------------------------ characteristic function
@@ -239,9 +251,9 @@ class Sampled:
             at, offset = np.where(is_of_law, -1, base), np.where(is_of_law, 1.0, offset)
         measured = self.pulse.scaled(z, at, offset, delta)
         rows = np.zeros((1 + len(self.weights), z.size), complex)
-        rows[0] = offset * _product(start, self.in_z.poles, more)
+        rows[0] = offset * root_product(start, self.in_z.poles, more)
         for part, row, gain, zeros in self.in_z.terms:
-            rows[1 + part] += gain * _product(start, zeros, more) * measured[row]
+            rows[1 + part] += gain * root_product(start, zeros, more) * measured[row]
         return rows
 
     def rounding(self, base: Whole, offset: Complex) -> Real:
@@ -249,9 +261,9 @@ class Sampled:
         start, is_of_law = self.open_loop[base], base >= self.pulse.poles.size
         scale = np.where(is_of_law, 1.0, offset)
         sizes = self.pulse.sizes(np.where(is_of_law, -1, base), scale, start + offset)
-        error = abs(scale) * _product_error(start, self.in_z.poles, offset)
+        error = abs(scale) * root_product_error(start, self.in_z.poles, offset)
         for part, row, gain, zeros in self.in_z.terms:
-            error += abs(self.weights[part] * gain) * _product_error(start, zeros, offset) * sizes[row]
+            error += abs(self.weights[part] * gain) * root_product_error(start, zeros, offset) * sizes[row]
         return error
 
     def __call__(self, z: Complex) -> Complex:
@@ -459,35 +471,12 @@ def _weierstrass(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tu
     of_plant, own = b < pulse.poles.size, np.where(b == pulse.poles.size - 1, known.size, b)
     listed = of_plant & (own < poles.size)  # but where a free hub angle has the pole at z = 1
     away[listed, own[listed]] = 1.0  # F is times the distance from that pole
-    slope = (
-        np.where(of_plant & ~listed, o, 1.0)
-        * (apart[:, : poles.size] / away).prod(axis=1)
-        * apart[:, poles.size :].prod(axis=1)
-    )
+    of_poles, others = (apart[:, : poles.size] / away).prod(axis=1), apart[:, poles.size :].prod(axis=1)
+    slope = np.where(of_plant & ~listed, o, 1.0) * of_poles * others
     return loop.row @ loop.terms(1 + (one + o), b, o), slope, apart
 
 
-def _product(start: Complex, roots: Complex, more: Any = 0.0) -> Complex:
-    """prod(delta - roots) at delta = start + more (n,), without loss where a root is the start."""
-    return np.asarray(((start[:, None] - roots) + np.reshape(more, (-1, 1))).prod(axis=1))
-
-
-def _product_error(start: Complex, roots: Complex, more: Any) -> Real:
-    """Bound on the rounding error of that product; a root that is the start is exact."""
-    away = start[:, None] - roots
-    sizes = abs(away + np.reshape(more, (-1, 1)))
-    blur = np.where(away == 0, 0.0, MACHINE_EPS * (abs(start)[:, None] + abs(roots)))
-    most = (sizes + blur).prod(axis=1)
-    return np.asarray(most - sizes.prod(axis=1) + MACHINE_EPS * ROUNDINGS * most)
-
-
-def sampled_loop(
-    arm: Arm,
-    law: AnyLaw,
-    chain: Chain | None = None,
-    *,
-    count: int = USUAL_MODES,
-) -> Sampled:
+def sampled_loop(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int = USUAL_MODES) -> Sampled:
     """Return the loop with `count` flexible modes.
 
     Raises ParameterError for a locked hub, an unknown signal, a law in z of another period, a massless hub whose moment
@@ -501,15 +490,6 @@ def sampled_loop(
         law, acting = (each.having(name, 1.0) for each in (law, acting))
     in_z = law_in_z(law, acting, chain)
     return Sampled(sensed_plant(arm, chain, in_z.signals, count), chain, law, in_z, tuple(weights))
-
-
-def first_distinct(make: Callable[[float], Sampled], candidates: Sequence[float]) -> Sampled:
-    """The loop of the first of some candidates at which no two damped modes are one; the error of the last one."""
-    *others, last = candidates
-    for each in others:
-        with suppress(ConvergenceError):
-            return make(each)
-    return make(last)
 
 
 def resized(loop: Sampled, count: int) -> Sampled:

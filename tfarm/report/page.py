@@ -7,6 +7,7 @@ import json
 import math
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from pathlib import Path
@@ -31,9 +32,11 @@ from tfarm.arm import (
     load,
     presets,
 )
+from tfarm.arm.writing import law_toml
 from tfarm.digits import how_many, listed, plain, scientific, significant
 from tfarm.dsp import Chain, discretise, load_chain, verdict
-from tfarm.errors import ConvergenceError, one_line
+from tfarm.dsp.chain import file_text
+from tfarm.errors import ConvergenceError, ParameterError, one_line
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.fitting.recording import MeasuredRun
@@ -360,3 +363,27 @@ def is_preset(arm: Arm, chain: Chain) -> bool:
 def argument(name: str, preset: bool) -> str:
     """The name of an arm in a command."""
     return shlex.quote(name if preset else f"{name}.toml")
+
+
+def file_of(case: Case) -> str:
+    """The arm's file with its chain, and with the law that the page is about where TOML can say that alone."""
+    law = own_law(case)
+    return file_text(case.arm, case.chain) + ("" if law is None else f"\n{law}")
+
+
+def own_law(case: Case) -> str | None:
+    """The table [law] of the one law of a page; None of none or several, or of one with files of its own."""
+    with suppress(ParameterError):
+        if len(case.laws) == 1 and case.laws[0].measured is None:
+            return law_toml(as_law(case.laws[0].law))
+    return None
+
+
+def command_of(case: Case, only: str) -> str:
+    """The command that writes this page; an arm that is no preset is named by its file, as are laws with theirs."""
+    law = own_law(case)
+    options = [] if law is not None else [f"--law {shlex.quote(each.file or 'FILE')}" for each in case.laws]
+    options += [f"--measured {shlex.quote(f'{each.name}={each.source}')}" for each in case.measured]
+    options += [f"--only {only}"] * bool(only)
+    name = argument(case.arm.name, law is None and is_preset(case.arm, case.chain))
+    return " ".join(["tfarm report", name, *options, "--out reports"])

@@ -6,7 +6,6 @@ The sections of an arm's page in their order, its page by templates, the index, 
 import hashlib
 import os
 import re
-import shlex
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -17,11 +16,9 @@ from typing import Any
 
 from markupsafe import Markup
 
-from tfarm.arm import PLANE, Arm, as_law
-from tfarm.arm.writing import law_toml
+from tfarm.arm import PLANE, Arm
 from tfarm.case import Comparison
 from tfarm.dsp import Chain
-from tfarm.dsp.chain import file_text
 from tfarm.errors import ParameterError, TfarmError, must_be_known, require
 from tfarm.files import temporary_folder
 from tfarm.fitting.data import Measured
@@ -47,11 +44,11 @@ from tfarm.report.page import (
     Fact,
     GivenLaw,
     PageSection,
-    argument,
     brief_on,
     check_laws,
+    command_of,
+    file_of,
     has_loop,
-    is_preset,
     keep,
     kept,
     kept_in,
@@ -398,30 +395,6 @@ def pages_in(folder: Path, written: Sequence[str] = ()) -> list[tuple[str, str]]
 def summary(case: Case) -> str:
     """The arm in one sentence, and the laws that its page is about in another."""
     return prose("summary", arm=case.arm, laws=[each.name for each in case.laws])
-
-
-def file_of(case: Case) -> str:
-    """The arm's file with its chain, and with the law that the page is about where TOML can say that alone."""
-    law = own_law(case)
-    return file_text(case.arm, case.chain) + ("" if law is None else f"\n{law}")
-
-
-def own_law(case: Case) -> str | None:
-    """The table [law] of the one law of a page; None of none or several, or of one with files of its own."""
-    with suppress(ParameterError):
-        if len(case.laws) == 1 and case.laws[0].measured is None:
-            return law_toml(as_law(case.laws[0].law))
-    return None
-
-
-def command_of(case: Case, only: str) -> str:
-    """The command that writes this page; an arm that is no preset is named by its file, as are laws with theirs."""
-    law = own_law(case)
-    options = [] if law is not None else [f"--law {shlex.quote(each.file or 'FILE')}" for each in case.laws]
-    options += [f"--measured {shlex.quote(f'{each.name}={each.source}')}" for each in case.measured]
-    options += [f"--only {only}"] * bool(only)
-    name = argument(case.arm.name, law is None and is_preset(case.arm, case.chain))
-    return " ".join(["tfarm report", name, *options, "--out reports"])
 
 
 # ------------------------------------------------------------ the index

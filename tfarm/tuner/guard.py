@@ -48,8 +48,7 @@ from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN
 from tfarm.arrays import Real
 from tfarm.dsp import Sampled, sampled_loop, stable_windows
 from tfarm.dsp.crossings import around
-from tfarm.dsp.plant import held_amplitude
-from tfarm.dsp.sampled import first_distinct
+from tfarm.dsp.plant import first_distinct, held_amplitude
 from tfarm.errors import CertificationError, ConvergenceError, must_be_known
 from tfarm.exact.rationals import exact_matrix, falls, is_positive_definite
 from tfarm.loop.margins import lowest
