@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         load,
         presets,
     )
-    from tfarm.case import compare
+    from tfarm.case import compare, result_card
     from tfarm.dsp.results import simulate
     from tfarm.dsp.verdict import sampled
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
@@ -88,6 +88,7 @@ __all__ = [
     "presets",
     "read_measured",
     "reduce",
+    "result_card",
     "sampled",
     "simulate",
     "spill",
@@ -114,6 +115,7 @@ _ROOMS = {  # the module of a name; after a colon another name there
     "plots": "plots",
     "read_measured": "fitting.data",
     "reduce": "reduced",
+    "result_card": "case",
     "sampled": "dsp.verdict",
     "simulate": "dsp.results",
     "spill": "loop.stability",

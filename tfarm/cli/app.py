@@ -298,11 +298,13 @@ def emit(
     png: Path | None = None,
     also: Sequence[Path | None] = (),
     rows: bool = False,
+    summary: Any = None,
 ) -> None:
     """Write the curves or rows of a record to CSV and its picture to PNG, then print it as JSON or as text.
 
     `defaults` is what JSON has of default gains; `also` are files that are written already.  The text ends with the
-    `rows` of the CSV file where they are wanted and not written.  Nothing is printed where standard output is one of
+    `rows` of the CSV file where they are wanted and not written, and begins with the result card `summary`, as the
+    "summary" of JSON.  Nothing is printed where standard output is one of
     the files.
     """
     from tfarm.schema import curve_table, to_dict
@@ -320,9 +322,16 @@ def emit(
     for path in written:
         print(f"written: {path}", file=sys.stderr)
     if json:
-        print(to_json({**to_dict(record), **(defaults or {})}))
+        own = {} if summary is None else {"summary": to_dict(summary)}
+        print(to_json({**own, **to_dict(record), **(defaults or {})}))
         return
-    from tfarm.schema.terminal import show
+    from tfarm.schema.terminal import show, show_table, show_text
+
+    if summary is not None:
+        show_table(summary.table)
+        for note in summary.notes:
+            show_text(note)
+        print()
 
     words = f"by default {defaults['default_gains_in_words']}" if defaults and defaults["default_gains"] else ""
     show(record, curve_table(record) if rows and csv is None else None, words)

@@ -63,9 +63,11 @@ def poles(
 
 @command(epilog="margins sasaki2012-lab --K1 0.3 --K2 0.3")
 def margins(arm: ArmName, law: LawFile = None, theory: TheoryName = None, json: Json = False, *, gains: Gains) -> None:
-    """Stability, the stability interval of each gain, and the margins of the exact loop function."""
+    """Result card, stability, the stability interval of each gain, and the margins of the exact loop function."""
     subject, controller, defaults = load_loop(arm, theory, gains, law)
-    emit(tfarm.margins(subject, controller), json, defaults)
+    found = tfarm.margins(subject, controller)
+    card = tfarm.result_card(subject, controller, load_chain(arm), continuous=found)
+    emit(found, json, defaults, summary=card)
 
 
 @command(epilog="nyquist sasaki2012-lab --K1 0.3 --K2 0.3 --png nyquist.png")
@@ -207,7 +209,10 @@ def sampled(
     A law of a file acts with its own period, which has to be that of the chain; one in s is made discrete by its rule.
     """
     subject, controller, defaults = load_loop(arm, theory, gains, law)
-    emit(tfarm.sampled(subject, controller, chain(arm), count=modes), json, defaults)
+    sampling = chain(arm)
+    found = tfarm.sampled(subject, controller, sampling, count=modes)
+    card = tfarm.result_card(subject, controller, sampling, at_samples=found)
+    emit(found, json, defaults, summary=card)
 
 
 @sampled_command(epilog="simulate sasaki2012-lab --scenario slew --output tip_rotation --csv slew.csv")

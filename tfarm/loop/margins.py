@@ -15,7 +15,8 @@ Disk margin: the largest alpha for which the loop is stable with every factor (2
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Annotated, NamedTuple
+from functools import partial
+from typing import Annotated, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -258,9 +259,33 @@ def _exact(verdict: Stability, found: LoopMargins) -> tuple[float | None, float 
     return None, None, None
 
 
+class LoopFunction(Protocol):
+    """A loop function L(i w), that of samples L(e^{i w T}) among them."""
+
+    @property
+    def feeds_back(self) -> bool:
+        """Whether L is other than 0."""
+
+    def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
+        """Denominator and numerator of L at s = i w [1/s]."""
+
+    def loop_function(self, s: NDArray[Any]) -> Complex:
+        """L at s = i w [1/s]."""
+
+
 def loop_margins(verdict: Stability) -> LoopMargins:
     """The margins of a stable loop up to the verdict's band."""
-    loop, omega = verdict.loop, dense(verdict)
+    return margins_of_curve(verdict.loop, dense(verdict), verdict.band, partial(gain_edges, verdict.loop))
+
+
+def margins_of_curve(
+    loop: LoopFunction, omega: Real, band: float,
+    edges: Callable[[tuple[PhaseCrossover, ...]], list[float]] | None = None,
+) -> LoopMargins:  # fmt: skip
+    """The margins of a loop function on a grid (n,) that resolves it.
+
+    `edges` are the factors that end stability, by default all -1/L at a phase crossover.
+    """
     crossed = unit_crossings(loop, omega)
     apart = _spread(lambda w: loop.loop_function(1j * w), crossed)  # of size 1: what its angle moves by [rad]
     minus = -loop.loop_function(1j * crossed)
@@ -280,10 +305,10 @@ def loop_margins(verdict: Stability) -> LoopMargins:
     values["peak_sensitivity"] = max(1.0, values["peak_sensitivity"])
     places = {name: float(f"{where:.{PLACE_DIGITS}g}") for name, (_, where) in least.items()}
     by_phase = phase_crossovers(loop, omega)
-    factors = gain_edges(loop, by_phase)
+    factors = [factor for _, factor in by_phase] if edges is None else edges(by_phase)
     gain = max((t for t in factors if 0 <= t < 1), default=0.0), min((t for t in factors if t > 1), default=math.inf)
     by_gain = tuple(sorted(map(GainCrossover, crossed.tolist(), angle.tolist())))
-    return LoopMargins(verdict.band, gain, **values, at=places, gain_crossovers=by_gain, phase_crossovers=by_phase)
+    return LoopMargins(band, gain, **values, at=places, gain_crossovers=by_gain, phase_crossovers=by_phase)
 
 
 def held(values: Real, spread: Real, most: int = MARGIN_DIGITS) -> Real:
@@ -305,7 +330,7 @@ def _spread(f: Callable[[Real], Real | Complex], omega: Real) -> Real:
     return np.asarray(abs(f(near.ravel()).reshape(near.shape) - f(omega)).max(axis=0))
 
 
-def _distance(loop: Loop, of_1: float, of_L: float) -> Callable[[Real], Real]:
+def _distance(loop: LoopFunction, of_1: float, of_L: float) -> Callable[[Real], Real]:
     """|1 + L| over |of_1 + of_L L| at i omega: 1/|S|, 1/|T|, or a disk margin at one frequency."""
 
     def at(omega: Real) -> Real:
@@ -315,7 +340,7 @@ def _distance(loop: Loop, of_1: float, of_L: float) -> Callable[[Real], Real]:
     return at
 
 
-def phase_crossovers(loop: Loop, omega: Real) -> tuple[PhaseCrossover, ...]:
+def phase_crossovers(loop: LoopFunction, omega: Real) -> tuple[PhaseCrossover, ...]:
     """Frequencies [rad/s] with L real and below 0, and the factor -1/L; at rest too where L is finite there.
 
     Where L changes the side of the real axis at a pole or zero of its own, its denominator or numerator turns and not
@@ -345,7 +370,7 @@ def phase_crossovers(loop: Loop, omega: Real) -> tuple[PhaseCrossover, ...]:
     return tuple(sorted(found))
 
 
-def _factor(loop: Loop, omega: Real) -> Complex:
+def _factor(loop: LoopFunction, omega: Real) -> Complex:
     """-1/L at i omega; 0 where L is infinite or vanishes."""
     drive, fed_back = loop.parts(1j * omega)
     return np.asarray(-drive / np.where(fed_back == 0, np.inf, fed_back))
@@ -391,7 +416,7 @@ def gain_edges(loop: Loop, by_phase: tuple[PhaseCrossover, ...]) -> list[float]:
     return found + ([-arm.rate_loss / gains.K1] if gains.K1 and arm.rate_loss else [])
 
 
-def unit_crossings(loop: Loop, omega: Real) -> Real:
+def unit_crossings(loop: LoopFunction, omega: Real) -> Real:
     """Frequencies [rad/s] where |L(i w)| = 1."""
     if not loop.feeds_back:
         return np.empty(0)

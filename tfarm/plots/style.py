@@ -33,6 +33,12 @@ from tfarm.schema import quantities
 INK, GREY, FAINT = "#1a1a1a", "#6b6b6b", "#d4d4d4"
 BLUE, ORANGE, GREEN, PURPLE = "#0060a8", "#c4500a", "#00795a", "#8a3b8f"  # distinct for the colour-blind too
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE)  # of several records in one picture
+# stability, the same in every picture, page and live view; each has a mark of its own too, for grey print
+STABLE, MARGINAL, UNSTABLE = BLUE, PURPLE, ORANGE
+# regions of a map by the number of unstable poles, 0 first: ever darker in grey; green is kept for good margins
+REGIONS = ("#d3e6f5", "#fbdcc4", "#f3bd95", "#e89c67", "#d97c40")
+# grades of margins; with those of a page's dark mode in style.css
+GOOD, LOW, POOR = GREEN, "#8a6100", "#b3310a"
 
 
 WIDEST_LEGEND = 0.95  # of a figure's width: letters are a little wider or narrower in a file of other dots an inch

@@ -31,10 +31,15 @@ def show(record: Any, rows: Table | None = None, last: str = "") -> None:
         if each.pairs:
             print("\n".join(pair_lines(each.pairs, terminal_width())))
         if each.table is not None:
-            print("\n".join(table_lines(each.table, terminal_width())))
+            show_table(each.table)
         if each.drawing:
             print(each.drawing)
     show_text(last)
+
+
+def show_table(table: Table) -> None:
+    """Print a table in the width of the terminal."""
+    print("\n".join(table_lines(table, terminal_width())))
 
 
 def show_text(text: str) -> None:

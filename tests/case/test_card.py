@@ -1,0 +1,135 @@
+"""The result card: the same numbers as the records', and as python-control's on other models of the same loops."""
+
+import math
+
+import control
+import numpy as np
+import pytest
+
+import tfarm
+from tests.shell import answer, run
+from tfarm.case import card
+from tfarm.dsp import Chain, Sampling, sampled_verdict
+
+BARE, LAB = tfarm.load("sasaki2012"), tfarm.load("sasaki2012-lab")
+LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
+
+
+def some_loops():
+    """Arms with damped links under gains at the hub, both loops stable, at periods of 1 to 10 ms."""
+    rng, found = np.random.default_rng(20261126), []
+    while len(found) < 6:
+        arm = LAB.having(damping=10 ** rng.uniform(-4, -3), payload_mass=LAB.payload.mass * rng.uniform(0.2, 3))
+        law = tfarm.HubFeedback(K1=10 ** rng.uniform(-1, 0), K2=rng.uniform(-0.1, 0.5), Kp=10 ** rng.uniform(-1, 0.5))
+        chain = Chain(sampling=Sampling(period=10 ** rng.uniform(-3, -2)))
+        both = tfarm.margins(arm, law).stability.is_stable, sampled_verdict(arm, law, chain).is_stable
+        found += [(arm, law, chain)] if all(both) else []
+    return found
+
+
+def continuous_model(arm, law, _):
+    """L(s) by python-control: the first modes of the arm with a static remainder, and the gains."""
+    plant = tfarm.reduce(arm, ["hub_angle", "hub_rate", "root_moment"], order=40).state_space()
+    return control.StateSpace([], [], [], [[law.Kp, law.K1, law.K2]]) * plant
+
+
+def sampled_model(arm, law, chain):
+    """L(z) by python-control: states of arm and law without feedback, and the row that closes the loop."""
+    loop = sampled_verdict(arm, law, chain).full
+    (A, b), closed = loop.frame, loop.matrix()
+    row = np.linalg.lstsq(b[:, None], A - closed, rcond=None)[0]
+    return control.StateSpace(A, b[:, None], row, [[0.0]], chain.sampling.period)
+
+
+@pytest.mark.parametrize(("name", "model"), [("continuous", continuous_model), ("sampled", sampled_model)])
+def test_margins_of_random_loops_are_those_of_python_control(name, model):
+    """To 1e-3: what a model of forty states leaves out."""
+    for arm, law, chain in some_loops():
+        own = getattr(tfarm.result_card(arm, law, chain), name)
+        L = model(arm, law, chain)
+        omega = np.geomspace(1e-2, math.pi / chain.sampling.period if L.isdtime() else 3e3, 20_000)
+        curve = L(np.exp(1j * omega * L.dt) if L.isdtime() else 1j * omega)
+        gains, phases, _, _, crossings, _ = control.stability_margins(control.FRD(curve, omega), returnall=True)
+        up = min((gain for gain in gains if gain > 1), default=math.inf)
+        assert 10 ** (own.gain_margin.value / 20) == pytest.approx(up, rel=1e-3)
+        phase = abs((phases + 180) % 360 - 180)
+        n = phase.argmin()
+        assert own.phase_margin[:2] == pytest.approx((phase[n], crossings[n]), rel=1e-3)
+        assert own.peak_sensitivity.value == pytest.approx(max(1.0, (1 / abs(1 + curve)).max()), rel=1e-3)
+
+
+def test_every_number_is_that_of_the_record():
+    found, at_samples = tfarm.margins(LAB, LAW), tfarm.sampled(LAB, LAW)
+    both = tfarm.result_card(LAB, LAW)
+    own = both.continuous
+    assert own.gain_margin.value == pytest.approx(20 * math.log10(found.gain_margin[1]), rel=1e-15)
+    assert own.phase_margin.value == abs(found.in_band.phase_margin.value)
+    assert own.phase_margin.omega == found.in_band.phase_margin.omega
+    assert (own.delay_margin.value, own.disk_margin) == (1e3 * found.exact_delay, found.exact_disk)
+    assert own.peak_sensitivity[:2] == found.in_band.sensitivity_peak
+    assert own.delay_margin_periods == pytest.approx(found.exact_delay / 0.01, rel=1e-15)
+    assert both.sampled.delay_margin.value == 1e3 * at_samples.delay_margin_seconds
+    assert both.sampled.time_constant == at_samples.verdict.time_constant
+
+
+@pytest.mark.parametrize(
+    ("size", "limits", "grade"),
+    [
+        (6.0, card.GAIN_LIMITS, "good"),
+        (5.99, card.GAIN_LIMITS, "low"),
+        (2.99, card.GAIN_LIMITS, "poor"),
+        (math.inf, card.PHASE_LIMITS, "good"),
+        (2.0, card.PEAK_LIMITS, "good"),
+        (3.0, card.PEAK_LIMITS, "low"),
+        (math.inf, card.PEAK_LIMITS, "poor"),
+        (None, card.PERIOD_LIMITS, "-"),
+    ],
+)
+def test_grades_change_at_their_limits(size, limits, grade):
+    assert card.grade_of(size, limits) == grade
+
+
+def test_the_worst_margin_names_the_grade():
+    own = tfarm.result_card(LAB, LAW)
+    assert (own.continuous.grade, own.continuous.limited_by) == ("poor", ("phase margin", "Ms"))
+    assert own.continuous.delay_margin.grade == "good"
+
+
+def test_an_undamped_arm_keeps_its_stability_and_is_graded_with_a_little_damping():
+    own = tfarm.result_card(BARE, LAW)
+    C = card.reference_damping(BARE)
+    assert tfarm.damped_modes(tfarm.modes(BARE.having(damping=C), 1)).damping_ratio[-1] == pytest.approx(1e-3, rel=1e-3)
+    damped = tfarm.result_card(BARE.having(damping=C), LAW)
+    assert own.continuous.phase_margin == damped.continuous.phase_margin
+    assert (own.continuous.stability, own.sampled.stability) == ("stable", "unstable")
+    assert own.sampled.phase_margin.value is None
+    assert own.sampled.minimum_damping == tfarm.sampled(BARE, LAW).minimum_damping.value
+    assert "undamped model" in own.notes[-1]
+
+
+def test_default_gains_are_no_design():
+    at_default = tfarm.result_card(LAB, tfarm.default_gains(LAB)).notes
+    assert [note.partition(";")[0] for note in at_default] == ["default gains: scaled from the paper's, not a design"]
+    assert tfarm.result_card(LAB, tfarm.HubFeedback(K1=0.3, K2=0.31)).notes == ()
+
+
+def test_damping_ratios_of_the_sampled_loop_tend_to_those_of_the_continuous_one():
+    """Of modes far above the sampling rate too, at a short period: to first order in it."""
+    both = tfarm.result_card(LAB, LAW, Chain(sampling=Sampling(period=1e-5)))
+    assert both.sampled.least_damping.mode == both.continuous.least_damping.mode
+    assert both.sampled.least_damping.ratio == pytest.approx(both.continuous.least_damping.ratio, rel=2e-3)
+
+
+def test_a_law_in_z_has_a_sampled_card_alone():
+    own = tfarm.result_card(LAB, tfarm.Law({"hub_rate": ([0.3, 0.0], [1.0, -0.1])}, period=0.01))
+    assert own.continuous is None
+    assert own.sampled.stability == "stable"
+
+
+@pytest.mark.parametrize("command", ["margins", "sampled"])
+def test_the_command_begins_with_the_card(capsys, command):
+    _, text, _ = run(capsys, command, "sasaki2012-lab")
+    assert text.splitlines()[1].split() == ["stability", "stable", "stable"]
+    found, own = answer(capsys, command, "sasaki2012-lab")["summary"], tfarm.result_card(LAB, tfarm.default_gains(LAB))
+    assert found["continuous"]["phase_margin_deg"]["value"] == own.continuous.phase_margin.value
+    assert found["sampled"]["grade"] == own.sampled.grade

@@ -1,0 +1,327 @@
+"""Result card: stability, margins and damping of the loop, continuous-time and sampled, each margin with its grade.
+
+The loop is broken at the actuator.  A grade is *good*, *low* or *poor*; the limits are usual ones of the textbooks:
+
+* gain margin 6 dB and 3 dB, phase margin 45 deg and 30 deg: Ogata, Modern Control Engineering, 2010, sec. 7-7, and
+  Franklin, Powell and Emami-Naeini, Feedback Control of Dynamic Systems, 2015, sec. 6.4;
+* peak sensitivity Ms 2 and 3: Astrom and Murray, Feedback Systems, 2008, sec. 11.5 (1.2 to 2 is usual);
+* delay margin one sampling period and half of one: one more sample of computing time keeps a good loop stable.
+
+The loop function of the sampled loop is that of the samples, L(e^{i w T}), up to half the sampling rate.
+
+Without damping of the link any delay destabilises some mode, and the exact delay and disk margins are 0 for every gain.
+Such an arm is graded with 0.1 % of critical damping in its first mode; its stability remains that of the arm as it is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import AnyLaw, Arm, as_law
+from tfarm.arrays import Complex
+from tfarm.digits import general
+from tfarm.dsp import Chain, Sampled
+from tfarm.dsp.chain import chain_or_usual
+from tfarm.dsp.crossings import CircleGrid, circle_grid
+from tfarm.dsp.verdict import Analysis, sampled
+from tfarm.errors import ConvergenceError
+from tfarm.loop.margins import LoopMargins, Margins, margins, margins_of_curve
+from tfarm.loop.stability import SMALL_GAIN
+from tfarm.records import record
+from tfarm.schema import Percent, Quantity, Table, across
+from tfarm.spectrum import modes
+from tfarm.spectrum.table import default_gains
+
+from .comparison import HUB, poles_by_mode
+
+GRADES = UNDEFINED, GOOD, LOW, POOR = "-", "good", "low", "poor"  # the first of a margin which is not defined
+GRADED = {  # names of the graded margins in the grade of the loop
+    "gain_margin": "gain margin",
+    "gain_reduction": "gain margin downwards",
+    "phase_margin": "phase margin",
+    "delay_margin": "delay margin",
+    "peak_sensitivity": "Ms",
+}
+GAIN_LIMITS, PHASE_LIMITS, PERIOD_LIMITS, PEAK_LIMITS = (6.0, 3.0), (45.0, 30.0), (1.0, 0.5), (2.0, 3.0)
+REFERENCE_RATIO = 1e-3  # damping ratio of mode 1 with which an undamped arm is graded
+SMALL_RATIO = 1e-3  # of mode 1: below it the minimum structural damping for stability is on the card
+MOST_FACTOR = 1e9  # on the controller: a larger gain margin is none
+SAME_FACTOR = 1e-6  # relative: by no more the gain margin differs from the factor at its phase crossover
+UNDAMPED = (
+    "undamped model: margins and grades are those with C = {:.4g} s, 0.1 % of critical damping in mode 1; "
+    "at C = 0 the exact delay and disk margins are 0 for every gain"
+)
+SCALED = "default gains: scaled from the paper's, not a design; `tfarm design` recommends gains"
+
+
+class Graded(NamedTuple):
+    """A margin, the frequency [rad/s] that limits it, and its grade."""
+
+    value: Annotated[float | None, Quantity(help="size of the margin; inf without a limit, null where not defined")]
+    omega: Annotated[float | None, Quantity(key="at_rad_s", help="frequency at which the margin is reached")]
+    grade: Annotated[str, Quantity(help="good, low, poor, or - where not defined")]
+
+    def as_text(self, digits: int) -> str:
+        """Value, frequency and grade."""
+        if self.value is None:
+            return UNDEFINED
+        size = "no limit" if math.isinf(self.value) else general(self.value, digits)
+        return f"{size}{'' if self.omega is None else f' at {general(self.omega, digits)} rad/s'}, {self.grade}"
+
+
+class LeastDamped(NamedTuple):
+    """The least damping ratio of the oscillating closed-loop poles, and the mode of that pole."""
+
+    ratio: Annotated[Percent, Quantity(help="-Re s / abs(s); below 0 where the mode grows")]
+    mode: Annotated[str, Quantity(help="flexible mode whose pole is nearest; else the hub or the controller")]
+
+    def as_text(self, digits: int) -> str:
+        """Ratio and mode."""
+        return f"{self.ratio.as_text(digits)}, {self.mode}"
+
+
+NOT_DEFINED = Graded(None, None, UNDEFINED)
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class LoopCard:
+    """The numbers of one loop; its margins are not defined unless it is stable."""
+
+    stability: Annotated[str, Quantity("stability", help="stable, marginal or unstable")]
+    grade: Annotated[str, Quantity("grade", help="worst grade of the margins: good, low, poor, or - without margins")]
+    limited_by: Annotated[tuple[str, ...], Quantity("limited by", help="margins with that grade, unless it is good")]
+    certainty: Annotated[str, Quantity("certainty", help="range of the verdict with its word of certainty")]
+    gain_margin: Annotated[Graded, Quantity("gain margin, upwards", "dB", 4, key="gain_margin_db",
+            help="increase of the loop gain up to which the loop stays stable")]  # fmt: skip
+    gain_reduction: Annotated[Graded, Quantity("gain margin, downwards", "dB", 4, key="gain_reduction_db",
+            help="reduction of the loop gain down to which the loop stays stable")]  # fmt: skip
+    phase_margin: Annotated[Graded, Quantity("phase margin", "deg", 4, key="phase_margin_deg",
+            help="least over all gain crossovers, of lag or of lead")]  # fmt: skip
+    delay_margin: Annotated[Graded, Quantity("delay margin", "ms", 4, key="delay_margin_ms",
+            help="smallest additional loop delay that destabilises the loop")]  # fmt: skip
+    delay_margin_periods: Annotated[float | None, Quantity("delay margin over sampling period", "", 4,
+            help="delay margin in sampling periods")]  # fmt: skip
+    peak_sensitivity: Annotated[Graded, Quantity("peak sensitivity Ms", "", 4,
+            help="largest abs(1/(1 + L)); its inverse is the distance of L from -1")]  # fmt: skip
+    disk_margin: Annotated[float | None, Quantity("disk margin", "", 4,
+            help="gain and phase together: factors (2 + d)/(2 - d), abs(d) < margin")]  # fmt: skip
+    least_damping: Annotated[LeastDamped | None, Quantity("least damping ratio", "", 4,
+            help="of the oscillating closed-loop poles in the range of the verdict")]  # fmt: skip
+    time_constant: Annotated[float | None, Quantity("dominant time constant", "s", 4, key="time_constant_s",
+            help="of the slowest closed-loop pole, below 0 of a growing one; without a free hub angle")]  # fmt: skip
+    minimum_damping: Annotated[float | None, Quantity("minimum structural damping for stability", "s", 4,
+            help="Kelvin-Voigt damping C of the link from which on the loop is stable")]  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class ResultCard:
+    """The card of an arm under a controller: the continuous-time loop, None under a law in z, and the sampled one."""
+
+    continuous: Annotated[LoopCard | None, Quantity(help="continuous-time loop; null under a law in z")]
+    sampled: Annotated[LoopCard | None, Quantity(help="sampled loop; null where it is not determined")]
+    period: Annotated[float, Quantity(unit="s", help="sampling period")]
+    notes: Annotated[tuple[str, ...], Quantity(help="conditions of margins and grades, reasons of a missing loop")]
+
+    @property
+    def table(self) -> Table:
+        """A row a quantity, a column a loop."""
+        loops = {"continuous-time": self.continuous, f"sampled, {1e3 * self.period:g} ms": self.sampled}
+        return across({name: each for name, each in loops.items() if each is not None}, title="result")
+
+
+def result_card(
+    arm: Arm,
+    law: AnyLaw,
+    chain: Chain | None = None,
+    *,
+    continuous: Margins | None = None,
+    at_samples: Analysis | None = None,
+) -> ResultCard:
+    """Return the result card of an arm under a law, sampled by a chain (every 10 ms unless given).
+
+    `continuous` (of `margins`) and `at_samples` (of `sampled`) are what is known of these loops already.  Raises
+    ParameterError where there is no loop.
+    """
+    law, chain = as_law(law), chain_or_usual(chain)
+    T, reference = chain.sampling.period, reference_damping(arm)
+    damped = arm.having(damping=reference) if arm.has_elastic_link else arm
+    notes = [SCALED] if law.gains == default_gains(arm) else []
+    notes += [UNDAMPED.format(reference)] if arm.has_elastic_link else []
+    loops: dict[str, Callable[[], tuple[LoopCard, Callable[[], LoopCard]]]] = {
+        "continuous": lambda: (
+            continuous_card(continuous or margins(arm, law), T),
+            lambda: continuous_card(margins(damped, law), T),
+        ),
+        "sampled": lambda: (
+            sampled_card(at_samples or sampled(arm, law, chain)),
+            lambda: sampled_card(sampled(damped, law, chain)),
+        ),
+    }
+    cards: dict[str, LoopCard | None] = dict.fromkeys(loops)
+    for name in loops if not law.is_discrete else ("sampled",):
+        try:
+            own, graded = loops[name]()
+            cards[name] = _with_margins(own, graded()) if damped is not arm and own.stability != "unstable" else own
+        except ConvergenceError as error:
+            notes.append(f"{name} loop not determined: {error}")
+    return ResultCard(**cards, period=T, notes=tuple(notes))
+
+
+def reference_damping(arm: Arm) -> float:
+    """Kelvin-Voigt damping C [s] with which the first mode of an undamped arm has the damping ratio 0.1 %."""
+    return 2 * REFERENCE_RATIO / float(modes(arm, 1).natural_frequency[-1])
+
+
+def continuous_card(found: Margins, period: float) -> LoopCard:
+    """The card of a continuous-time loop; its delay margin is graded by a sampling period [s]."""
+    verdict, band = found.stability, found.in_band
+    moving, table = verdict.poles.moving, modes(verdict.loop.arm, up_to=verdict.band)
+    own = dict(zip(table.index.tolist(), (1j * table.natural_frequency).tolist(), strict=True))
+    abscissa = verdict.spectral_abscissa
+    beyond = (
+        ", small gain beyond" if verdict.tail == SMALL_GAIN else ", theorem beyond" if verdict.is_known_beyond else ""
+    )
+    delay = None if band is None else (band.delay if found.exact_delay is None else found.exact_delay)
+    return LoopCard(
+        stability=verdict.verdict,
+        certainty=f"converged to {verdict.band:.4g} rad/s{beyond}",
+        **_margins(band, None if band is None else band.gain, delay, period),
+        least_damping=_least_damped(poles_by_mode(moving[moving.imag > 0], {n: s for n, s in own.items() if n})),
+        time_constant=-1 / abscissa if abscissa and math.isfinite(abscissa) else None,
+        minimum_damping=None,
+    )
+
+
+def sampled_card(found: Analysis) -> LoopCard:
+    """The card of a sampled loop."""
+    verdict, loop, band = found.verdict, found.verdict.full, None
+    arm, T = loop.plant.arm, loop.chain.sampling.period
+    if verdict.is_stable:
+        curve = SampledCurve(loop)
+        band = margins_of_curve(curve, curve.grid.q / T, math.pi / T)
+    is_small = arm.least_damping < SMALL_RATIO / REFERENCE_RATIO * reference_damping(arm)
+    needed, word = found.minimum_damping if is_small else None, "converged" if verdict.is_converged else "approximate"
+    return LoopCard(
+        stability=verdict.word,
+        certainty=f"certified to {verdict.band.top:.3g} rad/s"
+        if verdict.band
+        else f"{word}, first {verdict.modes_used} modes",
+        **_margins(band, found.gain_factors, found.delay_margin_seconds, T),
+        least_damping=_least_damped(unaliased_poles(loop)),
+        time_constant=verdict.time_constant,
+        minimum_damping=None if needed is None else needed.value,
+    )
+
+
+@dataclass(frozen=True)
+class SampledCurve:
+    """L(e^{i w T}) of a sampled loop as a function of s = i w."""
+
+    loop: Sampled
+
+    @cached_property
+    def grid(self) -> CircleGrid:
+        """Angles w T that resolve L."""
+        return circle_grid(self.loop)
+
+    @property
+    def feeds_back(self) -> bool:
+        """Whether a gain of the law is other than 0."""
+        return any(self.loop.weights)
+
+    def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
+        """Denominator and numerator of L at s = i w."""
+        q = np.ravel(np.imag(s)) * self.loop.chain.sampling.period
+        base = self.grid.base[np.minimum(np.searchsorted(self.grid.q, q), self.grid.q.size - 1)]
+        own, *rows = self.grid.at(base, q - self.grid.angles[base])
+        fed_back = np.asarray(np.array(self.loop.weights) @ np.array(rows), dtype=np.complex128)
+        return own.reshape(np.shape(s)), fed_back.reshape(np.shape(s))
+
+    def loop_function(self, s: NDArray[Any]) -> Complex:
+        """L at s = i w."""
+        own, fed_back = self.parts(s)
+        return np.asarray(np.divide(fed_back, own, out=np.full(own.shape, np.inf + 0j), where=own != 0))
+
+
+def unaliased_poles(loop: Sampled) -> dict[int, complex]:
+    """The poles s = ln(z)/T [1/s] with Im s > 0 by mode, each at the frequency that is nearest to that of its mode."""
+    T, poles = loop.chain.sampling.period, loop.poles
+    upper = poles.z.imag > 0
+    table = modes(loop.plant.arm, max(1, int(poles.mode.max(initial=1))))
+    natural = dict(zip(table.index.tolist(), table.natural_frequency.tolist(), strict=True))
+    found: dict[int, complex] = {}
+    for n, q, growth in zip(poles.mode[upper].tolist(), np.angle(poles.z[upper]).tolist(),
+                            poles.log_radius[upper].tolist(), strict=True):  # fmt: skip
+        of_mode = natural.get(n, q / T) * T if n else q
+        turned = [abs(side * q + 2 * math.pi * round((of_mode - side * q) / (2 * math.pi))) for side in (1, -1)]
+        s = complex(growth, min(turned, key=lambda each: abs(each - of_mode))) / T
+        found[n] = max(found.get(n, s), s, key=lambda each: each.real / abs(each))
+    return found
+
+
+def _least_damped(by_mode: Mapping[int, complex]) -> LeastDamped | None:
+    """The pole of least damping ratio."""
+    ratios = {n: Percent(-s.real / abs(s) + 0.0) for n, s in by_mode.items()}
+    if not ratios:
+        return None
+    least = min(ratios, key=lambda n: ratios[n])
+    return LeastDamped(ratios[least], "the hub or the controller" if least == HUB else f"mode {least}")
+
+
+def _margins(
+    band: LoopMargins | None, gain: tuple[float, float] | None, delay: float | None, period: float
+) -> dict[str, Any]:
+    """The graded margins from those of a stable loop function, its stable factors and its delay margin [s]."""
+    if band is None or gain is None:
+        undefined = {"grade": UNDEFINED, "limited_by": (), "delay_margin_periods": None, "disk_margin": None}
+        return dict.fromkeys(GRADED, NOT_DEFINED) | undefined
+    down, up = (_decibels(band, factor) for factor in gain)
+    phase, peak = band.phase_margin, band.sensitivity_peak
+    periods = None if delay is None else float(delay) / period
+    graded = (
+        Graded(*up, grade_of(up[0], GAIN_LIMITS)),
+        Graded(*down, grade_of(down[0], GAIN_LIMITS)),
+        Graded(abs(phase.value), phase.omega, grade_of(abs(phase.value), PHASE_LIMITS)),
+        Graded(None if delay is None else 1e3 * float(delay), None, grade_of(periods, PERIOD_LIMITS)),
+        Graded(peak.value, peak.omega, grade_of(peak.value, PEAK_LIMITS)),
+    )
+    worst = max((each.grade for each in graded), key=GRADES.index)
+    names = [name for name, each in zip(GRADED.values(), graded, strict=True) if each.grade == worst != GOOD]
+    return dict(zip(GRADED, graded, strict=True)) | {
+        "grade": worst,
+        "limited_by": tuple(names),
+        "delay_margin_periods": periods,
+        "disk_margin": band.disk,
+    }
+
+
+def _decibels(band: LoopMargins, factor: float) -> tuple[float, float | None]:
+    """Size [dB] of a factor that ends stability, and the frequency [rad/s] at which it does."""
+    if not 1 / MOST_FACTOR < factor < MOST_FACTOR:
+        return math.inf, None
+    near = [w for w, t in band.phase_crossovers if abs(t / factor - 1) < SAME_FACTOR]
+    return abs(20 * math.log10(factor)), near[0] if near else None
+
+
+def grade_of(size: float | None, limits: tuple[float, float]) -> str:
+    """Grade of a margin by the limits of good and low: least values where they descend, else greatest ones."""
+    if size is None:
+        return UNDEFINED
+    sign = 1.0 if limits[0] > limits[1] else -1.0
+    good, low = (sign * size >= sign * limit for limit in limits)
+    return GOOD if good else LOW if low else POOR
+
+
+def _with_margins(own: LoopCard, graded: LoopCard) -> LoopCard:
+    """A card with the margins and the damping ratio of another one."""
+    names = (*GRADED, "grade", "limited_by", "delay_margin_periods", "disk_margin", "least_damping", "time_constant")
+    return replace(own, **{name: getattr(graded, name) for name in names})
