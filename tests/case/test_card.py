@@ -1,6 +1,7 @@
 """The result card: the same numbers as the records', and as python-control's on other models of the same loops."""
 
 import math
+import re
 
 import control
 import numpy as np
@@ -105,6 +106,13 @@ def test_an_undamped_arm_keeps_its_stability_and_is_graded_with_a_little_damping
     assert own.sampled.phase_margin.value is None
     assert own.sampled.minimum_damping == tfarm.sampled(BARE, LAW).minimum_damping.value
     assert "undamped model" in own.notes[-1]
+
+
+def test_a_notebook_shows_the_card():
+    own = tfarm.result_card(LAB, LAW)
+    assert "poor: phase margin, Ms; sampled, 10 ms stable, poor: phase margin" in repr(own)
+    shown = own._repr_html_()
+    assert re.search(r'<td class="text" data-label="continuous-time"[^>]*>7.901 at 63.28 rad/s, poor</td>', shown)
 
 
 def test_default_gains_are_no_design():

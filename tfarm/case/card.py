@@ -36,6 +36,7 @@ from tfarm.loop.margins import LoopMargins, Margins, margins, margins_of_curve
 from tfarm.loop.stability import SMALL_GAIN
 from tfarm.records import record
 from tfarm.schema import Percent, Quantity, Table, across
+from tfarm.schema.html import as_html, with_symbols
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import default_gains
 
@@ -120,6 +121,13 @@ class LoopCard:
     minimum_damping: Annotated[float | None, Quantity("minimum structural damping for stability", "s", 4,
             help="Kelvin-Voigt damping C of the link from which on the loop is stable")]  # fmt: skip
 
+    @property
+    def finding(self) -> str:
+        """Stability, and of a stable loop the grade with the margins that have it."""
+        if self.grade in (UNDEFINED, GOOD):
+            return self.stability
+        return f"{self.stability}, {self.grade}: {', '.join(self.limited_by)}"
+
 
 @dataclass(frozen=True, kw_only=True)
 @record
@@ -132,10 +140,23 @@ class ResultCard:
     notes: Annotated[tuple[str, ...], Quantity(help="conditions of margins and grades, reasons of a missing loop")]
 
     @property
+    def loops(self) -> dict[str, LoopCard]:
+        """The loops that are determined, by name."""
+        both = {"continuous-time": self.continuous, f"sampled, {1e3 * self.period:g} ms": self.sampled}
+        return {name: each for name, each in both.items() if each is not None}
+
+    @property
+    def finding(self) -> str:
+        """Stability and grade of each loop."""
+        return "; ".join(f"{name} {each.finding}" for name, each in self.loops.items())
+
+    @property
     def table(self) -> Table:
         """A row a quantity, a column a loop."""
-        loops = {"continuous-time": self.continuous, f"sampled, {1e3 * self.period:g} ms": self.sampled}
-        return across({name: each for name, each in loops.items() if each is not None}, title="result")
+        return across(self.loops, title="result")
+
+    def _repr_html_(self) -> str:
+        return as_html(self.table) + "".join(f"<p>{with_symbols(note)}</p>" for note in self.notes)
 
 
 def result_card(
