@@ -32,11 +32,12 @@ from .style import (
     BLUE,
     COLOURS,
     FAINT,
-    GREEN,
     GREY,
     INK,
     ORANGE,
     PURPLE,
+    REGIONS,
+    STABLE,
     by_name,
     picture,
     safe,
@@ -259,10 +260,10 @@ def draw_measured_runs(each: Mapping[str, RunComparison], *, ax: Sequence[Axes])
 def tuned_gain(found: Tuning, *, ax: Axes) -> None:
     """A tuned gain over time (from `tfarm.tune`) in its guard, in the axes given or new ones; the axes."""
     guard, result = found.training.guard, found.training.result
-    ax.axhspan(guard.lo, guard.hi, color="#bfe3d6", lw=0, zorder=0.5, label="guard: proven for any K(t) in it")
+    ax.axhspan(guard.lo, guard.hi, color=REGIONS[0], lw=0, zorder=0.5, label="guard: proven for any K(t) in it")
     ax.step(result.t, result.K, where="post", color=INK, lw=1.4, label="the tuner's gain K(t)")
     best = found.best_constant.gain
-    ax.axhline(best, color=PURPLE, lw=1.2, ls=LONG_DASHED, label=f"best constant gain, {significant(best, 3)}")
+    ax.axhline(best, color=GREY, lw=1.2, ls=LONG_DASHED, label=f"best constant gain, {significant(best, 3)}")
     ax.axvline(found.trial.task.busy_until, color=INK, lw=0.8, ls=DOTTED)
     ax.axhline(0.0, color=GREY, lw=0.7)
     ax.set(xlim=(0.0, float(result.t[-1])), xlabel=TIME, ylabel=f"gain on the root moment, {MOMENT_GAIN} [−]")
@@ -281,7 +282,7 @@ def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap], *, 
     left.lines[-1].remove()  # the mark of one controller: the bar is at its rate gain
     guard, K = tuning.training.guard, tuning.training.result.K
     at, _ = tuning.trial.loop.gains.point
-    for ends, colour, width, alpha in ((guard.lo, guard.hi), GREEN, 9, 0.75), ((K.min(), K.max()), INK, 2.4, None):
+    for ends, colour, width, alpha in ((guard.lo, guard.hi), STABLE, 9, 0.75), ((K.min(), K.max()), INK, 2.4, None):
         left.plot([at, at], ends, solid_capstyle="butt", zorder=6, color=colour, lw=width, alpha=alpha)
     tuned_gain(tuning, ax=right)
     left.set_ylim(-0.25, 1.25)  # from 0 to the continuous loop's bound, 1, and a quarter to either side
