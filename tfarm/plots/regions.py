@@ -252,7 +252,8 @@ def draw_region(
         ax.plot(x, np.transpose([low, high]), **line)
         ends = np.nonzero([piece.begins and x[0] > across[0], piece.ends])[0]
         ax.vlines(x[-ends], low[-ends], high[-ends], **line)
-    ax.fill_between([], [], [], **looks, label=safe(label) + ("" if parts else ": nowhere in this picture"))
+    key = looks if hatch else looks | {"edgecolor": INK, "ls": ls, "lw": 1.0}
+    ax.fill_between([], [], [], **key, label=safe(label) + ("" if parts else ": nowhere in this picture"))
 
 
 def draw_proven(arm: Arm, x: Axis, y: Axis, ax: Axes) -> None:
@@ -261,7 +262,7 @@ def draw_proven(arm: Arm, x: Axis, y: Axis, ax: Axes) -> None:
     label = f"Lyapunov ({LYAPUNOV}): {kind}"
     ax.plot([0, 0, x.high], [y.low, 1, 1], color=GREY, lw=2.2, ls=dashes, label=label)
     if not arm.is_undamped:
-        ax.plot([0, x.high], [0, 0], color=GREY, lw=2.2, label=f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven")
+        ax.plot([0, x.high], [0, 0], color=GREY, lw=1.6, label=f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven")
 
 
 def law_mark(law: HubFeedback, is_best: bool, label: str, ax: Axes) -> None:

@@ -30,7 +30,7 @@ NOTE: dict[str, Any] = {"fontsize": 7.0, "color": GREY, "path_effects": HALO, "t
 RATIOS = (*(m * 10.0**k for k in range(-6, 0) for m in (1, 2, 5)), 0.8)  # of damping, of which as many as fit
 Z_RATIOS, Z_FREQUENCIES = (0.1, 0.3, 0.5, 0.7, 0.9), range(1, 10)  # the latter in tenths of pi/T
 RATIO_APART = 0.17  # of a side of the picture: between the ends of two lines of constant damping ratio
-NAME_ROOM = (0.12, 0.06)  # of the width and the height: around the beginning of a name
+NAME_ROOM = (0.15, 0.06)  # of the width and the height: around the beginning of a name
 ARROW_ROOM, ARROW = 0.05, 0.015  # of a side: a branch that is shorter has no arrow; half the length of one
 
 
@@ -158,7 +158,7 @@ def _name_branch(name: str, s: Complex, ax: Axes, places: list[Real]) -> None:
         at = np.array([s[int(share * s.size)].real, s[int(share * s.size)].imag])
         if is_free(at, places, ax, NAME_ROOM):
             places.append(at[None])
-            ax.annotate(name, tuple(at), xytext=(6, 3), **(NOTE | {"fontsize": 8.0, "color": INK}))
+            ax.annotate(name, tuple(at), xytext=(6, 5), **(NOTE | {"fontsize": 8.0, "color": INK}))
             return
 
 
