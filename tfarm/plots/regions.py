@@ -59,6 +59,7 @@ from .style import (
 SLATE = "#5b7083"  # of contours of damping: no colour of stability
 DASHED, DASH_DOTTED = (0, (5, 2.5)), (0, (6, 2, 1, 2))  # edges of a sampled loop, and of a second one
 HATCHES = ("..", "\\\\\\\\", "////")  # of a sampled loop: with more damping, with less, with its own
+NUMBER_ROOM = (0.08, 0.045)  # of the width and the height: around a number
 NUMBERS_ACROSS = 0.14  # share of the picture's width between two frequencies
 HALO: list[AbstractPathEffect] = [withStroke(linewidth=3.0, foreground="white")]  # around numbers on a line
 K2_RANGE = (-1.0, 1.5)  # of the gain that balances a torque: 1 where the input is one, less for a motor's current
@@ -168,7 +169,7 @@ def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
     ax.plot([], [], color=SLATE, lw=0.8, label="least damping ratio of the first two modes")
 
 
-def is_free(at: Real, places: Sequence[Real], ax: Axes, room: tuple[float, float] = (0.08, 0.045)) -> bool:
+def is_free(at: Real, places: Sequence[Real], ax: Axes, room: tuple[float, float] = NUMBER_ROOM) -> bool:
     """Whether a text there touches none of those at the other places; `room` in shares of the width and the height."""
     frame = ax.transData - ax.transAxes
     away = (abs(frame.transform(place) - frame.transform(at)) > room for place in places)

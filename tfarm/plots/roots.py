@@ -14,10 +14,10 @@ from tfarm.digits import kept_digits, plain, significant
 from tfarm.dsp.modes import DRAWN_RADIUS, RIM, SampledLoci, SampledLocus
 from tfarm.errors import one_line
 from tfarm.loop.loci import POLE_DIGITS, Loci, ReducedLocus, held_branches
-from tfarm.loop.locus import Locus, frame, origin_name, rounded, view
+from tfarm.loop.locus import BranchCrossing, Locus, frame, origin_name, rounded, view
 from tfarm.response.frequency import AXIS_SHARE
 
-from .regions import HALO, is_free
+from .regions import HALO, NUMBER_ROOM, is_free
 from .style import FAINT, FIGURES, GREY, INK, MARGINAL, REGIONS, STABLE, UNSTABLE, gains_words, picture
 
 ROOM_AROUND = 0.12  # around a branch, as a share of its extent
@@ -73,47 +73,55 @@ def _panel(fine: Locus, exact: Locus, reduced: ReducedLocus | None, numbers: Seq
 
     `fine` is `exact` with the values between that a round line takes.
     """
-    branches, gain, last = held_branches(fine.branches), exact.gain, float(exact.gain[-1])
-    everything = len(numbers) == len(branches)
-    shown = branches[list(numbers)]
+    branches, gain = held_branches(fine.branches), exact.gain
+    shown, everything = branches[list(numbers)], len(numbers) == len(branches)
     left, right, low, high = view(shown, exact.origin) if everything else frame(shown[shown.imag >= 0])
     wide, tall = ROOM_AROUND * (right - left), ROOM_AROUND * (high - low)
-    left, right = left - wide, right + 2 * wide
-    ax.set(xlim=(left, right), ylim=(low - tall, high + tall), xlabel="Re s [1/s]", ylabel="Im s [rad/s]")
+    ax.set(xlim=(left - wide, right + 2 * wide), ylim=(low - tall, high + tall))
+    ax.set(xlabel="Re s [1/s]", ylabel="Im s [rad/s]")
     ax.xaxis.set_major_locator(MaxNLocator(4))
     places = s_grid(ax, is_named=everything)
+    _draw_branches(shown, ax)
+    for r in () if reduced is None else held_branches(reduced.branches[list(numbers)]):
+        meets = np.flatnonzero(np.diff((r.imag == 0).astype(int))) + 1  # between two values: no corner is cut off
+        ax.plot(*(np.insert(part, meets, np.nan) for part in (r.real, r.imag)), color=INK, **THIN)
+    way, last = int(np.sign(gain[-1] - gain[0])), float(gain[-1])
     is_factor = not exact.varied.is_of_arm and exact.vary != "delay"
     begins = 0.0 if is_factor and min(gain[0], last) <= 0 <= max(gain[0], last) else float(gain[0])
     values = [float(f"{value:.3g}") for value in np.linspace(begins, last, 5)]
-    first, *others = (plain(value, 3) for value in values)
-    way = np.sign(last - gain[0])
-    ax.axvline(0, color=INK, lw=0.9, zorder=1)
-    half_planes = ax.axvspan(left, 0.0, fc="none"), ax.axvspan(0.0, right, fc=REGIONS[1], zorder=0.1)
     mark = CROSS_AT_ZERO if begins == 0 else CIRCLE_AT_FIRST
-    for n in numbers:
-        s = branches[n]
-        for width, colour, part in zip((2.6, 2.61), (STABLE, UNSTABLE), half_planes, strict=True):
-            ax.plot(s.real, s.imag, lw=width, color=colour, zorder=2)[0].set_clip_path(part)
-        resting = np.where(abs(s.real) <= AXIS_SHARE * abs(s), s, np.nan)
-        ax.plot(0 * resting.real, resting.imag, lw=2.8, color=MARGINAL, zorder=2.1)
-        if reduced is not None:
-            r = held_branches(reduced.branches[n])
-            meets = np.flatnonzero(np.diff((r.imag == 0).astype(int))) + 1  # between two values: no corner is cut off
-            ax.plot(*(np.insert(part, meets, np.nan) for part in (r.real, r.imag)), color=INK, **THIN)
-        start, *dots = np.interp(way * np.array(values), way * gain, held_branches(exact.branches[n]))
+    for s in held_branches(exact.branches[list(numbers)]):
+        start, *dots = np.interp(way * np.array(values), way * gain, s)
         ax.plot(start.real, start.imag, color=INK, zorder=4, **mark)
         ax.plot(np.real(dots), np.imag(dots), color=INK, zorder=4, **DOT)
-        arrow(s[:: int(way)], ax)
+    for s in shown:
+        arrow(s[::way], ax)
     edge_marks(shown[:, -1], ax, places)
     for origin in dict.fromkeys(exact.origin.tolist()) if everything else ():
         _name_branch(origin_name(origin), branches[exact.origin == origin].ravel(), ax, places)
-    for colour, name in ((STABLE, "stable"), (UNSTABLE, "unstable")):
-        ax.plot([], [], lw=2.5, color=colour, label=f"{name}, exact")
+    first, *others = (plain(value, 3) for value in values)
     entries = [(mark, f"{exact.vary} = {first}"), (DOT, f"{exact.vary} = {', '.join(others)}")]
     entries += [] if reduced is None else [(THIN, f"python-control, reduced model of order {reduced.order}")]
     for which, name in entries:
         ax.plot([], [], color=INK, label=name, **which)
-    seen = [each for each in exact.crossings if each.branch in numbers or (each.branch is None and everything)]
+    _draw_crossings([each for each in exact.crossings if each.branch in (*numbers, *[None] * everything)], exact, ax)
+
+
+def _draw_branches(shown: Complex, ax: Axes) -> None:
+    """The branches, their parts left and right of the axis in the colours of stability, and those on it."""
+    left, right = ax.get_xlim()
+    ax.axvline(0, color=INK, lw=0.9, zorder=1)
+    parts = ax.axvspan(left, 0.0, fc="none"), ax.axvspan(0.0, right, fc=REGIONS[1], zorder=0.1)
+    for width, colour, part, name in zip((2.6, 2.61), (STABLE, UNSTABLE), parts, ("stable", "unstable"), strict=True):
+        for s in shown:
+            ax.plot(s.real, s.imag, lw=width, color=colour, zorder=2)[0].set_clip_path(part)
+        ax.plot([], [], lw=2.5, color=colour, label=f"{name}, exact")
+    resting = np.where(abs(shown.real) <= AXIS_SHARE * abs(shown), shown, np.nan)
+    ax.plot(0 * resting.real.T, resting.imag.T, lw=2.8, color=MARGINAL, zorder=2.1)
+
+
+def _draw_crossings(seen: Sequence[BranchCrossing], exact: Locus, ax: Axes) -> None:
+    """A diamond at each, the first few with their values in the legend."""
     for number, each in enumerate(seen):
         label = f"crosses the axis at {exact.vary} = {plain(each.gain, 5)}, {significant(each.omega, 4)} rad/s"
         (omega,) = kept_digits([each.omega], POLE_DIGITS)
@@ -123,16 +131,15 @@ def _panel(fine: Locus, exact: Locus, reduced: ReducedLocus | None, numbers: Seq
 
 def arrow(s: Complex, ax: Axes) -> None:
     """An arrow in the middle of a line, in the direction in which it runs, where its part in view is long enough."""
-    frame_of = ax.transData - ax.transAxes
-    at = frame_of.transform(np.c_[s.real, s.imag])
+    to_view = ax.transData - ax.transAxes
+    at = to_view.transform(np.c_[s.real, s.imag])
     at = at[((at > 0) & (at < 1)).all(axis=1)]
     along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(at, axis=0).T))]
     if along[-1] > ARROW_ROOM:
-        ends = (np.interp(along[-1] / 2 + way * ARROW, along, part) for way in (-1, 1) for part in at.T)
-        x0, y0, x1, y1 = ends
-        tail, head = frame_of.inverted().transform([(x0, y0), (x1, y1)])
+        middle = along[-1] / 2 + np.array([-ARROW, ARROW])
+        tail, head = to_view.inverted().transform(np.c_[[np.interp(middle, along, part) for part in at.T]].T).tolist()
         looks = {"arrowstyle": "-|>", "color": INK, "lw": 0.0, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 12}
-        ax.annotate("", tuple(head), tuple(tail), arrowprops=looks, zorder=3.5)
+        ax.annotate("", head, tail, arrowprops=looks, zorder=3.5)
 
 
 def edge_marks(poles: Complex, ax: Axes, places: list[Real]) -> None:
@@ -143,23 +150,25 @@ def edge_marks(poles: Complex, ax: Axes, places: list[Real]) -> None:
         value = plain(p.real, 3) + (f" + {plain(p.imag, 3)}i" if p.imag else "")
         far.setdefault((min(max(p.real, left), right), min(p.imag, high)), []).append(value)
     for (x, y), values in far.items():
-        mark = "<" if x == left else ">" if x == right else "^"
+        mark, side, ha = ("<", 7, "left") if x == left else (">", -7, "right") if x == right else ("^", 7, "left")
         ax.plot(x, y, mark, color=GREY, ms=6.5, mec="white", zorder=5, clip_on=False)
-        if is_free(np.array([x, y]), places, ax):
-            places.append(np.array([[x, y]]))
-            side = -1 if x == right else 1
-            ax.annotate(", ".join(values), (x, y), xytext=(7 * side, 4), ha="left" if side > 0 else "right", **NOTE)
+        _note(", ".join(values), (x, y), places, ax, xytext=(side, 4), ha=ha)
 
 
 def _name_branch(name: str, s: Complex, ax: Axes, places: list[Real]) -> None:
     """The name at the first of a few places along a branch, in view and with Im s >= 0, that is free."""
     s = s[(s.imag >= 0) & (s.real > ax.get_xlim()[0]) & (s.real < ax.get_xlim()[1]) & (s.imag < ax.get_ylim()[1])]
-    for share in (0.0, 0.5, 0.99) if s.size else ():
-        at = np.array([s[int(share * s.size)].real, s[int(share * s.size)].imag])
-        if is_free(at, places, ax, NAME_ROOM):
-            places.append(at[None])
-            ax.annotate(name, tuple(at), xytext=(6, 5), **(NOTE | {"fontsize": 8.0, "color": INK}))
-            return
+    few = s[[int(share * s.size) for share in (0.0, 0.5, 0.99)]] if s.size else s
+    any(_note(name, (at.real, at.imag), places, ax, NAME_ROOM, xytext=(6, 5), fontsize=8.0, color=INK) for at in few)
+
+
+def _note(text: str, at: Any, places: list[Real], ax: Axes, room: Any = NUMBER_ROOM, **looks: Any) -> bool:
+    """A text at a place that is free of those at the others, which it then joins; whether it is."""
+    free = is_free(np.array(at), places, ax, room)
+    if free:
+        places.append(np.array([at]))
+        ax.annotate(text, at, **NOTE | looks)
+    return free
 
 
 # ------------------------------------------------------------ grids of damping ratio and natural frequency
@@ -183,9 +192,7 @@ def s_grid(ax: Axes, *, is_named: bool = True) -> list[Real]:
             continue
         last = place
         ax.plot([0.0, x], [0.0, y], **GRID)
-        at_top = x > left
-        ax.annotate(f"ζ {plain(ratio)}", (x, y), xytext=(3, -3), va="top" if at_top else "center", **NOTE)
-        places.append(np.array([[x, y]]))
+        _note(f"ζ {plain(ratio)}", (x, y), places, ax, xytext=(3, -3), va="top" if x > left else "center")
     for omega in MaxNLocator(6).tick_values(bottom, high) if left < 0 else ():
         if bottom < omega < high:
             angle = np.linspace(0.0, math.asin(min(1.0, -left / omega)), 61)
