@@ -273,8 +273,7 @@ def _z_plane(data: SampledLoci, along: SampledLocus, ax: Axes) -> None:
     ):
         each = z[:, columns]
         ax.plot(each.real, each.imag, color=UNSTABLE, lw=1.5, zorder=3)
-        ax.plot(each.real, each.imag, color=STABLE, lw=1.4, zorder=3.1)
-        for line in ax.lines[-each.shape[1] :] if each.size else ():
+        for line in ax.plot(each.real, each.imag, color=STABLE, lw=1.4, zorder=3.1):
             line.set_clip_path(circle)
         for at, face in ((0, "white"), (here, INK)):
             ax.plot(each[[at]].real, each[[at]].imag, mark, mfc=face, mec=INK, ms=4.0, mew=0.9, zorder=4)
