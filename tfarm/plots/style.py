@@ -36,7 +36,7 @@ COLOURS = (BLUE, ORANGE, GREEN, PURPLE)  # of several records in one picture
 # stability, the same in every picture, page and live view; each has a mark of its own too, for grey print
 STABLE, MARGINAL, UNSTABLE = BLUE, PURPLE, ORANGE
 # regions of a map by the number of unstable poles, 0 first: ever darker in grey; green is kept for good margins
-REGIONS = ("#d3e6f5", "#fbdcc4", "#f3bd95", "#e89c67", "#d97c40")
+REGIONS = ("#dcecf9", "#f8d0b0", "#efb286", "#e29259", "#cf7132")
 # grades of margins; with those of a page's dark mode in style.css
 GOOD, LOW, POOR = GREEN, "#8a6100", "#b3310a"
 
