@@ -324,9 +324,9 @@ def emit(
         write_file(csv, as_csv(curve_table(record), units=True).encode(), key="--csv")
     if png is not None:
         import tfarm.plots  # noqa: F401  every picture is registered once they are loaded
-        from tfarm.plots.style import save_picture
+        from tfarm.plots.style import FIGURES, save_picture
 
-        save_picture(record, png)
+        save_picture(FIGURES[type(record)], record, png)
     written = [path for path in (*also, csv, png) if path is not None]
     if any(map(is_standard_output, written)):
         return

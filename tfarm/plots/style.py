@@ -313,14 +313,20 @@ def save_figure(figure: Figure, folder: Path, stem: str, formats: tuple[str, ...
         (folder / f"{stem}.{kind}").write_bytes(content)
 
 
-def save_picture(record: Any, path: Path) -> None:
+def save_column(figure: Figure, folder: Path, stem: str) -> None:
+    """The same picture drawn for the column of a paper, as folder/stem.pdf."""
+    with column():
+        save_figure(figure.again(), folder, stem, formats=("pdf",))  # type: ignore[attr-defined]
+
+
+def save_picture(draw: Callable[[Any], Figure], record: Any, path: Path) -> None:
     """The picture of a record as one file, written whole: an SVG or a PDF for a column, else a PNG.
 
     Raises ParameterError, naming --figure, where it cannot be written.
     """
     kind = path.suffix.lower().removeprefix(".") or "png"
     with nullcontext() if kind == "png" else column():
-        (content,) = _drawn(FIGURES[type(record)](record), (kind,), PICTURE_DOTS)
+        (content,) = _drawn(draw(record), (kind,), PICTURE_DOTS)
     write_file(path, content, key="--figure")
 
 
