@@ -138,6 +138,18 @@ def test_a_figure_for_a_column_has_its_width_its_letters_and_no_headline(name, w
     assert figure.again().get_figwidth() > width
 
 
+def test_a_long_legend_makes_a_figure_of_a_column_higher_and_leaves_its_axes_their_height():
+    """Of one response, and of the same under two dozen names."""
+    data = tfarm.bode(LAB, "root_moment", (1.0, 300.0))
+    with column():
+        few, many = (tfarm.plots.bode.figure({f"{n} of a long name": data for n in range(count)}) for count in (1, 24))
+        for figure in (few, many):
+            figure.draw_without_rendering()
+    assert many.get_figheight() > few.get_figheight() + 0.5
+    heights = [figure.axes[0].get_position().height * figure.get_figheight() for figure in (few, many)]
+    assert heights[1] == pytest.approx(heights[0], rel=0.1)
+
+
 @pytest.mark.parametrize("kind", ["pdf", "svg"])
 def test_a_file_for_a_paper_is_the_same_on_every_run_and_has_letters_for_latex(kind, tmp_path, capsys):
     """Widths in points of 1/72 inch; TrueType in a PDF, and no date."""

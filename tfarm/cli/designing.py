@@ -258,7 +258,7 @@ def report(
     out: the folder to write to
     only: one page: bode, modes, margins, locus ...
     measured: measured response; may be repeated
-    paper: each figure as a PDF at the width of a paper's column too, which takes half as long again
+    paper: each figure as a PDF at the width of a paper's column too, which takes about a quarter longer
     """
     from tfarm.arm import law_tables
     from tfarm.fitting import data, recording

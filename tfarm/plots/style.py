@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from contextvars import ContextVar
 from functools import partial, wraps
+from itertools import product
 from pathlib import Path
 from typing import Any, get_args
 
@@ -82,7 +83,9 @@ DARK = f"""<defs>
 STYLE, COLUMN = (Path(__file__).with_name(f"{name}.mplstyle") for name in ("tfarm", "column"))
 COLUMN_WIDTH, PAGE_WIDTH = 3.5, 7.16  # inches, one and both columns of an IEEE paper
 COLUMN_POINTS, SMALL_POINTS, THIN = 8.0, 6.5, 0.7  # largest letters, those inside axes; factor on lines and marks
-LONG_LABEL = 14  # letters, of a label along one of several axes
+LONG_LABEL, LINE = 14, 46  # letters of a label up one of several axes, and of a line of a label below the axes
+LEGEND_LINE = 0.2  # inches
+SIZES_OF_LINES = ("linewidth", "markersize", "markeredgewidth")
 _in_column: ContextVar[bool] = ContextVar("_in_column", default=False)
 
 
@@ -162,8 +165,10 @@ def picture(
                     ax.set_xlabel("")
                 if _in_column.get():
                     make_thin(drawn)
-                legend_below(drawn)
-                if not _in_column.get():
+                below = legend_below(drawn)
+                if _in_column.get():
+                    drawn.set_figheight(fitted[1] + below)
+                else:
                     headline(drawn, title(*found))
             drawn.again = partial(figure, *found, **how)  # type: ignore[attr-defined]  # in another style
             return drawn
@@ -192,11 +197,10 @@ def picture(
 
 
 def column_size(inches: tuple[float, float], is_wide: bool) -> tuple[float, float]:
-    """Width and height of a picture in a paper; in one column its labels need more of the height."""
-    width, height = inches
-    return (
-        (PAGE_WIDTH, PAGE_WIDTH * height / width) if is_wide else (COLUMN_WIDTH, COLUMN_WIDTH * (height / width) ** 0.4)
-    )
+    """Width and height of a picture in a paper, without its legend; in one column labels need more of the height."""
+    if is_wide:
+        return PAGE_WIDTH, PAGE_WIDTH * inches[1] / inches[0]
+    return COLUMN_WIDTH, COLUMN_WIDTH * (inches[1] / inches[0]) ** 0.4 - LEGEND_LINE
 
 
 def make_thin(figure: Figure) -> None:
@@ -207,17 +211,20 @@ def make_thin(figure: Figure) -> None:
     for text in (each for each in figure.findobj() if isinstance(each, Text)):
         text.set_fontsize(min(text.get_fontsize(), COLUMN_POINTS))
     for ax in figure.axes:
-        for line in ax.lines:
-            line.set(linewidth=THIN * line.get_linewidth(), markersize=THIN * line.get_markersize())
-            line.set_markeredgewidth(THIN * line.get_markeredgewidth())
+        for each, of in (*product(ax.lines, SIZES_OF_LINES), *product(ax.collections, SIZES_OF_LINES[:1])):
+            each.set(**{of: THIN * np.asarray(getattr(each, f"get_{of}")())})
         for text in ax.texts:
             text.set_fontsize(min(text.get_fontsize(), SMALL_POINTS))
+        ax.set_xlabel(textwrap.fill(ax.get_xlabel(), LINE))
         if len(figure.axes) > 1 and len(label := ax.get_ylabel()) > LONG_LABEL:
             ax.set_ylabel(re.sub(r" +(?=\[)", "\n", label))
 
 
-def legend_below(figure: Figure) -> None:
-    """A legend, below the axes, of all labels that no axes has in a legend of its own; in as many columns as fit."""
+def legend_below(figure: Figure) -> float:
+    """A legend, below the axes, of all labels that no axes has in a legend of its own: its height [inches].
+
+    It has as many columns as fit.
+    """
     each = (ax.get_legend_handles_labels() for ax in figure.axes if ax.get_legend() is None)
     keys = {label: handle for own in each for handle, label in zip(*own, strict=True)}
     for number in (5, 3, 2, 1) if keys else ():
@@ -225,9 +232,11 @@ def legend_below(figure: Figure) -> None:
             keys.values(), keys, loc="outside lower left", ncols=number,
             fontsize=min(8.2, mpl.rcParams["legend.fontsize"]), handlelength=1.8, columnspacing=1.2,
         )  # fmt: skip
-        if number == 1 or legend.get_window_extent().width < WIDEST_LEGEND * figure.bbox.width:
-            return
+        box = legend.get_window_extent()
+        if number == 1 or box.width < WIDEST_LEGEND * figure.bbox.width:
+            return float(box.height / figure.dpi)
         legend.remove()
+    return 0.0
 
 
 def headline(figure: Figure, text: str) -> None:

@@ -78,8 +78,8 @@ def templates() -> Environment:
         keep_trailing_newline=True,
     )
     environment.globals |= {"inf": math.inf, "rate": RATE_GAIN, "moment": MOMENT_GAIN, "angle": ANGLE_GAIN,
-                            "plane": " and ".join(PLANE)}  # fmt: skip
-    environment.globals |= {"arm_python": arm_python, "gains_python": gains_python}
+                            "plane": " and ".join(PLANE), "arm_python": arm_python,
+                            "gains_python": gains_python}  # fmt: skip
     environment.filters.update(
         symbol=with_symbols, text=text, plain=plain, significant=significant, scientific=scientific, upper_first=upper,
         listed=listed, how_many=how_many, as_html=as_html,
