@@ -198,9 +198,8 @@ def picture(
 
 def column_size(inches: tuple[float, float], is_wide: bool) -> tuple[float, float]:
     """Width and height of a picture in a paper, without its legend; in one column labels need more of the height."""
-    if is_wide:
-        return PAGE_WIDTH, PAGE_WIDTH * inches[1] / inches[0]
-    return COLUMN_WIDTH, COLUMN_WIDTH * (inches[1] / inches[0]) ** 0.4 - LEGEND_LINE
+    share = inches[1] / inches[0]
+    return (PAGE_WIDTH, PAGE_WIDTH * share) if is_wide else (COLUMN_WIDTH, COLUMN_WIDTH * share**0.4 - LEGEND_LINE)
 
 
 def make_thin(figure: Figure) -> None:
