@@ -81,7 +81,7 @@ DARK = f"""<defs>
   </filter>""".encode()
 
 STYLE, COLUMN = (Path(__file__).with_name(f"{name}.mplstyle") for name in ("tfarm", "column"))
-COLUMN_WIDTH, PAGE_WIDTH = 3.5, 7.16  # inches, one and both columns of an IEEE paper
+COLUMN_WIDTH, PAGE_WIDTH, WIDE = 3.5, 7.16, 9.5  # inches: one and both columns of an IEEE paper, and what needs both
 COLUMN_POINTS, SMALL_POINTS, THIN = 8.0, 6.5, 0.7  # largest letters, those inside axes; factor on lines and marks
 LONG_LABEL, LINE = 14, 46  # letters of a label up one of several axes, and of a line of a label below the axes
 LEGEND_LINE = 0.2  # inches
@@ -199,7 +199,11 @@ def picture(
 def column_size(inches: tuple[float, float], is_wide: bool) -> tuple[float, float]:
     """Width and height of a picture in a paper, without its legend; in one column labels need more of the height."""
     share = inches[1] / inches[0]
-    return (PAGE_WIDTH, PAGE_WIDTH * share) if is_wide else (COLUMN_WIDTH, COLUMN_WIDTH * share**0.4 - LEGEND_LINE)
+    return (
+        (PAGE_WIDTH, PAGE_WIDTH * share)
+        if is_wide or inches[0] > WIDE
+        else (COLUMN_WIDTH, COLUMN_WIDTH * share**0.4 - LEGEND_LINE)
+    )
 
 
 def make_thin(figure: Figure) -> None:
