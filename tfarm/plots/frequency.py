@@ -174,8 +174,8 @@ def _mark_roots(data: Bode, ax: Axes) -> None:
         if math.log(omega) - last > width:
             last = math.log(omega)
             ax.text(
-                omega, 1.0 + 0.38 * NUMBER_STRIP, str(number), transform=ax.get_xaxis_transform(), ha="center",
-                va="bottom", fontsize=8.0, color=GREY,
+                omega, 1.0 + 0.3 * NUMBER_STRIP, str(number), transform=ax.get_xaxis_transform(), ha="center",
+                va="baseline", fontsize=8.0, color=GREY,
             )  # fmt: skip
 
 

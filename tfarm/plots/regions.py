@@ -6,7 +6,7 @@ and in `dsp`); nothing is read off a raster.  Edges are rounded as they are seen
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -376,6 +376,7 @@ def draw_overlay(data: StableRegions) -> Figure:
     """Both regions of an arm on a figure of its own, as high as moment gains are of use."""
     figure = overlay.figure(*data)
     figure.axes[0].set_ylim(*(data.continuous.arm.input_per_torque * end for end in K2_RANGE))
+    figure.again = partial(draw_overlay, data)  # to this height
     return figure
 
 

@@ -20,6 +20,7 @@ from pydantic import TypeAdapter
 import tfarm
 from tfarm.arm import (
     ANGLE_GAIN,
+    LISTED,
     MOMENT_GAIN,
     PLANE,
     RATE_GAIN,
@@ -42,7 +43,7 @@ from tfarm.fitting.fit import Fit
 from tfarm.fitting.recording import MeasuredRun
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import Margins, margins
-from tfarm.plots.style import Figure, gains_words, save_figure
+from tfarm.plots.style import Figure, gains_words, save_column, save_figure
 from tfarm.records import record
 from tfarm.response.signals import Signals, sign_of
 from tfarm.schema import Column, Table, save_table, text
@@ -77,7 +78,8 @@ def templates() -> Environment:
         keep_trailing_newline=True,
     )
     environment.globals |= {"inf": math.inf, "rate": RATE_GAIN, "moment": MOMENT_GAIN, "angle": ANGLE_GAIN,
-                            "plane": " and ".join(PLANE)}  # fmt: skip
+                            "plane": " and ".join(PLANE), "arm_python": arm_python,
+                            "gains_python": gains_python}  # fmt: skip
     environment.filters.update(
         symbol=with_symbols, text=text, plain=plain, significant=significant, scientific=scientific, upper_first=upper,
         listed=listed, how_many=how_many, as_html=as_html,
@@ -116,7 +118,10 @@ class Fact(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """A finished figure with its words.  `stem` names its files; `data` are the numbers that it draws."""
+    """A finished figure with its words.  `stem` names its files; `data` are the numbers that it draws.
+
+    `python` is the line of Python that draws it, empty where no public function does.
+    """
 
     stem: str
     title: str
@@ -124,14 +129,15 @@ class Picture(NamedTuple):
     alt: str
     figure: Figure
     data: tuple[Column, ...] = ()
+    python: str = ""
 
 
 def picture(
     kind: str, figure: Figure, *, data: Table | Iterable[Column] = (), stem: str = "", **values: Any
 ) -> Picture:
-    """A picture with the title, the caption and the alternative text of its kind; `stem` names its files."""
-    title, caption, alt = _parts(kind, values)
-    return Picture(stem or kind.replace("_", "-"), title, caption, alt, figure, _columns(data))
+    """A picture with title, caption, alternative text and line of Python of its kind; `stem` names its files."""
+    title, caption, alt, *python = _parts(kind, values)
+    return Picture(stem or kind.replace("_", "-"), title, caption, alt, figure, _columns(data), "".join(python))
 
 
 def sheet(kind: str, columns: Table | Iterable[Column], /, *, stem: str = "", **values: Any) -> Table:
@@ -171,25 +177,28 @@ class PageSection:
     failure: str = ""
 
 
-def save_section(section: PageSection, folder: Path) -> PageSection:
+def save_section(section: PageSection, folder: Path, is_paper: bool = False) -> PageSection:
     """The section with its blocks saved: what remains to be written are words."""
     for name in (PICTURES, DATA):
         (folder / name).mkdir(exist_ok=True)
     shown = [block for block in section.blocks if getattr(block, "columns", True)]
-    return replace(section, blocks=[save_block(block, folder) for block in shown])
+    return replace(section, blocks=[save_block(block, folder, is_paper) for block in shown])
 
 
-def save_block(block: Picture | Table, folder: Path) -> SavedBlock:
-    """A picture as pictures/*.svg, its numbers as data/*.csv; a table as data/*.csv and .json."""
+def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> SavedBlock:
+    """A picture as pictures/*.svg, for a paper *.pdf too, its data as data/*.csv; a table as data/*.csv and .json."""
     shape: Any = templates().get_template("blocks.html").module
     is_table = isinstance(block, Table)
     if isinstance(block, Table):
         html = shape.table(block, [f"{DATA}/{name}" for name in save_table(block, folder / DATA)])
     else:
         save_figure(block.figure, folder / PICTURES, block.stem, formats=("svg",))
+        if is_paper:
+            save_column(block.figure, folder / PICTURES, block.stem)
+        drawn = [f"{PICTURES}/{block.stem}.{kind}" for kind in ("svg", *["pdf"] * is_paper)]
         numbers = Table(columns=block.data, stem=f"{block.stem}-data")
         saved = save_table(numbers, folder / DATA, kinds=("csv",)) if block.data else ()
-        html = shape.picture(block, [f"{PICTURES}/{block.stem}.svg", *(f"{DATA}/{name}" for name in saved)])
+        html = shape.picture(block, [*drawn, *(f"{DATA}/{name}" for name in saved)])
     return SavedBlock(block.stem, block.title, is_table, html)
 
 
@@ -275,7 +284,7 @@ class Case(NamedTuple):
     """An arm, its chain, and the laws that the page is about; without any it is about the default gains.
 
     `fit` is the source of the arm's numbers, if they were fitted to measurements; `measured` are responses that are
-    drawn over its own.
+    drawn over its own.  Pictures are saved for a paper too where it `is_paper`.
     """
 
     arm: Arm
@@ -283,6 +292,7 @@ class Case(NamedTuple):
     laws: tuple[GivenLaw, ...] = ()
     fit: Fit | None = None
     measured: tuple[Measured, ...] = ()
+    is_paper: bool = False
 
     @property
     def controllers(self) -> tuple[Controller, ...]:
@@ -360,6 +370,20 @@ def is_preset(arm: Arm, chain: Chain) -> bool:
     return arm.name in presets() and (load(arm.name), load_chain(arm.name)) == (arm, chain)
 
 
+def arm_python(arm: Arm) -> str:
+    """Python that loads an arm: by its name where it comes with tfarm, else from the file in the folder of its page."""
+    name = arm.name if arm.name in presets() and load(arm.name) == arm else "arm.toml"
+    return f"tfarm.load({json.dumps(name)})"
+
+
+def gains_python(law: AnyLaw) -> str:
+    """Python that makes gains at the hub."""
+    gains = as_law(law).gains
+    assert gains is not None
+    values = {gain.name: float(gains[gain.name]) for gain in LISTED}
+    return f"tfarm.HubFeedback({', '.join(f'{name}={value!r}' for name, value in values.items() if value)})"
+
+
 def argument(name: str, preset: bool) -> str:
     """The name of an arm in a command."""
     return shlex.quote(name if preset else f"{name}.toml")
@@ -384,6 +408,6 @@ def command_of(case: Case, only: str) -> str:
     law = own_law(case)
     options = [] if law is not None else [f"--law {shlex.quote(each.file or 'FILE')}" for each in case.laws]
     options += [f"--measured {shlex.quote(f'{each.name}={each.source}')}" for each in case.measured]
-    options += [f"--only {only}"] * bool(only)
+    options += [f"--only {only}"] * bool(only) + ["--paper"] * case.is_paper
     name = argument(case.arm.name, law is None and is_preset(case.arm, case.chain))
     return " ".join(["tfarm report", name, *options, "--out reports"])

@@ -174,7 +174,7 @@ def make_section(name: str, anchor: str, make: Callable[[Case], PageSection], ca
     except TfarmError as error:
         answer = f"This section could not be made for this arm: {error}."
         section = PageSection(anchor=anchor, title=upper(name), answer=answer, failure=str(error))
-    return save_section(section, folder)
+    return save_section(section, folder, case.is_paper)
 
 
 # ------------------------------------------------------------ a report
@@ -189,6 +189,7 @@ def write(
     fits: Sequence[Fit | None] | None = None,
     measured: Sequence[Measured] = (),
     only: tuple[str, ...] | None = None,
+    paper: bool = False,
     progress: ReportProgress | None = None,
     notice: Notice | None = None,
 ) -> Path:
@@ -198,7 +199,8 @@ def write(
     those that each arm's page is about; where there is none it is about the default gains.  `fits` are where the arms'
     numbers are from, if they were fitted to measurements: their pages begin with these.  Responses that were `measured`
     are laid over those of every arm.
-    `only` ("bode", "modes", "margins", ...) writes those pages alone, out/<name>/bode.html and so on.  `progress` gets
+    `only` ("bode", "modes", "margins", ...) writes those pages alone, out/<name>/bode.html and so on.  With `paper`
+    each picture of a section is a PDF at the width of a paper's column too, pictures/*.pdf.  `progress` gets
     (done, total, what runs) whenever a piece of work begins, and at the end.  A section that tfarm cannot make of an
     arm has the reason in its place, and `notice` gets the same in one line at the end.  Raises ParameterError before
     any work if `out` cannot be written, two arms share a name or there is none, or an arm or its chain does not suit a
@@ -207,7 +209,7 @@ def write(
     out, n, names, only = Path(out), len(arms), [arm.name for arm in arms], only or ()
     _check(names, only)
     each = zip(arms, chains or [Chain()] * n, laws or [()] * n, fits or [None] * n, strict=True)
-    cases = [Case(arm, chain, tuple(own), fit, tuple(measured)) for arm, chain, own, fit in each]
+    cases = [Case(arm, chain, tuple(own), fit, tuple(measured), paper) for arm, chain, own, fit in each]
     for case in cases:
         check_laws(case)
     with _temporary(out, "out", names + [TRUST_FOLDER, ASSETS] * (not only)) as place:
