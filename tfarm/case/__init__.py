@@ -2,5 +2,6 @@
 
 from tfarm.case.card import LoopCard, ResultCard, result_card
 from tfarm.case.comparison import ComparedSide, Comparison, compare
+from tfarm.case.curve import loop_function
 
-__all__ = ["ComparedSide", "Comparison", "LoopCard", "ResultCard", "compare", "result_card"]
+__all__ = ["ComparedSide", "Comparison", "LoopCard", "ResultCard", "compare", "loop_function", "result_card"]

@@ -18,21 +18,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import AnyLaw, Arm, as_law
-from tfarm.arrays import Complex
 from tfarm.digits import general
 from tfarm.dsp import Chain, Sampled
 from tfarm.dsp.chain import chain_or_usual
-from tfarm.dsp.crossings import CircleGrid, circle_grid
 from tfarm.dsp.verdict import Analysis, sampled
 from tfarm.errors import ConvergenceError
-from tfarm.loop.margins import LoopMargins, Margins, margins, margins_of_curve
+from tfarm.loop.curve import gain_margin
+from tfarm.loop.margins import LoopMargins, Margins, margins
 from tfarm.loop.stability import SMALL_GAIN
 from tfarm.records import record
 from tfarm.schema import Percent, Quantity, Table, across
@@ -40,6 +37,7 @@ from tfarm.spectrum import modes
 from tfarm.spectrum.table import default_gains
 
 from .comparison import HUB, poles_by_mode
+from .curve import REFERENCE_RATIO, UNDAMPED, SampledCurve, reference_damping, sampled_margins
 
 GRADES = UNDEFINED, GOOD, LOW, POOR = "-", "good", "low", "poor"  # the first of a margin which is not defined
 GRADED = {  # names of the graded margins in the grade of the loop
@@ -50,14 +48,7 @@ GRADED = {  # names of the graded margins in the grade of the loop
     "peak_sensitivity": "Ms",
 }
 GAIN_LIMITS, PHASE_LIMITS, PERIOD_LIMITS, PEAK_LIMITS = (6.0, 3.0), (45.0, 30.0), (1.0, 0.5), (2.0, 3.0)
-REFERENCE_RATIO = 1e-3  # damping ratio of mode 1 with which an undamped arm is graded
 SMALL_RATIO = 1e-3  # of mode 1: below it the minimum structural damping for stability is on the card
-MOST_FACTOR = 1e9  # on the controller: a larger gain margin is none
-SAME_FACTOR = 1e-6  # relative: by no more the gain margin differs from the factor at its phase crossover
-UNDAMPED = (
-    "undamped model: margins and grades are those with C = {:.4g} s, 0.1 % of critical damping in mode 1; "
-    "at C = 0 the exact delay and disk margins are 0 for every gain"
-)
 SCALED = "default gains: scaled from the paper's, not a design; `tfarm design` recommends gains"
 
 
@@ -176,11 +167,6 @@ def result_card(
     return ResultCard(**cards, period=T, notes=tuple(notes))
 
 
-def reference_damping(arm: Arm) -> float:
-    """Kelvin-Voigt damping C [s] with which the first mode of an undamped arm has the damping ratio 0.1 %."""
-    return 2 * REFERENCE_RATIO / float(modes(arm, 1).natural_frequency[-1])
-
-
 def continuous_card(found: Margins, period: float) -> LoopCard:
     """The card of a continuous-time loop; its delay margin is graded by a sampling period [s]."""
     verdict, band = found.stability, found.in_band
@@ -206,8 +192,7 @@ def sampled_card(found: Analysis) -> LoopCard:
     verdict, loop, band = found.verdict, found.verdict.full, None
     arm, T = loop.plant.arm, loop.chain.sampling.period
     if verdict.is_stable:
-        curve = SampledCurve(loop)
-        band = margins_of_curve(curve, curve.grid.q / T, math.pi / T)
+        band = sampled_margins(SampledCurve(loop))
     is_small = arm.least_damping < SMALL_RATIO / REFERENCE_RATIO * reference_damping(arm)
     needed, word = found.minimum_damping if is_small else None, "converged" if verdict.is_converged else "approximate"
     return LoopCard(
@@ -220,36 +205,6 @@ def sampled_card(found: Analysis) -> LoopCard:
         time_constant=verdict.time_constant,
         minimum_damping=None if needed is None else needed.value,
     )
-
-
-@dataclass(frozen=True)
-class SampledCurve:
-    """L(e^{i w T}) of a sampled loop as a function of s = i w."""
-
-    loop: Sampled
-
-    @cached_property
-    def grid(self) -> CircleGrid:
-        """Angles w T that resolve L."""
-        return circle_grid(self.loop)
-
-    @property
-    def feeds_back(self) -> bool:
-        """Whether a gain of the law is other than 0."""
-        return any(self.loop.weights)
-
-    def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
-        """Denominator and numerator of L at s = i w."""
-        q = np.ravel(np.imag(s)) * self.loop.chain.sampling.period
-        base = self.grid.base[np.minimum(np.searchsorted(self.grid.q, q), self.grid.q.size - 1)]
-        own, *rows = self.grid.at(base, q - self.grid.angles[base])
-        fed_back = np.asarray(np.array(self.loop.weights) @ np.array(rows), dtype=np.complex128)
-        return own.reshape(np.shape(s)), fed_back.reshape(np.shape(s))
-
-    def loop_function(self, s: NDArray[Any]) -> Complex:
-        """L at s = i w."""
-        own, fed_back = self.parts(s)
-        return np.asarray(np.divide(fed_back, own, out=np.full(own.shape, np.inf + 0j), where=own != 0))
 
 
 def unaliased_poles(loop: Sampled) -> dict[int, complex]:
@@ -284,7 +239,7 @@ def _margins(
     if band is None or gain is None:
         undefined = {"grade": UNDEFINED, "limited_by": (), "delay_margin_periods": None, "disk_margin": None}
         return dict.fromkeys(GRADED, NOT_DEFINED) | undefined
-    down, up = (_decibels(band, factor) for factor in gain)
+    down, up = (gain_margin(band, factor) for factor in gain)
     phase, peak = band.phase_margin, band.sensitivity_peak
     periods = None if delay is None else float(delay) / period
     graded = (
@@ -302,14 +257,6 @@ def _margins(
         "delay_margin_periods": periods,
         "disk_margin": band.disk,
     }
-
-
-def _decibels(band: LoopMargins, factor: float) -> tuple[float, float | None]:
-    """Size [dB] of a factor that ends stability, and the frequency [rad/s] at which it does."""
-    if not 1 / MOST_FACTOR < factor < MOST_FACTOR:
-        return math.inf, None
-    near = [w for w, t in band.phase_crossovers if abs(t / factor - 1) < SAME_FACTOR]
-    return abs(20 * math.log10(factor)), near[0] if near else None
 
 
 def grade_of(size: float | None, limits: tuple[float, float]) -> str:

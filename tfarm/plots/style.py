@@ -64,7 +64,7 @@ STYLE = Path(__file__).with_name("tfarm.mplstyle")
 style = partial(matplotlib.style.context, ["default", STYLE])  # whatever the user's own settings are
 
 
-FIGURES: dict[Any, Callable[..., Figure]] = {}  # by the class of a record the picture of it as a figure of its own
+FIGURES: dict[Any, Callable[..., Figure]] = {}  # by the class of a record its first picture as a figure of its own
 
 
 def check_records(of: Sequence[tuple[Any, str]], found: Sequence[Any]) -> None:
@@ -128,7 +128,7 @@ def picture(
             return axes[0] if is_one else tuple(axes)
 
         for kind in get_args(of[0][0]) or (of[0][0],) if len(of) == 1 else ():
-            FIGURES[kind] = figure
+            FIGURES.setdefault(kind, figure)
         shown.figure = figure  # type: ignore[attr-defined]
         return shown
 
