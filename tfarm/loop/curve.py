@@ -112,9 +112,9 @@ def gain_margin(band: LoopMargins, factor: float) -> tuple[float, float | None]:
 
 
 @singledispatch
-def curve_of(found: Any) -> LoopCurve:
+def curve_of(found: Any) -> Any:
     """The curve of the margins of a continuous-time loop around every steep place; a curve is its own."""
-    raise TypeError(found)
+    return found
 
 
 @curve_of.register
@@ -125,8 +125,3 @@ def _(found: Margins) -> LoopCurve:
     return LoopCurve(
         arm=loop.arm, law=loop.law, stability=verdict.verdict, omega=omega, L=L, margins=found.in_band
     )  # fmt: skip
-
-
-@curve_of.register
-def _(found: LoopCurve) -> LoopCurve:
-    return found

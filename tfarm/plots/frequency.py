@@ -91,7 +91,7 @@ def draw_magnitude(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
     _mark_roots(first, ax)
     if first.arm.has_cutoff and first.band[0] < first.arm.shear_cutoff < first.band[1]:
         ax.axvline(first.arm.shear_cutoff, color=ORANGE, lw=1.0, ls="-.", label="shear cut-off")
-    ax.set_ylabel(f"|{first.label} / {first.input_label}|  [dB re 1 {first.gain_unit}]".replace("1 −", "1"))
+    ax.set_ylabel(f"|{first.label} / {first.input_label}|\nmagnitude [dB re 1 {first.gain_unit}]".replace("1 −", "1"))
     if first.is_zero:
         ax.text(0.5, 0.5, "zero at every frequency", ha="center", va="center", transform=ax.transAxes)
     hertz_axis(ax, 1.0 + NUMBER_STRIP)

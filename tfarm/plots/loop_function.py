@@ -6,9 +6,9 @@ is the rim, poles on the axis are arcs beyond it.
 
 import cmath
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import cycle
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -29,6 +29,7 @@ HIGHEST, LOWEST = 60.0, -80.0  # dB of L that are drawn: so that the part near 0
 NICHOLS_HIGHEST, NICHOLS_LOWEST = 40.0, -40.0
 USUAL_PEAK = 2.0  # Ms that is usual at most
 CLOSED_LOOP = (-20.0, -12.0, -6.0, -3.0, -1.0, 0.25, 0.5, 1.0, 3.0, 6.0)  # dB: |T| of the contours of a Nichols chart
+CONTOURS = ", ".join(f"{size:g}" for size in CLOSED_LOOP if size > 0) + " dB, the larger the nearer to −1"
 AROUND: Complex = np.exp(1j * math.pi * np.linspace(-1, 1, 721) ** 3)  # a circle, dense at 1, where T/(1 - T) is steep
 MOST_LINEAR, LEAST_LINEAR = 20.0, 1.5  # |L| at the edge of a linear Nyquist plot
 ZOOM = (-2.2, 0.4, -1.3, 1.3)  # of L around -1: Re from and to, Im from and to
@@ -36,40 +37,32 @@ ZOOM_GAP = 0.5  # between both, in half widths of the plot
 RING_SIZES = (0.2, 0.5, 1.0, 2.0, 5.0, math.inf)  # |L| of the rings
 ARC_RADIUS, REACH = 1.04, 1.35  # of the first arc at infinity, and of the picture
 ARCS_ALIKE = math.radians(20.0)  # arcs whose ends are as near as that turn alike
-LABEL_ROOM = np.array([[-0.05, 0.0], [0.0, 0.0], [0.05, 0.0]])  # of the axes: where a number of a contour is
 GAIN, PHASE_MARGIN = "o", "D"  # marks of margins
 DIGITS = 4  # of a margin, as on a card
 Looks = dict[str, Any]
 
 
-class Mark(NamedTuple):
-    """A decisive margin: its frequency [rad/s], nan where there is none to draw, L there, and its label."""
-
-    omega: float
-    L: complex
-    label: str
-    marker: str
+Mark = tuple[float, complex, str, str]  # of a margin: frequency [rad/s], nan without one, L there, label, marker
 
 
-def decisive(band: LoopMargins | None) -> Iterator[Mark]:
-    """The gain margins upwards and downwards, and the phase margin of least size."""
-    if band is None:
-        return
-    for factor, name in zip(reversed(band.gain), ("GM", "GM downwards"), strict=True):
+def decisive(band: LoopMargins) -> Iterator[Mark]:
+    """The gain margins upwards, and downwards where there is a limit, and the phase margin of least size."""
+    for factor, name in zip(band.gain[::-1] if band.gain[0] else band.gain[1:], ("GM", "GM downwards"), strict=False):
         size, omega = gain_margin(band, factor)
-        if factor == 0:  # reduced to nothing the loop is still stable
-            continue
-        where = f" at {general(omega, DIGITS)} rad/s" if omega else ""
-        words = f"{general(size, DIGITS)} dB{where}" if math.isfinite(size) else "no limit"
-        yield Mark(omega or math.nan, -1 / factor, f"{name} {words}", GAIN)
+        yield omega or math.nan, -1 / factor, f"{name} {_at(size, 'dB', omega)}", GAIN
     angle, omega = band.phase_margin
-    words = "no limit" if omega is None else f"{general(abs(angle), DIGITS)} deg at {general(omega, DIGITS)} rad/s"
-    L = math.nan if omega is None else -complex(np.exp(1j * math.radians(angle)))
-    yield Mark(omega or math.nan, L, f"PM {words}", PHASE_MARGIN)
+    yield omega or math.nan, -cmath.exp(1j * math.radians(angle)), f"PM {_at(abs(angle), 'deg', omega)}", PHASE_MARGIN
 
 
-def _name(curve: LoopCurve) -> str:
-    return "continuous-time" if curve.period is None else f"sampled, {general(1e3 * curve.period, DIGITS)} ms"
+def _at(size: float, unit: str, omega: float | None) -> str:
+    """A margin with its frequency."""
+    where = f" at {general(omega, DIGITS)} rad/s" if omega else ""
+    return f"{general(size, DIGITS)} {unit}{where}" if math.isfinite(size) else "no limit"
+
+
+def _name(curve: LoopCurve, of: str = "") -> str:
+    kind = "continuous-time" if curve.period is None else f"sampled, {general(1e3 * curve.period, DIGITS)} ms"
+    return f"{of}{kind}: {curve.stability}"
 
 
 def _dashes(curve: LoopCurve) -> Any:
@@ -81,20 +74,20 @@ def _looks(curve: LoopCurve) -> Looks:
     return {"color": BLUE, "ls": _dashes(curve), "label": _name(curve)}
 
 
-def _marked(curve: LoopCurve, mark: Mark, size: float = 6.5) -> Looks:
+def _marked(curve: LoopCurve, label: str, marker: str, size: float = 6.5) -> Looks:
     """A filled mark of a continuous-time loop, an open one of a sampled loop."""
-    inside, edge = (INK, "white") if curve.period is None else ("white", INK)
-    looks: Looks = {"ls": "none", "marker": mark.marker, "mfc": inside, "mec": edge, "ms": size, "zorder": 5}
-    return looks | {"label": f"{mark.label}{'' if curve.period is None else ', sampled'}"}
+    inside, edge, words = (INK, "white", "") if curve.period is None else ("white", INK, ", sampled")
+    return {"ls": "none", "marker": marker, "mfc": inside, "mec": edge, "ms": size, "zorder": 5, "label": label + words}
 
 
-def _title(words: str) -> Any:
-    def title(found: Any, *_: Any) -> str:
+def _of_loop(words: str, **how: Any) -> Callable[[Callable[..., None]], Any]:
+    """A picture of the loop function, by its margins or as a curve."""
+
+    def title(found: Any) -> str:
         curve = curve_of(found)
-        note = f"\n{curve.note}" if curve.note else ""
-        return f"{curve.arm.name}: {words}; {gains_words(curve.law)}; {curve.stability}{note}"
+        return f"{curve.arm.name}: {words}; {gains_words(curve.law)}\n{curve.note}".rstrip()
 
-    return title
+    return picture((Margins | LoopCurve, "tfarm.margins or tfarm.loop_function returns"), title=title, **how)
 
 
 def draw_loops(each: Mapping[str, tuple[Real, Complex]], upper: Axes, lower: Axes, looks: Sequence[Looks] = ()) -> None:
@@ -115,10 +108,7 @@ def draw_loops(each: Mapping[str, tuple[Real, Complex]], upper: Axes, lower: Axe
     hertz_axis(upper, 1.0)
 
 
-@picture(
-    (Margins | LoopCurve, "tfarm.margins or tfarm.loop_function returns"), size=(9.0, 6.4), rows=(1.5, 1.0),
-    title=_title("loop function L"),
-)  # fmt: skip
+@_of_loop("loop function L", size=(9.0, 6.4), rows=(1.5, 1.0))
 def loop(found: Margins | LoopCurve, *, ax: Sequence[Axes]) -> None:
     """Bode plot of the loop function with its margins, in two axes, those given or new ones: these axes.
 
@@ -128,23 +118,30 @@ def loop(found: Margins | LoopCurve, *, ax: Sequence[Axes]) -> None:
     upper, lower = ax
     sides = curve_of(found).sides
     draw_loops({_name(each): (each.omega, each.L) for each in sides}, upper, lower, [_looks(each) for each in sides])
+    upper.set_ylim(top=max(5.0, upper.get_ylim()[1]))
     for each in sides:
-        ends = each.omega[[0, -1]]
         if each.margins is not None:
-            gain = [w for w, _ in each.margins.gain_crossovers if ends[0] <= w <= ends[1]]
-            upper.plot(gain, np.zeros(len(gain)), "D", ms=3.0, color=GREY, label="gain crossovers, |L| = 1")
-            phase = [(w, 1 / t) for w, t in each.margins.phase_crossovers if ends[0] <= w <= ends[1] and t > 0]
-            at, height = np.reshape(phase, (-1, 2)).T
-            upper.plot(at, decibels(height), "o", ms=3.0, color=GREY, label="phase crossovers, L < 0")
-        for mark in decisive(each.margins):
-            size, angle = float(decibels(abs(mark.L))), math.degrees(cmath.phase(mark.L))
-            line: Looks = {"color": INK, "lw": 1.6, "ls": _dashes(each), "zorder": 4}
-            upper.plot([mark.omega], [size], **_marked(each, mark))
-            if mark.marker == GAIN:
-                upper.plot([mark.omega, mark.omega], [size, 0.0], **line)
-            else:
-                lower.plot([mark.omega, mark.omega], [math.copysign(180.0, angle), angle], **line)
-                lower.plot([mark.omega], [angle], **_marked(each, mark))
+            _crossovers(each.margins, upper)
+            for omega, L, label, marker in decisive(each.margins):
+                size, angle = float(decibels(abs(L))), math.degrees(cmath.phase(L))
+                line: Looks = {"color": INK, "lw": 1.6, "ls": _dashes(each), "zorder": 4}
+                upper.plot([omega], [size], **_marked(each, label, marker))
+                if marker == GAIN:
+                    upper.plot([omega, omega], [size, 0.0], **line)
+                else:
+                    lower.plot([omega, omega], [math.copysign(180.0, angle), angle], **line)
+                    lower.plot([omega], [angle], **_marked(each, label, marker))
+
+
+def _crossovers(margins: LoopMargins, ax: Axes) -> None:
+    """A small mark at every |L| = 1, and at every L < 0."""
+    gain = [(w, 1.0) for w, _ in margins.gain_crossovers]
+    phase = [(w, 1 / t) for w, t in margins.phase_crossovers if w and t]
+    for marker, label, found in (
+        (PHASE_MARGIN, "gain crossovers, |L| = 1", gain), (GAIN, "phase crossovers, L < 0", phase)
+    ):  # fmt: skip
+        omega, size = np.reshape(found, (-1, 2)).T
+        ax.plot(omega, decibels(size), marker, ms=3.0, color=GREY, label=label)
 
 
 def _chart(L: Complex) -> tuple[Real, Real]:
@@ -154,10 +151,7 @@ def _chart(L: Complex) -> tuple[Real, Real]:
     return np.insert(angle, jump, np.nan), np.insert(size, jump, np.nan)
 
 
-@picture(
-    (Margins | LoopCurve, "tfarm.margins or tfarm.loop_function returns"), size=(7.6, 6.8),
-    title=_title("Nichols chart"),
-)  # fmt: skip
+@_of_loop("Nichols chart", size=(7.6, 6.8))
 def nichols(found: Margins | LoopCurve, *, ax: Axes) -> None:
     """Nichols chart of the loop function: |L| in dB over its phase, with contours of the closed loop; the axes.
 
@@ -166,43 +160,28 @@ def nichols(found: Margins | LoopCurve, *, ax: Axes) -> None:
     """
     sides = curve_of(found).sides
     sizes = np.concatenate([each.magnitude for each in sides])
-    low, high = max(sizes.min() - 3, NICHOLS_LOWEST), min(max(sizes.max() + 3, 10.0), NICHOLS_HIGHEST)
-    ax.set(xlim=(-360, 0), ylim=(min(low, -10.0), high), xlabel="phase of L [deg]", ylabel="|L| [dB]")
+    low, high = max(min(sizes) - 3, NICHOLS_LOWEST), min(max(*sizes, 7) + 3, NICHOLS_HIGHEST)
+    low = min(low, -10.0)
+    ax.set(xlim=(-360, 0), ylim=(low, high), xlabel="phase of L [deg]", ylabel="|L| [dB]")
     ax.xaxis.set_major_locator(MaxNLocator(8, steps=(4.5, 9)))
     decibel_ticks(ax)
     ax.grid(False)
-    box = np.array([360.0, high - min(low, -10.0)])
-    usual = -1 + AROUND / USUAL_PEAK
-    drawn = np.concatenate([np.column_stack(_chart(L)) for L in (usual, *(each.L for each in sides))])
-    drawn = drawn[np.isfinite(drawn).all(axis=1)] / box
     for size in CLOSED_LOOP:
         T = 10 ** (size / 20) * AROUND
-        contour = np.array(_chart(T / (1 - T)))
-        ax.plot(*contour, color=GREY, lw=0.6, zorder=1)
-        seen = (contour / box[:, None]).T
-        inside = (contour[0] > -345) & (contour[0] < -15) & (contour[1] > low + 2) & (contour[1] < high - 2)
-        if (places := np.flatnonzero(inside)).size:  # the label is where the curve is farthest
-            away = [np.hypot(*(drawn - seen[place]).T).min() for place in places]
-            place = places[int(np.argmax(away))]
-            at, drawn = contour[:, place], np.r_[drawn, seen[place] + LABEL_ROOM]
-            ax.text(
-                at[0], at[1], f"{plain(size)} dB", fontsize=7.5, color=GREY, ha="center", va="center",
-                bbox={"fc": "white", "ec": "none", "pad": 0.6},
-            )  # fmt: skip
+        ax.plot(*_chart(T / (1 - T)), color=GREY, lw=0.6, zorder=1, label="|T| = |L/(1 + L)|: " + CONTOURS)
+    at = {plain(size): float(decibels(1 / (10 ** (-size / 20) - 1))) for size in CLOSED_LOOP if size < 0}
+    at = {name: height for name, height in at.items() if low <= height <= high}
+    ax.secondary_yaxis("right").set_yticks(list(at.values()), [f"|T| = {name} dB" for name in at], fontsize=7.5)
     label = f"Ms = {USUAL_PEAK:g}"
-    ax.plot(*_chart(usual), color=INK, lw=1.0, ls=":", zorder=2, label=label)
+    ax.plot(*_chart(-1 + AROUND / USUAL_PEAK), color=INK, lw=1.0, ls=":", zorder=2, label=label)
     ax.plot([-180], [0], "+", color=UNSTABLE, ms=12, mew=2.2, zorder=6, label="the point −1")
-    ax.plot([], [], color=GREY, lw=0.6, label="|L/(1 + L)|")
     for each in sides:
         ax.plot(*_chart(each.L), zorder=3, **_looks(each))
-        for mark in decisive(each.margins):
-            ax.plot(*_chart(np.array([mark.L])), **_marked(each, mark))
+        for _, L, words, marker in decisive(each.margins) if each.margins is not None else ():
+            ax.plot(*_chart(np.array([L])), **_marked(each, words, marker))
 
 
-@picture(
-    (Margins | LoopCurve, "tfarm.margins or tfarm.loop_function returns"), size=(9.0, 4.8),
-    title=_title("sensitivity S and complementary sensitivity T"),
-)  # fmt: skip
+@_of_loop("sensitivity S and complementary sensitivity T", size=(9.0, 4.8))
 def sensitivity(found: Margins | LoopCurve, *, ax: Axes) -> None:
     """|S| = |1/(1 + L)| and |T| = |L/(1 + L)| in dB over frequency, with their peaks Ms and Mt; the axes.
 
@@ -210,17 +189,14 @@ def sensitivity(found: Margins | LoopCurve, *, ax: Axes) -> None:
     """
     sides = curve_of(found).sides
     for each in sides:
-        band = each.margins
-        for name, values, colour, peak in (
-            ("S", each.sensitivity, BLUE, None if band is None else band.sensitivity_peak),
-            ("T", each.complementary, INK, None if band is None else band.complementary_peak),
-        ):
-            width = 1.5 if name == "S" else 1.0
-            ax.plot(each.omega, values, color=colour, lw=width, ls=_dashes(each), label=f"|{name}|, {_name(each)}")
-            if peak is not None and peak.omega is not None:
-                at = f"M{name.lower()} {general(peak.value, DIGITS)} at {general(peak.omega, DIGITS)} rad/s"
-                mark = Mark(peak.omega, math.nan, at, "o" if name == "S" else "s")
-                ax.plot([peak.omega], [decibels(peak.value)], **_marked(each, mark, 9.0 if name == "S" else 5.0))
+        for name, values, colour, width, marker, size in (
+            ("S", each.sensitivity, BLUE, 1.5, "o", 9.0), ("T", each.complementary, INK, 1.0, "s", 5.0)
+        ):  # fmt: skip
+            ax.plot(each.omega, values, color=colour, lw=width, ls=_dashes(each), label=_name(each, f"|{name}|, "))
+            if each.margins is not None:
+                peak, omega = each.margins.sensitivity_peak if name == "S" else each.margins.complementary_peak
+                label = f"M{name.lower()} {_at(peak, '', omega).replace('  ', ' ')}"
+                ax.plot([omega or math.nan], [decibels(peak)], **_marked(each, label, marker, size))
     ax.axhline(0.0, color=GREY, lw=0.9)
     ax.axhline(float(decibels(USUAL_PEAK)), color=GREY, lw=0.9, ls=":", label=f"Ms = {USUAL_PEAK:g}")
     low, high = ax.get_ylim()
@@ -270,8 +246,7 @@ def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     ]
     if data.verdict.is_stable:
         peak = loop_margins(data.verdict).sensitivity_peak
-        at = "" if peak.omega is None else f" at {general(peak.omega, DIGITS)} rad/s"
-        label = f"Ms = {general(peak.value, DIGITS)}{at}: radius 1/Ms"
+        label = f"radius 1/Ms, Ms {_at(peak.value, '', peak.omega).replace('  ', ' ')}"
         circles.append((-1.0, 1 / peak.value, {"color": INK, "ls": "--", "label": label}))
     for place, (x, X, y, Y) in ((ax, (-edge, edge, -edge, edge)), (zoom, ZOOM)):
         place.grid(False)
