@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from tfarm.arrays import Complex, Real
-from tfarm.digits import general, plain, significant
+from tfarm.digits import general, plain
 from tfarm.loop.curve import LoopCurve, curve_of, decibels, gain_margin
 from tfarm.loop.margins import LoopMargins, Margins, loop_margins
 from tfarm.loop.nyquist import Nyquist, compressed
@@ -282,18 +282,6 @@ def disc(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     ax.set_xticks(radii, [plain(size).replace("inf", "∞") for size in RING_SIZES], fontsize=7.5)
     ax.grid(False)
     ax.set_title(_words(data, name), fontsize=9.0, loc="center")
-
-
-@picture(
-    size=(9.6, 10.2), rows=(1.0, 1.15), grid=lambda figure, *_: figure.subplots(2, height_ratios=(1.0, 1.15)),
-    title=lambda data, _: f"{data.verdict.loop.arm.name}: the loop function L(iω) up to "
-                          f"{significant(data.verdict.band, 5)} rad/s",
-)  # fmt: skip
-def draw_nyquist(data: Nyquist, name: str, *, ax: Sequence[Axes]) -> None:
-    """The linear plot of a controller above its disc, for its page."""
-    nyquist(data, ax=ax[0], name=name)
-    disc(data, ax=ax[1], name=name)
-    ax[1].set_title("")
 
 
 def _both_halves(z: Complex, ax: Axes) -> None:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,11 +112,14 @@ def nyquist_section(case: Case) -> PageSection:
     """The loop function of each controller on a contour that hides nothing, its encirclements counted."""
     plots = [(each, nyquist.nyquist_of(margins_of(each.arm, each.law).stability)) for each in case.in_s]
     own = any(found.unstable_open for _, found in plots)
-    blocks: list[Picture | Table] = [
-        picture("nyquist_plot", loop_function.draw_nyquist.figure(found, each.name), stem=each.stem("nyquist"),
-                data=curve_table(found), each=each, found=found)
-        for each, found in plots
-    ]  # fmt: skip
+    blocks: list[Picture | Table] = []
+    for each, found in plots:
+        linear, disc = (plot.figure(found, name=each.name) for plot in (loop_function.nyquist, loop_function.disc))
+        how: dict[str, Any] = {"each": each, "found": found}
+        blocks += [
+            picture("nyquist_plot", linear, stem=each.stem("nyquist"), data=curve_table(found), **how),
+            picture("nyquist_disc", disc, stem=each.stem("nyquist-disc"), **how),
+        ]
     blocks.append(sheet("nyquist_count", across({each.title: found for each, found in plots}), own=own))
     return PageSection(title="Nyquist plot: encirclements of −1", words=[prose("nyquist", own=own)], blocks=blocks)
 
