@@ -166,6 +166,14 @@ def test_an_unstable_loop_has_a_curve_and_no_margins(name):
     assert "continuous-time: unstable" in " ".join(figure.axes[0].get_legend_handles_labels()[1])
 
 
+@pytest.mark.parametrize("name", ["loop", "nichols", "sensitivity"])
+def test_without_feedback_s_is_one_and_nothing_crosses(name):
+    curve = tfarm.loop_function(LAB, tfarm.HubFeedback())
+    assert not curve.sensitivity.any()
+    figure = getattr(tfarm.plots, name).figure(curve)
+    assert (labels(*figure.axes), complaints(figure)) == ({}, [])
+
+
 def test_of_a_law_in_z_it_is_the_sampled_loop_alone():
     law = tfarm.Law({"hub_rate": ([0.3], [1.0])}, period=0.01)
     found = tfarm.loop_function(LAB, law)

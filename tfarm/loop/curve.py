@@ -84,9 +84,9 @@ def refined(L: Callable[[Complex], Complex], omega: Real) -> tuple[Real, Complex
     """Frequencies (n,), more of them where L (of s = i w) changes by much from one to the next, and L there."""
     for number in range(FINER_ROUNDS):
         values = np.asarray(L(1j * omega), dtype=np.complex128)
-        known = np.isfinite(values) & (values != 0)
+        known = np.isfinite(values) & ((values != 0) | (not values.any()))
         omega, values = omega[known], values[known]
-        (coarse,) = np.nonzero(abs(np.diff(np.log(values))) > LONGEST_STEP)
+        (coarse,) = np.nonzero(abs(np.diff(np.log(np.where(values == 0, 1.0, values)))) > LONGEST_STEP)
         if number < FINER_ROUNDS - 1:
             omega = np.insert(omega, coarse + 1, np.sqrt(omega[coarse] * omega[coarse + 1]))
     return omega, values
