@@ -8,7 +8,8 @@
 In the look of the report's pages, whose pictures these are.  This is the only room with matplotlib.
 """
 
-from tfarm.plots.frequency import bode, measured, nyquist
+from tfarm.plots.frequency import bode, measured
+from tfarm.plots.loop_function import disc, loop, nichols, nyquist, sensitivity
 from tfarm.plots.motion import modes, sketch, slew, tuned_gain
 from tfarm.plots.regions import comparison, gain_map, overlay
 from tfarm.plots.roots import locus
@@ -18,12 +19,16 @@ __all__ = [
     "bode",
     "column",
     "comparison",
+    "disc",
     "gain_map",
     "locus",
+    "loop",
     "measured",
     "modes",
+    "nichols",
     "nyquist",
     "overlay",
+    "sensitivity",
     "sketch",
     "slew",
     "tuned_gain",

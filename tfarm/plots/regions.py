@@ -41,7 +41,8 @@ from tfarm.loop.plane import gain_map as counted
 from tfarm.schema import Column
 from tfarm.spectrum.table import default_gains
 
-from .frequency import MOST_DRAWN, bode, draw_loops
+from .frequency import bode
+from .loop_function import draw_loops
 from .style import (
     GREY,
     INK,
@@ -61,6 +62,7 @@ DASHED, DASH_DOTTED = (0, (5, 2.5)), (0, (6, 2, 1, 2))  # edges of a sampled loo
 HATCHES = ("..", "\\\\\\\\", "////")  # of a sampled loop: with more damping, with less, with its own
 NUMBER_ROOM = (0.08, 0.045)  # of the width and the height: around a number
 NUMBERS_ACROSS = 0.14  # share of the picture's width between two frequencies
+MOST_DRAWN = 1e3  # factor on a controller
 HALO: list[AbstractPathEffect] = [withStroke(linewidth=3.0, foreground="white")]  # around numbers on a line
 K2_RANGE = (-1.0, 1.5)  # of the gain that balances a torque: 1 where the input is one, less for a motor's current
 CUT_RANGE = (-1.02, 1.52)  # of the same: where intervals are cut, just outside the picture: no cut is seen as an edge
@@ -402,7 +404,7 @@ def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
         bode(dict(zip(names, data.responses, strict=True)), ax=(upper, lower))
     else:
         draw_loops(dict(zip(names, (side.loop_function for side in data.sides), strict=True)), upper, lower)
-        upper.set_ylabel("|L| at the samples [−]" if data.is_sampled else "|L|, loop opened at the input [−]")
+        upper.set_ylabel("|L| at the samples [dB]" if data.is_sampled else "|L|, loop opened at the input [dB]")
     upper.set_xlabel("")
     upper.tick_params(labelbottom=False)  # the frequencies of the phase below
     right.grid(False)

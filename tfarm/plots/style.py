@@ -117,7 +117,7 @@ def column() -> Iterator[None]:
         _in_column.reset(before)
 
 
-FIGURES: dict[Any, Callable[..., Figure]] = {}  # by the class of a record the picture of it as a figure of its own
+FIGURES: dict[Any, Callable[..., Figure]] = {}  # by the class of a record its first picture as a figure of its own
 
 
 def check_records(of: Sequence[tuple[Any, str]], found: Sequence[Any]) -> None:
@@ -189,7 +189,7 @@ def picture(
             return axes[0] if is_one else tuple(axes)
 
         for kind in get_args(of[0][0]) or (of[0][0],) if len(of) == 1 else ():
-            FIGURES[kind] = figure
+            FIGURES.setdefault(kind, figure)
         shown.figure = figure  # type: ignore[attr-defined]
         return shown
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,8 @@ from tfarm.dsp import GainMap as SampledMap
 from tfarm.dsp.discretise import rule_in_words
 from tfarm.errors import ConvergenceError, TfarmError
 from tfarm.loop import loci, loop, margins, nyquist, plane, poles, stability
-from tfarm.plots import frequency, regions, roots, style
+from tfarm.loop.curve import curve_of
+from tfarm.plots import loop_function, regions, roots, style
 from tfarm.plots.style import Axes
 from tfarm.records import record
 from tfarm.report.page import (
@@ -91,9 +92,8 @@ def margin_table(found: Sequence[tuple[Controller, margins.Margins]]) -> Table:
 
 
 def _bode_picture(each: Controller, found: margins.Margins) -> Picture:
-    omega, L = margins.loop_curve(found)
-    columns = Column("omega_rad_s", of=omega), Column("re_L", of=L.real), Column("im_L", of=L.imag)
-    figure, stem = frequency.draw_loop.figure(found, each.name), each.stem("bode")
+    curve, figure, stem = curve_of(found), loop_function.loop.figure(found), each.stem("bode")
+    columns = Column("omega_rad_s", of=curve.omega), Column("re_L", of=curve.L.real), Column("im_L", of=curve.L.imag)
     return picture("loop_function", figure, stem=stem, data=columns, each=each, found=found)
 
 
@@ -112,11 +112,14 @@ def nyquist_section(case: Case) -> PageSection:
     """The loop function of each controller on a contour that hides nothing, its encirclements counted."""
     plots = [(each, nyquist.nyquist_of(margins_of(each.arm, each.law).stability)) for each in case.in_s]
     own = any(found.unstable_open for _, found in plots)
-    blocks: list[Picture | Table] = [
-        picture("nyquist_plot", frequency.draw_nyquist.figure(found, each.name), stem=each.stem("nyquist"),
-                data=curve_table(found), each=each, found=found)
-        for each, found in plots
-    ]  # fmt: skip
+    blocks: list[Picture | Table] = []
+    for each, found in plots:
+        linear, disc = (plot.figure(found, name=each.name) for plot in (loop_function.nyquist, loop_function.disc))
+        how: dict[str, Any] = {"each": each, "found": found}
+        blocks += [
+            picture("nyquist_plot", linear, stem=each.stem("nyquist"), data=curve_table(found), **how),
+            picture("nyquist_disc", disc, stem=each.stem("nyquist-disc"), **how),
+        ]
     blocks.append(sheet("nyquist_count", across({each.title: found for each, found in plots}), own=own))
     return PageSection(title="Nyquist plot: encirclements of −1", words=[prose("nyquist", own=own)], blocks=blocks)
 
