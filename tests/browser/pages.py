@@ -419,7 +419,7 @@ def test_keys_undo_and_link_reach_every_state_and_the_file_is_a_law(browser, fol
         page.wait_for_function("live.law.K1 === live.loop.start.K1 && live.past.length === 1")
         page.evaluate("address => { location.href = address; }", address)
         page.wait_for_function("K1 => live.law.K1 === K1", arg=law["K1"])
-        assert page.locator("#zplane").is_visible()
+        page.locator("#zplane").wait_for(state="visible")
         page.locator("#reset").click()
         page.wait_for_function("live.law.K1 === live.loop.start.K1 && !live.link()")
 

@@ -22,9 +22,9 @@ function ticksOf({ low, high, kind, values }, most) {
   return [...Array(Math.floor(high / step + 1e-9) - Math.ceil(low / step - 1e-9) + 1).keys()].map(k => (Math.ceil(low / step - 1e-9) + k) * step);
 }
 // A number at a tick; powers of ten as such
-function label(x) {
-  const words = general(Math.abs(x) < 1e-12 ? 0 : x, Math.abs(x) > 9999 && Math.log10(Math.abs(x)) % 1 ? 6 : 4).replace("-", "−"), ten = /^(−?)1e([+-])0*(\d+)$/.exec(words);
-  return ten ? `${ten[1]}10${ten[2] === "-" ? "⁻" : ""}${[...ten[3]].map(k => "⁰¹²³⁴⁵⁶⁷⁸⁹"[k]).join("")}` : words;
+function label(x, kind) {
+  const words = general(Math.abs(x) < 1e-12 ? 0 : x, Math.abs(x) > 9999 && !kind ? 6 : 4).replace("-", "−"), ten = /^(−?)1e([+-])0*(\d+)$/.exec(words);
+  return ten && kind ? `${ten[1]}10${ten[2] === "-" ? "⁻" : ""}${[...ten[3]].map(k => "⁰¹²³⁴⁵⁶⁷⁸⁹"[k]).join("")}` : words;
 }
 
 // Draw plots, {x, y, marks, share of the height}, and return the scales of each; what a plot below has too is not lettered above
@@ -59,12 +59,12 @@ function frame(draw, plot, x, y, top, high, width, is_last, colours) {
     const at = y.at(value);
     if (!(at >= top - 1 && at <= top + high + 1)) continue;
     line(draw, [[x.from, at], [x.to, at]]);
-    if (Math.abs(last - at) > 11) { draw.fillText(label(value), x.from - 5, at); last = at; }
+    if (Math.abs(last - at) > 11) { draw.fillText(label(value, plot.y.kind), x.from - 5, at); last = at; }
   }
   draw.textAlign = "center";
   let end = -Infinity;
   for (const value of ticksOf(plot.x, Math.max(3, Math.floor((x.to - x.from) / 55))).sort((a, b) => a - b)) {
-    const at = x.at(value), words = label(value), half = draw.measureText(words).width / 2;
+    const at = x.at(value), words = label(value, plot.x.kind), half = draw.measureText(words).width / 2;
     if (!(at >= x.from - 1 && at <= x.to + 1)) continue;
     line(draw, [[at, top], [at, top + high]]);
     const middle = Math.min(Math.max(at, x.from), width - half);
@@ -72,7 +72,7 @@ function frame(draw, plot, x, y, top, high, width, is_last, colours) {
   }
   if (is_last) draw.fillText(plot.x.label, (x.from + x.to) / 2, top + high + 25);
   draw.save();
-  draw.translate(9, top + high / 2);
+  draw.translate(7, top + high / 2);
   draw.rotate(-Math.PI / 2);
   draw.fillText(plot.y.label, 0, 0);
   draw.restore();
@@ -138,6 +138,6 @@ const MARKS = {
   },
   words(draw, { words, x: of, y: on, text, colour }, x, y) {
     Object.assign(draw, { fillStyle: colour, textAlign: "left", textBaseline: "middle" });
-    for (const row of words) draw.fillText(row[text], Math.min(x.at(row[of]) + 4, x.to - draw.measureText(row[text]).width - 2), y.at(row[on]));
+    for (const row of words) draw.fillText(row[text], Math.min(x.at(row[of]) + 4, x.to - draw.measureText(row[text]).width - 2), Math.max(y.at(row[on]), y.to + 8));
   },
 };

@@ -10,7 +10,7 @@
   function dress() { // colours of the screen, light or dark
     const style = getComputedStyle(document.documentElement);
     for (const [name, of] of Object.entries({ ink: "ink", grey: "grey", faint: "line", link: "link", stable: "stable", marginal: "marginal", unstable: "unstable", good: "good", low: "low", poor: "poor" })) colours[name] = style.getPropertyValue(`--${of}`).trim();
-    Object.assign(colours, { blue: colours.stable, orange: colours.unstable });
+    Object.assign(colours, { blue: colours.link, orange: colours.ink });
   }
   dress();
 
@@ -70,7 +70,7 @@
   }
   function show() {
     const { law, verdict, why, margins, zmargins, zword } = now, period = data.period;
-    pill("verdict", now.grows ? "unstable" : verdict.replace("the frequency ", ""), now.grows ? "unstable" : now.stable ? "stable" : "marginal");
+    pill("verdict", now.grows ? "unstable" : now.stable ? "stable" : "marginal", now.grows ? "unstable" : now.stable ? "stable" : "marginal");
     pill("sampled", zword, now.z ? zword : "marginal");
     text("why", `${why}.`);
     card("s", margins, period);
@@ -173,7 +173,7 @@
       ],
     }],
     zplane: () => {
-      const { clientWidth: w, clientHeight: h } = $("zplane"), wide = 1.25 * Math.max(1, (w - LEFT - RIGHT) / (h - TOP - BELOW)), high = 1.25 * Math.max(1, (h - TOP - BELOW) / (w - LEFT - RIGHT));
+      const [wide, high] = equal("zplane", 1.25);
       return [{ x: { low: -wide, high: wide, label: "Re z" }, y: { low: -high, high, label: "Im z" }, marks: [
         { line: spirals(), x: "re", y: "im", by: "ratio", colour: colours.grey, dash: [4, 3], width: 0.8 }, { line: circle(0, 1), x: "x", y: "y", colour: colours.grey },
         { line: now.discs || [], x: "re", y: "im", by: "piece", colour: colours.link, width: 1 }, { points: pointed.zplane ? [pointed.zplane] : [], x: "re", y: "im", shape: DOT, colour: colours.link },
@@ -194,17 +194,17 @@
       ];
     },
     nyquist: fine => {
-      const here = pointed.bode ? turned([pointed.bode]) : [], a = 2.5 * zoom;
+      const here = pointed.bode ? turned([pointed.bode]) : [], [wide, high] = equal("nyquist", 2.5 * zoom);
       if (state.loop === "sensitivity") return [{ x: { low: now.from, high: (damped || loop).band, kind: "log", label: "frequency [rad/s]" }, y: { low: -50, high: 30, label: "|S|, |T| [dB]" }, marks: [
         { rule: 0 }, { rule: 6, dash: [2, 3] }, ...cursor(), { line: own(fine), x: "w", y: "T", colour: colours.link }, { line: own(fine), x: "w", y: "S", colour: colours.ink, width: 1.8 },
       ] }];
       const nichols = state.loop === "nichols", [x, y] = nichols ? ["angle", "dB"] : ["x", "y"], by = nichols ? "branch" : undefined;
       const axes = nichols ? { x: { low: -360, high: 0, label: "angle of L [deg]", values: [-360, -270, -180, -90, 0] }, y: { low: -40 * zoom, high: 40 * zoom, label: "|L| [dB]" } }
-        : { x: { low: -a, high: a, label: "Re L" }, y: { low: -a, high: a, label: "Im L" } };
+        : { x: { low: -wide, high: wide, label: "Re L" }, y: { low: -high, high, label: "Im L" } };
       return [{ ...axes, marks: [
         ...(nichols ? [{ rule: 0 }, { rule: -180, along: "x" }] : [{ line: circle(0, 1), x: "x", y: "y", colour: colours.grey, width: 1 }]), { line: half(state.loop), x, y, colour: colours.grey, dash: [2, 3], width: 1 },
         { line: sampledCurve(), x, y, by, colour: colours.grey, dash: [5, 3] }, { line: own(fine), x, y, by, colour: colours.ink },
-        { points: [nichols ? { angle: -180, dB: 0 } : { x: -1, y: 0 }], x, y, shape: CROSS, colour: colours.unstable }, { points: here, x, y, shape: DOT, colour: colours.link },
+        { points: [nichols ? { angle: -180, dB: 0 } : { x: -1, y: 0 }], x, y, shape: CROSS, colour: colours.ink }, { points: here, x, y, shape: DOT, colour: colours.link },
       ] }];
     },
     slew: fine => {
@@ -217,6 +217,11 @@
     },
     sensor: () => sensor.plots(),
   };
+  // Half of each axis where both have one scale, the shorter one `least`
+  function equal(name, least) {
+    const [wide, high] = room(name);
+    return [least * Math.max(1, wide / high), least * Math.max(1, high / wide)];
+  }
   const canvasOf = name => $(name).querySelector("canvas");
   function draw(name, fine = true) {
     if ($(name) && $(name).offsetParent && $(name).clientHeight > 80) scales[name] = paint(canvasOf(name), charts[name](fine), colours);
@@ -246,10 +251,10 @@
     clearTimeout(resting);
     now = numbers(law);
     dressed();
+    drawAll(false); // first: what is written changes the layout, which a chart would wait for
+    player?.show(now.run);
     show();
     notes();
-    drawAll(false);
-    player?.show(now.run);
     resting = setTimeout(rest, REST, now);
     window.live.moves.push(performance.now() - start);
   }
@@ -303,6 +308,7 @@
 
   // ---------------------------------------------------------------- states: link, undo, file
 
+  let written = location.hash.slice(1);
   const stateNow = () => ({ ...Object.fromEntries(names.map(name => [name, law[name]])), ...state });
   function link() {
     const shown = Object.entries(stateNow()).filter(([name, value]) => name in law ? value !== data.start[name] : value !== usual[name]);
@@ -315,7 +321,7 @@
     return found;
   }
   function keep() {
-    if (location.hash.slice(1) !== link()) location.replace(`#${link()}`); // from the disk too, where the history is closed
+    if (written !== link()) location.replace(`#${written = link()}`); // from the disk too, where the history is closed
     const here = stateNow(), last = past[past.length - 1];
     $("undo").disabled = past.length < 2;
     if (last && Object.keys(here).every(key => here[key] === last[key])) return;
@@ -401,7 +407,7 @@
   for (const id of ["plane", "loop"]) $(id).addEventListener("click", event => { if (event.target.value) set({ [id]: event.target.value }); });
   for (const id of ["vary", "shown"]) $(id).addEventListener("change", event => { now.locus = now.discs = null; set({ [id]: event.target.value }); });
   $("more").addEventListener("toggle", () => { if ($("more").open) { tables(); draw("sensor"); } });
-  addEventListener("hashchange", () => { if (location.hash.slice(1) !== link()) set(linked()); });
+  addEventListener("hashchange", () => { if (location.hash.slice(1) !== written) { written = location.hash.slice(1); set(linked()); } });
   addEventListener("resize", () => { set({}); draw("sensor"); });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { dress(); set({}); draw("sensor"); });
   const first = linked();
