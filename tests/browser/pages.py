@@ -5,7 +5,9 @@ Not collected by `make test`.  It prints how soon a live page answers and how lo
 
 from __future__ import annotations
 
+import json
 import math
+import re
 import shutil
 import statistics
 from collections.abc import Iterator
@@ -443,3 +445,19 @@ def test_the_dashboard_is_one_screen_and_one_column_on_a_phone(browser, folder, 
             assert len({round(left) for left in found[1:4, 0]} & {round(left) for left in found[4:7, 0]}) == 3
             area = ((found[:, 2] - found[:, 0]) * (found[:, 3] - found[:, 1])).sum()
             assert area > 0.9 * 1280 * 800  # no holes
+
+
+def test_a_page_without_sampled_loop_slew_and_sensor_has_the_rest(browser, folder, tmp_path, monkeypatch):
+    (text,) = re.findall(r'id="live-data">(.*?)</script>', (folder / ARMS[0] / "live.html").read_text("utf-8"), re.S)
+    missing = dict.fromkeys(("sampled_map", "sampled_loop", "slew", "sensor"))
+    data = json.loads(text) | missing | {"no_sensor": "no polynomial follows"}
+    monkeypatch.setattr("tfarm.report.live.live_data", lambda *_: data)
+    (tmp_path / "arm").mkdir()
+    save_live(Case(tfarm.load(ARMS[0]), load_chain(ARMS[0])), tmp_path / "arm")
+    write_assets(tmp_path / ASSETS)
+    with Opened(browser, tmp_path / "arm" / "live.html") as opened:
+        page = opened.page
+        set_gains(page, HubFeedback(**data["start"]))
+        page.wait_for_function("live.rested", timeout=60_000)
+        assert texts(page, ["verdict", "sampled"]) == {"verdict": "stable", "sampled": "not computed"}
+        assert page.evaluate("live.now.locus.length") > 50
