@@ -5,7 +5,7 @@
   const loop = new LiveLoop(data), discrete = data.sampled_loop && new SampledLoop(data.sampled_loop), slew = data.slew && new Slew(data.slew);
   const damped = data.graded && new LiveLoop({ ...data, ...data.graded }), dampedZ = damped && discrete && new SampledLoop(data.graded.sampled_loop); // that margins are graded with
   const REST = 200, UNDOS = 100, law = { ...data.start }; // ms without a move until everything is drawn in full; states that are kept
-  const state = { plane: "poles", loop: "nyquist", vary: "K2", shown: "5" }, usual = { ...state }, past = [], colours = {};
+  const state = { plane: "poles", loop: "nyquist", vary: "K2", shown: "3" }, usual = { ...state }, past = [], colours = {};
   const text = (id, words) => { const at = $(id); if (at && at.textContent !== words) at.textContent = words; };
   function dress() { // colours of the screen, light or dark
     const style = getComputedStyle(document.documentElement);
