@@ -26,7 +26,7 @@ function makeSensor(kinds, colours, redraw) {
     const all = [...own.map(row => row.w), ...modes].filter(w => w > 0), low = Math.min(...all) / 1.3, high = Math.max(...all) * 1.3;
     return [{ x: { low: 0, high: Math.max(...x), label: "sensor at x [m] from the clamp" }, y: { low, high, kind: "log", label: "frequency [rad/s]" }, marks: [
       ...modes.map(w => ({ rule: w, colour: colours.link, dash: [5, 3] })), { rule: x[at()], along: "x" },
-      { points: own, x: "x", y: "w", radius: 3, shape: row => row.right ? DOT : RING, colour: row => row.right ? colours.unstable : colours.ink },
+      { points: own, x: "x", y: "w", radius: 3, shape: row => row.right ? DOT : RING, colour: colours.ink },
     ] }];
   }
   for (const id of ["sensor-kind", "sensor-at"]) $(id).addEventListener("input", show);
