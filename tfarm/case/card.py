@@ -53,6 +53,7 @@ GRADED = {  # names of the graded margins in the grade of the loop
 }
 GAIN_LIMITS, PHASE_LIMITS, PERIOD_LIMITS, PEAK_LIMITS = (6.0, 3.0), (45.0, 30.0), (1.0, 0.5), (2.0, 3.0)
 REFERENCE_RATIO = 1e-3  # damping ratio of mode 1 with which an undamped arm is graded
+ON_REAL_AXIS = 1e-9  # of its size: imaginary part of a sampled pole which is rounding
 SMALL_RATIO = 1e-3  # of mode 1: below it the minimum structural damping for stability is on the card
 UNDAMPED = (
     "undamped model: margins and grades are those with C = {:.4g} s, 0.1 % of critical damping in mode 1; "
@@ -339,7 +340,8 @@ def sampled_margins(curve: SampledCurve) -> LoopMargins:
 def unaliased_poles(loop: Sampled) -> dict[int, complex]:
     """The poles s = ln(z)/T [1/s] with Im s > 0 by mode, each at the frequency that is nearest to that of its mode."""
     T, poles = loop.chain.sampling.period, loop.poles
-    upper = poles.z.imag > 0
+    # a real z < 0 oscillates at half the sampling rate; by rounding it may be one of a pair, or below the axis
+    upper = (poles.z.imag > 0) | ((poles.z.real < 0) & (abs(poles.z.imag) <= ON_REAL_AXIS * abs(poles.z)))
     table = modes(loop.plant.arm, max(1, int(poles.mode.max(initial=1))))
     natural = dict(zip(table.index.tolist(), table.natural_frequency.tolist(), strict=True))
     found: dict[int, complex] = {}

@@ -255,7 +255,6 @@ PACKAGES = (
     "control",
     "matplotlib",
     "latex2mathml",
-    "vl-convert-python",
 )
 
 
