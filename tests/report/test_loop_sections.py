@@ -207,5 +207,5 @@ def test_intervals_are_short_facts_of_the_map(section):
 def test_without_recommended_gains_there_is_a_sentence(monkeypatch):
     monkeypatch.setattr(map_room, "best", lambda arm, chain: None)
     section = recommended_section(Case(LAB, Chain()))
-    assert section.answer.startswith("No gains within the bounds")
+    assert section.answer.startswith("None: the search")
     assert not section.card

@@ -38,6 +38,7 @@ SHOWN = (  # sections of the first page in their order: anchor, name of a pictur
     ("margins-map", "map", 0),
     ("margins", ".+-bode", 0),
     ("sampled", "sampled-(slew|measured)", 0),
+    ("bode-root-moment", "bode-root-moment", 0),  # where there is no loop function
     ("modes", "", 0),
     ("locus", "locus-.+", -1),
     ("fit", "fit-overlay", 0),
@@ -59,10 +60,10 @@ class Card:
 
     name: str
     summary: str
-    picture: str = ""
-    modes: tuple[Mode, ...] = ()
-    loops: tuple[LoopResult, ...] = ()
-    notes: tuple[str, ...] = ()
+    picture: str
+    modes: tuple[Mode, ...]
+    loops: tuple[LoopResult, ...]
+    notes: tuple[str, ...]
 
 
 def save_card(case: Case, folder: Path) -> None:
@@ -152,7 +153,7 @@ def blocks(sections: Mapping[str, PageSection]) -> list[Block]:
     found = []
     for anchor, stem, place in SHOWN:
         section, page = sections.get(anchor), f"{anchor.partition('-')[0]}.html"
-        if section is None:
+        if section is None or (page == "bode.html" and "margins" in sections):
             continue
         pictures = [each for each in section.blocks if each.image and re.fullmatch(stem, each.stem)]
         if section.failure or not stem:

@@ -62,10 +62,11 @@ def sampled_section(case: Case) -> PageSection:
 
 def interval_facts(found: Analysis) -> Iterator[Fact]:
     """The stability intervals of both gains of a sampled loop."""
-    period = plain(1e3 * found.loop.chain.sampling.period)
+    period, modes = plain(1e3 * found.loop.chain.sampling.period), f" (first {found.verdict.modes_used} modes)"
     for name in PLANE:
-        unit = shown_unit(name, found.loop.plant.arm)
-        yield Fact(f"{name}, sampled, {period} ms", text(list(found.shown[name]), 4) or "no value", unit)
+        unit, shown = shown_unit(name, found.loop.plant.arm), text(list(found.shown[name]), 4) or "no value"
+        known = f"{name}, sampled, {period} ms{modes if modes in shown else ''}"
+        yield Fact(known, shown.replace(modes, "").replace("?", "not determined"), unit)
 
 
 def chain_words(arm: Arm, chain: Chain) -> str:
@@ -186,6 +187,8 @@ def slews(case: Case) -> tuple[list[Picture | Table], list[str], list[Fact]]:
 def settling_fact(each: Controller, run: Simulation, is_named: bool) -> Fact:
     """The settling time of a slew, or the time within which it is not reached."""
     label = f"settling time of the slew{f', {each.name}' if is_named else ''}"
+    if run.stopped is not None:
+        return Fact(label, "unstable")
     if run.settling_time is None:
         return Fact(label, f"not settled within {significant(run.t[-1], 4)}", "s")
     return Fact(label, text(run.settling_time, 4), "s")

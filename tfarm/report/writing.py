@@ -120,7 +120,7 @@ PIECES = (
     Piece("response of the tip", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),
     Piece("measured responses", "bode-measured", measured_section, lambda case: case.measured),
     Piece("the arm", "arm", arm_section, on="modes"),
-    Piece("modes", "modes", modes_section, title="Modes"),
+    Piece("modes", "modes", modes_section, title="Arm and modes"),
     Piece("root loci", "locus", locus_section, _in_s, "Root loci", task=LOOP_TASK),
     Piece("sampled loop", "sampled", sampled_section, lambda case: case.has_loop, "The sampled loop",
           task=SAMPLED_TASK),
@@ -322,13 +322,13 @@ def _write_pages(
     pages = navigation(case.arm, pages_in(earlier, (*written, *_is_live(folder))), trust, earlier)
     with_facts = (by_anchor.get(anchor, PageSection()) for anchor in ("margins-map", "sampled"))
     shared = {
-        "card": kept_in(folder, "card", Card) or Card(case.arm.name, summary(case)),
+        "card": kept_in(folder, "card", Card) or Card(case.arm.name, summary(case), "", (), (), ()),
         "short": SHORT,
         "pages": pages,
         "titles": dict(pages),
         "blocks": blocks(by_anchor),
         "short_facts": [fact for section in with_facts for fact in section.facts],
-        "has_recommended": "margins-recommended" in by_anchor,
+        "has_recommended": bool(by_anchor.get("margins-recommended", PageSection()).card),
         "open_pictures": 2,  # of a section: those that answer its question; the rest is a click away
         "has_proof": (folder / "proof.json").is_file(),
         "sha256": hashlib.sha256(file.encode()).hexdigest(),
