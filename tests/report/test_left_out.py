@@ -112,7 +112,7 @@ def test_every_piece_has_the_anchor_of_its_section(pages):
 
 
 def test_a_page_has_the_same_sections_whatever_is_written_with_it(tmp_path, monkeypatch):
-    """A page of the loop of an arm that has none has no section, but the sentence that says so."""
+    """A page of the loop of an arm that has none has no section, but the reason."""
     kept = tuple(replace(each, make=partial(bare, each.anchor)) for each in PIECES)
     monkeypatch.setattr("tfarm.report.writing.PIECES", kept)
     monkeypatch.setattr(writing, "save_proof", lambda *_: None)

@@ -278,7 +278,7 @@ def interval_facts(arm: Arm) -> list[Fact]:
 
 def recommended_section(case: Case) -> PageSection:
     """The gains that damp the first modes of the sampled loop best, with their result card."""
-    found, title = best(case.arm, case.chain), "Recommended gains"
+    found, title = best(case.arm, case.chain), "Recommended gains: best damping"
     if found is None:
         return PageSection(title=title, answer=prose("no_best_gains", modes=DESIGNED_MODES))
     gains = ", ".join(found.law.gain_text(name, partial(significant, digits=4), case.arm) for name in PLANE)
