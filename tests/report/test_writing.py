@@ -271,7 +271,8 @@ def test_long_matter_is_folded_on_the_pages_of_sections(pages):
 
 def test_every_cell_of_a_narrow_page_has_its_title(pages):
     """A table is stacked on a phone: each cell has the title of its column."""
-    text = "".join(page.read_text(encoding="utf-8") for page in (pages / NAME).glob("[!l]*.html"))
+    own = [page for page in (pages / NAME).glob("*.html") if page.name != "live.html"]
+    text = "".join(page.read_text(encoding="utf-8") for page in own)
     text += (pages / "index.html").read_text(encoding="utf-8")
     assert "<td" in text
     body = "".join(re.findall(r"<tbody>.*?</tbody>", text, flags=re.DOTALL))
