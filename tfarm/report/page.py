@@ -5,6 +5,7 @@ Texts are in templates/prose.txt, pages in the other templates; here is how both
 
 import json
 import math
+import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -55,6 +56,10 @@ TEMPLATES = Path(__file__).parent / "templates"
 PICTURES, DATA = "pictures", "data"  # folders in that of an arm
 T = TypeVar("T")
 PART = "\ue000"  # between title and caption, which no name has in it
+PROMISES = (
+    "certified", "complete", "converged", "default gains", "enclosed", "Lyapunov region", "not determined", "proven",
+    "small gain", "winding number",
+)  # fmt: skip
 DESIGNED_MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
 
 
@@ -117,6 +122,27 @@ class Fact(NamedTuple):
     note: str = ""
 
 
+class Cell(NamedTuple):
+    """A quantity of a loop as a card shows it: the frequency or the mode `at` which it is reached, and its grade."""
+
+    label: str
+    value: str
+    unit: str
+    at: str = ""
+    grade: str = ""
+
+
+@dataclass(frozen=True)
+class LoopResult:
+    """One loop as cards show it, its quantities by the names of `LoopCard`; `look` is the style of its pill."""
+
+    controller: str
+    loop: str
+    pill: str
+    look: str
+    cells: dict[str, Cell]
+
+
 class Picture(NamedTuple):
     """A finished figure with its words.  `stem` names its files; `data` are the numbers that it draws.
 
@@ -151,17 +177,17 @@ def _columns(of: Table | Iterable[Column]) -> tuple[Column, ...]:
 
 
 class SavedBlock(NamedTuple):
-    """A picture or table as the page shows it, its files saved."""
+    """A picture or table as the page shows it, its files saved; `image` is the picture without words."""
 
     stem: str
     title: str
-    is_table: bool
     html: Markup
+    image: Markup | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PageSection:
-    """A part of a page.  `answer` is its result in a sentence or two, at the top of the full page too.
+    """A part of a page.  `answer` is its result in a sentence or two, `card` that of a controller of its own.
 
     `words` are paragraphs, `items` a list; `blocks` pictures and tables, of which one without columns is not shown.
     `failure` is the reason why the section could not be made, which its words have too; empty otherwise.
@@ -173,6 +199,7 @@ class PageSection:
     words: Sequence[str] = ()
     items: Sequence[str] = ()
     facts: Sequence[Fact] = ()
+    card: Sequence[LoopResult] = ()
     blocks: Sequence[Any] = ()
     failure: str = ""
 
@@ -188,18 +215,31 @@ def save_section(section: PageSection, folder: Path, is_paper: bool = False) -> 
 def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> SavedBlock:
     """A picture as pictures/*.svg, for a paper *.pdf too, its data as data/*.csv; a table as data/*.csv and .json."""
     shape: Any = templates().get_template("blocks.html").module
-    is_table = isinstance(block, Table)
     if isinstance(block, Table):
-        html = shape.table(block, [f"{DATA}/{name}" for name in save_table(block, folder / DATA)])
-    else:
-        save_figure(block.figure, folder / PICTURES, block.stem, formats=("svg",))
-        if is_paper:
-            save_column(block.figure, folder / PICTURES, block.stem)
-        drawn = [f"{PICTURES}/{block.stem}.{kind}" for kind in ("svg", *["pdf"] * is_paper)]
-        numbers = Table(columns=block.data, stem=f"{block.stem}-data")
-        saved = save_table(numbers, folder / DATA, kinds=("csv",)) if block.data else ()
-        html = shape.picture(block, [*drawn, *(f"{DATA}/{name}" for name in saved)])
-    return SavedBlock(block.stem, block.title, is_table, html)
+        files = [f"{DATA}/{name}" for name in save_table(block, folder / DATA)]
+        return SavedBlock(block.stem, block.title, shape.table(block, files))
+    save_figure(block.figure, folder / PICTURES, block.stem, formats=("svg",))
+    if is_paper:
+        save_column(block.figure, folder / PICTURES, block.stem)
+    numbers = Table(columns=block.data, stem=f"{block.stem}-data")
+    saved = save_table(numbers, folder / DATA, kinds=("csv",)) if block.data else ()
+    drawn = [f"{PICTURES}/{block.stem}.{kind}" for kind in ("svg", *["pdf"] * is_paper)]
+    files = [*drawn, *(f"{DATA}/{name}" for name in saved)]
+    return SavedBlock(block.stem, block.title, shape.picture(block, files), shape.image(block))
+
+
+def explained(text: str, words: str = "") -> Markup:
+    """A sentence as a page shows it, commands in `...`; a promise leads to its meaning on the page `words`, if any."""
+    shown = re.sub("`(.+?)`", r"<code>\1</code>", str(with_symbols(text)))
+    for word in PROMISES if words else ():
+        linked = rf'<a class="term" href="{words}#{word_id(word)}">\g<0></a>'
+        shown = re.sub(rf"\b{word}\b", linked, shown, count=1, flags=re.IGNORECASE)
+    return Markup(shown)
+
+
+def word_id(name: str) -> str:
+    """The anchor of a word of the glossary."""
+    return f"word-{name.lower().replace(' ', '-')}"
 
 
 def write_text(file: Path, text: str) -> None:
