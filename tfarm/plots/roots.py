@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import Complex
 from tfarm.digits import kept_digits, plain, significant
 from tfarm.dsp.modes import DRAWN_RADIUS, RIM, SampledLoci, SampledLocus
 from tfarm.errors import one_line
@@ -17,8 +17,20 @@ from tfarm.loop.loci import POLE_DIGITS, Loci, ReducedLocus, held_branches
 from tfarm.loop.locus import BranchCrossing, Locus, frame, origin_name, rounded, view
 from tfarm.response.frequency import AXIS_SHARE
 
-from .regions import HALO, NUMBER_ROOM, is_free
-from .style import FAINT, FIGURES, GREY, INK, MARGINAL, REGIONS, STABLE, UNSTABLE, gains_words, picture
+from .style import (
+    FAINT,
+    FIGURES,
+    GREY,
+    INK,
+    MARGINAL,
+    REGIONS,
+    STABLE,
+    UNSTABLE,
+    arrows,
+    gains_words,
+    note,
+    picture,
+)
 
 ROOM_AROUND = 0.12  # around a branch, as a share of its extent
 CROSS_AT_ZERO: dict[str, Any] = {"ls": "none", "marker": "x", "ms": 6, "mew": 1.4}  # without the varying feedback
@@ -26,12 +38,11 @@ CIRCLE_AT_FIRST: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6, "mfc": 
 DOT: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 3.2}
 THIN: dict[str, Any] = {"lw": 0.9, "ls": (0, (2, 1.5)), "zorder": 3}  # of the reduced model
 GRID: dict[str, Any] = {"color": FAINT, "lw": 0.7, "zorder": 0.6}
-NOTE: dict[str, Any] = {"fontsize": 7.0, "color": GREY, "path_effects": HALO, "textcoords": "offset points"}
+VALUE: dict[str, Any] = {"fontsize": 7.0, "color": GREY}
 RATIOS = (*(m * 10.0**k for k in range(-6, 0) for m in (1, 2, 5)), 0.8)  # of damping, of which as many as fit
 Z_RATIOS, Z_FREQUENCIES = (0.1, 0.3, 0.5, 0.7, 0.9), range(1, 10)  # the latter in tenths of pi/T
 RATIO_APART = 0.17  # of a side of the picture: between the ends of two lines of constant damping ratio
 NAME_ROOM = (0.15, 0.06)  # of the width and the height: around the beginning of a name
-ARROW_ROOM, ARROW = 0.05, 0.015  # of a side: a branch that is shorter has no arrow; half the length of one
 
 
 def zoomed(exact: Locus) -> list[int]:
@@ -80,30 +91,28 @@ def _panel(fine: Locus, exact: Locus, reduced: ReducedLocus | None, numbers: Seq
     ax.set(xlim=(left - wide, right + 2 * wide), ylim=(low - tall, high + tall))
     ax.set(xlabel="Re s [1/s]", ylabel="Im s [rad/s]")
     ax.xaxis.set_major_locator(MaxNLocator(4))
-    places = s_grid(ax, is_named=everything)
+    s_grid(ax, is_named=everything)
     _draw_branches(shown, ax)
-    for r in () if reduced is None else held_branches(reduced.branches[list(numbers)]):
-        meets = np.flatnonzero(np.diff((r.imag == 0).astype(int))) + 1  # between two values: no corner is cut off
-        ax.plot(*(np.insert(part, meets, np.nan) for part in (r.real, r.imag)), color=INK, **THIN)
+    if reduced is not None:
+        ax.plot([], [], color=INK, label=f"python-control, reduced model of order {reduced.order}", **THIN)
+        for r in held_branches(reduced.branches[list(numbers)]):
+            meets = np.flatnonzero(np.diff((r.imag == 0).astype(int))) + 1  # between two values: no corner is cut off
+            ax.plot(*(np.insert(part, meets, np.nan) for part in (r.real, r.imag)), color=INK, **THIN)
     way, last = int(np.sign(gain[-1] - gain[0])), float(gain[-1])
     is_factor = not exact.varied.is_of_arm and exact.vary != "delay"
     begins = 0.0 if is_factor and min(gain[0], last) <= 0 <= max(gain[0], last) else float(gain[0])
     values = [float(f"{value:.3g}") for value in np.linspace(begins, last, 5)]
     mark = CROSS_AT_ZERO if begins == 0 else CIRCLE_AT_FIRST
-    for s in held_branches(exact.branches[list(numbers)]):
-        start, *dots = np.interp(way * np.array(values), way * gain, s)
-        ax.plot(start.real, start.imag, color=INK, zorder=4, **mark)
-        ax.plot(np.real(dots), np.imag(dots), color=INK, zorder=4, **DOT)
-    for s in shown:
-        arrow(s[::way], ax)
-    edge_marks(shown[:, -1], ax, places)
-    for origin in dict.fromkeys(exact.origin.tolist()) if everything else ():
-        _name_branch(origin_name(origin), branches[exact.origin == origin].ravel(), ax, places)
     first, *others = (plain(value, 3) for value in values)
-    entries = [(mark, f"{exact.vary} = {first}"), (DOT, f"{exact.vary} = {', '.join(others)}")]
-    entries += [] if reduced is None else [(THIN, f"python-control, reduced model of order {reduced.order}")]
-    for which, name in entries:
-        ax.plot([], [], color=INK, label=name, **which)
+    held = held_branches(exact.branches[list(numbers)])
+    at = np.array([np.interp(way * np.array(values), way * gain, s) for s in held])
+    for own, looks, name in ((at[:, 0], mark, first), (at[:, 1:].ravel(), DOT, ", ".join(others))):
+        ax.plot(own.real, own.imag, color=INK, zorder=4, label=f"{exact.vary} = {name}", **looks)
+    for s in shown:
+        arrows(s[::way], ax)
+    edge_marks(shown[:, -1], ax)
+    for origin in dict.fromkeys(exact.origin.tolist()) if everything else ():
+        _name_branch(origin_name(origin), branches[exact.origin == origin].ravel(), ax)
     _draw_crossings([each for each in exact.crossings if each.branch in (*numbers, *[None] * everything)], exact, ax)
 
 
@@ -129,20 +138,7 @@ def _draw_crossings(seen: Sequence[BranchCrossing], exact: Locus, ax: Axes) -> N
                 label=label if number < 6 else "further crossings of the axis")  # fmt: skip
 
 
-def arrow(s: Complex, ax: Axes) -> None:
-    """An arrow in the middle of a line, in the direction in which it runs, where its part in view is long enough."""
-    to_view = ax.transData - ax.transAxes
-    at = to_view.transform(np.c_[s.real, s.imag])
-    at = at[((at > 0) & (at < 1)).all(axis=1)]
-    along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(at, axis=0).T))]
-    if along[-1] > ARROW_ROOM:
-        middle = along[-1] / 2 + np.array([-ARROW, ARROW])
-        tail, head = to_view.inverted().transform(np.c_[[np.interp(middle, along, part) for part in at.T]].T).tolist()
-        looks = {"arrowstyle": "-|>", "color": INK, "lw": 0.0, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 12}
-        ax.annotate("", head, tail, arrowprops=looks, zorder=3.5)
-
-
-def edge_marks(poles: Complex, ax: Axes, places: list[Real]) -> None:
+def edge_marks(poles: Complex, ax: Axes) -> None:
     """A triangle at the edge for each pole out of view with Im >= 0, with its value where there is room."""
     (left, right), (_, high) = ax.get_xlim(), ax.get_ylim()
     far: dict[tuple[float, float], list[str]] = {}
@@ -152,75 +148,58 @@ def edge_marks(poles: Complex, ax: Axes, places: list[Real]) -> None:
     for (x, y), values in far.items():
         mark, side, ha = ("<", 7, "left") if x == left else (">", -7, "right") if x == right else ("^", 7, "left")
         ax.plot(x, y, mark, color=GREY, ms=6.5, mec="white", zorder=5, clip_on=False)
-        _note(", ".join(values), (x, y), places, ax, xytext=(side, 4), ha=ha)
+        note(", ".join(values), (x, y), ax, **VALUE, xytext=(side, 4), ha=ha, va="baseline")
 
 
-def _name_branch(name: str, s: Complex, ax: Axes, places: list[Real]) -> None:
+def _name_branch(name: str, s: Complex, ax: Axes) -> None:
     """The name at the first of a few places along a branch, in view and with Im s >= 0, that is free."""
     s = s[(s.imag >= 0) & (s.real > ax.get_xlim()[0]) & (s.real < ax.get_xlim()[1]) & (s.imag < ax.get_ylim()[1])]
     few = s[[int(share * s.size) for share in (0.0, 0.5, 0.99)]] if s.size else s
-    any(_note(name, (at.real, at.imag), places, ax, NAME_ROOM, xytext=(6, 5), fontsize=8.0, color=INK) for at in few)
-
-
-def _note(text: str, at: Any, places: list[Real], ax: Axes, room: Any = NUMBER_ROOM, **looks: Any) -> bool:
-    """A text at a place that is free of those at the others, which it then joins; whether it is."""
-    free = is_free(np.array(at), places, ax, room)
-    if free:
-        places.append(np.array([at]))
-        ax.annotate(text, at, **NOTE | looks)
-    return free
+    any(note(name, (at.real, at.imag), ax, NAME_ROOM, xytext=(6, 5), va="baseline") for at in few)
 
 
 # ------------------------------------------------------------ grids of damping ratio and natural frequency
 
 
-def s_grid(ax: Axes, *, is_named: bool = True) -> list[Real]:
+def s_grid(ax: Axes, *, is_named: bool = True) -> None:
     """Faint lines of constant damping ratio, with their values, and of constant natural frequency, left of the axis.
 
     Of as many ratios as fit the view; the frequencies, those of the ticks, have their values at the right where they
-    are named.  Returns the places of the values in the view.
+    are named.
     """
-    (left, right), (low, high), places = ax.get_xlim(), ax.get_ylim(), list[Real]()
-    bottom, last, share = max(low, 0.0), 0.0, -left / (right - left)
-    apart = RATIO_APART if is_named else 2 * RATIO_APART
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    bottom, apart = max(low, 0.0), RATIO_APART if is_named else 2 * RATIO_APART
     ax.grid(False)
     for ratio in RATIOS if left < 0 < high else ():
         slope = ratio / math.sqrt(1 - ratio**2)
         x, y = max(left, -high * slope), min(high, -left / slope)
-        place = share * x / left + (high - y) / (high - bottom)
-        if place < last + apart or y < bottom + 0.1 * (high - bottom):
-            continue
-        last = place
-        ax.plot([0.0, x], [0.0, y], **GRID)
-        _note(f"ζ {plain(ratio)}", (x, y), places, ax, xytext=(3, -3), va="top" if x > left else "center")
+        looks = {"xytext": (3, -3), "va": "top" if x > left else "center"}
+        if y > bottom + 0.1 * (high - bottom) and note(
+            f"ζ {plain(ratio)}", (x, y), ax, (apart, apart), **VALUE, **looks
+        ):
+            ax.plot([0.0, x], [0.0, y], **GRID)
     for omega in MaxNLocator(6).tick_values(bottom, high) if left < 0 else ():
         if bottom < omega < high:
-            angle = np.linspace(0.0, math.asin(min(1.0, -left / omega)), 61)
-            ax.plot(-omega * np.sin(angle), omega * np.cos(angle), **GRID)
+            s = omega * np.exp(1j * np.linspace(math.pi / 2, math.pi / 2 + math.asin(min(1.0, -left / omega)), 61))
+            ax.plot(s.real, s.imag, **GRID)
             if is_named:
-                ax.annotate(plain(omega, 4), (1.0, omega), xytext=(3, 0), va="center",
-                            xycoords=ax.get_yaxis_transform(), **NOTE)  # fmt: skip
-    if is_named:
-        ax.plot([], [], **GRID, label="damping ratio ζ; natural frequency, at the right [rad/s]")
-    return places
+                note(plain(omega, 4), (right, omega), ax, **VALUE, xytext=(3, 0))
+    ax.plot([], [], **GRID, label="damping ratio ζ; natural frequency, at the right [rad/s]")
 
 
 def z_grid(ax: Axes) -> None:
     """The same at the samples, z = exp(s T): spirals of constant damping ratio, and frequencies in parts of π/T."""
+    angle = np.linspace(0.0, math.pi, 181)
     for ratio in Z_RATIOS:
-        angle = np.linspace(0.0, math.pi, 181)
         z = np.exp((1j - ratio / math.sqrt(1 - ratio**2)) * angle)
         ax.plot(z.real, z.imag, **GRID)
         if ratio < 0.8:
-            middle = z[angle.size // 2]
-            ax.annotate(f"ζ {ratio}", (middle.real, middle.imag), xytext=(0, 0), ha="center", va="center", **NOTE)
+            note(f"ζ {ratio}", (z[90].real, z[90].imag), ax, **VALUE, ha="center")
     for tenths in Z_FREQUENCIES:
-        angle = np.linspace(0.0, math.pi / 2, 91)  # from the real axis of s to the imaginary one
-        z = np.exp(math.pi * tenths / 10 * (1j * np.sin(angle) - np.cos(angle)))
+        z = np.exp(math.pi * tenths / 10 * np.exp(1j * (math.pi - angle / 2)))  # from the real axis of s to the other
         ax.plot(z.real, z.imag, **GRID)
         if tenths % 2 == 0:
-            at = 0.9 * z[-1]
-            ax.annotate(f"0.{tenths}π/T", (at.real, at.imag), xytext=(0, 0), ha="center", va="center", **NOTE)
+            note(f"0.{tenths}π/T", (0.9 * z[-1].real, 0.9 * z[-1].imag), ax, **VALUE, ha="center")
     ax.plot([], [], **GRID, label="damping ratio ζ; natural frequency in π/T")
 
 
@@ -267,25 +246,22 @@ def _z_plane(data: SampledLoci, along: SampledLocus, ax: Axes) -> None:
     z = np.where((along.z.imag >= -1e-12) & (abs(along.z) < DRAWN_RADIUS), along.z, np.nan)
     is_aliased = np.array([bool(mode) and data.is_aliased(int(mode)) for mode in along.mode])
     for columns, mark, label in (
-        ((along.mode > 0) & ~is_aliased, "o", "mode"),
-        (is_aliased, "s", "mode beyond the Nyquist frequency"),
         (along.mode == 0, "D", "hub, filters, delay"),
+        (is_aliased, "s", "mode beyond the Nyquist frequency"),
+        ((along.mode > 0) & ~is_aliased, "o", "mode"),
     ):
         each = z[:, columns]
         ax.plot(each.real, each.imag, color=UNSTABLE, lw=1.5, zorder=3)
         for line in ax.plot(each.real, each.imag, color=STABLE, lw=1.4, zorder=3.1):
             line.set_clip_path(circle)
-        for at, face in ((0, "white"), (here, INK)):
-            ax.plot(each[[at]].real, each[[at]].imag, mark, mfc=face, mec=INK, ms=4.0, mew=0.9, zorder=4)
-        ax.plot([], [], mark, color=INK, ms=4.0, label=f"{label}, gains of the loop")
+        for at, face, words in ((0, "white", "start of the range"), (here, INK, f"{label}, gains of the loop")):
+            looks = {"mfc": face, "mec": INK, "ms": 4.0, "mew": 0.9, "zorder": 4, "label": words}
+            ax.plot(each[at].real, each[at].imag, mark, **looks)
         for branch in each.T:
-            arrow(branch, ax)
-    edge_marks(along.z[here], ax, [])
-    for looks, name in (
-        ({"color": STABLE}, "stable"), ({"color": UNSTABLE}, "unstable"),
-        ({"marker": "o", "ls": "none", "mfc": "white", "mec": INK, "ms": 4.0}, "start of the range"),
-    ):  # fmt: skip
-        ax.plot([], [], label=name, **looks)
+            arrows(branch, ax)
+    edge_marks(along.z[here], ax)
+    for colour, name in ((STABLE, "stable"), (UNSTABLE, "unstable")):
+        ax.plot([], [], color=colour, label=name)
     span = f"{plain(along.values[0], 2)} to {plain(along.values[-1], 3)}"
     held = gains_words(data.loop.gains, 10, but=along.gain)
     ax.set_title(f"z-plane, {along.gain} from {span} ({held})", fontsize=9.5)

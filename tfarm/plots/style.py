@@ -23,11 +23,13 @@ import numpy as np
 from matplotlib.axes import Axes as Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure as Figure  # which pages name too
-from matplotlib.text import Text
+from matplotlib.patheffects import AbstractPathEffect, withStroke
+from matplotlib.text import Annotation, Text
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tfarm.arm import GAINS, LISTED, PLANE, AnyLaw, Arm, as_law, shown_unit
 from tfarm.arm.law import NUMBER
+from tfarm.arrays import Complex
 from tfarm.digits import plain
 from tfarm.errors import require
 from tfarm.exact.outputs import signal_words, unit_over
@@ -48,6 +50,9 @@ GOOD, LOW, POOR = GREEN, "#8a6100", "#b3310a"
 
 WIDEST_LEGEND = 0.95  # of a figure's width: letters are a little wider or narrower in a file of other dots an inch
 LETTERS_PER_INCH = 11.5  # of a headline
+NUMBER_ROOM = (0.08, 0.045)  # of the width and the height: around a number
+HALO: list[AbstractPathEffect] = [withStroke(linewidth=3.0, foreground="white")]  # around numbers on a line
+ARROW_ROOM, ARROW = 0.05, 0.015  # of a side: a curve that is shorter has no arrow; half the length of one
 
 LYAPUNOV = "{} > 0, {} < 1".format(*PLANE)  # proven by the argument of the paper at C = 0
 NOT_THE_PAPERS = ("hub_angle",)  # outputs whose gain is an extension of the paper's law: named where it is used
@@ -165,10 +170,9 @@ def picture(
                     ax.set_xlabel("")
                 if _in_column.get():
                     make_thin(drawn)
-                below = legend_below(drawn)
-                if _in_column.get():
-                    drawn.set_figheight(fitted[1] + below)
+                    drawn.set_figheight(fitted[1] + legend_below(drawn))
                 else:
+                    legend_below(drawn)
                     headline(drawn, title(*found))
             drawn.again = partial(figure, *found, **how)  # type: ignore[attr-defined]  # in another style
             return drawn
@@ -247,6 +251,34 @@ def headline(figure: Figure, text: str) -> None:
     width = round(LETTERS_PER_INCH * figure.get_figwidth())
     lines = [textwrap.fill(line, width) for line in text.replace(" = ", "\u00a0=\u00a0").splitlines()]
     figure.suptitle(safe("\n".join(lines)), x=0.012, ha="left", fontsize=10.5, color=INK)
+
+
+def note(text: str, at: tuple[float, float], ax: Axes, room: tuple[float, float] = NUMBER_ROOM, **looks: Any) -> bool:
+    """A text with a halo at a place where the room around it, of the width and the height, is free of other notes.
+
+    Returns whether it is.
+    """
+    to_view = ax.transData - ax.transAxes
+    others = [to_view.transform(each.xy) for each in ax.texts if isinstance(each, Annotation) and each.get_text()]
+    is_free = bool((abs(np.reshape(others, (-1, 2)) - to_view.transform(at)) > room).any(axis=1).all())
+    if is_free:
+        own: Any = {"fontsize": 8.0, "textcoords": "offset points", "xytext": (0, 0), "va": "center", "zorder": 5}
+        ax.annotate(text, at, annotation_clip=False, path_effects=HALO, **own | looks)
+    return is_free
+
+
+def arrows(z: Complex, ax: Axes, shares: Sequence[float] = (0.5,), color: str = INK) -> None:
+    """Heads in the direction in which a curve runs, at these shares of its length in view, where that is enough."""
+    to_view = ax.transData - ax.transAxes
+    at = to_view.transform(np.c_[z.real, z.imag])
+    seen = np.flatnonzero(((at > 0) & (at < 1)).all(axis=1))
+    way = np.diff(at[seen], axis=0) * (np.diff(seen) == 1)[:, None]  # none from where it leaves the view to its return
+    along = np.cumsum(np.hypot(*way.T))
+    for n in np.searchsorted(along, along[-1] * np.array(shares)) if along.max(initial=0.0) > ARROW_ROOM else ():
+        half = ARROW * way[n] / np.hypot(*way[n])
+        tail, head = to_view.inverted().transform(at[seen[n]] + way[n] / 2 + [-half, half]).tolist()
+        looks = {"arrowstyle": "-|>", "color": color, "lw": 0.0, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 12}
+        ax.annotate("", head, tail, arrowprops=looks, zorder=3.5)
 
 
 def by_name(records: Any, name: str = "") -> Mapping[str, Any]:
