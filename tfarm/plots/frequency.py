@@ -3,14 +3,11 @@
 At an infinite resonance a Bode plot is broken and leaves the picture.
 """
 
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
 from itertools import cycle
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator, NullFormatter
 
 from tfarm.arm import PLANE, HubFeedback
@@ -29,7 +26,7 @@ from .style import (
     GREY,
     INK,
     ORANGE,
-    axis_label,
+    Axes,
     by_name,
     name_axes,
     note,
@@ -38,23 +35,19 @@ from .style import (
     safe,
 )
 
-RAD_PER_CYCLE = 2 * math.pi  # rad/s of 1 Hz
+RAD_PER_CYCLE = 2 * np.pi  # rad/s of 1 Hz
 NUMBER_STRIP = 0.085  # height of the strip of mode numbers above the magnitude, as a share of its axes: a line of them
 TICKS_A_DECADE = (1.0, 2.0, 5.0)  # where a measurement covers few of them
-NOISE_ROOM = 2.5  # factor above and below the noise: two ticks a picture at least
-FREQUENCY_HZ = "frequency [Hz]"
+FREQUENCY, FREQUENCY_HZ, PHASE = "angular frequency [rad/s]", "frequency [Hz]", "phase [deg]"
 POINTS: dict[str, Any] = {"ls": "none", "marker": ".", "ms": 3.5, "color": ORANGE, "zorder": 3}
 EXACT = "flexible arm, exact"
-FREQUENCY, PHASE = axis_label(Bode, "omega"), axis_label(Bode, "phase")
 Drawn = tuple[Real, Complex, dict[str, Any]]  # a curve over x: its values and looks
 
 
-def _title(data: Bode | Mapping[str, Bode]) -> str:
-    first = next(iter(by_name(data, EXACT).values()))
-    return f"{first.arm.name}: {first.input_label} to {first.label}"
-
-
-@picture((Bode, "tfarm.bode returns"), size=(9.0, 6.2), rows=(1.75, 1.0), title=_title)
+@picture(
+    (Bode, "tfarm.bode returns"), size=(9.0, 6.2), rows=(1.75, 1.0),
+    title=lambda data: "{0.arm.name}: {0.input_label} to {0.label}".format(next(iter(by_name(data).values()))),
+)  # fmt: skip
 def bode(data: Bode | Mapping[str, Bode], *, ax: Sequence[Axes]) -> None:
     """Magnitude over phase of a response (from `tfarm.bode`), in two axes, those given or new ones: these axes.
 
@@ -110,9 +103,9 @@ def draw_phase(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
 
 def over_frequency(ax: Axes, label: str, height: float = 1.0) -> None:
     """Decibels, with ticks at tens and twenties, over rad/s and, at that height above the axes, Hz."""
-    ax.set(xscale="log", xlabel=FREQUENCY, ylabel=label)
+    ax.set(xscale="log", xlabel=FREQUENCY, ylabel=label, xmargin=0)
     ax.yaxis.set_major_locator(MaxNLocator(7, steps=(1, 2, 4, 5, 10)))
-    ratios = (partial(np.multiply, 1 / RAD_PER_CYCLE), partial(np.multiply, RAD_PER_CYCLE))
+    ratios = (lambda omega: np.divide(omega, RAD_PER_CYCLE), lambda hertz: np.multiply(hertz, RAD_PER_CYCLE))
     upper = ax.secondary_xaxis(height, functions=ratios)
     upper.set_xlabel(FREQUENCY_HZ, labelpad=5.0)
     plain_ticks(upper.xaxis)
@@ -180,7 +173,7 @@ def _over_measured(one: Measured, curves: Sequence[Drawn], upper: Axes, lower: A
     hertz, size = one.omega / RAD_PER_CYCLE, abs(one.values)
     upper.plot(hertz, size, label="measured", **POINTS)
     lower.plot(hertz, np.degrees(np.angle(one.values)), **POINTS)
-    draw_curves(((omega / RAD_PER_CYCLE, *rest) for omega, *rest in curves), np.abs, upper, lower)
+    draw_curves([(omega / RAD_PER_CYCLE, values, looks) for omega, values, looks in curves], np.abs, upper, lower)
     within = np.log10([each for each in (*size, *(np.median(abs(values)) for _, values, _ in curves)) if each > 0])
     margin = 0.15 + 0.125 * np.ptp(within)  # an infinite peak of the exact curve leaves the picture
     upper.set(yscale="log", ylim=10 ** np.array([within.min() - margin, within.max() + margin]))
@@ -279,7 +272,8 @@ def measured(data: Overlay, *, ax: Sequence[Axes]) -> None:
         known = (size > 0) & np.isfinite(data.noise.sigma)
         share = data.noise.sigma[known] / size[known]
         lower.plot(hertz[known], share, color=GREY, lw=1.0)
-        lower.set(yscale="log", ylim=(share.min() / NOISE_ROOM, share.max() * NOISE_ROOM), ylabel="noise/value [−]")
+        # two ticks at least
+        lower.set(yscale="log", ylim=(share.min() / 2.5, share.max() * 2.5), ylabel="noise/value [−]")
         plain_ticks(lower.yaxis, 1, TICKS_A_DECADE if np.ptp(np.log10(share)) < 1 else (1.0,))
     lower.set(xscale=upper.get_xscale(), xlim=upper.get_xlim(), xlabel=FREQUENCY_HZ)
     plain_ticks(lower.xaxis, 4, TICKS_A_DECADE)

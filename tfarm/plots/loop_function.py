@@ -10,32 +10,26 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Rectangle
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import Complex, Real, Whole
 from tfarm.digits import general, plain
 from tfarm.loop.curve import LoopCurve, curve_of, decibels, gain_margin
 from tfarm.loop.margins import LoopMargins, Margins, loop_margins
 from tfarm.loop.nyquist import Nyquist, compressed
 
 from .frequency import FREQUENCY, Drawn, draw_curves, over_frequency, parted
-from .style import BLUE, FAINT, GREY, INK, UNSTABLE, arrows, gains_words, note, picture, safe
+from .style import BLUE, FAINT, GREY, INK, UNSTABLE, Axes, arrows, gains_words, note, picture, safe
 
 HIGHEST, LOWEST = 60.0, -80.0  # dB of L that are drawn: so that the part near 0 dB shows
-NICHOLS_HIGHEST, NICHOLS_LOWEST = 40.0, -40.0
 USUAL_PEAK = 2.0  # Ms that is usual at most
 CLOSED_LOOP = (-20.0, -12.0, -6.0, -3.0, -1.0, 0.25, 0.5, 1.0, 3.0, 6.0)  # dB: |T| of the contours of a Nichols chart
 CONTOURS = ", ".join(f"{size:g}" for size in CLOSED_LOOP if size > 0) + " dB, the larger the nearer to −1"
 AROUND: Complex = np.exp(1j * math.pi * np.linspace(-1, 1, 721) ** 3)  # a circle, dense at 1, where T/(1 - T) is steep
-MOST_LINEAR, LEAST_LINEAR = 20.0, 1.5  # |L| at the edge of a linear Nyquist plot
+MOST_LINEAR, LEAST_LINEAR = 20.0, 2.2  # |L| at the edge of a linear Nyquist plot: at least as far as the zoom
 ZOOM = (-2.2, 0.4, -1.3, 1.3)  # of L around -1: Re from and to, Im from and to
-CROSS = [(-1, 0), (1, 0), (math.nan, 0), (0, -1), (0, 1)]  # both axes of a plane
-ZOOM_GAP = 0.5  # between both, in half widths of the plot
 RING_SIZES = (0.2, 0.5, 1.0, 2.0, 5.0, math.inf)  # |L| of the rings
-HEADS = (0.12, 0.4, 0.75)  # of the length of a Nyquist plot: places of arrows
 ARC_RADIUS, REACH = 1.04, 1.35  # of the first arc at infinity, and of the picture
 ARCS_ALIKE = math.radians(20.0)  # arcs whose ends are as near as that turn alike
 GAIN, PHASE_MARGIN = "o", "D"  # marks of margins
@@ -43,11 +37,11 @@ DIGITS = 4  # of a margin, as on a card
 Looks = dict[str, Any]
 
 
-Mark = tuple[float, complex, str, str]  # of a margin: frequency [rad/s], nan without one, L there, label, marker
+def decisive(band: LoopMargins) -> Iterator[tuple[float, complex, str, str]]:
+    """The gain margins upwards, and downwards where there is a limit, and the phase margin of least size.
 
-
-def decisive(band: LoopMargins) -> Iterator[Mark]:
-    """The gain margins upwards, and downwards where there is a limit, and the phase margin of least size."""
+    Of each its frequency [rad/s], nan without one, L there, label and marker.
+    """
     for factor, name in zip(band.gain[::-1] if band.gain[0] else band.gain[1:], ("GM", "GM downwards"), strict=False):
         size, omega = gain_margin(band, factor)
         yield omega or math.nan, -1 / factor, f"{name} {_at(size, 'dB', omega)}", GAIN
@@ -90,9 +84,8 @@ def draw_loops(curves: Iterable[Drawn], label: str, upper: Axes, lower: Axes) ->
     upper.axhline(0.0, color=GREY, lw=0.9)
     lower.hlines([-180, 180], 0, 1, color=GREY, lw=0.9, transform=lower.get_yaxis_transform())
     over_frequency(upper, label)
-    upper.margins(x=0)
     low, high = upper.get_ylim()
-    upper.set_ylim(max(low, LOWEST + min(0.0, high)), min(high, HIGHEST + max(0.0, low)))
+    upper.set_ylim(max(low, LOWEST + min(0.0, high)), np.clip(high, 5.0, HIGHEST + max(0.0, low)))
     lower.set(xscale="log", xlim=upper.get_xlim(), xlabel=FREQUENCY)
 
 
@@ -106,12 +99,11 @@ def loop(found: Margins | LoopCurve, *, ax: Sequence[Axes]) -> None:
     upper, lower = ax
     sides = curve_of(found).sides
     draw_loops([(each.omega, each.L, _looks(each)) for each in sides], "|L| [dB]", upper, lower)
-    upper.set_ylim(top=max(5.0, upper.get_ylim()[1]))
     for each in sides:
         if each.margins is not None:
             _crossovers(each.margins, upper)
             for omega, L, label, marker in decisive(each.margins):
-                size, angle = float(decibels(abs(L))), math.degrees(cmath.phase(L))
+                size, angle = float(decibels(abs(L))), math.degrees(float(np.angle(L)))
                 upper.plot([omega], [size], **_marked(each, label, marker))
                 lower.plot([omega], [angle], **_marked(each, label, marker))
                 place, ends = (upper, (size, 0)) if marker == GAIN else (lower, (math.copysign(180, angle), angle))
@@ -143,9 +135,11 @@ def nichols(found: Margins | LoopCurve, *, ax: Axes) -> None:
     """
     sides = curve_of(found).sides
     sizes = np.concatenate([each.magnitude for each in sides])
-    low, high = np.clip((min(*sizes, -7) - 3, max(*sizes, 7) + 3), NICHOLS_LOWEST, NICHOLS_HIGHEST)
-    ax.set(xticks=range(-360, 1, 45), yticks=range(-40, 41, 10), xlabel="phase of L [deg]", ylabel="|L| [dB]")
-    ax.set(xlim=(-360, 0), ylim=(low, high))
+    low, high = np.clip((min(*sizes, -7) - 3, max(*sizes, 7) + 3), -40.0, 40.0)
+    ax.set(
+        xticks=range(-360, 1, 45), yticks=range(-40, 41, 10), xlim=(-360, 0), ylim=(low, high),
+        xlabel="phase of L [deg]", ylabel="|L| [dB]",
+    )  # fmt: skip
     ax.grid(False)
     for size in CLOSED_LOOP:
         T = 10 ** (size / 20) * AROUND
@@ -182,7 +176,6 @@ def sensitivity(found: Margins | LoopCurve, *, ax: Axes) -> None:
     ax.axhline(0.0, color=GREY, lw=0.9)
     ax.axhline(float(decibels(USUAL_PEAK)), color=GREY, lw=0.9, ls=":", label=f"Ms = {USUAL_PEAK:g}")
     over_frequency(ax, "|S|, |T| [dB]")
-    ax.margins(x=0)
     ax.set_ylim(bottom=max(ax.get_ylim()[0], LOWEST))
 
 
@@ -209,32 +202,27 @@ def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     """
     L = np.where(data.is_arc | ~np.isfinite(data.L), np.nan, data.L)
     edge = float(np.clip(1.1 * np.nanmax(abs(L)), LEAST_LINEAR, MOST_LINEAR))
-    whole = 2 * edge * (1 + ZOOM_GAP / 2 + 1)
-    zoom = ax.inset_axes((edge * (2 + ZOOM_GAP) / whole, 0.0, 2 * edge / whole, 1.0))
-    ax.set(aspect="equal", frame_on=False, xlim=(-edge, whole - edge), ylim=(-edge, edge), ylabel="Im L [−]")
-    ax.set_xlabel("Re L [−]", loc="left")
-    frame = Rectangle((-edge, -edge), 2 * edge, 2 * edge, fill=False, ec=GREY, lw=0.8, clip_on=False)
-    ax.add_patch(frame)
+    zoom = ax.inset_axes((5 / 9, 0, 4 / 9, 1))  # as wide as the plot, a quarter of that between both
     ticks = [tick for tick in MaxNLocator(5, steps=(1, 2, 5, 10)).tick_values(-edge, edge) if abs(tick) <= edge]
-    ax.set(xticks=ticks, yticks=ticks)
+    ax.set(
+        aspect="equal", frame_on=False, xticks=ticks, yticks=ticks, xlim=(-edge, 3.5 * edge), ylim=(-edge, edge),
+        ylabel="Im L [−]",
+    )  # fmt: skip
+    ax.set_xlabel("Re L [−]", loc="left")
+    frame = ax.add_patch(Rectangle((-edge, -edge), 2 * edge, 2 * edge, fill=False, ec=GREY, lw=0.8, clip_on=False))
     zoom.set(xlim=ZOOM[:2], ylim=ZOOM[2:], xlabel="Re L [−]", title="zoom at −1")
     circles: list[tuple[complex, float, Looks]] = [
         (0.0, 1.0, {"color": GREY, "ls": "-", "label": "|L| = 1"}),
         (-1.0, 1 / USUAL_PEAK, {"color": INK, "ls": ":", "label": f"Ms = {USUAL_PEAK:g}"}),
     ]
-    if data.verdict.is_stable:
-        peak = loop_margins(data.verdict).sensitivity_peak
+    for peak in [loop_margins(data.verdict).sensitivity_peak] if data.verdict.is_stable else []:
         label = f"radius 1/Ms, Ms {_at(peak.value, '', peak.omega).replace('  ', ' ')}"
         circles.append((-1.0, 1 / peak.value, {"color": INK, "ls": "--", "label": label}))
     for place in (ax, zoom):
-        place.grid(False)
-        place.plot(*np.transpose(CROSS) * MOST_LINEAR, color=FAINT, lw=0.7, zorder=0.5)
         for centre, radius, looks in circles:
             circle = centre + radius * AROUND
             place.plot(circle.real, circle.imag, lw=0.9, zorder=2, **looks)
-        _both_halves(L, place)
-        arrows(np.where(L.real < edge, L, np.nan), place, HEADS, BLUE)
-        place.plot([-1], [0], "+", color=UNSTABLE, ms=11, mew=2.2, zorder=6, ls="none", label="the point −1")
+        _curve(L, -1.0, edge, place)
     for line in ax.lines:
         line.set_clip_path(frame)
     ax.set_title(_words(data, name), fontsize=9.0, loc="left")
@@ -253,28 +241,27 @@ def disc(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     ax.set(aspect="equal", yticks=[], xlim=(-REACH, REACH), ylim=(-REACH, REACH), frame_on=False)
     for radius in radii:
         ax.add_patch(Circle((0, 0), radius, fill=False, ec=GREY if radius in (0.5, 1.0) else FAINT, lw=0.7, zorder=0.6))
-    ax.plot(*np.transpose(CROSS), color=FAINT, lw=0.7, zorder=0.5)
-    z = np.where(data.is_arc, np.nan, compressed(data.L))
-    _both_halves(z, ax)
-    arrows(z, ax, HEADS, BLUE)
+    _curve(np.where(data.is_arc, np.nan, compressed(data.L)), -0.5, 1.0, ax)
     _arcs(data, ax)
-    ax.plot([-0.5], [0], "+", color=UNSTABLE, ms=11, mew=2.2, zorder=6, ls="none", label="the point −1")
     ax.set_xlabel("|L| at the rings [−]", loc="right")
     ax.set_xticks(radii, [plain(size).replace("inf", "∞") for size in RING_SIZES], fontsize=7.5)
-    ax.grid(False)
     ax.set_title(_words(data, name), fontsize=9.0, loc="center")
 
 
-def _both_halves(z: Complex, ax: Axes) -> None:
-    """The curve of rising w, and its mirror image for w < 0."""
+def _curve(z: Complex, critical: float, edge: float, ax: Axes) -> None:
+    """The curve of rising w with arrows, its mirror image for w < 0, the point -1, and both axes out to the edge."""
+    ax.grid(False)
+    ax.plot([-edge, edge, math.nan, 0, 0], [0, 0, math.nan, -edge, edge], color=FAINT, lw=0.7, zorder=0.5)
     ax.plot(z.real, z.imag, color=BLUE, lw=1.3, zorder=3, label="ω > 0, arrows as it rises")
     ax.plot(z.real, -z.imag, color=BLUE, lw=0.6, alpha=0.55, zorder=2, label="ω < 0")
+    arrows(np.where(z.real < edge, z, np.nan), ax, (0.12, 0.4, 0.75), BLUE)
+    ax.plot([critical], [0], "+", color=UNSTABLE, ms=11, mew=2.2, zorder=6, ls="none", label="the point −1")
 
 
 def _arcs(data: Nyquist, ax: Axes) -> None:
     """Past poles as arcs beyond the rim, one for all that turn alike."""
     z = compressed(data.L)
-    alike: dict[tuple[int, int], list[tuple[NDArray[np.int64], float, float]]] = {}
+    alike: dict[tuple[int, int], list[tuple[Whole, float, float]]] = {}
     for piece in np.split(np.arange(z.size), np.flatnonzero(np.diff(data.is_arc.astype(int))) + 1):
         if data.is_arc[piece[0]]:
             first, *_, last = np.unwrap(np.angle(data.L[piece])).tolist()

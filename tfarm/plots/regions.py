@@ -4,21 +4,17 @@ Each region is a list of intervals of one gain at each value of the other, with 
 and in `dsp`); nothing is read off a raster.  Edges are rounded as they are seen in a picture of that plane.
 """
 
-import math
 from collections.abc import Mapping, Sequence
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
-from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
-from numpy.typing import NDArray
 from scipy import ndimage
 
 from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback
-from tfarm.arrays import Real
+from tfarm.arrays import Real, Whole
 from tfarm.case import Comparison
 from tfarm.crossing import Window, pieces
 from tfarm.digits import how_many, plain, scientific, significant
@@ -49,6 +45,8 @@ from .style import (
     LYAPUNOV,
     REGIONS,
     STABLE,
+    Axes,
+    Figure,
     gains_words,
     law_words,
     name_axes,
@@ -61,7 +59,6 @@ from .style import (
 SLATE = "#5b7083"  # of contours of damping: no colour of stability
 DASHED, DASH_DOTTED = (0, (5, 2.5)), (0, (6, 2, 1, 2))  # edges of a sampled loop, and of a second one
 HATCHES = ("..", "\\\\\\\\", "////")  # of a sampled loop: with more damping, with less, with its own
-MOST_DRAWN = 1e3  # factor on a controller
 K2_RANGE = (-1.0, 1.5)  # of the gain that balances a torque: 1 where the input is one, less for a motor's current
 CUT_RANGE = (-1.02, 1.52)  # of the same: where intervals are cut, just outside the picture: no cut is seen as an edge
 OVERLAY_COLUMNS = 72  # values of the gain across, and either side of upright edges
@@ -97,8 +94,9 @@ def gain_map(found: Plane | GainMap, *, ax: Axes) -> None:
         if found.is_of_gains:
             draw_boundary(found, edge(found, x, y), x, y, ax)
             return
-    there = zip(found.x, found.crossings, strict=False)
-    points = [(at, t) for at, each in there for t in each.within(y.low, y.high).gain]
+    points = [
+        (at, t) for at, each in zip(found.x, found.crossings, strict=False) for t in each.within(y.low, y.high).gain
+    ]
     if points:
         ax.plot(*np.transpose(points), ".", color=INK, ms=2.0, label="a pole on the stability limit, exact")
 
@@ -116,7 +114,7 @@ def ground(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
         ax.set_xlabel(f"{ax.get_xlabel()}; linear up to {plain(x.linear)}, logarithmic beyond")
 
 
-def _counts(found: Plane | GainMap, counts: NDArray[np.int64], ax: Axes) -> None:
+def _counts(found: Plane | GainMap, counts: Whole, ax: Axes) -> None:
     """The colours of the counts (rows, columns), and in each region, where it has most room, its count."""
     image = colours(counts)
     ax.pcolormesh(found.x, found.y, image, shading="nearest", rasterized=True, zorder=0.1)
@@ -130,34 +128,38 @@ def _counts(found: Plane | GainMap, counts: NDArray[np.int64], ax: Axes) -> None
             ax.fill_between([], [], [], color=image[inside][0], label=label if count else "stable")
         regions, last = ndimage.label(inside)
         room = ndimage.distance_transform_edt(np.pad(inside, 1), np.divide(1, counts.shape))[1:-1, 1:-1]
-        for row, column in ndimage.maximum_position(room, regions, range(1, last + 1)) if count else ():
-            if room[row, column] > 0.028:  # of the picture's width or height: else there is no room for a number
+        middle = room * ndimage.gaussian_filter(room, np.divide(counts.shape, 8))
+        for row, column in np.reshape(ndimage.maximum_position(middle, regions, range(1, last + 1)), (-1, 2)).tolist():
+            # of the picture's width or height: else there is no room for a number
+            if count and room[row, column] > 0.028:
                 text = "∞" if count == INFINITE else str(count)
                 ax.text(found.x[column], found.y[row], text, fontsize=9.0, ha="center", va="center", clip_on=True)
 
 
-def colours(unstable: NDArray[np.int64]) -> Real:
+def colours(unstable: Whole) -> Real:
     """The colour of each count, the darkest from the last of `REGIONS` on."""
-    last = len(REGIONS) - 1
-    number = np.where(unstable == INFINITE, last, unstable).clip(0, last)
-    return np.array([to_rgb(colour) for colour in REGIONS])[number]
+    number = np.where(unstable == INFINITE, len(REGIONS), unstable)
+    return np.take([to_rgb(colour) for colour in REGIONS], number, axis=0, mode="clip")
 
 
 def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
     """Of the least damping ratio (up, across), where it is a number: inside the stable region."""
-    ends = np.nanmin(damping, initial=math.inf), np.nanmax(damping, initial=0.0)
+    ends = np.nanmin(damping, initial=np.inf), np.nanmax(damping, initial=0.0)
     levels = [level for level in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(*ends) if ends[0] < level < ends[1]]
     if not levels:
         return
-    with np.errstate(invalid="ignore", divide="ignore"):  # by its logarithm, which is straighter
-        logarithm = np.ma.masked_invalid(np.log(damping))
+    logarithm = np.ma.log(np.ma.masked_invalid(damping))  # by which lines are straighter
     lines = ax.contour(
         across, up, logarithm, np.log(levels[-5:]), colors=SLATE, linewidths=0.8, linestyles="-", zorder=2.5
     )
     for level, parts in zip(lines.levels, lines.allsegs, strict=True):
-        name, longest = f"{plain(100 * math.exp(level), 3)} %", max(parts, key=len, default=())
-        along = (longest[int(share * len(longest))] for share in (0.5, 0.35, 0.65, 0.2, 0.8) if len(longest) > 12)
-        any(note(name, at, ax, ha="center", color=SLATE, zorder=6) for at in along)  # best place first
+        longest = max(parts, key=len, default=())
+        name = f"{plain(100 * np.exp(level), 3)} %"
+        any(
+            note(name, longest[int(share * len(longest))], ax, ha="center", color=SLATE, zorder=6)
+            for share in (0.5, 0.35, 0.65, 0.2, 0.8)  # best place first
+            if len(longest) > 12
+        )
     ax.plot([], [], color=SLATE, lw=0.8, label="least damping ratio of the first two modes")
 
 
@@ -172,7 +174,8 @@ def draw_boundary(found: Plane, points: Real, x: Axis, y: Axis, ax: Axes) -> Non
         if at is not None:
             line(at, color=INK, lw=1.6)
     along = stable_edge(found, points, x, y)
-    place, first = x.place(along[:, 0]), max(0.0, float(x.place(np.array(0.0))))
+    place = x.place(along[:, 0])
+    first = max(0.0, float(x.place(np.array(0.0))))
     inside = (first + 0.07 < place) & (place < 0.93) & (y.low < along[:, 1]) & (along[:, 1] < y.high)
     for across, up, omega in sorted(along[inside].tolist()):
         note(significant(omega, 3), (across, up), ax, (0.14, 1.0), ha="center")
@@ -216,11 +219,16 @@ def draw_region(
 
     Edges are upright where the region itself begins or ends.
     """
-    looks: dict[str, Any] = {"facecolor": REGIONS[0], "lw": 0}
-    line: dict[str, Any] = {"color": INK, "lw": 1.0, "ls": ls, "zorder": 2.5}
-    if hatch:
-        looks = {"facecolor": "none", "hatch": hatch, "edgecolor": (*to_rgb(STABLE), 0.5), "lw": 0}
-        line = {"color": STABLE, "lw": 1.4, "ls": DASHED, "zorder": 4.5}
+    line: dict[str, Any] = (
+        {"color": STABLE, "lw": 1.4, "ls": DASHED, "zorder": 4.5}
+        if hatch
+        else {"color": INK, "lw": 1.0, "ls": ls, "zorder": 2.5}
+    )
+    looks: dict[str, Any] = (
+        {"facecolor": "none", "hatch": hatch, "edgecolor": (*to_rgb(STABLE), 0.5), "lw": 0}
+        if hatch
+        else {"facecolor": REGIONS[0], "lw": 0}
+    )
     parts = pieces(across, stable)
     for piece in parts:
         x, low, high = np.array(piece.points).T
@@ -325,7 +333,8 @@ def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes
     planes = sampled if isinstance(sampled, Sequence) else [sampled]
     ms = plain(1e3 * planes[0].loop.chain.sampling.period)
     (low, *_, high), (bottom, *_, top) = continuous.axes
-    ax.set(xscale="log" if low > 0 else "linear", xlim=(low, high), ylim=(bottom, top))
+    inside = 0.008 * (top - bottom)  # so that where intervals are cut no edge is seen
+    ax.set(xscale="log" if low > 0 else "linear", xlim=(low, high), ylim=(bottom + inside, top - inside))
     plain_ticks(ax.xaxis)
     ax.grid(False)
     ax.axhline(0.0, color=GREY, lw=0.7, zorder=3.5)
@@ -345,14 +354,6 @@ def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes
         ax.axhline(1.0, color=INK, lw=1.1, ls=(0, (5, 3)), zorder=4, label=label)
     law = planes[0].loop.gains
     ax.plot(*law.point, "o", color="white", mec=INK, mew=1.4, ms=7, zorder=6, ls="none", label=gains_words(law))
-
-
-def draw_overlay(data: StableRegions) -> Figure:
-    """Both regions of an arm on a figure of its own, as high as moment gains are of use."""
-    figure = overlay.figure(*data)
-    figure.axes[0].set_ylim(*(data.continuous.arm.input_per_torque * end for end in K2_RANGE))
-    figure.again = partial(draw_overlay, data)  # to this height
-    return figure
 
 
 # ------------------------------------------------------------ two arms, or two laws on one arm
@@ -405,5 +406,7 @@ def _factors(data: Comparison, ax: Axes) -> None:
         [0.0], [1.0], "o", mfc=INK, mec="white", ms=7.5, zorder=7, clip_on=False, label="the controllers as they are"
     )
     ax.axhline(1.0, color=INK, lw=0.6)
-    limits = {"xlim": (0.0, 1e3 * delay[-1]), "ylim": (0.0, min(ax.get_ylim()[1], MOST_DRAWN))}
-    ax.set(xlabel="further delay [ms]", ylabel="factor on the controller [−]", **limits)
+    ax.set(
+        xlabel="further delay [ms]", ylabel="factor on the controller [−]", xlim=(0.0, 1e3 * delay[-1]),
+        ylim=(0.0, min(ax.get_ylim()[1], 1e3)),
+    )  # fmt: skip

@@ -1,11 +1,9 @@
 """Root loci: exact branches, those of python-control on a reduced model, and where they cross the axis."""
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
@@ -26,6 +24,7 @@ from .style import (
     REGIONS,
     STABLE,
     UNSTABLE,
+    Axes,
     arrows,
     gains_words,
     note,
@@ -33,16 +32,11 @@ from .style import (
 )
 
 ROOM_AROUND = 0.12  # around a branch, as a share of its extent
-CROSS_AT_ZERO: dict[str, Any] = {"ls": "none", "marker": "x", "ms": 6, "mew": 1.4}  # without the varying feedback
-CIRCLE_AT_FIRST: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6, "mfc": "white", "mew": 1.2}  # at the start
-DOT: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 3.2}
 THIN: dict[str, Any] = {"lw": 0.9, "ls": (0, (2, 1.5)), "zorder": 3}  # of the reduced model
 GRID: dict[str, Any] = {"color": FAINT, "lw": 0.7, "zorder": 0.6}
 VALUE: dict[str, Any] = {"fontsize": 7.0, "color": GREY}
 RATIOS = (*(m * 10.0**k for k in range(-6, 0) for m in (1, 2, 5)), 0.8)  # of damping, of which as many as fit
 Z_RATIOS, Z_FREQUENCIES = (0.1, 0.3, 0.5, 0.7, 0.9), range(1, 10)  # the latter in tenths of pi/T
-RATIO_APART = 0.17  # of a side of the picture: between the ends of two lines of constant damping ratio
-NAME_ROOM = (0.15, 0.06)  # of the width and the height: around the beginning of a name
 
 
 def zoomed(exact: Locus) -> list[int]:
@@ -54,7 +48,10 @@ def zoomed(exact: Locus) -> list[int]:
 
 @picture(
     size=(9.0, 5.8), title=lambda data: _title(data.exact),
-    grid=lambda figure, _: figure.subplot_mosaic("AABC;AADE", width_ratios=[1.7, 1.7, 1.3, 1.3]),
+    grid=lambda figure, data: figure.subplot_mosaic(
+        "AABC;AADE".translate(dict.fromkeys(b"BCDE"[len(zoomed(data.exact)) :], ".")),  # gaps beyond the last
+        width_ratios=[1.7, 1.7, 1.3, 1.3],
+    ),
 )  # fmt: skip
 def draw_loci(data: Loci, *, ax: Sequence[Axes]) -> None:
     """All branches in one panel, and each mode enlarged in one of its own."""
@@ -62,14 +59,9 @@ def draw_loci(data: Loci, *, ax: Sequence[Axes]) -> None:
     whole, *panels = ax
     _panel(fine, exact, data.reduced, range(len(exact.branches)), whole)
     whole.set_title("all branches", fontsize=9.0)
-    for n, one in zip(chosen, panels, strict=False):
+    for n, one in zip(chosen, panels, strict=True):
         _panel(fine, exact, data.reduced, [n], one)
         one.set_title(origin_name(int(exact.origin[n])), fontsize=9.0)
-        one.tick_params(labelsize=7.0)
-        one.xaxis.label.set_fontsize(8.0)
-        one.yaxis.label.set_fontsize(8.0)
-    for one in panels[len(chosen) :]:
-        one.remove()
 
 
 def _title(exact: Locus, *_: object) -> str:
@@ -88,8 +80,10 @@ def _panel(fine: Locus, exact: Locus, reduced: ReducedLocus | None, numbers: Seq
     shown, everything = branches[list(numbers)], len(numbers) == len(branches)
     left, right, low, high = view(shown, exact.origin) if everything else frame(shown[shown.imag >= 0])
     wide, tall = ROOM_AROUND * (right - left), ROOM_AROUND * (high - low)
-    ax.set(xlim=(left - wide, right + 2 * wide), ylim=(low - tall, high + tall))
-    ax.set(xlabel="Re s [1/s]", ylabel="Im s [rad/s]")
+    ax.set(
+        xlim=(left - wide, right + 2 * wide), ylim=(low - tall, high + tall),
+        xlabel="Re s [1/s]", ylabel="Im s [rad/s]",
+    )  # fmt: skip
     ax.xaxis.set_major_locator(MaxNLocator(4))
     s_grid(ax, is_named=everything)
     _draw_branches(shown, ax)
@@ -102,12 +96,13 @@ def _panel(fine: Locus, exact: Locus, reduced: ReducedLocus | None, numbers: Seq
     is_factor = not exact.varied.is_of_arm and exact.vary != "delay"
     begins = 0.0 if is_factor and min(gain[0], last) <= 0 <= max(gain[0], last) else float(gain[0])
     values = [float(f"{value:.3g}") for value in np.linspace(begins, last, 5)]
-    mark = CROSS_AT_ZERO if begins == 0 else CIRCLE_AT_FIRST
     first, *others = (plain(value, 3) for value in values)
     held = held_branches(exact.branches[list(numbers)])
     at = np.array([np.interp(way * np.array(values), way * gain, s) for s in held])
-    for own, looks, name in ((at[:, 0], mark, first), (at[:, 1:].ravel(), DOT, ", ".join(others))):
-        ax.plot(own.real, own.imag, color=INK, zorder=4, label=f"{exact.vary} = {name}", **looks)
+    marks: Any = ("x" if begins == 0 else "o", 6, "white", first), ("o", 3.2, INK, ", ".join(others))
+    for own, (mark, size, face, name) in zip((at[:, 0], at[:, 1:].ravel()), marks, strict=True):
+        looks: Any = {"ls": "none", "marker": mark, "ms": size, "mfc": face, "label": f"{exact.vary} = {name}"}
+        ax.plot(own.real, own.imag, color=INK, mew=1.3, zorder=4, **looks)
     for s in shown:
         arrows(s[::way], ax)
     edge_marks(shown[:, -1], ax)
@@ -155,7 +150,7 @@ def _name_branch(name: str, s: Complex, ax: Axes) -> None:
     """The name at the first of a few places along a branch, in view and with Im s >= 0, that is free."""
     s = s[(s.imag >= 0) & (s.real > ax.get_xlim()[0]) & (s.real < ax.get_xlim()[1]) & (s.imag < ax.get_ylim()[1])]
     few = s[[int(share * s.size) for share in (0.0, 0.5, 0.99)]] if s.size else s
-    any(note(name, (at.real, at.imag), ax, NAME_ROOM, xytext=(6, 5), va="baseline") for at in few)
+    any(note(name, (at.real, at.imag), ax, (0.15, 0.06), xytext=(6, 5), va="baseline") for at in few)
 
 
 # ------------------------------------------------------------ grids of damping ratio and natural frequency
@@ -168,39 +163,40 @@ def s_grid(ax: Axes, *, is_named: bool = True) -> None:
     are named.
     """
     (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
-    bottom, apart = max(low, 0.0), RATIO_APART if is_named else 2 * RATIO_APART
+    bottom = max(low, 0.0)
+    apart = 0.17 if is_named else 0.34  # of a side, from one ratio to the next
     ax.grid(False)
     for ratio in RATIOS if left < 0 < high else ():
-        slope = ratio / math.sqrt(1 - ratio**2)
+        slope = ratio / np.sqrt(1 - ratio**2)
         x, y = max(left, -high * slope), min(high, -left / slope)
-        looks = {"xytext": (3, -3), "va": "top" if x > left else "center"}
-        if y > bottom + 0.1 * (high - bottom) and note(
-            f"ζ {plain(ratio)}", (x, y), ax, (apart, apart), **VALUE, **looks
-        ):
+        looks = VALUE | {"xytext": (3, -3), "va": "top" if x > left else "center"}
+        is_apart = (high - y) / (high - bottom) - x / (right - left) > apart and y > bottom + 0.1 * (high - bottom)
+        if is_apart and note(f"ζ {plain(ratio)}", (x, y), ax, (apart, apart), **looks):
             ax.plot([0.0, x], [0.0, y], **GRID)
     for omega in MaxNLocator(6).tick_values(bottom, high) if left < 0 else ():
         if bottom < omega < high:
-            s = omega * np.exp(1j * np.linspace(math.pi / 2, math.pi / 2 + math.asin(min(1.0, -left / omega)), 61))
-            ax.plot(s.real, s.imag, **GRID)
-            if is_named:
-                note(plain(omega, 4), (right, omega), ax, **VALUE, xytext=(3, 0))
+            angle = np.linspace(0.0, np.arcsin(min(1.0, -left / omega)), 61)
+            name = plain(omega, 4) if is_named else ""
+            _grid_line(1j * omega * np.exp(1j * angle), name, (right, omega), ax, xytext=(3, 0))
     ax.plot([], [], **GRID, label="damping ratio ζ; natural frequency, at the right [rad/s]")
 
 
 def z_grid(ax: Axes) -> None:
     """The same at the samples, z = exp(s T): spirals of constant damping ratio, and frequencies in parts of π/T."""
-    angle = np.linspace(0.0, math.pi, 181)
+    angle = np.linspace(0.0, np.pi, 181)
     for ratio in Z_RATIOS:
-        z = np.exp((1j - ratio / math.sqrt(1 - ratio**2)) * angle)
-        ax.plot(z.real, z.imag, **GRID)
-        if ratio < 0.8:
-            note(f"ζ {ratio}", (z[90].real, z[90].imag), ax, **VALUE, ha="center")
+        z = np.exp((1j - ratio / np.sqrt(1 - ratio**2)) * angle)
+        _grid_line(z, f"ζ {ratio}" if ratio < 0.8 else "", (z[90].real, z[90].imag), ax, ha="center")
     for tenths in Z_FREQUENCIES:
-        z = np.exp(math.pi * tenths / 10 * np.exp(1j * (math.pi - angle / 2)))  # from the real axis of s to the other
-        ax.plot(z.real, z.imag, **GRID)
-        if tenths % 2 == 0:
-            note(f"0.{tenths}π/T", (0.9 * z[-1].real, 0.9 * z[-1].imag), ax, **VALUE, ha="center")
+        z = np.exp(np.pi * tenths / 10 * np.exp(1j * (np.pi - angle / 2)))  # from the real axis of s to the other
+        name = "" if tenths % 2 else f"0.{tenths}π/T"
+        _grid_line(z, name, (0.9 * z[-1].real, 0.9 * z[-1].imag), ax, ha="center")
     ax.plot([], [], **GRID, label="damping ratio ζ; natural frequency in π/T")
+
+
+def _grid_line(z: Complex, name: str, at: tuple[float, float], ax: Axes, **looks: Any) -> None:
+    ax.plot(z.real, z.imag, **GRID)
+    note(name, at, ax, **VALUE, **looks)
 
 
 # ------------------------------------------------------------ the pictures
@@ -223,12 +219,11 @@ def locus(exact: Locus, reduced: ReducedLocus | None = None, *, ax: Axes) -> Non
 FIGURES[Loci] = lambda data: locus.figure(data.exact, data.reduced)
 
 
-def _z_title(data: SampledLoci) -> str:
-    ms = plain(1e3 * data.loop.chain.sampling.period)
-    return f"{data.loop.plant.arm.name}: poles of the loop sampled every {ms} ms"
-
-
-@picture(size=(9.0, 3.6), title=_z_title, grid=lambda figure, _: figure.subplots(1, 2))
+@picture(
+    size=(9.0, 3.6), grid=lambda figure, _: figure.subplots(1, 2),
+    title=lambda data: f"{data.loop.plant.arm.name}: poles of the loop sampled every "
+                       f"{plain(1e3 * data.loop.chain.sampling.period)} ms",
+)  # fmt: skip
 def draw_sampled_loci(data: SampledLoci, *, ax: Sequence[Axes]) -> None:
     """The z-plane with the locus along each gain."""
     for along, one in zip(data.by.values(), ax, strict=True):
@@ -237,8 +232,10 @@ def draw_sampled_loci(data: SampledLoci, *, ax: Sequence[Axes]) -> None:
 
 def _z_plane(data: SampledLoci, along: SampledLocus, ax: Axes) -> None:
     """The upper half of the z-plane with one gain's locus; open marks at its start, full ones at the loop's gains."""
-    ax.set(xlim=(-RIM, RIM), xticks=[-1.0, -0.5, 0.0, 0.5, 1.0], ylim=(0.0, RIM), aspect="equal")
-    ax.set(xlabel="Re z [−]", ylabel="Im z [−]", facecolor=REGIONS[1])
+    ax.set(
+        xlim=(-RIM, RIM), xticks=[-1.0, -0.5, 0.0, 0.5, 1.0], ylim=(0.0, RIM), aspect="equal",
+        xlabel="Re z [−]", ylabel="Im z [−]", facecolor=REGIONS[1],
+    )  # fmt: skip
     circle = ax.add_patch(Circle((0, 0), 1.0, fc="white", ec=INK, lw=0.9, zorder=0.5))
     ax.grid(False)
     z_grid(ax)
@@ -255,7 +252,7 @@ def _z_plane(data: SampledLoci, along: SampledLocus, ax: Axes) -> None:
         for line in ax.plot(each.real, each.imag, color=STABLE, lw=1.4, zorder=3.1):
             line.set_clip_path(circle)
         for at, face, words in ((0, "white", "start of the range"), (here, INK, f"{label}, gains of the loop")):
-            looks = {"mfc": face, "mec": INK, "ms": 4.0, "mew": 0.9, "zorder": 4, "label": words}
+            looks: Any = {"mfc": face, "mec": INK, "ms": 4.0, "mew": 0.9, "zorder": 4, "label": words}
             ax.plot(each[at].real, each[at].imag, mark, **looks)
         for branch in each.T:
             arrows(branch, ax)
