@@ -104,7 +104,7 @@ def overlay_picture(both: regions.StableRegions, found: Analysis) -> Picture:
     rows = [row for row in margins_of(arm, gains).stability_intervals if row.name == MOMENT_GAIN]
     return picture(
         "sampled_overlay",
-        regions.draw_overlay(both),
+        regions.overlay.figure(*both),
         data=regions.region_columns(both),
         arm=arm,
         low=float(both.continuous.axes[0][0]),
