@@ -9,10 +9,11 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import GAINS, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, cancelled, shown_unit, unit_of
+from tfarm.arm import GAINS, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, cancelled, shown_unit, unit_of
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import REFERENCE, is_measured
 from tfarm.arrays import Real
+from tfarm.case.card import POOR
 from tfarm.case.card import loop_function as loop_curves
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain
@@ -34,6 +35,7 @@ from tfarm.report.page import (
     Picture,
     best,
     brief_on,
+    columns_of,
     has_loop,
     margins_of,
     picture,
@@ -50,6 +52,7 @@ from tfarm.synthesis import judge, models, structures
 GRID_COLUMNS, GRID_ROWS = 240, 200  # of the coloured grid
 DAMPING_EVERY = 4  # of them, the damping is computed at one in four
 DAMPING_MODES = 8  # of the model whose poles that is of: it is right to a few digits, more than a contour shows
+RECOMMENDED = "Recommended gains (best damping)"
 RANGE_OF_K2 = (-1.0, 1.6)  # of the locus, times what balances a torque: both sides of 0, and beyond 1
 shortly = partial(plain, digits=4)  # how a gain is written in a title
 
@@ -64,7 +67,11 @@ def margins_section(case: Case) -> PageSection:
     words += [] if case.laws else [sign_words(case.arm)]
     blocks: list[Picture | Table] = [*(_bode_picture(*pair, case.chain) for pair in found), margin_table(found)]
     for each, it in found:
-        blocks += tables_of(each, it)
+        crossovers = {"gain_crossovers": it.gain_crossovers, "phase_crossovers": it.phase_crossovers}
+        for kind, rows in crossovers.items():
+            blocks.append(sheet(kind, table(rows), stem=each.stem(kind.replace("_", "-")), each=each))
+        own = table(it.stability_intervals)
+        blocks.append(sheet("intervals", own, stem=each.stem("windows"), each=each, note=it.intervals_note))
         try:
             few = stability.spill(each.arm, each.law, 12)
             blocks.append(sheet("spill", table(few.models), stem=each.stem("spill"), each=each, found=few))
@@ -87,21 +94,12 @@ def _bode_picture(each: Controller, found: margins.Margins, chain: Chain) -> Pic
         curve = loop_curves(each.arm, each.law, chain)
     except ConvergenceError:
         curve = curve_of(found)
-    rows = [
+    rows = (
         (own.period or 0.0, *row) for own in curve.sides for row in zip(own.omega, own.L.real, own.L.imag, strict=True)
-    ]
-    keys = ("period_s", "omega_rad_s", "re_L", "im_L")
-    data = [Column(key, of=of) for key, of in zip(keys, zip(*rows, strict=True), strict=True)]
+    )
+    data = columns_of(("period_s", "omega_rad_s", "re_L", "im_L"), rows)
     figure = loop_function.loop.figure(curve)
     return picture("loop_function", figure, stem=each.stem("bode"), data=data, each=each, curve=curve)
-
-
-def tables_of(each: Controller, found: margins.Margins) -> Iterator[Table]:
-    """Every crossing of |L| = 1 and of L < 0 in the range, ascending, and the stability interval of each number."""
-    for kind, rows in (("gain_crossovers", found.gain_crossovers), ("phase_crossovers", found.phase_crossovers)):
-        yield sheet(kind, table(rows), stem=each.stem(kind.replace("_", "-")), each=each)
-    columns = table(found.stability_intervals).columns
-    yield sheet("intervals", columns, stem=each.stem("windows"), each=each, note=found.intervals_note)
 
 
 # ------------------------------------------------------------ Nyquist
@@ -121,22 +119,6 @@ def nyquist_section(case: Case) -> PageSection:
         ]
     blocks.append(sheet("nyquist_count", across({each.title: found for each, found in plots}), own=own))
     return PageSection(title="Nyquist plot: encirclements of −1", words=[prose("nyquist", own=own)], blocks=blocks)
-
-
-# ------------------------------------------------------------ poles
-
-
-def poles_tables(case: Case) -> tuple[list[str], list[Table]]:
-    """The first closed-loop poles of each controller, complete in a box; a sentence where they are not determined."""
-    words, tables, of = list[str](), list[Table](), quantities(poles.Poles)["values"]
-    for each in case.in_s:
-        try:
-            found = poles.closed_loop_poles(each.arm, each.law)
-            columns = roots_table(found.values, of).columns
-            tables.append(sheet("poles", columns, stem=each.stem("poles"), each=each, box=found.box))
-        except TfarmError as error:
-            words.append(f"{upper(each.name)}: poles not determined, {error}.")
-    return words, tables
 
 
 # ------------------------------------------------------------ laws
@@ -265,8 +247,7 @@ def map_data(data: MapOfArm) -> Sequence[Column]:
     grid = [("grid", K1, K2, math.inf if count < 0 else int(count), damping, "") for K1, K2, count, damping in points]
     line = [("boundary", K1, K2, "", "", omega) for K1, K2, omega in data.edge.tolist() if not math.isnan(K1)]
     rate = "_".join([PLANE[0], *shown_unit(PLANE[0], data.case.arm).replace("/", " ").split()])
-    keys = ("what", rate, PLANE[1], "unstable_poles", "least_damping_ratio", "omega_rad_s")
-    return [Column(key, of=own) for key, own in zip(keys, zip(*grid, *line, strict=True), strict=True)]
+    return columns_of(("what", rate, PLANE[1], "unstable_poles", "least_damping_ratio", "omega_rad_s"), [*grid, *line])
 
 
 def map_section(case: Case) -> PageSection:
@@ -278,26 +259,28 @@ def map_section(case: Case) -> PageSection:
         unit=f"{plain(rate_unit(arm), 4)} {unit_of(RATE_GAIN, arm)}",
         deepest=plane.DEEPEST_MOMENT_GAIN * arm.input_per_torque,
     )  # fmt: skip
-    return PageSection(title="Stability region of both gains", facts=interval_facts(arm), blocks=(drawn,))
-
-
-def interval_facts(arm: Arm) -> list[Fact]:
-    """The stability intervals of each gain of the continuous-time loop, the other at its default."""
-    return [
+    facts = [
         Fact(f"{row.name}, continuous", text(row.intervals, 4) or "no value", row.unit)
-        for row in margins_of(arm, default_gains(arm)).stability_intervals
+        for row in margins_of(arm, as_law(default_gains(arm))).stability_intervals
         if row.name in PLANE
     ]
+    return PageSection(title="Stability region of both gains", facts=facts, blocks=(drawn,))
 
 
 def recommended_section(case: Case) -> PageSection:
-    """The gains that damp the first modes of the sampled loop best, with their result card."""
-    found, title = best(case.arm, case.chain), "Recommended gains: best damping"
+    """The gains that damp the first modes of the sampled loop best, with their result card.
+
+    They are recommended unless a margin of the sampled loop is poor.
+    """
+    found = best(case.arm, case.chain)
     if found is None:
-        return PageSection(title=title, answer=prose("no_best_gains", modes=DESIGNED_MODES))
+        return PageSection(title=RECOMMENDED, answer=prose("no_best_gains", modes=DESIGNED_MODES))
     gains = ", ".join(found.law.gain_text(name, partial(significant, digits=4), case.arm) for name in PLANE)
     answer, each = prose("best_gains", found=found, modes=DESIGNED_MODES, gains=gains), case.in_s[-1]
-    return PageSection(title=title, answer=answer, card=results(card_of(each, case), each.title))
+    card = card_of(each, case)
+    is_poor = card.sampled is not None and card.sampled.grade == POOR
+    title = "Gains of best damping" if is_poor else RECOMMENDED
+    return PageSection(title=title, answer=answer, card=results(card, each.title))
 
 
 # ------------------------------------------------------------ root loci
@@ -305,7 +288,14 @@ def recommended_section(case: Case) -> PageSection:
 
 def locus_section(case: Case) -> PageSection:
     """Poles of the controllers; of an arm's own page root loci along each gain too."""
-    words, tables = poles_tables(case)
+    words, tables, of = list[str](), list[Table](), quantities(poles.Poles)["values"]
+    for each in case.in_s:
+        try:
+            listed = poles.closed_loop_poles(each.arm, each.law)
+            shown = roots_table(listed.values, of)
+            tables.append(sheet("poles", shown, stem=each.stem("poles"), each=each, box=listed.box))
+        except TfarmError as error:
+            words.append(f"{upper(each.name)}: poles not determined, {error}.")
     if case.laws:
         return PageSection(title="Closed-loop poles", words=words, blocks=tables)
     arm, gains, blocks = case.arm, default_gains(case.arm), list[Picture | Table]()
@@ -315,21 +305,18 @@ def locus_section(case: Case) -> PageSection:
     found: dict[str, loci.Loci] = {}
     for name, (start, stop) in ranges.items():
         try:
-            found[name] = loci.loci(arm, gains, name, start, stop)
-            blocks += locus_blocks(found[name])
+            found[name] = own = loci.loci(arm, gains, name, start, stop)
+            stem = f"locus-{name}"
+            blocks += [
+                picture("locus", roots.draw_loci.figure(own), stem=stem, data=locus_data(own), found=own),
+                sheet("branches", table(own.rows), stem=f"{stem}-branches", found=own),
+                sheet("crossings", table(own.exact.crossings), stem=f"{stem}-crossings", found=own),
+            ]
         except ConvergenceError:
             words.append(prose("not_followed", name=name))
     others = {name: gains.gain_text(other, shortly, arm) for name, other in zip(PLANE, reversed(PLANE), strict=True)}
     answer = prose("locus_lead", found=found, gains=others)
     return PageSection(title="Root loci", answer=answer, words=words, blocks=[*blocks, *tables])
-
-
-def locus_blocks(data: loci.Loci) -> Iterator[Picture | Table]:
-    """The picture of a locus, its branches, and their crossings of the imaginary axis."""
-    stem = f"locus-{data.name}"
-    yield picture("locus", roots.draw_loci.figure(data), stem=stem, data=locus_data(data), found=data)
-    yield sheet("branches", table(data.rows), stem=f"{stem}-branches", found=data)
-    yield sheet("crossings", table(data.exact.crossings), stem=f"{stem}-crossings", found=data)
 
 
 def locus_data(data: loci.Loci) -> Sequence[Column]:

@@ -10,14 +10,26 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, shown_unit
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, shown_unit
 from tfarm.digits import kept_digits, plain, significant
 from tfarm.dsp import Analysis, Chain, Simulation, modes, results, sampled_verdict, traces, verdict
 from tfarm.dsp.chain import MOST_DELAY
 from tfarm.errors import ParameterError
 from tfarm.fitting.recording import RunComparison, compare_run, overshoot
 from tfarm.plots import motion, regions, roots, style
-from tfarm.report.page import Case, Controller, Fact, PageSection, Picture, margins_of, on_hub, picture, prose, sheet
+from tfarm.report.page import (
+    Case,
+    Controller,
+    Fact,
+    PageSection,
+    Picture,
+    columns_of,
+    margins_of,
+    on_hub,
+    picture,
+    prose,
+    sheet,
+)
 from tfarm.schema import Column, Quantity, Table, across, table, text
 from tfarm.spectrum.table import default_gains
 
@@ -101,7 +113,7 @@ def delays_table(found: Sequence[tuple[Controller, Analysis]], chain: Chain) -> 
 def overlay_picture(both: regions.StableRegions, found: Analysis) -> Picture:
     """Stability regions of the continuous and of the sampled loop in one plane, with the intervals of K2 below it."""
     arm, gains = both.continuous.arm, found.loop.gains
-    rows = [row for row in margins_of(arm, gains).stability_intervals if row.name == MOMENT_GAIN]
+    rows = [row for row in margins_of(arm, as_law(gains)).stability_intervals if row.name == MOMENT_GAIN]
     return picture(
         "sampled_overlay",
         regions.draw_overlay(both),
@@ -136,8 +148,7 @@ def loci_data(data: modes.SampledLoci) -> Sequence[Column]:
             loop = locus.loop.having(**{locus.gain: value})
             each = zip(locus.mode.tolist(), poles, strict=True)
             rows += [(name, *map(loop.number, PLANE), mode, z.real, z.imag) for mode, z in each if not z.imag < 0]
-    keys = ("locus", *PLANE, "mode", "real", "imaginary")
-    return [Column(key, of=cells) for key, cells in zip(keys, zip(*rows, strict=True), strict=True)]
+    return columns_of(("locus", *PLANE, "mode", "real", "imaginary"), rows)
 
 
 # ------------------------------------------------------------ in time

@@ -23,7 +23,7 @@ from tfarm.fitting.fit import Fit
 from tfarm.plots.regions import comparison
 from tfarm.processes import shared
 from tfarm.report.arm_section import arm_section, assumptions_section
-from tfarm.report.live import ASSETS, LIVE_PAGE, is_live, save_live, write_assets
+from tfarm.report.live import ASSETS, is_live, save_live, write_assets
 from tfarm.report.loop_section import (
     law_section,
     locus_section,
@@ -321,16 +321,17 @@ def _write_pages(
         if piece.anchor in by_anchor:
             own[piece.page].append(by_anchor[piece.anchor])
     written = only or ("index", *own)
-    pages = navigation(case.arm, pages_in(earlier, (*written, *_is_live(folder))), trust, earlier)
+    pages = navigation(case.arm, pages_in(earlier, folder, written=written), trust, earlier)
     with_facts = (by_anchor.get(anchor, PageSection()) for anchor in ("margins-map", "sampled"))
+    recommended = by_anchor.get("margins-recommended", PageSection())
     shared = {
-        "card": kept_in(folder, "card", Card) or Card(case.arm.name, summary(case), "", (), (), ()),
+        "card": kept_in(folder, "card", Card) or Card(case.arm.name, summary(case)),
         "short": SHORT,
         "pages": pages,
         "titles": dict(pages),
-        "blocks": blocks(by_anchor),
+        "blocks": [*blocks(by_anchor)],
         "short_facts": [fact for section in with_facts for fact in section.facts],
-        "has_recommended": bool(by_anchor.get("margins-recommended", PageSection()).card),
+        "recommended": recommended.title if recommended.card else "",
         "open_pictures": 2,  # of a section: those that answer its question; the rest is a click away
         "has_proof": (folder / "proof.json").is_file(),
         "sha256": hashlib.sha256(file.encode()).hexdigest(),
@@ -343,22 +344,17 @@ def _write_pages(
         write_text(folder / f"{name}.html", page)
 
 
-def _is_live(folder: Path) -> tuple[str, ...]:
-    """The name of the live page where it has been made."""
-    return ("live",) if (folder / LIVE_PAGE).is_file() else ()
-
-
 def navigation(arm: Arm, own: Sequence[tuple[str, str]], trust: str, folder: Path) -> list[tuple[str, str]]:
     """(file, title) of all that a page of an arm leads to."""
     compared = kept_comparison(folder.parent)
-    more = [(f"../{COMPARISON_PAGE}", compared.title)] if arm.name in compared.arms else []
+    more = [(f"../{COMPARISON_PAGE}", compared["title"])] if arm.name in compared["arms"] else []
     return [("../index.html", "All arms"), *own, *more, *([(f"../{trust}", "Method and proofs")] if trust else [])]
 
 
-def pages_in(folder: Path, written: Sequence[str] = ()) -> list[tuple[str, str]]:
-    """(file, title) of the pages in an arm's folder, and of those that are being written."""
-    there = {name: title for name, title in PAGES.items() if name in written or (folder / f"{name}.html").is_file()}
-    return [(f"{name}.html", title) for name, title in there.items()]
+def pages_in(*folders: Path, written: Sequence[str] = ()) -> list[tuple[str, str]]:
+    """(file, title) of the pages in the folders of an arm, and of those that are being written."""
+    there = {*written, *(file.stem for folder in folders for file in folder.glob("*.html"))}
+    return [(f"{name}.html", title) for name, title in PAGES.items() if name in there]
 
 
 # ------------------------------------------------------------ the index
@@ -367,25 +363,17 @@ def pages_in(folder: Path, written: Sequence[str] = ()) -> list[tuple[str, str]]
 def index_page(out: Path, *, trust: str) -> str:
     """The page that leads to all others in a folder of reports."""
     cards = [(card, pages) for folder, card in kept(out, "card", Card).items() if (pages := pages_in(folder))]
-    compared = kept_comparison(out).title
+    compared = kept_comparison(out)["title"]
     return render("index.html", title="tfarm reports", cards=cards, trust=trust, compared=compared, short=SHORT)
 
 
 # ------------------------------------------------------------ a comparison
 
 
-@dataclass(frozen=True)
-class KeptComparison:
-    """The title of the comparison in a folder of reports, and the arms that it compares."""
-
-    title: str = ""
-    arms: tuple[str, ...] = ()
-
-
-def kept_comparison(out: Path) -> KeptComparison:
-    """The comparison in a folder of reports; an empty one where there is none."""
-    found = kept_in(out, "compare", KeptComparison) if (out / COMPARISON_PAGE).is_file() else None
-    return found or KeptComparison()
+def kept_comparison(out: Path) -> dict[str, Any]:
+    """The title of the comparison in a folder of reports, and the arms that it compares; empty where there is none."""
+    found = kept_in(out, "compare", dict[str, Any]) if (out / COMPARISON_PAGE).is_file() else None
+    return {"title": "", "arms": (), **(found or {})}
 
 
 def write_comparison(found: Comparison, out: Path) -> Path:
