@@ -11,6 +11,7 @@ import tfarm
 from tests.plots.labels import complaints
 from tests.report.written import coarsen, plain_cards
 from tfarm.arm import Hub, HubFeedback
+from tfarm.case.card import margins_of
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import Sampling
 from tfarm.loop import plane as edges
@@ -29,7 +30,7 @@ from tfarm.report.loop_section import (
     margins_section,
     recommended_section,
 )
-from tfarm.report.page import DESIGNED_MODES, Case, brief_on, has_loop, margins_of, on_hub, prose
+from tfarm.report.page import DESIGNED_MODES, Case, brief_on, has_loop, on_hub, prose
 from tfarm.spectrum.table import PAPER_GAINS, default_gains
 
 LAB, PURE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
@@ -191,7 +192,7 @@ def test_the_star_is_stable_at_the_period_of_its_page(lab):
         gains = Case(LAB, chain).in_s[1].law.gains
         assert f"K1 = {gains.K1:.4g}" in section.answer
         phase = tfarm.margins(LAB, gains).in_band.phase_margin.value
-        assert section.card[0]["phase_margin_deg"]["value"] == pytest.approx(abs(phase), rel=5e-4)
+        assert float(section.card[0]["phase_margin_deg"]["value"]) == pytest.approx(abs(phase), rel=5e-4)
     slow, fast = (Case(LAB, each).in_s[1].law.gains.K1 for each in (Chain(), quick))
     assert fast > slow
 

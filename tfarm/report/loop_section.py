@@ -7,13 +7,12 @@ from functools import partial
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import GAINS, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, cancelled, shown_unit, unit_of
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import REFERENCE, is_measured
 from tfarm.arrays import Real
-from tfarm.case.card import POOR
+from tfarm.case.card import POOR, margins_of, result_card
 from tfarm.case.card import loop_function as loop_curves
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain
@@ -25,7 +24,7 @@ from tfarm.loop.curve import curve_of
 from tfarm.plots import loop_function, regions, roots, style
 from tfarm.plots.style import Axes
 from tfarm.records import record
-from tfarm.report.overview import card_of, results
+from tfarm.report.overview import results
 from tfarm.report.page import (
     DESIGNED_MODES,
     Case,
@@ -37,7 +36,6 @@ from tfarm.report.page import (
     brief_on,
     columns_of,
     has_loop,
-    margins_of,
     picture,
     prose,
     sheet,
@@ -134,10 +132,10 @@ def law_section(case: Case) -> PageSection:
     ]  # fmt: skip
     words.append(sign_words(case.arm))
     words.append(prose("not_on_page", discrete=[each.name for each in named if each.law.is_discrete]))
-    entries = [entry for each in named for entry in entries_of(each)]
-    blocks = [sheet("law_entries", table(entries))]
-    title = "The controller" if len(named) == 1 else "The controllers"
-    return PageSection(title=title, answer=prose("laws", each=named), words=words, blocks=blocks)
+    blocks = [sheet("law_entries", table([entry for each in named for entry in entries_of(each)]))]
+    return PageSection(
+        title="The controller" + "s" * (len(named) > 1), answer=prose("laws", each=named), words=words, blocks=blocks
+    )
 
 
 class Entry(NamedTuple):
@@ -163,8 +161,7 @@ def entries_of(each: Controller) -> Iterator[Entry]:
             signal = name.removeprefix(REFERENCE)
             enters = "less its reference" if name in law.references else "as it is"
             enters = enters if is_measured(name) else "its reference alone"
-            unit = Signals(each.arm, (signal,)).units[0]
-            yield Entry(each.name, signal, unit, enters, num, den)
+            yield Entry(each.name, signal, Signals(each.arm, (signal,)).units[0], enters, num, den)
 
 
 # ------------------------------------------------------------ the map of both gains
@@ -177,8 +174,7 @@ class MapOfArm:
 
     `region` is the exact count on the coloured grid, `edge` (n, 3) the exact boundary, both gains and w, within the
     picture with rows of nan where it leaves it; `damping` (rows, columns) the least damping ratio of the first
-    `DESIGNED_MODES` modes at `axes`, every fourth value of each gain on the grid and the frame's, and `counts` the
-    unstable poles there.  `sampled` is the
+    `DESIGNED_MODES` modes on the `coarse` grid, of every fourth value of each gain and the frame's.  `sampled` is the
     region of the loop sampled by the case's chain, None where that is not determined.
     """
 
@@ -187,9 +183,8 @@ class MapOfArm:
     y: plane.Axis
     region: plane.Plane
     edge: Real
-    axes: tuple[Real, Real]
+    coarse: plane.Plane
     damping: Real
-    counts: NDArray[np.int64]
     sampled: SampledMap | None
 
 
@@ -202,13 +197,13 @@ def map_of_arm(case: Case) -> MapOfArm:
     across, up = (
         np.r_[axis.low, each[half::DAMPING_EVERY], axis.high] for axis, each in zip((x, y), found.axes, strict=True)
     )
-    sampled = regions.sampled_region(arm, x, y, case.chain)
-    damping, counts = damping_over(arm, across, up), plane.gain_map(arm, across, up).unstable
-    return MapOfArm(case, x, y, found, plane.edge(found, x, y), (across, up), damping, counts, sampled)
+    coarse, sampled = plane.gain_map(arm, across, up), regions.sampled_region(arm, x, y, case.chain)
+    return MapOfArm(case, x, y, found, plane.edge(found, x, y), coarse, damping_over(coarse), sampled)
 
 
-def damping_over(arm: Arm, across: Real, up: Real) -> Real:
+def damping_over(coarse: plane.Plane) -> Real:
     """The least damping ratio (rows, columns) of the first modes over both gains."""
+    arm, (across, up) = coarse.arm, coarse.axes
     signals = tuple(each.output for name in PLANE for each in GAINS if each.name == name)
     model = models.continuous_model(arm, signals, DESIGNED_MODES, DAMPING_MODES, first_frequency(arm))
     points = np.reshape(np.meshgrid(across, up), (2, -1))
@@ -228,7 +223,7 @@ def draw_map_of_arm(data: MapOfArm, *, ax: Axes) -> None:
     case, found, x, y = data.case, data.region, data.x, data.y
     designed = best(case.arm, case.chain)
     regions.ground(found, x, y, ax)
-    regions.contours(*data.axes, np.where(data.counts == 0, data.damping, np.nan), ax)
+    regions.contours(*data.coarse.axes, np.where(data.coarse.unstable == 0, data.damping, np.nan), ax)
     regions.draw_boundary(found, data.edge, x, y, ax)
     regions.draw_sampled(data.sampled, ax)
     if case.arm.is_uniform:
@@ -243,7 +238,8 @@ def draw_map_of_arm(data: MapOfArm, *, ax: Axes) -> None:
 
 def map_data(data: MapOfArm) -> Sequence[Column]:
     """The grid with counts and damping, then the boundary with its frequencies; the sampled region has its own file."""
-    points = zip(*map(np.ravel, np.meshgrid(*data.axes)), data.counts.ravel(), data.damping.ravel(), strict=True)
+    own = np.meshgrid(*data.coarse.axes)
+    points = zip(*map(np.ravel, (*own, data.coarse.unstable, data.damping)), strict=True)
     grid = [("grid", K1, K2, math.inf if count < 0 else int(count), damping, "") for K1, K2, count, damping in points]
     line = [("boundary", K1, K2, "", "", omega) for K1, K2, omega in data.edge.tolist() if not math.isnan(K1)]
     rate = "_".join([PLANE[0], *shown_unit(PLANE[0], data.case.arm).replace("/", " ").split()])
@@ -259,12 +255,16 @@ def map_section(case: Case) -> PageSection:
         unit=f"{plain(rate_unit(arm), 4)} {unit_of(RATE_GAIN, arm)}",
         deepest=plane.DEEPEST_MOMENT_GAIN * arm.input_per_torque,
     )  # fmt: skip
-    facts = [
+    return PageSection(title="Stability region of both gains", facts=interval_facts(arm), blocks=(drawn,))
+
+
+def interval_facts(arm: Arm) -> list[Fact]:
+    """The stability intervals of each gain of the continuous-time loop, the other at its default."""
+    return [
         Fact(f"{row.name}, continuous", text(row.intervals, 4) or "no value", row.unit)
         for row in margins_of(arm, as_law(default_gains(arm))).stability_intervals
         if row.name in PLANE
     ]
-    return PageSection(title="Stability region of both gains", facts=facts, blocks=(drawn,))
 
 
 def recommended_section(case: Case) -> PageSection:
@@ -277,7 +277,7 @@ def recommended_section(case: Case) -> PageSection:
         return PageSection(title=RECOMMENDED, answer=prose("no_best_gains", modes=DESIGNED_MODES))
     gains = ", ".join(found.law.gain_text(name, partial(significant, digits=4), case.arm) for name in PLANE)
     answer, each = prose("best_gains", found=found, modes=DESIGNED_MODES, gains=gains), case.in_s[-1]
-    card = card_of(each, case)
+    card = result_card(each.arm, each.law, case.chain)
     is_poor = card.sampled is not None and card.sampled.grade == POOR
     title = "Gains of best damping" if is_poor else RECOMMENDED
     return PageSection(title=title, answer=answer, card=results(card, each.title))

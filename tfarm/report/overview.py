@@ -11,12 +11,13 @@ from tfarm.case.card import ResultCard, result_card
 from tfarm.errors import TfarmError
 from tfarm.plots.frequency import draw_card
 from tfarm.plots.style import save_figure
-from tfarm.report.page import PICTURES, Case, Controller, PageSection, SavedBlock, keep, margins_of, prose
+from tfarm.report.page import PICTURES, Case, PageSection, SavedBlock, keep, prose
 from tfarm.response.frequency import bode
-from tfarm.schema import json_value, table, to_dict
+from tfarm.schema import table, text, to_dict
 from tfarm.spectrum import modes
 from tfarm.spectrum.listing import listed_modes
 
+DIGITS = 4
 SHOWN_MODES = 5  # on the first page; the page of modes has ten
 MODE_COLUMNS = ("index", "natural_frequency", "natural_frequency_hz", "damping_ratio")
 SHORT = {"gain_margin_db": "GM", "phase_margin_deg": "PM", "delay_margin_ms": "DM", "peak_sensitivity": "Ms"}  # a line
@@ -35,15 +36,15 @@ SHOWN = (  # sections of the first page in their order: anchor, name of a pictur
 class Card:
     """An arm as its pages and the table of arms show it; `picture` is empty where there is none.
 
-    `modes` are rows of `tfarm modes --json`, `loops` are those of the summary of `tfarm sampled --json`.
+    `modes` are rows of `tfarm modes --json`, `loops` the loops of the summary of `tfarm sampled --json` in words.
     """
 
     name: str
     summary: str
-    picture: str = ""
-    modes: tuple[dict[str, Any], ...] = ()
-    loops: tuple[dict[str, Any], ...] = ()
-    notes: tuple[str, ...] = ()
+    picture: str
+    modes: tuple[dict[str, Any], ...]
+    loops: tuple[dict[str, Any], ...]
+    notes: tuple[str, ...]
 
 
 def save_card(case: Case, folder: Path) -> None:
@@ -56,7 +57,7 @@ def save_card(case: Case, folder: Path) -> None:
     loops, notes = list[dict[str, Any]](), [] if case.has_loop else [prose("no_loop", arm=arm)]
     for each in () if arm.is_locked else case.controllers:
         try:
-            found = card_of(each, case)
+            found = result_card(each.arm, each.law, case.chain)
             loops += results(found, each.name if case.laws else each.title)
             notes += found.notes
         except TfarmError as error:
@@ -71,18 +72,17 @@ def summary(case: Case) -> str:
     return prose("summary", arm=case.arm, laws=[each.name for each in case.laws])
 
 
-def card_of(each: Controller, case: Case) -> ResultCard:
-    """The result card of a controller, with the margins that the page has already."""
-    known = None if each.law.is_discrete else margins_of(each.arm, each.law)
-    return result_card(each.arm, each.law, case.chain, continuous=known)
-
-
 def results(found: ResultCard, controller: str) -> list[dict[str, Any]]:
-    """The loops of a card as JSON has them, each with its controller, its name and its finding."""
+    """The loops of a card in words under their keys in JSON, each with its controller, its name and its finding."""
     return [
-        {"controller": controller, "loop": name, "finding": own.finding, **json_value(to_dict(own))}
+        {"controller": controller, "loop": name, "finding": own.finding, **in_words(to_dict(own))}
         for name, own in found.loops.items()
     ]
+
+
+def in_words(value: Any) -> Any:
+    """A value of JSON as a page shows it."""
+    return {key: in_words(each) for key, each in value.items()} if isinstance(value, dict) else text(value, DIGITS)
 
 
 def blocks(sections: Mapping[str, PageSection]) -> Iterator[tuple[PageSection, SavedBlock | None]]:

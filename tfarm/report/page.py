@@ -44,7 +44,6 @@ from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.fitting.recording import MeasuredRun
 from tfarm.loop.loop import Loop
-from tfarm.loop.margins import margins
 from tfarm.plots.style import Figure, gains_words, save_column, save_figure
 from tfarm.records import record
 from tfarm.response.signals import Signals, sign_of
@@ -225,14 +224,14 @@ def explained(text: str, words: str = "") -> Markup:
     """A sentence as a page shows it, commands in `...`; a promise leads to its meaning on the page `words`, if any."""
     shown = re.sub("`(.+?)`", r"<code>\1</code>", str(with_symbols(text)))
     for word in PROMISES if words else ():
-        linked = rf'<a class="term" href="{words}#{word_id(word)}">\g<0></a>'
+        linked = rf'<a class="term" href="{words}#{anchor("word", word)}">\g<0></a>'
         shown = re.sub(rf"\b{word}\b", linked, shown, count=1, flags=re.IGNORECASE)
     return Markup(shown)
 
 
-def word_id(name: str) -> str:
-    """The anchor of a word of the glossary."""
-    return f"word-{name.lower().replace(' ', '-')}"
+def anchor(kind: str, name: str) -> str:
+    """A name for links: the equation "(A.1)" becomes "eq-a-1"."""
+    return f"{kind}-{re.sub(r'[^a-z0-9]+', '-', name.lower()).strip('-')}"
 
 
 def write_text(file: Path, text: str) -> None:
@@ -260,8 +259,8 @@ def kept_in(folder: Path, kind: str, record: type[T]) -> T | None:
 def kept(out: Path, kind: str, record: type[T]) -> dict[Path, T]:
     """The records of that kind in the folders of arms, by folder; what is none of ours is passed over."""
     folders = sorted((f for f in out.iterdir() if f.is_dir() and not f.name.startswith(".")), key=lambda f: f.name)
-    found = ((folder, kept_in(folder, kind, record)) for folder in folders)
-    return {folder: each for folder, each in found if each is not None and getattr(each, "name", "") == folder.name}
+    found = {folder: each for folder in folders if (each := kept_in(folder, kind, record)) is not None}
+    return {folder: each for folder, each in found.items() if getattr(each, "name", "") == folder.name}
 
 
 # ------------------------------------------------------------ the case
@@ -390,7 +389,6 @@ def best(arm: Arm, chain: Chain) -> Design | None:
 
 
 brief_on = lru_cache(maxsize=64)(verdict.sampled_brief)  # each computed once for all sections of a page
-margins_of = lru_cache(maxsize=64)(margins)
 
 
 def is_preset(arm: Arm, chain: Chain) -> bool:

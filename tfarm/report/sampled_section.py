@@ -11,6 +11,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, shown_unit
+from tfarm.case.card import margins_of
 from tfarm.digits import kept_digits, plain, significant
 from tfarm.dsp import Analysis, Chain, Simulation, modes, results, sampled_verdict, traces, verdict
 from tfarm.dsp.chain import MOST_DELAY
@@ -24,7 +25,6 @@ from tfarm.report.page import (
     PageSection,
     Picture,
     columns_of,
-    margins_of,
     on_hub,
     picture,
     prose,
@@ -128,27 +128,23 @@ def overlay_picture(both: regions.StableRegions, found: Analysis) -> Picture:
 
 
 def loci_picture(found: Analysis) -> Picture:
-    """Root loci of the sampled loop in the z-plane, along each gain."""
+    """Root loci of the sampled loop in the z-plane, along each gain; its data are the poles with Im z >= 0."""
     loop, arm = found.loop, found.loop.plant.arm
     turning = arm.hub_side_inertia * arm.input_per_torque  # at the hub, in the unit of the input times s^2
     # past the rate gain at which sampling alone makes the hub unstable; K2 over the stable interval of most arms
     top = max(1.25 * 2 * turning / loop.chain.sampling.period, modes.STRONGER * loop.gains[RATE_GAIN])
     loci = modes.sampled_loci(loop, top, (-0.5, 1.5))
     aliased = int((found.modes.band > 0).sum())
-    return picture(
-        "sampled_loci", roots.draw_sampled_loci.figure(loci), data=loci_data(loci), half=loci.half_rate, aliased=aliased
-    )
-
-
-def loci_data(data: modes.SampledLoci) -> Sequence[Column]:
-    """Every pole of the loci with Im z >= 0: a row a gain and a branch."""
-    rows = []
-    for name, locus in data.by.items():
+    rows = []  # a gain and a branch each
+    for name, locus in loci.by.items():
         for value, poles in zip(locus.values.tolist(), locus.z, strict=True):
-            loop = locus.loop.having(**{locus.gain: value})
-            each = zip(locus.mode.tolist(), poles, strict=True)
-            rows += [(name, *map(loop.number, PLANE), mode, z.real, z.imag) for mode, z in each if not z.imag < 0]
-    return columns_of(("locus", *PLANE, "mode", "real", "imaginary"), rows)
+            own, each = locus.loop.having(**{locus.gain: value}), zip(locus.mode.tolist(), poles, strict=True)
+            rows += [(name, *map(own.number, PLANE), mode, z.real, z.imag) for mode, z in each if not z.imag < 0]
+    data, figure = (
+        columns_of(("locus", *PLANE, "mode", "real", "imaginary"), rows),
+        roots.draw_sampled_loci.figure(loci),
+    )
+    return picture("sampled_loci", figure, data=data, half=loci.half_rate, aliased=aliased)
 
 
 # ------------------------------------------------------------ in time

@@ -322,15 +322,16 @@ def _write_pages(
             own[piece.page].append(by_anchor[piece.anchor])
     written = only or ("index", *own)
     pages = navigation(case.arm, pages_in(earlier, folder, written=written), trust, earlier)
-    with_facts = (by_anchor.get(anchor, PageSection()) for anchor in ("margins-map", "sampled"))
     recommended = by_anchor.get("margins-recommended", PageSection())
     shared = {
-        "card": kept_in(folder, "card", Card) or Card(case.arm.name, summary(case)),
+        "card": kept_in(folder, "card", Card) or Card(case.arm.name, summary(case), "", (), (), ()),
         "short": SHORT,
         "pages": pages,
         "titles": dict(pages),
         "blocks": [*blocks(by_anchor)],
-        "short_facts": [fact for section in with_facts for fact in section.facts],
+        "short_facts": [
+            fact for name in ("margins-map", "sampled") if name in by_anchor for fact in by_anchor[name].facts
+        ],
         "recommended": recommended.title if recommended.card else "",
         "open_pictures": 2,  # of a section: those that answer its question; the rest is a click away
         "has_proof": (folder / "proof.json").is_file(),
@@ -363,8 +364,10 @@ def pages_in(*folders: Path, written: Sequence[str] = ()) -> list[tuple[str, str
 def index_page(out: Path, *, trust: str) -> str:
     """The page that leads to all others in a folder of reports."""
     cards = [(card, pages) for folder, card in kept(out, "card", Card).items() if (pages := pages_in(folder))]
-    compared = kept_comparison(out)["title"]
-    return render("index.html", title="tfarm reports", cards=cards, trust=trust, compared=compared, short=SHORT)
+    return render(
+        "index.html", title="tfarm reports", cards=cards, trust=trust, compared=kept_comparison(out)["title"],
+        short=SHORT,
+    )  # fmt: skip
 
 
 # ------------------------------------------------------------ a comparison
@@ -384,10 +387,17 @@ def write_comparison(found: Comparison, out: Path) -> Path:
     """
     title = f"{found.one.name} and {found.other.name} compared"
     arms = list(dict.fromkeys(side.arm.name for side in found.sides))
+    drawn = picture("comparison_picture", comparison.figure(found), stem="comparison", found=found)
+    rows = (
+        (of, getattr(found, name)) for name, of in quantities(Comparison).items() if of.label and name != "is_sampled"
+    )
+    first, *tables = (sheet("compared", table(each), stem=f"compare-{of.key}", of=of) for of, each in rows)
     with _temporary(out, "--out") as made:
-        saved = save_section(_comparison_section(found), made)
-        others = [("index.html", "all arms"), *((f"{name}/index.html", name) for name in arms)]
-        pages = [(file, name) for file, name in others if (out / file).is_file()]
+        saved = save_section(
+            PageSection(words=[prose("comparison", found=found)], blocks=[first, drawn, *tables]), made
+        )
+        others = {"index.html": "all arms"} | {f"{name}/index.html": name for name in arms}
+        pages = [(file, name) for file, name in others.items() if (out / file).is_file()]
         write_text(made / COMPARISON_PAGE, render(COMPARISON_PAGE, title=title, saved=saved, pages=pages))
         keep(made, "compare", {"title": title, "arms": arms})
         move_into(made, out)
@@ -395,13 +405,3 @@ def write_comparison(found: Comparison, out: Path) -> Path:
             write_text(made / "index.html", index_page(out, trust=TRUST_PAGE if (out / TRUST_PAGE).is_file() else ""))
             move_into(made, out)
     return out / COMPARISON_PAGE
-
-
-def _comparison_section(found: Comparison) -> PageSection:
-    """The verdicts and the picture of a comparison, then its tables of differences."""
-    drawn = picture("comparison_picture", comparison.figure(found), stem="comparison", found=found)
-    rows = (
-        (of, getattr(found, name)) for name, of in quantities(Comparison).items() if of.label and name != "is_sampled"
-    )
-    first, *tables = (sheet("compared", table(each), stem=f"compare-{of.key}", of=of) for of, each in rows)
-    return PageSection(words=[prose("comparison", found=found)], blocks=[first, drawn, *tables])
