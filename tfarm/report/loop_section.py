@@ -52,7 +52,6 @@ DAMPING_EVERY = 4  # of them, the damping is computed at one in four
 DAMPING_MODES = 8  # of the model whose poles that is of: it is right to a few digits, more than a contour shows
 RECOMMENDED = "Recommended gains (best damping)"
 RANGE_OF_K2 = (-1.0, 1.6)  # of the locus, times what balances a torque: both sides of 0, and beyond 1
-shortly = partial(plain, digits=4)  # how a gain is written in a title
 
 
 # ------------------------------------------------------------ margins
@@ -96,8 +95,9 @@ def _bode_picture(each: Controller, found: margins.Margins, chain: Chain) -> Pic
         (own.period or 0.0, *row) for own in curve.sides for row in zip(own.omega, own.L.real, own.L.imag, strict=True)
     )
     data = columns_of(("period_s", "omega_rad_s", "re_L", "im_L"), rows)
-    figure = loop_function.loop.figure(curve)
-    return picture("loop_function", figure, stem=each.stem("bode"), data=data, each=each, curve=curve)
+    return picture(
+        "loop_function", loop_function.loop.figure(curve), stem=each.stem("bode"), data=data, each=each, curve=curve
+    )
 
 
 # ------------------------------------------------------------ Nyquist
@@ -193,9 +193,9 @@ def map_of_arm(case: Case) -> MapOfArm:
     arm, x = case.arm, plane.rate_axis(case.arm)
     y = plane.moment_axis(arm, x)
     found = plane.gain_map(arm, x.grid(GRID_COLUMNS), y.grid(GRID_ROWS))
-    half = DAMPING_EVERY // 2
     across, up = (
-        np.r_[axis.low, each[half::DAMPING_EVERY], axis.high] for axis, each in zip((x, y), found.axes, strict=True)
+        np.r_[axis.low, each[DAMPING_EVERY // 2 :: DAMPING_EVERY], axis.high]
+        for axis, each in zip((x, y), found.axes, strict=True)
     )
     coarse, sampled = plane.gain_map(arm, across, up), regions.sampled_region(arm, x, y, case.chain)
     return MapOfArm(case, x, y, found, plane.edge(found, x, y), coarse, damping_over(coarse), sampled)
@@ -277,10 +277,11 @@ def recommended_section(case: Case) -> PageSection:
         return PageSection(title=RECOMMENDED, answer=prose("no_best_gains", modes=DESIGNED_MODES))
     gains = ", ".join(found.law.gain_text(name, partial(significant, digits=4), case.arm) for name in PLANE)
     answer, each = prose("best_gains", found=found, modes=DESIGNED_MODES, gains=gains), case.in_s[-1]
-    card = result_card(each.arm, each.law, case.chain)
-    is_poor = card.sampled is not None and card.sampled.grade == POOR
-    title = "Gains of best damping" if is_poor else RECOMMENDED
-    return PageSection(title=title, answer=answer, card=results(card, each.title))
+    card = results(result_card(each.arm, each.law, case.chain), each.title)
+    title = (
+        "Gains of best damping" if POOR in (each["grade"] for each in card[-1:]) else RECOMMENDED
+    )  # of the sampled one
+    return PageSection(title=title, answer=answer, card=card)
 
 
 # ------------------------------------------------------------ root loci
@@ -314,7 +315,10 @@ def locus_section(case: Case) -> PageSection:
             ]
         except ConvergenceError:
             words.append(prose("not_followed", name=name))
-    others = {name: gains.gain_text(other, shortly, arm) for name, other in zip(PLANE, reversed(PLANE), strict=True)}
+    others = {
+        name: gains.gain_text(other, partial(plain, digits=4), arm)
+        for name, other in zip(PLANE, reversed(PLANE), strict=True)
+    }
     answer = prose("locus_lead", found=found, gains=others)
     return PageSection(title="Root loci", answer=answer, words=words, blocks=[*blocks, *tables])
 

@@ -174,8 +174,9 @@ def sensitivity_table(modes: Modes) -> Table:
         *(Column(f"mode_{number}", f"mode {number}", "%/%", of=values, digits=partial(fixed, decimals=3),
                  tint=list(map(tint, values))) for number, values in by_mode),
     )  # fmt: skip
-    dropped = [name for name in rows if name not in shown]
-    return sheet("sensitivities", columns, is_rig=not modes.arm.is_uniform, dropped=dropped)
+    return sheet(
+        "sensitivities", columns, is_rig=not modes.arm.is_uniform, dropped=[name for name in rows if name not in shown]
+    )
 
 
 def tint(x: float) -> str:

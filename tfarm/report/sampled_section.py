@@ -102,9 +102,12 @@ def delays_table(found: Sequence[tuple[Controller, Analysis]], chain: Chain) -> 
         if not more or own + more + each.law.delay / T <= MOST_DELAY
     ]
     names, delays, verdicts = zip(*rows, strict=True)
-    first = Column("law", "controller", of=names), Column("further_delay_ms", "further delay", "ms", of=delays)
-    is_free = any(verdict.loop.has_free_angle for verdict in verdicts)
-    return sheet("sampled_delays", (*first, *table(verdicts, VERDICT_COLUMNS).columns), free=is_free)
+    columns = (
+        Column("law", "controller", of=names),
+        Column("further_delay_ms", "further delay", "ms", of=delays),
+        *table(verdicts, VERDICT_COLUMNS).columns,
+    )
+    return sheet("sampled_delays", columns, free=any(verdict.loop.has_free_angle for verdict in verdicts))
 
 
 # ------------------------------------------------------------ pictures of gains
@@ -160,15 +163,15 @@ def slews(case: Case) -> tuple[list[Picture | Table], list[str], list[Fact]]:
     if all(each.given.measured is not None for each in case.controllers):
         return [], [], []
     bare = on_hub(case.arm, default_gains(case.arm).having(MOMENT_GAIN, 0.0), f"{MOMENT_GAIN} = 0", "without")
-    runs: dict[str, Simulation] = {}
-    words, task, simulated = [], case.chain.slew, []
-    for each in (*([] if case.laws else [bare]), *case.controllers):
+    runs, words, task = dict[str, Simulation](), list[str](), case.chain.slew
+    duration = traces.RECORD_LENGTH * task.rise_time
+    candidates = [*([] if case.laws else [bare]), *case.controllers]
+    for each in candidates:
         try:
-            duration = traces.RECORD_LENGTH * task.rise_time
             runs[each.name] = results.drawn(each.arm, each.law, case.chain, "slew", duration)
-            simulated.append(each)
         except ParameterError as error:
             words.append(f"No slew of {each.name} is simulated: {error}.")
+    simulated = [each for each in candidates if each.name in runs]
     if len({each.arm.input_unit for each in simulated}) > 1:
         return [], [*words, "The controllers drive inputs of different units: their slews are not drawn together."], []
     if not runs:

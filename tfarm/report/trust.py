@@ -217,14 +217,13 @@ def proof_tables(proofs: Sequence[ArmProof]) -> list[Table]:
 def accuracy_table(proofs: Sequence[ArmProof]) -> Table:
     """The worst error of each arm's two responses."""
     errors = {output: [dict(proof.errors).get(output) for proof in proofs] for output in PROVEN_OUTPUTS}
-    columns = (
+    return sheet("accuracy", (
         Column("arm", "arm", of=[proof.name for proof in proofs]),
         Column("band_rad_s", "from … to, rad/s", of=[" … ".join(significant(x, 4) for x in p.band) for p in proofs]),
         *(Column(output, output.replace("_", " "), of=own,
                  shown=["zero throughout" if error is None else scientific(error, 2) for error in own])
           for output, own in errors.items()),
-    )  # fmt: skip
-    return sheet("accuracy", columns)
+    ))  # fmt: skip
 
 
 def published_tables(found: published.Validation) -> list[Table]:
@@ -329,7 +328,7 @@ def write_trust(
     save_table(table(audited, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation"), folder / DATA)
     errors = [error for proof in proofs for _, error in proof.errors]
     names = " ".join(argument(proof.name, proof.source == "preset") for proof in proofs)
-    text = render(
+    write_text(folder / "index.html", render(
         "trust.html",
         title="Method and proofs",
         sections={name: save_section(PageSection(blocks=own), folder) for name, own in blocks.items()},
@@ -345,5 +344,4 @@ def write_trust(
         glossary=[term for term in GLOSSARY_TERMS if term.name in PROMISES],
         word_id=partial(anchor, "word"),
         command=f"tfarm report {names} --out reports",
-    )
-    write_text(folder / "index.html", text)
+    ))  # fmt: skip

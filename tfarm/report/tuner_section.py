@@ -107,9 +107,13 @@ def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
 
 def section_of(data: TunerNumbers) -> PageSection:
     """The section on numbers that were computed already."""
-    words = [prose("tuner", guard=data.tuning.training.guard.sentence)]
-    return PageSection(title=TITLE, answer=tuner_in_short(data), facts=tuner_facts(data), words=words,
-                       blocks=list(blocks_of(data)))  # fmt: skip
+    return PageSection(
+        title=TITLE,
+        answer=tuner_in_short(data),
+        facts=tuner_facts(data),
+        words=[prose("tuner", guard=data.tuning.training.guard.sentence)],
+        blocks=list(blocks_of(data)),
+    )
 
 
 def saved_cost(data: TunerNumbers) -> float:

@@ -61,7 +61,6 @@ from tfarm.schema import quantities, table
 from tfarm.stopping import undone_if_stopped
 
 ReportProgress = Callable[[int, int, str], object]
-Notice = Callable[[str], object]
 Calls = Mapping[str, Sequence[Callable[[], Any]]]  # by task: what one process does in turn
 MOST_WORKERS = 2  # processes that share the pieces of a report: as many cores as a small machine has
 WORTH_A_PROCESS = 8  # pieces for which a second process, which takes a second or two to start, is worth it
@@ -143,8 +142,12 @@ def make_section(name: str, anchor: str, make: Callable[[Case], PageSection], ca
     try:
         section = replace(make(case), anchor=anchor)
     except TfarmError as error:
-        answer = f"This section could not be made for this arm: {error}."
-        section = PageSection(anchor=anchor, title=upper(name), answer=answer, failure=str(error))
+        section = PageSection(
+            anchor=anchor,
+            title=upper(name),
+            answer=f"This section could not be made for this arm: {error}.",
+            failure=str(error),
+        )
     return save_section(section, folder, case.is_paper)
 
 
@@ -162,7 +165,7 @@ def write(
     only: tuple[str, ...] | None = None,
     paper: bool = False,
     progress: ReportProgress | None = None,
-    notice: Notice | None = None,
+    notice: Callable[[str], object] | None = None,
 ) -> Path:
     """Write the report of each arm to out/<name>/, out/trust/ and out/index.html; the page to open first.
 
@@ -322,7 +325,6 @@ def _write_pages(
             own[piece.page].append(by_anchor[piece.anchor])
     written = only or ("index", *own)
     pages = navigation(case.arm, pages_in(earlier, folder, written=written), trust, earlier)
-    recommended = by_anchor.get("margins-recommended", PageSection())
     shared = {
         "card": kept_in(folder, "card", Card) or Card(case.arm.name, summary(case), "", (), (), ()),
         "short": SHORT,
@@ -332,7 +334,7 @@ def _write_pages(
         "short_facts": [
             fact for name in ("margins-map", "sampled") if name in by_anchor for fact in by_anchor[name].facts
         ],
-        "recommended": recommended.title if recommended.card else "",
+        "recommended": by_anchor.get("margins-recommended"),
         "open_pictures": 2,  # of a section: those that answer its question; the rest is a click away
         "has_proof": (folder / "proof.json").is_file(),
         "sha256": hashlib.sha256(file.encode()).hexdigest(),
