@@ -1,6 +1,7 @@
 """The pages as a reader gets them: complete, the same on every run, and all or nothing."""
 
 import hashlib
+import json
 import math
 import re
 import subprocess
@@ -29,8 +30,9 @@ from tests.report.written import (
     plain_cards,
     validated,
 )
-from tfarm.case.card import LoopCard
+from tfarm.case.card import Graded, LoopCard
 from tfarm.dsp import Chain, load_chain
+from tfarm.dsp.edges import LowerBound
 from tfarm.plots.style import GOOD, LOW, MARGINAL, POOR, UNSTABLE
 from tfarm.report import overview, write, writing
 from tfarm.report.arm_section import arm_section
@@ -438,8 +440,27 @@ def test_each_law_has_a_row_and_one_in_z_no_continuous_verdict(tmp_path):
     assert page.count('rowspan="3"') == 3
 
 
+def test_an_arm_without_hub_inertia_has_its_loops_and_the_reason_why_there_is_no_other(tmp_path):
+    bare = replace(LAB, hub=tfarm.Hub(inertia=0.0))
+    save_card(Case(bare, Chain()), tmp_path)
+    card = json.loads((tmp_path / "card.json").read_text(encoding="utf-8"))
+    assert [loop["loop"] for loop in card["loops"]] == ["continuous-time", "sampled, 10 ms"]
+    assert "The hub of this arm has no inertia" in card["notes"][0]
+    writing._write_pages(Case(bare, Chain()), tmp_path, [], (), "", tmp_path)
+    assert "The hub of this arm has no inertia" in (tmp_path / "index.html").read_text(encoding="utf-8")
+
+
+def test_a_lower_bound_is_one_on_a_card():
+    card = tfarm.result_card(LAB, tfarm.HubFeedback(K1=0.3))
+    margin = replace(card.sampled, delay_margin=Graded(LowerBound(200.0), None, "good"), delay_margin_periods=20.0)
+    (loop,) = results(replace(card, continuous=None, sampled=margin), "gains")
+    cell = str(templates().get_template("blocks.html").module.cell(loop, "delay_margin_ms"))
+    words = " ".join("".join(Read(cell).texts).split())
+    assert words == "≥ 200 ms good 20 periods"
+
+
 def test_a_card_that_is_not_determined_has_its_reason(tmp_path, monkeypatch):
-    monkeypatch.setattr(overview, "card_of", Unmakeable(tfarm.ConvergenceError("stopped short", None, None)))
+    monkeypatch.setattr(overview, "result_card", Unmakeable(tfarm.ConvergenceError("stopped short", None, None)))
     loops, page = rows_of(tmp_path, [], Chain())
     assert (loops, "no loop" in page) == ((), True)
     (card,) = kept(tmp_path, "card", Card).values()

@@ -40,8 +40,11 @@ def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
 
     modes = tfarm.modes(arm, count=3)  # the rigid body's 0 is not shown
     slenderness = arm.link.slenderness if arm.is_uniform else arm.length / arm.link.section.radius_of_gyration
-    numbered = zip(modes.index, modes.natural_frequency, strict=True)
-    frequencies = {f"natural frequency {number}": omega for number, omega in numbered if number > 0}
+    frequencies = {
+        f"natural frequency {number}": omega
+        for number, omega in zip(modes.index, modes.natural_frequency, strict=True)
+        if number > 0
+    }
     frequencies |= {"shear cut-off √(κGA/ρI)": arm.shear_cutoff} if arm.has_cutoff else {}
     return (
         *(Fact(label, significant(omega, 8), "rad/s", f"{significant(omega / (2 * math.pi), 8)} Hz")

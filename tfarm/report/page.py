@@ -195,8 +195,9 @@ def save_section(section: PageSection, folder: Path, is_paper: bool = False) -> 
     """The section with its blocks saved: what remains to be written are words."""
     for name in (PICTURES, DATA):
         (folder / name).mkdir(exist_ok=True)
-    shown = [block for block in section.blocks if getattr(block, "columns", True)]
-    return replace(section, blocks=[save_block(block, folder, is_paper) for block in shown])
+    return replace(section, blocks=[
+        save_block(block, folder, is_paper) for block in section.blocks if getattr(block, "columns", True)
+    ])  # fmt: skip
 
 
 def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> SavedBlock:

@@ -325,13 +325,14 @@ def write_trust(
     found = published.Validation(tuple(printed))
     blocks = {"proofs": proof_tables(proofs), "accuracy": [accuracy_table(proofs)],
               "published": published_tables(found), "again": again_tables(proofs)}  # fmt: skip
+    sections = {name: save_section(PageSection(blocks=own), folder) for name, own in blocks.items()}
     save_table(table(audited, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation"), folder / DATA)
     errors = [error for proof in proofs for _, error in proof.errors]
     names = " ".join(argument(proof.name, proof.source == "preset") for proof in proofs)
     write_text(folder / "index.html", render(
         "trust.html",
         title="Method and proofs",
-        sections={name: save_section(PageSection(blocks=own), folder) for name, own in blocks.items()},
+        sections=sections,
         proofs=proofs,
         digits=BRACKET_DIGITS,
         points=BAND_POINTS,
