@@ -91,7 +91,12 @@ def test_contours_reach_the_frame_and_words_overlap_nothing(lab):
     """A line of equal damping ends at the frame, at the stability boundary, or where it began."""
     figure = draw_map_of_arm.figure(lab)
     assert complaints(figure) == []
-    assert (*lab.axes[0][[0, -1]], *lab.axes[1][[0, -1]]) == (lab.x.low, lab.x.high, lab.y.low, lab.y.high)
+    assert (*lab.coarse.axes[0][[0, -1]], *lab.coarse.axes[1][[0, -1]]) == (
+        lab.x.low,
+        lab.x.high,
+        lab.y.low,
+        lab.y.high,
+    )
     (contours,) = (each for each in figure.axes[0].collections if isinstance(each, QuadContourSet))
     ends = [line[[0, -1], 1].min() for level in contours.allsegs for line in level if len(line) > 20]
     assert sum(low == lab.y.low for low in ends) > 3
@@ -100,7 +105,7 @@ def test_contours_reach_the_frame_and_words_overlap_nothing(lab):
 def test_the_contours_are_the_damping_of_the_poles(lab):
     """Least damping ratio by the exact poles in a box, below the band that the caption names."""
     for row, column in ((5, 20), (25, 40), (30, 55)):
-        law = HubFeedback(K1=float(lab.axes[0][column]), K2=float(lab.axes[1][row]))
+        law = HubFeedback(K1=float(lab.coarse.axes[0][column]), K2=float(lab.coarse.axes[1][row]))
         poles = closed_loop_poles(LAB, law, 6).values
         poles = poles[(poles.imag > 0) & (poles.imag < band_of(LAB, DESIGNED_MODES))]
         expected = (-poles.real / abs(poles)).min()
