@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import ANGLE_GAIN, FED_BACK, GAINS, MOMENT_GAIN, PLANE, Arm, HubFeedback, as_law, unit_of
-from tfarm.case.card import GAIN_LIMITS, PEAK_LIMITS, PERIOD_LIMITS, PHASE_LIMITS, UNDAMPED, reference_damping
+from tfarm.case.card import GAIN_LIMITS, GRADED, PEAK_LIMITS, PERIOD_LIMITS, PHASE_LIMITS, UNDAMPED, reference_damping
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits, scientific
 from tfarm.dsp import Chain, PulseTransfer, Sampled, Scenario, Simulator, sampled_verdict, scenario
@@ -181,6 +181,7 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
         "longest_delay": LONGEST_DELAY_SAMPLES * chain.sampling.period,
         "outputs": {gain.name: gain.output for gain in GAINS},
         "limits": LIMITS,
+        "margin_names": dict(zip(("up", "down", "phase", "delay", "peak"), GRADED.values(), strict=True)),
         "graded": _graded(arm, laws, chain, reference) if arm.has_elastic_link else None,
     }
 

@@ -4,7 +4,7 @@
   const $ = id => document.getElementById(id), data = JSON.parse($("live-data").textContent), names = ["K1", "K2", "Kp"];
   const loop = new LiveLoop(data), discrete = data.sampled_loop && new SampledLoop(data.sampled_loop), slew = data.slew && new Slew(data.slew);
   const damped = data.graded && new LiveLoop({ ...data, ...data.graded }), dampedZ = damped && discrete && new SampledLoop(data.graded.sampled_loop); // that margins are graded with
-  const REST = 200, UNDOS = 100, law = { ...data.start }; // ms without a move until everything is drawn in full; states that are kept
+  const REST = 200, UNDOS = 100, PRECISE = 0.25, law = { ...data.start }; // ms without a move until everything is drawn in full; states that are kept; pixels
   const state = { plane: "poles", loop: "nyquist", vary: "K2", shown: "3" }, usual = { ...state }, past = [], colours = {};
   const text = (id, words) => { const at = $(id); if (at && at.textContent !== words) at.textContent = words; };
   function dress() { // colours of the screen, light or dark
@@ -31,7 +31,7 @@
     const from = Math.min(loop.places[0] / 50, ...(margins ? margins.crossed.map(row => row.w / 3) : [])), drawn = {};
     return {
       law, poles, own, verdict, why, stable, grows, margins, near, frame: { x: [left, right], y: [0, top] }, ...sampledNumbers(law, z),
-      ratio: ratio(shownPoles), constant: constant(slowest(shownPoles)), from, run: slew && slew.run(law), curve: fine => drawn[fine] ||= curveOf(curve, fine, from),
+      ratio: ratio(shownPoles), constant: constant(slowest(shownPoles)), run: slew && slew.run(law), from, curve: () => drawn[zoom] ||= curveOf(curve, ...pixels(), from),
       areas: now && now.law.Kp === law.Kp ? now.areas : areas(law), edge: now && now.law.Kp === law.Kp ? now.edge : null,
     };
   }
@@ -43,7 +43,7 @@
     const scaled = { ...curve, w: curve.w.map(q => q / T), at: w => curve.at(w * T) };
     return {
       z, zword, zown: of === discrete ? null : own, zmargins: is_stable ? of.margins(law, curve, loop.restOf(law)) : null, zratio: ratio(of.unaliased(own)),
-      zconstant: T * constant(Math.max(...own.map(each => each.growth))), zcurve: from => curveOf(scaled, false, from),
+      zconstant: T * constant(Math.max(...own.map(each => each.growth))), zcurve: from => curveOf(scaled, ...pixels(), from),
     };
   }
 
@@ -51,30 +51,28 @@
 
   const grade = (size, [good, low]) => { const way = good > low ? 1 : -1; return way * size >= way * good ? "good" : way * size >= way * low ? "low" : "poor"; };
   const infinite = x => Number.isFinite(x) ? general(x, 4) : "no limit", decibels = factor => factor > 1e-9 && factor < 1e9 ? Math.abs(dB(factor)) : Infinity;
-  function card(of, margins, period) {
+  function card(of, id, kind, margins, period) {
     const { limits } = data, cells = margins ? {
       up: [decibels(margins.gain[1]), limits.gain], down: [decibels(margins.gain[0]), limits.gain], phase: [Math.abs(margins.phase.value), limits.phase],
       delay: [1e3 * margins.delay.value, limits.periods.map(x => 1e3 * x * period)], peak: [margins.peak_sensitivity.value, limits.peak],
-    } : {};
-    for (const name of ["up", "down", "phase", "delay", "peak"]) {
-      const [value, limit] = cells[name] || [], found = limit ? grade(value, limit) : "";
+    } : {}, grades = {};
+    for (const name of Object.keys(data.margin_names)) {
+      const [value, limit] = cells[name] || [], found = grades[name] = limit ? grade(value, limit) : "";
       const is_bound = of === "z" && name === "delay" && value > 1e3 * data.longest_delay; // where tfarm searches no further
       text(`${of}-${name}`, limit ? is_bound ? `≥ ${general(1e3 * data.longest_delay, 4)}` : infinite(value) : "-");
       text(`${of}-${name}-grade`, found);
       $(`${of}-${name}-grade`).className = `grade ${found}`;
     }
-  }
-  function pill(id, words, kind) {
-    text(id, words);
-    $(id).className = `pill ${kind}`;
+    const worst = ["poor", "low", "good"].find(each => Object.values(grades).includes(each)), own = Object.keys(grades).filter(name => grades[name] === worst);
+    text(id, kind);
+    $(id).className = `pill ${worst || kind}`; // a stable loop has the colour of its grade
+    text(`${of}-limits`, worst && worst !== "good" ? `${worst}: ${own.map(name => data.margin_names[name]).join(", ")}` : "");
   }
   function show() {
     const { law, verdict, why, margins, zmargins, zword } = now, period = data.period;
-    pill("verdict", now.grows ? "unstable" : now.stable ? "stable" : "marginal", now.grows ? "unstable" : now.stable ? "stable" : "marginal");
-    pill("sampled", zword, now.z ? zword : "marginal");
+    card("s", "verdict", now.grows ? "unstable" : now.stable ? "stable" : "marginal", margins, period);
+    card("z", "sampled", zword, zmargins, period);
     text("why", `${why}.`);
-    card("s", margins, period);
-    card("z", zmargins, period);
     text("s-ratio", Number.isFinite(now.ratio) ? general(100 * now.ratio, 4) : "-");
     text("z-ratio", Number.isFinite(now.zratio) ? general(100 * now.zratio, 4) : "-");
     text("s-constant", Number.isFinite(now.constant) ? general(now.constant, 4) : "-");
@@ -157,7 +155,7 @@
   }
   const half = loop => circle(-1, 0.5).map(({ x, y }) => loop === "nyquist" ? { x, y } : { angle: degrees([-x, -y]) - 180, dB: dB(Math.hypot(x, y)) });
   const turned = list => list.map(row => ({ ...row, angle: row.angle - 180 })), cursor = () => pointed.bode ? [{ rule: pointed.bode.w, along: "x", dash: [3, 3] }] : [];
-  const sampledCurve = () => now.zcurve ? (now.zrows ||= turned(now.zcurve(now.from))) : [], own = fine => (now.rows ||= {})[fine] ||= turned(now.curve(fine));
+  const sampledCurve = () => now.zcurve ? (now.zrows ||= {})[zoom] ||= turned(now.zcurve(now.from)) : [], own = () => (now.rows ||= {})[zoom] ||= turned(now.curve());
   const charts = {
     map: () => [{ ...plane, marks: [
       { area: now.areas || [], x: "K1", low: "low", high: "high", by: "part", fill: colours.stable },
@@ -180,30 +178,30 @@
         polePoints((now.z || []).map(({ z, growth }) => ({ re: z[0], im: z[1], growth })), "re", "im", row => row.growth),
       ] }];
     },
-    bode: fine => {
+    bode: () => {
       const x = { low: now.from, high: (damped || loop).band, kind: "log", label: "frequency [rad/s]" }, phase = phaseMargin(), crossed = now.margins ? now.margins.crossed : [];
       return [
         { x, y: { low: -60, high: 40, label: "|L| [dB]" }, marks: [
-          { rule: 0 }, ...cursor(), { line: sampledCurve(), x: "w", y: "dB", colour: colours.grey, dash: [5, 3] }, { line: own(fine), x: "w", y: "dB", colour: colours.ink },
+          { rule: 0 }, ...cursor(), { line: sampledCurve(), x: "w", y: "dB", colour: colours.grey, dash: [5, 3] }, { line: own(), x: "w", y: "dB", colour: colours.ink },
           ...gainStems().map(each => ({ stems: [each], colour: each.colour })), { points: crossed.map(({ w }) => ({ w, y: 0 })), x: "w", y: "y", shape: RING, radius: 3, colour: colours.ink },
         ] },
         { x, y: { low: -360, high: 0, label: "angle of L [deg]", values: [-360, -270, -180, -90, 0] }, marks: [
-          { rule: -180 }, ...cursor(), { line: sampledCurve(), x: "w", y: "angle", by: "branch", colour: colours.grey, dash: [5, 3] }, { line: own(fine), x: "w", y: "angle", by: "branch", colour: colours.ink },
+          { rule: -180 }, ...cursor(), { line: sampledCurve(), x: "w", y: "angle", by: "branch", colour: colours.grey, dash: [5, 3] }, { line: own(), x: "w", y: "angle", by: "branch", colour: colours.ink },
           ...(phase ? [{ stems: [phase], colour: phase.colour }] : []),
         ] },
       ];
     },
-    nyquist: fine => {
+    nyquist: () => {
       const here = pointed.bode ? turned([pointed.bode]) : [], [wide, high] = equal("nyquist", 2.5 * zoom);
       if (state.loop === "sensitivity") return [{ x: { low: now.from, high: (damped || loop).band, kind: "log", label: "frequency [rad/s]" }, y: { low: -50, high: 30, label: "|S|, |T| [dB]" }, marks: [
-        { rule: 0 }, { rule: 6, dash: [2, 3] }, ...cursor(), { line: own(fine), x: "w", y: "T", colour: colours.link }, { line: own(fine), x: "w", y: "S", colour: colours.ink, width: 1.8 },
+        { rule: 0 }, { rule: 6, dash: [2, 3] }, ...cursor(), { line: own(), x: "w", y: "T", colour: colours.link }, { line: own(), x: "w", y: "S", colour: colours.ink, width: 1.8 },
       ] }];
       const nichols = state.loop === "nichols", [x, y] = nichols ? ["angle", "dB"] : ["x", "y"], by = nichols ? "branch" : undefined;
       const axes = nichols ? { x: { low: -360, high: 0, label: "angle of L [deg]", values: [-360, -270, -180, -90, 0] }, y: { low: -40 * zoom, high: 40 * zoom, label: "|L| [dB]" } }
         : { x: { low: -wide, high: wide, label: "Re L" }, y: { low: -high, high, label: "Im L" } };
       return [{ ...axes, marks: [
         ...(nichols ? [{ rule: 0 }, { rule: -180, along: "x" }] : [{ line: circle(0, 1), x: "x", y: "y", colour: colours.grey, width: 1 }]), { line: half(state.loop), x, y, colour: colours.grey, dash: [2, 3], width: 1 },
-        { line: sampledCurve(), x, y, by, colour: colours.grey, dash: [5, 3] }, { line: own(fine), x, y, by, colour: colours.ink },
+        { line: sampledCurve(), x, y, by, colour: colours.grey, dash: [5, 3] }, { line: own(), x, y, by, colour: colours.ink },
         { points: [nichols ? { angle: -180, dB: 0 } : { x: -1, y: 0 }], x, y, shape: CROSS, colour: colours.ink }, { points: here, x, y, shape: DOT, colour: colours.link },
       ] }];
     },
@@ -221,6 +219,11 @@
   function equal(name, least) {
     const [wide, high] = room(name);
     return [least * Math.max(1, wide / high), least * Math.max(1, high / wide)];
+  }
+  // Of the Nyquist plot: how far a chord is off at most, and the largest |L| of its frame
+  function pixels() {
+    const [wide, high] = equal("nyquist", 2.5 * zoom);
+    return [PRECISE * 2 * wide / room("nyquist")[0], Math.hypot(wide, high)];
   }
   const canvasOf = name => $(name).querySelector("canvas");
   function draw(name, fine = true) {
@@ -375,7 +378,7 @@
   });
   // What the curves are under the pointer, in words
   pointing("bode", x => {
-    const w = scales.bode[0].x.back(x), curve = now.curve(true), row = curve.find(each => each.w >= w);
+    const w = scales.bode[0].x.back(x), curve = now.curve(), row = curve.find(each => each.w >= w);
     if (!row) return;
     pointed.bode = row;
     text("reading", `${general(row.w, 5)} rad/s = ${general(hertz(row.w), 5)} Hz: L ${general(row.dB, 4)} dB, ${general(row.angle - 180, 4)}°, S ${general(row.S, 4)} dB, T ${general(row.T, 4)} dB`);
