@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page, sync_playwright
 
 import tfarm
-from tfarm.arm import Arm, HubFeedback, as_law
+from tfarm.arm import Arm, HubFeedback, Law, as_law
 from tfarm.arm.law_tables import load_law
 from tfarm.case.card import LoopCard, SampledCurve, reference_damping
 from tfarm.dsp import Chain, load_chain, sampled_verdict
@@ -31,7 +31,7 @@ from tfarm.loop.margins import margins
 from tfarm.loop.plane import gain_map
 from tfarm.loop.stability import stability
 from tfarm.report.live import ASSETS, SCRIPT, save_live, write_assets
-from tfarm.report.page import Case
+from tfarm.report.page import Case, GivenLaw
 from tfarm.schema import to_dict
 
 Real = NDArray[np.float64]
@@ -520,3 +520,61 @@ def test_a_page_without_sampled_loop_slew_and_sensor_has_the_rest(browser, folde
         page.wait_for_function("live.now.locus?.length", timeout=60_000)
         assert texts(page, ["verdict", "sampled"]) == {"verdict": "stable", "sampled": "not computed"}
         assert page.evaluate("live.now.locus.length") > 50
+
+
+def is_in(areas: list[dict[str, float]], across: str, point: tuple[float, float]) -> bool:
+    """Whether a point is in one of the parts of a region, between two of its columns."""
+    pairs = [
+        (a, b) for a, b in itertools.pairwise(areas) if a["part"] == b["part"] and a[across] <= point[0] <= b[across]
+    ]
+    for a, b in pairs:
+        share = (point[0] - a[across]) / (b[across] - a[across])
+        low, high = (a[end] + share * (b[end] - a[end]) for end in ("low", "high"))
+        if low < point[1] < high:
+            return True
+    return False
+
+
+LAWS = {
+    "sasaki2012-lab": Law(
+        {"hub_angle": ([0.4, 3.0], [0.002, 1.0]), "moment@0.1": ([1e-4, 0.0, 0.2], [4e-4, 8e-3, 1.0])}, delay=0.002
+    ),
+    "stocky-steel": Law({"hub_rate": ([80.0], [1e-4, 1.0]), "root_moment": 0.3, "hub_angle": 40.0}),
+    "quanser-flexlink": Law({"hub_angle": ([0.05, 1.0], [0.005, 1.0])}),
+}
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_a_law_of_rational_parts_has_a_slider_for_the_gain_of_each(browser, tmp_path, name):
+    """At random gains the card, the file of the law and what the map has there are the library's."""
+    arm, chain, law, rng = tfarm.load(name), load_chain(name), LAWS[name], np.random.default_rng(4)
+    (tmp_path / name).mkdir()
+    save_live(Case(arm, chain, (GivenLaw(law),)), tmp_path / name)
+    write_assets(tmp_path / ASSETS)
+    verdicts = set()
+    with Opened(browser, tmp_path / name / "live.html") as opened:
+        page = opened.page
+        start = page.evaluate("live.loop.start")
+        assert start == {key: value for key, (_, value) in law.part_gains.items()}
+        for factors in (np.ones(len(start)), *10.0 ** rng.uniform(-0.9, 0.9, (7, len(start)))):
+            gains = {key: value * by for (key, value), by in zip(start.items(), factors.tolist(), strict=True)}
+            for key, value in gains.items():
+                page.locator(f"[id='{key}']").fill(repr(value))
+                page.locator(f"[id='{key}']").dispatch_event("change")
+            page.wait_for_function("gains => Object.keys(gains).every(k => live.now.law[k] === gains[k])", arg=gains)
+            now = law.weighted(factors.tolist())
+            card = tfarm.result_card(arm, now, chain).continuous
+            assert card is not None
+            wanted = card_words(card, "s") | {"verdict": card.stability}
+            assert texts(page, list(wanted)) == wanted, gains
+            (tmp_path / "law.toml").write_text(page.evaluate("live.lawFile()"), encoding="utf-8")
+            kept, s = load_law(tmp_path / "law.toml"), 1j * np.geomspace(0.1, 1e3, 9)
+            assert np.allclose(kept.values(s), now.values(s), rtol=1e-12)
+            assert kept.delay == now.delay
+            verdicts.add(card.stability)
+            if len(start) > 1:
+                page.wait_for_function("live.now.areas", timeout=60_000)
+                across, up = list(start)[:2]
+                inside = is_in(page.evaluate("live.now.areas"), across, (gains[across], gains[up]))
+                assert inside == (card.stability == "stable"), gains
+        assert "stable" in verdicts

@@ -1,11 +1,11 @@
 // The live page: gains from sliders, fields, keys, the map and the link; numbers by LiveLoop, SampledLoop and Slew; charts by `paint`.
 "use strict";
 (() => {
-  const $ = id => document.getElementById(id), data = JSON.parse($("live-data").textContent), names = ["K1", "K2", "Kp"];
+  const $ = id => document.getElementById(id), data = JSON.parse($("live-data").textContent), { names } = data, [across, up] = data.plane || [];
   const loop = new LiveLoop(data), discrete = data.sampled_loop && new SampledLoop(data.sampled_loop), slew = data.slew && new Slew(data.slew);
   const damped = data.graded && new LiveLoop({ ...data, ...data.graded }), dampedZ = damped && discrete && new SampledLoop(data.graded.sampled_loop); // that margins are graded with
   const REST = 200, UNDOS = 100, PRECISE = 0.25, law = { ...data.start }; // ms without a move until everything is drawn in full; states that are kept; pixels
-  const state = { plane: "poles", loop: "nyquist", vary: "K2", shown: "3" }, usual = { ...state }, past = [], colours = {};
+  const state = { plane: "poles", loop: "nyquist", vary: up || names[0], shown: "3" }, usual = { ...state }, past = [], colours = {};
   const text = (id, words) => { const at = $(id); if (at && at.textContent !== words) at.textContent = words; };
   function dress() { // colours of the screen, light or dark
     const style = getComputedStyle(document.documentElement);
@@ -32,7 +32,7 @@
     return {
       law, poles, own, verdict, why, stable, grows, margins, near, frame: { x: [left, right], y: [0, top] }, ...sampledNumbers(law, z),
       ratio: ratio(shownPoles), constant: constant(slowest(shownPoles)), run: slew && slew.run(law), from, curve: () => drawn[zoom] ||= curveOf(curve, ...pixels(), from),
-      areas: now && now.law.Kp === law.Kp ? now.areas : areas(law), edge: now && now.law.Kp === law.Kp ? now.edge : null,
+      ...(now && names.every(name => name === across || name === up || now.law[name] === law[name]) ? { areas: now.areas, edge: now.edge } : { areas: areas(law), edge: null }),
     };
   }
   function sampledNumbers(law, z) {
@@ -78,15 +78,15 @@
     text("s-constant", Number.isFinite(now.constant) ? general(now.constant, 4) : "-");
     text("z-constant", Number.isFinite(now.zconstant) ? general(now.zconstant, 4) : "-");
     if (slew) { now.figures = slew.figures(now.run); const { settled } = now.figures; text("slew-settled", Number.isFinite(settled) ? general(settled, 5) : `not settled within ${general((now.run.n - 1) * slew.period, 5)} s`); }
-    $("scaled").hidden = !names.every(name => law[name] === data.default[name]);
+    $("scaled").hidden = !data.default || !names.every(name => law[name] === data.default[name]);
     names.forEach(name => { $(`slider-${name}`).value = place(data.axes[name], law[name]); if (document.activeElement !== $(name)) $(name).value = law[name]; });
-    text("map-note", !law.Kp ? `K1 = ${general(law.K1, 4)}, K2 = ${general(law.K2, 4)}` : "The sampled region is known at Kp = 0 and not shown at this Kp; the verdict is that of the gains.");
+    text("map-note", !law.Kp ? [across, up].map(name => `${name} = ${general(law[name], 4)}`).join(", ") : "The sampled region is known at Kp = 0 and not shown at this Kp; the verdict is that of the gains.");
     rows("pole-rows", now.poles.slice(0, 5).map(s => [general(s[0], 5), general(s[1], 6), general(hertz(s[1]), 5), dampingRatio(s)]));
     if ($("more").open) tables();
   }
   // What is below the dashboard: the loop as it is, with every margin and crossing
   function tables() {
-    const { law, z } = now, margins = now.stable ? loop.margins(law, loop.dense(now.poles, law)) : null, gains = `${data.command_name} --K1 ${law.K1} --K2 ${law.K2} --Kp ${law.Kp}`;
+    const { law, z } = now, margins = now.stable ? loop.margins(law, loop.dense(now.poles, law)) : null, gains = data.of_law ? `${data.command_name} --law FILE` : `${data.command_name} --K1 ${law.K1} --K2 ${law.K2} --Kp ${law.Kp}`;
     for (const id of ["margins", "crossovers", "turnings"]) $(id).hidden = !margins;
     $("no-margins").hidden = !!margins;
     text("command", `tfarm margins ${gains}`);
@@ -134,7 +134,7 @@
   let zoom = 1;
   const area = (list, part) => list.map(row => ({ ...row, part: `${part}${row.part}` })), sampledAreas = data.sampled_map ? data.sampled_map.areas : [];
   // The regions where they are known at once: the sampled one is known at Kp = 0 alone, and Kp > 0 moves no edge of a lossless loop
-  const areas = ({ Kp }) => !Kp || loop.kind === "reactive" ? area(data.continuous, "c") : null;
+  const areas = ({ Kp }) => data.continuous && (!Kp || loop.kind === "reactive") ? area(data.continuous, "c") : null;
   const proven = data.lyapunov ? [[0, data.axes.K2.low], [0, 1], [data.axes.K1.high, 1]].map(([K1, K2]) => ({ K1, K2 })) : [];
   function gainAxis(name) {
     const { low, high, linear } = data.axes[name], unit = data.units[name], sizes = linear === null ? [] : [...Array(16).keys()].map(k => linear * 10 ** k).filter(x => x <= Math.max(high, -low));
@@ -142,7 +142,7 @@
     const values = linear === null ? undefined : [0, ...shown, ...shown.map(x => -x)].filter(x => low <= x && x <= high);
     return { low, high, label: unit === "1" ? name : `${name} [${unit}]`, values, ...(linear === null ? {} : { kind: "symlog", constant: linear }) };
   }
-  const plane = { x: gainAxis("K1"), y: gainAxis("K2") }, limited = (margins, of) => margins ? [margins.phase, margins.peak_sensitivity][of] : null;
+  const plane = up && { x: gainAxis(across), y: gainAxis(up) }, limited = (margins, of) => margins ? [margins.phase, margins.peak_sensitivity][of] : null;
   const kindOf = x => x < 0 ? "stable" : x > 0 ? "unstable" : "marginal", shapes = { stable: CROSS, marginal: BOX, unstable: RING };
   const polePoints = (list, x, y, sign) => ({ points: list, x, y, shape: row => shapes[kindOf(sign(row))], colour: row => colours[kindOf(sign(row))] });
   function phaseMargin() {
@@ -158,10 +158,10 @@
   const sampledCurve = () => now.zcurve ? (now.zrows ||= {})[zoom] ||= turned(now.zcurve(now.from)) : [], own = () => (now.rows ||= {})[zoom] ||= turned(now.curve());
   const charts = {
     map: () => [{ ...plane, marks: [
-      { area: now.areas || [], x: "K1", low: "low", high: "high", by: "part", fill: colours.stable },
+      { area: now.areas || [], x: across, low: "low", high: "high", by: "part", fill: colours.stable },
       { area: now.law.Kp ? [] : sampledAreas, x: "K1", low: "low", high: "high", by: "part", hatch: colours.stable, dash: [5, 3] },
-      { line: now.edge || [], x: "K1", y: "K2", by: "piece", colour: colours.stable, width: 1 }, { line: proven, x: "K1", y: "K2", colour: colours.ink, dash: [2, 3] },
-      { rule: now.law.K1, along: "x" }, { rule: now.law.K2 }, { points: [now.law], x: "K1", y: "K2", shape: DOT, colour: colours.ink },
+      { line: now.edge || [], x: across, y: up, by: "piece", colour: colours.stable, width: 1 }, { line: proven, x: "K1", y: "K2", colour: colours.ink, dash: [2, 3] },
+      { rule: now.law[across], along: "x" }, { rule: now.law[up] }, { points: [now.law], x: across, y: up, shape: DOT, colour: colours.ink },
     ] }],
     poles: () => [{
       x: { low: now.frame.x[0], high: now.frame.x[1], label: "Re s [1/s]" }, y: { low: now.frame.y[0], high: now.frame.y[1], label: "Im s [rad/s]" }, marks: [
@@ -272,7 +272,7 @@
     of.resting = true;
     keep();
     drawAll(true);
-    const work = [["map", "edge", onAxis], ["map", "areas", inPlane], state.plane === "poles" ? ["poles", "locus", inS] : ["zplane", "discs", inZ]];
+    const work = [...(up ? [["map", "edge", onAxis], ["map", "areas", inPlane]] : []), state.plane === "poles" ? ["poles", "locus", inS] : ["zplane", "discs", inZ]];
     for (const [name, key, make] of work) {
       const found = of[key] || await inSlices(make(), of);
       if (!found) return;
@@ -285,10 +285,10 @@
   const along = gain => [share => gainAt(data.axes[gain], share, 8), K => ({ ...now.law, [gain]: K })];
   function* onAxis() {
     yield;
-    return loop.kind === "reactive" ? [] : edgeOf(w => loop.boundary(w, now.law), [...loop.base.w], data.axes);
+    return loop.kind === "reactive" ? [] : edgeOf(w => loop.boundary(w, now.law), [...loop.base.w], data.plane, data.axes);
   }
   function* inPlane() {
-    return area(yield* regionOf(loop, now.law.Kp, data.axes), "c");
+    return area(yield* regionOf(loop, now.law, data.axes), "c");
   }
   function inS() {
     const [gain, law] = along(state.vary), { frame } = now;
@@ -340,6 +340,7 @@
   }
   // The table of `tfarm.arm.writing.law_toml`
   function lawFile() {
+    if (data.of_law) return `${data.of_law.head}\n` + data.of_law.parts.map(({ name, signal, num, den }) => `\n[law."${signal}"]\nnum = [${num.map(x => +(x * law[name]).toPrecision(15)).join(", ")}]\nden = [${den.join(", ")}]\n`).join("");
     const used = ["Kp", "K1", "K2"].filter(name => law[name]), number = x => /[.e]/.test(String(x)) ? String(x) : `${x}.0`;
     const signals = (used.length ? used : ["K1"]).map(name => `\n[law.${data.outputs[name]}]\ngain = ${number(law[name])}\n`);
     return `[law]\nname = "gains at the hub"\nreferences = [${used.map(name => `"${data.outputs[name]}"`).join(", ")}]\n${signals.join("")}`;
@@ -361,12 +362,14 @@
     canvasOf(name).addEventListener("pointermove", event => { const box = canvasOf(name).getBoundingClientRect(); follow(event.clientX - box.left, event.clientY - box.top, event); });
   }
   let dragged = false;
-  const toGains = (x, y) => { const [{ x: across, y: up }] = scales.map; set({ K1: +across.back(x).toPrecision(4), K2: +up.back(y).toPrecision(4) }); };
-  canvasOf("map").addEventListener("pointerdown", event => { dragged = true; canvasOf("map").setPointerCapture(event.pointerId); toGains(event.offsetX, event.offsetY); });
-  pointing("map", (x, y) => { if (dragged) toGains(x, y); });
+  const toGains = (x, y) => { const [plot] = scales.map; set({ [across]: +plot.x.back(x).toPrecision(4), [up]: +plot.y.back(y).toPrecision(4) }); };
+  if (up) {
+    canvasOf("map").addEventListener("pointerdown", event => { dragged = true; canvasOf("map").setPointerCapture(event.pointerId); toGains(event.offsetX, event.offsetY); });
+    pointing("map", (x, y) => { if (dragged) toGains(x, y); });
+  }
   addEventListener("pointerup", () => { dragged = false; });
-  $("map").addEventListener("keydown", event => {
-    const ways = { ArrowLeft: ["K1", -1], ArrowRight: ["K1", 1], ArrowDown: ["K2", -1], ArrowUp: ["K2", 1] }, way = ways[event.key];
+  $("map")?.addEventListener("keydown", event => {
+    const ways = { ArrowLeft: [across, -1], ArrowRight: [across, 1], ArrowDown: [up, -1], ArrowUp: [up, 1] }, way = ways[event.key];
     if (!way) return;
     event.preventDefault();
     const [name, side] = way, axis = data.axes[name];

@@ -61,8 +61,8 @@ function spirals() {
 }
 
 // The curve of gains with a pole on the axis, or on the unit circle: `at(w)` is a point of it; halved where it is coarse, cut where it leaves the map
-function edgeOf(at, frequencies, { K1, K2 }) {
-  const found = [], placed = row => [place(K1, row.K1), place(K2, row.K2)], seen = ([x, y]) => x > -0.1 && x < 1.1 && y > -0.1 && y < 1.1;
+function edgeOf(at, frequencies, [across, up], axes) {
+  const found = [], placed = row => [place(axes[across], row[across]), place(axes[up], row[up])], seen = ([x, y]) => x > -0.1 && x < 1.1 && y > -0.1 && y < 1.1;
   let piece = 0;
   const trace = (a, b, depth) => {
     if (!a || !b) return;
@@ -82,10 +82,11 @@ function edgeOf(at, frequencies, { K1, K2 }) {
   return found;
 }
 
-// The stable region at one Kp, by intervals of K2 at values of K1 that are halved where a part begins or ends: a generator that yields before each
-const SLICES = 80, CLOSER = 5; // values of K1, and halvings between two of them
-function* regionOf(loop, Kp, { K1, K2 }) {
-  const column = share => { const gain = gainAt(K1, share, 12); return { share, gain, rows: loop.intervals(gain, Kp, K2.low, K2.high) }; };
+// The stable region of two numbers at the others of `law`, by intervals of the second at values of the first that are halved where a part begins or ends: a generator that yields before each
+const SLICES = 80, CLOSER = 5; // values, and halvings between two of them
+function* regionOf(loop, law, axes) {
+  const [across, up] = loop.plane;
+  const column = share => { const gain = gainAt(axes[across], share, 12); return { share, gain, rows: loop.intervals({ ...law, [across]: gain }, axes[up].low, axes[up].high) }; };
   const goesOn = (a, b) => a.rows.length === b.rows.length && a.rows.every(([low, high], i) => low < b.rows[i][1] && b.rows[i][0] < high);
   const found = [];
   function* between(a, b, depth) {
@@ -98,7 +99,7 @@ function* regionOf(loop, Kp, { K1, K2 }) {
   }
   for (let k = 0, last = null; k <= SLICES; k++) {
     yield;
-    const next = column((k + 0.003) / (SLICES + 0.006)); // K1 = 0 may be an edge
+    const next = column((k + 0.003) / (SLICES + 0.006)); // 0 may be an edge
     if (last) yield* between(last, next, CLOSER);
     found.push(next);
     last = next;
@@ -106,7 +107,7 @@ function* regionOf(loop, Kp, { K1, K2 }) {
   let part = 0;
   return found.flatMap((each, k) => {
     if (k && !goesOn(found[k - 1], each)) part += 1000;
-    return each.rows.map(([low, high], i) => ({ part: part + i, K1: each.gain, low, high }));
+    return each.rows.map(([low, high], i) => ({ part: part + i, [across]: each.gain, low, high }));
   });
 }
 
