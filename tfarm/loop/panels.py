@@ -51,7 +51,7 @@ NOT_SENSED = 1e-9  # of a mode's largest: a reading no larger of any mode is non
 class Panels:
     """Samples of d, theta and m, `values` (3, panels, PANEL_SAMPLES), on panels of the axis up to `band` [rad/s].
 
-    Those of `law_rows` are of D and of each part of a law, order 0.
+    Under a law they are of the drive times its denominator and of what each part feeds back.
 
     A panel is from `low` to `high` [rad/s], the first from -`high`, and has one positive factor on its values; `order`
     is n of the drive's s^n.  `error` is the largest miss between samples, as a share of a part's size on its panel.
@@ -65,17 +65,17 @@ class Panels:
     error: float
 
 
-Rows = Callable[[Complex], Complex]  # all parts at s, up to one positive factor
-
-
-def loop_panels(arm: Arm, band: float, rows: Rows | None = None) -> Panels:
-    """Return the samples up to a band [rad/s], of hub angle and gauge or of other rows.
+def loop_panels(arm: Arm, band: float, loop: Loop | None = None) -> Panels:
+    """Return the samples up to a band [rad/s], of hub angle and gauge or of the parts of a loop's law.
 
     Raises ParameterError for an arm that cannot turn freely, ConvergenceError where halving panels does not help.
     """
     require(arm.has_rigid_mode, "arm", arm.name, "samples of a loop are of an arm that turns freely")
-    order = 0 if rows else 1 if arm.rate_loss else 2
-    rows = rows or partial(_hub_rows, arm, order)
+    order = 1 if arm.rate_loss else 2
+    rows: Callable[[Complex], Complex] = partial(_hub_rows, arm, order)
+    if loop is not None:
+        at_rest = loop.k.at_rest + int((loop.law.poles == 0).sum())
+        order, rows = at_rest - loop.zeros_at_origin, partial(_law_rows, loop, at_rest)
     places = np.asarray(steep_places(arm, band))[STEEP_A_PANEL - 1 :: STEEP_A_PANEL]
     edges = np.r_[0.0, places[places < band], band]
     waiting = [(-edges[1], edges[1]), *itertools.pairwise(edges[1:])]
@@ -104,19 +104,14 @@ def _hub_rows(arm: Arm, order: int, s: Complex) -> Complex:
     return both.real + 0j if arm.is_reactive else both
 
 
-def law_rows(loop: Loop) -> Rows:
-    """D of a loop without the law, and what each part of the law adds to it, over s^n with n zeros at s = 0."""
-
-    def rows(s: Complex) -> Complex:
-        rig, (shares, whole) = loop.signals.parts(s), loop.law.shares(s)
-        fed_back = np.exp(-s * loop.law.delay) * (shares * rig.numerators).sum(axis=1)
-        scaled = np.exp(rig.scale - rig.scale.real.max()) / s**loop.zeros_at_origin
-        return np.vstack([rig.drive * whole, fed_back]) * scaled
-
-    return rows
+def _law_rows(loop: Loop, at_rest: int, s: Complex) -> Complex:
+    """The drive times the law's denominator over s^at_rest, and what each part feeds back over the s^n of D."""
+    rig, (shares, whole) = loop.signals.parts(s), loop.law.shares(s)
+    fed_back = np.exp(-s * loop.law.delay) * (shares * rig.numerators).sum(axis=1) / s**loop.zeros_at_origin
+    return np.vstack([rig.drive * whole / s**at_rest, fed_back]) * np.exp(rig.scale - rig.scale.real.max())
 
 
-def _panel(rows: Rows, low: float, high: float) -> tuple[Complex, float]:
+def _panel(rows: Callable[[Complex], Complex], low: float, high: float) -> tuple[Complex, float]:
     """Samples of all parts on one panel, the largest 1, and the largest miss between them."""
     middle, half = (low + high) / 2, (high - low) / 2
     both = rows(1j * (middle + half * np.r_[CHEBYSHEV, BETWEEN_SAMPLES]))

@@ -15,6 +15,7 @@ from tfarm.arm import ANGLE_GAIN, FED_BACK, GAINS, MOMENT_GAIN, PLANE, AnyLaw, A
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Part
 from tfarm.arm.writing import law_toml
+from tfarm.arrays import Complex
 from tfarm.case.card import GAIN_LIMITS, GRADED, PEAK_LIMITS, PERIOD_LIMITS, PHASE_LIMITS, UNDAMPED, reference_damping
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits, scientific
@@ -27,7 +28,7 @@ from tfarm.dsp.simulate import FOLDED_UP, quantisers
 from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.errors import TfarmError
 from tfarm.loop.loop import Loop, steep_places
-from tfarm.loop.panels import PANEL_SAMPLES, Positions, Sensor, law_rows, loop_panels, positions, sensed_places
+from tfarm.loop.panels import PANEL_SAMPLES, Positions, Sensor, loop_panels, positions, sensed_places
 from tfarm.loop.plane import gain_map, moment_axis, rate_axis, rate_columns
 from tfarm.loop.stability import band_of_family, stability
 from tfarm.loop.windows import windows_of
@@ -64,6 +65,24 @@ def sampled_numbers(loop: Sampled) -> dict[str, Any]:
     twice, once = plant.rigid[0]
     states = {"states": 2 if twice else 1 if once else 0, "modes": plant.count}
     return _sampling(loop.chain) | _plant(PulseTransfer(plant, loop.chain.sampling).folded().plant) | states
+
+
+def law_in_page(loop: Sampled, names: Sequence[str]) -> dict[str, Any]:
+    """The sampled loop of a law: `columns` are its parts by name, in delta = z - 1; `ones` poles at z = 1."""
+    plant, in_z = loop.pulse.plant, loop.in_z
+    orders = [2 if twice else 1 if once else 0 for twice, once in plant.rigid.tolist()]
+    columns = [
+        {"name": names[n], "row": row, "g": g, "zeros": _pairs(zeros), "poles": _pairs(in_z.part_poles[n])}
+        for n, row, g, zeros in in_z.columns
+    ]
+    ones = max(orders[row] - int((zeros == 0).sum()) for _, row, _, zeros in in_z.columns)
+    own = {"columns": columns, "ones": max(0, ones), "modes": loop.plant.count}
+    return _sampling(loop.chain) | _plant(plant) | own
+
+
+def _pairs(values: Complex) -> list[list[float]]:
+    """Real and imaginary parts."""
+    return [[float(each.real), float(each.imag)] for each in values]
 
 
 def slew_numbers(arm: Arm, chain: Chain, law: HubFeedback) -> dict[str, Any] | None:
@@ -194,7 +213,7 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
 def law_data(arm: Arm, chain: Chain, law: Law) -> dict[str, Any]:
     """The same for a law of rational parts: the gain of each part is a number of the page.
 
-    The sampled loop and the slew are of gains at the hub alone.  Raises ParameterError for other laws.
+    The slew is of gains at the hub alone.  Raises ParameterError for other laws.
     """
     head, *_ = law_toml(law).split("\n\n")  # which refuses a state space, and two blocks on one signal
     gains = {name: value for name, (_, value) in law.part_gains.items()}
@@ -219,8 +238,9 @@ def law_data(arm: Arm, chain: Chain, law: Law) -> dict[str, Any]:
         "by_sign": False,
         "moments": [None, None],
         "beyond": BEYOND,
-        **dict.fromkeys(("continuous", "sampled_map", "sampled_loop", "slew", "lyapunov", "default", "outputs")),
-        "graded": _graded(arm, corners, None, law, unit) if arm.has_elastic_link else None,
+        **dict.fromkeys(("continuous", "sampled_map", "slew", "lyapunov", "default", "outputs")),
+        "sampled_loop": law_in_page(sampled_verdict(arm, law, chain).full, list(gains)),
+        "graded": _graded(arm, corners, chain, law, unit) if arm.has_elastic_link else None,
     }
 
 
@@ -255,7 +275,7 @@ def _samples(arm: Arm, laws: Sequence[Law], law: Law | None = None) -> tuple[dic
     They are those of hub angle and gauge, or of each part of `law`, whose poles and zeros are steep places too.
     """
     band, is_quiet = band_of_family(Loop(arm, each) for each in laws)
-    samples = loop_panels(arm, band, None if law is None else law_rows(Loop(arm, law)))
+    samples = loop_panels(arm, band, None if law is None else Loop(arm, law))
     blocks = () if law is None else (cast(Rational, part.block) for part in law.parts)
     own = [abs(s) for block in blocks for s in (*block.poles, *block.zeros) if s]
     return {
@@ -269,17 +289,17 @@ def _samples(arm: Arm, laws: Sequence[Law], law: Law | None = None) -> tuple[dic
     }, is_quiet
 
 
-def _graded(arm: Arm, laws: Sequence[Law], chain: Chain | None, law: AnyLaw, unit: Law | None = None) -> dict[str, Any]:
+def _graded(arm: Arm, laws: Sequence[Law], chain: Chain, law: AnyLaw, unit: Law | None = None) -> dict[str, Any]:
     """The loop with whose damping an undamped arm is graded, and the words for that: `tfarm.case.card`."""
     C = reference_damping(arm)
     damped = arm.having(damping=C)
-    sampled = None if chain is None else sampled_numbers(sampled_verdict(damped, law, chain).full)
+    sampled = sampled_verdict(damped, law, chain).full
     samples, _ = _samples(damped, laws, unit)
     count = stability(damped, law, samples["band"]).unstable_roots
     return samples | {
         "kind": "band",
         "reference_count": count,
-        "sampled_loop": sampled,
+        "sampled_loop": sampled_numbers(sampled) if unit is None else law_in_page(sampled, list(unit.part_gains)),
         "words": UNDAMPED.format(C),
     }
 
@@ -353,7 +373,7 @@ def sensor_numbers(arm: Arm) -> dict[str, Any]:
 
 def _numbers(found: Positions) -> dict[str, Any]:
     """The positions in a few digits."""
-    zeros = [np.c_[each.real, each.imag].tolist() for each in found.known_zeros]
+    zeros = [_pairs(each) for each in found.known_zeros]
     return {
         "x": kept_digits(found.x, SENSOR_DIGITS),
         "band": found.band,

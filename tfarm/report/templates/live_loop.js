@@ -142,7 +142,7 @@ class LiveLoop {
 
   // drive s^n d and the sum of each number of the law times its row, a part times a power of s, at s = i w
   parts({ w, values }, law) {
-    const raised = ([x, y], power) => power === 2 ? [-w * w * x, -w * w * y] : power ? [-w * y, w * x] : [x, y];
+    const raised = ([x, y], power) => power > 1 ? raised([-w * w * x, -w * w * y], power - 2) : power ? [-w * y, w * x] : [x, y];
     let re = 0, im = 0;
     this.names.forEach((name, r) => { const [part, power] = this.rows[r], [x, y] = raised(values[part], power); re += law[name] * x; im += law[name] * y; });
     return [raised(values[0], this.order), [re, im]];
