@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -36,7 +36,7 @@ from tfarm.loop.curve import LoopCurve, curve_of, gain_margin, lowest_drawn, ref
 from tfarm.loop.margins import LoopMargins, Margins, margins, margins_of_curve
 from tfarm.loop.stability import SMALL_GAIN, stability
 from tfarm.records import record
-from tfarm.schema import Percent, Quantity, Table, across
+from tfarm.schema import Percent, Quantity, Table, across, text
 from tfarm.schema.html import as_html, with_symbols
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import default_gains
@@ -73,7 +73,7 @@ class Graded(NamedTuple):
         """Value, frequency and grade."""
         if self.value is None:
             return UNDEFINED
-        size = "no limit" if math.isinf(self.value) else general(self.value, digits)
+        size = "no limit" if math.isinf(self.value) else text(self.value, digits)
         return f"{size}{'' if self.omega is None else f' at {general(self.omega, digits)} rad/s'}, {self.grade}"
 
 
@@ -89,6 +89,7 @@ class LeastDamped(NamedTuple):
 
 
 NOT_DEFINED = Graded(None, None, UNDEFINED)
+_margins_of, _sampled_of = lru_cache(maxsize=16)(margins), lru_cache(maxsize=16)(sampled)  # card and curve of a page
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -179,12 +180,12 @@ def result_card(
     notes += [UNDAMPED.format(reference)] if arm.has_elastic_link else []
     loops: dict[str, Callable[[], tuple[LoopCard, Callable[[], LoopCard]]]] = {
         "continuous": lambda: (
-            continuous_card(continuous or margins(arm, law), T),
-            lambda: continuous_card(margins(damped, law), T),
+            continuous_card(continuous or _margins_of(arm, law), T),
+            lambda: continuous_card(_margins_of(damped, law), T),
         ),
         "sampled": lambda: (
-            sampled_card(at_samples or sampled(arm, law, chain)),
-            lambda: sampled_card(sampled(damped, law, chain)),
+            sampled_card(at_samples or _sampled_of(arm, law, chain)),
+            lambda: sampled_card(_sampled_of(damped, law, chain)),
         ),
     }
     cards: dict[str, LoopCard | None] = dict.fromkeys(loops)
@@ -307,13 +308,13 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
 
     found = None
     if not law.is_discrete:
-        own = margins(damped, law)
+        own = _margins_of(damped, law)
         found = as_card(curve_of(own), (own.stability if damped is arm else stability(arm, law)).verdict)
     if found is not None and chain is None:
         return found
     chain = chain_or_usual(chain)
-    at_samples = sampled(damped, law, chain)
-    word = (at_samples if damped is arm else sampled(arm, law, chain)).verdict.word
+    at_samples = _sampled_of(damped, law, chain)
+    word = _sampled_of(arm, law, chain).verdict.word
     return replace(as_card(sampled_curve(at_samples), word), continuous=found)
 
 
@@ -372,12 +373,12 @@ def _margins(
         return dict.fromkeys(GRADED, NOT_DEFINED) | undefined
     down, up = (gain_margin(band, factor) for factor in gain)
     phase, peak = band.phase_margin, band.sensitivity_peak
-    periods = None if delay is None else float(delay) / period
+    periods = None if delay is None else type(delay)(delay / period)
     graded = (
         Graded(*up, grade_of(up[0], GAIN_LIMITS)),
         Graded(*down, grade_of(down[0], GAIN_LIMITS)),
         Graded(abs(phase.value), phase.omega, grade_of(abs(phase.value), PHASE_LIMITS)),
-        Graded(None if delay is None else 1e3 * float(delay), None, grade_of(periods, PERIOD_LIMITS)),
+        Graded(None if delay is None else type(delay)(1e3 * delay), None, grade_of(periods, PERIOD_LIMITS)),
         Graded(peak.value, peak.omega, grade_of(peak.value, PEAK_LIMITS)),
     )
     worst = max((each.grade for each in graded), key=GRADES.index)

@@ -13,7 +13,9 @@ from tfarm.arm import GAINS, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, cancelled, show
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import REFERENCE, is_measured
 from tfarm.arrays import Real
+from tfarm.case.card import loop_function as loop_curves
 from tfarm.digits import plain, significant
+from tfarm.dsp import Chain
 from tfarm.dsp import GainMap as SampledMap
 from tfarm.dsp.discretise import rule_in_words
 from tfarm.errors import ConvergenceError, TfarmError
@@ -60,7 +62,7 @@ def margins_section(case: Case) -> PageSection:
     found = [(each, margins_of(each.arm, each.law)) for each in case.in_s]
     words = [] if case.has_loop else [prose("no_loop", arm=case.arm)]
     words += [] if case.laws else [sign_words(case.arm)]
-    blocks: list[Picture | Table] = [*(_bode_picture(*pair) for pair in found), margin_table(found)]
+    blocks: list[Picture | Table] = [*(_bode_picture(*pair, case.chain) for pair in found), margin_table(found)]
     for each, it in found:
         blocks += tables_of(each, it)
         try:
@@ -79,10 +81,19 @@ def margin_table(found: Sequence[tuple[Controller, margins.Margins]]) -> Table:
     return sheet("margins", own, undamped=undamped, leads=leads)
 
 
-def _bode_picture(each: Controller, found: margins.Margins) -> Picture:
-    curve, figure, stem = curve_of(found), loop_function.loop.figure(found), each.stem("bode")
-    columns = Column("omega_rad_s", of=curve.omega), Column("re_L", of=curve.L.real), Column("im_L", of=curve.L.imag)
-    return picture("loop_function", figure, stem=stem, data=columns, each=each, found=found)
+def _bode_picture(each: Controller, found: margins.Margins, chain: Chain) -> Picture:
+    """Bode plot of the continuous-time and the sampled loop function; of the first alone where the other has none."""
+    try:
+        curve = loop_curves(each.arm, each.law, chain)
+    except ConvergenceError:
+        curve = curve_of(found)
+    rows = [
+        (own.period or 0.0, *row) for own in curve.sides for row in zip(own.omega, own.L.real, own.L.imag, strict=True)
+    ]
+    keys = ("period_s", "omega_rad_s", "re_L", "im_L")
+    data = [Column(key, of=of) for key, of in zip(keys, zip(*rows, strict=True), strict=True)]
+    figure = loop_function.loop.figure(curve)
+    return picture("loop_function", figure, stem=each.stem("bode"), data=data, each=each, curve=curve)
 
 
 def tables_of(each: Controller, found: margins.Margins) -> Iterator[Table]:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from markupsafe import Markup
 
-from tfarm.case.card import GOOD, GRADED, UNDEFINED, LoopCard, ResultCard, result_card
+from tfarm.case.card import GRADED, UNDEFINED, LoopCard, ResultCard, result_card
 from tfarm.errors import TfarmError
 from tfarm.plots.frequency import draw_card
 from tfarm.plots.style import save_figure
@@ -106,17 +106,11 @@ def first_modes(case: Case) -> tuple[Mode, ...]:
 
 
 def results(found: ResultCard, controller: str) -> list[LoopResult]:
-    """The loops of a card as pages show them."""
-    loops = {"continuous-time": found.continuous, f"sampled, {1e3 * found.period:g} ms": found.sampled}
-    return [LoopResult(controller, name, *pill_of(own), cells_of(own)) for name, own in loops.items() if own]
-
-
-def pill_of(own: LoopCard) -> tuple[str, str]:
-    """The words of a loop's pill, and its style: the grade of a stable loop, else the verdict."""
-    if own.stability != "stable" or own.grade == UNDEFINED:
-        return own.stability, own.stability
-    limits = "" if own.grade == GOOD else f", {own.grade}: {', '.join(own.limited_by)}"
-    return own.stability + limits, own.grade
+    """The loops of a card as pages show them; the look of a pill is the grade of a stable loop, else its stability."""
+    return [
+        LoopResult(controller, name, own.finding, own.stability if own.grade == UNDEFINED else own.grade, cells_of(own))
+        for name, own in found.loops.items()
+    ]
 
 
 def cells_of(own: LoopCard) -> dict[str, Cell]:
