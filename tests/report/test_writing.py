@@ -130,7 +130,7 @@ def test_no_file_is_left_unlinked_or_half_written(pages):
 def test_names_and_assumptions_are_text_and_nothing_else(pages):
     """On the page of the arm, the live one, the index and the one on trust, and in every drawing."""
     for page in pages.rglob("*.html"):
-        check_page(page.read_text(encoding="utf-8"), NAME, scripts=3 * (page.name == "live.html"))
+        check_page(page.read_text(encoding="utf-8"), NAME, scripts=2 * (page.name == "live.html"))
     page = (pages / NAME / "modes.html").read_text(encoding="utf-8")
     check_page(page, PRINTED.partition("I_h")[0], "second assumption", LONG)
     assert "I<sub>h</sub> in kg m² \u05e9" in page

@@ -151,7 +151,7 @@
   }
   function gainStems() {
     if (!now.margins) return [];
-    return now.margins.gain.flatMap(factor => now.margins.crossovers.filter(row => row.w > 0 && Math.abs(row.factor / factor - 1) < 1e-6).map(({ w }) => ({ w, low: Math.max(-dB(factor), -60), high: 0, colour: colours[grade(decibels(factor), data.limits.gain)] })));
+    return now.margins.gain.flatMap(factor => now.margins.crossovers.filter(row => row.w > 0 && Math.abs(row.factor / factor - 1) < 1e-6).map(({ w }) => ({ w, size: decibels(factor), low: Math.max(-dB(factor), -60), high: 0, colour: colours[grade(decibels(factor), data.limits.gain)] })));
   }
   const half = loop => circle(-1, 0.5).map(({ x, y }) => loop === "nyquist" ? { x, y } : { angle: degrees([-x, -y]) - 180, dB: dB(Math.hypot(x, y)) });
   const turned = list => list.map(row => ({ ...row, angle: row.angle - 180 })), cursor = () => pointed.bode ? [{ rule: pointed.bode.w, along: "x", dash: [3, 3] }] : [];
@@ -191,20 +191,21 @@
         ] },
       ];
     },
-    nyquist: () => {
+    nyquist: (_, of = state.loop) => {
       const here = pointed.bode ? turned([pointed.bode]) : [], [wide, high] = equal("nyquist", 2.5 * zoom);
-      if (state.loop === "sensitivity") return [{ x: { low: now.from, high: (damped || loop).band, kind: "log", label: "frequency [rad/s]" }, y: { low: -50, high: 30, label: "|S|, |T| [dB]" }, marks: [
+      if (of === "sensitivity") return [{ x: { low: now.from, high: (damped || loop).band, kind: "log", label: "frequency [rad/s]" }, y: { low: -50, high: 30, label: "|S|, |T| [dB]" }, marks: [
         { rule: 0 }, { rule: 6, dash: [2, 3] }, ...cursor(), { line: own(), x: "w", y: "T", colour: colours.link }, { line: own(), x: "w", y: "S", colour: colours.ink, width: 1.8 },
       ] }];
-      const nichols = state.loop === "nichols", [x, y] = nichols ? ["angle", "dB"] : ["x", "y"], by = nichols ? "branch" : undefined;
+      const nichols = of === "nichols", [x, y] = nichols ? ["angle", "dB"] : ["x", "y"], by = nichols ? "branch" : undefined;
       const axes = nichols ? { x: { low: -360, high: 0, label: "angle of L [deg]", values: [-360, -270, -180, -90, 0] }, y: { low: -40 * zoom, high: 40 * zoom, label: "|L| [dB]" } }
         : { x: { low: -wide, high: wide, label: "Re L" }, y: { low: -high, high, label: "Im L" } };
       return [{ ...axes, marks: [
-        ...(nichols ? [{ rule: 0 }, { rule: -180, along: "x" }] : [{ line: circle(0, 1), x: "x", y: "y", colour: colours.grey, width: 1 }]), { line: half(state.loop), x, y, colour: colours.grey, dash: [2, 3], width: 1 },
+        ...(nichols ? [{ rule: 0 }, { rule: -180, along: "x" }] : [{ line: circle(0, 1), x: "x", y: "y", colour: colours.grey, width: 1 }]), { line: half(of), x, y, colour: colours.grey, dash: [2, 3], width: 1 },
         { line: sampledCurve(), x, y, by, colour: colours.grey, dash: [5, 3] }, { line: own(), x, y, by, colour: colours.ink },
         { points: [nichols ? { angle: -180, dB: 0 } : { x: -1, y: 0 }], x, y, shape: CROSS, colour: colours.ink }, { points: here, x, y, shape: DOT, colour: colours.link },
       ] }];
     },
+    side: () => charts.nyquist(true, "sensitivity"), // where there is no slew
     slew: fine => {
       const found = slewSets(slew, now.run, fine ? Math.ceil(20 * slew.fastest(now.run) * slew.period / (2 * Math.PI)) : 0, $("slew").clientWidth);
       const x = { low: 0, high: (slew.n - 1) * slew.period, label: "time [s]" }, at = player ? [{ rule: player.time, along: "x" }] : [];
@@ -229,10 +230,10 @@
   function draw(name, fine = true) {
     if ($(name) && $(name).offsetParent && $(name).clientHeight > 80) scales[name] = paint(canvasOf(name), charts[name](fine), colours);
   }
-  const drawAll = fine => ["map", "poles", "zplane", "bode", "nyquist", ...(slew ? ["slew"] : [])].forEach(name => draw(name, fine));
+  const drawAll = fine => ["map", "poles", "zplane", "bode", "nyquist", "side", "slew"].forEach(name => draw(name, fine));
   const room = name => [canvasOf(name).clientWidth - LEFT - RIGHT, canvasOf(name).clientHeight - TOP - BELOW];
   function notes() {
-    const { margins } = now, gain = margins && gainStems().map(({ w, low }) => `gain margin ${general(Math.abs(low), 4)} dB at ${general(w, 4)} rad/s`), phase = limited(margins, 0), peak = limited(margins, 1);
+    const { margins } = now, gain = margins && gainStems().map(({ w, size }) => `gain margin ${general(size, 4)} dB at ${general(w, 4)} rad/s`), phase = limited(margins, 0), peak = limited(margins, 1);
     text("reading", margins ? [...gain, phase.at ? `phase margin ${general(Math.abs(phase.value), 4)}° ${phase.value < 0 ? "(lead)" : "(lag)"} at ${general(phase.at, 4)} rad/s` : ""].filter(Boolean).join("; ") : "An unstable loop has no margins.");
     const circles = { nyquist: "Unit circle; dotted: Ms = 2. Shift and the wheel zoom.", nichols: "Cross: −1; dotted: Ms = 2. Shift and the wheel zoom.", sensitivity: "Thick: S; thin: T; dotted: 6 dB." };
     text("loop-note", `${margins && peak.at ? `Ms ${general(peak.value, 4)} at ${general(peak.at, 4)} rad/s. ` : ""}${circles[state.loop]}`);
