@@ -23,7 +23,7 @@ from tfarm.exact.system import system_of
 from tfarm.loop.loop import Loop
 from tfarm.loop.panels import MOST_MISS, loop_panels
 from tfarm.loop.stability import stability
-from tfarm.report.live import law_data, live_data, save_live, sensor_numbers, slew_numbers
+from tfarm.report.live import has_sliders, law_data, live_data, save_live, sensor_numbers, slew_numbers
 from tfarm.report.page import Case
 
 SIGNALS = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
@@ -205,6 +205,14 @@ LAW = Law({"hub_angle": ([0.4, 3.0], [0.02, 1.0]), "tip_displacement": ([-0.2], 
 def law_page(request):
     arm, chain = tfarm.load(request.param), load_chain(request.param)
     return arm, chain, json.loads(json.dumps(law_data(arm, chain, LAW), allow_nan=False))
+
+
+def test_only_few_rational_parts_in_s_have_sliders():
+    five = ("hub_angle", "hub_rate", "root_moment", "tip_displacement", "strain@0.05")
+    assert has_sliders(LAW)
+    assert not has_sliders(Law(dict.fromkeys(five, 1.0)))
+    assert not has_sliders(Law({"hub_rate": ([0.3], [1.0, -0.5])}, period=0.01))
+    assert not has_sliders(Law.of_matrices([[-5.0]], [[1.0]], [[1.0]], [[0.3]], ["hub_rate"]))
 
 
 def test_samples_of_a_law_are_each_part_times_the_response_to_its_signal(law_page):

@@ -11,7 +11,20 @@ from typing import Any, cast, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import ANGLE_GAIN, FED_BACK, GAINS, MOMENT_GAIN, PLANE, AnyLaw, Arm, HubFeedback, Law, as_law, unit_of
+from tfarm.arm import (
+    ANGLE_GAIN,
+    FED_BACK,
+    GAINS,
+    MOMENT_GAIN,
+    PLANE,
+    AnyLaw,
+    Arm,
+    HubFeedback,
+    Law,
+    arm_and_law,
+    as_law,
+    unit_of,
+)
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Part
 from tfarm.arm.writing import law_toml
@@ -45,6 +58,14 @@ SENSOR_DIGITS = 6  # of the numbers of that chart: far more than a screen has
 LIVE_PAGE, ASSETS, SCRIPT = "live.html", "assets", "live.js"
 LIMITS = {"gain": GAIN_LIMITS, "phase": PHASE_LIMITS, "periods": PERIOD_LIMITS, "peak": PEAK_LIMITS}  # of the grades
 BEYOND = "|L| < 0.5 beyond the frequency range at all gains of this page: no unstable pole there (small gain)"
+AT_HUB = {  # `rows`: of each gain a part of the samples, and the power of s on it
+    "names": ["K1", "K2", "Kp"],
+    "labels": {"K1": "hub rate", "K2": "root moment", "Kp": "hub angle"},
+    "plane": PLANE,
+    "rows": [[1, 1], [2, 2], [1, 0]],
+    "of_law": None,
+}
+MOST_PARTS = 4  # of a law: |L| beyond the frequency range is bounded at all 2^n corners of their ranges
 REACH = 10.0  # of a gain of a law, up and down: the range of its slider
 COLOURS = {"stable": STABLE, "marginal": MARGINAL, "unstable": UNSTABLE, "good": GOOD, "low": LOW, "poor": POOR}
 
@@ -71,13 +92,19 @@ def law_in_page(loop: Sampled, names: Sequence[str]) -> dict[str, Any]:
     """The sampled loop of a law: `columns` are its parts by name, in delta = z - 1; `ones` poles at z = 1."""
     plant, in_z = loop.pulse.plant, loop.in_z
     orders = [2 if twice else 1 if once else 0 for twice, once in plant.rigid.tolist()]
-    columns = [
-        {"name": names[n], "row": row, "g": g, "zeros": _pairs(zeros), "poles": _pairs(in_z.part_poles[n])}
-        for n, row, g, zeros in in_z.columns
-    ]
     ones = max(orders[row] - int((zeros == 0).sum()) for _, row, _, zeros in in_z.columns)
-    own = {"columns": columns, "ones": max(0, ones), "modes": loop.plant.count}
-    return _sampling(loop.chain) | _plant(plant) | own
+    return (
+        _sampling(loop.chain)
+        | _plant(plant)
+        | {
+            "ones": max(0, ones),
+            "modes": loop.plant.count,
+            "columns": [
+                {"name": names[n], "row": row, "g": g, "zeros": _pairs(zeros), "poles": _pairs(in_z.part_poles[n])}
+                for n, row, g, zeros in in_z.columns
+            ],
+        }
+    )
 
 
 def _pairs(values: Complex) -> list[list[float]]:
@@ -187,11 +214,7 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
     sampled = sampled_region(arm, x, y, chain)
     return {
         **_page(arm, chain),
-        "names": ["K1", "K2", "Kp"],
-        "labels": {"K1": "hub rate", "K2": "root moment", "Kp": "hub angle"},
-        "plane": PLANE,
-        "rows": [[1, 1], [2, 2], [1, 0]],  # a part of the samples and the power of s on it
-        "of_law": None,
+        **AT_HUB,
         "units": {gain.name: unit_of(gain.name, arm) for gain in GAINS},
         "axes": axes,
         "start": {gain.name: (law or reference)[gain.name] for gain in GAINS},
@@ -215,7 +238,7 @@ def law_data(arm: Arm, chain: Chain, law: Law) -> dict[str, Any]:
 
     The slew is of gains at the hub alone.  Raises ParameterError for other laws.
     """
-    head, *_ = law_toml(law).split("\n\n")  # which refuses a state space, and two blocks on one signal
+    head, *_ = law_toml(law).split("\n\n")
     gains = {name: value for name, (_, value) in law.part_gains.items()}
     corners = [law.weighted(each) for each in product((1 / REACH, REACH), repeat=len(law.parts))]
     unit = law.weighted([1.0 / value for value in gains.values()])
@@ -295,10 +318,9 @@ def _graded(arm: Arm, laws: Sequence[Law], chain: Chain, law: AnyLaw, unit: Law 
     damped = arm.having(damping=C)
     sampled = sampled_verdict(damped, law, chain).full
     samples, _ = _samples(damped, laws, unit)
-    count = stability(damped, law, samples["band"]).unstable_roots
     return samples | {
         "kind": "band",
-        "reference_count": count,
+        "reference_count": stability(damped, law, samples["band"]).unstable_roots,
         "sampled_loop": sampled_numbers(sampled) if unit is None else law_in_page(sampled, list(unit.part_gains)),
         "words": UNDAMPED.format(C),
     }
@@ -388,17 +410,23 @@ def is_live(case: Case) -> bool:
     return has_loop(case.arm) and case.arm.has_rigid_mode
 
 
+def has_sliders(law: Law) -> bool:
+    """Whether a page can have a slider for each part of a law: gains at the hub, or few rational parts in s."""
+    are_rational = all(hasattr(part.block, "num") for part in law.parts)
+    return not law.is_discrete and are_rational and len(law.part_gains) == len(law.parts) <= MOST_PARTS
+
+
 def save_live(case: Case, folder: Path) -> None:
-    """live.html in the arm's folder.  It begins at the gains that the arm's pages are about.
+    """live.html in the arm's folder.  It begins at the first law of its pages that has sliders, else at default gains.
 
     Where its numbers cannot be made the page has the reason.
     """
     arm, chain, laws = case.arm, case.chain, case.laws
     title, out = f"{arm.name}: live loop", folder / LIVE_PAGE
-    given = [as_law(each.law) for each in laws if not as_law(each.law).is_discrete]
-    first, gains = (given[0], given[0].gains) if given else (None, None)
+    law = next((law for each in laws if has_sliders(law := as_law(each.law))), as_law(default_gains(arm)))
+    arm, _ = arm_and_law(arm, law)
     try:
-        data = law_data(arm, chain, first) if first and gains is None else live_data(arm, chain, gains)
+        data = law_data(arm, chain, law) if law.gains is None else live_data(arm, chain, law.gains)
     except TfarmError as error:
         write_text(out, render("live_failed.html", title=title, why=str(error)))
         return
