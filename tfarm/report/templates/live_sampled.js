@@ -167,7 +167,7 @@ class SampledLoop {
     const lag = row => (row.angle + 360) % 360 * Math.PI / 180 / row.w, near = [...found.crossed].sort((a, b) => lag(a) - lag(b)), { w, N } = curve;
     const L = i => size(pair(N, i)), tops = [...w.keys()].slice(1, -1).filter(i => L(i) > 0.3 && L(i) < 1 && L(i) >= L(i - 1) && L(i) > L(i + 1)); // a fraction of a sample may lift one over 1
     const at = row => ({ ...row, at: row.at / T }), soon = row => !near.length || lag(row) < 1.3 * lag(near[0]) + 0.3;
-    const peaks = tops.map(i => ({ w: w[i], angle: degrees(times(-1, pair(N, i))) })).filter(soon);
+    const peaks = tops.map(i => ({ w: w[i], angle: degrees(times(-1, pair(N, i))) })).filter(soon).sort((a, b) => lag(a) - lag(b)).slice(0, 3);
     const delays = [...near.slice(0, 3).filter(soon).map(row => this.delayAt(law, row.w, lag(row), 0)), ...peaks.flatMap(row => [-1, 1].map(side => this.delayAt(law, row.w, lag(row), side)))];
     return {
       ...found, phase: at(found.phase), peak_sensitivity: at(found.peak_sensitivity), delay: { value: T * Math.min(Infinity, ...delays) },

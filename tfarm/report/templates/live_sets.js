@@ -21,6 +21,7 @@ function curveOf({ w, D, N, at }, pixel, end, from) {
   const place = (w, a, b, c, d) => { const q = a * a + b * b; return { w, x: (a * c + b * d) / q, y: (a * d - b * c) / q }; };
   const allowed = (x, y) => { const abs = Math.sqrt(x * x + y * y); return Math.max(UNSEEN * RELATIVE, Math.min(pixel * Math.max(1, abs / end) ** 2, RELATIVE * Math.min(abs, Math.sqrt((1 + x) ** 2 + y * y)))); };
   const far = (a, b, x, y) => (a - x) ** 2 + (b - y) ** 2 > allowed(x, y) ** 2;
+  const outside = ({ x, y }) => x * x + y * y > 2 * end * end; // seen in plots of dB alone, where a piece of a hundredth of its frequency has no width
   const push = ({ w, x, y }) => {
     const n = Math.sqrt(x * x + y * y), sum = Math.max(Math.sqrt((1 + x) ** 2 + y * y), 1e-300), abs = Math.max(n, 1e-12), angle = degrees([-x, -y]);
     if (last && Math.abs(angle - last.angle) > 180) branch += 1;
@@ -29,7 +30,7 @@ function curveOf({ w, D, N, at }, pixel, end, from) {
   const between = (a, b, halvings) => {
     if (!halvings || !far(a.x, a.y, b.x, b.y)) return;
     const q = (a.w + b.w) / 2, middle = place(q, ...at(q));
-    if (!far((a.x + b.x) / 2, (a.y + b.y) / 2, middle.x, middle.y)) return;
+    if (!far((a.x + b.x) / 2, (a.y + b.y) / 2, middle.x, middle.y) || (b.w < 1.01 * a.w && [a, middle, b].every(outside))) return;
     between(a, middle, halvings - 1);
     push(middle);
     between(middle, b, halvings - 1);
