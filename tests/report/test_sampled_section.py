@@ -19,8 +19,8 @@ from tfarm.loop.windows import windows_of
 from tfarm.plots import regions
 from tfarm.plots.regions import CUT_RANGE, K2_RANGE, overlay, stable_regions
 from tfarm.report import sampled_section as page
-from tfarm.report.page import Case, prose
-from tfarm.report.sampled_section import CURVE_DIGITS, sampled_section
+from tfarm.report.page import DRAWN_DIGITS, Case, prose
+from tfarm.report.sampled_section import sampled_section
 from tfarm.schema import across, text
 from tfarm.spectrum.table import default_gains
 
@@ -145,9 +145,9 @@ def test_the_slew_is_the_simulators_own(section):
     for key, K2 in (("without", 0.0), ("default", 0.3)):
         expected = simulator.linear(HubFeedback(K1=0.3, K2=K2))
         for name, signal in (("torque", expected.torque), ("root_moment", expected.at_samples.root_moment)):
-            at_samples = np.isin(drawn["t_s"], kept_digits(expected.t, CURVE_DIGITS))
+            at_samples = np.isin(drawn["t_s"], kept_digits(expected.t, DRAWN_DIGITS))
             shown = np.array(drawn[f"{name}_{key}_N_m"])[at_samples]
-            half_a_digit = 0.5 * 10.0 ** (1 - CURVE_DIGITS)  # of a number that begins with 1
+            half_a_digit = 0.5 * 10.0 ** (1 - DRAWN_DIGITS)  # of a number that begins with 1
             assert abs(shown - signal).max() < half_a_digit * abs(signal).max()
 
 

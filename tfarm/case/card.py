@@ -52,9 +52,8 @@ GRADED = {  # names of the graded margins in the grade of the loop
     "peak_sensitivity": "Ms",
 }
 GAIN_LIMITS, PHASE_LIMITS, PERIOD_LIMITS, PEAK_LIMITS = (6.0, 3.0), (45.0, 30.0), (1.0, 0.5), (2.0, 3.0)
-REFERENCE_RATIO = 1e-3  # damping ratio of mode 1 with which an undamped arm is graded
+REFERENCE_RATIO = 1e-3  # damping ratio of mode 1 with which an undamped arm is graded; less is small damping
 ON_REAL_AXIS = 1e-9  # of its size: imaginary part of a sampled pole which is rounding
-SMALL_RATIO = 1e-3  # of mode 1: below it the minimum structural damping for stability is on the card
 UNDAMPED = (
     "undamped model: margins and grades are those with C = {:.4g} s, 0.1 % of critical damping in mode 1; "
     "at C = 0 the exact delay and disk margins are 0 for every gain"
@@ -229,7 +228,7 @@ def sampled_card(found: Analysis) -> LoopCard:
     arm, T = loop.plant.arm, loop.chain.sampling.period
     if verdict.is_stable:
         band = sampled_margins(SampledCurve(loop))
-    is_small = arm.least_damping < SMALL_RATIO / REFERENCE_RATIO * reference_damping(arm)
+    is_small = arm.least_damping < reference_damping(arm)
     needed, word = found.minimum_damping if is_small else None, "converged" if verdict.is_converged else "approximate"
     return LoopCard(
         stability=verdict.word,

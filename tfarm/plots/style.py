@@ -147,12 +147,7 @@ def picture(
                 draw(*found, ax=drawn.axes[0] if is_one else drawn.axes, **how)
                 for ax in drawn.axes[: len(rows) - 1] if grid is None else []:
                     ax.set_xlabel("")
-                if _in_column.get():
-                    make_thin(drawn)
-                    drawn.set_figheight(fitted[1] + legend_below(drawn))
-                else:
-                    legend_below(drawn)
-                    headline(drawn, title(*found))
+                finish(drawn, fitted[1], title(*found))
             drawn.again = partial(figure, *found, **how)  # type: ignore[attr-defined]  # in another style
             return drawn
 
@@ -162,6 +157,8 @@ def picture(
             if ax is None:
                 from matplotlib import pyplot  # not needed, and not loaded, for a page
 
+                # loads the backend here: inside a style, the mode of a notebook's would be reset
+                pyplot.draw_if_interactive()  # type: ignore[no-untyped-call]
                 axes = figure(*found, new=pyplot.figure, **how).axes
             else:
                 axes = list(np.ravel(np.asarray(ax, dtype=object)))
@@ -204,6 +201,16 @@ def make_thin(figure: Figure) -> None:
         ax.set_xlabel(textwrap.fill(ax.get_xlabel(), LINE))
         if len(figure.axes) > 1 and len(label := ax.get_ylabel()) > LONG_LABEL:
             ax.set_ylabel(re.sub(r" +(?=\[)", "\n", label))
+
+
+def finish(drawn: Figure, height: float, words: str) -> None:
+    """Legend and headline; of a figure for a column of a paper thin lines, no headline, and room for its legend."""
+    if _in_column.get():
+        make_thin(drawn)
+        drawn.set_figheight(height + legend_below(drawn))
+    else:
+        legend_below(drawn)
+        headline(drawn, words)
 
 
 def legend_below(figure: Figure) -> float:

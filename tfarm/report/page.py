@@ -209,16 +209,14 @@ def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> 
     save_figure(block.figure, folder / PICTURES, block.stem, formats=("svg",))
     if is_paper:
         save_column(block.figure, folder / PICTURES, block.stem)
-    columns = tuple(replace(each, of=list(map(drawn_value, each.of))) for each in block.data)
+    columns = tuple(
+        replace(each, of=[kept_digits((x,), DRAWN_DIGITS)[0] if isinstance(x, float) else x for x in each.of])
+        for each in block.data
+    )
     saved = save_table(Table(columns=columns, stem=f"{block.stem}-data"), folder / DATA, ("csv",)) if columns else ()
     drawn = [f"{PICTURES}/{block.stem}.{kind}" for kind in ("svg", *["pdf"] * is_paper)]
     files = [*drawn, *(f"{DATA}/{name}" for name in saved)]
     return SavedBlock(block.stem, block.title, shape.picture(block, files), shape.image(block))
-
-
-def drawn_value(value: Any) -> Any:
-    """A value of a picture to more digits than it shows; words and counts as they are."""
-    return kept_digits((value,), DRAWN_DIGITS)[0] if isinstance(value, float) else value
 
 
 def explained(text: str, words: str = "") -> Markup:

@@ -12,7 +12,7 @@ import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, shown_unit
 from tfarm.case.card import margins_of
-from tfarm.digits import kept_digits, plain, significant
+from tfarm.digits import plain, significant
 from tfarm.dsp import Analysis, Chain, Simulation, modes, results, sampled_verdict, traces, verdict
 from tfarm.dsp.chain import MOST_DELAY
 from tfarm.errors import ParameterError
@@ -36,7 +36,6 @@ from tfarm.spectrum.table import default_gains
 MORE_DELAY = (0.0, 0.5, 1.0)  # samples of further delay for which the verdict is given
 VERDICT_COLUMNS = ("word", "spectral_radius", "time_constant", "slowest", "holds_for")
 WHOLE_LAW_COLUMNS = ("index", "natural_frequency", "band", "aliased", "first_order", "by_damping", "log_radius")
-CURVE_DIGITS = 7  # digits of a curve in its file: a hundredth of the width of a line is four
 
 
 def sampled_section(case: Case) -> PageSection:
@@ -213,8 +212,7 @@ def piece_of_bands(runs: Mapping[str, Simulation]) -> float | None:
 def response_columns(arm: Arm, each: Mapping[str, Simulation]) -> Sequence[Column]:
     """The curves of some simulations of one scenario as they are drawn: a row a point, or a piece of the bands.
 
-    Torques are those held at that time, the rigid arm's moment that of the sample after it.  Numbers have
-    `CURVE_DIGITS` digits: a page's folder is no place for six thousand rows of so many columns to the last bit.
+    Torques are those held at that time, the rigid arm's moment that of the sample after it.
     """
     moments = {key: traces.curve_of(run, "root_moment") for key, run in each.items()}
     t, first = min((moment.t for moment in moments.values()), key=len), next(iter(each.values()))
@@ -226,7 +224,7 @@ def response_columns(arm: Arm, each: Mapping[str, Simulation]) -> Sequence[Colum
         columns += traces.tip_deviation(arm, run).at(t).columns(f"tip_error_{key}", "m")
         name = f"{driven}_{key}_{unit.replace(' ', '_')}"
         columns.append(Column(name, unit=unit, of=traces.held_at(run, run.torque, t)))
-    return [replace(each, of=kept_digits(map(float, each.values), CURVE_DIGITS)) for each in columns]
+    return columns
 
 
 # ------------------------------------------------------------ measured in time
