@@ -145,7 +145,7 @@ def test_the_slew_is_the_simulators_own(section):
     for key, K2 in (("without", 0.0), ("default", 0.3)):
         expected = simulator.linear(HubFeedback(K1=0.3, K2=K2))
         for name, signal in (("torque", expected.torque), ("root_moment", expected.at_samples.root_moment)):
-            at_samples = np.isin(drawn["t_s"], kept_digits(expected.t, DRAWN_DIGITS))
+            at_samples = np.isin(*(kept_digits(t, DRAWN_DIGITS) for t in (drawn["t_s"], expected.t)))
             shown = np.array(drawn[f"{name}_{key}_N_m"])[at_samples]
             half_a_digit = 0.5 * 10.0 ** (1 - DRAWN_DIGITS)  # of a number that begins with 1
             assert abs(shown - signal).max() < half_a_digit * abs(signal).max()
