@@ -4,7 +4,7 @@
   const $ = id => document.getElementById(id), data = JSON.parse($("live-data").textContent), { names } = data, [across, up] = data.plane || [];
   const loop = new LiveLoop(data), discrete = data.sampled_loop && new SampledLoop(data.sampled_loop), slew = data.slew && new Slew(data.slew);
   const damped = data.graded && new LiveLoop({ ...data, ...data.graded }), dampedZ = damped && discrete && new SampledLoop(data.graded.sampled_loop); // that margins are graded with
-  const REST = 200, UNDOS = 100, PRECISE = 0.25, law = { ...data.start }; // ms without a move until everything is drawn in full; states that are kept; pixels
+  const REST = 200, UNDOS = 100, PRECISE = 0.25, MOVING = 1, law = { ...data.start }; // ms without a move until everything is drawn in full; states that are kept; pixels of a chord at rest and in a move
   const state = { plane: "poles", loop: "nyquist", vary: up || names[0], shown: "3" }, usual = { ...state }, past = [], colours = {};
   const text = (id, words) => { const at = $(id); if (at && at.textContent !== words) at.textContent = words; };
   function dress() { // colours of the screen, light or dark
@@ -31,7 +31,7 @@
     const from = Math.min(loop.places[0] / 50, ...(margins ? margins.crossed.map(row => row.w / 3) : [])), drawn = {};
     return {
       law, poles, own, verdict, why, stable, grows, margins, near, frame: { x: [left, right], y: [0, top] }, ...sampledNumbers(law, z),
-      ratio: ratio(shownPoles), constant: constant(slowest(shownPoles)), run: slew && slew.run(law), from, curve: () => drawn[zoom] ||= curveOf(curve, ...pixels(), from),
+      ratio: ratio(shownPoles), constant: constant(slowest(shownPoles)), run: slew && slew.run(law), from, curve: () => drawn[sharp()] ||= curveOf(curve, ...pixels(), from),
       ...(now && names.every(name => name === across || name === up || now.law[name] === law[name]) ? { areas: now.areas, edge: now.edge } : { areas: areas(law), edge: null }),
     };
   }
@@ -155,7 +155,7 @@
   }
   const half = loop => circle(-1, 0.5).map(({ x, y }) => loop === "nyquist" ? { x, y } : { angle: degrees([-x, -y]) - 180, dB: dB(Math.hypot(x, y)) });
   const turned = list => list.map(row => ({ ...row, angle: row.angle - 180 })), cursor = () => pointed.bode ? [{ rule: pointed.bode.w, along: "x", dash: [3, 3] }] : [];
-  const sampledCurve = () => now.zcurve ? (now.zrows ||= {})[zoom] ||= turned(now.zcurve(now.from)) : [], own = () => (now.rows ||= {})[zoom] ||= turned(now.curve());
+  const sampledCurve = () => now.zcurve ? (now.zrows ||= {})[sharp()] ||= turned(now.zcurve(now.from)) : [], own = () => (now.rows ||= {})[sharp()] ||= turned(now.curve());
   const charts = {
     map: () => [{ ...plane, marks: [
       { area: now.areas || [], x: across, low: "low", high: "high", by: "part", fill: colours.stable },
@@ -221,10 +221,10 @@
     const [wide, high] = room(name);
     return [least * Math.max(1, wide / high), least * Math.max(1, high / wide)];
   }
-  // Of the Nyquist plot: how far a chord is off at most, and the largest |L| of its frame
+  // Of the Nyquist plot: how far a chord is off at most, also relative to L, and the largest |L| of its frame
   function pixels() {
     const [wide, high] = equal("nyquist", 2.5 * zoom);
-    return [PRECISE * 2 * wide / room("nyquist")[0], Math.hypot(wide, high)];
+    return [chord * 2 * wide / room("nyquist")[0], RELATIVE * chord / PRECISE, Math.hypot(wide, high)];
   }
   const canvasOf = name => $(name).querySelector("canvas");
   function draw(name, fine = true) {
@@ -241,7 +241,8 @@
 
   // ---------------------------------------------------------------- moves: gains change here alone, a frame draws the last of them
 
-  let waiting = false, resting = 0;
+  let waiting = false, resting = 0, chord = PRECISE;
+  const sharp = () => `${zoom} ${chord}`; // by which curves are kept
   function set(changes) {
     for (const [name, value] of Object.entries(changes)) {
       if (name in law) { if (Number.isFinite(value)) law[name] = clip(value, data.axes[name].low, data.axes[name].high); } else state[name] = value;
@@ -253,6 +254,7 @@
   function move() {
     const start = performance.now();
     clearTimeout(resting);
+    chord = MOVING;
     now = numbers(law);
     dressed();
     drawAll(false); // first: what is written changes the layout, which a chart would wait for
@@ -272,6 +274,7 @@
     if (of.resting) return;
     of.resting = true;
     keep();
+    chord = PRECISE;
     drawAll(true);
     const work = [...(up ? [["map", "edge", onAxis], ["map", "areas", inPlane]] : []), state.plane === "poles" ? ["poles", "locus", inS] : ["zplane", "discs", inZ]];
     for (const [name, key, make] of work) {

@@ -15,11 +15,11 @@ function gainAt(axis, share, digits = 4) {
 // Points of L over w from the frequency `from`: more where a chord is off its curve by more than `pixel` of a plot that ends at |L| = `end`,
 // or by more than a pixel of dB and degrees of L or 1 + L; fewer where all of them are nearer
 const HALVINGS = 8, RELATIVE = 0.015, UNSEEN = 1e-3; // 0.13 dB or 0.9 degrees; below every plot of dB
-function curveOf({ w, D, N, at }, pixel, end, from) {
+function curveOf({ w, D, N, at }, pixel, relative, end, from) {
   const rows = [];
   let branch = 0, last = null;
   const place = (w, a, b, c, d) => { const q = a * a + b * b; return { w, x: (a * c + b * d) / q, y: (a * d - b * c) / q }; };
-  const allowed = (x, y) => { const abs = Math.sqrt(x * x + y * y); return Math.max(UNSEEN * RELATIVE, Math.min(pixel * Math.max(1, abs / end) ** 2, RELATIVE * Math.min(abs, Math.sqrt((1 + x) ** 2 + y * y)))); };
+  const allowed = (x, y) => { const abs = Math.sqrt(x * x + y * y); return Math.max(UNSEEN * relative, Math.min(pixel * Math.max(1, abs / end) ** 2, relative * Math.min(abs, Math.sqrt((1 + x) ** 2 + y * y)))); };
   const far = (a, b, x, y) => (a - x) ** 2 + (b - y) ** 2 > allowed(x, y) ** 2;
   const outside = ({ x, y }) => x * x + y * y > 2 * end * end; // seen in plots of dB alone, where a piece of a hundredth of its frequency has no width
   const push = ({ w, x, y }) => {
