@@ -16,7 +16,7 @@ from tfarm.dsp import sampled_verdict
 from tfarm.loop.stability import stability
 from tfarm.synthesis import search
 from tfarm.synthesis.design import design
-from tfarm.synthesis.structures import LEAST_INTEGRAL_SPEED, structure_of
+from tfarm.synthesis.structures import INTEGRAL_SPEED, structure_of
 
 LAB = tfarm.load("sasaki2012-lab")
 T = 0.01
@@ -79,7 +79,7 @@ def test_the_objective_is_not_worse_than_that_of_pd(found):
 def test_the_integral_gain_has_a_lower_limit(found):
     c = found[False].coefficients
     assert found[False].at_limit == ("Ki",)
-    assert c["Ki"] == pytest.approx(LEAST_INTEGRAL_SPEED * c["Kp"] * np.sqrt(c["Kp"] / LAB.total_inertia), rel=1e-9)
+    assert c["Ki"] == pytest.approx(INTEGRAL_SPEED * c["Kp"] * np.sqrt(c["Kp"] / LAB.total_inertia), rel=1e-9)
 
 
 def test_pi_needs_friction(monkeypatch):

@@ -9,15 +9,14 @@ from typing import Any, NamedTuple
 from tfarm.digits import general
 from tfarm.errors import must_be_known, require
 
-GPA = 1e9  # Pa
 SHEAR = ("shear_modulus", "poissons_ratio")  # keys of [link], of which there is one
 WORDS = {  # keys of [link] that a material fills: symbol, unit and size of the unit
     "density": ("rho", "kg/m^3", 1.0),
-    "youngs_modulus": ("E", "GPa", GPA),
-    "shear_modulus": ("G", "GPa", GPA),
+    "youngs_modulus": ("E", "GPa", 1e9),
+    "shear_modulus": ("G", "GPa", 1e9),
     "poissons_ratio": ("nu", "", 1.0),
 }
-NO_COWPER = "; shear factor of the section that of nu = 0, unless given"
+NOT_ISOTROPIC = "is not isotropic: G is no function of E; give shear_modulus, in Pa"
 
 
 class Material(NamedTuple):
@@ -51,39 +50,30 @@ def materials() -> dict[str, Material]:
     return {name: Material(name=name, **values) for name, values in tables.items()}
 
 
-def material_of(table: Any) -> Material | None:
-    """Return the material that the table of a link names, if any.
+def of_material(table: Any) -> tuple[Material, dict[str, float]] | None:
+    """Return the material that the table of a link names, and the numbers taken from it: those that the table lacks.
 
-    Raises ParameterError for an unknown material, and for Poisson's ratio of one that is not isotropic.
+    None without a material.  Raises ParameterError for an unknown one, and for Poisson's ratio of a laminate.
     """
     name = table.get("material") if isinstance(table, dict) else None
     if not isinstance(name, str):
         return None
     must_be_known("link.material", name, materials())
-    found, nu = materials()[name], table.get("poissons_ratio")
-    remedy = f"{name} is not isotropic: G is no function of E; give shear_modulus, in Pa"
-    require(found.is_isotropic or nu is None, "link.poissons_ratio", nu, remedy)
-    return found
-
-
-def taken(material: Material, table: Mapping[str, Any]) -> dict[str, float]:
-    """Return the numbers that a link takes from its material: those that its table lacks."""
-    lacking = [key for key in WORDS if key not in table and not (key in SHEAR and any(each in table for each in SHEAR))]
-    return {key: value for key in lacking if (value := getattr(material, key)) is not None}
+    found = materials()[name]
+    is_right = found.is_isotropic or "poissons_ratio" not in table
+    require(is_right, "link.poissons_ratio", table.get("poissons_ratio"), f"{name} {NOT_ISOTROPIC}")
+    has_shear = any(key in table for key in SHEAR)
+    lacking = [key for key in WORDS if key not in table and not (key in SHEAR and has_shear)]
+    return found, {key: value for key in lacking if (value := getattr(found, key)) is not None}
 
 
 def filled(table: Any) -> Any:
     """Return the table of a link with the numbers of its material, if it names one."""
-    material = material_of(table)
-    return table if material is None else {**taken(material, table), **table}
+    found = of_material(table)
+    return table if found is None else {**found[1], **table}
 
 
 def assumed(tables: Iterable[Mapping[str, Any]]) -> list[str]:
     """Return one assumption for each material of links, with the numbers that are taken from it and their source."""
-    named = [(material, table) for table in tables if (material := material_of(table)) is not None]
-    texts = []
-    for material, table in named:
-        keys = taken(material, table)
-        note = "" if material.is_isotropic or "shear_factor" in table.get("section", {}) else NO_COWPER
-        texts += [material.words(keys) + note] if keys else []
+    texts = (found[0].words(found[1]) for found in map(of_material, tables) if found is not None and found[1])
     return list(dict.fromkeys(texts))

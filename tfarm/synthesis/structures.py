@@ -37,7 +37,7 @@ from tfarm.spectrum.table import check_gains, first_frequency, rate_unit, turnin
 
 Bounds = tuple[float, float]
 
-INTEGRAL_SPEED, LEAST_INTEGRAL_SPEED = 0.2, 0.1  # of Ki, in Kp sqrt(Kp/J): start and lower limit
+INTEGRAL_SPEED = 0.1  # lower limit of Ki, in Kp sqrt(Kp/J); the search starts at twice as much
 ANGLE_SPEED = 0.1  # of the first frequency, and rad a sample: speed of the angle unless Kp is given
 LOGARITHMIC = 1e-8  # of the usual size: the unit of a positive coefficient
 REACH = np.exp(4.0)  # of a coefficient's usual size, up and down: its first bounds
@@ -275,9 +275,8 @@ def _lead(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
 
 def _integral_gain(arm: Arm, Kp: float) -> Coefficient:
     """Ki, from its lower limit on."""
-    speed = float(np.sqrt(Kp / arm.turned_inertia))
-    least, start = LEAST_INTEGRAL_SPEED * Kp * speed, INTEGRAL_SPEED * Kp * speed
-    return Coefficient("Ki", LOGARITHMIC * start, (least, REACH * start), (least, np.inf), start)
+    least = INTEGRAL_SPEED * Kp * float(np.sqrt(Kp / arm.turned_inertia))
+    return Coefficient("Ki", LOGARITHMIC * least, (least, REACH * least), (least, np.inf), 2 * least)
 
 
 def _pi(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
