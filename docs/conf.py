@@ -73,7 +73,8 @@ def commands_page() -> str:
 
 def arm_file_page() -> str:
     """Return every table of an arm's file: key, label, unit, default and meaning, from the declaration of its keys."""
-    lines = ["# Arm file", "", "Tables of an arm's TOML file, in SI units. A key without a default is required.", ""]
+    lines = ["# Arm file", "", "Tables of an arm's TOML file, in SI units. A key without a default is required; in "
+             "`[link]` a material replaces the density and the moduli.", ""]  # fmt: skip
     for name, table in FILE_TABLES.items():
         meaning = inspect.getdoc(getattr(table, "makes", table)) or ""
         lines += [f"## {f'[{name}]' if name else 'Top of the file'}", "", " ".join(meaning.split()), ""]
@@ -88,14 +89,14 @@ def materials_table() -> list[str]:
     rows = (
         [f"`{name}`", f"{of.density:g}", f"{of.youngs_modulus / 1e9:g}",
          f"ν = {of.poissons_ratio:g}" if of.is_isotropic else f"G = {(of.shear_modulus or 0) / 1e9:g} GPa",
-         f"{of.source}; {of.range}"]
+         of.source, of.range]
         for name, of in materials().items()
     )  # fmt: skip
     text = (
         "`material` fills the density and the moduli that are left out; each key in the file replaces its number. "
         "Laminates have E along the link and G in the plane of bending, and the shear factor of ν = 0 unless given."
     )
-    titles = ("material", "density [kg/m^3]", "E [GPa]", "shear", "source and usual range")
+    titles = ("material", "density [kg/m^3]", "E [GPa]", "shear", "source", "usual range")
     return ["### Materials", "", text, "", *markdown_table(titles, rows), ""]
 
 

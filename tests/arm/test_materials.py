@@ -9,6 +9,7 @@ from tfarm.arm import Section, load, to_toml
 from tfarm.arm.materials import materials
 from tfarm.arm.schema import arm_of_table
 from tfarm.errors import ParameterError
+from tfarm.fitting.fit import is_named
 
 METALS = ("steel", "spring steel", "aluminium 6061", "titanium 6Al-4V", "brass")
 LAMINATES = ("CFRP UD 0", "GFRP")
@@ -82,11 +83,18 @@ def test_each_key_of_the_file_replaces_the_number_of_the_material():
 
 def test_the_assumptions_have_the_numbers_that_were_taken_with_their_source():
     (text,) = arm_with('material = "steel"').assumptions
-    assert text.startswith("material steel: rho = 7850 kg/m^3, E = 210 GPa, nu = 0.3 (EN 1993-1-1:2005")
+    assert text.startswith("material steel: ρ = 7850 kg/m^3, E = 210 GPa, ν = 0.3 (EN 1993-1-1:2005")
     (text,) = arm_with('material = "steel"', "youngs_modulus = 2.0e11", "shear_modulus = 8.0e10").assumptions
-    assert text.startswith("material steel: rho = 7850 kg/m^3 (")
+    assert text.startswith("material steel: ρ = 7850 kg/m^3 (")
     whole = ("density = 1.0e3", "youngs_modulus = 2.0e11", "shear_modulus = 8.0e10")
     assert arm_with('material = "steel"', *whole).assumptions == ()
+
+
+def test_a_fit_marks_the_numbers_of_a_material_that_it_frees():
+    """Its assumptions name a number by the symbol of its label."""
+    (text,) = arm_with('material = "steel"').assumptions
+    numbers = {"youngs_modulus": 2.1e11, "density": 7850.0, "poissons_ratio": 0.3, "length": 0.5}
+    assert [name for name, value in numbers.items() if is_named(f"link.{name}", value, text)] == [*numbers][:3]
 
 
 def test_segments_of_two_materials_have_a_line_each_and_the_arm_is_written_and_read_back(tmp_path):

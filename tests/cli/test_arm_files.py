@@ -63,7 +63,7 @@ def test_each_line_of_the_file_has_a_comment_and_the_examples_in_it_are_right(ca
     lines = file.read_text(encoding="utf-8").splitlines()
     bare = [line for line in lines if line and "#" not in line]
     assert bare == ["[link.section]"]
-    assert "# material steel: rho = 7850 kg/m^3, E = 210 GPa, nu = 0.3 (EN 1993-1-1:2005" in "\n".join(lines)
+    assert "# material steel: ρ = 7850 kg/m^3, E = 210 GPa, ν = 0.3 (EN 1993-1-1:2005" in "\n".join(lines)
     spare = [line[2:] for line in lines if re.match(r"# (\[|\w+ = )", line)]
     top = [line for line in spare if line.startswith(("assumptions", "theory", "input"))]
     own = [line for line in lines if not line.startswith("#")]

@@ -11,10 +11,10 @@ from tfarm.errors import must_be_known, require
 
 SHEAR = ("shear_modulus", "poissons_ratio")  # keys of [link], of which there is one
 WORDS = {  # keys of [link] that a material fills: symbol, unit and size of the unit
-    "density": ("rho", "kg/m^3", 1.0),
+    "density": ("ρ", "kg/m^3", 1.0),
     "youngs_modulus": ("E", "GPa", 1e9),
     "shear_modulus": ("G", "GPa", 1e9),
-    "poissons_ratio": ("nu", "", 1.0),
+    "poissons_ratio": ("ν", "", 1.0),
 }
 NOT_ISOTROPIC = "is not isotropic: G is no function of E; give shear_modulus, in Pa"
 
