@@ -93,9 +93,15 @@ def test_the_damping_ratio_is_that_of_the_damped_mode(capsys, tmp_path):
         ((), "--material is missing: give the material (steel, spring steel,"),
         (("--material", "gold"), "--material = 'gold': known are: steel, spring steel"),
         (STEEL[:2], "--length is missing: give the length of the link [m]"),
-        (STEEL[:4], "--width is missing: give the section: --width and --depth (rectangle), --diameter (round)"),
-        (STEEL[:6], "--depth is missing: give the depth of the section [m]; on a terminal tfarm asks for it"),
-        ((*STEEL[:6], "--diameter", "0.1"), "--diameter = 0.1: give --width and --depth (rectangle)"),
+        (STEEL[:4], "--width is missing: give the section: rectangle (--width, --depth), round (--diameter) or tube"),
+        (
+            STEEL[:6],
+            "--depth is missing: give the depth of the section (side of the rectangle in the plane of bending) [m]; on",
+        ),
+        (
+            (*STEEL[:6], "--diameter", "0.1"),
+            "--diameter = 0.1: give the sizes of one section: rectangle (--width, --depth)",
+        ),
         (STEEL[:8], "--hub-inertia is missing: give the inertia of the hub"),
         ((*STEEL, "--width", "0"), "link.section.width = 0.0: the width is a positive"),
         ((*STEEL, "--length", "-1"), "link.length = -1.0: a length is a positive"),

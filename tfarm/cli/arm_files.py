@@ -13,7 +13,7 @@ from tfarm.cli.app import SAMPLING, ArmName, Json, TheoryName, add_command, adva
 from tfarm.errors import MISSING, must_be_known, require
 from tfarm.files import write_file
 
-SECTIONS = "--width and --depth (rectangle), --diameter (round) or --outer-diameter and --inner-diameter (tube)"
+SECTIONS = "rectangle (--width, --depth), round (--diameter) or tube (--outer-diameter, --inner-diameter)"
 Size = Annotated[float | None, typer.Option(rich_help_panel="Section")]
 
 
@@ -56,18 +56,20 @@ def section_table(
     outer_diameter: of a round tube [m]
     inner_diameter: of a round tube [m]
     """
+    from tfarm.arm.schema import file_key
+
     sizes = {"width": width, "depth": depth, "diameter": diameter, "outer_diameter": outer_diameter,
              "inner_diameter": inner_diameter}  # fmt: skip
     options = {name: f"--{name.replace('_', '-')}" for name in sizes}
     given = [name for name, size in sizes.items() if size is not None]
     last = (given or ["width"])[-1]
     shapes = [shape for shape, of in SHAPES.items() if set(given) <= set(of.dimensions)]
-    require(shapes, options[last], sizes[last], f"give {SECTIONS}")
+    require(shapes, options[last], sizes[last], f"give the sizes of one section: {SECTIONS}")
     shape = shapes[0] if given else asked(options[last], None, f"section: {SECTIONS}", str, "rectangle")
     must_be_known("section", shape, SHAPES)
-    names = SHAPES[shape].dimensions
     return {"shape": shape} | {
-        name: asked(options[name], sizes[name], f"{name.replace('_', ' ')} of the section [m]") for name in names
+        name: asked(options[name], sizes[name], "{0.label} ({0.help}) [m]".format(file_key(f"link.section.{name}")))
+        for name in SHAPES[shape].dimensions
     }
 
 
