@@ -14,6 +14,7 @@ from typer.cli import get_docs_for_click
 import tfarm
 import tfarm.cli.running  # loads every command
 from tfarm.arm.law_tables import LawTable, SignalTable
+from tfarm.arm.materials import materials
 from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES, StrictTable, file_keys
 from tfarm.cli.app import whole_command
 from tfarm.dsp.chain import CHAIN_TABLES
@@ -72,13 +73,31 @@ def commands_page() -> str:
 
 def arm_file_page() -> str:
     """Return every table of an arm's file: key, label, unit, default and meaning, from the declaration of its keys."""
-    lines = ["# Arm file", "", "Tables of an arm's TOML file, in SI units. A key without a default is required.", ""]
+    lines = ["# Arm file", "", "Tables of an arm's TOML file, in SI units. A key without a default is required; in "
+             "`[link]` a material replaces the density and the moduli.", ""]  # fmt: skip
     for name, table in FILE_TABLES.items():
         meaning = inspect.getdoc(getattr(table, "makes", table)) or ""
         lines += [f"## {f'[{name}]' if name else 'Top of the file'}", "", " ".join(meaning.split()), ""]
         rows = (row_of(name.partition("]")[0] or "top", *field) for field in table.model_fields.items())
         lines += [*markdown_table(("key", "label", "unit", "type", "default", "meaning"), rows), ""]
+        lines += materials_table() if name == "link" else []
     return "\n".join(lines)
+
+
+def materials_table() -> list[str]:
+    """Return the materials of a link: numbers, source and usual range."""
+    rows = (
+        [f"`{name}`", f"{of.density:g}", f"{of.youngs_modulus / 1e9:g}",
+         f"ν = {of.poissons_ratio:g}" if of.is_isotropic else f"G = {(of.shear_modulus or 0) / 1e9:g} GPa",
+         of.source, of.range]
+        for name, of in materials().items()
+    )  # fmt: skip
+    text = (
+        "`material` fills the density and the moduli that are left out; each key in the file replaces its number. "
+        "Laminates have E along the link and G in the plane of bending, and the shear factor of ν = 0 unless given."
+    )
+    titles = ("material", "density [kg/m^3]", "E [GPa]", "shear", "source", "usual range")
+    return ["### Materials", "", text, "", *markdown_table(titles, rows), ""]
 
 
 def json_page() -> str:

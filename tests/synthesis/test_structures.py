@@ -46,7 +46,7 @@ def start_of(name):
     return as_law(form.record_at(np.clip(form.origin + 0.3, *form.box)))
 
 
-@pytest.mark.parametrize("name", thinned(STRUCTURES, 3))
+@pytest.mark.parametrize("name", thinned([each for each in STRUCTURES if each != "PI"], 3))  # which needs friction
 def test_a_law_of_each_structure_is_judged_as_by_another_model(name):
     """Margin, peak of S and, without the higher modes, the radius."""
     law = start_of(name)
@@ -107,7 +107,7 @@ def test_a_design_is_saved_and_read_back(capsys, monkeypatch, tmp_path):
 @pytest.mark.parametrize(
     ("options", "key"),
     [
-        ({"structure": "PID"}, "structure"),
+        ({"structure": "LQG"}, "structure"),
         ({"structure": "lead", "objective": "beauty"}, "objective"),
         ({"structure": "lead", "K1": (0.0, 1.0)}, "K1"),
         ({"structure": "PD", "Kp": -1.0}, "Kp"),

@@ -14,6 +14,7 @@ from typing import Any, ClassVar, TypeVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
+from tfarm.arm.materials import assumed, filled, materials
 from tfarm.arm.parts import Attachment, Gauge, Hub, Link, Motor, Payload, RotarySpring, Section
 from tfarm.arm.records import MOST_PARTS, Arm
 from tfarm.errors import MISSING, ParameterError, did_you_mean, must_be_known, require
@@ -104,8 +105,12 @@ class SectionTable(TomlTable):
 
 @of(Link)
 class LinkTable(TomlTable):
-    """[link], or one [[link]] of several, with either shear_modulus or poissons_ratio."""
+    """[link], or one [[link]] of several, with either shear_modulus or poissons_ratio.
 
+    A material fills those that are left out, and the density and Young's modulus.
+    """
+
+    material: str | None = None
     shear_modulus: float | None = None
     poissons_ratio: float | None = None
     section: dict[str, Any]
@@ -116,11 +121,15 @@ class LinkTable(TomlTable):
         require(shape is not MISSING, key, shape, remedy)
         must_be_known(key, shape, list(SHAPE_TABLES))
         section = validated(SHAPE_TABLES[shape], self.section, "link.section").build()
+        is_laminate = self.material is not None and not materials()[self.material].is_isotropic
+        if is_laminate and section.shear_factor is None:  # Cowper's needs a Poisson's ratio of at most 0.5
+            section = replace(section, shear_factor=section.cowper_factor(0.0))
         remedy = "give it in Pa, or give poissons_ratio"
         require(self.shear_modulus is not None or nu is not None, "link.shear_modulus", MISSING, remedy)
         remedy = "shear_modulus is given too, and one follows from the other; leave one out"
         require(self.shear_modulus is None or nu is None, "link.poissons_ratio", nu, remedy)
-        return (Link if nu is None else Link.isotropic)(**{**self.given(), "section": section})
+        numbers = {key: value for key, value in self.given().items() if key != "material"}
+        return (Link if nu is None else Link.isotropic)(**{**numbers, "section": section})
 
 
 class ArmTable(StrictTable):
@@ -159,6 +168,7 @@ def arm_of_table(table: dict[str, Any]) -> Arm:
     links = [head.link] if isinstance(head.link, dict) else head.link
     link, *outer = _built("link", links, LINKS) or [None]
     require(link, "link", MISSING, f"give {LINKS}")
+    own["assumptions"] = [*head.assumptions, *assumed(links)]
     return Arm(
         **{name: value for name, value in own.items() if name in AT_THE_TOP},
         link=link,
@@ -197,7 +207,7 @@ def file_key(key: str, arm: Arm | None = None) -> Quantity:
 def _within(name: str, place: str, table: Any) -> Any:
     """Return the record of a table; the key of a ParameterError begins with its place in the file."""
     try:
-        return validated(PART_TABLES[name], table, name).build()
+        return validated(PART_TABLES[name], filled(table) if name == "link" else table, name).build()
     except ParameterError as error:
         key = ".".join((place, *error.key.split(".")[1:]))
         raise ParameterError(key=key, value=error.value, remedy=error.remedy) from None

@@ -28,7 +28,7 @@ def to_toml(arm: Arm) -> str:
 
     The numbers of the paper's arm are always there, others only where they differ from their defaults.
     """
-    return _text(_tables(arm_table(arm)))
+    return _text(toml_tables(arm_table(arm)))
 
 
 def arm_table(arm: Arm) -> dict[str, Any]:
@@ -71,7 +71,7 @@ def law_toml(law: Law) -> str:
     require(len(set(names)) == len(names), "law", law.name, "two blocks on one signal: add them up first")
     own = {key: getattr(law, key) for key, usual in LAW_DEFAULTS.items() if getattr(law, key) != usual}
     signals = {part.signals[0]: _signal_table(part) for part in law.parts}
-    return _text(_tables({"name": law.name, **own, **signals}, "law"))
+    return _text(toml_tables({"name": law.name, **own, **signals}, "law"))
 
 
 def save_law(law: Law, path: Path) -> None:
@@ -94,7 +94,7 @@ def _text(tables: Iterable[list[str]]) -> str:
     return "\n\n".join("\n".join(table) for table in tables) + "\n"
 
 
-def _tables(table: Mapping[str, Any], place: str = "", heading: str = "[{}]") -> Iterator[list[str]]:
+def toml_tables(table: Mapping[str, Any], place: str = "", heading: str = "[{}]") -> Iterator[list[str]]:
     """Yield the lines of a table with its heading, then those of the tables in it."""
     lists = {key: value if isinstance(value, list) else [value] for key, value in table.items()}
     inner = {key: each for key, each in lists.items() if each and isinstance(each[0], dict)}
@@ -103,7 +103,7 @@ def _tables(table: Mapping[str, Any], place: str = "", heading: str = "[{}]") ->
     for key, tables in inner.items():
         where = ".".join(filter(None, (place, json.dumps(key) if "@" in key else key)))
         for each in tables:
-            yield from _tables(each, where, "[[{}]]" if tables is table[key] else "[{}]")
+            yield from toml_tables(each, where, "[[{}]]" if tables is table[key] else "[{}]")
 
 
 def _value(value: Any) -> str:

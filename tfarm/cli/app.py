@@ -370,7 +370,8 @@ def progress() -> Iterator[Callable[[int, int, str], None]]:
 
     def speak() -> None:
         while not over.wait(PROGRESS_EVERY if time.monotonic() - began > PROGRESS_AFTER else PROGRESS_AFTER):
-            print_line(f"{_state[0]} ({time.monotonic() - began:.0f} s)")
+            if _state[0]:  # none between a question and its answer
+                print_line(f"{_state[0]} ({time.monotonic() - began:.0f} s)")
 
     Thread(target=speak, daemon=True).start()
     try:

@@ -11,7 +11,7 @@ from typing import Any
 import typer
 from typer.exceptions import TyperException
 
-from tfarm.cli import commands, control, designing  # noqa: F401  each adds its commands
+from tfarm.cli import arm_files, commands, control, designing  # noqa: F401  each adds its commands
 from tfarm.cli.app import discard, print_line, progress, whole_command
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError, require
 from tfarm.files import STANDARD_OUTPUT
@@ -65,6 +65,8 @@ def call(arguments: list[str]) -> int:
             command.invoke(context)
     except typer.Exit as stop:
         return stop.exit_code
+    except typer.Abort:  # of a question, by the end of the input or an interrupt
+        raise KeyboardInterrupt from None
     return 0
 
 

@@ -99,7 +99,7 @@ class Design:
     those of `widened` are wider than at first.  `flat` are ranges of each coefficient, the others constant, in which
     the value is within one per cent of the best.  `at_bound` names coefficients at an end of their bounds: there the
     search was cut off, and the value is no optimum.  Those in `at_limit` are at a physical end, K1 = 0, the K2 = 1 that
-    stops the hub, or 2/T of a pole.  Of `starts` searches `agreed` reached the best score.
+    stops the hub, or 2/T of a pole, or at the least Ki.  Of `starts` searches `agreed` reached the best score.
     """
 
     objective: Annotated[str, Quantity("objective", help="criterion of the design")]
@@ -191,7 +191,8 @@ def design(
     """Return the law of a structure with the best value of an objective in the sampled loop of a chain (default 10 ms).
 
     Structures are "K1-K2", gains of rate and moment, within the bounds `K1` and `K2` where given, "PD", "PD+notch",
-    "lead", "PPF" of the first `modes` modes and "strain-rate"; `Kp` is chosen where it is 0, but of "K1-K2".
+    "lead", "PI" and "PID" (with a filtered derivative) of the hub angle, "PPF" of the first `modes` modes and
+    "strain-rate"; `Kp` is chosen where it is 0, but of "K1-K2".
     Objectives are "damping" of the first `modes` modes, "margin", "sensitivity", "delay", "residual" and "cost" (see
     `objectives`).  The law is stable when sampled, with all gains a quarter larger or smaller, and in continuous time.
     `continuous`: for the continuous-time loop instead; its best law may be unstable when sampled.

@@ -4,11 +4,15 @@
     PD            v = -Kp theta - K1 theta_t
     PD+notch      v = -(Kp + K1 s/(1 + s/pole)) N(s) theta                       of the hub angle alone
     lead          v = -Kp (1 + s/zero)/(1 + s/pole) theta
+    PI            v = -(Kp + Ki/s) theta                                         for a hub with friction or back-EMF
+    PID           v = -(Kp + Ki/s + Kd s/(1 + s/pole)) theta
     PPF           PD, and -sum g_i w_i^2/(s^2 + 2 zeta_i w_i s + w_i^2) M        positive position feedback
     strain-rate   PD, and -g s/(1 + s/pole) M
 
 N(s) = (s^2 + 2 a w s + w^2)/(s^2 + 2 b w s + w^2).  M is the root moment; g and K2 are of either sign.  Kp is fixed: it
 gives the speed of the angle, sqrt(Kp/J), and all objectives are best at small Kp.  Signals enter less their references.
+Most objectives are best without an integral, so Ki has a lower limit, Kp sqrt(Kp/J)/10.  PI alone stabilises no rigid
+hub without friction: the roots of J s^3 + Kp s + Ki have the sum 0.
 A pole faster than 2/T rings when discretised by Tustin's rule: there the search ends.
 
 A coefficient is c = unit sinh(x), x the coordinate of the search: linear below its unit and logarithmic above.  So a
@@ -33,6 +37,7 @@ from tfarm.spectrum.table import check_gains, first_frequency, rate_unit, turnin
 
 Bounds = tuple[float, float]
 
+INTEGRAL_SPEED = 0.1  # lower limit of Ki, in Kp sqrt(Kp/J); the search starts at twice as much
 ANGLE_SPEED = 0.1  # of the first frequency, and rad a sample: speed of the angle unless Kp is given
 LOGARITHMIC = 1e-8  # of the usual size: the unit of a positive coefficient
 REACH = np.exp(4.0)  # of a coefficient's usual size, up and down: its first bounds
@@ -268,6 +273,33 @@ def _lead(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
     return Structure("lead", free, {ANGLE_GAIN: Kp}, entries)
 
 
+def _integral_gain(arm: Arm, Kp: float) -> Coefficient:
+    """Ki, from its lower limit on."""
+    least = INTEGRAL_SPEED * Kp * float(np.sqrt(Kp / arm.turned_inertia))
+    return Coefficient("Ki", LOGARITHMIC * least, (least, REACH * least), (least, np.inf), 2 * least)
+
+
+def _pi(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
+    def entries(c: Real) -> tuple[Entry, ...]:
+        return (Entry("hub_angle", polynomial(Kp, c[0]), polynomial(1.0, 0.0)),)
+
+    return Structure("PI", (_integral_gain(arm, Kp),), {ANGLE_GAIN: Kp}, entries)
+
+
+def _pid(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
+    def entries(c: Real) -> tuple[Entry, ...]:
+        Ki, Kd, pole = c
+        num = polynomial(Kd + Kp / pole, Kp + Ki / pole, Ki)
+        return (Entry("hub_angle", num, polynomial(1 / pole, 1.0, 0.0)),)
+
+    free = (
+        _integral_gain(arm, Kp),
+        _rate_gain(arm, Kp)._replace(name="Kd"),
+        positive("pole_rad_s", 2 / period, 2 / period),  # the fastest derivative of a sampled signal
+    )
+    return Structure("PID", free, {ANGLE_GAIN: Kp}, entries)
+
+
 def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
     frequencies = natural_modes(arm, modes).natural_frequency[-modes:].tolist()
 
@@ -305,5 +337,6 @@ def _strain_rate(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
 
 
 STRUCTURES: dict[str, Callable[[Arm, float, int, float], Structure]] = {
-    TWO_GAINS: _two_gains, "PD": _pd, "PD+notch": _pd_notch, "lead": _lead, "PPF": _ppf, "strain-rate": _strain_rate,
+    TWO_GAINS: _two_gains, "PD": _pd, "PD+notch": _pd_notch, "lead": _lead, "PI": _pi, "PID": _pid, "PPF": _ppf,
+    "strain-rate": _strain_rate,
 }  # fmt: skip

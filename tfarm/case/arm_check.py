@@ -1,0 +1,127 @@
+"""Check of an arm's file: derived numbers, warnings, controller, and the tables that it leaves out."""
+
+import shlex
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, NamedTuple
+
+from tfarm.arm import Arm, Theory, implausible
+from tfarm.arm.law_tables import load_law
+from tfarm.arm.reading import arm_in, load_tables
+from tfarm.arm.schema import arm_of_table
+from tfarm.dsp import Chain
+from tfarm.dsp.chain import chain_of_tables, load_chain
+from tfarm.errors import require
+from tfarm.schema import Percent, Quantity
+from tfarm.spectrum import modes
+from tfarm.spectrum.listing import listed_modes
+
+from .card import reference_damping
+
+LARGE_ERROR = 0.01  # of the first frequency by Euler-Bernoulli: a steel link of slenderness 20 has some 1.3 %
+DEFAULTS = {  # of the tables that a file may leave out
+    "clamp": "rigid, no spring between hub and link",
+    "joint": "rigid, no spring between drive and hub",
+    "motor": "none, the input is the torque on the hub, or its angle where it is locked",
+    "attachment": "none, no body or spring on the link",
+    "gauge": "at the root, x = 0 m",
+    "payload": "none, a free tip",
+    "sampling": f"period {Chain().sampling.period:g} s, no computational delay, no anti-aliasing filter",
+    "converters": "ideal, without quantisation and range",
+    "actuator": "no limit of the input, no analog damping of the hub",
+    "slew": f"1.15 times the reach at the tip, in {Chain().slew.rise_time:g} s",
+    "law": "default gains: K1 = 0.00642 J w1, and K2 = 0.3 with hub inertia; scaled from the paper's, not a design",
+}
+
+
+class Note(NamedTuple):
+    """A key or table of a file, or a signal, and what there is to it."""
+
+    name: Annotated[str, Quantity("item", help="key with its value, heading of a table, or signal of the controller")]
+    text: Annotated[str, Quantity("note", help="warning, default without the table, or factor of the signal")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmCheck:
+    """An arm's file as it is read."""
+
+    arm: Annotated[str, Quantity("arm", help="name of the arm")]
+    theory: Annotated[str, Quantity("beam theory", help="timoshenko, shear, rayleigh or euler-bernoulli")]
+    mass: Annotated[float, Quantity("mass of the link", "kg", 4, "of all segments", key="mass_kg")]
+    inertia: Annotated[float, Quantity("total inertia J", "kg m^2", 4, "of all parts, about the axis",
+                                       key="total_inertia_kg_m2")]  # fmt: skip
+    slenderness: Annotated[
+        float,
+        Quantity("slenderness", "", 4, "length over radius of gyration of the section, the least of all segments"),
+    ]
+    frequency: Annotated[float, Quantity("first flexible frequency", "rad/s", 6, "exact, of the undamped arm",
+                                         key="first_frequency_rad_s")]  # fmt: skip
+    frequency_hz: Annotated[float, Quantity("first frequency", "Hz", 6, "the same in hertz", key="first_frequency_hz")]
+    euler_bernoulli: Annotated[float, Quantity("by Euler-Bernoulli", "rad/s", 6, "without shear and rotary inertia",
+                                               key="euler_bernoulli_rad_s")]  # fmt: skip
+    error: Annotated[Percent, Quantity("error of Euler-Bernoulli", "", 3, "its frequency over the exact one, less 1",
+                                       key="euler_bernoulli_error")]  # fmt: skip
+    damping_ratio: Annotated[
+        Percent | None,
+        Quantity("damping ratio of mode 1", "", 4, "exact, without controller; null where not determined"),
+    ]
+    assumptions: Annotated[tuple[str, ...], Quantity("assumptions", help="of the file, and sources of its materials")]
+    next_command: Annotated[str, Quantity("next", help="command to try next")]
+    warnings: Annotated[list[Note], Quantity("warnings", help="values that may have a wrong unit, and limits")]
+    law: Annotated[list[Note], Quantity("controller", help="signals of the file's law with their factors")]
+    missing: Annotated[list[Note], Quantity("missing tables", help="tables left out, and what is assumed instead")]
+
+
+def check_arm(name: str, theory: Theory | None = None) -> ArmCheck:
+    """Return the check of a preset or an arm's file, all its tables read.
+
+    Raises ParameterError, naming the file and the key, for the first problem.
+    """
+    tables, file = load_tables(name)
+    arm = arm_in(tables, file) if theory is None else arm_in(tables, file).under(theory)
+    law = load_law(name)
+    load_chain(name)
+    first = listed_modes(modes(arm, 1)).modes[-1]
+    omega = float(first.natural_frequency)
+    of_bernoulli = first.theories["euler-bernoulli"]
+    error = Percent(of_bernoulli / omega - 1)
+    ratio = 0.0 if arm.is_undamped else first.damping_ratio
+    slenderness = min(arm.length / link.section.radius_of_gyration for link in arm.links)
+    return ArmCheck(
+        arm=arm.name, theory=arm.theory, mass=arm.own_mass, inertia=arm.total_inertia, slenderness=slenderness,
+        frequency=omega, frequency_hz=first.natural_frequency_hz, euler_bernoulli=of_bernoulli, error=error,
+        damping_ratio=None if ratio is None else Percent(ratio), assumptions=arm.assumptions,
+        next_command=f"tfarm {'modes' if arm.is_locked else 'margins'} {shlex.quote(name)}",
+        warnings=[Note(*text.split(": ", 1)) for text in _warnings(tables, arm, slenderness, error)],
+        law=[] if law is None else [Note(*each) for each in law.as_typed()],
+        missing=[Note(f"[{table}]", text) for table, text in DEFAULTS.items() if table not in tables],
+    )  # fmt: skip
+
+
+def _warnings(tables: Mapping[str, Any], arm: Arm, slenderness: float, error: float) -> Iterator[str]:
+    """Yield the warnings of an arm: a motor without input, values that may have a wrong unit, a short link, C = 0."""
+    if "motor" in tables and "input" not in tables:
+        yield "input: hub_torque is assumed; with a [motor] give hub_torque, motor_voltage or motor_current"
+    yield from implausible(arm)
+    if error > LARGE_ERROR:
+        yield f"slenderness = {slenderness:.3g}: shear and rotary inertia count; Euler-Bernoulli leaves them out"
+    if arm.has_elastic_link:
+        yield (
+            "link.damping = 0: undamped model, in which any delay destabilises a mode; "
+            f"C = {reference_damping(arm):.3g} s is a damping ratio of 0.1 % in mode 1"
+        )
+
+
+def with_damping(tables: dict[str, Any], ratio: float | None) -> dict[str, Any]:
+    """Return the tables of an arm's file, with the damping C of its link of which mode 1 has this ratio, if given.
+
+    Raises ParameterError for tables that are no arm's.
+    """
+    arm = arm_of_table(tables)
+    chain_of_tables(tables)
+    if ratio is None:
+        return tables
+    require(0 < ratio < 1, "--damping-ratio", ratio, "above 0 and below 1; 0.005 is 0.5 % of critical damping")
+    C = 2 * ratio / float(modes(arm, 1).natural_frequency[-1])  # of bending alone
+    found = listed_modes(modes(arm.having(damping=C), 1)).modes[-1].damping_ratio or ratio
+    return tables | {"link": {"damping": float(f"{C * ratio / found:.4g}")} | tables["link"]}

@@ -1,0 +1,124 @@
+"""The commands that begin an arm's file and check it."""
+
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from tfarm.arm.parts import SHAPES
+from tfarm.cli.app import SAMPLING, ArmName, Json, TheoryName, add_command, advance, emit, refuse
+from tfarm.errors import MISSING, must_be_known, require
+from tfarm.files import write_file
+
+SECTIONS = "rectangle (--width, --depth), round (--diameter) or tube (--outer-diameter, --inner-diameter)"
+Size = Annotated[float | None, typer.Option(rich_help_panel="Section")]
+
+
+def asked(option: str, value: Any, text: str, kind: type = float, usual: Any = None) -> Any:
+    """Return the value of an option, where it is None the answer to a question on a terminal.
+
+    Raises ParameterError where standard input is no terminal.
+    """
+    if value is not None:
+        return value
+    require(sys.stdin and sys.stdin.isatty(), option, MISSING, f"give the {text}; on a terminal tfarm asks for it")
+    advance(0, 0, "")  # no lines of progress between question and answer
+    return typer.prompt(text, type=kind, default=usual, err=True)
+
+
+def link_table(*, material: str | None = None, length: float | None = None) -> dict[str, Any]:
+    """Return the table of a link without its section.
+
+    Options:
+    material: steel, spring steel, aluminium 6061, titanium 6Al-4V, brass, CFRP UD 0, GFRP, PLA or ABS
+    length: length of the link [m]
+    """
+    from tfarm.arm.materials import materials
+
+    chosen = asked("--material", material, f"material ({', '.join(materials())})", str, "steel")
+    must_be_known("--material", chosen, materials())
+    return {"length": asked("--length", length, "length of the link [m]"), "material": chosen}
+
+
+def section_table(
+    *, width: Size = None, depth: Size = None, diameter: Size = None, outer_diameter: Size = None,
+    inner_diameter: Size = None,
+) -> dict[str, Any]:  # fmt: skip
+    """Return the table of a section, whose shape follows from its sizes.
+
+    Options:
+    width: side of a rectangle along the axis of rotation [m]
+    depth: side of a rectangle in the plane of bending [m]
+    diameter: of a solid round bar [m]
+    outer_diameter: of a round tube [m]
+    inner_diameter: of a round tube [m]
+    """
+    from tfarm.arm.schema import file_key
+
+    sizes = {"width": width, "depth": depth, "diameter": diameter, "outer_diameter": outer_diameter,
+             "inner_diameter": inner_diameter}  # fmt: skip
+    options = {name: f"--{name.replace('_', '-')}" for name in sizes}
+    given = [name for name, size in sizes.items() if size is not None]
+    last = (given or ["width"])[-1]
+    shapes = [shape for shape, of in SHAPES.items() if set(given) <= set(of.dimensions)]
+    require(shapes, options[last], sizes[last], f"give the sizes of one section: {SECTIONS}")
+    shape = shapes[0] if given else asked(options[last], None, f"section: {SECTIONS}", str, "rectangle")
+    must_be_known("section", shape, SHAPES)
+    return {"shape": shape} | {
+        name: asked(options[name], sizes[name], "{0.label} ({0.help}) [m]".format(file_key(f"link.section.{name}")))
+        for name in SHAPES[shape].dimensions
+    }
+
+
+@add_command(
+    "Arm", epilog="new my-arm.toml --material steel --length 0.8 --width 0.06 --depth 0.004 --hub-inertia 0.05"
+)
+def new(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="the file to write, .toml", show_default=False)],
+    link: Callable[..., Any] = link_table,
+    section: Callable[..., Any] = section_table,
+    hub_inertia: float | None = None,
+    payload_mass: float = 0.0,
+    payload_inertia: float = 0.0,
+    damping: float | None = None,
+    damping_ratio: float | None = None,
+    period: Annotated[float | None, typer.Option(rich_help_panel=SAMPLING)] = None,
+    force: bool = False,
+) -> None:
+    """Arm file with comments, from options; on a terminal tfarm asks for what is missing.
+
+    Options:
+    hub_inertia: inertia of the hub about the axis [kg m^2]; inf locks it, 0 is a free pin
+    payload_mass: mass at the tip [kg]
+    payload_inertia: inertia of the payload about its own centre of mass [kg m^2]
+    damping: Kelvin-Voigt damping C of the link [s]
+    damping_ratio: or the damping ratio of mode 1, such as 0.005
+    period: sampling period of the controller [s]
+    force: replace the file
+    """
+    from tfarm.arm.starting import first_file
+    from tfarm.case.arm_check import with_damping
+
+    require(file.suffix == ".toml", "FILE", str(file), "give a name that ends with .toml")
+    require(force or not os.path.lexists(file), "FILE", str(file), "exists already; --force replaces it")
+    refuse({"--damping-ratio": None if damping is None else damping_ratio}, "give it or --damping, not both")
+    tables = {
+        "name": file.stem,
+        "link": ({} if damping is None else {"damping": damping}) | link() | {"section": section()},
+        "hub": {"inertia": asked("--hub-inertia", hub_inertia, "inertia of the hub about the axis [kg m^2]")},
+        "payload": {"mass": payload_mass, "inertia": payload_inertia},
+        **({} if period is None else {"sampling": {"period": period}}),
+    }
+    write_file(file, first_file(with_damping(tables, damping_ratio)).encode(), key="FILE")
+    print(f"written: {file}; next: tfarm check {file}")
+
+
+@add_command("Arm", epilog="check my-arm.toml")
+def check(arm: ArmName, theory: TheoryName = None, json: Json = False) -> None:
+    """Arm file as it is read: mass, inertia, first frequency, warnings, missing tables and their defaults."""
+    from tfarm.case.arm_check import check_arm
+
+    emit(check_arm(arm, theory), json)
