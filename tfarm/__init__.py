@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         presets,
     )
     from tfarm.case import compare, result_card
+    from tfarm.case.step import step
     from tfarm.dsp.results import simulate
     from tfarm.dsp.verdict import sampled
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
@@ -92,6 +93,7 @@ __all__ = [
     "sampled",
     "simulate",
     "spill",
+    "step",
     "transfer",
     "tune",
 ]
@@ -119,6 +121,7 @@ _ROOMS = {  # the module of a name; after a colon another name there
     "sampled": "dsp.verdict",
     "simulate": "dsp.results",
     "spill": "loop.stability",
+    "step": "case.step",
     "transfer": "response",
     "tune": "tuner",
 }

@@ -18,9 +18,13 @@ from matplotlib.ticker import MaxNLocator
 
 from tfarm.arm import MOMENT_GAIN, Arm, Link
 from tfarm.arrays import Real
+from tfarm.case.step import Step
 from tfarm.digits import how_many, plain, significant, unit
 from tfarm.dsp import GainMap, Simulation, traces
+from tfarm.dsp.results import Run
+from tfarm.dsp.simulate import SETTLED_SHARE
 from tfarm.dsp.traces import POINTS_A_PERIOD, TimeCurve
+from tfarm.exact.outputs import OUTPUTS
 from tfarm.fitting.recording import RunComparison
 from tfarm.loop.plane import Plane
 from tfarm.spectrum import Modes
@@ -35,8 +39,11 @@ from .style import (
     GREEN,
     GREY,
     INK,
+    MARGINAL,
     ORANGE,
     PURPLE,
+    STABLE,
+    UNSTABLE,
     by_name,
     picture,
     safe,
@@ -48,6 +55,12 @@ BESIDE_ARM = 0.2  # share of the length left of the hub and right of the tip
 HUB_WIDTH = 0.06  # width of the drawn hub, as a share of the length
 TIME = "time [s]"
 DASHED, DOTTED, LONG_DASHED = (0, (4, 3)), (0, (1, 2)), (0, (5, 3))
+OF_STABILITY = {"stable": (STABLE, "o"), "marginal": (MARGINAL, "s"), "unstable": (UNSTABLE, "x")}  # colour, mark
+HATCH = "/////"
+FEW_SAMPLES = 60  # of a run: each is marked
+STEP_ROWS = (1.0, 1.0, 1.0, 1.0)  # heights of hub, tip, root moment and torque
+SHOWN_SETTLED = 1.5  # times the last settling time: end of the picture
+OFF_FRAME = 0.3  # of the height of a stable response: margin beyond it for an unstable one
 
 
 def scaled(found: Modes, count: int) -> dict[int, Real]:
@@ -218,9 +231,81 @@ def _draw_curve(curve: TimeCurve, ax: Axes, colour: str, *, scale: float = 1.0, 
     """The line, or the band."""
     low, high = scale * curve.low, scale * curve.high
     if curve.is_band:
-        ax.fill_between(curve.t, low, high, color=colour, alpha=0.55, lw=0.8, label=looks.get("label"))
+        is_dashed = looks.get("ls") == DASHED  # of a sampled loop: its band is hatched
+        own = {"fc": "none", "ec": colour, "hatch": HATCH} if is_dashed else {"color": colour, "alpha": 0.55}
+        ax.fill_between(curve.t, low, high, lw=0.8, label=looks.get("label"), **own)
     else:
         ax.plot(curve.t, low, color=colour, lw=1.3, **looks)
+
+
+def _name_signals(arm: Arm, names: Sequence[str], ax: Sequence[Axes]) -> None:
+    """Along the axes: the signals with their units, the last being the input of the arm, and time."""
+    of_input = "motor torque [N m]" if arm.input_unit == "N m" else f"motor [{arm.input_unit}]"
+    known = [OUTPUTS[name.partition("@")[0]] for name in names[:-1]]
+    labels = [f"{each.label.replace('at x', 'of the tip')} [{each.unit}]" for each in known]
+    for one, label in zip(ax, (*labels, of_input), strict=True):
+        one.axhline(0.0, color=GREY, lw=0.6)
+        one.set(xlabel=TIME, ylabel=label)
+
+
+def _mark(ax: Axes, t: Real, y: Real, colour: str, mark: str) -> None:
+    """Marks at the samples where these are few."""
+    if t.size <= FEW_SAMPLES:
+        ax.plot(t, y, mark, color=colour, ms=3.0, mew=1.0)
+
+
+@picture(
+    (Step, "tfarm.step returns"), size=(9.0, 8.4), rows=STEP_ROWS,
+    title=lambda found: f"{found.arm.name}: {found.scenario_in_words}",
+)  # fmt: skip
+def step(found: Step, *, ax: Sequence[Axes]) -> None:
+    """Time responses (from `tfarm.step`) in four axes, given or new; these: hub, tip, root moment [N m] and input.
+
+    The continuous-time loop is solid, the sampled one dashed; references are grey, with 5 % to either side.  Of an
+    unstable loop the part within the range of a stable one is drawn.
+    """
+    _name_signals(found.arm, found.names, ax)
+    t, every = found.t[found.t <= _shown_until(found)], round(found.period / found.t[1])
+    for one, name in zip(ax, found.names, strict=True):
+        one.set_xlim(0.0, t[-1])
+        if (reference := found.reference.get(name)) is not None:
+            ends = np.sort(reference[-1] * np.array([1 - SETTLED_SHARE, 1 + SETTLED_SHARE]))
+            one.axhspan(*ends, color=FAINT, lw=0, alpha=0.6, zorder=0)
+            one.plot(t, reference[: t.size], color=GREY, lw=0.8, label="reference, 5 %")
+        for loop, each in found.loops.items():
+            y, (colour, mark) = each.signals[name][: t.size], OF_STABILITY[each.stability]
+            line = "-" if each is found.continuous else DASHED
+            _draw_curve(traces.curve(t[: y.size], y), one, colour, ls=line, label=f"{loop}, {each.stability}")
+            if each is found.sampled:
+                _mark(one, t[: y.size : every], y[::every], colour, mark)
+        stable = [each.signals[name] for each in found.loops.values() if each.hub]
+        if stable and len(stable) < len(found.loops):
+            low, high = stable[0].min(), stable[0].max()
+            one.set_ylim(low - OFF_FRAME * (high - low), high + OFF_FRAME * (high - low))
+
+
+def _shown_until(found: Step) -> float:
+    """End of the picture [s]: some time after every signal of a stable loop has settled, else that of the record."""
+    each = [of for loop in found.loops.values() for of in (loop.hub, loop.tip, loop.root_moment, loop.torque) if of]
+    ends = [math.inf if of.settling_time is None else SHOWN_SETTLED * of.settling_time for of in each]
+    return min(max(ends, default=math.inf), float(found.t[-1]))
+
+
+@picture(
+    (Run, "tfarm.dsp.results.simulated_run returns"), size=(9.0, 8.4), rows=STEP_ROWS,
+    title=lambda run: f"{run.arm.name}: {run.scenario_in_words}",
+)  # fmt: skip
+def simulation(run: Run, *, ax: Sequence[Axes]) -> None:
+    """A sampled run in four axes, given or new; these: hub angle, tip displacement, root moment [N m] and input."""
+    names, found = ("hub_angle", "tip_displacement", "root_moment"), run.simulation
+    colour, mark = OF_STABILITY["unstable" if found.stopped else "stable"]
+    _name_signals(run.arm, (*names, "torque"), ax)
+    for one, name in zip(ax, names, strict=False):
+        _draw_curve(traces.curve_of(found, name), one, colour, ls=DASHED)
+        _mark(one, found.t, found.at_samples.signal(name), colour, mark)
+    _draw_curve(traces.curve(found.t, found.torque), ax[-1], colour, drawstyle="steps-post")
+    if found.scenario.name == "slew":
+        ax[0].plot(found.scenario.t, found.scenario.hub_angle, color=GREY, lw=0.8, label="reference")
 
 
 def _measured_rows(each: Mapping[str, RunComparison]) -> int:

@@ -1,0 +1,398 @@
+"""Time responses of the loop with their figures, continuous-time and sampled: reference step, slew, pulse, deflection.
+
+Both loops have the same input.  The sampled one has its converters, delay and filters too, and is exact between the
+samples.  An initial deflection is the first mode of the arm without controller, released at rest: the free motion is
+one pair of exponentials at any damping, so the response of the loop to it is exact.  (The static shape under a force at
+the tip is an equilibrium only where the hub is kept at its angle.)
+
+Figures, as in textbooks (Ogata, Modern Control Engineering, 2010, sec. 5-3): the final value is the mean of the last
+tenth of the record; rise time from 10 to 90 % of it; overshoot beyond it, over it; settling within 5 % of it, as for
+`tfarm simulate`.  Of a signal without a reference, and of root moment and torque, the 5 % are of its largest value.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any
+
+import numpy as np
+
+from tfarm.arm import AT_HUB, AnyLaw, Arm, Law, as_law, tracked
+from tfarm.arm.feedback import OUTPUT_OF
+from tfarm.arm.law import REFERENCE
+from tfarm.arrays import LEAST_SIZE, Real
+from tfarm.dsp import Chain, traces
+from tfarm.dsp.chain import PERIOD, TIME_ROUNDING, chain_or_usual
+from tfarm.dsp.plant import sensed_plant
+from tfarm.dsp.results import ENOUGH_CHANGE, simulated
+from tfarm.dsp.scenarios import PULSE_SHARE, TRIAL_SLEWS, Scenario, described, scenario, unit_step
+from tfarm.dsp.simulate import LEFT_OF_RECORD, MOST_BETWEEN, SETTLED_SHARE, first_mode
+from tfarm.dsp.verdict import sampled_verdict
+from tfarm.errors import ConvergenceError, ParameterError, must_be_known
+from tfarm.loop.loop import Loop
+from tfarm.loop.poles import Poles
+from tfarm.loop.stability import verdict_on
+from tfarm.loop.time_response import (
+    ACTUATOR,
+    TORQUE,
+    Excitation,
+    TimeResponse,
+    Transform,
+    time_response,
+    usual_poles,
+)
+from tfarm.records import record
+from tfarm.response.signals import Controller, controller, placed
+from tfarm.schema import Column, Percent, Quantity, Table, across
+from tfarm.schema.html import as_html, with_symbols
+from tfarm.spectrum.table import first_frequency
+
+SAMPLED_NAMES = {"reference": "reference", "slew": "slew", "pulse": "pulse", "deflection": "decay"}  # by scenario
+MOMENT = AT_HUB[-1]
+TIME_CONSTANTS = 8.0  # of the dominant pole: length of a record after its input, to 3e-4 of the final value
+LONGEST_SLEWS = 20.0  # times the slew: a record without a duration is no longer
+DOMINANT = 2.0  # times the first frequency: a pole farther away is not the dominant one
+LEAST_POINTS, MOST_POINTS = 2000, 20_000  # of a record
+CONVERGED = 1e-9  # of the peak of each signal: bound on the remainder there of a converged response
+
+
+@dataclass(frozen=True, kw_only=True)
+class SignalFigures:
+    """Figures of one signal over time, in its own unit; None where the signal, or the record, has none."""
+
+    signal: Annotated[str, Quantity(help="output of the arm, or torque for its input")]
+    unit: Annotated[str, Quantity(help="SI unit of the values of the signal")]
+    peak: Annotated[float, Quantity("peak", digits=6, unit_of="unit", help="largest value in size, with its sign")]
+    peak_time: Annotated[float, Quantity("peak time", "s", 4, help="time of the peak")]
+    final_value: Annotated[float | None, Quantity("final value", digits=4, unit_of="unit",
+            help="mean over the last tenth of the record; none where the signal has not settled")]  # fmt: skip
+    rise_time: Annotated[float | None, Quantity("rise time (10-90 %)", "s", 4,
+            help="time from 10 to 90 % of the final value, of a signal with a reference")]  # fmt: skip
+    overshoot: Annotated[Percent | None, Quantity("overshoot", "", 4,
+            help="excess of the largest value over the final one, as a share of that")]  # fmt: skip
+    settling_time: Annotated[float | None, Quantity("settling time (5 %)", "s", 4,
+            help="end of deviations above 5 % of the final value, without a reference of the largest")]  # fmt: skip
+    steady_state_error: Annotated[float | None, Quantity("steady-state error", digits=4, unit_of="unit",
+            help="reference less final value")]  # fmt: skip
+    residual_rms: Annotated[float | None, Quantity("residual vibration (rms)", digits=4, unit_of="unit",
+            help="rms about the final value once the slew or the pulse is over")]  # fmt: skip
+    remainder_bound: Annotated[float | None, Quantity(
+            help="largest contribution of the omitted poles at any time of the record, as measured")]  # fmt: skip
+    remainder_at_peak: Annotated[float | None, Quantity("remainder bound at the peak", digits=2, unit_of="unit",
+            help="contribution of the omitted poles at the peak at most, as measured")]  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopResponse:
+    """Figures of one loop, not defined of an unstable one, and its signals by name, "torque" being the input."""
+
+    stability: Annotated[str, Quantity("stability", help="stable, marginal or unstable")]
+    certainty: Annotated[str, Quantity("certainty", help="word of certainty, with the number of poles or modes")]
+    hub: Annotated[SignalFigures | None, Quantity("hub", help="hub angle, or hub rate where that is the reference")]
+    tip: Annotated[SignalFigures | None, Quantity("tip", help="tip displacement, or its velocity under a hub rate")]
+    root_moment: Annotated[SignalFigures | None, Quantity("root moment", help="elastic moment at the root")]
+    torque: Annotated[SignalFigures | None, Quantity("torque", help="input of the arm: torque, voltage or current")]
+    signals: dict[str, Real]
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class Step:
+    """Time responses of an arm under a controller, continuous-time and sampled, at the times `t` [s].
+
+    A loop that is not determined is None, that of a law in z in continuous time too; the signals of a sampled loop end
+    where it was stopped.  `names` are the signals of hub and tip, root moment and torque, `reference` that of hub and
+    tip, `response` is the continuous-time response at any time.
+    """
+
+    arm: Arm
+    law: AnyLaw
+    scenario: Annotated[str, Quantity(help="reference, slew, pulse or deflection")]
+    scenario_in_words: Annotated[str, Quantity("scenario", help="input with its size")]
+    duration: Annotated[float, Quantity("duration", "s", 4, help="length of the record")]
+    period: Annotated[float, PERIOD]
+    continuous: Annotated[LoopResponse | None, Quantity(help="continuous-time loop; null where it is not determined")]
+    sampled: Annotated[LoopResponse | None, Quantity(help="sampled loop; null where it is not determined")]
+    notes: Annotated[tuple[str, ...], Quantity("notes", help="reasons of figures and loops that are not determined")]
+    t: Real
+    names: tuple[str, ...]
+    reference: dict[str, Real]
+    response: TimeResponse | None
+
+    @property
+    def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
+        """Names of the arm and the controller."""
+        return controller(as_law(self.law), self.arm)
+
+    @property
+    def loops(self) -> dict[str, LoopResponse]:
+        """The loops that are determined, by name."""
+        both = {"continuous-time": self.continuous, f"sampled, {1e3 * self.period:g} ms": self.sampled}
+        return {name: each for name, each in both.items() if each is not None}
+
+    @property
+    def finding(self) -> str:
+        """Stability of each loop."""
+        return "; ".join(f"{name} {each.stability}" for name, each in self.loops.items())
+
+    @property
+    def table(self) -> Table:
+        """A row a figure, a column a loop."""
+        return across(self.loops, title="time response")
+
+    @property
+    def csv_table(self) -> Table:
+        """The signals of both loops at the same times, empty where a run was stopped."""
+        columns = [Column("t", "time", "s", of=self.t)]
+        for prefix, loop in (("", self.continuous), ("sampled_", self.sampled)):
+            for name, y in loop.signals.items() if loop else ():
+                cells = [*y.tolist(), *[""] * (self.t.size - y.size)]
+                columns.append(Column(prefix + name, unit=unit_of(self.arm, name), of=cells))
+        return Table(columns=tuple(columns))
+
+    def _repr_html_(self) -> str:
+        return as_html(self.table) + "".join(f"<p>{with_symbols(note)}</p>" for note in self.notes)
+
+
+def unit_of(arm: Arm, name: str) -> str:
+    """SI unit of a signal, or of the input as "torque"."""
+    return arm.input_unit if name == TORQUE else placed(name, arm.length)[0].unit
+
+
+def step(
+    arm: Arm,
+    law: AnyLaw,
+    chain: Chain | None = None,
+    scenario_name: str = "reference",
+    duration: float | None = None,
+    *,
+    outputs: Sequence[str] = (),
+) -> Step:
+    """Return the time responses of the continuous-time and of the sampled loop, with their figures.
+
+    Parameters
+    ----------
+    arm, law, chain
+        The loop; a chain of 10 ms with ideal converters unless given.
+    scenario_name
+        "reference": unit step of the reference of the hub angle where the law feeds that back, else of the hub rate.
+        "slew": that of the chain.  "pulse": a torque at the hub for a tenth of the slew.  "deflection": the first mode
+        released with the tip displaced by 0.01 L.
+    duration
+        Length of the record [s]; by default eight time constants of the dominant pole after the input, at most 20
+        slews.
+    outputs
+        Further signals, such as "strain@0.05".
+
+    Raises
+    ------
+    ParameterError
+        For a locked hub, an unknown scenario or output, a loop without a reference of the hub, and as `simulate` does.
+    ConvergenceError
+        Where neither loop is determined.
+    """
+    must_be_known("scenario", scenario_name, SAMPLED_NAMES)
+    chain, notes, is_step = chain_or_usual(chain), list[str](), scenario_name == "reference"
+    hub, law = followed(law) if is_step else ("hub_angle", law)
+    arm, law = tracked(arm, law)
+    tip, full, response = "tip_displacement" if hub == "hub_angle" else f"velocity@{arm.length!r}", as_law(law), None
+    poles = None if full.is_discrete else _known("continuous-time", notes, lambda: usual_poles(Loop(arm, full)))
+    length = usual_duration(poles, chain, scenario_name) if duration is None else duration
+    task = unit_step(hub, chain, length) if is_step else scenario(SAMPLED_NAMES[scenario_name], arm, chain, length)
+    case = _Case(arm, tuple(dict.fromkeys((hub, tip, MOMENT, *outputs))), task)
+    if poles is not None:
+        response = time_response(poles, case.names, excitation(poles.loop, full, chain, task, case.names), length)
+    case.t = _times(response, task)
+    if is_step or scenario_name == "slew":
+        angle = traces.reference_angle(task, case.t) if hub == "hub_angle" else np.full(case.t.size, task.hub_rate[0])
+        case.reference = {hub: angle, tip: arm.reach * angle}
+    continuous = None if response is None else case.continuous(response)
+    sampled = _known("sampled", notes, lambda: case.sampled(law, chain))
+    if continuous is sampled is None:
+        raise ConvergenceError("; ".join(notes), None, length)
+    found = Step(
+        arm=arm, law=law, scenario=scenario_name, scenario_in_words=described(task, arm, chain), duration=length,
+        period=task.period, continuous=continuous, sampled=sampled, notes=(), t=case.t,
+        names=(hub, tip, MOMENT, TORQUE), reference=case.reference, response=response,
+    )  # fmt: skip
+    grows = [f"{name} loop unstable: its response grows, figures are not defined"
+             for name, each in found.loops.items() if each.stability == "unstable"]  # fmt: skip
+    return replace(found, notes=(*notes, *grows))
+
+
+def _known(name: str, notes: list[str], find: Callable[[], Any]) -> Any:
+    """Return what `find` returns; None, with a note, where that loop is not determined."""
+    try:
+        return find()
+    except ConvergenceError as error:
+        notes.append(f"{name} loop not determined: {error}")
+        return None
+
+
+def followed(law: AnyLaw) -> tuple[str, AnyLaw]:
+    """Return the signal of the hub whose reference steps, and the law with that reference.
+
+    Raises ParameterError for a law that feeds back neither hub angle nor hub rate.
+    """
+    full = as_law(law)
+    gains = {} if full.gains is None else {OUTPUT_OF[name]: gain for name, gain in full.gains.by_name.items()}
+    for name in AT_HUB[:2]:
+        if REFERENCE + name in full.wanted:
+            return name, law
+        if name in full.signals and gains.get(name, 1.0):
+            return name, law if name in full.references else replace(full, references=(*full.references, name))
+    remedy = "the controller feeds back neither hub angle nor hub rate; choose slew, pulse or deflection"
+    raise ParameterError(key="scenario", value="reference", remedy=remedy)
+
+
+def usual_duration(poles: Poles | None, chain: Chain, scenario_name: str) -> float:
+    """Length [s] of a record: eight time constants of the dominant pole after the input, to two digits."""
+    rise = chain.slew.rise_time
+    if poles is None:
+        return TRIAL_SLEWS * rise
+    near = poles.moving[abs(poles.moving) <= DOMINANT * first_frequency(poles.loop.arm)]
+    slowest = float(abs(near.real).min(initial=math.inf))
+    busy = {"slew": rise, "pulse": PULSE_SHARE * rise}.get(scenario_name, 0.0)
+    if not 0 < slowest < math.inf:
+        return TRIAL_SLEWS * rise
+    return float(f"{min(busy + TIME_CONSTANTS / slowest, LONGEST_SLEWS * rise):.2g}")
+
+
+def excitation(loop: Loop, law: Law, chain: Chain, task: Scenario, names: Sequence[str]) -> Excitation:
+    """Return the input of a scenario of the sampled loop in continuous time; `law` names its own references.
+
+    Raises ParameterError for a reference that no scenario has.
+    """
+    for name in (*law.references, *law.wanted):
+        must_be_known("references", name.removeprefix(REFERENCE), AT_HUB)
+    if task.tip_offset:
+        return _released(loop, task.tip_offset, names)
+    arm, rise, (angle, rate, moment) = loop.arm, chain.slew.rise_time, AT_HUB
+    times: tuple[float, ...] = (0.0,)
+    weights: tuple[float, ...] = (1.0,)
+    inputs = {angle if task.hub_angle[0] else rate: _power(1.0, 1)}
+    if task.name == "pulse":
+        times, weights, inputs = (0.0, task.busy_until), (1.0, -1.0), {ACTUATOR: _power(task.disturbance[0], 1)}
+    elif task.name == "slew":
+        a, of_rate = chain.slew.acceleration(arm.reach), _power(arm.rate_loss, 2)
+        times, weights = (0.0, rise / 2, rise), (a, -2 * a, a)
+        inputs = {ACTUATOR: lambda s: arm.turned_inertia / s + of_rate(s), angle: _power(1.0, 3), rate: _power(1.0, 2)}
+        inputs[moment] = _power(-arm.gauged_inertia * float(task.reading == "vibration"), 1)
+    found = {place: X for place, X in inputs.items() if place == ACTUATOR or place in law.references}
+    found |= {REFERENCE + name: _opposite(X) for name, X in inputs.items() if REFERENCE + name in law.wanted}
+    return Excitation(found, times, weights)
+
+
+def _power(coefficient: float, n: int) -> Transform:
+    """coefficient/s^n."""
+    return lambda s: coefficient / s**n
+
+
+def _opposite(X: Transform) -> Transform:
+    return lambda s: -X(s)
+
+
+def _released(loop: Loop, offset: float, names: Sequence[str]) -> Excitation:
+    """The first mode released: to the law its motion is a reference of the opposite sign."""
+    signals = tuple(dict.fromkeys(("tip_displacement", *loop.law.signals, *names)))
+    plant = sensed_plant(loop.arm, Chain(), signals, 1).unfiltered
+    first, amplitude = first_mode(plant, offset)
+    p = complex(plant.poles[first])
+
+    def motion(name: str) -> Transform:
+        r = complex(plant.residues[signals.index(name), first]) * amplitude
+        return lambda s: r / (s - p) + r.conjugate() / (s - p.conjugate())
+
+    inputs = {name: _opposite(motion(name)) for name in loop.law.signals}
+    return Excitation(inputs, poles=(p, p.conjugate()), free={name: motion(name) for name in names})
+
+
+def _times(response: TimeResponse | None, task: Scenario) -> Real:
+    """Times [s] of a record: the samples and times between them, which resolve the fastest mode that shows."""
+    T, n = task.period, task.t.size
+    finest = (n - 1) * T / LEAST_POINTS
+    if response is not None:
+        sizes = abs(response.amplitudes[:-1])
+        shows = (sizes > traces.VISIBLE * sizes.max(axis=1, keepdims=True)).any(axis=0)
+        fastest = response.z.imag[shows].max(initial=0.0)
+        finest = min(finest, 2 * math.pi / (traces.POINTS_A_PERIOD * max(fastest, LEAST_SIZE)))
+    steps = int(np.clip(math.ceil(T / finest), 1, min(MOST_BETWEEN, max(1, MOST_POINTS // n))))
+    k = np.arange((n - 1) * steps + 1)
+    return T * (k // steps + k % steps / steps)
+
+
+@dataclass
+class _Case:
+    """One scenario on an arm: the signals of hub and tip come first, their references are by name."""
+
+    arm: Arm
+    names: tuple[str, ...]
+    task: Scenario
+    t: Real = field(default_factory=lambda: np.empty(0))
+    reference: dict[str, Real] = field(default_factory=dict)
+
+    def continuous(self, response: TimeResponse) -> LoopResponse:
+        """The continuous-time loop."""
+        y, bound = response.at(self.t), response.remainder(self.t).max(axis=1).tolist()
+        peaks = [response.peak(name, self.t) for name in response.names]
+        at_peak = response.remainder(np.array([time for time, _ in peaks])).diagonal().tolist()
+        is_converged = all(left <= CONVERGED * abs(peak) for left, (_, peak) in zip(at_peak, peaks, strict=True))
+        certainty = f"{'converged' if is_converged else 'approximate'}, {response.poles.count} poles"
+        signals, known = dict(zip(response.names, y, strict=True)), zip(peaks, bound, at_peak, strict=True)
+        of = {name: self._figures(name, signals[name], *each) for name, each in zip(signals, known, strict=True)}
+        return self._of_loop(verdict_on(response.poles.loop).verdict, certainty, of, signals)
+
+    def sampled(self, law: AnyLaw, chain: Chain) -> LoopResponse:
+        """The sampled loop."""
+        steps, of = round(self.task.period / self.t[1]), {}
+        run, used = simulated(self.arm, law, chain, self.task, between=steps - 1, outputs=self.names)
+        signals = {name: traces.continuous(run, name)[1][: self.t.size] for name in self.names}
+        signals[TORQUE] = traces.held_at(run, run.torque, self.t[: signals[MOMENT].size])
+        word = "unstable" if run.stopped else sampled_verdict(self.arm, law, chain).word
+        for name, y in signals.items() if word != "unstable" else ():
+            at = int(abs(y).argmax())
+            of[name] = self._figures(name, y, (float(self.t[at]), float(y[at])))
+        is_converged = used.change is not None and used.change <= ENOUGH_CHANGE
+        certainty = f"{'converged' if is_converged else 'approximate'}, {used.modes} modes"
+        return self._of_loop(word, certainty, of, signals)
+
+    def _of_loop(
+        self, stability: str, certainty: str, of: Mapping[str, SignalFigures], signals: dict[str, Real]
+    ) -> LoopResponse:
+        """The figures of a loop; of an unstable one those of its signals are left out."""
+        parts = zip(("hub", "tip", "root_moment", "torque"), (*self.names[:3], TORQUE), strict=True)
+        of = {} if stability == "unstable" else of
+        return LoopResponse(
+            stability=stability, certainty=certainty, signals=signals, **{part: of.get(name) for part, name in parts}
+        )
+
+    def _figures(
+        self, name: str, y: Real, peak: tuple[float, float], bound: float | None = None, at_peak: float | None = None
+    ) -> SignalFigures:
+        """Figures of one signal at the times of the record."""
+        t, busy, reference = self.t, self.task.busy_until, self.reference.get(name)
+        final = 0.0 if name == MOMENT else float(y[LEFT_OF_RECORD * t >= (LEFT_OF_RECORD - 1) * t[-1]].mean())
+        away = abs(y - final)
+        scale = float(away.max()) if reference is None else abs(final)
+        settled = 1 + int(np.flatnonzero(away > SETTLED_SHARE * scale).max(initial=-1))
+        is_settled = not settled or LEFT_OF_RECORD * (t.size - 1 - settled) >= t.size - 1
+        is_step = is_settled and reference is not None
+        after = t >= busy * (1 - TIME_ROUNDING)
+        return SignalFigures(
+            signal=name, unit=unit_of(self.arm, name), peak=peak[1], peak_time=peak[0],
+            final_value=final if is_settled and name != MOMENT else None,
+            rise_time=_reached(t, y / final, 0.9) - _reached(t, y / final, 0.1) if is_step else None,
+            overshoot=Percent(max(0.0, float((y / final).max()) - 1)) if is_step else None,
+            settling_time=float(t[settled]) if is_settled else None,
+            steady_state_error=float(reference[-1]) - final if is_settled and reference is not None else None,
+            residual_rms=float(np.sqrt(np.mean((y - final)[after] ** 2))) if busy and after.any() else None,
+            remainder_bound=bound, remainder_at_peak=at_peak,
+        )  # fmt: skip
+
+
+def _reached(t: Real, share: Real, level: float) -> float:
+    """Time [s] at which a signal first reaches a level, by a line between two records."""
+    n = int((share >= level).argmax())
+    return float(np.interp(level, share[n - 1 : n + 1], t[n - 1 : n + 1])) if n else float(t[0])
