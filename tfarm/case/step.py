@@ -14,13 +14,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
 
 from tfarm.arm import AT_HUB, AnyLaw, Arm, Law, as_law, tracked
-from tfarm.arm.feedback import OUTPUT_OF
 from tfarm.arm.law import REFERENCE
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.dsp import Chain, traces
@@ -30,7 +29,7 @@ from tfarm.dsp.results import ENOUGH_CHANGE, simulated
 from tfarm.dsp.scenarios import PULSE_SHARE, TRIAL_SLEWS, Scenario, described, scenario, unit_step
 from tfarm.dsp.simulate import LEFT_OF_RECORD, MOST_BETWEEN, SETTLED_SHARE, first_mode
 from tfarm.dsp.verdict import sampled_verdict
-from tfarm.errors import ConvergenceError, ParameterError, must_be_known
+from tfarm.errors import ConvergenceError, must_be_known, require
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import Poles
 from tfarm.loop.stability import verdict_on
@@ -46,11 +45,11 @@ from tfarm.loop.time_response import (
 from tfarm.records import record
 from tfarm.response.signals import Controller, controller, placed
 from tfarm.schema import Column, Percent, Quantity, Table, across
-from tfarm.schema.html import as_html, with_symbols
+from tfarm.schema.html import as_html
 from tfarm.spectrum.table import first_frequency
 
 SAMPLED_NAMES = {"reference": "reference", "slew": "slew", "pulse": "pulse", "deflection": "decay"}  # by scenario
-MOMENT = AT_HUB[-1]
+MOMENT, UNSTABLE = AT_HUB[-1], "unstable"
 TIME_CONSTANTS = 8.0  # of the dominant pole: length of a record after its input, to 3e-4 of the final value
 LONGEST_SLEWS = 20.0  # times the slew: a record without a duration is no longer
 DOMINANT = 2.0  # times the first frequency: a pole farther away is not the dominant one
@@ -89,7 +88,16 @@ class LoopResponse:
     """Figures of one loop, not defined of an unstable one, and its signals by name, "torque" being the input."""
 
     stability: Annotated[str, Quantity("stability", help="stable, marginal or unstable")]
-    certainty: Annotated[str, Quantity("certainty", help="word of certainty, with the number of poles or modes")]
+    certainty: Annotated[str, Quantity("certainty",
+            help="converged where the remainder, or the change with twice the modes, is small")]  # fmt: skip
+    number: Annotated[
+        int,
+        Quantity(
+            "poles, or modes when sampled",
+            help="poles of the response, conjugates counted, or flexible modes",
+            key="number",
+        ),
+    ]
     hub: Annotated[SignalFigures | None, Quantity("hub", help="hub angle, or hub rate where that is the reference")]
     tip: Annotated[SignalFigures | None, Quantity("tip", help="tip displacement, or its velocity under a hub rate")]
     root_moment: Annotated[SignalFigures | None, Quantity("root moment", help="elastic moment at the root")]
@@ -115,7 +123,7 @@ class Step:
     period: Annotated[float, PERIOD]
     continuous: Annotated[LoopResponse | None, Quantity(help="continuous-time loop; null where it is not determined")]
     sampled: Annotated[LoopResponse | None, Quantity(help="sampled loop; null where it is not determined")]
-    notes: Annotated[tuple[str, ...], Quantity("notes", help="reasons of figures and loops that are not determined")]
+    not_determined: Annotated[tuple[str, ...], Quantity("not determined", help="loops that are not, and why")]
     t: Real
     names: tuple[str, ...]
     reference: dict[str, Real]
@@ -133,9 +141,13 @@ class Step:
         return {name: each for name, each in both.items() if each is not None}
 
     @property
-    def finding(self) -> str:
+    def finding(
+        self,
+    ) -> Annotated[str, Quantity("finding", help="stability of each loop; an unstable one has no figures")]:
         """Stability of each loop."""
-        return "; ".join(f"{name} {each.stability}" for name, each in self.loops.items())
+        grows = {UNSTABLE: " (the response grows, figures are not defined)"}
+        both = self.loops.items()
+        return "; ".join(f"{name} {each.stability}{grows.get(each.stability, '')}" for name, each in both)
 
     @property
     def table(self) -> Table:
@@ -153,7 +165,7 @@ class Step:
         return Table(columns=tuple(columns))
 
     def _repr_html_(self) -> str:
-        return as_html(self.table) + "".join(f"<p>{with_symbols(note)}</p>" for note in self.notes)
+        return as_html(self.table)
 
 
 def unit_of(arm: Arm, name: str) -> str:
@@ -195,31 +207,30 @@ def step(
     """
     must_be_known("scenario", scenario_name, SAMPLED_NAMES)
     chain, notes, is_step = chain_or_usual(chain), list[str](), scenario_name == "reference"
-    hub, law = followed(law) if is_step else ("hub_angle", law)
+    hub, law = followed(law) if is_step else (AT_HUB[0], law)
     arm, law = tracked(arm, law)
-    tip, full, response = "tip_displacement" if hub == "hub_angle" else f"velocity@{arm.length!r}", as_law(law), None
+    full, of_angle, response = as_law(law), hub == AT_HUB[0], None
+    tip = "tip_displacement" if of_angle else f"velocity@{arm.length!r}"
     poles = None if full.is_discrete else _known("continuous-time", notes, lambda: usual_poles(Loop(arm, full)))
     length = usual_duration(poles, chain, scenario_name) if duration is None else duration
     task = unit_step(hub, chain, length) if is_step else scenario(SAMPLED_NAMES[scenario_name], arm, chain, length)
-    case = _Case(arm, tuple(dict.fromkeys((hub, tip, MOMENT, *outputs))), task)
+    names = tuple(dict.fromkeys((hub, tip, MOMENT, *outputs)))
     if poles is not None:
-        response = time_response(poles, case.names, excitation(poles.loop, full, chain, task, case.names), length)
-    case.t = _times(response, task)
+        response = time_response(poles, names, excitation(poles.loop, full, chain, task, names), length)
+    t, reference = _times(response, task), {}
     if is_step or scenario_name == "slew":
-        angle = traces.reference_angle(task, case.t) if hub == "hub_angle" else np.full(case.t.size, task.hub_rate[0])
-        case.reference = {hub: angle, tip: arm.reach * angle}
-    continuous = None if response is None else case.continuous(response)
-    sampled = _known("sampled", notes, lambda: case.sampled(law, chain))
+        angle = traces.reference_angle(task, t) if of_angle else np.ones(t.size)
+        reference = {hub: angle, tip: arm.reach * angle}
+    record = _Record(arm, names, task.busy_until, t, reference)
+    continuous = None if response is None else record.continuous(response)
+    sampled = _known("sampled", notes, lambda: record.sampled(law, chain, task))
     if continuous is sampled is None:
         raise ConvergenceError("; ".join(notes), None, length)
-    found = Step(
+    return Step(
         arm=arm, law=law, scenario=scenario_name, scenario_in_words=described(task, arm, chain), duration=length,
-        period=task.period, continuous=continuous, sampled=sampled, notes=(), t=case.t,
-        names=(hub, tip, MOMENT, TORQUE), reference=case.reference, response=response,
+        period=task.period, continuous=continuous, sampled=sampled, not_determined=tuple(notes), t=t,
+        names=(*names[:3], TORQUE), reference=reference, response=response,
     )  # fmt: skip
-    grows = [f"{name} loop unstable: its response grows, figures are not defined"
-             for name, each in found.loops.items() if each.stability == "unstable"]  # fmt: skip
-    return replace(found, notes=(*notes, *grows))
 
 
 def _known(name: str, notes: list[str], find: Callable[[], Any]) -> Any:
@@ -237,27 +248,22 @@ def followed(law: AnyLaw) -> tuple[str, AnyLaw]:
     Raises ParameterError for a law that feeds back neither hub angle nor hub rate.
     """
     full = as_law(law)
-    gains = {} if full.gains is None else {OUTPUT_OF[name]: gain for name, gain in full.gains.by_name.items()}
-    for name in AT_HUB[:2]:
-        if REFERENCE + name in full.wanted:
-            return name, law
-        if name in full.signals and gains.get(name, 1.0):
-            return name, law if name in full.references else replace(full, references=(*full.references, name))
+    known = {*full.references, *(name.removeprefix(REFERENCE) for name in full.wanted)}
+    hub = next((name for name in AT_HUB[:2] if name in known.union(full.signals)), "")
     remedy = "the controller feeds back neither hub angle nor hub rate; choose slew, pulse or deflection"
-    raise ParameterError(key="scenario", value="reference", remedy=remedy)
+    require(hub, "scenario", "reference", remedy)
+    return hub, law if hub in known else replace(full, references=(*full.references, hub))
 
 
 def usual_duration(poles: Poles | None, chain: Chain, scenario_name: str) -> float:
     """Length [s] of a record: eight time constants of the dominant pole after the input, to two digits."""
-    rise = chain.slew.rise_time
-    if poles is None:
-        return TRIAL_SLEWS * rise
-    near = poles.moving[abs(poles.moving) <= DOMINANT * first_frequency(poles.loop.arm)]
-    slowest = float(abs(near.real).min(initial=math.inf))
+    rise, slowest = chain.slew.rise_time, 0.0
+    if poles is not None:
+        near = poles.moving[abs(poles.moving) <= DOMINANT * first_frequency(poles.loop.arm)]
+        slowest = float(abs(near.real).min(initial=math.inf))
     busy = {"slew": rise, "pulse": PULSE_SHARE * rise}.get(scenario_name, 0.0)
-    if not 0 < slowest < math.inf:
-        return TRIAL_SLEWS * rise
-    return float(f"{min(busy + TIME_CONSTANTS / slowest, LONGEST_SLEWS * rise):.2g}")
+    length = min(busy + TIME_CONSTANTS / slowest, LONGEST_SLEWS * rise) if slowest else TRIAL_SLEWS * rise
+    return float(f"{length:.2g}")
 
 
 def excitation(loop: Loop, law: Law, chain: Chain, task: Scenario, names: Sequence[str]) -> Excitation:
@@ -270,24 +276,25 @@ def excitation(loop: Loop, law: Law, chain: Chain, task: Scenario, names: Sequen
     if task.tip_offset:
         return _released(loop, task.tip_offset, names)
     arm, rise, (angle, rate, moment) = loop.arm, chain.slew.rise_time, AT_HUB
-    times: tuple[float, ...] = (0.0,)
-    weights: tuple[float, ...] = (1.0,)
-    inputs = {angle if task.hub_angle[0] else rate: _power(1.0, 1)}
     if task.name == "pulse":
-        times, weights, inputs = (0.0, task.busy_until), (1.0, -1.0), {ACTUATOR: _power(task.disturbance[0], 1)}
-    elif task.name == "slew":
-        a, of_rate = chain.slew.acceleration(arm.reach), _power(arm.rate_loss, 2)
-        times, weights = (0.0, rise / 2, rise), (a, -2 * a, a)
-        inputs = {ACTUATOR: lambda s: arm.turned_inertia / s + of_rate(s), angle: _power(1.0, 3), rate: _power(1.0, 2)}
-        inputs[moment] = _power(-arm.gauged_inertia * float(task.reading == "vibration"), 1)
-    found = {place: X for place, X in inputs.items() if place == ACTUATOR or place in law.references}
-    found |= {REFERENCE + name: _opposite(X) for name, X in inputs.items() if REFERENCE + name in law.wanted}
-    return Excitation(found, times, weights)
+        return Excitation({ACTUATOR: lambda s: task.disturbance[0] / s}, (0.0, task.busy_until), (1.0, -1.0))
+    if task.name == "reference":
+        followed_by = {angle if task.hub_angle[0] else rate: lambda s: 1 / s}
+        return Excitation(_through(law, followed_by))
+    a, reads = chain.slew.acceleration(arm.reach), task.reading == "vibration"
+    inputs: dict[str, Transform] = {
+        angle: lambda s: 1 / s**3,
+        rate: lambda s: 1 / s**2,
+        moment: lambda s: -arm.gauged_inertia * reads / s,
+    }
+    fed: Transform = lambda s: arm.turned_inertia / s + arm.rate_loss / s**2  # noqa: E731
+    return Excitation({ACTUATOR: fed} | _through(law, inputs), (0.0, rise / 2, rise), (a, -2 * a, a))
 
 
-def _power(coefficient: float, n: int) -> Transform:
-    """coefficient/s^n."""
-    return lambda s: coefficient / s**n
+def _through(law: Law, references: Mapping[str, Transform]) -> dict[str, Transform]:
+    """References as inputs of a law: of its signals, and with the opposite sign those of its columns."""
+    own = {name: X for name, X in references.items() if name in law.references}
+    return own | {REFERENCE + name: _opposite(X) for name, X in references.items() if REFERENCE + name in law.wanted}
 
 
 def _opposite(X: Transform) -> Transform:
@@ -306,7 +313,7 @@ def _released(loop: Loop, offset: float, names: Sequence[str]) -> Excitation:
         return lambda s: r / (s - p) + r.conjugate() / (s - p.conjugate())
 
     inputs = {name: _opposite(motion(name)) for name in loop.law.signals}
-    return Excitation(inputs, poles=(p, p.conjugate()), free={name: motion(name) for name in names})
+    return Excitation(inputs, poles=(p,), free={name: motion(name) for name in names})
 
 
 def _times(response: TimeResponse | None, task: Scenario) -> Real:
@@ -316,79 +323,79 @@ def _times(response: TimeResponse | None, task: Scenario) -> Real:
     if response is not None:
         sizes = abs(response.amplitudes[:-1])
         shows = (sizes > traces.VISIBLE * sizes.max(axis=1, keepdims=True)).any(axis=0)
-        fastest = response.z.imag[shows].max(initial=0.0)
-        finest = min(finest, 2 * math.pi / (traces.POINTS_A_PERIOD * max(fastest, LEAST_SIZE)))
+        fastest = max(response.z.imag[shows].max(initial=0.0), LEAST_SIZE)
+        finest = min(finest, 2 * math.pi / (traces.POINTS_A_PERIOD * fastest))
     steps = int(np.clip(math.ceil(T / finest), 1, min(MOST_BETWEEN, max(1, MOST_POINTS // n))))
     k = np.arange((n - 1) * steps + 1)
     return T * (k // steps + k % steps / steps)
 
 
-@dataclass
-class _Case:
-    """One scenario on an arm: the signals of hub and tip come first, their references are by name."""
+@dataclass(frozen=True)
+class _Record:
+    """The times [s] of a record, when its input is over, and its signals: those of hub and tip, the moment, others."""
 
     arm: Arm
     names: tuple[str, ...]
-    task: Scenario
-    t: Real = field(default_factory=lambda: np.empty(0))
-    reference: dict[str, Real] = field(default_factory=dict)
+    busy: float
+    t: Real
+    reference: Mapping[str, Real]
 
     def continuous(self, response: TimeResponse) -> LoopResponse:
         """The continuous-time loop."""
-        y, bound = response.at(self.t), response.remainder(self.t).max(axis=1).tolist()
-        peaks = [response.peak(name, self.t) for name in response.names]
-        at_peak = response.remainder(np.array([time for time, _ in peaks])).diagonal().tolist()
-        is_converged = all(left <= CONVERGED * abs(peak) for left, (_, peak) in zip(at_peak, peaks, strict=True))
-        certainty = f"{'converged' if is_converged else 'approximate'}, {response.poles.count} poles"
-        signals, known = dict(zip(response.names, y, strict=True)), zip(peaks, bound, at_peak, strict=True)
-        of = {name: self._figures(name, signals[name], *each) for name, each in zip(signals, known, strict=True)}
-        return self._of_loop(verdict_on(response.poles.loop).verdict, certainty, of, signals)
+        signals, bound = dict(zip(response.names, response.at(self.t), strict=True)), response.remainder(self.t)
+        of, is_converged = {}, True
+        for row, (name, y) in enumerate(signals.items()):
+            time, peak = response.peak(name, self.t)
+            left = float(response.remainder(np.array([time]))[row, 0])
+            of[name] = self._figures(name, y, time, peak, float(bound[row].max()), left)
+            is_converged &= left <= CONVERGED * abs(peak)
+        return self._loop(verdict_on(response.poles.loop).verdict, is_converged, response.poles.count, of, signals)
 
-    def sampled(self, law: AnyLaw, chain: Chain) -> LoopResponse:
+    def sampled(self, law: AnyLaw, chain: Chain, task: Scenario) -> LoopResponse:
         """The sampled loop."""
-        steps, of = round(self.task.period / self.t[1]), {}
-        run, used = simulated(self.arm, law, chain, self.task, between=steps - 1, outputs=self.names)
+        between = round(task.period / self.t[1]) - 1
+        run, used = simulated(self.arm, law, chain, task, between=between, outputs=self.names)
         signals = {name: traces.continuous(run, name)[1][: self.t.size] for name in self.names}
         signals[TORQUE] = traces.held_at(run, run.torque, self.t[: signals[MOMENT].size])
         word = "unstable" if run.stopped else sampled_verdict(self.arm, law, chain).word
-        for name, y in signals.items() if word != "unstable" else ():
+        of = {}
+        for name, y in signals.items() if word != UNSTABLE else ():
             at = int(abs(y).argmax())
-            of[name] = self._figures(name, y, (float(self.t[at]), float(y[at])))
+            of[name] = self._figures(name, y, float(self.t[at]), float(y[at]))
         is_converged = used.change is not None and used.change <= ENOUGH_CHANGE
-        certainty = f"{'converged' if is_converged else 'approximate'}, {used.modes} modes"
-        return self._of_loop(word, certainty, of, signals)
+        return self._loop(word, is_converged, used.modes, of, signals)
 
-    def _of_loop(
-        self, stability: str, certainty: str, of: Mapping[str, SignalFigures], signals: dict[str, Real]
+    def _loop(
+        self, stability: str, is_converged: bool, number: int, of: Mapping[str, Any], signals: dict[str, Real]
     ) -> LoopResponse:
         """The figures of a loop; of an unstable one those of its signals are left out."""
-        parts = zip(("hub", "tip", "root_moment", "torque"), (*self.names[:3], TORQUE), strict=True)
-        of = {} if stability == "unstable" else of
+        hub, tip, moment, torque = (None if stability == UNSTABLE else of[name] for name in (*self.names[:3], TORQUE))
         return LoopResponse(
-            stability=stability, certainty=certainty, signals=signals, **{part: of.get(name) for part, name in parts}
-        )
+            stability=stability, certainty="converged" if is_converged else "approximate", number=number,
+            hub=hub, tip=tip, root_moment=moment, torque=torque, signals=signals,
+        )  # fmt: skip
 
     def _figures(
-        self, name: str, y: Real, peak: tuple[float, float], bound: float | None = None, at_peak: float | None = None
+        self, name: str, y: Real, peak_time: float, peak: float, bound: float | None = None, left: float | None = None
     ) -> SignalFigures:
         """Figures of one signal at the times of the record."""
-        t, busy, reference = self.t, self.task.busy_until, self.reference.get(name)
+        t, reference = self.t, self.reference.get(name)
         final = 0.0 if name == MOMENT else float(y[LEFT_OF_RECORD * t >= (LEFT_OF_RECORD - 1) * t[-1]].mean())
         away = abs(y - final)
         scale = float(away.max()) if reference is None else abs(final)
         settled = 1 + int(np.flatnonzero(away > SETTLED_SHARE * scale).max(initial=-1))
         is_settled = not settled or LEFT_OF_RECORD * (t.size - 1 - settled) >= t.size - 1
-        is_step = is_settled and reference is not None
-        after = t >= busy * (1 - TIME_ROUNDING)
+        share = y / final if is_settled and reference is not None and final else None
+        after = t >= self.busy * (1 - TIME_ROUNDING)
         return SignalFigures(
-            signal=name, unit=unit_of(self.arm, name), peak=peak[1], peak_time=peak[0],
+            signal=name, unit=unit_of(self.arm, name), peak=peak, peak_time=peak_time,
             final_value=final if is_settled and name != MOMENT else None,
-            rise_time=_reached(t, y / final, 0.9) - _reached(t, y / final, 0.1) if is_step else None,
-            overshoot=Percent(max(0.0, float((y / final).max()) - 1)) if is_step else None,
+            rise_time=None if share is None else _reached(t, share, 0.9) - _reached(t, share, 0.1),
+            overshoot=None if share is None else Percent(max(0.0, float(share.max()) - 1)),
             settling_time=float(t[settled]) if is_settled else None,
-            steady_state_error=float(reference[-1]) - final if is_settled and reference is not None else None,
-            residual_rms=float(np.sqrt(np.mean((y - final)[after] ** 2))) if busy and after.any() else None,
-            remainder_bound=bound, remainder_at_peak=at_peak,
+            steady_state_error=None if share is None or reference is None else float(reference[-1]) - final,
+            residual_rms=float(np.sqrt(np.mean((y - final)[after] ** 2))) if self.busy and after.any() else None,
+            remainder_bound=bound, remainder_at_peak=left,
         )  # fmt: skip
 
 

@@ -19,7 +19,6 @@ proof.  Shear modes above the shear cut-off of a damped arm are not in it.
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
@@ -38,8 +37,9 @@ USUAL_COUNT = 80  # flexible modes below the top of the box
 CLOSE, MOST_CLOSE = 3.0, 0.1  # poles closer than 3/T are one circle, but no farther apart than 0.1 of the first mode
 SLOW_RADIUS = 2.0  # over T: of a circle around s = 0, on which e^{s T} is moderate
 POLE_RADIUS = 0.25  # of the way to the next pole: radius of the circle of one pole
-POLE_NODES, FEWEST_NODES, MOST_NODES, NODE_LOG = 32, 48, 512, 40.0  # of circles; e^-40 is below the rounding
+FEWEST_NODES, MOST_NODES, NODE_LOG = 32, 512, 40.0  # of circles; e^-40 is below the rounding
 KNOWN_RESIDUE = 1e-6  # of the largest value on a circle times its radius: smaller ones do not correct a pole
+ON_AXIS = 1e-9  # of the least distance of two circles: by so little a centre is off the real axis
 LEAST_FALL, MOST_FALL = 0.5, 0.9  # of the sum of residues from one octave of frequency to the next
 IDENTITY_FACTOR = 2.0  # on the sum of the omitted residues at t = 0+, whose signs differ
 MOST_GROWTH = 500.0  # exponent of the fastest growing pole at the end of a record
@@ -50,7 +50,7 @@ Transform = Callable[[Complex], Complex]
 
 @dataclass(frozen=True)
 class Excitation:
-    """Inputs sum_i w_i e^{-s t_i} X(s) of a loop: `inputs` are X by place, `poles` those of all X [1/s].
+    """Inputs sum_i w_i e^{-s t_i} X(s) of a loop: `inputs` are X by place, `poles` those of all X [1/s] but 0.
 
     A place is `ACTUATOR`, a signal whose reference it is, or a column of references of the law (with the minus of its
     sign).  `free` is a motion that is added to outputs.
@@ -63,17 +63,13 @@ class Excitation:
     free: Mapping[str, Transform] = field(default_factory=dict)
 
 
-class Term(NamedTuple):
-    """Exponents z (m,) and amplitudes (signals, m) of one pole or circle, for Re of the sum."""
-
-    z: Complex
-    amplitudes: Complex
-
-
 @dataclass(frozen=True)
 @record
 class TimeResponse:
-    """Signals over time by name, "torque" being the input: `at`, and the bound on the `remainder` of omitted poles."""
+    """Signals over time by name, "torque" being the input: h is Re of the sum of `amplitudes` (signals, m) e^{z t}.
+
+    `initial` is h(0+) (signals,).
+    """
 
     names: tuple[str, ...]
     excitation: Excitation
@@ -84,46 +80,48 @@ class TimeResponse:
 
     def at(self, t: Real) -> Real:
         """Return the signals (signals, n) at times t [s]."""
-        t = np.asarray(t, dtype=float)
-        found = np.zeros((len(self.names), t.size))
-        for start, weight in zip(self.excitation.times, self.excitation.weights, strict=True):
-            later = t >= start
-            found[:, later] += weight * (self.amplitudes @ np.exp(np.outer(self.z, t[later] - start))).real
-        return found
+        return self._summed(t, lambda tau: (self.amplitudes @ np.exp(np.outer(self.z, tau))).real, 1.0)
 
     def remainder(self, t: Real) -> Real:
         """Return the bound (signals, n) on the contribution of the poles outside the box at times t [s]."""
-        t, (left, _, _, top) = np.asarray(t, dtype=float), self.poles.box
+        left, _, _, top = self.poles.box
         last, before = ((self.z.imag > top / 2 ** (n + 1)) & (self.z.imag <= top / 2**n) for n in (0, 1))
         sizes = abs(self.amplitudes)
-        falls = sizes[:, last].sum(axis=1) / np.maximum(sizes[:, before].sum(axis=1), LEAST_SIZE)
-        fall = np.clip(falls, LEAST_FALL, MOST_FALL)[:, None]
-        slowest = max(left, self.z[last].real.max(initial=left))
+        fall = sizes[:, last].sum(axis=1) / np.maximum(sizes[:, before].sum(axis=1), LEAST_SIZE)
+        fall = np.clip(fall, LEAST_FALL, MOST_FALL)[:, None]
+        slowest = self.z[last].real.max(initial=left)
         omitted = IDENTITY_FACTOR * abs(self.amplitudes.sum(axis=1).real - self.initial)[:, None]
+
+        def bound(tau: Real) -> Real:
+            above = fall / (1 - fall) * (sizes[:, last] @ np.exp(np.outer(self.z[last].real, tau)))
+            return np.asarray(np.maximum(above, omitted * np.exp(slowest * tau)))
+
+        return self._summed(t, bound, -1.0)
+
+    def _summed(self, t: Real, h: Callable[[Real], Real], sign: float) -> Real:
+        """Sum of w_i h(t - t_i); of |w_i| h where the sign is -1."""
         found = np.zeros((len(self.names), t.size))
         for start, weight in zip(self.excitation.times, self.excitation.weights, strict=True):
-            tau = t[t >= start] - start
-            above = fall / (1 - fall) * (sizes[:, last] @ np.exp(np.outer(self.z[last].real, tau)))
-            found[:, t >= start] += abs(weight) * np.maximum(above, omitted * np.exp(slowest * tau))
+            found[:, t >= start] += (weight if sign > 0 else abs(weight)) * h(t[t >= start] - start)
         return found
 
     def peak(self, name: str, t: Real) -> tuple[float, float]:
         """Return time [s] and value of a signal where it is largest in size, between the times around that of `t`."""
         row = self.names.index(name)
         for _ in range(ZOOMS):
-            y = abs(self.at(t)[row])
-            n = int(y.argmax())
+            n = int(abs(self.at(t)[row]).argmax())
             t = np.linspace(t[max(n - 1, 0)], t[min(n + 1, t.size - 1)], ZOOM_POINTS)
-        at = t[[int(abs(self.at(t)[row]).argmax())]]
-        return float(at[0]), float(self.at(at)[row, 0])
+        y = self.at(t)[row]
+        n = int(abs(y).argmax())
+        return float(t[n]), float(y[n])
 
 
-def usual_poles(loop: Loop, count: int = USUAL_COUNT) -> Poles:
-    """Return the poles of a response: those below a frequency with `count` flexible modes, complete in their box.
+def usual_poles(loop: Loop) -> Poles:
+    """Return the poles of a response: those below a frequency with 80 flexible modes, complete in their box.
 
     Raises ConvergenceError where they are not complete.
     """
-    return poles_below(loop, band_of(loop.arm, count))
+    return poles_below(loop, band_of(loop.arm, USUAL_COUNT))
 
 
 def time_response(poles: Poles, names: tuple[str, ...], excitation: Excitation, duration: float) -> TimeResponse:
@@ -131,7 +129,6 @@ def time_response(poles: Poles, names: tuple[str, ...], excitation: Excitation, 
 
     Raises ParameterError for a loop that grows beyond a double.
     """
-    loop = poles.loop
     growth = float(poles.values.real.max(initial=0.0)) * duration
     remedy = (
         f"the loop is unstable and grows by e^{growth:.0f}; at most {MOST_GROWTH * duration / max(growth, 1):.3g} s"
@@ -139,79 +136,61 @@ def time_response(poles: Poles, names: tuple[str, ...], excitation: Excitation, 
     require(growth < MOST_GROWTH, "duration", duration, remedy)
 
     def transform(s: Complex) -> Complex:
-        return _transform(loop, names, excitation, s)
+        return transformed(poles.loop, names, excitation, s)
 
-    terms = list(_terms(poles, excitation, transform, duration))
-    far = np.array([FAR_RIGHT[1] * first_frequency(loop.arm)], complex)
-    return TimeResponse(
-        names=(*names, TORQUE),
-        excitation=excitation,
-        poles=poles,
-        z=np.concatenate([each.z for each in terms]),
-        amplitudes=np.hstack([each.amplitudes for each in terms]),
-        initial=(transform(far) * far).real[:, 0],
-    )
+    z, amplitudes = zip(*_terms(poles, excitation, transform, duration), strict=True)
+    far = np.array([FAR_RIGHT[1] * first_frequency(poles.loop.arm)], complex)
+    initial = (transform(far) * far).real[:, 0]
+    return TimeResponse((*names, TORQUE), excitation, poles, np.concatenate(z), np.hstack(amplitudes), initial)
 
 
-def _transform(loop: Loop, names: tuple[str, ...], excitation: Excitation, s: Complex) -> Complex:
-    """H (signals and torque, n) at s (n,)."""
+def transformed(loop: Loop, names: tuple[str, ...], excitation: Excitation, s: Complex) -> Complex:
+    """Return H (signals and torque, n) at s (n,)."""
     law, of = loop.law, Signals(loop.arm, tuple(dict.fromkeys((*loop.law.signals, *names))))
     drive, numerators, _ = of.parts(s)
-    row = dict(zip(of.names, numerators, strict=True))
-    columns = (*law.signals, *law.wanted)
+    row, columns = dict(zip(of.names, numerators, strict=True)), (*law.signals, *law.wanted)
     shares, whole = law.shares(s, columns)
     entries = dict(zip(columns, np.exp(-s * law.delay) * shares.sum(axis=0), strict=True))
     D = drive * whole + sum(entries[name] * row[name] for name in law.signals)
     driven = sum(X(s) * (whole if place == ACTUATOR else entries[place]) for place, X in excitation.inputs.items())
     found = np.array([*(row[name] for name in names), drive]) * driven / D
     for name, motion in excitation.free.items():
-        if name in names:
-            found[names.index(name)] += motion(s)
+        found[names.index(name)] += motion(s)
     return found
 
 
-def _terms(poles: Poles, excitation: Excitation, transform: Transform, duration: float) -> Iterator[Term]:
-    """The terms of each pole and circle with Im >= 0, twice those with a conjugate."""
-    k = poles.loop.k
-    upper = np.r_[poles.values, np.array(excitation.poles, complex)]
-    every = np.unique(np.r_[0, upper, upper.conj()])
-    apart = abs(every[:, None] - every)
+def _terms(
+    poles: Poles, excitation: Excitation, transform: Transform, duration: float
+) -> Iterator[tuple[Complex, Complex]]:
+    """Exponents (m,) and amplitudes (signals, m) of each pole or circle with Im >= 0, twice those with a conjugate."""
+    known = np.r_[poles.values, np.array(excitation.poles, complex)]
+    every = np.unique(np.r_[0, known, known.conj()])
     reach = min(CLOSE / duration, MOST_CLOSE * first_frequency(poles.loop.arm))
-    _, label = connected_components(apart <= reach)
+    _, label = connected_components(abs(every[:, None] - every) <= reach)
     left, _, _, top = poles.box
     for n in range(label.max() + 1):
         own = every[label == n]
-        centre = complex(own.mean())
-        is_real = abs(centre.imag) <= 1e-12 * abs(centre) or not own.imag.any()
-        if centre.imag < 0 and not is_real:
-            continue
-        centre = complex(centre.real, 0.0 if is_real else centre.imag)
-        extent = float(abs(own - centre).max())
-        edges = [abs(p - centre) for p in (*every[label != n].tolist(), *k.singular)]
-        edges += [abs(edge) for edge in (centre.real - left, top - centre.imag) if edge]
-        room, share = min(edges), 1.0 if is_real else 2.0
-        if own.size == 1 and centre:
-            yield _pole(centre, POLE_RADIUS * room, share, transform)
-        else:
-            yield _circle(centre, extent, room, share, transform, duration)
+        c = complex(own.mean())
+        edges = [*poles.loop.k.singular, complex(left, c.imag), complex(c.real, top)]
+        room = float(abs(np.r_[every[label != n], edges] - c).min())
+        if c.imag >= -ON_AXIS * reach:
+            z, amplitudes = _circle(own, c, room, transform, duration)
+            yield z, amplitudes * (2.0 if c.imag > ON_AXIS * reach else 1.0)
 
 
-def _pole(p: complex, radius: float, share: float, transform: Transform) -> Term:
-    """A simple pole: its residue is the first moment of H on the circle, and the second one corrects its place."""
-    arrow = radius * np.exp(2j * np.pi * np.arange(POLE_NODES) / POLE_NODES)
-    values = transform(p + arrow) * arrow
-    residues, moved = values.mean(axis=1), (values * arrow).mean(axis=1)
-    known = abs(residues) / np.maximum(abs(values).max(axis=1), LEAST_SIZE)
+def _circle(own: Complex, c: complex, room: float, transform: Transform, duration: float) -> tuple[Complex, Complex]:
+    """The nodes of a circle around poles; of a simple one its residue, with its place from the next moment of H."""
+    is_simple, extent, radius = own.size == 1 and c != 0, float(abs(own - c).max()), POLE_RADIUS * room
+    if not is_simple:
+        radius = min(math.sqrt(extent * room) or radius, max(extent / POLE_RADIUS, SLOW_RADIUS / duration))
+    nodes = int(np.clip(-NODE_LOG / math.log(max(extent, radius**2 / room) / radius), FEWEST_NODES, MOST_NODES))
+    arrow = radius * np.exp(2j * np.pi * (np.arange(nodes) + 0.5) / nodes)
+    values = transform(c + arrow) * arrow / nodes
+    if not is_simple:
+        return c + arrow, values
+    residues = values.sum(axis=1)
+    known = abs(residues) / np.maximum(abs(values).max(axis=1) * nodes, LEAST_SIZE)
     best = int(known.argmax())
     if known[best] > KNOWN_RESIDUE:
-        p += moved[best] / residues[best]
-    return Term(np.array([p]), share * residues[:, None])
-
-
-def _circle(c: complex, extent: float, room: float, share: float, transform: Transform, duration: float) -> Term:
-    """Several poles, or one of higher order: the nodes of a circle around all of them."""
-    radius = min(math.sqrt(extent * room) or POLE_RADIUS * room, max(extent / POLE_RADIUS, SLOW_RADIUS / duration))
-    ratio = max(extent / radius, radius / room)
-    nodes = int(np.clip(NODE_LOG / -math.log(ratio), FEWEST_NODES, MOST_NODES))
-    arrow = radius * np.exp(2j * np.pi * (np.arange(nodes) + 0.5) / nodes)
-    return Term(c + arrow, share * transform(c + arrow) * arrow / nodes)
+        c += (values[best] @ arrow) / residues[best]
+    return np.array([c]), residues[:, None]

@@ -7,7 +7,7 @@ In the look of the report's pages, whose pictures these are.  This is the only r
 """
 
 from tfarm.plots.frequency import bode, measured, nyquist
-from tfarm.plots.motion import modes, simulation, sketch, slew, step, tuned_gain
+from tfarm.plots.motion import modes, sketch, slew, step, tuned_gain
 from tfarm.plots.regions import comparison, gain_map, overlay
 from tfarm.plots.roots import locus
 
@@ -20,7 +20,6 @@ __all__ = [
     "modes",
     "nyquist",
     "overlay",
-    "simulation",
     "sketch",
     "slew",
     "step",

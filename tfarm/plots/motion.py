@@ -36,6 +36,7 @@ from .style import (
     BLUE,
     COLOURS,
     FAINT,
+    FIGURES,
     GREEN,
     GREY,
     INK,
@@ -248,10 +249,12 @@ def _name_signals(arm: Arm, names: Sequence[str], ax: Sequence[Axes]) -> None:
         one.set(xlabel=TIME, ylabel=label)
 
 
-def _mark(ax: Axes, t: Real, y: Real, colour: str, mark: str) -> None:
-    """Marks at the samples where these are few."""
-    if t.size <= FEW_SAMPLES:
-        ax.plot(t, y, mark, color=colour, ms=3.0, mew=1.0)
+def _draw_signal(ax: Axes, t: Real, y: Real, looks: tuple[str, str], every: int = 0, **how: Any) -> None:
+    """A signal at even times; with `every` that of a sampled loop, with marks at the samples where these are few."""
+    colour, mark = looks
+    _draw_curve(traces.curve(t, y), ax, colour, ls=DASHED if every else "-", **how)
+    if every and t.size <= FEW_SAMPLES * every:
+        ax.plot(t[::every], y[::every], mark, color=colour, ms=3.0, mew=1.0)
 
 
 @picture(
@@ -273,11 +276,8 @@ def step(found: Step, *, ax: Sequence[Axes]) -> None:
             one.axhspan(*ends, color=FAINT, lw=0, alpha=0.6, zorder=0)
             one.plot(t, reference[: t.size], color=GREY, lw=0.8, label="reference, 5 %")
         for loop, each in found.loops.items():
-            y, (colour, mark) = each.signals[name][: t.size], OF_STABILITY[each.stability]
-            line = "-" if each is found.continuous else DASHED
-            _draw_curve(traces.curve(t[: y.size], y), one, colour, ls=line, label=f"{loop}, {each.stability}")
-            if each is found.sampled:
-                _mark(one, t[: y.size : every], y[::every], colour, mark)
+            y, looks, label = each.signals[name][: t.size], OF_STABILITY[each.stability], f"{loop}, {each.stability}"
+            _draw_signal(one, t[: y.size], y, looks, every if each is found.sampled else 0, label=label)
         stable = [each.signals[name] for each in found.loops.values() if each.hub]
         if stable and len(stable) < len(found.loops):
             low, high = stable[0].min(), stable[0].max()
@@ -291,21 +291,7 @@ def _shown_until(found: Step) -> float:
     return min(max(ends, default=math.inf), float(found.t[-1]))
 
 
-@picture(
-    (Run, "tfarm.dsp.results.simulated_run returns"), size=(9.0, 8.4), rows=STEP_ROWS,
-    title=lambda run: f"{run.arm.name}: {run.scenario_in_words}",
-)  # fmt: skip
-def simulation(run: Run, *, ax: Sequence[Axes]) -> None:
-    """A sampled run in four axes, given or new; these: hub angle, tip displacement, root moment [N m] and input."""
-    names, found = ("hub_angle", "tip_displacement", "root_moment"), run.simulation
-    colour, mark = OF_STABILITY["unstable" if found.stopped else "stable"]
-    _name_signals(run.arm, (*names, "torque"), ax)
-    for one, name in zip(ax, names, strict=False):
-        _draw_curve(traces.curve_of(found, name), one, colour, ls=DASHED)
-        _mark(one, found.t, found.at_samples.signal(name), colour, mark)
-    _draw_curve(traces.curve(found.t, found.torque), ax[-1], colour, drawstyle="steps-post")
-    if found.scenario.name == "slew":
-        ax[0].plot(found.scenario.t, found.scenario.hub_angle, color=GREY, lw=0.8, label="reference")
+FIGURES[Run] = lambda run: slew.figure(run.arm, run.simulation, run.scenario_in_words)
 
 
 def _measured_rows(each: Mapping[str, RunComparison]) -> int:
