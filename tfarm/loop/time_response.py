@@ -35,7 +35,8 @@ from .poles import Poles, poles_below
 ACTUATOR, TORQUE = "actuator", "torque"  # the input of the arm as a place of excitation, and as a signal
 USUAL_COUNT = 80  # flexible modes below the top of the box
 CLOSE, MOST_CLOSE = 3.0, 0.1  # poles closer than 3/T are one circle, but no farther apart than 0.1 of the first mode
-SLOW_RADIUS = 2.0  # over T: of a circle around s = 0, on which e^{s T} is moderate
+SLOW_RADIUS = 2.0  # over T: of a circle around s = 0, on which e^{s T} is moderate; or of the extent of its poles
+NODES_OF_GROWTH = 4.0  # times radius and T: nodes more on a circle with e^{s T}, whose powers of s T would alias
 POLE_RADIUS = 0.25  # of the way to the next pole: radius of the circle of one pole
 FEWEST_NODES, MOST_NODES, NODE_LOG = 32, 512, 40.0  # of circles; e^-40 is below the rounding
 KNOWN_RESIDUE = 1e-6  # of the largest value on a circle times its radius: smaller ones do not correct a pole
@@ -116,12 +117,12 @@ class TimeResponse:
         return float(t[n]), float(y[n])
 
 
-def usual_poles(loop: Loop) -> Poles:
-    """Return the poles of a response: those below a frequency with 80 flexible modes, complete in their box.
+def usual_poles(loop: Loop, count: int = USUAL_COUNT) -> Poles:
+    """Return the poles of a response: those below a frequency with `count` flexible modes, complete in their box.
 
     Raises ConvergenceError where they are not complete.
     """
-    return poles_below(loop, band_of(loop.arm, USUAL_COUNT))
+    return poles_below(loop, band_of(loop.arm, count))
 
 
 def time_response(poles: Poles, names: tuple[str, ...], excitation: Excitation, duration: float) -> TimeResponse:
@@ -181,9 +182,12 @@ def _terms(
 def _circle(own: Complex, c: complex, room: float, transform: Transform, duration: float) -> tuple[Complex, Complex]:
     """The nodes of a circle around poles; of a simple one its residue, with its place from the next moment of H."""
     is_simple, extent, radius = own.size == 1 and c != 0, float(abs(own - c).max()), POLE_RADIUS * room
+    more = 0.0 if is_simple else NODES_OF_GROWTH * duration
     if not is_simple:
-        radius = min(math.sqrt(extent * room) or radius, max(extent / POLE_RADIUS, SLOW_RADIUS / duration))
-    nodes = int(np.clip(-NODE_LOG / math.log(max(extent, radius**2 / room) / radius), FEWEST_NODES, MOST_NODES))
+        radius = min(math.sqrt(extent * room) or radius, max(SLOW_RADIUS * extent, SLOW_RADIUS / duration))
+    nodes = int(
+        np.clip(-NODE_LOG / math.log(max(extent, radius**2 / room) / radius), FEWEST_NODES, MOST_NODES) + more * radius
+    )
     arrow = radius * np.exp(2j * np.pi * (np.arange(nodes) + 0.5) / nodes)
     values = transform(c + arrow) * arrow / nodes
     if not is_simple:
