@@ -40,6 +40,8 @@ DRAWN = {
         *("--points", "20", "--branches", "2"),
     ],
     "map": ["map", LAB, "--points", "21"],
+    "simulate": ["simulate", LAB, "--duration", "2", "--modes", "8"],
+    "step": ["step", LAB, "--scenario", "deflection", "--duration", "1"],
     "map of a law": [
         *("map", LAB, "--law", "LAW", "--points", "8"),
         *("--vary", "hub_angle.num.0=0,20", "--vary", "delay=0,0.02"),

@@ -49,9 +49,7 @@ def exact_signals(arm, law, excitation, s):
         C * np.exp(-s * law.delay) * tfarm.transfer(arm, name)(s)
         for name, C in zip(law.signals, law.values(s), strict=True)
     )
-    pulses = sum(
-        w * np.exp(-s * t) for t, w in zip(excitation.times, excitation.weights, strict=True)
-    )
+    pulses = sum(w * np.exp(-s * t) for t, w in zip(excitation.times, excitation.weights, strict=True))
     driven = excitation.inputs[ACTUATOR](s) * pulses / (1 + L)
     return np.array([tfarm.transfer(arm, name)(s) * driven for name in NAMES])
 
@@ -133,7 +131,9 @@ def test_without_feedback_it_is_the_modal_sum(arm, name):
     p, r = model.eigenvalues.ravel(), model.residues[0].ravel()
     p, r = np.r_[p, model.single], np.r_[r, model.single_residues[0]]
     double, single = model.rigid[0]
-    expected = double * t**2 / 2 + single * t + (r / p * (np.exp(np.outer(t, p)) - 1)).sum(axis=1).real + model.static[0]
+    expected = (
+        double * t**2 / 2 + single * t + (r / p * (np.exp(np.outer(t, p)) - 1)).sum(axis=1).real + model.static[0]
+    )
     assert np.abs(found.at(t)[0] - expected).max() <= 2e-5 * abs(expected).max()
 
 

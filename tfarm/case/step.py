@@ -277,7 +277,8 @@ def excitation(loop: Loop, law: Law, chain: Chain, task: Scenario, names: Sequen
         return _released(loop, task.tip_offset, names)
     arm, rise, (angle, rate, moment) = loop.arm, chain.slew.rise_time, AT_HUB
     if task.name == "pulse":
-        return Excitation({ACTUATOR: lambda s: task.disturbance[0] / s}, (0.0, task.busy_until), (1.0, -1.0))
+        size, ends = task.disturbance[0], ((0.0, task.busy_until), (1.0, -1.0))  # which is no torque of the motor
+        return Excitation({ACTUATOR: lambda s: size / s}, *ends, free={TORQUE: lambda s: -size / s})
     if task.name == "reference":
         followed_by = {angle if task.hub_angle[0] else rate: lambda s: 1 / s}
         return Excitation(_through(law, followed_by))

@@ -156,7 +156,7 @@ def transformed(loop: Loop, names: tuple[str, ...], excitation: Excitation, s: C
     driven = sum(X(s) * (whole if place == ACTUATOR else entries[place]) for place, X in excitation.inputs.items())
     found = np.array([*(row[name] for name in names), drive]) * driven / D
     for name, motion in excitation.free.items():
-        found[names.index(name)] += motion(s)
+        found[(*names, TORQUE).index(name)] += motion(s)
     return found
 
 
