@@ -13,9 +13,9 @@ tenth of the record; rise time from 10 to 90 % of it; overshoot beyond it, over 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -26,10 +26,10 @@ from tfarm.dsp import Chain, traces
 from tfarm.dsp.chain import PERIOD, TIME_ROUNDING, chain_or_usual
 from tfarm.dsp.plant import sensed_plant
 from tfarm.dsp.results import ENOUGH_CHANGE, simulated
-from tfarm.dsp.scenarios import PULSE_SHARE, TRIAL_SLEWS, Scenario, described, scenario, unit_step
+from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, described, scenario, unit_step
 from tfarm.dsp.simulate import LEFT_OF_RECORD, MOST_BETWEEN, SETTLED_SHARE, first_mode
 from tfarm.dsp.verdict import sampled_verdict
-from tfarm.errors import ConvergenceError, must_be_known, require
+from tfarm.errors import must_be_known, require
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import Poles
 from tfarm.loop.stability import verdict_on
@@ -49,11 +49,13 @@ from tfarm.schema.html import as_html
 from tfarm.spectrum.table import first_frequency
 
 SAMPLED_NAMES = {"reference": "reference", "slew": "slew", "pulse": "pulse", "deflection": "decay"}  # by scenario
-MOMENT, UNSTABLE = AT_HUB[-1], "unstable"
+MOMENT, UNSTABLE, GROWS = AT_HUB[-1], "unstable", " (the response grows, its figures are not defined)"
+PARTS = ("hub", "tip", "root_moment", "torque")
 TIME_CONSTANTS = 8.0  # of the dominant pole: length of a record after its input, to 3e-4 of the final value
 LONGEST_SLEWS = 20.0  # times the slew: a record without a duration is no longer
 DOMINANT = 2.0  # times the first frequency: a pole farther away is not the dominant one
 LEAST_POINTS, MOST_POINTS = 2000, 20_000  # of a record
+Peak = tuple[float, float, float | None]  # time [s], value, and bound on the remainder there
 CONVERGED = 1e-9  # of the peak of each signal: bound on the remainder there of a converged response
 
 
@@ -77,9 +79,7 @@ class SignalFigures:
             help="reference less final value")]  # fmt: skip
     residual_rms: Annotated[float | None, Quantity("residual vibration (rms)", digits=4, unit_of="unit",
             help="rms about the final value once the slew or the pulse is over")]  # fmt: skip
-    remainder_bound: Annotated[float | None, Quantity(
-            help="largest contribution of the omitted poles at any time of the record, as measured")]  # fmt: skip
-    remainder_at_peak: Annotated[float | None, Quantity("remainder bound at the peak", digits=2, unit_of="unit",
+    remainder_bound: Annotated[float | None, Quantity("remainder bound at the peak", digits=2, unit_of="unit",
             help="contribution of the omitted poles at the peak at most, as measured")]  # fmt: skip
 
 
@@ -89,20 +89,15 @@ class LoopResponse:
 
     stability: Annotated[str, Quantity("stability", help="stable, marginal or unstable")]
     certainty: Annotated[str, Quantity("certainty",
-            help="converged where the remainder, or the change with twice the modes, is small")]  # fmt: skip
-    number: Annotated[
-        int,
-        Quantity(
-            "poles, or modes when sampled",
-            help="poles of the response, conjugates counted, or flexible modes",
-            key="number",
-        ),
-    ]
-    hub: Annotated[SignalFigures | None, Quantity("hub", help="hub angle, or hub rate where that is the reference")]
-    tip: Annotated[SignalFigures | None, Quantity("tip", help="tip displacement, or its velocity under a hub rate")]
-    root_moment: Annotated[SignalFigures | None, Quantity("root moment", help="elastic moment at the root")]
-    torque: Annotated[SignalFigures | None, Quantity("torque", help="input of the arm: torque, voltage or current")]
+            help="by the remainder of the poles or by twice the modes, with their number")]  # fmt: skip
     signals: dict[str, Real]
+    hub: Annotated[SignalFigures | None, Quantity("hub",
+            help="hub angle, or hub rate where that is the reference")] = None  # fmt: skip
+    tip: Annotated[SignalFigures | None, Quantity("tip",
+            help="tip displacement, or its velocity under a hub rate")] = None  # fmt: skip
+    root_moment: Annotated[SignalFigures | None, Quantity("root moment", help="elastic moment at the root")] = None
+    torque: Annotated[SignalFigures | None, Quantity("torque",
+            help="input of the arm by the motor: torque, voltage or current")] = None  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,44 +105,34 @@ class LoopResponse:
 class Step:
     """Time responses of an arm under a controller, continuous-time and sampled, at the times `t` [s].
 
-    A loop that is not determined is None, that of a law in z in continuous time too; the signals of a sampled loop end
-    where it was stopped.  `names` are the signals of hub and tip, root moment and torque, `reference` that of hub and
-    tip, `response` is the continuous-time response at any time.
+    A law in z has no continuous-time loop; the signals of a sampled loop end where it was stopped.  `names` are the
+    signals of hub and tip, root moment and torque, `reference` is that of hub and tip, `response` the continuous-time
+    response at any time.
     """
 
     arm: Arm
-    law: AnyLaw
+    controller: Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]
     scenario: Annotated[str, Quantity(help="reference, slew, pulse or deflection")]
     scenario_in_words: Annotated[str, Quantity("scenario", help="input with its size")]
     duration: Annotated[float, Quantity("duration", "s", 4, help="length of the record")]
     period: Annotated[float, PERIOD]
-    continuous: Annotated[LoopResponse | None, Quantity(help="continuous-time loop; null where it is not determined")]
-    sampled: Annotated[LoopResponse | None, Quantity(help="sampled loop; null where it is not determined")]
-    not_determined: Annotated[tuple[str, ...], Quantity("not determined", help="loops that are not, and why")]
+    continuous: Annotated[LoopResponse | None, Quantity(help="continuous-time loop; null under a law in z")]
+    sampled: Annotated[LoopResponse, Quantity(help="sampled loop")]
     t: Real
     names: tuple[str, ...]
     reference: dict[str, Real]
     response: TimeResponse | None
 
     @property
-    def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
-        """Names of the arm and the controller."""
-        return controller(as_law(self.law), self.arm)
-
-    @property
     def loops(self) -> dict[str, LoopResponse]:
-        """The loops that are determined, by name."""
-        both = {"continuous-time": self.continuous, f"sampled, {1e3 * self.period:g} ms": self.sampled}
-        return {name: each for name, each in both.items() if each is not None}
+        """The loops by name."""
+        continuous = {"continuous-time": self.continuous} if self.continuous else {}
+        return {**continuous, f"sampled, {1e3 * self.period:g} ms": self.sampled}
 
     @property
-    def finding(
-        self,
-    ) -> Annotated[str, Quantity("finding", help="stability of each loop; an unstable one has no figures")]:
+    def finding(self) -> Annotated[str, Quantity("finding", help="stability of each loop")]:
         """Stability of each loop."""
-        grows = {UNSTABLE: " (the response grows, figures are not defined)"}
-        both = self.loops.items()
-        return "; ".join(f"{name} {each.stability}{grows.get(each.stability, '')}" for name, each in both)
+        return "; ".join(f"{name} {each.stability}{'' if each.hub else GROWS}" for name, each in self.loops.items())
 
     @property
     def table(self) -> Table:
@@ -203,17 +188,17 @@ def step(
     ParameterError
         For a locked hub, an unknown scenario or output, a loop without a reference of the hub, and as `simulate` does.
     ConvergenceError
-        Where neither loop is determined.
+        Where the poles of the loop are not complete.
     """
     must_be_known("scenario", scenario_name, SAMPLED_NAMES)
-    chain, notes, is_step = chain_or_usual(chain), list[str](), scenario_name == "reference"
+    chain, is_step = chain_or_usual(chain), scenario_name == "reference"
     hub, law = followed(law) if is_step else (AT_HUB[0], law)
     arm, law = tracked(arm, law)
-    full, of_angle, response = as_law(law), hub == AT_HUB[0], None
-    tip = "tip_displacement" if of_angle else f"velocity@{arm.length!r}"
-    poles = None if full.is_discrete else _known("continuous-time", notes, lambda: usual_poles(Loop(arm, full)))
-    length = usual_duration(poles, chain, scenario_name) if duration is None else duration
+    full, of_angle, response, continuous = as_law(law), hub == AT_HUB[0], None, None
+    poles = None if full.is_discrete else usual_poles(Loop(arm, full))
+    length = usual_duration(poles, chain) if duration is None else duration
     task = unit_step(hub, chain, length) if is_step else scenario(SAMPLED_NAMES[scenario_name], arm, chain, length)
+    tip = "tip_displacement" if of_angle else f"velocity@{arm.length!r}"
     names = tuple(dict.fromkeys((hub, tip, MOMENT, *outputs)))
     if poles is not None:
         response = time_response(poles, names, excitation(poles.loop, full, chain, task, names), length)
@@ -222,24 +207,13 @@ def step(
         angle = traces.reference_angle(task, t) if of_angle else np.ones(t.size)
         reference = {hub: angle, tip: arm.reach * angle}
     record = _Record(arm, names, task.busy_until, t, reference)
-    continuous = None if response is None else record.continuous(response)
-    sampled = _known("sampled", notes, lambda: record.sampled(law, chain, task))
-    if continuous is sampled is None:
-        raise ConvergenceError("; ".join(notes), None, length)
+    if response is not None:
+        continuous = record.continuous(response)
     return Step(
-        arm=arm, law=law, scenario=scenario_name, scenario_in_words=described(task, arm, chain), duration=length,
-        period=task.period, continuous=continuous, sampled=sampled, not_determined=tuple(notes), t=t,
-        names=(*names[:3], TORQUE), reference=reference, response=response,
+        arm=arm, controller=controller(full, arm), scenario=scenario_name, duration=length, period=task.period,
+        scenario_in_words=described(task, arm, chain), continuous=continuous, sampled=record.sampled(law, chain, task),
+        t=t, names=(*names[:3], TORQUE), reference=reference, response=response,
     )  # fmt: skip
-
-
-def _known(name: str, notes: list[str], find: Callable[[], Any]) -> Any:
-    """Return what `find` returns; None, with a note, where that loop is not determined."""
-    try:
-        return find()
-    except ConvergenceError as error:
-        notes.append(f"{name} loop not determined: {error}")
-        return None
 
 
 def followed(law: AnyLaw) -> tuple[str, AnyLaw]:
@@ -255,15 +229,14 @@ def followed(law: AnyLaw) -> tuple[str, AnyLaw]:
     return hub, law if hub in known else replace(full, references=(*full.references, hub))
 
 
-def usual_duration(poles: Poles | None, chain: Chain, scenario_name: str) -> float:
-    """Length [s] of a record: eight time constants of the dominant pole after the input, to two digits."""
-    rise, slowest = chain.slew.rise_time, 0.0
-    if poles is not None:
-        near = poles.moving[abs(poles.moving) <= DOMINANT * first_frequency(poles.loop.arm)]
-        slowest = float(abs(near.real).min(initial=math.inf))
-    busy = {"slew": rise, "pulse": PULSE_SHARE * rise}.get(scenario_name, 0.0)
-    length = min(busy + TIME_CONSTANTS / slowest, LONGEST_SLEWS * rise) if slowest else TRIAL_SLEWS * rise
-    return float(f"{length:.2g}")
+def usual_duration(poles: Poles | None, chain: Chain) -> float:
+    """Length [s] of a record: a slew and eight time constants of the dominant pole, to two digits."""
+    rise = chain.slew.rise_time
+    if poles is None:
+        return TRIAL_SLEWS * rise
+    near = poles.moving[abs(poles.moving) <= DOMINANT * first_frequency(poles.loop.arm)]
+    slowest = max(abs(near.real).min(initial=math.inf), TIME_CONSTANTS / (LONGEST_SLEWS * rise))
+    return float(f"{rise + TIME_CONSTANTS / slowest:.2g}")
 
 
 def excitation(loop: Loop, law: Law, chain: Chain, task: Scenario, names: Sequence[str]) -> Excitation:
@@ -280,41 +253,31 @@ def excitation(loop: Loop, law: Law, chain: Chain, task: Scenario, names: Sequen
         size, ends = task.disturbance[0], ((0.0, task.busy_until), (1.0, -1.0))  # which is no torque of the motor
         return Excitation({ACTUATOR: lambda s: size / s}, *ends, free={TORQUE: lambda s: -size / s})
     if task.name == "reference":
-        followed_by = {angle if task.hub_angle[0] else rate: lambda s: 1 / s}
-        return Excitation(_through(law, followed_by))
-    a, reads = chain.slew.acceleration(arm.reach), task.reading == "vibration"
-    inputs: dict[str, Transform] = {
-        angle: lambda s: 1 / s**3,
-        rate: lambda s: 1 / s**2,
-        moment: lambda s: -arm.gauged_inertia * reads / s,
-    }
-    fed: Transform = lambda s: arm.turned_inertia / s + arm.rate_loss / s**2  # noqa: E731
-    return Excitation({ACTUATOR: fed} | _through(law, inputs), (0.0, rise / 2, rise), (a, -2 * a, a))
+        return Excitation(_through(law, {angle if task.hub_angle[0] else rate: lambda s: 1 / s}))
+    a, read = chain.slew.acceleration(arm.reach), arm.gauged_inertia * float(task.reading == "vibration")
+    references: dict[str, Transform] = {
+        angle: lambda s: 1 / s**3, rate: lambda s: 1 / s**2, moment: lambda s: -read / s
+    }  # fmt: skip
+    inputs = _through(law, references)
+    inputs[ACTUATOR] = lambda s: arm.turned_inertia / s + arm.rate_loss / s**2
+    return Excitation(inputs, (0.0, rise / 2, rise), (a, -2 * a, a))
 
 
 def _through(law: Law, references: Mapping[str, Transform]) -> dict[str, Transform]:
     """References as inputs of a law: of its signals, and with the opposite sign those of its columns."""
     own = {name: X for name, X in references.items() if name in law.references}
-    return own | {REFERENCE + name: _opposite(X) for name, X in references.items() if REFERENCE + name in law.wanted}
-
-
-def _opposite(X: Transform) -> Transform:
-    return lambda s: -X(s)
+    wanted = {REFERENCE + name: X for name, X in references.items() if REFERENCE + name in law.wanted}
+    return own | {name: lambda s, X=X: -X(s) for name, X in wanted.items()}
 
 
 def _released(loop: Loop, offset: float, names: Sequence[str]) -> Excitation:
-    """The first mode released: to the law its motion is a reference of the opposite sign."""
+    """The first mode released: the free motion of each signal."""
     signals = tuple(dict.fromkeys(("tip_displacement", *loop.law.signals, *names)))
     plant = sensed_plant(loop.arm, Chain(), signals, 1).unfiltered
     first, amplitude = first_mode(plant, offset)
-    p = complex(plant.poles[first])
-
-    def motion(name: str) -> Transform:
-        r = complex(plant.residues[signals.index(name), first]) * amplitude
-        return lambda s: r / (s - p) + r.conjugate() / (s - p.conjugate())
-
-    inputs = {name: _opposite(motion(name)) for name in loop.law.signals}
-    return Excitation(inputs, poles=(p,), free={name: motion(name) for name in names})
+    p, pairs = complex(plant.poles[first]), zip(signals, plant.residues[:, first] * amplitude, strict=True)
+    free = {name: lambda s, r=r: r / (s - p) + r.conjugate() / (s - p.conjugate()) for name, r in pairs}
+    return Excitation({}, poles=(p,), free=free)
 
 
 def _times(response: TimeResponse | None, task: Scenario) -> Real:
@@ -343,14 +306,11 @@ class _Record:
 
     def continuous(self, response: TimeResponse) -> LoopResponse:
         """The continuous-time loop."""
-        signals, bound = dict(zip(response.names, response.at(self.t), strict=True)), response.remainder(self.t)
-        of, is_converged = {}, True
-        for row, (name, y) in enumerate(signals.items()):
-            time, peak = response.peak(name, self.t)
-            left = float(response.remainder(np.array([time]))[row, 0])
-            of[name] = self._figures(name, y, time, peak, float(bound[row].max()), left)
-            is_converged &= left <= CONVERGED * abs(peak)
-        return self._loop(verdict_on(response.poles.loop).verdict, is_converged, response.poles.count, of, signals)
+        signals = dict(zip(response.names, response.at(self.t), strict=True))
+        peaks = {name: response.peak(name, self.t) for name in signals}
+        is_converged = all(bound <= CONVERGED * abs(peak) for _, peak, bound in peaks.values())
+        certainty = f"{'converged' if is_converged else 'approximate'}, {response.poles.count} poles"
+        return self._loop(verdict_on(response.poles.loop).verdict, certainty, signals, peaks)
 
     def sampled(self, law: AnyLaw, chain: Chain, task: Scenario) -> LoopResponse:
         """The sampled loop."""
@@ -358,27 +318,22 @@ class _Record:
         run, used = simulated(self.arm, law, chain, task, between=between, outputs=self.names)
         signals = {name: traces.continuous(run, name)[1][: self.t.size] for name in self.names}
         signals[TORQUE] = traces.held_at(run, run.torque, self.t[: signals[MOMENT].size])
-        word = "unstable" if run.stopped else sampled_verdict(self.arm, law, chain).word
-        of = {}
-        for name, y in signals.items() if word != UNSTABLE else ():
-            at = int(abs(y).argmax())
-            of[name] = self._figures(name, y, float(self.t[at]), float(y[at]))
+        at = {name: int(abs(y).argmax()) for name, y in signals.items() if y.size}
+        peaks = {name: (float(self.t[n]), float(signals[name][n]), None) for name, n in at.items()}
         is_converged = used.change is not None and used.change <= ENOUGH_CHANGE
-        return self._loop(word, is_converged, used.modes, of, signals)
+        certainty = f"{'converged' if is_converged else 'approximate'}, {used.modes} modes"
+        word = UNSTABLE if run.stopped else sampled_verdict(self.arm, law, chain).word
+        return self._loop(word, certainty, signals, peaks)
 
     def _loop(
-        self, stability: str, is_converged: bool, number: int, of: Mapping[str, Any], signals: dict[str, Real]
+        self, stability: str, certainty: str, signals: dict[str, Real], peaks: Mapping[str, Peak]
     ) -> LoopResponse:
         """The figures of a loop; of an unstable one those of its signals are left out."""
-        hub, tip, moment, torque = (None if stability == UNSTABLE else of[name] for name in (*self.names[:3], TORQUE))
-        return LoopResponse(
-            stability=stability, certainty="converged" if is_converged else "approximate", number=number,
-            hub=hub, tip=tip, root_moment=moment, torque=torque, signals=signals,
-        )  # fmt: skip
+        names = zip(PARTS, (*self.names[:3], TORQUE), strict=True) if stability != UNSTABLE else ()
+        of = {part: self._figures(name, signals[name], *peaks[name]) for part, name in names}
+        return LoopResponse(stability=stability, certainty=certainty, signals=signals, **of)
 
-    def _figures(
-        self, name: str, y: Real, peak_time: float, peak: float, bound: float | None = None, left: float | None = None
-    ) -> SignalFigures:
+    def _figures(self, name: str, y: Real, peak_time: float, peak: float, bound: float | None) -> SignalFigures:
         """Figures of one signal at the times of the record."""
         t, reference = self.t, self.reference.get(name)
         final = 0.0 if name == MOMENT else float(y[LEFT_OF_RECORD * t >= (LEFT_OF_RECORD - 1) * t[-1]].mean())
@@ -396,7 +351,7 @@ class _Record:
             settling_time=float(t[settled]) if is_settled else None,
             steady_state_error=None if share is None or reference is None else float(reference[-1]) - final,
             residual_rms=float(np.sqrt(np.mean((y - final)[after] ** 2))) if self.busy and after.any() else None,
-            remainder_bound=bound, remainder_at_peak=left,
+            remainder_bound=bound,
         )  # fmt: skip
 
 

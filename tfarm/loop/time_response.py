@@ -54,7 +54,7 @@ class Excitation:
     """Inputs sum_i w_i e^{-s t_i} X(s) of a loop: `inputs` are X by place, `poles` those of all X [1/s] but 0.
 
     A place is `ACTUATOR`, a signal whose reference it is, or a column of references of the law (with the minus of its
-    sign).  `free` is a motion that is added to outputs.
+    sign).  `free` is a motion that is added to signals, and which the law feeds back.
     """
 
     inputs: Mapping[str, Transform]
@@ -106,15 +106,15 @@ class TimeResponse:
             found[:, t >= start] += (weight if sign > 0 else abs(weight)) * h(t[t >= start] - start)
         return found
 
-    def peak(self, name: str, t: Real) -> tuple[float, float]:
-        """Return time [s] and value of a signal where it is largest in size, between the times around that of `t`."""
+    def peak(self, name: str, t: Real) -> tuple[float, float, float]:
+        """Return time [s] and value of a signal where it is largest in size, near that of `t`, and the bound there."""
         row = self.names.index(name)
         for _ in range(ZOOMS):
             n = int(abs(self.at(t)[row]).argmax())
             t = np.linspace(t[max(n - 1, 0)], t[min(n + 1, t.size - 1)], ZOOM_POINTS)
         y = self.at(t)[row]
         n = int(abs(y).argmax())
-        return float(t[n]), float(y[n])
+        return float(t[n]), float(y[n]), float(self.remainder(t[[n]])[row, 0])
 
 
 def usual_poles(loop: Loop, count: int = USUAL_COUNT) -> Poles:
@@ -153,11 +153,11 @@ def transformed(loop: Loop, names: tuple[str, ...], excitation: Excitation, s: C
     shares, whole = law.shares(s, columns)
     entries = dict(zip(columns, np.exp(-s * law.delay) * shares.sum(axis=0), strict=True))
     D = drive * whole + sum(entries[name] * row[name] for name in law.signals)
+    free = {name: motion(s) for name, motion in excitation.free.items()}
     driven = sum(X(s) * (whole if place == ACTUATOR else entries[place]) for place, X in excitation.inputs.items())
+    driven = driven - sum(entries[name] * free[name] for name in law.signals if name in free)
     found = np.array([*(row[name] for name in names), drive]) * driven / D
-    for name, motion in excitation.free.items():
-        found[(*names, TORQUE).index(name)] += motion(s)
-    return found
+    return found + np.array([free.get(name, 0 * s) for name in (*names, TORQUE)])
 
 
 def _terms(
