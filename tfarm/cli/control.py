@@ -34,7 +34,7 @@ from tfarm.files import write_mat
 
 command = partial(add_command, "Loop")
 sampled_command = partial(add_command, "Sampled loop")
-DRAWN_BETWEEN = 20  # records between two samples of a picture
+DRAWN_BETWEEN = 15  # records between two samples of a picture
 ModeCount = Annotated[
     int | None, typer.Option("--modes", min=1, max=400, help="flexible modes; by default as many as the result takes")
 ]
@@ -269,7 +269,7 @@ def simulate(
     scenario: slew, step, decay, impulse or pulse
     duration: duration [s]
     output: further signal, as strain@0.05; may be repeated
-    between: records between two samples; with --png by default 20
+    between: records between two samples; with --png by default 15
     mat: write the signals to a MATLAB file
     controller: tuner of `tfarm tune --save`: it sets K2, with its own K1
     """

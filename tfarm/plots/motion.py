@@ -58,6 +58,10 @@ TIME = "time [s]"
 DASHED, DOTTED, LONG_DASHED = (0, (4, 3)), (0, (1, 2)), (0, (5, 3))
 OF_STABILITY = {"stable": (STABLE, "o"), "marginal": (MARGINAL, "s"), "unstable": (UNSTABLE, "x")}  # colour, mark
 HATCH = "/////"
+LEAST_RISE, MOST_TURNS = (
+    1 / 3000,
+    400,
+)  # share of its height by which a curve rises from point to point; turns of a line
 FEW_SAMPLES = 60  # of a run: each is marked
 STEP_ROWS = (1.0, 1.0, 1.0, 1.0)  # heights of hub, tip, root moment and torque
 SHOWN_SETTLED = 1.5  # times the last settling time: end of the picture
@@ -251,8 +255,11 @@ def _name_signals(arm: Arm, names: Sequence[str], ax: Sequence[Axes]) -> None:
 
 def _draw_signal(ax: Axes, t: Real, y: Real, looks: tuple[str, str], every: int = 0, **how: Any) -> None:
     """A signal at even times; with `every` that of a sampled loop, with marks at the samples where these are few."""
-    colour, mark = looks
-    _draw_curve(traces.curve(t, y), ax, colour, ls=DASHED if every else "-", **how)
+    (colour, mark), step = looks, math.ceil(t.size / traces.MOST_LINE)
+    rises = np.diff(y)[abs(np.diff(y)) > LEAST_RISE * np.ptp(y)]
+    if np.count_nonzero(np.diff(np.signbit(rises))) > MOST_TURNS:
+        step = 1  # for a band
+    _draw_curve(traces.curve(t[::step], y[::step]), ax, colour, ls=DASHED if every else "-", **how)
     if every and t.size <= FEW_SAMPLES * every:
         ax.plot(t[::every], y[::every], mark, color=colour, ms=3.0, mew=1.0)
 
