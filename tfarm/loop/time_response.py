@@ -35,11 +35,9 @@ from .poles import Poles, poles_below
 ACTUATOR, TORQUE = "actuator", "torque"  # the input of the arm as a place of excitation, and as a signal
 USUAL_COUNT = 80  # flexible modes below the top of the box
 CLOSE, MOST_CLOSE = 3.0, 0.1  # poles closer than 3/T are one circle, but no farther apart than 0.1 of the first mode
-SLOW_RADIUS = 2.0  # over T: of a circle around s = 0, on which e^{s T} is moderate; or of the extent of its poles
-NODES_OF_GROWTH = 4.0  # times radius and T: nodes more on a circle with e^{s T}, whose powers of s T would alias
+SLOW_RADIUS = 2.0  # over T, of a circle around s = 0, on which e^{s T} is moderate; or times the extent of its poles
 POLE_RADIUS = 0.25  # of the way to the next pole: radius of the circle of one pole
-FEWEST_NODES, MOST_NODES, NODE_LOG = 32, 512, 40.0  # of circles; e^-40 is below the rounding
-KNOWN_RESIDUE = 1e-6  # of the largest value on a circle times its radius: smaller ones do not correct a pole
+POLE_NODES, FEWEST_NODES, MOST_NODES, NODE_LOG = 32, 128, 512, 40.0  # of circles; e^-40 is below the rounding
 ON_AXIS = 1e-9  # of the least distance of two circles: by so little a centre is off the real axis
 LEAST_FALL, MOST_FALL = 0.5, 0.9  # of the sum of residues from one octave of frequency to the next
 IDENTITY_FACTOR = 2.0  # on the sum of the omitted residues at t = 0+, whose signs differ
@@ -180,21 +178,12 @@ def _terms(
 
 
 def _circle(own: Complex, c: complex, room: float, transform: Transform, duration: float) -> tuple[Complex, Complex]:
-    """The nodes of a circle around poles; of a simple one its residue, with its place from the next moment of H."""
+    """The nodes of a circle around poles, to a distance of `room` from others; of a simple pole its residue."""
     is_simple, extent, radius = own.size == 1 and c != 0, float(abs(own - c).max()), POLE_RADIUS * room
-    more = 0.0 if is_simple else NODES_OF_GROWTH * duration
     if not is_simple:
-        radius = min(math.sqrt(extent * room) or radius, max(SLOW_RADIUS * extent, SLOW_RADIUS / duration))
-    nodes = int(
-        np.clip(-NODE_LOG / math.log(max(extent, radius**2 / room) / radius), FEWEST_NODES, MOST_NODES) + more * radius
-    )
+        radius = min(math.sqrt(extent * room) or radius, SLOW_RADIUS * max(extent, 1 / duration))
+    ratio = max(extent / radius, radius / room)
+    nodes = int(np.clip(-NODE_LOG / math.log(ratio), POLE_NODES if is_simple else FEWEST_NODES, MOST_NODES))
     arrow = radius * np.exp(2j * np.pi * (np.arange(nodes) + 0.5) / nodes)
     values = transform(c + arrow) * arrow / nodes
-    if not is_simple:
-        return c + arrow, values
-    residues = values.sum(axis=1)
-    known = abs(residues) / np.maximum(abs(values).max(axis=1) * nodes, LEAST_SIZE)
-    best = int(known.argmax())
-    if known[best] > KNOWN_RESIDUE:
-        c += (values[best] @ arrow) / residues[best]
-    return np.array([c]), residues[:, None]
+    return (own, values.sum(axis=1)[:, None]) if is_simple else (c + arrow, values)
