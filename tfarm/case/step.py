@@ -178,8 +178,8 @@ def step(
         "slew": that of the chain.  "pulse": a torque at the hub for a tenth of the slew.  "deflection": the first mode
         released with the tip displaced by 0.01 L.
     duration
-        Length of the record [s]; by default eight time constants of the dominant pole after the input, at most 20
-        slews.
+        Length of the record [s]; by default that of a slew and eight time constants of the dominant pole, at most 20
+        slews more.
     outputs
         Further signals, such as "strain@0.05".
 

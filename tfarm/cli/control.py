@@ -236,7 +236,7 @@ def step(
     Options:
     scenario: reference (unit step of the hub angle, or of the hub rate without its feedback), slew, pulse (of torque)
         or deflection (first mode released)
-    duration: duration [s]; by default eight time constants of the dominant pole after the input
+    duration: duration [s]; by default a slew and eight time constants of the dominant pole
     output: further signal of the CSV file, as strain@0.05; may be repeated
     """
     subject, controller, defaults = load_loop(arm, theory, gains, law)
