@@ -84,6 +84,7 @@ class SignalFigures:
 
 
 @dataclass(frozen=True, kw_only=True)
+@record
 class LoopResponse:
     """Figures of one loop, not defined of an unstable one, and its signals by name, "torque" being the input."""
 
