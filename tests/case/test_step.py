@@ -125,10 +125,11 @@ def test_a_column_of_references_is_the_reference_of_its_signal():
             "slew",
             "references = .tip_deflection",
         ),
+        (LAB.having(payload_mass=math.inf), LAW, "deflection", "scenario = .deflection.: no free decay"),
         (LAB, LAW, "deflection", None),
         (LAB.having(hub_inertia=0.0), tfarm.HubFeedback(K1=0.3), "pulse", None),
     ],
-    ids=["locked", "algebraic", "unknown", "no reference", "no such reference", "free", "massless hub"],
+    ids=["locked", "algebraic", "unknown", "no reference", "no such reference", "pinned", "free", "massless hub"],
 )
 def test_what_has_no_response_is_refused_in_a_line(arm, law, scenario, words):
     if words is None:

@@ -275,7 +275,7 @@ def _released(loop: Loop, offset: float, names: Sequence[str]) -> Excitation:
     """The first mode released: the free motion of each signal."""
     signals = tuple(dict.fromkeys(("tip_displacement", *loop.law.signals, *names)))
     plant = sensed_plant(loop.arm, Chain(), signals, 1).unfiltered
-    first, amplitude = first_mode(plant, offset)
+    first, amplitude = first_mode(plant, offset, "deflection")
     p, pairs = complex(plant.poles[first]), zip(signals, plant.residues[:, first] * amplitude, strict=True)
     free = {name: lambda s, r=r: r / (s - p) + r.conjugate() / (s - p.conjugate()) for name, r in pairs}
     return Excitation({}, poles=(p,), free=free)

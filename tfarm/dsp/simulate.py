@@ -394,7 +394,7 @@ class Simulator:
         return Trace(t, angle, rate, moment, tip, dict(zip(self.others, more, strict=True)))
 
 
-def first_mode(plant: Plant, offset: float) -> tuple[int, complex]:
+def first_mode(plant: Plant, offset: float, scenario: str = "decay") -> tuple[int, complex]:
     """Return the pole p of the first mode, by its place, and its amplitude at rest with the tip displaced by `offset`.
 
     a = i x/(p r), x = offset |p|^2/(2 Im p), r the residue of the tip displacement.  Raises ParameterError where the
@@ -403,7 +403,7 @@ def first_mode(plant: Plant, offset: float) -> tuple[int, complex]:
     tip = plant.residues[plant.outputs.index("tip_displacement")]
     found = np.flatnonzero((plant.mode == 1) & (plant.poles.imag > 0) & (tip != 0))
     remedy = "no free decay: the tip is pinned, or the first mode is overdamped; take another scenario"
-    require(found.size, "scenario", "decay", remedy)
+    require(found.size, "scenario", scenario, remedy)
     first = int(found[0])
     p, r = complex(plant.poles[first]), complex(tip[first])
     return first, 1j * offset * abs(p) ** 2 / (2 * p.imag) / (p * r)
