@@ -41,6 +41,7 @@ POLE_NODES, FEWEST_NODES, MOST_NODES, NODE_LOG = 32, 128, 512, 40.0  # of circle
 ON_AXIS = 1e-9  # of the least distance of two circles: by so little a centre is off the real axis
 LEAST_FALL, MOST_FALL = 0.5, 0.9  # of the sum of residues from one octave of frequency to the next
 IDENTITY_FACTOR = 2.0  # on the sum of the omitted residues at t = 0+, whose signs differ
+BLOCK = 20_000  # times that are evaluated together: with 200 terms 64 MB
 MOST_GROWTH = 500.0  # exponent of the fastest growing pole at the end of a record
 ZOOM_POINTS, ZOOMS = 41, 5  # of the search for a peak: each narrows the interval by a factor of 20
 
@@ -79,7 +80,7 @@ class TimeResponse:
 
     def at(self, t: Real) -> Real:
         """Return the signals (signals, n) at times t [s]."""
-        return self._summed(t, lambda tau: (self.amplitudes @ np.exp(np.outer(self.z, tau))).real, 1.0)
+        return self._summed(t, lambda tau: (self.amplitudes @ np.exp(np.outer(self.z, tau))).real)
 
     def remainder(self, t: Real) -> Real:
         """Return the bound (signals, n) on the contribution of the poles outside the box at times t [s]."""
@@ -95,13 +96,15 @@ class TimeResponse:
             above = fall / (1 - fall) * (sizes[:, last] @ np.exp(np.outer(self.z[last].real, tau)))
             return np.asarray(np.maximum(above, omitted * np.exp(slowest * tau)))
 
-        return self._summed(t, bound, -1.0)
+        return self._summed(t, bound, np.abs)
 
-    def _summed(self, t: Real, h: Callable[[Real], Real], sign: float) -> Real:
-        """Sum of w_i h(t - t_i); of |w_i| h where the sign is -1."""
+    def _summed(self, t: Real, h: Callable[[Real], Real], size: Callable[[float], float] = float) -> Real:
+        """Sum of w_i h(t - t_i), the weights or their sizes, in blocks of times."""
         found = np.zeros((len(self.names), t.size))
         for start, weight in zip(self.excitation.times, self.excitation.weights, strict=True):
-            found[:, t >= start] += (weight if sign > 0 else abs(weight)) * h(t[t >= start] - start)
+            later = np.flatnonzero(t >= start)
+            for part in np.array_split(later, 1 + later.size // BLOCK):
+                found[:, part] += size(weight) * h(t[part] - start)
         return found
 
     def peak(self, name: str, t: Real) -> tuple[float, float, float]:
