@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         load,
         presets,
     )
-    from tfarm.case import compare, result_card
+    from tfarm.case import compare, loop_function, result_card
     from tfarm.case.step import step
     from tfarm.dsp.results import simulate
     from tfarm.dsp.verdict import sampled
@@ -80,6 +80,7 @@ __all__ = [
     "fit",
     "load",
     "locus",
+    "loop_function",
     "map",
     "margins",
     "modes",
@@ -107,6 +108,7 @@ _ROOMS = {  # the module of a name; after a colon another name there
     "compare": "case",
     "damped_modes": "spectrum",
     "default_gains": "spectrum.table",
+    "loop_function": "case",
     "map": "loop.plane:gain_map",
     "margins": "loop.margins",
     "Measured": "fitting.data",
