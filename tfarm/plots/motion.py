@@ -261,7 +261,7 @@ def _draw_signal(ax: Axes, t: Real, y: Real, looks: tuple[str, str], every: int 
 
 
 @picture(
-    (Step, "tfarm.step returns"), size=(9.0, 8.4), rows=STEP_ROWS,
+    (Step, "tfarm.step returns"), size=(9.0, 10.0), rows=STEP_ROWS,
     title=lambda found: f"{found.arm.name}: {found.scenario_in_words}",
 )  # fmt: skip
 def step(found: Step, *, ax: Sequence[Axes]) -> None:
