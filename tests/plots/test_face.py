@@ -42,7 +42,7 @@ AXES = {
     "slew": 3,
     "step": 4,
 }  # of a plot that has several
-PICTURES = sorted({*tfarm.plots.__all__} - {"column"})
+PICTURES = sorted({*tfarm.plots.__all__} - {"animate", "column"})
 OTHERS = [f"{name} of a rig" for name in ("gain_map", "nyquist", "disc", "bode", "locus", "loop", "nichols")]
 OTHERS += ["locus of a law", "gain_map of a law"]
 

@@ -31,6 +31,7 @@ from tfarm.cli.app import (
     print_line,
     refuse,
 )
+from tfarm.errors import require
 from tfarm.files import write_mat
 
 command = partial(add_command, "Loop")
@@ -301,6 +302,7 @@ def simulate(
     csv: Csv = None,
     png: Png = None,
     mat: File = None,
+    animate: File = None,
     controller: Annotated[Path | None, typer.Option(metavar="FILE", exists=True)] = None,
     law: LawFile = None,
     theory: TheoryName = None,
@@ -316,8 +318,11 @@ def simulate(
     output: further signal, as strain@0.05; may be repeated
     between: records between two samples; with --png by default 15
     mat: write the signals to a MATLAB file
+    animate: draw the arm in motion into this file, a GIF
     controller: tuner of `tfarm tune --save`: it sets K2, with its own K1
     """
+    if animate is not None:
+        require(animate.suffix.lower() == ".gif", "--animate", str(animate), "give a name that ends in .gif")
     how: Any = {"count": modes, "between": between or DRAWN_BETWEEN * (png is not None), "outputs": output or ()}
     defaults = None
     if controller is None:
@@ -336,7 +341,9 @@ def simulate(
         if found.between:
             signals["between"] = {name(key): values for key, values in found.between.items()}
         write_mat(mat, signals, key="--mat")
+    if animate is not None:
+        tfarm.plots.animate(found.arm, found.simulation).save(animate)
     if found.stopped_at is not None:
         mode = f"mode {found.growing_mode}" if found.growing_mode else "the hub"
         print_line(f"unstable: stopped at {found.stopped_at:.6g} s, {mode} grows")
-    emit(found, json, defaults, csv=csv, png=png, also=(mat,))
+    emit(found, json, defaults, csv=csv, png=png, also=(mat, animate))

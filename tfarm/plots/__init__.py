@@ -8,6 +8,7 @@
 In the look of the report's pages, whose pictures these are.  This is the only room with matplotlib.
 """
 
+from tfarm.plots.animation import animate
 from tfarm.plots.frequency import bode, measured
 from tfarm.plots.loop_function import disc, loop, nichols, nyquist, sensitivity
 from tfarm.plots.motion import modes, sketch, slew, step, tuned_gain
@@ -16,6 +17,7 @@ from tfarm.plots.roots import locus
 from tfarm.plots.style import column
 
 __all__ = [
+    "animate",
     "bode",
     "column",
     "comparison",
