@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import html
 import itertools
 import json
 import math
@@ -206,8 +205,8 @@ def test_explore_writes_the_page_that_a_report_has_and_opens_it(tmp_path, monkey
     shown = tfarm.explore(arm, law, chain)
     assert len(opened) == 1
     assert shown.path != found.path
-    (text,) = re.findall(r'<iframe srcdoc="([^"]*)"', shown._repr_html_())
-    page = html.unescape(text)
+    (text,) = re.findall(r'<iframe src="data:text/html;charset=utf-8;base64,([^"]*)"', shown._repr_html_())
+    page = base64.b64decode(text).decode()
     assert (found.path.parents[1] / "assets" / "live.js").read_text(encoding="utf-8") in page
     assert "<script src=" not in page
     with pytest.raises(tfarm.ParameterError, match="hub turns freely"):

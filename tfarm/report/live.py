@@ -7,7 +7,6 @@ import sys
 import webbrowser
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 from itertools import product
 from pathlib import Path
 from tempfile import mkdtemp
@@ -342,9 +341,9 @@ class LivePage:
         """The page in a frame, with its script in it: a notebook serves no other file."""
         link, script = f'<script src="../{ASSETS}/{SCRIPT}">', self.path.parents[1] / ASSETS / SCRIPT
         page = self.path.read_text(encoding="utf-8").replace(link, f"<script>{script.read_text(encoding='utf-8')}")
-        return (
-            f'<iframe srcdoc="{escape(page)}" title="live page" style="width:100%;height:{FRAME}px;border:0"></iframe>'
-        )
+        text = base64.b64encode(page.encode()).decode("ascii")  # no srcdoc: its links lead into the notebook's own page
+        source = f'src="data:text/html;charset=utf-8;base64,{text}" title="live page"'
+        return f'<iframe {source} style="width:100%;height:{FRAME}px;border:0"></iframe>'
 
 
 def explore(arm: Arm, law: AnyLaw | None = None, chain: Chain | None = None) -> LivePage:
