@@ -146,7 +146,8 @@ class LoopResult:
 class Picture(NamedTuple):
     """A finished figure with its words.  `stem` names its files; `data` are the numbers that it draws.
 
-    `python` is the line of Python that draws it, empty where no public function does.
+    `film` is a GIF, whose still picture is the figure.  `python` is the line of Python that draws it, empty where no
+    public function does.
     """
 
     stem: str
@@ -156,6 +157,7 @@ class Picture(NamedTuple):
     figure: Figure
     data: tuple[Column, ...] = ()
     python: str = ""
+    film: bytes = b""
 
 
 def picture(
@@ -223,7 +225,10 @@ def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> 
         save_column(block.figure, folder / PICTURES, block.stem)
     numbers = Table(columns=block.data, stem=f"{block.stem}-data")
     saved = save_table(numbers, folder / DATA, kinds=("csv",)) if block.data else ()
-    drawn = [f"{PICTURES}/{block.stem}.{kind}" for kind in ("svg", *["pdf"] * is_paper)]
+    if block.film:
+        (folder / PICTURES / f"{block.stem}.gif").write_bytes(block.film)
+    kinds = ("svg", *["pdf"] * is_paper, *["gif"] * bool(block.film))
+    drawn = [f"{PICTURES}/{block.stem}.{kind}" for kind in kinds]
     files = [*drawn, *(f"{DATA}/{name}" for name in saved)]
     return SavedBlock(block.stem, block.title, shape.picture(block, files), shape.image(block))
 
