@@ -5,6 +5,7 @@ Not collected by `make test`.  It prints how soon a live page answers and how lo
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import re
@@ -20,16 +21,17 @@ from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page, sync_playwright
 
 import tfarm
-from tfarm.arm import Arm, HubFeedback, as_law
+from tfarm.arm import Arm, HubFeedback, Law, as_law
 from tfarm.arm.law_tables import load_law
-from tfarm.case.card import LoopCard
+from tfarm.case.card import LoopCard, SampledCurve, reference_damping
 from tfarm.dsp import Chain, load_chain, sampled_verdict
 from tfarm.dsp.results import simulated_run
+from tfarm.loop.loop import Loop
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import gain_map
 from tfarm.loop.stability import stability
 from tfarm.report.live import ASSETS, SCRIPT, save_live, write_assets
-from tfarm.report.page import Case
+from tfarm.report.page import Case, GivenLaw
 from tfarm.schema import to_dict
 
 Real = NDArray[np.float64]
@@ -291,6 +293,61 @@ def test_a_sensor_has_the_modes_and_zeros_of_its_place(browser, folder, kind):
             assert abs(zeros - s).min() < 1e-4 * abs(s)
 
 
+@pytest.mark.parametrize("name", ARMS)
+def test_a_chord_of_the_loop_function_is_within_a_pixel_of_it(browser, folder, name):
+    """Exact L of both loops at two places between any two points of the page, in pixels of the Nyquist plot."""
+    arm, chain = tfarm.load(name), load_chain(name)
+    with Opened(browser, folder / name / "live.html") as opened:
+        page = opened.page
+        law = HubFeedback(**page.evaluate("live.loop.start")).having("K1", 0.5 * page.evaluate("live.loop.start.K1"))
+        set_gains(page, law)
+        pixels = page.evaluate("live.room('nyquist')[0]") / 5.0  # of 1, where that is the shorter side
+        graded = arm.having(damping=reference_damping(arm)) if arm.has_elastic_link else arm
+        of = arm if sampled_verdict(arm, law, chain).word == "unstable" else graded
+        exact = (Loop(graded, as_law(law)).parts, SampledCurve(sampled_verdict(of, law, chain).full).parts)
+        for key, parts in zip(("curve", "zcurve"), exact, strict=True):
+            rows = page.evaluate(f"live.now.{key}(live.now.from).map(row => [row.w, row.x, row.y])")
+            w, x, y = np.array(rows).T
+            chords = x + 1j * y
+            for share in (0.3, 0.6):
+                drive, fed_back = parts(1j * (w[:-1] + share * np.diff(w)))
+                own, drawn = fed_back / drive, chords[:-1]
+                along = np.clip(((own - drawn) / np.diff(chords)).real, 0, 1)
+                off = abs(own - drawn - along * np.diff(chords))[abs(own) < 2.5]
+                assert off.size > 100
+                assert pixels * off.max() < 1.0, key
+
+
+def test_the_whole_arm_is_in_the_frame_of_the_player_at_all_times(browser, folder):
+    """Nothing meets the border of the canvas, and the hub is drawn whole; also under gains that swing far."""
+    margin = """() => {
+        const c = document.getElementById('arm'), found = [];
+        const copy = new OffscreenCanvas(c.width, c.height).getContext('2d', { willReadFrequently: true });
+        copy.drawImage(c, 0, 0);
+        const d = copy.getImageData(0, 0, c.width, c.height).data;
+        let hub = 0;
+        for (let i = 0; i < d.length; i += 4) {
+            const x = i / 4 % c.width, y = Math.floor(i / 4 / c.width);
+            if (d[i + 3] > 40) found.push(Math.min(x, y, c.height - 1 - y));
+            hub += x < c.width - 124 && d[i] === d[i + 2] && d[i + 3] === 255;
+        }
+        return [found.reduce((a, b) => Math.min(a, b)), hub, c.height - c.clientHeight];
+    }"""
+    for name, width in itertools.product(ARMS, (1280, 400)):
+        with Opened(browser, folder / name / "live.html", width) as opened:
+            page = opened.page
+            page.set_viewport_size({"width": width, "height": 800})
+            for K2 in (0.3, -0.9):
+                page.evaluate("K2 => live.set({ K2 })", K2)
+                page.wait_for_function("K2 => live.now.law.K2 === K2", arg=K2)
+                for share in np.linspace(0.0, 1.0, 9):
+                    page.locator("#scrub").fill(f"{share:g}")
+                    edge, hub, taller = page.evaluate(margin)
+                    assert edge > 1
+                    assert hub > 0.8 * math.pi * 14**2
+                    assert taller == 0
+
+
 @pytest.mark.parametrize("motion", ["no-preference", "reduce"])
 def test_the_player_starts_on_request_and_respects_reduced_motion(browser, folder, motion):
     with Opened(browser, folder / ARMS[0] / "live.html", motion=motion) as opened:
@@ -387,11 +444,13 @@ def test_the_card_is_the_librarys_at_random_gains(browser, folder, name):
             card = tfarm.result_card(arm, law, chain)
             for of, each in (("s", card.continuous), ("z", card.sampled)):
                 assert each is not None
-                wanted = card_words(each, of)
+                wanted = card_words(each, of) | {f"{of}-limits": each.finding.removeprefix(each.stability)[2:]}
                 if each.stability == "unstable":  # of other modes where the page has a fixed number of them
                     wanted = {key: words for key, words in wanted.items() if not key.startswith("z-ratio")}
                 here = {key: words.removeprefix("≥ ") for key, words in texts(page, list(wanted)).items()}
                 assert here == wanted, (law, of)
+                look = page.locator("#verdict" if of == "s" else "#sampled").get_attribute("class")
+                assert look == f"pill {each.stability if each.grade == '-' else each.grade}"
                 margins_seen += each.phase_margin.value is not None
         assert margins_seen >= 4
 
@@ -458,6 +517,73 @@ def test_a_page_without_sampled_loop_slew_and_sensor_has_the_rest(browser, folde
     with Opened(browser, tmp_path / "arm" / "live.html") as opened:
         page = opened.page
         set_gains(page, HubFeedback(**data["start"]))
-        page.wait_for_function("live.rested", timeout=60_000)
+        page.wait_for_function("live.now.locus?.length", timeout=60_000)
         assert texts(page, ["verdict", "sampled"]) == {"verdict": "stable", "sampled": "not computed"}
         assert page.evaluate("live.now.locus.length") > 50
+
+
+def is_in(areas: list[dict[str, float]], across: str, point: tuple[float, float]) -> bool:
+    """Whether a point is in one of the parts of a region, between two of its columns."""
+    pairs = [
+        (a, b) for a, b in itertools.pairwise(areas) if a["part"] == b["part"] and a[across] <= point[0] <= b[across]
+    ]
+    for a, b in pairs:
+        share = (point[0] - a[across]) / (b[across] - a[across])
+        low, high = (a[end] + share * (b[end] - a[end]) for end in ("low", "high"))
+        if low < point[1] < high:
+            return True
+    return False
+
+
+PD_AND_NOTCH = Law(
+    {"hub_angle": ([0.4, 3.0], [0.002, 1.0]), "moment@0.1": ([1e-4, 0.0, 0.2], [4e-4, 8e-3, 1.0])}, delay=0.002
+)
+OF_THREE = Law({"hub_rate": ([80.0], [1e-4, 1.0]), "root_moment": 0.3, "hub_angle": 40.0})
+ONE_LEAD = Law({"hub_angle": ([0.05, 1.0], [0.005, 1.0])})
+AGAINST_EACH_OTHER = Law({"hub_angle": ([0.4, 3.0], [0.002, 1.0]), "tip_displacement": ([-1.5], [0.01, 1.0])})
+LAWS = [
+    ("sasaki2012-lab", PD_AND_NOTCH),
+    ("stocky-steel", OF_THREE),
+    ("quanser-flexlink", ONE_LEAD),
+    ("sasaki2012-lab", AGAINST_EACH_OTHER),
+]
+
+
+@pytest.mark.parametrize(("name", "law"), LAWS)
+def test_a_law_of_rational_parts_has_a_slider_for_the_gain_of_each(browser, tmp_path, name, law):
+    """At random gains the card, the file of the law and what the map has there are the library's."""
+    arm, chain, rng = tfarm.load(name), load_chain(name), np.random.default_rng(4)
+    (tmp_path / name).mkdir()
+    save_live(Case(arm, chain, (GivenLaw(law),)), tmp_path / name)
+    write_assets(tmp_path / ASSETS)
+    verdicts = set()
+    with Opened(browser, tmp_path / name / "live.html") as opened:
+        page = opened.page
+        start = page.evaluate("live.loop.start")
+        assert start == {key: value for key, (_, value) in law.part_gains.items()}
+        for factors in (np.ones(len(start)), *10.0 ** rng.uniform(-0.9, 0.9, (7, len(start)))):
+            gains = {key: value * by for (key, value), by in zip(start.items(), factors.tolist(), strict=True)}
+            for key, value in gains.items():
+                page.locator(f"[id='{key}']").fill(repr(value))
+                page.locator(f"[id='{key}']").dispatch_event("change")
+            page.wait_for_function("gains => Object.keys(gains).every(k => live.now.law[k] === gains[k])", arg=gains)
+            now = law.weighted(factors.tolist())
+            both = tfarm.result_card(arm, now, chain)
+            card, sampled = both.continuous, both.sampled
+            assert card is not None
+            assert sampled is not None
+            wanted = card_words(card, "s") | {"verdict": card.stability, "sampled": sampled.stability}
+            wanted |= {} if sampled.stability == "unstable" else card_words(sampled, "z")
+            here = {key: words.removeprefix("≥ ") for key, words in texts(page, list(wanted)).items()}
+            assert here == wanted, gains
+            (tmp_path / "law.toml").write_text(page.evaluate("live.lawFile()"), encoding="utf-8")
+            kept, s = load_law(tmp_path / "law.toml"), 1j * np.geomspace(0.1, 1e3, 9)
+            assert np.allclose(kept.values(s), now.values(s), rtol=1e-12)
+            assert kept.delay == now.delay
+            verdicts.add(card.stability)
+            if len(start) > 1:
+                page.wait_for_function("live.now.areas", timeout=60_000)
+                across, up = list(start)[:2]
+                inside = is_in(page.evaluate("live.now.areas"), across, (gains[across], gains[up]))
+                assert inside == (card.stability == "stable"), gains
+        assert "stable" in verdicts

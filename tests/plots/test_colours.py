@@ -16,7 +16,7 @@ from tfarm.spectrum.table import default_gains
 LAB = tfarm.load("sasaki2012-lab")
 LAW = default_gains(LAB)
 K1, K2 = np.linspace(-0.5, 2.0, 60), np.linspace(-1.0, 1.5, 61)
-STEP = 4.0  # of CIELAB lightness, of 100: two greys that are told apart
+STEP = 4.0  # of CIELAB lightness, of 100: two distinct greys
 
 
 def lightness(colour):
@@ -34,7 +34,7 @@ def colour_at(figure, places):
     return [to_hex(pixel / 255) for pixel in pixels[pixels.shape[0] - 1 - rows, columns, :3]]
 
 
-def test_regions_are_ever_darker_and_told_apart_in_grey():
+def test_regions_are_ever_darker_and_distinct_in_grey():
     light = np.array([lightness(colour) for colour in style.REGIONS])
     assert (np.diff(light) < -STEP).all()
     assert lightness("#ffffff") == pytest.approx(100.0)

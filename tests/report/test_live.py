@@ -17,14 +17,14 @@ from scipy.optimize import brentq
 
 import tfarm
 from tests.shared import remembered, thinned
-from tfarm.arm import HubFeedback
+from tfarm.arm import HubFeedback, Law
 from tfarm.dsp import Chain, Sampling, load_chain, sampled_verdict
 from tfarm.exact.characteristic import float_units, loop_parts
 from tfarm.exact.system import system_of
 from tfarm.loop.loop import Loop
 from tfarm.loop.panels import MOST_MISS, loop_panels
 from tfarm.loop.stability import stability
-from tfarm.report.live import live_data, save_live, sensor_numbers, slew_numbers
+from tfarm.report.live import has_sliders, law_data, live_data, save_live, sensor_numbers, slew_numbers
 from tfarm.report.page import Case, GivenLaw
 
 SIGNALS = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
@@ -219,6 +219,61 @@ def test_an_arm_that_cannot_turn_freely_has_no_samples():
         loop_panels(arm.having(payload_mass=math.inf), 1000.0)
 
 
+# ------------------------------------------------------------ the page of a law
+
+
+LAW = Law({"hub_angle": ([0.4, 3.0], [0.02, 1.0]), "tip_displacement": ([-0.2], [0.01, 1.0]), "root_moment": 0.2})
+
+
+@pytest.fixture(scope="module", params=["sasaki2012-lab", "quanser-flexlink"])
+def law_page(request):
+    arm, chain = tfarm.load(request.param), load_chain(request.param)
+    return arm, chain, json.loads(json.dumps(law_data(arm, chain, LAW), allow_nan=False))
+
+
+def test_only_few_rational_parts_in_s_have_sliders():
+    five = ("hub_angle", "hub_rate", "root_moment", "tip_displacement", "strain@0.05")
+    assert has_sliders(LAW)
+    assert not has_sliders(Law(dict.fromkeys(five, 1.0)))
+    assert not has_sliders(Law({"hub_rate": ([0.3], [1.0, -0.5])}, period=0.01))
+    assert not has_sliders(Law.of_matrices([[-5.0]], [[1.0]], [[1.0]], [[0.3]], ["hub_rate"]))
+
+
+def test_samples_of_a_law_are_each_part_times_the_response_to_its_signal(law_page):
+    """Against `tfarm.transfer` and the entries of the law, up to the smallest of both at resonances."""
+    arm, _, data = law_page
+    page, omega = Page(data), np.random.default_rng(3).uniform(1e-3, 1.0, 100) * data["band"]
+    drive, *rows = page.at(omega)
+    assert data["rows"] == [[1, 0], [2, 0], [3, 0]]
+    for name, row, entry, signal in zip(data["names"], rows, LAW.values(1j * omega), LAW.signals, strict=True):
+        exact = entry * tfarm.transfer(arm, signal)(1j * omega)
+        here = data["start"][name] * row / ((1j * omega) ** data["order"] * drive)
+        assert (abs(here - exact) < 1e-6 * abs(exact) + 1e-9 * abs(exact).max()).all(), name
+
+
+def test_sampled_loop_of_a_law_has_the_poles_of_its_state_space(law_page):
+    """Plant and blocks of the page closed by python-control, against the library's spectral radius."""
+    arm, chain, data = law_page
+    held = data["sampled_loop"]
+    plant, T = Plant(held, 2.0), held["period"]
+    columns = sorted(held["columns"], key=lambda column: column["row"])
+    assert [column["row"] for column in columns] == [0, 1, 2]
+    for factor in (1.0, 0.3):
+        blocks = []
+        for each in columns:
+            zeros, poles = (1.0 + np.array([complex(*pair) for pair in each[key]]) for key in ("zeros", "poles"))
+            gain = factor * each["g"] * data["start"][each["name"]]
+            blocks.append(control.ss(control.zpk(zeros, poles, gain, dt=T)))
+        outputs = control.ss(plant.A, plant.B[:, None], plant.C[:3], 0, T)
+        L = control.ss([], [], [], np.ones((1, 3)), T) * control.append(*blocks) * outputs
+        known = sampled_verdict(arm, LAW.times(factor), chain)
+        assert held["delay"] == held["fraction"] == 0
+        z = control.feedback(L, 1).poles()
+        if not any(twice for twice, _ in held["rigid"]):
+            z = np.delete(z, abs(z - 1).argmin())  # an integral that none of the signals feels
+        assert math.log(abs(z).max()) == pytest.approx(known.log_radius, rel=1e-5, abs=1e-11)
+
+
 # ------------------------------------------------------------ the page's arithmetic, from its numbers alone
 
 
@@ -233,13 +288,15 @@ class Page:
     def __init__(self, data):
         self.data = data
         self.low, self.high = np.array(data["low"]), np.array(data["high"])
-        values = np.frombuffer(base64.b64decode(data["samples"]), "<f8").view(complex).reshape(-1, 3, POINTS)
+        values = (
+            np.frombuffer(base64.b64decode(data["samples"]), "<f8").view(complex).reshape(self.low.size, -1, POINTS)
+        )
         self.series = values @ TO_SERIES.T
         self.series[..., 0] /= 2
         self.grid = self._grid()
 
     def at(self, omega):
-        """d, theta and m (3, n)."""
+        """d, theta and m (3, n), or d and the parts of a law."""
         omega = np.atleast_1d(omega)
         panel = np.minimum(np.searchsorted(self.high, omega), self.high.size - 1)
         x = (2 * omega - self.low[panel] - self.high[panel]) / (self.high[panel] - self.low[panel])

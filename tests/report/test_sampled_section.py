@@ -19,10 +19,10 @@ from tfarm.dsp.chain import Converters, Sampling
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
 from tfarm.plots import regions
-from tfarm.plots.regions import CUT_RANGE, K2_RANGE, draw_overlay, stable_regions
+from tfarm.plots.regions import CUT_RANGE, K2_RANGE, overlay, stable_regions
 from tfarm.report import sampled_section as page
-from tfarm.report.page import Case, GivenLaw, prose, save_block
-from tfarm.report.sampled_section import CURVE_DIGITS, FILM_FRAMES, sampled_section, slews
+from tfarm.report.page import DRAWN_DIGITS, Case, GivenLaw, prose, save_block
+from tfarm.report.sampled_section import FILM_FRAMES, sampled_section, slews
 from tfarm.schema import across, text
 from tfarm.spectrum.table import default_gains
 
@@ -54,7 +54,7 @@ def test_the_picture_of_a_rig_is_as_high_as_its_own_gains(monkeypatch):
     monkeypatch.setattr("tfarm.plots.regions.LITTLE_DAMPINGS", ())
     rig = tfarm.load("quanser-2dsfl")
     data = stable_regions(rig, default_gains(rig), Chain())
-    low, high = draw_overlay(data).axes[0].get_ylim()
+    low, high = overlay.figure(*data).axes[0].get_ylim()
     assert 0.112 < high < 0.2
     (sampled,) = data.sampled
     ((bottom, top),) = sampled.stable_intervals[0]
@@ -147,9 +147,9 @@ def test_the_slew_is_the_simulators_own(section):
     for key, K2 in (("without", 0.0), ("default", 0.3)):
         expected = simulator.linear(HubFeedback(K1=0.3, K2=K2))
         for name, signal in (("torque", expected.torque), ("root_moment", expected.at_samples.root_moment)):
-            at_samples = np.isin(drawn["t_s"], kept_digits(expected.t, CURVE_DIGITS))
+            at_samples = np.isin(drawn["t_s"], kept_digits(expected.t, DRAWN_DIGITS))
             shown = np.array(drawn[f"{name}_{key}_N_m"])[at_samples]
-            half_a_digit = 0.5 * 10.0 ** (1 - CURVE_DIGITS)  # of a number that begins with 1
+            half_a_digit = 0.5 * 10.0 ** (1 - DRAWN_DIGITS)  # of a number that begins with 1
             assert abs(shown - signal).max() < half_a_digit * abs(signal).max()
 
 

@@ -36,7 +36,7 @@ from tfarm.loop.curve import LoopCurve, curve_of, gain_margin, lowest_drawn, ref
 from tfarm.loop.margins import LoopMargins, Margins, margins, margins_of_curve
 from tfarm.loop.stability import SMALL_GAIN, stability
 from tfarm.records import record
-from tfarm.schema import Percent, Quantity, Table, across
+from tfarm.schema import Percent, Quantity, Table, across, text
 from tfarm.schema.html import as_html, with_symbols
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import default_gains
@@ -52,9 +52,8 @@ GRADED = {  # names of the graded margins in the grade of the loop
     "peak_sensitivity": "Ms",
 }
 GAIN_LIMITS, PHASE_LIMITS, PERIOD_LIMITS, PEAK_LIMITS = (6.0, 3.0), (45.0, 30.0), (1.0, 0.5), (2.0, 3.0)
-REFERENCE_RATIO = 1e-3  # damping ratio of mode 1 with which an undamped arm is graded
+REFERENCE_RATIO = 1e-3  # damping ratio of mode 1 with which an undamped arm is graded; less is small damping
 ON_REAL_AXIS = 1e-9  # of its size: imaginary part of a sampled pole which is rounding
-SMALL_RATIO = 1e-3  # of mode 1: below it the minimum structural damping for stability is on the card
 UNDAMPED = (
     "undamped model: margins and grades are those with C = {:.4g} s, 0.1 % of critical damping in mode 1; "
     "at C = 0 the exact delay and disk margins are 0 for every gain"
@@ -73,7 +72,7 @@ class Graded(NamedTuple):
         """Value, frequency and grade."""
         if self.value is None:
             return UNDEFINED
-        size = "no limit" if math.isinf(self.value) else general(self.value, digits)
+        size = "no limit" if math.isinf(self.value) else text(self.value, digits)
         return f"{size}{'' if self.omega is None else f' at {general(self.omega, digits)} rad/s'}, {self.grade}"
 
 
@@ -89,7 +88,7 @@ class LeastDamped(NamedTuple):
 
 
 NOT_DEFINED = Graded(None, None, UNDEFINED)
-_margins_of, _sampled_of = lru_cache(maxsize=16)(margins), lru_cache(maxsize=16)(sampled)  # card and curve of a page
+margins_of, _sampled_of = lru_cache(maxsize=64)(margins), lru_cache(maxsize=16)(sampled)  # card and curve of a page
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,8 +179,8 @@ def result_card(
     notes += [UNDAMPED.format(reference)] if arm.has_elastic_link else []
     loops: dict[str, Callable[[], tuple[LoopCard, Callable[[], LoopCard]]]] = {
         "continuous": lambda: (
-            continuous_card(continuous or _margins_of(arm, law), T),
-            lambda: continuous_card(_margins_of(damped, law), T),
+            continuous_card(continuous or margins_of(arm, law), T),
+            lambda: continuous_card(margins_of(damped, law), T),
         ),
         "sampled": lambda: (
             sampled_card(at_samples or _sampled_of(arm, law, chain)),
@@ -229,7 +228,7 @@ def sampled_card(found: Analysis) -> LoopCard:
     arm, T = loop.plant.arm, loop.chain.sampling.period
     if verdict.is_stable:
         band = sampled_margins(SampledCurve(loop))
-    is_small = arm.least_damping < SMALL_RATIO / REFERENCE_RATIO * reference_damping(arm)
+    is_small = arm.least_damping < reference_damping(arm)
     needed, word = found.minimum_damping if is_small else None, "converged" if verdict.is_converged else "approximate"
     return LoopCard(
         stability=verdict.word,
@@ -308,7 +307,7 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
 
     found = None
     if not law.is_discrete:
-        own = _margins_of(damped, law)
+        own = margins_of(damped, law)
         found = as_card(curve_of(own), (own.stability if damped is arm else stability(arm, law)).verdict)
     if found is not None and chain is None:
         return found
@@ -373,12 +372,12 @@ def _margins(
         return dict.fromkeys(GRADED, NOT_DEFINED) | undefined
     down, up = (gain_margin(band, factor) for factor in gain)
     phase, peak = band.phase_margin, band.sensitivity_peak
-    periods = None if delay is None else float(delay) / period
+    periods = None if delay is None else type(delay)(delay / period)
     graded = (
         Graded(*up, grade_of(up[0], GAIN_LIMITS)),
         Graded(*down, grade_of(down[0], GAIN_LIMITS)),
         Graded(abs(phase.value), phase.omega, grade_of(abs(phase.value), PHASE_LIMITS)),
-        Graded(None if delay is None else 1e3 * float(delay), None, grade_of(periods, PERIOD_LIMITS)),
+        Graded(None if delay is None else type(delay)(1e3 * delay), None, grade_of(periods, PERIOD_LIMITS)),
         Graded(peak.value, peak.omega, grade_of(peak.value, PEAK_LIMITS)),
     )
     worst = max((each.grade for each in graded), key=GRADES.index)

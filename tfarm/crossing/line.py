@@ -126,7 +126,7 @@ def crossed(places: Real, parts: Parts) -> tuple[Real, Real, Whole]:
 
 
 def crossings(family: Family, count: int, places: Real, *, with_dips: bool) -> list[list[Crossing]]:
-    """The crossings of each of so many lines between neighbours of a grid of places, all solved for at once.
+    """The crossings of each line between neighbours of a grid of places, all solved for at once.
 
     `with_dips`: those too of which two lie between neighbours, where |h| dips through 0.
     """

@@ -20,7 +20,6 @@ from .margins import BELOW_SLOWEST, IN_RANGE, LoopMargins, Margins, dense
 
 MOST_FACTOR = 1e9  # on the controller: a larger gain margin is none
 SAME_FACTOR = 1e-6  # relative: by no more the gain margin differs from the factor at its phase crossover
-TURN = 360.0  # deg
 LONGEST_STEP, FINER_ROUNDS = 0.15, 6  # of ln L from point to point, and rounds in which longer ones are halved
 
 
@@ -60,7 +59,7 @@ class LoopCurve:
     @property
     def phase(self) -> Annotated[Real, Quantity("phase", "deg", curve=True, help="angle of L, above -360 to 0")]:
         """The angle of L in (-360, 0] deg: with -180 in the middle, as a Nichols chart has it."""
-        return np.asarray(-np.mod(-np.degrees(np.angle(self.L)), TURN))
+        return np.asarray(-np.mod(-np.degrees(np.angle(self.L)), 360.0))
 
     @property
     def sensitivity(self) -> Annotated[Real, Quantity("|S|", "dB", curve=True, key="sensitivity_db",

@@ -14,7 +14,9 @@ changes the drive alone.
 """
 
 import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -28,7 +30,7 @@ from tfarm.records import record
 from tfarm.response import transfer
 from tfarm.spectrum import Modes, modes
 
-from .loop import band_of, steep_places
+from .loop import Loop, band_of, steep_places
 
 PANEL_SAMPLES = 24  # of order 1/2 as the parts are, few more never help where a panel holds one mode
 STEEP_A_PANEL = 3  # steep places a panel: each mode has one of the own, the locked and the free hub
@@ -49,6 +51,8 @@ NOT_SENSED = 1e-9  # of a mode's largest: a reading no larger of any mode is non
 class Panels:
     """Samples of d, theta and m, `values` (3, panels, PANEL_SAMPLES), on panels of the axis up to `band` [rad/s].
 
+    Under a law they are of the drive times its denominator and of what each part feeds back.
+
     A panel is from `low` to `high` [rad/s], the first from -`high`, and has one positive factor on its values; `order`
     is n of the drive's s^n.  `error` is the largest miss between samples, as a share of a part's size on its panel.
     """
@@ -61,20 +65,24 @@ class Panels:
     error: float
 
 
-def loop_panels(arm: Arm, band: float) -> Panels:
-    """Return the samples up to a band [rad/s].
+def loop_panels(arm: Arm, band: float, loop: Loop | None = None) -> Panels:
+    """Return the samples up to a band [rad/s], of hub angle and gauge or of the parts of a loop's law.
 
     Raises ParameterError for an arm that cannot turn freely, ConvergenceError where halving panels does not help.
     """
     require(arm.has_rigid_mode, "arm", arm.name, "samples of a loop are of an arm that turns freely")
     order = 1 if arm.rate_loss else 2
+    rows: Callable[[Complex], Complex] = partial(_hub_rows, arm, order)
+    if loop is not None:
+        at_rest = loop.k.at_rest + int((loop.law.poles == 0).sum())
+        order, rows = at_rest - loop.zeros_at_origin, partial(_law_rows, loop, at_rest)
     places = np.asarray(steep_places(arm, band))[STEEP_A_PANEL - 1 :: STEEP_A_PANEL]
     edges = np.r_[0.0, places[places < band], band]
     waiting = [(-edges[1], edges[1]), *itertools.pairwise(edges[1:])]
     done: list[tuple[float, float, Complex, float]] = []
     while waiting:
         low, high = waiting.pop()
-        values, error = _panel(arm, order, low, high)
+        values, error = _panel(rows, low, high)
         if error <= MOST_MISS:
             done.append((float(low), float(high), values, error))
         elif low == -high:
@@ -87,17 +95,26 @@ def loop_panels(arm: Arm, band: float) -> Panels:
     return Panels(band, np.array(lows), np.array(highs), np.stack(parts, axis=1), order, max(errors))
 
 
-def _panel(arm: Arm, order: int, low: float, high: float) -> tuple[Complex, float]:
-    """Samples of d, theta and m on one panel, the largest 1, and the largest miss between them.
-
-    Without losses they are real: the imaginary part is rounding, and would be a loss next to a resonance.
-    """
-    middle, half, k = (low + high) / 2, (high - low) / 2, system_of(arm)
-    s = 1j * (middle + half * np.r_[CHEBYSHEV, BETWEEN_SAMPLES])
+def _hub_rows(arm: Arm, order: int, s: Complex) -> Complex:
+    """d, theta and m; without losses real: the imaginary part is rounding, and would be a loss next to a resonance."""
+    k = system_of(arm)
     drive, numerators, scale = loop_parts(k, s)
     theta, _, gauge = (float_units(k) * numerators)[[FED_BACK.index(output) for output in AT_HUB]]
     both = np.stack([drive / s**order, theta, gauge / s**2]) * np.exp(scale - scale.real.max())
-    both = both.real + 0j if arm.is_reactive else both
+    return both.real + 0j if arm.is_reactive else both
+
+
+def _law_rows(loop: Loop, at_rest: int, s: Complex) -> Complex:
+    """The drive times the law's denominator over s^at_rest, and what each part feeds back over the s^n of D."""
+    rig, (shares, whole) = loop.signals.parts(s), loop.law.shares(s)
+    fed_back = np.exp(-s * loop.law.delay) * (shares * rig.numerators).sum(axis=1) / s**loop.zeros_at_origin
+    return np.vstack([rig.drive * whole / s**at_rest, fed_back]) * np.exp(rig.scale - rig.scale.real.max())
+
+
+def _panel(rows: Callable[[Complex], Complex], low: float, high: float) -> tuple[Complex, float]:
+    """Samples of all parts on one panel, the largest 1, and the largest miss between them."""
+    middle, half = (low + high) / 2, (high - low) / 2
+    both = rows(1j * (middle + half * np.r_[CHEBYSHEV, BETWEEN_SAMPLES]))
     size = abs(both).max()
     values, between = both[:, :PANEL_SAMPLES] / size, both[:, PANEL_SAMPLES:] / size
     weights = BARYCENTRIC / (BETWEEN_SAMPLES[:, None] - CHEBYSHEV)

@@ -10,13 +10,30 @@ from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from tempfile import mkdtemp
-from typing import Any, get_args
+from typing import Any, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import ANGLE_GAIN, FED_BACK, GAINS, MOMENT_GAIN, PLANE, AnyLaw, Arm, HubFeedback, as_law, unit_of
-from tfarm.case.card import GAIN_LIMITS, PEAK_LIMITS, PERIOD_LIMITS, PHASE_LIMITS, UNDAMPED, reference_damping
+from tfarm.arm import (
+    ANGLE_GAIN,
+    FED_BACK,
+    GAINS,
+    MOMENT_GAIN,
+    PLANE,
+    AnyLaw,
+    Arm,
+    HubFeedback,
+    Law,
+    arm_and_law,
+    as_law,
+    unit_of,
+)
+from tfarm.arm.blocks import Rational
+from tfarm.arm.law import Part
+from tfarm.arm.writing import law_toml
+from tfarm.arrays import Complex
+from tfarm.case.card import GAIN_LIMITS, GRADED, PEAK_LIMITS, PERIOD_LIMITS, PHASE_LIMITS, UNDAMPED, reference_damping
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits, scientific
 from tfarm.dsp import Chain, PulseTransfer, Sampled, Scenario, Simulator, sampled_verdict, scenario
@@ -46,6 +63,16 @@ SENSOR_DIGITS = 6  # of the numbers of that chart: far more than a screen has
 FRAME = 780  # pixels: height of the page in a notebook
 LIVE_PAGE, ASSETS, SCRIPT = "live.html", "assets", "live.js"
 LIMITS = {"gain": GAIN_LIMITS, "phase": PHASE_LIMITS, "periods": PERIOD_LIMITS, "peak": PEAK_LIMITS}  # of the grades
+BEYOND = "|L| < 0.5 beyond the frequency range at all gains of this page: no unstable pole there (small gain)"
+AT_HUB = {  # `rows`: of each gain a part of the samples, and the power of s on it
+    "names": ["K1", "K2", "Kp"],
+    "labels": {"K1": "hub rate", "K2": "root moment", "Kp": "hub angle"},
+    "plane": PLANE,
+    "rows": [[1, 1], [2, 2], [1, 0]],
+    "of_law": None,
+}
+MOST_PARTS = 4  # of a law: |L| beyond the frequency range is bounded at all 2^n corners of their ranges
+REACH = 10.0  # of a gain of a law, up and down: the range of its slider
 COLOURS = {"stable": STABLE, "marginal": MARGINAL, "unstable": UNSTABLE, "good": GOOD, "low": LOW, "poor": POOR}
 
 
@@ -65,6 +92,30 @@ def sampled_numbers(loop: Sampled) -> dict[str, Any]:
     twice, once = plant.rigid[0]
     states = {"states": 2 if twice else 1 if once else 0, "modes": plant.count}
     return _sampling(loop.chain) | _plant(PulseTransfer(plant, loop.chain.sampling).folded().plant) | states
+
+
+def law_in_page(loop: Sampled, names: Sequence[str]) -> dict[str, Any]:
+    """The sampled loop of a law: `columns` are its parts by name, in delta = z - 1; `ones` poles at z = 1."""
+    plant, in_z = loop.pulse.plant, loop.in_z
+    orders = [2 if twice else 1 if once else 0 for twice, once in plant.rigid.tolist()]
+    ones = max(orders[row] - int((zeros == 0).sum()) for _, row, _, zeros in in_z.columns)
+    return (
+        _sampling(loop.chain)
+        | _plant(plant)
+        | {
+            "ones": max(0, ones),
+            "modes": loop.plant.count,
+            "columns": [
+                {"name": names[n], "row": row, "g": g, "zeros": _pairs(zeros), "poles": _pairs(in_z.part_poles[n])}
+                for n, row, g, zeros in in_z.columns
+            ],
+        }
+    )
+
+
+def _pairs(values: Complex) -> list[list[float]]:
+    """Real and imaginary parts."""
+    return [[float(each.real), float(each.imag)] for each in values]
 
 
 def slew_numbers(arm: Arm, chain: Chain, law: HubFeedback) -> dict[str, Any] | None:
@@ -161,14 +212,15 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
     } | {ANGLE_GAIN: {"low": 0.0, "high": stiffest, "linear": 1e-4 * stiffest}}
     reference = default_gains(arm)
     corners = product(*((of["low"], of["high"]) for of in axes.values()))
-    laws = [HubFeedback(**dict(zip(axes, each, strict=True))) for each in corners]
+    laws = [as_law(HubFeedback(**dict(zip(axes, each, strict=True)))) for each in corners]
     samples, is_quiet = _samples(arm, laws)
     band, across = samples["band"], rate_columns(arm, x, LIVE_COLUMNS)
     beyond = np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])
     continuous = gain_map(arm, np.unique(np.r_[across, x.high]), beyond)
     sampled = sampled_region(arm, x, y, chain)
     return {
-        "name": arm.name,
+        **_page(arm, chain),
+        **AT_HUB,
         "units": {gain.name: unit_of(gain.name, arm) for gain in GAINS},
         "axes": axes,
         "start": {gain.name: (law or reference)[gain.name] for gain in GAINS},
@@ -180,51 +232,116 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
         "sampled_map": None if sampled is None else _sampled(sampled, chain),
         "sampled_loop": None if sampled is None else sampled_numbers(sampled.loop),
         "slew": slew_numbers(arm, chain, law or reference),
-        **sensor_numbers(arm),
         "lyapunov": arm.is_uniform,
         "default": {gain.name: reference[gain.name] for gain in GAINS},
-        "period": chain.sampling.period,
-        "longest_delay": LONGEST_DELAY_SAMPLES * chain.sampling.period,
         "outputs": {gain.name: gain.output for gain in GAINS},
-        "limits": LIMITS,
         "graded": _graded(arm, laws, chain, reference) if arm.has_elastic_link else None,
     }
 
 
-def _samples(arm: Arm, laws: Sequence[HubFeedback]) -> tuple[dict[str, Any], bool]:
-    """Samples of the loop's parts in the band of these laws, and whether small gain holds beyond it."""
-    band, is_quiet = band_of_family(Loop(arm, as_law(law)) for law in laws)
-    samples = loop_panels(arm, band)
+def law_data(arm: Arm, chain: Chain, law: Law) -> dict[str, Any]:
+    """The same for a law of rational parts: the gain of each part is a number of the page.
+
+    The slew is of gains at the hub alone.  Raises ParameterError for other laws.
+    """
+    head, *_ = law_toml(law).split("\n\n")
+    gains = {name: value for name, (_, value) in law.part_gains.items()}
+    corners = [law.weighted(each) for each in product((1 / REACH, REACH), repeat=len(law.parts))]
+    unit = law.weighted([1.0 / value for value in gains.values()])
+    samples, is_quiet = _samples(arm, corners, unit)
+    return {
+        **_page(arm, chain),
+        "names": list(gains),
+        "labels": {name: "" if name in law.signals else "factor" for name in gains},
+        "plane": list(gains)[:2] if len(gains) > 1 else None,
+        "rows": [[place, 0] for place in range(1, 1 + len(gains))],
+        "of_law": {"head": head, "parts": [_table(name, part) for name, part in zip(gains, unit.parts, strict=True)]},
+        "units": dict.fromkeys(gains, "1"),
+        "axes": {name: _gain_axis(value) for name, value in gains.items()},
+        "start": gains,
+        "reference": gains,
+        "reference_count": stability(arm, law, samples["band"]).unstable_roots,
+        **samples,
+        **_known(arm, is_quiet),
+        "kind": "quiet" if is_quiet else "band",
+        "by_sign": False,
+        "moments": [None, None],
+        "beyond": BEYOND,
+        **dict.fromkeys(("continuous", "sampled_map", "slew", "lyapunov", "default", "outputs")),
+        "sampled_loop": law_in_page(sampled_verdict(arm, law, chain).full, list(gains)),
+        "graded": _graded(arm, corners, chain, law, unit) if arm.has_elastic_link else None,
+    }
+
+
+def _gain_axis(value: float) -> dict[str, float]:
+    """The range of a gain of a law, without 0, at which poles may join those at s = 0."""
+    low, high = sorted((value / REACH, value * REACH))
+    return {"low": low, "high": high, "linear": abs(value) / REACH}
+
+
+def _table(name: str, part: Part) -> dict[str, Any]:
+    """A part of a law whose gain is 1, for the table of its signal."""
+    block = cast(Rational, part.block)
+    return {"name": name, "signal": part.signals[0], "num": block.num, "den": block.den}
+
+
+def _page(arm: Arm, chain: Chain) -> dict[str, Any]:
+    """What every live page has."""
+    T = chain.sampling.period
+    return {
+        "name": arm.name,
+        **sensor_numbers(arm),
+        "period": T,
+        "longest_delay": LONGEST_DELAY_SAMPLES * T,
+        "limits": LIMITS,
+        "margin_names": dict(zip(("up", "down", "phase", "delay", "peak"), GRADED.values(), strict=True)),
+    }
+
+
+def _samples(arm: Arm, laws: Sequence[Law], law: Law | None = None) -> tuple[dict[str, Any], bool]:
+    """Samples of the loop's parts in the band of these laws, and whether small gain holds beyond it.
+
+    They are those of hub angle and gauge, or of each part of `law`, whose poles and zeros are steep places too.
+    """
+    band, is_quiet = band_of_family(Loop(arm, each) for each in laws)
+    samples = loop_panels(arm, band, None if law is None else Loop(arm, law))
+    blocks = () if law is None else (cast(Rational, part.block) for part in law.parts)
+    own = [abs(s) for block in blocks for s in (*block.poles, *block.zeros) if s]
     return {
         "samples": packed(samples.values.transpose(1, 0, 2)),  # the bytes of doubles, by panel, part and point
         "low": samples.low.tolist(),
         "high": samples.high.tolist(),
         "order": samples.order,
         "error": float(f"{samples.error:.0e}"),
-        "places": np.asarray(steep_places(arm, 1.05 * samples.band)).tolist(),
+        "places": np.unique(np.r_[steep_places(arm, 1.05 * samples.band), own]).tolist(),
         "band": samples.band,
     }, is_quiet
 
 
-def _graded(arm: Arm, laws: Sequence[HubFeedback], chain: Chain, law: HubFeedback) -> dict[str, Any]:
+def _graded(arm: Arm, laws: Sequence[Law], chain: Chain, law: AnyLaw, unit: Law | None = None) -> dict[str, Any]:
     """The loop with whose damping an undamped arm is graded, and the words for that: `tfarm.case.card`."""
     C = reference_damping(arm)
     damped = arm.having(damping=C)
-    sampled = sampled_numbers(sampled_verdict(damped, law, chain).full)
-    return _samples(damped, laws)[0] | {"kind": "band", "sampled_loop": sampled, "words": UNDAMPED.format(C)}
+    sampled = sampled_verdict(damped, law, chain).full
+    samples, _ = _samples(damped, laws, unit)
+    return samples | {
+        "kind": "band",
+        "reference_count": stability(damped, law, samples["band"]).unstable_roots,
+        "sampled_loop": sampled_numbers(sampled) if unit is None else law_in_page(sampled, list(unit.part_gains)),
+        "words": UNDAMPED.format(C),
+    }
 
 
 def _known(arm: Arm, is_quiet: bool) -> dict[str, Any]:
     """Theorems and bounds beyond the frequency range, and the static balance, on which verdicts rest."""
     kind = "reactive" if arm.is_reactive else "quiet" if is_quiet else "band"
     by_energy = "C = 0: every mode beyond the frequency range is damped (Lyapunov), with a decay rate that tends to 0"
-    beyond = "|L| < 0.5 beyond the frequency range at all gains of this page: no unstable pole there (small gain)"
     if arm.is_reactive and not arm.reads_hub_moment:
         by_energy = "C = 0: no mode of the frequency range is driven; not determined beyond"
     moments = _stable_moments(arm) if arm.is_reactive else (-math.inf, math.inf)
     return {
         "kind": kind,
-        "beyond": beyond if kind == "quiet" else by_energy,
+        "beyond": BEYOND if kind == "quiet" else by_energy,
         "moments": [None if math.isinf(end) else end for end in moments],  # JSON has no infinity
         "by_sign": arm.has_elastic_link and arm.reads_hub_moment and not arm.input_lags,
         "hub_alone": arm.loses_at_hub_alone,
@@ -284,7 +401,7 @@ def sensor_numbers(arm: Arm) -> dict[str, Any]:
 
 def _numbers(found: Positions) -> dict[str, Any]:
     """The positions in a few digits."""
-    zeros = [np.c_[each.real, each.imag].tolist() for each in found.known_zeros]
+    zeros = [_pairs(each) for each in found.known_zeros]
     return {
         "x": kept_digits(found.x, SENSOR_DIGITS),
         "band": found.band,
@@ -299,16 +416,23 @@ def is_live(case: Case) -> bool:
     return has_loop(case.arm) and case.arm.has_rigid_mode
 
 
+def has_sliders(law: Law) -> bool:
+    """Whether a page can have a slider for each part of a law: gains at the hub, or few rational parts in s."""
+    are_rational = all(hasattr(part.block, "num") for part in law.parts)
+    return not law.is_discrete and are_rational and len(law.part_gains) == len(law.parts) <= MOST_PARTS
+
+
 def save_live(case: Case, folder: Path) -> None:
-    """live.html in the arm's folder.  It begins at the gains that the arm's pages are about.
+    """live.html in the arm's folder.  It begins at the first law of its pages that has sliders, else at default gains.
 
     Where its numbers cannot be made the page has the reason.
     """
     arm, chain, laws = case.arm, case.chain, case.laws
     title, out = f"{arm.name}: live loop", folder / LIVE_PAGE
-    given = [gains for each in laws if (gains := as_law(each.law).gains) is not None]
+    law = next((law for each in laws if has_sliders(law := as_law(each.law))), as_law(default_gains(arm)))
+    arm, _ = arm_and_law(arm, law)
     try:
-        data = live_data(arm, chain, given[0] if given else None)
+        data = law_data(arm, chain, law) if law.gains is None else live_data(arm, chain, law.gains)
     except TfarmError as error:
         write_text(out, render("live_failed.html", title=title, why=str(error)))
         return
@@ -356,7 +480,7 @@ def explore(arm: Arm, law: AnyLaw | None = None, chain: Chain | None = None) -> 
     arm
         The arm.
     law
-        The gains at which the page begins; by default, and for another controller, the default gains.
+        The controller at which the page begins; the default gains unless given, and for one that has no sliders.
     chain
         Sampling; every 10 ms unless given.
 

@@ -27,12 +27,17 @@ function label(x, kind) {
   return ten && kind ? `${ten[1]}10${ten[2] === "-" ? "⁻" : ""}${[...ten[3]].map(k => "⁰¹²³⁴⁵⁶⁷⁸⁹"[k]).join("")}` : words;
 }
 
-// Draw plots, {x, y, marks, share of the height}, and return the scales of each; what a plot below has too is not lettered above
-function paint(canvas, plots, colours) {
-  const ratio = window.devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight, draw = canvas.getContext("2d");
-  if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) { canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio); }
+// A canvas with as many dots as its place has, empty
+function cleared(canvas) {
+  const ratio = window.devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight, draw = canvas.getContext("2d"), dots = [width, height].map(x => Math.round(x * ratio));
+  if (canvas.width !== dots[0] || canvas.height !== dots[1]) [canvas.width, canvas.height] = dots;
   draw.setTransform(ratio, 0, 0, ratio, 0, 0);
   draw.clearRect(0, 0, width, height);
+  return { draw, width, height };
+}
+// Draw plots, {x, y, marks, share of the height}, and return the scales of each; what a plot below has too is not lettered above
+function paint(canvas, plots, colours) {
+  const { draw, width, height } = cleared(canvas);
   draw.font = "11px system-ui, sans-serif";
   const free = height - TOP - BELOW - BETWEEN * (plots.length - 1), whole = plots.reduce((sum, plot) => sum + (plot.share || 1), 0);
   let top = TOP;

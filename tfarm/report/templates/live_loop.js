@@ -11,7 +11,7 @@ const div = (a, b) => times(1 / (b[0] * b[0] + b[1] * b[1]), mul(a, conj(b)));
 const geometric = (a, b, n) => [...Array(n).keys()].map(i => a * (b / a) ** (i / (n - 1)));
 const SERIES = X.map((_, k) => X.map((_, j) => (k ? 2 : 1) / POINTS * Math.cos(k * Math.PI * (j + 0.5) / POINTS)));
 const AWAY = geometric(0.05, 20, 12); // of the distance of a pole from the axis: where a curve has points near it
-const degrees = a => Math.atan2(a[1], a[0]) * 180 / Math.PI;
+const WEIGHTS = new Float64Array(POINTS), degrees = a => Math.atan2(a[1], a[0]) * 180 / Math.PI;
 
 // The zero of f between a and b, where its values fa and fb have opposite signs: Chandrupatla (1997)
 function zeroOf(f, a, fa, b, fb) {
@@ -93,7 +93,7 @@ function curveOn({ w, D, rows }, gains, more, at) {
       curve.w[k] = w[i];
       for (const c of [0, 1]) {
         curve.D[2 * k + c] = D[2 * i + c];
-        for (let r = 0; r < 3; r++) curve.N[2 * k + c] += gains[r] * rows[r][2 * i + c];
+        for (let r = 0; r < gains.length; r++) curve.N[2 * k + c] += gains[r] * rows[r][2 * i + c];
       }
       i += 1;
     } else {
@@ -110,7 +110,9 @@ class LiveLoop {
     Object.assign(this, data);
     const bytes = Uint8Array.from(atob(data.samples), c => c.charCodeAt(0));
     this.values = new Float64Array(bytes.buffer); // panel, part, point, re and im
-    const base = this.grid().map(w => this.at(w)), units = [{ K1: 1, K2: 0, Kp: 0 }, { K1: 0, K2: 1, Kp: 0 }, { K1: 0, K2: 0, Kp: 1 }];
+    this.count_of_parts = this.values.length / (2 * POINTS * this.low.length);
+    this.units_of_law = this.names.map(one => Object.fromEntries(this.names.map(name => [name, +(name === one)])));
+    const base = this.grid().map(w => this.at(w)), units = this.units_of_law;
     const all = (part, law) => Float64Array.from(base.flatMap(point => this.parts(point, law)[part]));
     this.base = { w: Float64Array.from(base, point => point.w), D: all(0, units[0]), rows: units.map(unit => all(1, unit)) };
     this.series = []; // by how many zeros at s = 0 are divided out
@@ -118,34 +120,32 @@ class LiveLoop {
   }
 
   sample(panel, part, j) {
-    const i = 2 * ((panel * 3 + part) * POINTS + j);
+    const i = 2 * ((panel * this.count_of_parts + part) * POINTS + j);
     return [this.values[i], this.values[i + 1]];
   }
 
-  // d, theta and m at a real frequency w [rad/s], by the barycentric formula
+  // The parts at a real frequency w [rad/s], by the barycentric formula: d, theta and m, or under a law d and what each of its factors adds
   at(w) {
     let p = 0;
     while (p < this.low.length - 1 && w > this.high[p]) p += 1;
     const x = (2 * w - this.low[p] - this.high[p]) / (this.high[p] - this.low[p]), v = this.values;
-    let weights = 0, d = 0, e = 0, f = 0, g = 0, h = 0, k = 0, i = 6 * p * POINTS; // one number each: it is asked for thousands of times
-    for (let j = 0; j < POINTS; j++, i += 2) {
-      const c = C[j] / (x - X[j] || 1e-300);
-      weights += c;
-      d += c * v[i];
-      e += c * v[i + 1];
-      f += c * v[i + 2 * POINTS];
-      g += c * v[i + 2 * POINTS + 1];
-      h += c * v[i + 4 * POINTS];
-      k += c * v[i + 4 * POINTS + 1];
+    let weights = 0, i = 2 * this.count_of_parts * p * POINTS;
+    for (let j = 0; j < POINTS; j++) weights += WEIGHTS[j] = C[j] / (x - X[j] || 1e-300);
+    const values = [];
+    for (let part = 0; part < this.count_of_parts; part++) {
+      let re = 0, im = 0;
+      for (let j = 0; j < POINTS; j++, i += 2) { re += WEIGHTS[j] * v[i]; im += WEIGHTS[j] * v[i + 1]; }
+      values.push([re / weights, im / weights]);
     }
-    return { w, d: [d / weights, e / weights], theta: [f / weights, g / weights], m: [h / weights, k / weights] };
+    return { w, values };
   }
 
-  // drive s^n d and what the law makes of hub angle and gauge, at s = i w
-  parts({ w, d, theta, m }, law) {
-    const s = [0, w], s2 = [-w * w, 0];
-    const drive = mul(this.order === 2 ? s2 : s, d);
-    return [drive, add(mul([law.Kp, law.K1 * w], theta), mul(times(law.K2, s2), m))];
+  // drive s^n d and the sum of each number of the law times its row, a part times a power of s, at s = i w
+  parts({ w, values }, law) {
+    const raised = ([x, y], power) => power > 1 ? raised([-w * w * x, -w * w * y], power - 2) : power ? [-w * y, w * x] : [x, y];
+    let re = 0, im = 0;
+    this.names.forEach((name, r) => { const [part, power] = this.rows[r], [x, y] = raised(values[part], power); re += law[name] * x; im += law[name] * y; });
+    return [raised(values[0], this.order), [re, im]];
   }
 
   // Steep places closely, evenly between, slowly below: `tfarm.loop.loop.grid`
@@ -164,16 +164,28 @@ class LiveLoop {
     return [...D, ...N];
   }
   curve(law, more = []) {
-    return curveOn(this.base, [law.K1, law.K2, law.Kp], more, w => this.both(w, law));
+    return curveOn(this.base, this.names.map(name => law[name]), more, w => this.both(w, law));
   }
 
   // Unstable poles of the band: those of the reference and what crosses the axis on the way, first with Kp = 0
   count(law) {
+    if (this.of_law) return this.reference_count + this.crossed(this.reference, law) + this.rests(this.reference, law);
     const from = { ...this.reference, Kp: 0 }, corner = { ...law, Kp: 0 }, loss = this.rate_loss;
     let n = this.reference_count + this.crossed(from, corner) + this.crossed(corner, law);
     const way = corner.K1 - from.K1, t = -(from.K1 + loss) / way;
     if (way && t > 0 && t < 1) n -= Math.sign(way * (this.inertia - (from.K2 + t * (law.K2 - from.K2)) * this.gauged));
     return n + (law.Kp * (law.K1 + loss) < 0 ? 1 : 0);
+  }
+
+  // 1 where a real pole becomes unstable at s = 0 on the straight way between two laws, -1 where one becomes stable
+  rests(from, to) {
+    const [a, , c] = this.both(0, from), [, , e] = this.both(0, to), t = (a + c) / (c - e), near = this.base.w[0];
+    if (!(t > 0 && t < 1)) return 0;
+    const [, d, , m] = this.both(near, this.between(from, to, t));
+    return Math.sign((c - e) * (d + m));
+  }
+  between(from, to, t) {
+    return Object.fromEntries(this.names.map(name => [name, from[name] + t * (to[name] - from[name])]));
   }
 
   crossed(from, to) {
@@ -182,17 +194,19 @@ class LiveLoop {
 
   // Where on the straight way between two laws, 0 to 1, a pair of poles crosses the axis, and by how much it changes the count
   crossings(from, to) {
-    const way = { K1: to.K1 - from.K1, K2: to.K2 - from.K2, Kp: to.Kp - from.Kp };
-    if (!(way.K1 || way.K2 || way.Kp)) return [];
+    const way = Object.fromEntries(this.names.map(name => [name, to[name] - from[name]]));
+    if (!this.names.some(name => way[name])) return [];
     const { w, D, N } = this.curve(from), along = this.curve(way).N, A = D.map((d, i) => d + N[i]);
     const at = q => { const [a, b, c, d] = this.both(q, from), [, , e, f] = this.both(q, way); return [a + c, b + d, e, f]; };
     const found = zerosOn({ w, D: A, N: along, at }, (a, b, c, d) => b * c - a * d);
     return found.map(each => { const [a, b, c, d] = at(each.w); return { t: -(a * c + b * d) / (c * c + d * d), change: each.change }; }).filter(({ t }) => t > 0 && t < 1);
   }
 
-  // The intervals of K2 from low to high in which no pole of the band is unstable, and beyond it not every mode is driven
-  intervals(K1, Kp, low, high) {
-    const at = t => low + t * (high - low), from = { K1, K2: low, Kp }, found = this.crossings(from, { K1, K2: high, Kp }).sort((a, b) => a.t - b.t);
+  // The intervals of the second number of the map from low to high in which no pole of the band is unstable, and beyond it not every mode is driven
+  intervals(law, low, high) {
+    const [, up] = this.plane, { K1 } = law, from = { ...law, [up]: low }, to = { ...law, [up]: high }, at = t => low + t * (high - low), found = this.crossings(from, to);
+    if (this.of_law) { const [a, , c] = this.both(0, from), [, , e] = this.both(0, to), t = (a + c) / (c - e); if (t > 0 && t < 1) found.push({ t, change: this.rests(from, to) }); }
+    found.sort((a, b) => a.t - b.t);
     const driven = this.by_sign && this.hub_alone && this.kind === "band", end = driven && K1 + this.rate_loss > 0 ? this.whole : Infinity;
     const rows = [];
     let n = this.count(from), begin = n ? null : 0;
@@ -213,7 +227,7 @@ class LiveLoop {
       if (!(this.moments[0] < K2 && K2 < this.moments[1])) return ["not stable", `K2 is not below ${general(this.moments[1], 5)}`];
       return Kp >= 0 ? ["stable", this.beyond] : ["unstable", "Kp < 0: the hub falls from its angle"];
     }
-    if (K1 + this.rate_loss === 0 && Kp === 0) return ["not stable", "nothing holds the hub: two poles at 0"];
+    if (!this.of_law && K1 + this.rate_loss === 0 && Kp === 0) return ["not stable", "nothing holds the hub: two poles at 0"];
     const seen = poles.filter(s => s[0] > 1e-9 * size(s)).reduce((n, s) => n + (s[1] ? 2 : 1), 0);
     const n = Math.max(this.count(law), seen); // poles that came from beyond the band are seen alone
     if (n > 0) return ["unstable", `${n} unstable pole${n > 1 ? "s" : ""} up to ${band}`];
@@ -234,7 +248,7 @@ class LiveLoop {
   rigidCrossings(law) {
     const a = law.K1 / this.inertia, b = law.Kp / this.inertia, k = law.K2 * this.gauged / this.inertia;
     const A = 1 - k * k, B = 2 * b * k + a * a, root = Math.sqrt(B * B + 4 * A * b * b);
-    return this.rate_loss ? [] : [(B + root) / (2 * A), (B - root) / (2 * A)].filter(q => q > 0).map(Math.sqrt);
+    return this.rate_loss || this.of_law ? [] : [(B + root) / (2 * A), (B - root) / (2 * A)].filter(q => q > 0).map(Math.sqrt);
   }
 
   margins(law, curve, all = true) {
@@ -245,6 +259,7 @@ class LiveLoop {
 
   // The factor on all gains at which a pole is at s = 0
   restOf(law) {
+    if (this.of_law) { const [a, , c] = this.both(0, law); return -a / c; }
     return law.Kp ? 0 : law.K1 ? -this.rate_loss / law.K1 : this.rate_loss ? NaN : this.inertia / this.gauged / law.K2;
   }
 
@@ -259,11 +274,11 @@ class LiveLoop {
   // Closed-loop poles s near the axis, up to `top`: every zero of each panel's Chebyshev series, those off its panel left
   // out.  `near`: those of gains close by, from which they are soon found; `enough`: no further panel is searched where more are found
   poles(law, near = null, top = Infinity, enough = Infinity) {
-    const found = [], zero = law.Kp ? 0 : law.K1 || this.rate_loss ? 1 : 2, zeros = [];
+    const found = [], zero = Math.min(this.order, ...this.rows.map(([, power], r) => law[this.names[r]] ? power : 2)), zeros = [];
     this.low.forEach((low, p) => {
       if (low > top || found.length > enough) return;
       const middle = (low + this.high[p]) / 2, half = (this.high[p] - low) / 2, [d, ...rows] = this.seriesOf(p, zero);
-      const f = Float64Array.from(d, (x, i) => x + law.K1 * rows[0][i] + law.K2 * rows[1][i] + law.Kp * rows[2][i]);
+      const f = Float64Array.from(d, (x, i) => this.names.reduce((sum, name, r) => sum + law[name] * rows[r][i], x));
       zeros[p] = zerosOfSeries(f, near && near.zeros[p]);
       for (const z of zeros[p]) {
         const s = [-half * z[1], middle + half * z[0]], inside = Math.abs(z[0]) <= 1 && (p > 0 || s[1] > -1e-9 * half);
@@ -277,11 +292,11 @@ class LiveLoop {
   // The Chebyshev series of D and of what each gain adds to N, over s^zero, on panel p
   seriesOf(p, zero) {
     const known = this.series[zero] ||= [];
-    return known[p] ||= [[0, 0], [1, 0], [1, 1], [1, 2]].map(([part, gain]) => {
-      const unit = { K1: +(gain === 0), K2: +(gain === 1), Kp: +(gain === 2) }, middle = (this.low[p] + this.high[p]) / 2, half = (this.high[p] - this.low[p]) / 2;
+    return known[p] ||= [[0, 0], ...this.names.map((_, r) => [1, r])].map(([part, r]) => {
+      const unit = this.units_of_law[r], middle = (this.low[p] + this.high[p]) / 2, half = (this.high[p] - this.low[p]) / 2;
       const f = X.map((x, j) => {
         const w = middle + half * x;
-        let value = this.parts({ w, d: this.sample(p, 0, j), theta: this.sample(p, 1, j), m: this.sample(p, 2, j) }, unit)[part];
+        let value = this.parts({ w, values: [...Array(this.count_of_parts).keys()].map(k => this.sample(p, k, j)) }, unit)[part];
         for (let k = 0; k < zero; k++) value = div(value, [0, w]);
         return value;
       });
@@ -289,12 +304,12 @@ class LiveLoop {
     });
   }
 
-  // K1, K2 with poles at +- i w: the D-decomposition curve at this Kp
+  // The two numbers of the map with poles at +- i w: the D-decomposition curve at these others
   boundary(w, law) {
     const point = this.at(w);
-    const cross = (a, b) => a[1] * b[0] - a[0] * b[1], [D, N] = this.parts(point, { K1: 0, K2: 0, Kp: law.Kp }), P = add(D, N);
-    const a = this.parts(point, { K1: 1, K2: 0, Kp: 0 })[1], b = this.parts(point, { K1: 0, K2: 1, Kp: 0 })[1], det = cross(a, b);
-    return { K1: -cross(P, b) / det, K2: cross(P, a) / det, w };
+    const [across, up] = this.plane, cross = (a, b) => a[1] * b[0] - a[0] * b[1], [D, N] = this.parts(point, { ...law, [across]: 0, [up]: 0 }), P = add(D, N);
+    const [a, b] = this.plane.map(name => this.parts(point, this.units_of_law[this.names.indexOf(name)])[1]), det = cross(a, b);
+    return { [across]: -cross(P, b) / det, [up]: cross(P, a) / det, w };
   }
 }
 

@@ -1,11 +1,11 @@
 // The live page: gains from sliders, fields, keys, the map and the link; numbers by LiveLoop, SampledLoop and Slew; charts by `paint`.
 "use strict";
 (() => {
-  const $ = id => document.getElementById(id), data = JSON.parse($("live-data").textContent), names = ["K1", "K2", "Kp"];
+  const $ = id => document.getElementById(id), data = JSON.parse($("live-data").textContent), { names } = data, [across, up] = data.plane || [];
   const loop = new LiveLoop(data), discrete = data.sampled_loop && new SampledLoop(data.sampled_loop), slew = data.slew && new Slew(data.slew);
   const damped = data.graded && new LiveLoop({ ...data, ...data.graded }), dampedZ = damped && discrete && new SampledLoop(data.graded.sampled_loop); // that margins are graded with
-  const REST = 200, UNDOS = 100, law = { ...data.start }; // ms without a move until everything is drawn in full; states that are kept
-  const state = { plane: "poles", loop: "nyquist", vary: "K2", shown: "3" }, usual = { ...state }, past = [], colours = {};
+  const REST = 200, UNDOS = 100, PRECISE = 0.25, law = { ...data.start }; // ms without a move until everything is drawn in full; states that are kept; pixels
+  const state = { plane: "poles", loop: "nyquist", vary: up || names[0], shown: "3" }, usual = { ...state }, past = [], colours = {};
   const text = (id, words) => { const at = $(id); if (at && at.textContent !== words) at.textContent = words; };
   function dress() { // colours of the screen, light or dark
     const style = getComputedStyle(document.documentElement);
@@ -31,8 +31,8 @@
     const from = Math.min(loop.places[0] / 50, ...(margins ? margins.crossed.map(row => row.w / 3) : [])), drawn = {};
     return {
       law, poles, own, verdict, why, stable, grows, margins, near, frame: { x: [left, right], y: [0, top] }, ...sampledNumbers(law, z),
-      ratio: ratio(shownPoles), constant: constant(slowest(shownPoles)), from, run: slew && slew.run(law), curve: fine => drawn[fine] ||= curveOf(curve, fine, from),
-      areas: now && now.law.Kp === law.Kp ? now.areas : areas(law), edge: now && now.law.Kp === law.Kp ? now.edge : null,
+      ratio: ratio(shownPoles), constant: constant(slowest(shownPoles)), run: slew && slew.run(law), from, curve: () => drawn[zoom] ||= curveOf(curve, ...pixels(), from),
+      ...(now && names.every(name => name === across || name === up || now.law[name] === law[name]) ? { areas: now.areas, edge: now.edge } : { areas: areas(law), edge: null }),
     };
   }
   function sampledNumbers(law, z) {
@@ -43,7 +43,7 @@
     const scaled = { ...curve, w: curve.w.map(q => q / T), at: w => curve.at(w * T) };
     return {
       z, zword, zown: of === discrete ? null : own, zmargins: is_stable ? of.margins(law, curve, loop.restOf(law)) : null, zratio: ratio(of.unaliased(own)),
-      zconstant: T * constant(Math.max(...own.map(each => each.growth))), zcurve: from => curveOf(scaled, false, from),
+      zconstant: T * constant(Math.max(...own.map(each => each.growth))), zcurve: from => curveOf(scaled, ...pixels(), from),
     };
   }
 
@@ -51,44 +51,42 @@
 
   const grade = (size, [good, low]) => { const way = good > low ? 1 : -1; return way * size >= way * good ? "good" : way * size >= way * low ? "low" : "poor"; };
   const infinite = x => Number.isFinite(x) ? general(x, 4) : "no limit", decibels = factor => factor > 1e-9 && factor < 1e9 ? Math.abs(dB(factor)) : Infinity;
-  function card(of, margins, period) {
+  function card(of, id, kind, margins, period) {
     const { limits } = data, cells = margins ? {
       up: [decibels(margins.gain[1]), limits.gain], down: [decibels(margins.gain[0]), limits.gain], phase: [Math.abs(margins.phase.value), limits.phase],
       delay: [1e3 * margins.delay.value, limits.periods.map(x => 1e3 * x * period)], peak: [margins.peak_sensitivity.value, limits.peak],
-    } : {};
-    for (const name of ["up", "down", "phase", "delay", "peak"]) {
-      const [value, limit] = cells[name] || [], found = limit ? grade(value, limit) : "";
+    } : {}, grades = {};
+    for (const name of Object.keys(data.margin_names)) {
+      const [value, limit] = cells[name] || [], found = grades[name] = limit ? grade(value, limit) : "";
       const is_bound = of === "z" && name === "delay" && value > 1e3 * data.longest_delay; // where tfarm searches no further
       text(`${of}-${name}`, limit ? is_bound ? `≥ ${general(1e3 * data.longest_delay, 4)}` : infinite(value) : "-");
       text(`${of}-${name}-grade`, found);
       $(`${of}-${name}-grade`).className = `grade ${found}`;
     }
-  }
-  function pill(id, words, kind) {
-    text(id, words);
-    $(id).className = `pill ${kind}`;
+    const worst = ["poor", "low", "good"].find(each => Object.values(grades).includes(each)), own = Object.keys(grades).filter(name => grades[name] === worst);
+    text(id, kind);
+    $(id).className = `pill ${worst || kind}`; // a stable loop has the colour of its grade
+    text(`${of}-limits`, worst && worst !== "good" ? `${worst}: ${own.map(name => data.margin_names[name]).join(", ")}` : "");
   }
   function show() {
     const { law, verdict, why, margins, zmargins, zword } = now, period = data.period;
-    pill("verdict", now.grows ? "unstable" : now.stable ? "stable" : "marginal", now.grows ? "unstable" : now.stable ? "stable" : "marginal");
-    pill("sampled", zword, now.z ? zword : "marginal");
+    card("s", "verdict", now.grows ? "unstable" : now.stable ? "stable" : "marginal", margins, period);
+    card("z", "sampled", zword, zmargins, period);
     text("why", `${why}.`);
-    card("s", margins, period);
-    card("z", zmargins, period);
     text("s-ratio", Number.isFinite(now.ratio) ? general(100 * now.ratio, 4) : "-");
     text("z-ratio", Number.isFinite(now.zratio) ? general(100 * now.zratio, 4) : "-");
     text("s-constant", Number.isFinite(now.constant) ? general(now.constant, 4) : "-");
     text("z-constant", Number.isFinite(now.zconstant) ? general(now.zconstant, 4) : "-");
     if (slew) { now.figures = slew.figures(now.run); const { settled } = now.figures; text("slew-settled", Number.isFinite(settled) ? general(settled, 5) : `not settled within ${general((now.run.n - 1) * slew.period, 5)} s`); }
-    $("scaled").hidden = !names.every(name => law[name] === data.default[name]);
+    $("scaled").hidden = !data.default || !names.every(name => law[name] === data.default[name]);
     names.forEach(name => { $(`slider-${name}`).value = place(data.axes[name], law[name]); if (document.activeElement !== $(name)) $(name).value = law[name]; });
-    text("map-note", !law.Kp ? `K1 = ${general(law.K1, 4)}, K2 = ${general(law.K2, 4)}` : "The sampled region is known at Kp = 0 and not shown at this Kp; the verdict is that of the gains.");
+    text("map-note", !law.Kp ? [across, up].map(name => `${name} = ${general(law[name], 4)}`).join(", ") : "The sampled region is known at Kp = 0 and not shown at this Kp; the verdict is that of the gains.");
     rows("pole-rows", now.poles.slice(0, 5).map(s => [general(s[0], 5), general(s[1], 6), general(hertz(s[1]), 5), dampingRatio(s)]));
     if ($("more").open) tables();
   }
   // What is below the dashboard: the loop as it is, with every margin and crossing
   function tables() {
-    const { law, z } = now, margins = now.stable ? loop.margins(law, loop.dense(now.poles, law)) : null, gains = `${data.command_name} --K1 ${law.K1} --K2 ${law.K2} --Kp ${law.Kp}`;
+    const { law, z } = now, margins = now.stable ? loop.margins(law, loop.dense(now.poles, law)) : null, gains = data.of_law ? `${data.command_name} --law FILE` : `${data.command_name} --K1 ${law.K1} --K2 ${law.K2} --Kp ${law.Kp}`;
     for (const id of ["margins", "crossovers", "turnings"]) $(id).hidden = !margins;
     $("no-margins").hidden = !!margins;
     text("command", `tfarm margins ${gains}`);
@@ -136,7 +134,7 @@
   let zoom = 1;
   const area = (list, part) => list.map(row => ({ ...row, part: `${part}${row.part}` })), sampledAreas = data.sampled_map ? data.sampled_map.areas : [];
   // The regions where they are known at once: the sampled one is known at Kp = 0 alone, and Kp > 0 moves no edge of a lossless loop
-  const areas = ({ Kp }) => !Kp || loop.kind === "reactive" ? area(data.continuous, "c") : null;
+  const areas = ({ Kp }) => data.continuous && (!Kp || loop.kind === "reactive") ? area(data.continuous, "c") : null;
   const proven = data.lyapunov ? [[0, data.axes.K2.low], [0, 1], [data.axes.K1.high, 1]].map(([K1, K2]) => ({ K1, K2 })) : [];
   function gainAxis(name) {
     const { low, high, linear } = data.axes[name], unit = data.units[name], sizes = linear === null ? [] : [...Array(16).keys()].map(k => linear * 10 ** k).filter(x => x <= Math.max(high, -low));
@@ -144,7 +142,7 @@
     const values = linear === null ? undefined : [0, ...shown, ...shown.map(x => -x)].filter(x => low <= x && x <= high);
     return { low, high, label: unit === "1" ? name : `${name} [${unit}]`, values, ...(linear === null ? {} : { kind: "symlog", constant: linear }) };
   }
-  const plane = { x: gainAxis("K1"), y: gainAxis("K2") }, limited = (margins, of) => margins ? [margins.phase, margins.peak_sensitivity][of] : null;
+  const plane = up && { x: gainAxis(across), y: gainAxis(up) }, limited = (margins, of) => margins ? [margins.phase, margins.peak_sensitivity][of] : null;
   const kindOf = x => x < 0 ? "stable" : x > 0 ? "unstable" : "marginal", shapes = { stable: CROSS, marginal: BOX, unstable: RING };
   const polePoints = (list, x, y, sign) => ({ points: list, x, y, shape: row => shapes[kindOf(sign(row))], colour: row => colours[kindOf(sign(row))] });
   function phaseMargin() {
@@ -153,17 +151,17 @@
   }
   function gainStems() {
     if (!now.margins) return [];
-    return now.margins.gain.flatMap(factor => now.margins.crossovers.filter(row => row.w > 0 && Math.abs(row.factor / factor - 1) < 1e-6).map(({ w }) => ({ w, low: Math.max(-dB(factor), -60), high: 0, colour: colours[grade(decibels(factor), data.limits.gain)] })));
+    return now.margins.gain.flatMap(factor => now.margins.crossovers.filter(row => row.w > 0 && Math.abs(row.factor / factor - 1) < 1e-6).map(({ w }) => ({ w, size: decibels(factor), low: Math.max(-dB(factor), -60), high: 0, colour: colours[grade(decibels(factor), data.limits.gain)] })));
   }
   const half = loop => circle(-1, 0.5).map(({ x, y }) => loop === "nyquist" ? { x, y } : { angle: degrees([-x, -y]) - 180, dB: dB(Math.hypot(x, y)) });
   const turned = list => list.map(row => ({ ...row, angle: row.angle - 180 })), cursor = () => pointed.bode ? [{ rule: pointed.bode.w, along: "x", dash: [3, 3] }] : [];
-  const sampledCurve = () => now.zcurve ? (now.zrows ||= turned(now.zcurve(now.from))) : [], own = fine => (now.rows ||= {})[fine] ||= turned(now.curve(fine));
+  const sampledCurve = () => now.zcurve ? (now.zrows ||= {})[zoom] ||= turned(now.zcurve(now.from)) : [], own = () => (now.rows ||= {})[zoom] ||= turned(now.curve());
   const charts = {
     map: () => [{ ...plane, marks: [
-      { area: now.areas || [], x: "K1", low: "low", high: "high", by: "part", fill: colours.stable },
+      { area: now.areas || [], x: across, low: "low", high: "high", by: "part", fill: colours.stable },
       { area: now.law.Kp ? [] : sampledAreas, x: "K1", low: "low", high: "high", by: "part", hatch: colours.stable, dash: [5, 3] },
-      { line: now.edge || [], x: "K1", y: "K2", by: "piece", colour: colours.stable, width: 1 }, { line: proven, x: "K1", y: "K2", colour: colours.ink, dash: [2, 3] },
-      { rule: now.law.K1, along: "x" }, { rule: now.law.K2 }, { points: [now.law], x: "K1", y: "K2", shape: DOT, colour: colours.ink },
+      { line: now.edge || [], x: across, y: up, by: "piece", colour: colours.stable, width: 1 }, { line: proven, x: "K1", y: "K2", colour: colours.ink, dash: [2, 3] },
+      { rule: now.law[across], along: "x" }, { rule: now.law[up] }, { points: [now.law], x: across, y: up, shape: DOT, colour: colours.ink },
     ] }],
     poles: () => [{
       x: { low: now.frame.x[0], high: now.frame.x[1], label: "Re s [1/s]" }, y: { low: now.frame.y[0], high: now.frame.y[1], label: "Im s [rad/s]" }, marks: [
@@ -180,33 +178,34 @@
         polePoints((now.z || []).map(({ z, growth }) => ({ re: z[0], im: z[1], growth })), "re", "im", row => row.growth),
       ] }];
     },
-    bode: fine => {
+    bode: () => {
       const x = { low: now.from, high: (damped || loop).band, kind: "log", label: "frequency [rad/s]" }, phase = phaseMargin(), crossed = now.margins ? now.margins.crossed : [];
       return [
         { x, y: { low: -60, high: 40, label: "|L| [dB]" }, marks: [
-          { rule: 0 }, ...cursor(), { line: sampledCurve(), x: "w", y: "dB", colour: colours.grey, dash: [5, 3] }, { line: own(fine), x: "w", y: "dB", colour: colours.ink },
+          { rule: 0 }, ...cursor(), { line: sampledCurve(), x: "w", y: "dB", colour: colours.grey, dash: [5, 3] }, { line: own(), x: "w", y: "dB", colour: colours.ink },
           ...gainStems().map(each => ({ stems: [each], colour: each.colour })), { points: crossed.map(({ w }) => ({ w, y: 0 })), x: "w", y: "y", shape: RING, radius: 3, colour: colours.ink },
         ] },
         { x, y: { low: -360, high: 0, label: "angle of L [deg]", values: [-360, -270, -180, -90, 0] }, marks: [
-          { rule: -180 }, ...cursor(), { line: sampledCurve(), x: "w", y: "angle", by: "branch", colour: colours.grey, dash: [5, 3] }, { line: own(fine), x: "w", y: "angle", by: "branch", colour: colours.ink },
+          { rule: -180 }, ...cursor(), { line: sampledCurve(), x: "w", y: "angle", by: "branch", colour: colours.grey, dash: [5, 3] }, { line: own(), x: "w", y: "angle", by: "branch", colour: colours.ink },
           ...(phase ? [{ stems: [phase], colour: phase.colour }] : []),
         ] },
       ];
     },
-    nyquist: fine => {
+    nyquist: (_, of = state.loop) => {
       const here = pointed.bode ? turned([pointed.bode]) : [], [wide, high] = equal("nyquist", 2.5 * zoom);
-      if (state.loop === "sensitivity") return [{ x: { low: now.from, high: (damped || loop).band, kind: "log", label: "frequency [rad/s]" }, y: { low: -50, high: 30, label: "|S|, |T| [dB]" }, marks: [
-        { rule: 0 }, { rule: 6, dash: [2, 3] }, ...cursor(), { line: own(fine), x: "w", y: "T", colour: colours.link }, { line: own(fine), x: "w", y: "S", colour: colours.ink, width: 1.8 },
+      if (of === "sensitivity") return [{ x: { low: now.from, high: (damped || loop).band, kind: "log", label: "frequency [rad/s]" }, y: { low: -50, high: 30, label: "|S|, |T| [dB]" }, marks: [
+        { rule: 0 }, { rule: 6, dash: [2, 3] }, ...cursor(), { line: own(), x: "w", y: "T", colour: colours.link }, { line: own(), x: "w", y: "S", colour: colours.ink, width: 1.8 },
       ] }];
-      const nichols = state.loop === "nichols", [x, y] = nichols ? ["angle", "dB"] : ["x", "y"], by = nichols ? "branch" : undefined;
+      const nichols = of === "nichols", [x, y] = nichols ? ["angle", "dB"] : ["x", "y"], by = nichols ? "branch" : undefined;
       const axes = nichols ? { x: { low: -360, high: 0, label: "angle of L [deg]", values: [-360, -270, -180, -90, 0] }, y: { low: -40 * zoom, high: 40 * zoom, label: "|L| [dB]" } }
         : { x: { low: -wide, high: wide, label: "Re L" }, y: { low: -high, high, label: "Im L" } };
       return [{ ...axes, marks: [
-        ...(nichols ? [{ rule: 0 }, { rule: -180, along: "x" }] : [{ line: circle(0, 1), x: "x", y: "y", colour: colours.grey, width: 1 }]), { line: half(state.loop), x, y, colour: colours.grey, dash: [2, 3], width: 1 },
-        { line: sampledCurve(), x, y, by, colour: colours.grey, dash: [5, 3] }, { line: own(fine), x, y, by, colour: colours.ink },
+        ...(nichols ? [{ rule: 0 }, { rule: -180, along: "x" }] : [{ line: circle(0, 1), x: "x", y: "y", colour: colours.grey, width: 1 }]), { line: half(of), x, y, colour: colours.grey, dash: [2, 3], width: 1 },
+        { line: sampledCurve(), x, y, by, colour: colours.grey, dash: [5, 3] }, { line: own(), x, y, by, colour: colours.ink },
         { points: [nichols ? { angle: -180, dB: 0 } : { x: -1, y: 0 }], x, y, shape: CROSS, colour: colours.ink }, { points: here, x, y, shape: DOT, colour: colours.link },
       ] }];
     },
+    side: () => charts.nyquist(true, "sensitivity"), // where there is no slew
     slew: fine => {
       const found = slewSets(slew, now.run, fine ? Math.ceil(20 * slew.fastest(now.run) * slew.period / (2 * Math.PI)) : 0, $("slew").clientWidth);
       const x = { low: 0, high: (slew.n - 1) * slew.period, label: "time [s]" }, at = player ? [{ rule: player.time, along: "x" }] : [];
@@ -222,14 +221,19 @@
     const [wide, high] = room(name);
     return [least * Math.max(1, wide / high), least * Math.max(1, high / wide)];
   }
+  // Of the Nyquist plot: how far a chord is off at most, and the largest |L| of its frame
+  function pixels() {
+    const [wide, high] = equal("nyquist", 2.5 * zoom);
+    return [PRECISE * 2 * wide / room("nyquist")[0], Math.hypot(wide, high)];
+  }
   const canvasOf = name => $(name).querySelector("canvas");
   function draw(name, fine = true) {
     if ($(name) && $(name).offsetParent && $(name).clientHeight > 80) scales[name] = paint(canvasOf(name), charts[name](fine), colours);
   }
-  const drawAll = fine => ["map", "poles", "zplane", "bode", "nyquist", ...(slew ? ["slew"] : [])].forEach(name => draw(name, fine));
+  const drawAll = fine => ["map", "poles", "zplane", "bode", "nyquist", "side", "slew"].forEach(name => draw(name, fine));
   const room = name => [canvasOf(name).clientWidth - LEFT - RIGHT, canvasOf(name).clientHeight - TOP - BELOW];
   function notes() {
-    const { margins } = now, gain = margins && gainStems().map(({ w, low }) => `gain margin ${general(Math.abs(low), 4)} dB at ${general(w, 4)} rad/s`), phase = limited(margins, 0), peak = limited(margins, 1);
+    const { margins } = now, gain = margins && gainStems().map(({ w, size }) => `gain margin ${general(size, 4)} dB at ${general(w, 4)} rad/s`), phase = limited(margins, 0), peak = limited(margins, 1);
     text("reading", margins ? [...gain, phase.at ? `phase margin ${general(Math.abs(phase.value), 4)}° ${phase.value < 0 ? "(lead)" : "(lag)"} at ${general(phase.at, 4)} rad/s` : ""].filter(Boolean).join("; ") : "An unstable loop has no margins.");
     const circles = { nyquist: "Unit circle; dotted: Ms = 2. Shift and the wheel zoom.", nichols: "Cross: −1; dotted: Ms = 2. Shift and the wheel zoom.", sensitivity: "Thick: S; thin: T; dotted: 6 dB." };
     text("loop-note", `${margins && peak.at ? `Ms ${general(peak.value, 4)} at ${general(peak.at, 4)} rad/s. ` : ""}${circles[state.loop]}`);
@@ -269,7 +273,7 @@
     of.resting = true;
     keep();
     drawAll(true);
-    const work = [["map", "edge", onAxis], ["map", "areas", inPlane], state.plane === "poles" ? ["poles", "locus", inS] : ["zplane", "discs", inZ]];
+    const work = [...(up ? [["map", "edge", onAxis], ["map", "areas", inPlane]] : []), state.plane === "poles" ? ["poles", "locus", inS] : ["zplane", "discs", inZ]];
     for (const [name, key, make] of work) {
       const found = of[key] || await inSlices(make(), of);
       if (!found) return;
@@ -282,10 +286,10 @@
   const along = gain => [share => gainAt(data.axes[gain], share, 8), K => ({ ...now.law, [gain]: K })];
   function* onAxis() {
     yield;
-    return loop.kind === "reactive" ? [] : edgeOf(w => loop.boundary(w, now.law), [...loop.base.w], data.axes);
+    return loop.kind === "reactive" ? [] : edgeOf(w => loop.boundary(w, now.law), [...loop.base.w], data.plane, data.axes);
   }
   function* inPlane() {
-    return area(yield* regionOf(loop, now.law.Kp, data.axes), "c");
+    return area(yield* regionOf(loop, now.law, data.axes), "c");
   }
   function inS() {
     const [gain, law] = along(state.vary), { frame } = now;
@@ -337,6 +341,7 @@
   }
   // The table of `tfarm.arm.writing.law_toml`
   function lawFile() {
+    if (data.of_law) return `${data.of_law.head}\n` + data.of_law.parts.map(({ name, signal, num, den }) => `\n[law."${signal}"]\nnum = [${num.map(x => +(x * law[name]).toPrecision(15)).join(", ")}]\nden = [${den.join(", ")}]\n`).join("");
     const used = ["Kp", "K1", "K2"].filter(name => law[name]), number = x => /[.e]/.test(String(x)) ? String(x) : `${x}.0`;
     const signals = (used.length ? used : ["K1"]).map(name => `\n[law.${data.outputs[name]}]\ngain = ${number(law[name])}\n`);
     return `[law]\nname = "gains at the hub"\nreferences = [${used.map(name => `"${data.outputs[name]}"`).join(", ")}]\n${signals.join("")}`;
@@ -358,12 +363,14 @@
     canvasOf(name).addEventListener("pointermove", event => { const box = canvasOf(name).getBoundingClientRect(); follow(event.clientX - box.left, event.clientY - box.top, event); });
   }
   let dragged = false;
-  const toGains = (x, y) => { const [{ x: across, y: up }] = scales.map; set({ K1: +across.back(x).toPrecision(4), K2: +up.back(y).toPrecision(4) }); };
-  canvasOf("map").addEventListener("pointerdown", event => { dragged = true; canvasOf("map").setPointerCapture(event.pointerId); toGains(event.offsetX, event.offsetY); });
-  pointing("map", (x, y) => { if (dragged) toGains(x, y); });
+  const toGains = (x, y) => { const [plot] = scales.map; set({ [across]: +plot.x.back(x).toPrecision(4), [up]: +plot.y.back(y).toPrecision(4) }); };
+  if (up) {
+    canvasOf("map").addEventListener("pointerdown", event => { dragged = true; canvasOf("map").setPointerCapture(event.pointerId); toGains(event.offsetX, event.offsetY); });
+    pointing("map", (x, y) => { if (dragged) toGains(x, y); });
+  }
   addEventListener("pointerup", () => { dragged = false; });
-  $("map").addEventListener("keydown", event => {
-    const ways = { ArrowLeft: ["K1", -1], ArrowRight: ["K1", 1], ArrowDown: ["K2", -1], ArrowUp: ["K2", 1] }, way = ways[event.key];
+  $("map")?.addEventListener("keydown", event => {
+    const ways = { ArrowLeft: [across, -1], ArrowRight: [across, 1], ArrowDown: [up, -1], ArrowUp: [up, 1] }, way = ways[event.key];
     if (!way) return;
     event.preventDefault();
     const [name, side] = way, axis = data.axes[name];
@@ -375,7 +382,7 @@
   });
   // What the curves are under the pointer, in words
   pointing("bode", x => {
-    const w = scales.bode[0].x.back(x), curve = now.curve(true), row = curve.find(each => each.w >= w);
+    const w = scales.bode[0].x.back(x), curve = now.curve(), row = curve.find(each => each.w >= w);
     if (!row) return;
     pointed.bode = row;
     text("reading", `${general(row.w, 5)} rad/s = ${general(hertz(row.w), 5)} Hz: L ${general(row.dB, 4)} dB, ${general(row.angle - 180, 4)}°, S ${general(row.S, 4)} dB, T ${general(row.T, 4)} dB`);

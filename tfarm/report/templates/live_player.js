@@ -1,6 +1,6 @@
 // The player: the arm over its slew, its deflection enlarged, with torque and root moment; still unless it is asked to play.
 "use strict";
-const ENLARGED = 0.2; // of the length: how far the largest deflection is drawn
+const ENLARGED = 0.2, EDGE = 18, BARS = 124; // of the length: how far the largest deflection is drawn; pixels around the arm, and of the bars
 
 function slewSets(slew, found, between, width) {
   const { t, angle, moment, tip } = slew.traces(found, Math.min(between, Math.ceil(40_000 / found.n))), rows = y => shownOver(t, y, Math.max(width, 300));
@@ -11,13 +11,18 @@ function slewSets(slew, found, between, width) {
 function makePlayer(slew, colours, first, moved) {
   const $ = id => document.getElementById(id), canvas = $("arm"), still = matchMedia("(prefers-reduced-motion: reduce)");
   const end = () => (found.n - 1) * slew.period, round = x => [1, 2, 5, 10].map(k => k * 10 ** Math.floor(Math.log10(x))).filter(k => k <= x * 1.0001).pop();
-  let found = first, t = 0, playing = false, last = 0, factor = 1, most = { torque: 1, moment: 1 };
+  let found = first, t = 0, playing = false, last = 0, factor = 1, box = null, most = { torque: 1, moment: 1 };
+
+  // A place of the turned arm [m], and the least box around all places of a run
+  const turned = (along, across, angle) => [along * Math.cos(angle) - across * Math.sin(angle), along * Math.sin(angle) + across * Math.cos(angle)];
+  const boxOf = (...places) => places.reduce(([a, b, c, d], [x, y]) => [Math.min(a, x), Math.max(b, x), Math.min(c, y), Math.max(d, y)], [0, 0, 0, 0]);
 
   // Another run: how much its deflection is enlarged, and how long its bars are at most
   function show(run) {
     found = run;
     const figures = slew.figures(run), bent = run.tip.reduce((top, x, k) => Math.max(top, Math.abs(x - slew.reach * run.angle[k])), 0);
     factor = bent > 0 ? Math.max(1, round(ENLARGED * slew.length / bent)) : 1;
+    box = boxOf([0, 0], ...run.angle.flatMap((angle, k) => [turned(slew.reach, 0, slew.ideal[5 * k + 1]), turned(slew.reach, factor * (run.tip[k] - slew.reach * angle), angle)]));
     most = { torque: figures.torque || 1, moment: figures.moment || 1 };
     $("factor").textContent = factor > 1 ? `Deflection is drawn ${factor} times as large.` : "Deflection is drawn to scale.";
     go(Math.min(t, end()));
@@ -32,12 +37,9 @@ function makePlayer(slew, colours, first, moved) {
 
   // The arm from above: hub, its line, where the reference has it, and the arm as it is bent
   function paint(angle, deflection, torque, moment, reference) {
-    const ratio = devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight, draw = canvas.getContext("2d");
-    if (canvas.width !== Math.round(width * ratio)) { canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio); }
-    draw.setTransform(ratio, 0, 0, ratio, 0, 0);
-    draw.clearRect(0, 0, width, height);
-    const side = slew.travel > 0 ? 1 : -1, x0 = 0.1 * Math.min(width, 500), y0 = side > 0 ? height - 34 : 34, scale = Math.min(width - x0 - 110, height - 60) / slew.reach;
-    const at = (along, across, turned) => [x0 + scale * (along * Math.cos(turned) - across * Math.sin(turned)), y0 - scale * (along * Math.sin(turned) + across * Math.cos(turned))];
+    const { draw, width, height } = cleared(canvas), [left, right, low, high] = box;
+    const scale = Math.min((width - BARS - 2 * EDGE) / (right - left), (height - 2 * EDGE) / (high - low));
+    const at = (...place) => { const [x, y] = turned(...place); return [(width - BARS) / 2 + scale * (x - (left + right) / 2), height / 2 - scale * (y - (low + high) / 2)]; };
     const line = (points, colour, thick, dash = []) => {
       draw.beginPath();
       points.forEach(([x, y], i) => i ? draw.lineTo(x, y) : draw.moveTo(x, y));

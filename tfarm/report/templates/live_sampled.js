@@ -16,6 +16,9 @@ class SampledLoop {
     this.p = [...Array(m).keys()].map(i => pair(p, i)).concat([[0, 0]]); // s = 0 is the last one
     this.b = this.p.map(each => exp(times(this.period, each)));
     this.residues = this.rigid.map(([, once], o) => [...r.slice(2 * m * o, 2 * m * (o + 1)), once, 0]);
+    const a = this.smoothing, plain = { g: 1, zeros: [], poles: [] }, rate = a === null ? { row: 1 } : { row: 0, g: (1 - a) / this.period, zeros: [[0, 0]], poles: [[a - 1, 0]] };
+    this.columns ||= [{ ...plain, name: "Kp", row: 0 }, { ...plain, name: "K2", row: 2 }, { ...plain, name: "K1", ...rate }];
+    this.names = this.columns.map(column => column.name);
     this.hold(this.delay, this.fraction);
   }
 
@@ -26,14 +29,25 @@ class SampledLoop {
     return Object.assign(this, { delay, fraction: f, early, late, flat, ramps: [(1 - f) ** 2 * T * T / 2, f * (1 - f / 2) * T * T] });
   }
 
-  // What the law makes of each output: residues and static parts of their weighted sum, the rate apart where it is a difference
-  weighted({ K1, K2, Kp }) {
-    const rate = this.smoothing === null ? K1 : 0, gains = [Kp, rate, K2];
+  // What the law makes of each output: residues and static parts of their weighted sum, and apart those times a block of the law with
+  // states, g prod(delta - zeros)/prod(delta - poles), delta = z - 1; the hub rate is such a one where it is a difference
+  weighted(law) {
     const sum = of => Float64Array.from({ length: 2 * this.b.length }, (_, i) => of.reduce((total, K, o) => total + K * this.residues[o][i], 0));
     const real = (of, values) => of.reduce((total, K, o) => total + K * values[o], 0), twice = this.rigid.map(row => row[0]);
-    const make = of => ({ r: sum(of), static: real(of, this.static), twice: real(of, twice) });
-    const difference = this.smoothing === null || !K1 ? null : make([K1 * (1 - this.smoothing) / this.period, 0, 0]);
-    return { law: make(gains), difference };
+    const make = of => ({ r: sum(of), static: real(of, this.static), twice: real(of, twice) }), gains = this.rigid.map(() => 0), blocks = [];
+    for (const { name, row, g, zeros, poles } of this.columns) {
+      if (!zeros.length && !poles.length) gains[row] += law[name] * g;
+      else if (law[name]) blocks.push({ ...make(this.rigid.map((_, o) => o === row ? law[name] * g : 0)), zeros, poles });
+    }
+    return [...(gains.some(K => K) || !blocks.length ? [{ ...make(gains), zeros: [], poles: [] }] : []), ...blocks];
+  }
+
+  // A block and its slope at delta
+  filtered({ zeros, poles }, delta) {
+    let value = [1, 0], slope = [0, 0];
+    for (const zero of zeros) { const away = minus(delta, zero); slope = add(mul(slope, away), value); value = mul(value, away); }
+    for (const pole of poles) { const away = minus(delta, pole); value = div(value, away); slope = div(minus(slope, value), away); }
+    return [value, slope];
   }
 
   // H and H' of one weighted sum at z = b[base] + offset, the share of the pole `base` times the offset apart
@@ -64,12 +78,11 @@ class SampledLoop {
 
   // g = offset F and g' at z = b[base] + offset, F = 1 + gains . H, without loss however small the offset
   characteristic(weights, z, base, offset) {
-    let [value, slope, own, ownSlope] = this.transfer(weights.law, z, base, offset);
-    if (weights.difference) {
-      const [h, hs, o, os] = this.transfer(weights.difference, z, base, offset), a = this.smoothing;
-      const lag = div([1, 0], minus(z, [a, 0])), step = mul(base === this.b.length - 1 ? offset : minus(z, [1, 0]), lag), steep = times(1 - a, mul(lag, lag));
-      [value, slope] = [add(value, mul(h, step)), add(slope, add(mul(hs, step), mul(h, steep)))];
-      [own, ownSlope] = [add(own, mul(o, step)), add(ownSlope, add(mul(os, step), mul(o, steep)))];
+    let value = [0, 0], slope = [0, 0], own = [0, 0], ownSlope = [0, 0];
+    for (const each of weights) {
+      const [h, hs, o, os] = this.transfer(each, z, base, offset), [c, steep] = this.filtered(each, base === this.b.length - 1 ? offset : minus(z, [1, 0]));
+      [value, slope] = [add(value, mul(h, c)), add(slope, add(mul(hs, c), mul(h, steep)))];
+      [own, ownSlope] = [add(own, mul(o, c)), add(ownSlope, add(mul(os, c), mul(o, steep)))];
     }
     const late = this.delay ? exp(times(-this.delay, [Math.log(size(z)), Math.atan2(z[1], z[0])])) : [1, 0], n = times(-this.delay, div(late, z));
     [slope, ownSlope] = [add(mul(slope, late), mul(value, n)), add(mul(ownSlope, late), mul(own, n))];
@@ -85,9 +98,9 @@ class SampledLoop {
 
   // Aberth's iteration (1973) on F times its poles, from `near` or from all poles of the plant moved by `away`
   iterated(law, near, away, exact) {
-    const last = this.b.length - 1, ones = Math.max(0, this.states - (law.Kp ? 0 : 1)), weights = this.weighted(law);
+    const last = this.b.length - 1, ones = this.ones ?? Math.max(0, this.states - (law.Kp ? 0 : 1)), weights = this.weighted(law);
     const at = this.b.map((b, i) => ({ b, n: i === last ? ones : 1 })).filter(each => each.n > 0);
-    const others = [{ b: [0, 0], n: this.delay + 1 }, ...(weights.difference && this.smoothing ? [{ b: [this.smoothing, 0], n: 1 }] : [])];
+    const others = [{ b: [0, 0], n: this.delay + 1 }, ...weights.flatMap(each => each.poles.map(pole => ({ b: add([1, 0], pole), n: 1 }))).filter(({ b }) => size(b))];
     const starts = [...at, ...others].flatMap(({ b, n }) => Array(n).fill(b)).map((b, i) => add(b, times(away, [Math.cos(2.4 * i), Math.sin(2.4 * i)])));
     if (near && near.length !== starts.length) return null;
     const z = near ? near.map(each => each.z) : starts;
@@ -125,9 +138,8 @@ class SampledLoop {
 
   // L at z = e^{iq} as D and N, D = 1, far from poles of the plant on the circle
   both(q, weights) {
-    const z = [Math.cos(q), Math.sin(q)], T = this.delay;
-    let [value] = this.transfer(weights.law, z, -1, z);
-    if (weights.difference) value = add(value, mul(this.transfer(weights.difference, z, -1, z)[0], div(minus(z, [1, 0]), minus(z, [this.smoothing, 0]))));
+    const z = [Math.cos(q), Math.sin(q)], T = this.delay, delta = [-2 * Math.sin(q / 2) ** 2, z[1]];
+    const value = weights.reduce((sum, each) => add(sum, mul(this.transfer(each, z, -1, z)[0], this.filtered(each, delta)[0])), [0, 0]);
     return [1, 0, ...mul(value, [Math.cos(T * q), -Math.sin(T * q)])];
   }
   // What each gain adds to L at angles q near every pole of the plant
@@ -137,8 +149,8 @@ class SampledLoop {
       return y < 0 || size(this.b[i]) < 1e-2 ? [] : [at, ...away.flatMap(x => [at - x, at + x])];
     });
     const w = Float64Array.from(new Set([...close.filter(q => q > 1e-6 && q < Math.PI), Math.PI])).sort();
-    const rows = [{ K1: 1, K2: 0, Kp: 0 }, { K1: 0, K2: 1, Kp: 0 }, { K1: 0, K2: 0, Kp: 1 }].map(unit => {
-      const weights = this.weighted(unit);
+    const rows = this.names.map(one => {
+      const weights = this.weighted(Object.fromEntries(this.names.map(name => [name, +(name === one)])));
       return Float64Array.from([...w].flatMap(q => this.both(q, weights).slice(2)));
     });
     Object.defineProperty(this, "base", { value: { w, D: Float64Array.from([...w].flatMap(() => [1, 0])), rows } });
@@ -147,33 +159,38 @@ class SampledLoop {
   curve(law, poles) {
     const weights = this.weighted(law), at = q => this.both(q, weights);
     const close = poles.flatMap(({ z, growth }) => z[1] > 0 ? [0, ...AWAY, ...AWAY.map(x => -x)].map(x => Math.atan2(z[1], z[0]) + Math.abs(growth) * x) : []);
-    return curveOn(this.base, [law.K1, law.K2, law.Kp], close.filter(q => q > 1e-6 && q < Math.PI), at);
+    return curveOn(this.base, this.names.map(name => law[name]), close.filter(q => q > 1e-6 && q < Math.PI), at);
   }
   // Margins, w in rad/s; `rest` is the factor at which a pole at z = 1 ends stability
   margins(law, curve, rest) {
     const found = marginsOn(curve, false), [, , last] = curve.at(Math.PI), all = [...found.factors.map(row => row.factor), -1 / last, rest], T = this.period;
-    const lag = row => (row.angle + 360) % 360 * Math.PI / 180 / row.w, near = [...found.crossed].sort((a, b) => lag(a) - lag(b));
-    const at = row => ({ ...row, at: row.at / T }), delays = near.filter((row, i) => i < 3 && lag(row) < 1.3 * lag(near[0]) + 0.3).map(row => this.delayAt(law, row.w, lag(row)));
+    const lag = row => (row.angle + 360) % 360 * Math.PI / 180 / row.w, near = [...found.crossed].sort((a, b) => lag(a) - lag(b)), { w, N } = curve;
+    const L = i => size(pair(N, i)), tops = [...w.keys()].slice(1, -1).filter(i => L(i) > 0.3 && L(i) < 1 && L(i) >= L(i - 1) && L(i) > L(i + 1)); // a fraction of a sample may lift one over 1
+    const at = row => ({ ...row, at: row.at / T }), soon = row => !near.length || lag(row) < 1.3 * lag(near[0]) + 0.3;
+    const peaks = tops.map(i => ({ w: w[i], angle: degrees(times(-1, pair(N, i))) })).filter(soon).sort((a, b) => lag(a) - lag(b)).slice(0, 3);
+    const delays = [...near.slice(0, 3).filter(soon).map(row => this.delayAt(law, row.w, lag(row), 0)), ...peaks.flatMap(row => [-1, 1].map(side => this.delayAt(law, row.w, lag(row), side)))];
     return {
       ...found, phase: at(found.phase), peak_sensitivity: at(found.peak_sensitivity), delay: { value: T * Math.min(Infinity, ...delays) },
       gain: [Math.max(0, ...all.filter(t => t >= 0 && t < 1)), Math.min(Infinity, ...all.filter(t => t > 1))],
     };
   }
-  // The further delay [samples] at which the crossing of |L| = 1 near q is at -1; a fraction of a sample moves the crossing too
-  delayAt(law, q, from) {
-    let more = from;
+  // The further delay [samples] at which the crossing of |L| = 1 near `top` is at -1, on one `side` of it where that is a peak (else 0);
+  // a fraction of a sample moves the crossing too.  Infinite where the peak does not cross
+  delayAt(law, top, from, side) {
+    let more = from, q = top, off = 0;
     for (let k = 0; k < 12; k++) {
       const total = this.delay + this.fraction + more, later = Object.create(this).hold(Math.floor(total), total % 1), weights = later.weighted(law);
       const f = q => { const [, , x, y] = later.both(q, weights); return Math.log(x * x + y * y); };
       for (let h = (k ? 1e-5 : 1e-3) * q, j = 0; j < 10; j++, h *= 4) {
-        const [a, b] = [q - h, Math.min(q + h, Math.PI)], [fa, fb] = [f(a), f(b)];
+        const [a, b] = side ? [side < 0 ? top - h : top, side < 0 ? top : Math.min(top + h, Math.PI)] : [q - h, Math.min(q + h, Math.PI)], [fa, fb] = [f(a), f(b)];
         if (fa * fb < 0) { q = zeroOf(f, a, fa, b, fb); break; }
       }
       const [, , x, y] = later.both(q, weights), step = Math.atan2(-y, -x) / q;
       more += step + (more + step < 0 ? 2 * Math.PI / q : 0);
+      off = Math.abs(f(q));
       if (Math.abs(step) < 1e-8) break;
     }
-    return more;
+    return side && off > 1e-6 ? Infinity : more;
   }
 
   // The poles in s, each at the frequency nearest to that of the mode whose pole in z is nearest: tfarm.case.card
@@ -187,7 +204,7 @@ class SampledLoop {
   }
 
   // What all poles add up to, by the two highest powers of z in F times its poles: none is missing then
-  sumOfPoles({ K1, K2, Kp }, all) {
+  sumOfPoles(law, all) {
     const sum = all.reduce((total, { b, n }) => add(total, times(n, b)), [0, 0]);
     if (this.delay) return sum;
     const first = this.rigid.map(([twice], o) => {
@@ -196,8 +213,7 @@ class SampledLoop {
       for (let i = 0; i < this.b.length; i++) total += residues[2 * i] * this.early[i][0] - residues[2 * i + 1] * this.early[i][1];
       return total;
     });
-    const rate = this.smoothing === null ? first[1] : first[0] * (1 - this.smoothing) / this.period;
-    return minus(sum, [Kp * first[0] + K1 * rate + K2 * first[2], 0]);
+    return minus(sum, [this.columns.reduce((total, { name, row, g, zeros, poles }) => total + (zeros.length === poles.length ? law[name] * g * first[row] : 0), 0), 0]);
   }
 
   // z as an offset from the pole of the plant that is nearest

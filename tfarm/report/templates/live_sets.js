@@ -12,26 +12,34 @@ function gainAt(axis, share, digits = 4) {
   return +(axis.linear === null ? y : Math.sign(y) * axis.linear * Math.expm1(Math.abs(y))).toPrecision(digits);
 }
 
-// Points of L over w: those too near to each other left out, others put in where L turns (`fine`); it begins at the frequency `from`
-function curveOf({ w, D, N, at }, fine, from) {
-  const rows = [], small = row => { const k = 1 / (1 + row.abs); return [k * row.x, k * row.y]; }, apart = fine ? 2e-5 : 1e-3;
+// Points of L over w from the frequency `from`: more where a chord is off its curve by more than `pixel` of a plot that ends at |L| = `end`,
+// or by more than a pixel of dB and degrees of L or 1 + L; fewer where all of them are nearer
+const HALVINGS = 8, RELATIVE = 0.015, UNSEEN = 1e-3; // 0.13 dB or 0.9 degrees; below every plot of dB
+function curveOf({ w, D, N, at }, pixel, end, from) {
+  const rows = [];
   let branch = 0, last = null;
-  const row = (w, a, b, c, d) => {
-    const q = a * a + b * b, x = (a * c + b * d) / q, y = (a * d - b * c) / q, sum = Math.max(Math.hypot(a + c, b + d), 1e-300), n = Math.hypot(c, d);
-    const abs = Math.max(n / Math.sqrt(q), 1e-12);
-    return { w, x, y, abs, dB: dB(abs), angle: degrees([-x, -y]), S: dB(Math.sqrt(q) / sum), T: dB(Math.max(n / sum, 1e-12)) };
+  const place = (w, a, b, c, d) => { const q = a * a + b * b; return { w, x: (a * c + b * d) / q, y: (a * d - b * c) / q }; };
+  const allowed = (x, y) => { const abs = Math.sqrt(x * x + y * y); return Math.max(UNSEEN * RELATIVE, Math.min(pixel * Math.max(1, abs / end) ** 2, RELATIVE * Math.min(abs, Math.sqrt((1 + x) ** 2 + y * y)))); };
+  const far = (a, b, x, y) => (a - x) ** 2 + (b - y) ** 2 > allowed(x, y) ** 2;
+  const outside = ({ x, y }) => x * x + y * y > 2 * end * end; // seen in plots of dB alone, where a piece of a hundredth of its frequency has no width
+  const push = ({ w, x, y }) => {
+    const n = Math.sqrt(x * x + y * y), sum = Math.max(Math.sqrt((1 + x) ** 2 + y * y), 1e-300), abs = Math.max(n, 1e-12), angle = degrees([-x, -y]);
+    if (last && Math.abs(angle - last.angle) > 180) branch += 1;
+    rows.push(last = { w, x, y, abs, dB: dB(abs), angle, S: -dB(sum), T: dB(Math.max(n / sum, 1e-12)), branch });
   };
-  const push = each => {
-    if (last && Math.abs(each.angle - last.angle) > 180) branch += 1;
-    rows.push(last = Object.assign(each, { branch }));
+  const between = (a, b, halvings) => {
+    if (!halvings || !far(a.x, a.y, b.x, b.y)) return;
+    const q = (a.w + b.w) / 2, middle = place(q, ...at(q));
+    if (!far((a.x + b.x) / 2, (a.y + b.y) / 2, middle.x, middle.y) || (b.w < 1.01 * a.w && [a, middle, b].every(outside))) return;
+    between(a, middle, halvings - 1);
+    push(middle);
+    between(middle, b, halvings - 1);
   };
   for (let i = 0; i < w.length; i++) {
-    if (w[i] < from || (last && w[i] < last.w * (1 + apart))) continue;
-    const next = row(w[i], D[2 * i], D[2 * i + 1], N[2 * i], N[2 * i + 1]);
-    if (last && fine) {
-      const start = last.w, steps = Math.min(12, Math.ceil(size(minus(small(next), small(last))) / 0.03));
-      for (let k = 1; k < steps; k++) { const q = start + (w[i] - start) * k / steps; push(row(q, ...at(q))); }
-    }
+    if (w[i] < from) continue;
+    const next = place(w[i], D[2 * i], D[2 * i + 1], N[2 * i], N[2 * i + 1]);
+    if (last && w[i] < last.w * (1 + 1e-3) && !far(last.x, last.y, next.x, next.y)) continue;
+    if (last) between(last, next, HALVINGS);
     push(next);
   }
   return rows;
@@ -54,8 +62,8 @@ function spirals() {
 }
 
 // The curve of gains with a pole on the axis, or on the unit circle: `at(w)` is a point of it; halved where it is coarse, cut where it leaves the map
-function edgeOf(at, frequencies, { K1, K2 }) {
-  const found = [], placed = row => [place(K1, row.K1), place(K2, row.K2)], seen = ([x, y]) => x > -0.1 && x < 1.1 && y > -0.1 && y < 1.1;
+function edgeOf(at, frequencies, [across, up], axes) {
+  const found = [], placed = row => [place(axes[across], row[across]), place(axes[up], row[up])], seen = ([x, y]) => x > -0.1 && x < 1.1 && y > -0.1 && y < 1.1;
   let piece = 0;
   const trace = (a, b, depth) => {
     if (!a || !b) return;
@@ -75,10 +83,11 @@ function edgeOf(at, frequencies, { K1, K2 }) {
   return found;
 }
 
-// The stable region at one Kp, by intervals of K2 at values of K1 that are halved where a part begins or ends: a generator that yields before each
-const SLICES = 80, CLOSER = 5; // values of K1, and halvings between two of them
-function* regionOf(loop, Kp, { K1, K2 }) {
-  const column = share => { const gain = gainAt(K1, share, 12); return { share, gain, rows: loop.intervals(gain, Kp, K2.low, K2.high) }; };
+// The stable region of two numbers at the others of `law`, by intervals of the second at values of the first that are halved where a part begins or ends: a generator that yields before each
+const SLICES = 80, CLOSER = 5; // values, and halvings between two of them
+function* regionOf(loop, law, axes) {
+  const [across, up] = loop.plane;
+  const column = share => { const gain = gainAt(axes[across], share, 12); return { share, gain, rows: loop.intervals({ ...law, [across]: gain }, axes[up].low, axes[up].high) }; };
   const goesOn = (a, b) => a.rows.length === b.rows.length && a.rows.every(([low, high], i) => low < b.rows[i][1] && b.rows[i][0] < high);
   const found = [];
   function* between(a, b, depth) {
@@ -91,7 +100,7 @@ function* regionOf(loop, Kp, { K1, K2 }) {
   }
   for (let k = 0, last = null; k <= SLICES; k++) {
     yield;
-    const next = column((k + 0.003) / (SLICES + 0.006)); // K1 = 0 may be an edge
+    const next = column((k + 0.003) / (SLICES + 0.006)); // 0 may be an edge
     if (last) yield* between(last, next, CLOSER);
     found.push(next);
     last = next;
@@ -99,7 +108,7 @@ function* regionOf(loop, Kp, { K1, K2 }) {
   let part = 0;
   return found.flatMap((each, k) => {
     if (k && !goesOn(found[k - 1], each)) part += 1000;
-    return each.rows.map(([low, high], i) => ({ part: part + i, K1: each.gain, low, high }));
+    return each.rows.map(([low, high], i) => ({ part: part + i, [across]: each.gain, low, high }));
   });
 }
 
