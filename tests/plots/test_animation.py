@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 import tfarm
-from tfarm.dsp import Chain, Sampling
+from tfarm.dsp import Chain, Sampling, load_chain
 from tfarm.plots.animation import MOST_FRAMES, Motion, draw_motion, exaggeration, film, motion_of
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -49,6 +49,19 @@ def test_the_drawn_tip_is_at_hub_angle_times_reach_plus_deflection(run, motion, 
     assert turned[x.size // 2].imag == pytest.approx(middle, abs=1e-9 * scale)
     torque = run.torque[min(int(motion.t[frame] / 0.01 + 1e-9), run.torque.size - 1)]
     assert figure.axes[0].get_title(loc="left") == f"t = {motion.t[frame]:.2f} s,  u = {torque:.3g} N m"
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [("quanser-flexlink", "slew"), ("sasaki2012", "decay"), ("sasaki2012", "pulse")]
+)
+def test_the_motion_is_the_runs_own_through_converters_and_from_rest_or_not(name, kind):
+    """The tip of every frame, whatever drives the hub."""
+    arm = tfarm.load(name)
+    run = tfarm.simulate(arm, tfarm.default_gains(arm), load_chain(name), kind, 0.5, count=20, between=4)
+    found = motion_of(arm, run)
+    theta, tip = (at(run, signal, found.t) for signal in ("hub_angle", "tip_displacement"))
+    places = np.exp(1j * theta) * (arm.reach + 1j * found.factor * (tip - arm.reach * theta))
+    assert abs(places - found.link[:, -1]).max() < 1e-9 * arm.reach
 
 
 def test_the_still_has_the_largest_deflection_of_the_tip(run, motion):

@@ -79,10 +79,8 @@ def motion_of(arm: Arm, run: Simulation, until: float = math.inf, most: int = MO
 
 def exaggeration(share: float) -> int:
     """The factor of a deflection that is this share of the reach: 1 where it is seen, else 2, 5, 10, 20, ..."""
-    if not 0 < share < SEEN:
-        return 1
-    decade = 10 ** math.floor(math.log10(DRAWN / share))
-    return max(step * decade for step in (1, 2, 5) if step * decade * share <= DRAWN)
+    decade = 10 ** math.floor(math.log10(DRAWN / share)) if 0 < share < SEEN else 0
+    return max((step * decade for step in (1, 2, 5) if step * decade * share <= DRAWN), default=1) or 1
 
 
 def _edges(motion: Motion) -> Real:
