@@ -89,6 +89,7 @@ def test_a_film_has_a_frame_for_each_twentieth_of_its_own_second_and_the_same_by
         red, _, blue = np.moveaxis(np.array(gif.convert("RGB")).astype(int), -1, 0)
         heights.append(gif.height - np.argwhere(blue - red > 120)[:, 0].min())
     angles = motion.link[[1, motion.t.size // 2, -1], -1].imag
+    assert gif.convert("RGB").getpixel((3, 3)) == (255, 255, 255)
     assert np.corrcoef(heights, angles)[0, 1] > 0.999
     assert shown._repr_html_().startswith('<img src="data:image/gif;base64,R0lGOD')
 

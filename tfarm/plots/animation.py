@@ -31,7 +31,7 @@ STATIONS, BETWEEN = 15, 4  # along the link; records between two samples, betwee
 RATE, PERIOD_FRAMES, MOST_FRAMES = 20, 8, 240  # frames: a second, least in a period of the first mode, most of a film
 SEEN, DRAWN = 0.02, 0.1  # of the reach: largest deflection that is seen to scale, and largest of an exaggerated one
 HUB, BEYOND, RIM, MOST = 0.05, 1.07, 0.1, 1.3  # of the reach: hub, end of the reference, edge, and largest picture
-WIDTH, LETTERS, DOTS, INKS = 6.0, 0.9, 80, 48  # inches across, and above and below; dots an inch; colours
+WIDTH, LETTERS, DOTS, INKS, WHITE = 6.0, 0.9, 80, 48, 250  # inches across, above and below; dots an inch; colours
 
 
 class Motion(NamedTuple):
@@ -181,5 +181,6 @@ class Writer(PillowWriter):
     def finish(self) -> None:
         """Write the file."""
         palette = self._frames[0].quantize(INKS)
+        palette.putpalette([255 if each >= WHITE else each for each in palette.getpalette()])  # as the page's
         self._frames = [each.quantize(palette=palette, dither=0) for each in self._frames]
         super().finish()
