@@ -25,6 +25,7 @@ print(f"E = {arm.link.youngs_modulus:.8g} Pa, fitted to {omega.size} lines")
 chosen = tfarm.design(arm)  # K1 and K2 for the 10 ms loop
 save_law(tfarm.Law.of_gains(chosen.law), Path("law.toml"))  # for `--law law.toml`
 law = load_law("./law.toml")
+assert law is not None  # None of a file without [law]
 print(f"damping {100 * chosen.value:.4g} %;", tfarm.sampled(arm, law).verdict.sentence)
 print("on the rig itself:", tfarm.sampled(bench, law).verdict.word)
 

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         presets,
     )
     from tfarm.case import compare, loop_function, result_card
+    from tfarm.case.step import step
     from tfarm.dsp.results import simulate
     from tfarm.dsp.verdict import sampled
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from tfarm.loop.poles import closed_loop_poles
     from tfarm.loop.stability import spill
     from tfarm.reduced import reduce
+    from tfarm.report.live import explore
     from tfarm.response import bode, transfer
     from tfarm.spectrum import damped_modes, modes
     from tfarm.spectrum.table import default_gains
@@ -76,6 +78,7 @@ __all__ = [
     "damped_modes",
     "default_gains",
     "design",
+    "explore",
     "fit",
     "load",
     "locus",
@@ -93,6 +96,7 @@ __all__ = [
     "sampled",
     "simulate",
     "spill",
+    "step",
     "transfer",
     "tune",
 ]
@@ -109,6 +113,7 @@ _ROOMS = {  # the module of a name; after a colon another name there
     "loop_function": "case",
     "map": "loop.plane:gain_map",
     "margins": "loop.margins",
+    "explore": "report.live",
     "Measured": "fitting.data",
     "fit": "fitting.fit",
     "modes": "spectrum",
@@ -121,6 +126,7 @@ _ROOMS = {  # the module of a name; after a colon another name there
     "sampled": "dsp.verdict",
     "simulate": "dsp.results",
     "spill": "loop.stability",
+    "step": "case.step",
     "transfer": "response",
     "tune": "tuner",
 }

@@ -44,6 +44,8 @@ DRAWN = {
         *("--points", "20", "--branches", "2"),
     ],
     "map": ["map", LAB, "--points", "21"],
+    "simulate": ["simulate", LAB, "--duration", "2", "--modes", "8"],
+    "step": ["step", LAB, "--scenario", "deflection", "--duration", "1"],
     "map of a law": [
         *("map", LAB, "--law", "LAW", "--points", "8"),
         *("--vary", "hub_angle.num.0=0,20", "--vary", "delay=0,0.02"),
@@ -108,3 +110,18 @@ def test_nyquist_counts_what_the_map_counts(capsys, K2, unstable):
     _, out, _ = run(capsys, "nyquist", LAB, "--K1", "0.3", "--K2", K2)
     lines = [re.split("  +", line) for line in out.splitlines()]
     assert all([label, str(unstable)] in lines for label in ("unstable poles by Nyquist's criterion", "unstable poles"))
+
+
+def test_a_film_is_that_of_the_run_and_a_gif(capsys, tmp_path):
+    file = tmp_path / "slew.gif"
+    words = ("simulate", LAB, "--duration", "0.2", "--modes", "20", "--animate")
+    code, out, err = run(capsys, *words, str(file))
+    assert (code, err) == (0, f"written: {file}\n")
+    assert "residual root moment" in out
+    arm = tfarm.load(LAB)
+    shown = tfarm.plots.animate(arm, tfarm.simulate(arm, tfarm.default_gains(arm), duration=0.2, count=20))
+    assert file.read_bytes() == shown.gif
+    code, _, err = run(capsys, *words, str(tmp_path / "slew.png"))
+    assert code == 2
+    assert "--animate" in err
+    assert "ends in .gif" in err

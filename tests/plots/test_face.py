@@ -33,8 +33,16 @@ LAB = tfarm.load("sasaki2012-lab")
 MICRO = Path(__file__).parents[1] / "data" / "reproductions" / "micro2.toml"
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
 LEAD = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_deflection": ([0.5], [0.02, 1.0])})
-AXES = {"comparison": 3, "bode": 2, "loop": 2, "measured": 3, "modes": 3, "slew": 3}  # of a plot that has several
-PICTURES = sorted({*tfarm.plots.__all__} - {"column"})
+AXES = {
+    "comparison": 3,
+    "bode": 2,
+    "loop": 2,
+    "measured": 3,
+    "modes": 3,
+    "slew": 3,
+    "step": 4,
+}  # of a plot that has several
+PICTURES = sorted({*tfarm.plots.__all__} - {"animate", "column"})
 OTHERS = [f"{name} of a rig" for name in ("gain_map", "nyquist", "disc", "bode", "locus", "loop", "nichols")]
 OTHERS += ["locus of a law", "gain_map of a law"]
 
@@ -73,6 +81,7 @@ def records():
         "sketch": [LAB],
         "tuned_gain": [tfarm.tune(LAB, Plan(trials=1))],
         "slew": [LAB, tfarm.simulate(LAB, LAW, duration=2.0, count=8, between=4)],
+        "step": [tfarm.step(LAB, LAW, scenario_name="slew")],
         "locus of a law": [tfarm.locus(LAB, LEAD, "gain", 0.0, 2.0, 10, 3)],
         "gain_map of a law": [tfarm.map(LAB, factors, delays, law=LEAD, vary=("gain", "delay"))],
         "bode of a rig": [tfarm.bode(rig, "root_moment", (1.0, 1000.0))],

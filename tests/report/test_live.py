@@ -7,6 +7,7 @@ import itertools
 import json
 import math
 import re
+import sys
 from dataclasses import replace
 
 import control
@@ -24,7 +25,7 @@ from tfarm.loop.loop import Loop
 from tfarm.loop.panels import MOST_MISS, loop_panels
 from tfarm.loop.stability import stability
 from tfarm.report.live import has_sliders, law_data, live_data, save_live, sensor_numbers, slew_numbers
-from tfarm.report.page import Case
+from tfarm.report.page import Case, GivenLaw
 
 SIGNALS = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
 ARMS = ("sasaki2012-lab", "stocky-steel", "quanser-flexlink")
@@ -187,6 +188,29 @@ def test_the_page_stays_small_and_has_its_text_alone(tmp_path, monkeypatch):
     assert page.count("</script>") == 2
     (text,) = re.findall(r'<script type="application/json" id="live-data">(.*?)</script>', page, re.S)
     assert json.loads(text)["name"] == odd.name
+
+
+def test_explore_writes_the_page_that_a_report_has_and_opens_it(tmp_path, monkeypatch):
+    """In a notebook no browser is opened: the page is in a frame, with its script."""
+    opened = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    arm, law, chain = tfarm.load(ARMS[0]), HubFeedback(K1=0.25, K2=0.4), Chain(sampling=Sampling(period=0.005))
+    found = tfarm.explore(arm, law, chain)
+    (tmp_path / "report").mkdir()
+    save_live(Case(arm, chain, (GivenLaw(law),)), tmp_path / "report")
+    assert found.path.read_bytes() == (tmp_path / "report" / "live.html").read_bytes()
+    assert opened == [found.path.as_uri()]
+    monkeypatch.setitem(sys.modules, "ipykernel", sys)
+    shown = tfarm.explore(arm, law, chain)
+    assert len(opened) == 1
+    assert shown.path != found.path
+    (text,) = re.findall(r'<iframe src="data:text/html;charset=utf-8;base64,([^"]*)"', shown._repr_html_())
+    page = base64.b64decode(text).decode()
+    assert (found.path.parents[1] / "assets" / "live.js").read_text(encoding="utf-8") in page
+    assert "<script src=" not in page
+    with pytest.raises(tfarm.ParameterError, match="hub turns freely"):
+        tfarm.explore(arm.having(hub_inertia=math.inf))
 
 
 def test_an_arm_that_cannot_turn_freely_has_no_samples():

@@ -1,5 +1,6 @@
 """The sampled loop on the page: drawn numbers are those of the rooms, verdicts name their modes, same bytes."""
 
+import io
 import math
 from dataclasses import replace
 from functools import cache
@@ -7,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import tfarm
 from tests.report.written import blocks_of, values_of
@@ -19,8 +21,8 @@ from tfarm.loop.windows import windows_of
 from tfarm.plots import regions
 from tfarm.plots.regions import CUT_RANGE, K2_RANGE, overlay, stable_regions
 from tfarm.report import sampled_section as page
-from tfarm.report.page import DRAWN_DIGITS, Case, prose
-from tfarm.report.sampled_section import sampled_section
+from tfarm.report.page import DRAWN_DIGITS, Case, GivenLaw, prose, save_block
+from tfarm.report.sampled_section import FILM_FRAMES, sampled_section, slews
 from tfarm.schema import across, text
 from tfarm.spectrum.table import default_gains
 
@@ -149,6 +151,31 @@ def test_the_slew_is_the_simulators_own(section):
             shown = np.array(drawn[f"{name}_{key}_N_m"])[at_samples]
             half_a_digit = 0.5 * 10.0 ** (1 - DRAWN_DIGITS)  # of a number that begins with 1
             assert abs(shown - signal).max() < half_a_digit * abs(signal).max()
+
+
+def test_the_film_is_of_the_slew_under_the_controller_and_moves_only_where_that_is_wanted(section, tmp_path):
+    """Its still is the SVG, which a page has where motion is not wanted, and in print."""
+    shown = blocks_of(section)["slew-film"]
+    gif = Image.open(io.BytesIO(shown.film))
+    assert gif.n_frames == 1 + FILM_FRAMES
+    run = tfarm.simulate(LAB, GAINS, duration=1.5, count=20, between=4)
+    link = shown.figure.axes[0].lines[1].get_xydata() @ [1, 1j]
+    bent = math.sqrt(abs(link[-1]) ** 2 - LAB.reach**2)
+    tip = abs(run.between.tip_displacement - LAB.reach * run.between.hub_angle).max()
+    assert bent == pytest.approx(5 * tip, rel=0.02)
+    for name in ("pictures", "data"):
+        (tmp_path / name).mkdir()
+    words = str(save_block(shown, tmp_path).html)
+    still = '<picture><source media="(prefers-reduced-motion: reduce), print" srcset="pictures/slew-film.svg">'
+    assert f'{still}<img src="pictures/slew-film.gif" loading="lazy"' in words
+    assert (tmp_path / "pictures" / "slew-film.gif").read_bytes() == shown.film
+    assert (tmp_path / "pictures" / "slew-film.svg").stat().st_size > 1_000
+    assert str(save_block(blocks_of(section)["sampled-slew"], tmp_path).html).count("<picture>") == 0
+
+
+def test_a_loop_that_diverges_has_no_film():
+    pictures, _, _ = slews(Case(LAB, Chain(), (GivenLaw(HubFeedback(K1=0.3, K2=3.0)),)))
+    assert [each.stem for each in pictures] == ["sampled-slew", "sampled-slew-numbers"]
 
 
 # ------------------------------------------------------------ bytes and odd arms

@@ -225,11 +225,14 @@ class Law:
         numerators, whole = self.shares(np.ones(1, complex))
         return numerators.sum(axis=0)[:, 0], complex(whole[0])
 
-    def shares(self, s: Complex) -> tuple[Complex, Complex]:
-        """Return the numerators of each part (parts, signals, n) and the common denominator (n,), as `polynomials`."""
+    def shares(self, s: Complex, columns: Sequence[str] | None = None) -> tuple[Complex, Complex]:
+        """Return the numerators of each part (parts, columns, n) and the common denominator (n,), as `polynomials`.
+
+        The columns are the signals unless named.
+        """
         s = np.asarray(s, dtype=complex)
         dens = [part.block.denominator(s) for part in self.parts]
-        row = {name: n for n, name in enumerate(self.signals)}
+        row = {name: n for n, name in enumerate(self.signals if columns is None else columns)}
         numerators = np.zeros((len(self.parts), len(row), *s.shape), complex)
         for n, part in enumerate(self.parts):
             others = np.prod([den for m, den in enumerate(dens) if m != n], axis=0) * -self.sign

@@ -31,10 +31,12 @@ from tfarm.cli.app import (
     print_line,
     refuse,
 )
+from tfarm.errors import require
 from tfarm.files import write_mat
 
 command = partial(add_command, "Loop")
 sampled_command = partial(add_command, "Sampled loop")
+DRAWN_BETWEEN = 15  # records between two samples of a picture
 ModeCount = Annotated[
     int | None, typer.Option("--modes", min=1, max=400, help="flexible modes; by default as many as the result takes")
 ]
@@ -257,6 +259,34 @@ def sampled(
     emit(found, json, defaults, summary=tfarm.result_card(subject, controller, sampling, at_samples=found))
 
 
+@command(epilog="step sasaki2012-lab --scenario slew --png slew.png")
+def step(
+    arm: ArmName,
+    scenario: str = "reference",
+    duration: float | None = None,
+    chain: Any = load_chain,
+    output: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
+    csv: Csv = None,
+    png: Png = None,
+    law: LawFile = None,
+    theory: TheoryName = None,
+    json: Json = False,
+    *,
+    gains: Gains,
+) -> None:
+    """Time response of the continuous-time and the sampled loop: rise, overshoot, settling, peaks, residual vibration.
+
+    Options:
+    scenario: reference (unit step of the hub angle, or of the hub rate without its feedback), slew, pulse (of torque)
+        or deflection (first mode released)
+    duration: duration [s]; by default a slew and eight time constants of the dominant pole
+    output: further signal of the CSV file, as strain@0.05; may be repeated
+    """
+    subject, controller, defaults = load_loop(arm, theory, gains, law)
+    emit(tfarm.step(subject, controller, chain(arm), scenario, duration, outputs=output or ()), json, defaults,
+         csv=csv, png=png)  # fmt: skip
+
+
 @sampled_command(epilog="simulate sasaki2012-lab --scenario slew --output tip_rotation --csv slew.csv")
 def simulate(
     arm: ArmName,
@@ -267,7 +297,9 @@ def simulate(
     output: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
     between: Annotated[int, typer.Option(min=0, max=1000)] = 0,
     csv: Csv = None,
+    png: Png = None,
     mat: File = None,
+    animate: File = None,
     controller: Annotated[Path | None, typer.Option(metavar="FILE", exists=True)] = None,
     law: LawFile = None,
     theory: TheoryName = None,
@@ -278,14 +310,17 @@ def simulate(
     """Time response of the sampled loop: hub angle, tip, root moment and torque, exact between the samples.
 
     Options:
-    scenario: slew, step, decay or impulse
+    scenario: slew, step, decay, impulse or pulse
     duration: duration [s]
     output: further signal, as strain@0.05; may be repeated
-    between: records between two samples
+    between: records between two samples; with --png by default 15
     mat: write the signals to a MATLAB file
+    animate: draw the arm in motion into this file, a GIF
     controller: tuner of `tfarm tune --save`: it sets K2, with its own K1
     """
-    how: Any = {"count": modes, "between": between, "outputs": output or ()}
+    if animate is not None:
+        require(animate.suffix.lower() == ".gif", "--animate", str(animate), "give a name that ends in .gif")
+    how: Any = {"count": modes, "between": between or DRAWN_BETWEEN * (png is not None), "outputs": output or ()}
     defaults = None
     if controller is None:
         from tfarm.dsp.results import simulated_run
@@ -304,7 +339,9 @@ def simulate(
         if found.between:
             signals["between"] = {name(key): values for key, values in found.between.items()}
         write_mat(mat, signals, key="--mat")
+    if animate is not None:
+        tfarm.plots.animate(found.arm, found.simulation).save(animate)
     if found.stopped_at is not None:
         mode = f"mode {found.growing_mode}" if found.growing_mode else "the hub"
         print_line(f"unstable: stopped at {found.stopped_at:.6g} s, {mode} grows")
-    emit(found, json, defaults, csv=csv, also=(mat,))
+    emit(found, json, defaults, csv=csv, png=png, also=(mat, animate))

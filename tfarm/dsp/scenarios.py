@@ -18,10 +18,11 @@ from tfarm.spectrum.table import turning_inertia
 
 MOST_TASK_SAMPLES = 4_000_000  # of a record, a few hundred MB of signals
 STEP_TORQUE, IMPULSE, TIP_OFFSET = 0.1, 0.01, 0.01  # N m, N m s, m: sizes of the scenarios of the paper's arm
+PULSE_SHARE = 0.1  # of the slew's rise time: width of a pulse of torque, in whole samples
 TRIAL_COST = (1.0, 2.6)  # 1/(N m)^2 s: weights a and b of the paper's (23), of vibration and of the law's own share
 TRIAL_SLEWS = 3.0  # times the slew: length of a trial for an arm and its chain
 TRIAL_DURATION = 3.0  # s, of a trial or a simulation by default: three times the paper's slew
-SCENARIOS = ("slew", "step", "decay", "impulse")
+SCENARIOS = ("slew", "step", "decay", "impulse", "pulse")
 PAPER_TORQUE = 3.0  # N m, of the slew of 1.15 m in 1 s of the preset sasaki2012
 
 
@@ -122,17 +123,30 @@ def resting(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:
     """Return a scenario without references.
 
     A step of the torque r at t = 0, 0.1 of the arm's unit of torque; the decay of the first mode from rest with the tip
-    displaced by 0.01 L; or a disturbance impulse on the hub just after the sample at t = 0, 0.01 s of that unit.  So it
-    is first measured a sample later.  (Just before a sample the moment of a damped arm would be measured where it grows
-    as t^-1/2, without bound, and no number of modes converges.)
+    displaced by 0.01 L; a disturbance on the hub of 0.1 of that unit for a tenth of the slew; or an impulse there just
+    after the sample at t = 0, 0.01 s of that unit.  So it is first measured a sample later.  (Just before a sample the
+    moment of a damped arm would be measured where it grows as t^-1/2, without bound, and no number of modes converges.)
     """
-    zero, unit = np.zeros(_samples(duration, chain.sampling.period)), torque_unit(arm, chain)
+    T, unit = chain.sampling.period, torque_unit(arm, chain)
+    zero = np.zeros(_samples(duration, T))
+    width = max(1, round(PULSE_SHARE * chain.slew.rise_time / T))
     sizes: dict[str, dict[str, Any]] = {
+        "pulse": {
+            "disturbance": np.where(np.arange(zero.size) < width, STEP_TORQUE * unit, 0.0),
+            "busy_until": width * T,
+        },
         "step": {"feedforward": zero + STEP_TORQUE * unit},
         "decay": {"tip_offset": TIP_OFFSET * arm.length},
         "impulse": {"impulse": IMPULSE * unit},
     }
-    return replace(Scenario(name, chain.sampling.period, zero, zero, zero, zero, zero), **sizes[name])
+    return replace(Scenario(name, T, zero, zero, zero, zero, zero), **sizes[name])
+
+
+def unit_step(signal: str, chain: Chain, duration: float) -> Scenario:
+    """Return a reference of 1 rad of the hub angle, or of 1 rad/s of the hub rate, from t = 0 on."""
+    zero = np.zeros(_samples(duration, chain.sampling.period))
+    resting_task = Scenario("reference", chain.sampling.period, zero, zero, zero, zero, zero)
+    return replace(resting_task, **{signal: zero + 1.0})  # type: ignore[arg-type]  # of an array of references
 
 
 def described(task: Scenario, arm: Arm, chain: Chain) -> str:
@@ -143,6 +157,8 @@ def described(task: Scenario, arm: Arm, chain: Chain) -> str:
         "step": f"a step of {task.feedforward[0]:.4g} {arm.input_unit}",
         "decay": f"the first mode released with the tip at {task.tip_offset:.4g} m",
         "impulse": f"an impulse of {task.impulse:.4g} {arm.input_unit} s on the hub",
+        "pulse": f"{task.disturbance[0]:.4g} {arm.input_unit} on the hub for {task.busy_until:.4g} s",
+        "reference": f"a unit step of the reference of the hub {'angle' if task.hub_angle[0] else 'rate'}",
     }
     return words[task.name]
 

@@ -25,7 +25,7 @@ from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import kernel
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.discretise import acting_law, with_all_gains
-from tfarm.dsp.plant import RECORDED, USUAL_MODES, sensed_plant
+from tfarm.dsp.plant import RECORDED, USUAL_MODES, Plant, sensed_plant
 from tfarm.dsp.scenarios import Scenario
 from tfarm.errors import must_be_known, require
 from tfarm.exact.outputs import OUTPUTS
@@ -348,18 +348,11 @@ class Simulator:
         )
 
     def _at_first(self) -> Complex:
-        """The modal amplitudes (m,) at t = 0: 0, or of the first mode at rest with the tip displaced.
-
-        a = i x/(p r), x = offset |p|^2/(2 Im p).
-        """
+        """The modal amplitudes (m,) at t = 0: 0, or of the first mode at rest with the tip displaced."""
         amplitude: Complex = np.zeros(self._kept.size, complex)
         if offset := self.scenario.tip_offset:
-            tip = self.plant.residues[self.plant.outputs.index("tip_displacement")]
-            first = np.flatnonzero((self.plant.mode == 1) & (self.plant.poles.imag > 0) & (tip != 0))[:1]
-            remedy = "no free decay: the tip is pinned, or the first mode is overdamped; take another scenario"
-            require(first.size, "scenario", "decay", remedy)
-            p, r = self.plant.poles[first], tip[first]
-            amplitude[np.isin(self._kept, first)] = 1j * offset * abs(p) ** 2 / (2 * p.imag) / (p * r)
+            first, released = first_mode(self.plant, offset)
+            amplitude[self._kept == first] = released
         return amplitude
 
     def _energy(self, amplitude: Complex, rate: float) -> float:
@@ -399,6 +392,21 @@ class Simulator:
         """The recorded outputs."""
         angle, rate, moment, tip, *more = (np.ascontiguousarray(column) for column in record[:, len(self.measured) :].T)
         return Trace(t, angle, rate, moment, tip, dict(zip(self.others, more, strict=True)))
+
+
+def first_mode(plant: Plant, offset: float, scenario: str = "decay") -> tuple[int, complex]:
+    """Return the pole p of the first mode, by its place, and its amplitude at rest with the tip displaced by `offset`.
+
+    a = i x/(p r), x = offset |p|^2/(2 Im p), r the residue of the tip displacement.  Raises ParameterError where the
+    tip is pinned or the mode overdamped.
+    """
+    tip = plant.residues[plant.outputs.index("tip_displacement")]
+    found = np.flatnonzero((plant.mode == 1) & (plant.poles.imag > 0) & (tip != 0))
+    remedy = "no free decay: the tip is pinned, or the first mode is overdamped; take another scenario"
+    require(found.size, "scenario", scenario, remedy)
+    first = int(found[0])
+    p, r = complex(plant.poles[first]), complex(tip[first])
+    return first, 1j * offset * abs(p) ** 2 / (2 * p.imag) / (p * r)
 
 
 def references_of(law: Law, task: Scenario) -> Real:

@@ -8,14 +8,16 @@
 In the look of the report's pages, whose pictures these are.  This is the only room with matplotlib.
 """
 
+from tfarm.plots.animation import animate
 from tfarm.plots.frequency import bode, measured
 from tfarm.plots.loop_function import disc, loop, nichols, nyquist, sensitivity
-from tfarm.plots.motion import modes, sketch, slew, tuned_gain
+from tfarm.plots.motion import modes, sketch, slew, step, tuned_gain
 from tfarm.plots.regions import comparison, gain_map, overlay
 from tfarm.plots.roots import locus
 from tfarm.plots.style import column
 
 __all__ = [
+    "animate",
     "bode",
     "column",
     "comparison",
@@ -31,5 +33,6 @@ __all__ = [
     "sensitivity",
     "sketch",
     "slew",
+    "step",
     "tuned_gain",
 ]

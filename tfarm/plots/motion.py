@@ -16,9 +16,13 @@ from matplotlib.ticker import MaxNLocator
 
 from tfarm.arm import MOMENT_GAIN, Arm, Link
 from tfarm.arrays import Real
+from tfarm.case.step import Step
 from tfarm.digits import how_many, plain, significant, unit
 from tfarm.dsp import GainMap, Simulation, traces
+from tfarm.dsp.results import Run
+from tfarm.dsp.simulate import SETTLED_SHARE
 from tfarm.dsp.traces import POINTS_A_PERIOD, TimeCurve
+from tfarm.exact.outputs import OUTPUTS
 from tfarm.fitting.recording import RunComparison
 from tfarm.loop.plane import Plane
 from tfarm.spectrum import Modes
@@ -29,11 +33,14 @@ from .regions import overlay
 from .style import (
     BLUE,
     FAINT,
+    FIGURES,
     GREY,
     INK,
+    MARGINAL,
     ORANGE,
     REGIONS,
     STABLE,
+    UNSTABLE,
     Axes,
     Figure,
     by_name,
@@ -47,6 +54,14 @@ HUB_WIDTH = 0.06  # width of the drawn hub, as a share of the length
 TIME = "time [s]"
 RUNS = ("#a3a3a3", INK, "#0b7f93", "#8a6d3b")  # several simulations, without feedback first: no colours of stability
 DASHED, DOTTED, LONG_DASHED = (0, (4, 3)), (0, (1, 2)), (0, (5, 3))
+OF_STABILITY = {"stable": (STABLE, "o"), "marginal": (MARGINAL, "s"), "unstable": (UNSTABLE, "x")}  # colour, mark
+HATCH = "/////"
+LEAST_RISE = 1 / 3000  # of the height of a curve: rise from point to point that counts
+MOST_TURNS = 400  # of a line; with more it is a band
+FEW_SAMPLES = 60  # of a run: each is marked
+STEP_ROWS = (1.0, 1.0, 1.0, 1.0)  # heights of hub, tip, root moment and torque
+SHOWN_SETTLED = 1.5  # times the last settling time: end of the picture
+OFF_FRAME = 0.3  # of the height of a stable response: margin beyond it for an unstable one
 
 
 def scaled(found: Modes, count: int) -> dict[int, Real]:
@@ -211,9 +226,69 @@ def _draw_curve(curve: TimeCurve, ax: Axes, colour: str, *, scale: float = 1.0, 
     """The line, or the band."""
     low, high = scale * curve.low, scale * curve.high
     if curve.is_band:
-        ax.fill_between(curve.t, low, high, color=colour, alpha=0.55, lw=0.8, label=looks.get("label"))
+        is_dashed = looks.get("ls") == DASHED  # of a sampled loop: its band is hatched
+        own = {"fc": "none", "ec": colour, "hatch": HATCH} if is_dashed else {"color": colour, "alpha": 0.55}
+        ax.fill_between(curve.t, low, high, lw=0.8, label=looks.get("label"), **own)
     else:
         ax.plot(curve.t, low, color=colour, lw=1.3, **looks)
+
+
+def _name_signals(arm: Arm, names: Sequence[str], ax: Sequence[Axes]) -> None:
+    """Along the axes: the signals with their units, the last being the input of the arm, and time."""
+    of_input = "motor torque [N m]" if arm.input_unit == "N m" else f"motor [{arm.input_unit}]"
+    known = [OUTPUTS[name.partition("@")[0]] for name in names[:-1]]
+    labels = [f"{each.label.replace('at x', 'of the tip')} [{each.unit}]" for each in known]
+    for one, label in zip(ax, (*labels, of_input), strict=True):
+        one.axhline(0.0, color=GREY, lw=0.6)
+        one.set(xlabel=TIME, ylabel=label)
+
+
+def _draw_signal(ax: Axes, t: Real, y: Real, looks: tuple[str, str], every: int = 0, **how: Any) -> None:
+    """A signal at even times; with `every` that of a sampled loop, with marks at the samples where these are few."""
+    (colour, mark), step = looks, math.ceil(t.size / traces.MOST_LINE)
+    rises = np.diff(y)[abs(np.diff(y)) > LEAST_RISE * np.ptp(y)]
+    if np.count_nonzero(np.diff(np.signbit(rises))) > MOST_TURNS:
+        step = 1  # for a band
+    _draw_curve(traces.curve(t[::step], y[::step]), ax, colour, ls=DASHED if every else "-", **how)
+    if every and t.size <= FEW_SAMPLES * every:
+        ax.plot(t[::every], y[::every], mark, color=colour, ms=3.0, mew=1.0)
+
+
+@picture(
+    (Step, "tfarm.step returns"), size=(9.0, 10.0), rows=STEP_ROWS,
+    title=lambda found: f"{found.arm.name}: {found.scenario_in_words}",
+)  # fmt: skip
+def step(found: Step, *, ax: Sequence[Axes]) -> None:
+    """Time responses (from `tfarm.step`) in four axes, given or new; these: hub, tip, root moment [N m] and input.
+
+    The continuous-time loop is solid, the sampled one dashed; references are grey, with 5 % to either side.  Of an
+    unstable loop the part within the range of a stable one is drawn.
+    """
+    _name_signals(found.arm, found.names, ax)
+    t, every = found.t[found.t <= _shown_until(found)], round(found.period / found.t[1])
+    for one, name in zip(ax, found.names, strict=True):
+        one.set_xlim(0.0, t[-1])
+        if (reference := found.reference.get(name)) is not None:
+            ends = np.sort(reference[-1] * np.array([1 - SETTLED_SHARE, 1 + SETTLED_SHARE]))
+            one.axhspan(*ends, color=FAINT, lw=0, alpha=0.6, zorder=0)
+            one.plot(t, reference[: t.size], color=GREY, lw=0.8, label="reference, 5 %")
+        for loop, each in found.loops.items():
+            y, looks, label = each.signals[name][: t.size], OF_STABILITY[each.stability], f"{loop}, {each.stability}"
+            _draw_signal(one, t[: y.size], y, looks, every if each is found.sampled else 0, label=label)
+        stable = [each.signals[name] for each in found.loops.values() if each.hub]
+        if stable and len(stable) < len(found.loops):
+            low, high = stable[0].min(), stable[0].max()
+            one.set_ylim(low - OFF_FRAME * (high - low), high + OFF_FRAME * (high - low))
+
+
+def _shown_until(found: Step) -> float:
+    """End of the picture [s]: some time after every signal of a stable loop has settled, else that of the record."""
+    each = [of for loop in found.loops.values() for of in (loop.hub, loop.tip, loop.root_moment, loop.torque) if of]
+    ends = [math.inf if of.settling_time is None else SHOWN_SETTLED * of.settling_time for of in each]
+    return min(max(ends, default=math.inf), float(found.t[-1]))
+
+
+FIGURES[Run] = lambda run: slew.figure(run.arm, run.simulation, run.scenario_in_words)
 
 
 def _measured_rows(each: Mapping[str, RunComparison]) -> int:

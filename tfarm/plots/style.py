@@ -354,6 +354,15 @@ def save_picture(draw: Callable[[Any], Figure], record: Any, path: Path) -> None
     write_file(path, content, key="--figure")
 
 
+def settled(figure: Figure) -> None:
+    """Make the layout of a figure once, for all that is drawn of it."""
+    if (layout := figure.get_layout_engine()) is not None:
+        layout.execute(figure)
+        figure.set_layout_engine(None)
+    for ax in figure.axes:  # at ten digits: the layout's solver orders by address, so its last bit differs
+        ax.set_position(tuple(np.round(ax.get_position(original=True).bounds, 10).tolist()))
+
+
 def _drawn(figure: Figure, formats: tuple[str, ...], dpi: int) -> Iterator[bytes]:
     """The figure in each format, its layout made once for all of them.
 
@@ -361,11 +370,7 @@ def _drawn(figure: Figure, formats: tuple[str, ...], dpi: int) -> Iterator[bytes
     """
     with style(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing")  # an arm's name may hold any letter
-        if (layout := figure.get_layout_engine()) is not None:
-            layout.execute(figure)
-            figure.set_layout_engine(None)
-        for ax in figure.axes:  # at ten digits: the layout's solver orders by address, so its last bit differs
-            ax.set_position(tuple(np.round(ax.get_position(original=True).bounds, 10).tolist()))
+        settled(figure)
         for kind in formats:
             content = io.BytesIO()
             figure.savefig(content, format=kind, dpi=dpi, metadata=METADATA[kind])

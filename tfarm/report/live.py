@@ -3,9 +3,13 @@
 import base64
 import json
 import math
+import sys
+import webbrowser
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any, cast, get_args
 
 import numpy as np
@@ -34,12 +38,13 @@ from tfarm.crossing import pieces
 from tfarm.digits import kept_digits, scientific
 from tfarm.dsp import Chain, PulseTransfer, Sampled, Scenario, Simulator, sampled_verdict, scenario
 from tfarm.dsp import GainMap as SampledMap
+from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.edges import LONGEST_DELAY_SAMPLES
 from tfarm.dsp.plant import Plant, sensed_plant
 from tfarm.dsp.results import enough_modes, ideal_chain
 from tfarm.dsp.simulate import FOLDED_UP, quantisers
 from tfarm.dsp.traces import RECORD_LENGTH
-from tfarm.errors import TfarmError
+from tfarm.errors import TfarmError, require
 from tfarm.loop.loop import Loop, steep_places
 from tfarm.loop.panels import PANEL_SAMPLES, Positions, Sensor, loop_panels, positions, sensed_places
 from tfarm.loop.plane import gain_map, moment_axis, rate_axis, rate_columns
@@ -47,7 +52,7 @@ from tfarm.loop.stability import band_of_family, stability
 from tfarm.loop.windows import windows_of
 from tfarm.plots.regions import BEYOND_PICTURE, sampled_region
 from tfarm.plots.style import GOOD, LOW, MARGINAL, POOR, STABLE, UNSTABLE
-from tfarm.report.page import TEMPLATES, Case, argument, has_loop, is_preset, render, sign_words, write_text
+from tfarm.report.page import TEMPLATES, Case, GivenLaw, argument, has_loop, is_preset, render, sign_words, write_text
 from tfarm.response import transfer
 from tfarm.spectrum.table import angle_unit, default_gains
 
@@ -55,6 +60,7 @@ MOST_LIVE_SAMPLES = 5000  # of a slew: 160 kB of references; a longer one is lef
 LIVE_COLUMNS = 90  # values of the gain across at which the continuous region is cut
 SENSED_MODES = 6  # whose frequencies and zeros the chart of sensors has
 SENSOR_DIGITS = 6  # of the numbers of that chart: far more than a screen has
+FRAME = 780  # pixels: height of the page in a notebook
 LIVE_PAGE, ASSETS, SCRIPT = "live.html", "assets", "live.js"
 LIMITS = {"gain": GAIN_LIMITS, "phase": PHASE_LIMITS, "periods": PERIOD_LIMITS, "peak": PEAK_LIMITS}  # of the grades
 BEYOND = "|L| < 0.5 beyond the frequency range at all gains of this page: no unstable pole there (small gain)"
@@ -444,3 +450,56 @@ def write_assets(folder: Path) -> None:
     parts = ("loop", "sampled", "locus", "sets", "chart", "player", "sensor", "page")
     scripts = "".join((TEMPLATES / f"live_{name}.js").read_text(encoding="utf-8") for name in parts)
     write_text(folder / SCRIPT, f"(() => {{\n{scripts}}})();\n")
+
+
+# ------------------------------------------------------------ from Python
+
+
+@dataclass(frozen=True)
+class LivePage:
+    """A live page on this computer, its `path`; a notebook shows it."""
+
+    path: Path
+
+    def _repr_html_(self) -> str:
+        """The page in a frame, with its script in it: a notebook serves no other file."""
+        link, script = f'<script src="../{ASSETS}/{SCRIPT}">', self.path.parents[1] / ASSETS / SCRIPT
+        page = self.path.read_text(encoding="utf-8").replace(link, f"<script>{script.read_text(encoding='utf-8')}")
+        text = base64.b64encode(page.encode()).decode("ascii")  # no srcdoc: its links lead into the notebook's own page
+        source = f'src="data:text/html;charset=utf-8;base64,{text}" title="live page"'
+        return f'<iframe {source} style="width:100%;height:{FRAME}px;border:0"></iframe>'
+
+
+def explore(arm: Arm, law: AnyLaw | None = None, chain: Chain | None = None) -> LivePage:
+    """Show the live page of an arm: in a notebook as the output of a cell, else in the browser.
+
+    The page is a file of its own with its script, in a temporary folder that stays; nothing is served.
+
+    Parameters
+    ----------
+    arm
+        The arm.
+    law
+        The controller at which the page begins; the default gains unless given, and for one that has no sliders.
+    chain
+        Sampling; every 10 ms unless given.
+
+    Returns
+    -------
+    LivePage
+        With the `path` of the page.
+
+    Raises
+    ------
+    ParameterError
+        For an arm whose hub does not turn freely or has no inertia.
+    """
+    case = Case(arm, chain_or_usual(chain), () if law is None else (GivenLaw(law),))
+    require(is_live(case), "arm", arm.name, "give one whose hub turns freely and has inertia")
+    place = Path(mkdtemp(prefix="tfarm-"))
+    (folder := place / "arm").mkdir()
+    save_live(case, folder)
+    write_assets(place / ASSETS)
+    if "ipykernel" not in sys.modules:
+        webbrowser.open((folder / LIVE_PAGE).as_uri())
+    return LivePage(folder / LIVE_PAGE)

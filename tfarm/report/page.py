@@ -128,7 +128,8 @@ class Fact(NamedTuple):
 class Picture(NamedTuple):
     """A finished figure with its words.  `stem` names its files; `data` are the numbers that it draws.
 
-    `python` is the line of Python that draws it, empty where no public function does.
+    `film` is a GIF, whose still picture is the figure.  `python` is the line of Python that draws it, empty where no
+    public function does.
     """
 
     stem: str
@@ -138,6 +139,7 @@ class Picture(NamedTuple):
     figure: Figure
     data: tuple[Column, ...] = ()
     python: str = ""
+    film: bytes = b""
 
 
 def picture(
@@ -214,7 +216,10 @@ def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> 
         for each in block.data
     )
     saved = save_table(Table(columns=columns, stem=f"{block.stem}-data"), folder / DATA, ("csv",)) if columns else ()
-    drawn = [f"{PICTURES}/{block.stem}.{kind}" for kind in ("svg", *["pdf"] * is_paper)]
+    if block.film:
+        (folder / PICTURES / f"{block.stem}.gif").write_bytes(block.film)
+    kinds = ("svg", *["pdf"] * is_paper, *["gif"] * bool(block.film))
+    drawn = [f"{PICTURES}/{block.stem}.{kind}" for kind in kinds]
     files = [*drawn, *(f"{DATA}/{name}" for name in saved)]
     return SavedBlock(block.stem, block.title, shape.picture(block, files), shape.image(block))
 

@@ -17,7 +17,7 @@ from tfarm.dsp import Analysis, Chain, Simulation, modes, results, sampled_verdi
 from tfarm.dsp.chain import MOST_DELAY
 from tfarm.errors import ParameterError
 from tfarm.fitting.recording import RunComparison, compare_run, overshoot
-from tfarm.plots import motion, regions, roots, style
+from tfarm.plots import animation, motion, regions, roots, style
 from tfarm.report.page import (
     Case,
     Controller,
@@ -36,6 +36,7 @@ from tfarm.spectrum.table import default_gains
 MORE_DELAY = (0.0, 0.5, 1.0)  # samples of further delay for which the verdict is given
 VERDICT_COLUMNS = ("word", "spectral_radius", "time_constant", "slowest", "holds_for")
 WHOLE_LAW_COLUMNS = ("index", "natural_frequency", "band", "aliased", "first_order", "by_damping", "log_radius")
+FILM_SLEWS, FILM_FRAMES = 1.5, 80  # length of a film in slews, and frames at most: a second of computing
 
 
 def sampled_section(case: Case) -> PageSection:
@@ -178,6 +179,7 @@ def slews(case: Case) -> tuple[list[Picture | Table], list[str], list[Fact]]:
     arm, title = simulated[0].arm, prose("slew_title", task=task, reach=case.arm.reach)
     figure = motion.slew.figure(arm, {style.safe(name): run for name, run in runs.items()}, title)
     columns = response_columns(arm, {each.key: runs[each.name] for each in simulated})
+    moving = [each for each in simulated if each is not bare and runs[each.name].stopped is None]
     numbers = (
         Column("law", "controller", of=list(runs)),
         *table(list(runs.values()), ("residual_moment", "settling_time")).columns,
@@ -186,11 +188,19 @@ def slews(case: Case) -> tuple[list[Picture | Table], list[str], list[Fact]]:
     return (
         [
             picture("sampled_slew", figure, data=columns, runs=runs, piece=piece_of_bands(runs), task=title),
+            *(film_picture(each, runs[each.name], task.rise_time) for each in moving[:1]),
             sheet("slew_numbers", numbers, stem="sampled-slew-numbers"),
         ],
         words,
         [settling_fact(each, runs[each.name], len(case.laws) > 1) for each in simulated if each is not bare],
     )
+
+
+def film_picture(each: Controller, run: Simulation, rise: float) -> Picture:
+    """The film of a slew, and of what follows for half as long."""
+    found = animation.motion_of(each.arm, run, FILM_SLEWS * rise, FILM_FRAMES)
+    still = picture("slew_film", animation.draw_motion.figure(found), name=each.name, found=found)
+    return still._replace(film=animation.film(found).gif)
 
 
 def settling_fact(each: Controller, run: Simulation, is_named: bool) -> Fact:

@@ -211,6 +211,8 @@ def sections(record: Any, title: str = "") -> list[Section]:
             later.append(Section(of.help or of.label, table=roots_table(value, of)))
         elif shown := with_unit(value, of):
             own.pairs.append((of.label, shown))
+    if isinstance(whole := getattr(record, "table", None), Table):
+        later.append(Section(whole.title, table=whole))
     if hasattr(record, "drawing"):
         later.append(Section(drawing=record.drawing))
     return [own, *later]

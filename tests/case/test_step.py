@@ -1,0 +1,163 @@
+"""Figures of time responses: those of textbooks, of the same loop sampled ever faster, and of `tfarm simulate`."""
+
+import csv
+import math
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.shell import answer, run
+from tfarm.case.step import PARTS, SAMPLED_NAMES, _Record
+from tfarm.dsp import Chain
+from tfarm.dsp.chain import Sampling
+
+LAB, LOSSLESS = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
+LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
+SERVO = tfarm.HubFeedback(K1=1.0, K2=0.3, Kp=3.0)
+
+
+def test_figures_of_a_second_order_system_are_those_of_the_textbook():
+    """Overshoot e^{-pi z/sqrt(1 - z^2)} at pi/wd, rise and settling times from the closed form."""
+    z, w = 0.4, 5.0
+    wd = w * math.sqrt(1 - z * z)
+
+    def y(t):
+        return 2 * (1 - np.exp(-z * w * t) * (np.cos(wd * t) + z * w / wd * np.sin(wd * t)))
+
+    t = np.linspace(0.0, 10.0, 200_001)
+    record = _Record(LAB, ("hub_angle", "tip_displacement", "root_moment"), 0.0, t, {"hub_angle": 2.1 + 0 * t})
+    at = int(y(t).argmax())
+    found = record._figures("hub_angle", y(t), t[at], y(t)[at], None)
+    assert found.overshoot == pytest.approx(math.exp(-math.pi * z / math.sqrt(1 - z * z)), rel=1e-6)
+    assert found.peak_time == pytest.approx(math.pi / wd, rel=1e-4)
+    assert found.steady_state_error == pytest.approx(0.1, rel=1e-4)
+    low, high = (next(s for s in t if y(s) >= 2 * share) for share in (0.1, 0.9))
+    assert found.rise_time == pytest.approx(high - low, abs=1e-4)
+    outside = t[abs(y(t) / 2 - 1) > 0.05]
+    assert found.settling_time == pytest.approx(outside[-1], abs=1e-4)
+    assert found.residual_rms is None
+
+
+@pytest.mark.parametrize("scenario", SAMPLED_NAMES)
+def test_the_sampled_response_becomes_the_continuous_one(scenario):
+    """With a period of 0.2 ms instead of 10 ms the figures of both loops differ by a hundredth, T w1."""
+    found = tfarm.step(LAB, SERVO, Chain(sampling=Sampling(period=2e-4)), scenario, 1.5)
+    for part in PARTS:
+        one, other = getattr(found.continuous, part), getattr(found.sampled, part)
+        assert other.peak == pytest.approx(one.peak, rel=0.01), part
+        name = one.signal
+        apart = abs(found.continuous.signals[name] - found.sampled.signals[name])
+        assert np.quantile(apart, 0.98) < 0.02 * abs(one.peak), part
+    assert (found.continuous.stability, found.sampled.stability) == ("stable", "stable")
+
+
+def test_the_settling_time_of_the_root_moment_is_that_of_simulate():
+    found, run_ = tfarm.step(LAB, LAW, scenario_name="slew", duration=3.0), tfarm.simulate(LAB, LAW, duration=3.0)
+    assert found.sampled.root_moment.settling_time == pytest.approx(run_.settling_time, abs=0.01)
+    assert found.sampled.root_moment.residual_rms == pytest.approx(run_.residual_raw, rel=0.05)
+    assert found.sampled.torque.peak == pytest.approx(run_.torque[abs(run_.torque).argmax()], rel=1e-6)
+
+
+def test_a_servo_follows_the_slew_and_the_step():
+    slew = tfarm.step(LAB, SERVO, scenario_name="slew")
+    travel = 1.15
+    for loop in slew.loops.values():
+        assert loop.hub.final_value == pytest.approx(travel, rel=2e-3)
+        assert loop.tip.final_value == pytest.approx(travel * LAB.reach, rel=2e-3)
+    step = tfarm.step(LAB, SERVO)
+    assert step.continuous.hub.signal == "hub_angle"
+    assert step.continuous.hub.final_value == pytest.approx(1.0, abs=2e-3)
+    assert step.continuous.certainty.startswith("converged, ")
+    assert tfarm.step(LOSSLESS, SERVO, duration=2.0).continuous.certainty.startswith("approximate, ")
+
+
+def test_without_a_controller_the_first_mode_rings_on():
+    """At C = 0 a cosine of the first natural frequency, from a deflection of the tip of a hundredth of the length."""
+    found = tfarm.step(LOSSLESS, tfarm.HubFeedback(), scenario_name="deflection", duration=1.0)
+    w = float(tfarm.modes(LOSSLESS, 1).natural_frequency[-1])
+    expected = 0.01 * LOSSLESS.length * np.cos(w * found.t)
+    np.testing.assert_allclose(found.continuous.signals["tip_displacement"], expected, atol=1e-12)
+    assert abs(found.continuous.signals["torque"]).max() == 0.0
+    assert found.continuous.stability == "marginal"
+
+
+def test_an_unstable_loop_has_a_response_and_no_figures():
+    found = tfarm.step(LAB, tfarm.HubFeedback(K1=-1.0, K2=0.3), duration=3.0)
+    assert {each.stability for each in found.loops.values()} == {"unstable"}
+    assert all(getattr(loop, part) is None for loop in found.loops.values() for part in PARTS)
+    assert "the response grows, its figures are not defined" in found.finding
+    hub = found.continuous.signals["hub_rate"]
+    assert abs(hub[-200:]).max() > 3 * abs(hub[:1000]).max()
+
+
+def test_a_law_in_z_has_the_sampled_response_alone():
+    law = tfarm.Law({"hub_rate": ([0.3], [1.0])}, period=0.01, references=("hub_rate",))
+    found = tfarm.step(LAB, law, duration=10.0)
+    assert found.continuous is None
+    assert list(found.loops) == ["sampled, 10 ms"]
+    assert found.sampled.hub.signal == "hub_rate"
+    assert found.sampled.hub.settling_time > 0
+
+
+def test_a_column_of_references_is_the_reference_of_its_signal():
+    """C (reference - hub angle) as one state space of two columns, and as a signal with a reference."""
+    A, B, C, D = [[-50.0]], [[1.0, -1.0]], [[100.0]], [[0.0, 0.0]]
+    columns = tfarm.Law.of_matrices(A, B, C, D, ("hub_angle", "reference:hub_angle"))
+    signal = tfarm.Law({"hub_angle": ([100.0], [1.0, 50.0])}, references=("hub_angle",))
+    one, other = (tfarm.step(LAB, law, duration=0.5) for law in (columns, signal))
+    for kind in ("continuous", "sampled"):
+        for name in one.names:
+            y, expected = getattr(one, kind).signals[name], getattr(other, kind).signals[name]
+            np.testing.assert_allclose(y, expected, rtol=1e-8, atol=1e-10 * abs(expected).max())
+
+
+@pytest.mark.parametrize(
+    ("arm", "law", "scenario", "words"),
+    [
+        (LAB.having(hub_inertia=math.inf), LAW, "slew", "locked hub"),
+        (LAB.having(hub_inertia=0.0), LAW, "slew", "K2 = 0.3"),
+        (LAB, LAW, "impulse", "scenario = .impulse"),
+        (LAB, tfarm.HubFeedback(K2=0.3), "reference", "neither hub angle nor hub rate"),
+        (
+            LAB,
+            tfarm.Law({"tip_deflection": 0.1}, references=("tip_deflection",)),
+            "slew",
+            "references = .tip_deflection",
+        ),
+        (LAB.having(payload_mass=math.inf), LAW, "deflection", "scenario = .deflection.: no free decay"),
+        (LAB, LAW, "deflection", None),
+        (LAB.having(hub_inertia=0.0), tfarm.HubFeedback(K1=0.3), "pulse", None),
+    ],
+    ids=["locked", "algebraic", "unknown", "no reference", "no such reference", "pinned", "free", "massless hub"],
+)
+def test_what_has_no_response_is_refused_in_a_line(arm, law, scenario, words):
+    if words is None:
+        found = tfarm.step(arm, law, scenario_name=scenario, duration=1.0)
+        assert found.continuous.stability == "stable"
+        assert all(np.isfinite(y).all() for y in found.continuous.signals.values())
+        return
+    with pytest.raises(tfarm.ParameterError, match=words):
+        tfarm.step(arm, law, scenario_name=scenario)
+
+
+def test_the_command_prints_both_loops_and_writes_their_signals(capsys, tmp_path):
+    words = ["step", "sasaki2012-lab", "--scenario", "pulse", "--duration", "0.5", "--output", "moment@0.25"]
+    found = answer(capsys, *words)
+    assert {"continuous", "sampled", "scenario_in_words", "duration_s", "period_s"} <= found.keys()
+    own = tfarm.step(LAB, tfarm.default_gains(LAB), scenario_name="pulse", duration=0.5)
+    for loop, part in (("continuous", "hub"), ("sampled", "torque")):
+        assert found[loop][part]["peak"] == pytest.approx(getattr(getattr(own, loop), part).peak, rel=1e-9)
+    code, out, _ = run(capsys, *words, "--csv", str(tmp_path / "signals.csv"))
+    assert (code, columns_of(out)) == (0, ["continuous-time", "sampled, 10 ms"])
+    with (tmp_path / "signals.csv").open(encoding="utf-8") as file:
+        rows = list(csv.reader(file))
+    assert rows[0][:2] == ["t [s]", "hub_angle [rad]"]
+    assert {"moment@0.25 [N m]", "sampled_torque [N m]"} <= set(rows[0])
+    column = np.array([float(row[1]) for row in rows[1:]])
+    np.testing.assert_array_equal(column, own.continuous.signals["hub_angle"])
+
+
+def columns_of(out):
+    (line,) = [each for each in out.splitlines() if each.startswith("quantity")]
+    return [each.strip() for each in line.split("  ") if each.strip()][2:]

@@ -1,0 +1,362 @@
+"""Time responses of the loop with their figures, continuous-time and sampled: reference step, slew, pulse, deflection.
+
+Both loops have the same input.  The sampled one has its converters, delay and filters too, and is exact between the
+samples.  An initial deflection is the first mode of the arm without controller, released at rest: the free motion is
+one pair of exponentials at any damping, so the response of the loop to it is exact.  (The static shape under a force at
+the tip is an equilibrium only where the hub is kept at its angle.)
+
+Figures, as in textbooks (Ogata, Modern Control Engineering, 2010, sec. 5-3): the final value is the mean of the last
+tenth of the record; rise time from 10 to 90 % of it; overshoot beyond it, over it; settling within 5 % of it, as for
+`tfarm simulate`.  Of a signal without a reference, and of root moment and torque, the 5 % are of its largest value.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+import numpy as np
+
+from tfarm.arm import AT_HUB, AnyLaw, Arm, Law, as_law, tracked
+from tfarm.arm.law import REFERENCE
+from tfarm.arrays import LEAST_SIZE, Real
+from tfarm.dsp import Chain, traces
+from tfarm.dsp.chain import PERIOD, TIME_ROUNDING, chain_or_usual
+from tfarm.dsp.plant import sensed_plant
+from tfarm.dsp.results import ENOUGH_CHANGE, simulated
+from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, described, scenario, unit_step
+from tfarm.dsp.simulate import LEFT_OF_RECORD, MOST_BETWEEN, SETTLED_SHARE, first_mode
+from tfarm.dsp.verdict import sampled_verdict
+from tfarm.errors import must_be_known, require
+from tfarm.loop.loop import Loop
+from tfarm.loop.poles import Poles
+from tfarm.loop.stability import verdict_on
+from tfarm.loop.time_response import (
+    ACTUATOR,
+    TORQUE,
+    Excitation,
+    TimeResponse,
+    Transform,
+    time_response,
+    usual_poles,
+)
+from tfarm.records import record
+from tfarm.response.signals import Controller, controller, placed
+from tfarm.schema import Column, Percent, Quantity, Table, across
+from tfarm.schema.html import as_html
+from tfarm.spectrum.table import first_frequency
+
+SAMPLED_NAMES = {"reference": "reference", "slew": "slew", "pulse": "pulse", "deflection": "decay"}  # by scenario
+MOMENT, UNSTABLE, GROWS = AT_HUB[-1], "unstable", " (the response grows, its figures are not defined)"
+PARTS = ("hub", "tip", "root_moment", "torque")
+TIME_CONSTANTS = 8.0  # of the dominant pole: length of a record after its input, to 3e-4 of the final value
+LONGEST_SLEWS = 20.0  # times the slew: a record without a duration is no longer
+DOMINANT = 2.0  # times the first frequency: a pole farther away is not the dominant one
+LEAST_POINTS, MOST_POINTS = 2000, 20_000  # of a record
+Peak = tuple[float, float, float | None]  # time [s], value, and bound on the remainder there
+CONVERGED = 1e-9  # of the peak of each signal: bound on the remainder there of a converged response
+
+
+@dataclass(frozen=True, kw_only=True)
+class SignalFigures:
+    """Figures of one signal over time, in its own unit; None where the signal, or the record, has none."""
+
+    signal: Annotated[str, Quantity(help="output of the arm, or torque for its input")]
+    unit: Annotated[str, Quantity(help="SI unit of the values of the signal")]
+    peak: Annotated[float, Quantity("peak", digits=6, unit_of="unit", help="largest value in size, with its sign")]
+    peak_time: Annotated[float, Quantity("peak time", "s", 4, help="time of the peak")]
+    final_value: Annotated[float | None, Quantity("final value", digits=4, unit_of="unit",
+            help="mean over the last tenth of the record; none where the signal has not settled")]  # fmt: skip
+    rise_time: Annotated[float | None, Quantity("rise time (10-90 %)", "s", 4,
+            help="time from 10 to 90 % of the final value, of a signal with a reference")]  # fmt: skip
+    overshoot: Annotated[Percent | None, Quantity("overshoot", "", 4,
+            help="excess of the largest value over the final one, as a share of that")]  # fmt: skip
+    settling_time: Annotated[float | None, Quantity("settling time (5 %)", "s", 4,
+            help="end of deviations above 5 % of the final value, without a reference of the largest")]  # fmt: skip
+    steady_state_error: Annotated[float | None, Quantity("steady-state error", digits=4, unit_of="unit",
+            help="reference less final value")]  # fmt: skip
+    residual_rms: Annotated[float | None, Quantity("residual vibration (rms)", digits=4, unit_of="unit",
+            help="rms about the final value once the slew or the pulse is over")]  # fmt: skip
+    remainder_bound: Annotated[float | None, Quantity("remainder bound at the peak", digits=2, unit_of="unit",
+            help="contribution of the omitted poles at the peak at most, as measured")]  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class LoopResponse:
+    """Figures of one loop, not defined of an unstable one, and its signals by name, "torque" being the input."""
+
+    stability: Annotated[str, Quantity("stability", help="stable, marginal or unstable")]
+    certainty: Annotated[str, Quantity("certainty",
+            help="by the remainder of the poles or by twice the modes, with their number")]  # fmt: skip
+    signals: dict[str, Real]
+    hub: Annotated[SignalFigures | None, Quantity("hub",
+            help="hub angle, or hub rate where that is the reference")] = None  # fmt: skip
+    tip: Annotated[SignalFigures | None, Quantity("tip",
+            help="tip displacement, or its velocity under a hub rate")] = None  # fmt: skip
+    root_moment: Annotated[SignalFigures | None, Quantity("root moment", help="elastic moment at the root")] = None
+    torque: Annotated[SignalFigures | None, Quantity("torque",
+            help="input of the arm by the motor: torque, voltage or current")] = None  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class Step:
+    """Time responses of an arm under a controller, continuous-time and sampled, at the times `t` [s].
+
+    A law in z has no continuous-time loop; the signals of a sampled loop end where it was stopped.  `names` are the
+    signals of hub and tip, root moment and torque, `reference` is that of hub and tip, `response` the continuous-time
+    response at any time.
+    """
+
+    arm: Arm
+    controller: Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]
+    scenario: Annotated[str, Quantity(help="reference, slew, pulse or deflection")]
+    scenario_in_words: Annotated[str, Quantity("scenario", help="input with its size")]
+    duration: Annotated[float, Quantity("duration", "s", 4, help="length of the record")]
+    period: Annotated[float, PERIOD]
+    continuous: Annotated[LoopResponse | None, Quantity(help="continuous-time loop; null under a law in z")]
+    sampled: Annotated[LoopResponse, Quantity(help="sampled loop")]
+    t: Real
+    names: tuple[str, ...]
+    reference: dict[str, Real]
+    response: TimeResponse | None
+
+    @property
+    def loops(self) -> dict[str, LoopResponse]:
+        """The loops by name."""
+        continuous = {"continuous-time": self.continuous} if self.continuous else {}
+        return {**continuous, f"sampled, {1e3 * self.period:g} ms": self.sampled}
+
+    @property
+    def finding(self) -> Annotated[str, Quantity("finding", help="stability of each loop")]:
+        """Stability of each loop."""
+        return "; ".join(f"{name} {each.stability}{'' if each.hub else GROWS}" for name, each in self.loops.items())
+
+    @property
+    def table(self) -> Table:
+        """A row a figure, a column a loop."""
+        return across(self.loops, title="time response")
+
+    @property
+    def csv_table(self) -> Table:
+        """The signals of both loops at the same times, empty where a run was stopped."""
+        columns = [Column("t", "time", "s", of=self.t)]
+        for prefix, loop in (("", self.continuous), ("sampled_", self.sampled)):
+            for name, y in loop.signals.items() if loop else ():
+                cells = [*y.tolist(), *[""] * (self.t.size - y.size)]
+                columns.append(Column(prefix + name, unit=unit_of(self.arm, name), of=cells))
+        return Table(columns=tuple(columns))
+
+    def _repr_html_(self) -> str:
+        return as_html(self.table)
+
+
+def unit_of(arm: Arm, name: str) -> str:
+    """SI unit of a signal, or of the input as "torque"."""
+    return arm.input_unit if name == TORQUE else placed(name, arm.length)[0].unit
+
+
+def step(
+    arm: Arm,
+    law: AnyLaw,
+    chain: Chain | None = None,
+    scenario_name: str = "reference",
+    duration: float | None = None,
+    *,
+    outputs: Sequence[str] = (),
+) -> Step:
+    """Return the time responses of the continuous-time and of the sampled loop, with their figures.
+
+    Parameters
+    ----------
+    arm, law, chain
+        The loop; a chain of 10 ms with ideal converters unless given.
+    scenario_name
+        "reference": unit step of the reference of the hub angle where the law feeds that back, else of the hub rate.
+        "slew": that of the chain.  "pulse": a torque at the hub for a tenth of the slew.  "deflection": the first mode
+        released with the tip displaced by 0.01 L.
+    duration
+        Length of the record [s]; by default that of a slew and eight time constants of the dominant pole, at most 20
+        slews more.
+    outputs
+        Further signals, such as "strain@0.05".
+
+    Raises
+    ------
+    ParameterError
+        For a locked hub, an unknown scenario or output, a loop without a reference of the hub, and as `simulate` does.
+    ConvergenceError
+        Where the poles of the loop are not complete.
+    """
+    must_be_known("scenario", scenario_name, SAMPLED_NAMES)
+    chain, is_step = chain_or_usual(chain), scenario_name == "reference"
+    hub, law = followed(law) if is_step else (AT_HUB[0], law)
+    arm, law = tracked(arm, law)
+    full, of_angle, response, continuous = as_law(law), hub == AT_HUB[0], None, None
+    poles = None if full.is_discrete else usual_poles(Loop(arm, full))
+    length = usual_duration(poles, chain) if duration is None else duration
+    task = unit_step(hub, chain, length) if is_step else scenario(SAMPLED_NAMES[scenario_name], arm, chain, length)
+    tip = "tip_displacement" if of_angle else f"velocity@{arm.length!r}"
+    names = tuple(dict.fromkeys((hub, tip, MOMENT, *outputs)))
+    if poles is not None:
+        response = time_response(poles, names, excitation(poles.loop, full, chain, task, names), length)
+    t, reference = _times(response, task), {}
+    if is_step or scenario_name == "slew":
+        angle = traces.reference_angle(task, t) if of_angle else np.ones(t.size)
+        reference = {hub: angle, tip: arm.reach * angle}
+    record = _Record(arm, names, task.busy_until, t, reference)
+    if response is not None:
+        continuous = record.continuous(response)
+    return Step(
+        arm=arm, controller=controller(full, arm), scenario=scenario_name, duration=length, period=task.period,
+        scenario_in_words=described(task, arm, chain), continuous=continuous, sampled=record.sampled(law, chain, task),
+        t=t, names=(*names[:3], TORQUE), reference=reference, response=response,
+    )  # fmt: skip
+
+
+def followed(law: AnyLaw) -> tuple[str, AnyLaw]:
+    """Return the signal of the hub whose reference steps, and the law with that reference.
+
+    Raises ParameterError for a law that feeds back neither hub angle nor hub rate.
+    """
+    full = as_law(law)
+    known = {*full.references, *(name.removeprefix(REFERENCE) for name in full.wanted)}
+    hub = next((name for name in AT_HUB[:2] if name in known.union(full.signals)), "")
+    remedy = "the controller feeds back neither hub angle nor hub rate; choose slew, pulse or deflection"
+    require(hub, "scenario", "reference", remedy)
+    return hub, law if hub in known else replace(full, references=(*full.references, hub))
+
+
+def usual_duration(poles: Poles | None, chain: Chain) -> float:
+    """Length [s] of a record: a slew and eight time constants of the dominant pole, to two digits."""
+    rise = chain.slew.rise_time
+    if poles is None:
+        return TRIAL_SLEWS * rise
+    near = poles.moving[abs(poles.moving) <= DOMINANT * first_frequency(poles.loop.arm)]
+    slowest = max(abs(near.real).min(initial=math.inf), TIME_CONSTANTS / (LONGEST_SLEWS * rise))
+    return float(f"{rise + TIME_CONSTANTS / slowest:.2g}")
+
+
+def excitation(loop: Loop, law: Law, chain: Chain, task: Scenario, names: Sequence[str]) -> Excitation:
+    """Return the input of a scenario of the sampled loop in continuous time; `law` names its own references.
+
+    Raises ParameterError for a reference that no scenario has.
+    """
+    for name in (*law.references, *law.wanted):
+        must_be_known("references", name.removeprefix(REFERENCE), AT_HUB)
+    if task.tip_offset:
+        return _released(loop, task.tip_offset, names)
+    arm, rise, (angle, rate, moment) = loop.arm, chain.slew.rise_time, AT_HUB
+    if task.name == "pulse":
+        size, ends = task.disturbance[0], ((0.0, task.busy_until), (1.0, -1.0))  # which is no torque of the motor
+        return Excitation({ACTUATOR: lambda s: size / s}, *ends, free={TORQUE: lambda s: -size / s})
+    if task.name == "reference":
+        return Excitation(_through(law, {angle if task.hub_angle[0] else rate: lambda s: 1 / s}))
+    a, read = chain.slew.acceleration(arm.reach), arm.gauged_inertia * float(task.reading == "vibration")
+    references: dict[str, Transform] = {
+        angle: lambda s: 1 / s**3, rate: lambda s: 1 / s**2, moment: lambda s: -read / s
+    }  # fmt: skip
+    inputs = _through(law, references)
+    inputs[ACTUATOR] = lambda s: arm.turned_inertia / s + arm.rate_loss / s**2
+    return Excitation(inputs, (0.0, rise / 2, rise), (a, -2 * a, a))
+
+
+def _through(law: Law, references: Mapping[str, Transform]) -> dict[str, Transform]:
+    """References as inputs of a law: of its signals, and with the opposite sign those of its columns."""
+    own = {name: X for name, X in references.items() if name in law.references}
+    wanted = {REFERENCE + name: X for name, X in references.items() if REFERENCE + name in law.wanted}
+    return own | {name: lambda s, X=X: -X(s) for name, X in wanted.items()}
+
+
+def _released(loop: Loop, offset: float, names: Sequence[str]) -> Excitation:
+    """The first mode released: the free motion of each signal."""
+    signals = tuple(dict.fromkeys(("tip_displacement", *loop.law.signals, *names)))
+    plant = sensed_plant(loop.arm, Chain(), signals, 1).unfiltered
+    first, amplitude = first_mode(plant, offset, "deflection")
+    p, pairs = complex(plant.poles[first]), zip(signals, plant.residues[:, first] * amplitude, strict=True)
+    free = {name: lambda s, r=r: r / (s - p) + r.conjugate() / (s - p.conjugate()) for name, r in pairs}
+    return Excitation({}, poles=(p,), free=free)
+
+
+def _times(response: TimeResponse | None, task: Scenario) -> Real:
+    """Times [s] of a record: the samples and times between them, which resolve the fastest mode that shows."""
+    T, n = task.period, task.t.size
+    finest = (n - 1) * T / LEAST_POINTS
+    if response is not None:
+        sizes = abs(response.amplitudes[:-1])
+        shows = (sizes > traces.VISIBLE * sizes.max(axis=1, keepdims=True)).any(axis=0)
+        fastest = max(response.z.imag[shows].max(initial=0.0), LEAST_SIZE)
+        finest = min(finest, 2 * math.pi / (traces.POINTS_A_PERIOD * fastest))
+    steps = int(np.clip(math.ceil(T / finest), 1, min(MOST_BETWEEN, max(1, MOST_POINTS // n))))
+    k = np.arange((n - 1) * steps + 1)
+    return T * (k // steps + k % steps / steps)
+
+
+@dataclass(frozen=True)
+class _Record:
+    """The times [s] of a record, when its input is over, and its signals: those of hub and tip, the moment, others."""
+
+    arm: Arm
+    names: tuple[str, ...]
+    busy: float
+    t: Real
+    reference: Mapping[str, Real]
+
+    def continuous(self, response: TimeResponse) -> LoopResponse:
+        """The continuous-time loop."""
+        signals = dict(zip(response.names, response.at(self.t), strict=True))
+        peaks = {name: response.peak(name, self.t) for name in signals}
+        is_converged = all(bound <= CONVERGED * abs(peak) for _, peak, bound in peaks.values())
+        certainty = f"{'converged' if is_converged else 'approximate'}, {response.poles.count} poles"
+        return self._loop(verdict_on(response.poles.loop).verdict, certainty, signals, peaks)
+
+    def sampled(self, law: AnyLaw, chain: Chain, task: Scenario) -> LoopResponse:
+        """The sampled loop."""
+        between = round(task.period / self.t[1]) - 1
+        run, used = simulated(self.arm, law, chain, task, between=between, outputs=self.names)
+        signals = {name: traces.continuous(run, name)[1][: self.t.size] for name in self.names}
+        signals[TORQUE] = traces.held_at(run, run.torque, self.t[: signals[MOMENT].size])
+        at = {name: int(abs(y).argmax()) for name, y in signals.items() if y.size}
+        peaks = {name: (float(self.t[n]), float(signals[name][n]), None) for name, n in at.items()}
+        is_converged = used.change is not None and used.change <= ENOUGH_CHANGE
+        certainty = f"{'converged' if is_converged else 'approximate'}, {used.modes} modes"
+        word = UNSTABLE if run.stopped else sampled_verdict(self.arm, law, chain).word
+        return self._loop(word, certainty, signals, peaks)
+
+    def _loop(
+        self, stability: str, certainty: str, signals: dict[str, Real], peaks: Mapping[str, Peak]
+    ) -> LoopResponse:
+        """The figures of a loop; of an unstable one those of its signals are left out."""
+        names = zip(PARTS, (*self.names[:3], TORQUE), strict=True) if stability != UNSTABLE else ()
+        of = {part: self._figures(name, signals[name], *peaks[name]) for part, name in names}
+        return LoopResponse(stability=stability, certainty=certainty, signals=signals, **of)
+
+    def _figures(self, name: str, y: Real, peak_time: float, peak: float, bound: float | None) -> SignalFigures:
+        """Figures of one signal at the times of the record."""
+        t, reference = self.t, self.reference.get(name)
+        final = 0.0 if name == MOMENT else float(y[LEFT_OF_RECORD * t >= (LEFT_OF_RECORD - 1) * t[-1]].mean())
+        away = abs(y - final)
+        scale = float(away.max()) if reference is None else abs(final)
+        settled = 1 + int(np.flatnonzero(away > SETTLED_SHARE * scale).max(initial=-1))
+        is_settled = not settled or LEFT_OF_RECORD * (t.size - 1 - settled) >= t.size - 1
+        share = y / final if is_settled and reference is not None and final else None
+        after = t >= self.busy * (1 - TIME_ROUNDING)
+        return SignalFigures(
+            signal=name, unit=unit_of(self.arm, name), peak=peak, peak_time=peak_time,
+            final_value=final if is_settled and name != MOMENT else None,
+            rise_time=None if share is None else _reached(t, share, 0.9) - _reached(t, share, 0.1),
+            overshoot=None if share is None else Percent(max(0.0, float(share.max()) - 1)),
+            settling_time=float(t[settled]) if is_settled else None,
+            steady_state_error=None if share is None or reference is None else float(reference[-1]) - final,
+            residual_rms=float(np.sqrt(np.mean((y - final)[after] ** 2))) if self.busy and after.any() else None,
+            remainder_bound=bound,
+        )  # fmt: skip
+
+
+def _reached(t: Real, share: Real, level: float) -> float:
+    """Time [s] at which a signal first reaches a level, by a line between two records."""
+    n = int((share >= level).argmax())
+    return float(np.interp(level, share[n - 1 : n + 1], t[n - 1 : n + 1])) if n else float(t[0])
