@@ -1,8 +1,12 @@
-"""Sphinx configuration.  Pages are prose in MyST; those of commands, JSON keys and files are made from the code."""
+"""Sphinx configuration.  Pages are prose in MyST, tutorials are notebooks; references and tables come from the code."""
 
+import hashlib
 import inspect
+import json
+import logging
+import os
 import re
-from collections.abc import Iterable
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +25,15 @@ from tfarm.fitting.recording import RunTable
 from tfarm.schema.glossary import CERTAINTY, declared_records
 
 HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE), str(HERE.parent)]  # `tables`; and `tests`, with the surveys that tables are measured by
+
+from tables import markdown_table  # noqa: E402
 
 project = "tfarm"
 author = copyright = "The tfarm authors"
 release = version = tfarm.__version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-myst_enable_extensions = ["colon_fence", "dollarmath", "deflist", "substitution"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "tables"]
+myst_enable_extensions = ["colon_fence", "dollarmath", "amsmath", "deflist", "substitution"]
 myst_heading_anchors = 3
 html_theme = "furo"
 html_math_renderer = "mathml"
@@ -40,6 +47,30 @@ add_module_names = False
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 exclude_patterns = ["_build"]
+html_static_path = ["static"]
+html_css_files = ["notebook.css"]
+
+
+def hash_of_sources() -> str:
+    """Return a hash of the package: what a notebook shows is kept until the package changes."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(tfarm.__file__).parent.rglob("*")):
+        if path.suffix in (".py", ".toml"):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+nb_execution_mode = "cache"
+nb_execution_cache_path = str(HERE / "_build" / "notebooks" / hash_of_sources())
+nb_execution_in_temp = True
+nb_execution_timeout = 120
+nb_execution_raise_on_error = True
+nb_output_stderr = "remove"  # progress and names of written files
+nb_merge_streams = True
+os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # the command tfarm, in notebooks
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+os.environ["IPYTHONDIR"] = str(HERE / "_build" / "ipython")  # no profile of the user's own
+logging.getLogger("traitlets").setLevel(logging.WARNING)
 
 
 FILE_TABLES: dict[str, type[StrictTable]] = {
@@ -50,13 +81,6 @@ FILE_TABLES: dict[str, type[StrictTable]] = {
     **CHAIN_TABLES,
     "measured": RunTable,
 }
-
-
-def markdown_table(titles: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
-    """Return the lines of a table."""
-    cells = ([cell.replace("|", r"\|").replace("\n", " ") for cell in row] for row in rows)
-    head = [*titles]
-    return [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *cells)]
 
 
 def commands_page() -> str:
@@ -127,6 +151,26 @@ def write_references(app: Any) -> None:
             path.write_text(text, encoding="utf-8")
 
 
+def write_kernel_settings(app: Any) -> None:
+    """Write the profile of the kernels of notebooks: of their messages only errors are shown."""
+    profile = Path(os.environ["IPYTHONDIR"]) / "profile_default"
+    (profile / "startup").mkdir(parents=True, exist_ok=True)
+    (profile / "startup" / "kernel.py").write_bytes((HERE / "kernel.py").read_bytes())
+    settings = 'get_config().IPKernelApp.log_level = "ERROR"\n'
+    (profile / "ipython_kernel_config.py").write_text(settings, encoding="utf-8")
+
+
+def check_figures(app: Any, error: Exception | None) -> None:
+    """Raise ExtensionError for a cell of a notebook that draws without a figure in its output."""
+    from sphinx.errors import ExtensionError
+
+    for path in () if error else Path(app.outdir).parent.glob("jupyter_execute/**/*.ipynb"):
+        for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+            data = (each.get("data", {}) for each in cell.get("outputs", []))
+            if "tfarm.plots." in "".join(cell["source"]) and not any("image/png" in each for each in data):
+                raise ExtensionError(f"{path.name}: no figure by {''.join(cell['source'])!r}")
+
+
 def write_formula(translator: Any, node: Any) -> None:
     """Write a formula as MathML, which browsers draw without a script or the network."""
     from docutils import nodes  # comes with Sphinx; the tests read this file without
@@ -139,4 +183,6 @@ def write_formula(translator: Any, node: Any) -> None:
 def setup(app: Any) -> None:
     """Connect the pages and formulas above to Sphinx."""
     app.connect("builder-inited", write_references)
+    app.connect("builder-inited", write_kernel_settings)
+    app.connect("build-finished", check_figures)
     app.add_html_math_renderer("mathml", (write_formula, None), (write_formula, None))
