@@ -2,7 +2,6 @@
 
 import hashlib
 import inspect
-import json
 import logging
 import os
 import re
@@ -161,14 +160,36 @@ def write_kernel_settings(app: Any) -> None:
 
 
 def check_figures(app: Any, error: Exception | None) -> None:
-    """Raise ExtensionError for a cell of a notebook that draws without a figure in its output."""
+    """Raise ExtensionError for a tutorial with fewer figures than its cells draw."""
     from sphinx.errors import ExtensionError
 
-    for path in () if error else Path(app.outdir).parent.glob("jupyter_execute/**/*.ipynb"):
-        for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
-            data = (each.get("data", {}) for each in cell.get("outputs", []))
-            if "tfarm.plots." in "".join(cell["source"]) and not any("image/png" in each for each in data):
-                raise ExtensionError(f"{path.name}: no figure by {''.join(cell['source'])!r}")
+    for path in () if error else (HERE / "tutorials").glob("*.md"):
+        drawn = path.read_text(encoding="utf-8").count("tfarm.plots.")
+        shown = (Path(app.outdir) / "tutorials" / f"{path.stem}.html").read_text(encoding="utf-8").count("<img ")
+        if shown < drawn:
+            raise ExtensionError(f"{path.name}: {drawn} figures are drawn, {shown} shown")
+
+
+ACCESSIBLE = (  # of the theme's pages: names and levels that a screen reader wants, and scrolling by keyboard
+    ('role="heading">', 'role="heading" aria-level="2">'),
+    ('<aside class="sidebar-drawer">', '<aside class="sidebar-drawer" aria-label="pages">'),
+    ('<aside class="toc-drawer', '<aside aria-label="contents of this page" class="toc-drawer'),
+    ("<pre>", '<pre tabindex="0">'),
+    ('<div class="table-wrapper', '<div tabindex="0" class="table-wrapper'),
+    ('<div class="output text_html">', '<div tabindex="0" class="output text_html">'),
+    ('display="block">', 'display="block" tabindex="0">'),
+)
+
+
+def make_accessible(app: Any, error: Exception | None) -> None:
+    """Complete the attributes of finished pages."""
+    for path in () if error else Path(app.outdir).rglob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        made = text
+        for old, new in ACCESSIBLE:
+            made = made.replace(old, new)
+        if made != text:
+            path.write_text(made, encoding="utf-8")
 
 
 def write_formula(translator: Any, node: Any) -> None:
@@ -185,4 +206,5 @@ def setup(app: Any) -> None:
     app.connect("builder-inited", write_references)
     app.connect("builder-inited", write_kernel_settings)
     app.connect("build-finished", check_figures)
+    app.connect("build-finished", make_accessible)
     app.add_html_math_renderer("mathml", (write_formula, None), (write_formula, None))

@@ -33,7 +33,7 @@ DOCS = ROOT / "docs"
 MADE = {"reference/commands", "reference/json", "reference/arm-file"}  # by docs/conf.py; their examples are the help's
 PAGES = {str(path.relative_to(DOCS).with_suffix("")): path for path in sorted(DOCS.rglob("*.md"))}
 PAGES = {name: path for name, path in PAGES.items() if name not in MADE and not name.startswith("_build")}
-DEAR: set[str] = set()  # more than some seconds; `make docs` and `make survey` execute them
+DEAR = {"tutorials/design", "howto/compare"}  # seven seconds each: run by `make survey`
 SHOWN = {"{toctree}", "{computed}", "{eval-rst}", "{math}", "{note}", "{tip}", "{seealso}", "{figure}"}
 FENCE = re.compile(r"^(?P<fence>`{3,}|:{3,})(?P<kind>[^\n`]*)\n(?P<text>.*?)^(?P=fence)[ ]*$", re.MULTILINE | re.DOTALL)
 OPTIONS = re.compile(r"(?::([\w-]+):[ ]*(.*)\n)")
@@ -54,7 +54,8 @@ def blocks_of(page):
     for match in FENCE.finditer(page.read_text(encoding="utf-8")):
         head = re.match(rf"(?:{OPTIONS.pattern})*", match["text"]).group() if match["kind"].startswith("{") else ""
         kind = match["kind"].strip().removeprefix("{code-block} ")
-        found.append(Block(kind, dict(OPTIONS.findall(head)), match["text"][len(head) :].lstrip("\n")))
+        text = re.sub(r"\A---\n.*?^---\n", "", match["text"][len(head) :], flags=re.MULTILINE | re.DOTALL)
+        found.append(Block(kind, dict(OPTIONS.findall(head)), text.lstrip("\n")))
     return found
 
 
