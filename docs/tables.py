@@ -70,22 +70,15 @@ def differences() -> list[str]:
 
 @table
 def audit() -> list[str]:
-    """Equations of the paper that are not right as printed."""
+    """Equations of the paper that are not right as printed, each with both readings and the check."""
     from tfarm.audit import audit as audited
 
-    rows = audited()
-    wrong = [row for row in rows if row.verdict != "ok"]
-    cells = (
-        [row.equation, row.verdict, _formula(row.printed_tex), _formula(row.corrected_tex), row.evidence]
-        for row in wrong
-    )
-    right = ", ".join(row.equation for row in rows if row.verdict == "ok")
-    titles = ("equation", "verdict", "as printed", "as corrected", "check")
-    return [*markdown_table(titles, cells), "", f"Right as printed: {right}."]
-
-
-def _formula(tex: str) -> str:
-    return f"${tex}$"
+    lines = []
+    for row in (rows := audited()):
+        if row.verdict != "ok":
+            lines += [f"**{row.equation}**, {row.verdict}", "", "as printed", f": $$ {row.printed_tex} $$", ""]
+            lines += ["as corrected", f": $$ {row.corrected_tex} $$", "", "check", f": {row.evidence}", ""]
+    return [*lines, f"Right as printed: {', '.join(row.equation for row in rows if row.verdict == 'ok')}."]
 
 
 @table
