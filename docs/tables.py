@@ -209,6 +209,7 @@ def setup(app: Any) -> dict[str, bool]:
         required_arguments = 1
 
         def run(self) -> list[nodes.Node]:
+            self.env.note_reread()  # with every build: no table is older than the code
             part, name = nodes.container(), self.arguments[0]
             self.state.nested_parse(StringList(TABLES[name](), source=name), self.content_offset, part)
             return part.children

@@ -188,6 +188,27 @@ def test_every_block_of_a_page_runs(name, folder):
         assert unprinted(prose_of(page), code + run.said) == [], run.said
 
 
+def anchors_of(name):
+    """Return the anchors of the headings of a page, as Sphinx makes them."""
+    heads = re.findall(r"^#{1,3} (.*)$", FENCE.sub("", PAGES[name].read_text(encoding="utf-8")), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", head.lower()).replace(" ", "-") for head in heads}
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_links_of_a_page_lead_somewhere(name):
+    """Offline: pages and their headings, files of the repository, and the form of what is elsewhere."""
+    page = PAGES[name]
+    for target in re.findall(r"\]\(([^)\s]+)\)", FENCE.sub("", page.read_text(encoding="utf-8"))):
+        file, _, anchor = target.partition("#")
+        if "://" in target:
+            assert re.fullmatch(r"https://[\w.-]+\.[a-z]+(/\S*)?", target), target
+            continue
+        path = (page.parent / file).resolve() if file else page
+        known = str(path.relative_to(ROOT).with_suffix("")).removeprefix("docs/")
+        assert path.exists() or known in MADE, target
+        assert not anchor or anchor in anchors_of(known), target
+
+
 @pytest.fixture(scope="module")
 def tables():
     """docs/tables.py; it needs no Sphinx to be imported."""
