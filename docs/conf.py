@@ -5,6 +5,7 @@ import inspect
 import logging
 import os
 import re
+import shutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -151,7 +152,10 @@ def write_references(app: Any) -> None:
 
 
 def write_kernel_settings(app: Any) -> None:
-    """Write the profile of the kernels of notebooks: of their messages only errors are shown."""
+    """Write the profile of the kernels of notebooks, of whose messages only errors are shown; leave no older cache."""
+    for each in Path(nb_execution_cache_path).parent.glob("*"):
+        if each.name != Path(nb_execution_cache_path).name:
+            shutil.rmtree(each)
     profile = Path(os.environ["IPYTHONDIR"]) / "profile_default"
     (profile / "startup").mkdir(parents=True, exist_ok=True)
     (profile / "startup" / "kernel.py").write_bytes((HERE / "kernel.py").read_bytes())
