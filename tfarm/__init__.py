@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         load,
         presets,
     )
-    from tfarm.case import compare, result_card
+    from tfarm.case import compare, loop_function, result_card
     from tfarm.dsp.results import simulate
     from tfarm.dsp.verdict import sampled
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
@@ -79,6 +79,7 @@ __all__ = [
     "fit",
     "load",
     "locus",
+    "loop_function",
     "map",
     "margins",
     "modes",
@@ -105,6 +106,7 @@ _ROOMS = {  # the module of a name; after a colon another name there
     "compare": "case",
     "damped_modes": "spectrum",
     "default_gains": "spectrum.table",
+    "loop_function": "case",
     "map": "loop.plane:gain_map",
     "margins": "loop.margins",
     "Measured": "fitting.data",

@@ -5,7 +5,9 @@ Not collected by `make test`.  It prints how soon a live page answers and how lo
 
 from __future__ import annotations
 
+import json
 import math
+import re
 import shutil
 import statistics
 from collections.abc import Iterator
@@ -18,13 +20,15 @@ from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page, sync_playwright
 
 import tfarm
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import Arm, HubFeedback, as_law
+from tfarm.arm.law_tables import load_law
+from tfarm.case.card import LoopCard
 from tfarm.dsp import Chain, load_chain, sampled_verdict
 from tfarm.dsp.results import simulated_run
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import gain_map
 from tfarm.loop.stability import stability
-from tfarm.report.live import ASSETS, save_live, write_assets
+from tfarm.report.live import ASSETS, SCRIPT, save_live, write_assets
 from tfarm.report.page import Case
 from tfarm.schema import to_dict
 
@@ -32,8 +36,9 @@ Real = NDArray[np.float64]
 
 ARMS = ("sasaki2012-lab", "stocky-steel", "quanser-flexlink")
 FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run")
-GAINS, MOVES = 10, 30
-INTERACTIVE, MOVE = 1.0, 0.15  # s: what they should take; printed, and asserted with room for a busy machine
+GAINS, MOVES = 10, 60
+LARGEST_PAGE = 1_000_000  # bytes of a page and its script
+INTERACTIVE, MOVE = 0.5, 0.016  # s: what they should take; printed, and asserted with room for a busy machine
 BUSY = 5.0
 LARGEST_TURN = 5.0  # deg, of the line of a locus at a point of it
 SEEN = 1.5  # pixels: a piece of a line whose ends are seen
@@ -91,7 +96,8 @@ class Opened:
 
 
 def set_gains(page: Page, law: HubFeedback) -> None:
-    """Typed into the fields, as a reader does; waits until the page has drawn the last of them."""
+    """Typed into the fields, with the tables open; waits until the page has drawn the last of them."""
+    page.evaluate("document.getElementById('more').open = true")
     before = page.evaluate("window.live.moves.length")
     for name in ("K1", "K2", "Kp"):
         page.locator(f"#{name}").fill(repr(law[name]))
@@ -123,9 +129,10 @@ def texts(page: Page, ids: list[str]) -> dict[str, str]:
 
 
 def show_chart(page: Page, name: str) -> Any:
-    """A chart is made when it comes into view: its box then."""
-    page.locator(f"#{name}").scroll_into_view_if_needed()
-    page.wait_for_selector(f"#{name} canvas")
+    """The box of a chart, which is chosen and in view."""
+    if page.locator(f"button[value={name}]").count():
+        page.locator(f"button[value={name}]").click()
+    page.locator(f"#{name} canvas").scroll_into_view_if_needed()
     page.wait_for_timeout(300)
     box = page.locator(f"#{name} canvas").bounding_box()
     assert box is not None
@@ -209,14 +216,17 @@ def test_loci_have_the_poles_of_their_gains(browser, folder, name):
     arm, chain = tfarm.load(name), load_chain(name)
     with Opened(browser, folder / name / "live.html") as opened:
         page = opened.page
+        page.wait_for_function("live.now.locus?.length", timeout=60_000)
+        turned = {"poles": page.evaluate("[live.now.locus, live.now.frame, live.room('poles')]")}
         show_chart(page, "zplane")
-        page.wait_for_function("live.now.discs?.length && live.now.locus?.length", timeout=60_000)
+        page.wait_for_function("live.now.discs?.length", timeout=60_000)
         law = HubFeedback(**page.evaluate("live.now.law"))
         band = page.evaluate("live.loop.band")
-        rows, discs = page.evaluate("[live.now.locus, live.now.discs]")
+        rows, discs = turned["poles"][0], page.evaluate("live.now.discs")
         disc = {"x": [-1.25, 1.25], "y": [-1.25, 1.25]}
-        for chart, each, frame in (("poles", rows, page.evaluate("live.now.frame")), ("zplane", discs, disc)):
-            turns = seen_turns(each, frame, page.evaluate(f"live.room('{chart}')"))
+        turned["zplane"] = [discs, disc, page.evaluate("live.room('zplane')")]
+        for each, frame, chart in turned.values():
+            turns = seen_turns(each, frame, chart)
             assert turns.size > 5
             assert turns.max() <= LARGEST_TURN
         for row in rows[:: len(rows) // 6]:
@@ -228,9 +238,11 @@ def test_loci_have_the_poles_of_their_gains(browser, folder, name):
             z = complex(row["re"], row["im"])
             assert abs(loop.having(K2=row["gain"]).poles.z - z).min() < 1e-6, row
         box = show_chart(page, "poles")
+        page.wait_for_function("live.now.locus?.length", timeout=60_000)
         pole = page.evaluate("[live.now.near[1][0], live.now.near[1][1], live.now.frame]")
         x, y = ((pole[i] - pole[2][k][0]) / (pole[2][k][1] - pole[2][k][0]) for i, k in enumerate("xy"))
-        page.mouse.move(box["x"] + box["width"] * (0.13 + 0.85 * x), box["y"] + box["height"] * (0.03 + 0.85 * (1 - y)))
+        wide, high = page.evaluate("live.room('poles')")  # right of 54 pixels and below 8 of letters
+        page.mouse.move(box["x"] + 54 + wide * x, box["y"] + 8 + high * (1 - y))
         page.wait_for_function("document.getElementById('poles-reading').textContent.includes('K2 = ')")
 
 
@@ -242,16 +254,15 @@ def test_the_region_of_a_hub_that_is_held_is_the_librarys(browser, folder, name)
         page = opened.page
         axes = page.evaluate("live.loop.axes")
         set_gains(page, HubFeedback(**page.evaluate("live.loop.start")).having("Kp", 0.02 * axes["Kp"]["high"]))
-        page.wait_for_function("live.now.areas")
+        page.wait_for_function("live.now.areas", timeout=60_000)
         areas, Kp = page.evaluate("[live.now.areas, live.now.law.Kp]")
-        assert {row["what"] for row in areas} == {"stable, continuous"}
         columns = sorted({row["K1"] for row in areas})[3 :: len(areas) // 5]
         known = gain_map(arm, np.array(columns), np.array([axes["K2"]["low"], axes["K2"]["high"]]), Kp=Kp)
         for gain, intervals in zip(columns, known.stable_intervals, strict=True):
             here = [(row["low"], row["high"]) for row in areas if row["K1"] == gain]
             cut = [(max(row[0], axes["K2"]["low"]), row[1]) for row in here]
             np.testing.assert_allclose(cut, intervals, rtol=1e-6)
-        assert "Grey: the sampled region at Kp = 0" in page.locator("#map-note").inner_text()
+        assert "The sampled region is known at Kp = 0 and not shown" in page.locator("#map-note").inner_text()
 
 
 @pytest.mark.parametrize("kind", ["displacement", "moment"])
@@ -259,6 +270,7 @@ def test_a_sensor_has_the_modes_and_zeros_of_its_place(browser, folder, kind):
     arm = tfarm.load(ARMS[0])
     with Opened(browser, folder / ARMS[0] / "live.html") as opened:
         page = opened.page
+        page.locator("#more summary").click()
         show_chart(page, "sensor")
         page.locator("#sensor-kind").select_option(kind)
         page.locator("#sensor-at").fill("9")
@@ -317,15 +329,18 @@ def test_it_answers_soon(browser, folder, name, capsys):
             page.mouse.move(x, box["y"] + 0.6 * box["height"])
             page.wait_for_function("n => window.live.moves.length > n", arg=count)
         page.mouse.up()
-        ready, moves = page.evaluate("[window.live.ready, window.live.moves]")
-        median = statistics.median(moves)
+        ready, moves = page.evaluate("[window.live.ready, window.live.moves.slice(3)]")
+        slowest, median = sorted(moves)[int(0.95 * len(moves))], statistics.median(moves)
         with capsys.disabled():
             print(
-                f"\n{name}: interactive after {ready:.0f} ms, a move {median:.0f} ms (median of {len(moves)} dragged)"
+                f"\n{name}: interactive after {ready:.0f} ms, a move {median:.0f} ms (median), "
+                f"{slowest:.0f} ms (95th percentile of {len(moves)} dragged)"
             )
         assert page.locator("#K1").input_value() != str(page.evaluate("window.live.loop.start.K1"))
         assert ready < 1e3 * INTERACTIVE * BUSY
-        assert median < 1e3 * MOVE * BUSY
+        assert slowest < 1e3 * MOVE * BUSY
+    size = sum(file.stat().st_size for file in (folder / name / "live.html", folder / ASSETS / SCRIPT))
+    assert size <= LARGEST_PAGE
 
 
 def test_pointing_at_a_curve_reads_both_units(browser, folder):
@@ -340,3 +355,109 @@ def test_pointing_at_a_curve_reads_both_units(browser, folder):
         at = f"window.live.loop.parts(window.live.loop.at({rad}), window.live.law)"
         size = page.evaluate(f"(() => {{ const [D, N] = {at}; return Math.hypot(...N) / Math.hypot(...D); }})()")
         assert f"L {20 * math.log10(size):.2f}"[:5] in words
+
+
+CARD = {"up": "gain_margin", "down": "gain_reduction", "phase": "phase_margin", "delay": "delay_margin",
+        "peak": "peak_sensitivity"}  # fmt: skip
+
+
+def card_words(card: LoopCard, of: str) -> dict[str, str]:
+    """What the page's card has of one loop, from the library's."""
+    wanted = {}
+    for key, name in CARD.items():
+        found = getattr(card, name)
+        size = "-" if found.value is None else "no limit" if math.isinf(found.value) else f"{found.value:.4g}"
+        wanted |= {f"{of}-{key}": size, f"{of}-{key}-grade": found.grade.strip("-")}
+    least, constant = card.least_damping, card.time_constant
+    return wanted | {
+        f"{of}-ratio": "-" if least is None else f"{100 * least.ratio:.4g}",
+        f"{of}-constant": "-" if constant is None else f"{constant:.4g}",
+    }
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_the_card_is_the_librarys_at_random_gains(browser, folder, name):
+    """Every digit and grade of both loops; a drag, a typed gain and a link give the same."""
+    arm, chain = tfarm.load(name), load_chain(name)
+    with Opened(browser, folder / name / "live.html") as opened:
+        page, margins_seen = opened.page, 0
+        data = live_data(page)
+        for law in (HubFeedback(**data["start"]), *random_gains(data, 6)):
+            set_gains(page, law)
+            card = tfarm.result_card(arm, law, chain)
+            for of, each in (("s", card.continuous), ("z", card.sampled)):
+                assert each is not None
+                wanted = card_words(each, of)
+                if each.stability == "unstable":  # of other modes where the page has a fixed number of them
+                    wanted = {key: words for key, words in wanted.items() if not key.startswith("z-ratio")}
+                here = {key: words.removeprefix("≥ ") for key, words in texts(page, list(wanted)).items()}
+                assert here == wanted, (law, of)
+                margins_seen += each.phase_margin.value is not None
+        assert margins_seen >= 4
+
+
+def test_keys_undo_and_link_reach_every_state_and_the_file_is_a_law(browser, folder, tmp_path):
+    file = folder / ARMS[0] / "live.html"
+    with Opened(browser, file, 1280) as opened:
+        page = opened.page
+        page.wait_for_function("live.past.length === 1")
+        assert page.evaluate("document.documentElement.scrollHeight <= innerHeight + 100")
+        page.locator("#map").focus()
+        page.keyboard.press("ArrowRight")
+        page.wait_for_function("live.past.length === 2")
+        page.locator("button[value=nichols]").click()
+        page.locator("button[value=zplane]").click()
+        page.wait_for_function("live.past.length === 3")
+        law, address = page.evaluate("[{...live.law}, location.href]")
+        assert law["K1"] > page.evaluate("live.loop.start.K1")
+        with page.expect_download() as download:
+            page.locator("#save").click()
+        download.value.save_as(tmp_path / "law.toml")
+        assert load_law(tmp_path / "law.toml") == as_law(HubFeedback(**law))
+        page.locator("#map").focus()
+        page.keyboard.press("z")
+        page.wait_for_function("document.querySelector('button[value=nyquist]').ariaPressed === 'true'")
+        page.keyboard.press("Control+z")
+        page.wait_for_function("live.law.K1 === live.loop.start.K1 && live.past.length === 1")
+        page.evaluate("address => { location.href = address; }", address)
+        page.wait_for_function("K1 => live.law.K1 === K1", arg=law["K1"])
+        page.locator("#zplane").wait_for(state="visible")
+        page.locator("#reset").click()
+        page.wait_for_function("live.law.K1 === live.loop.start.K1 && !live.link()")
+
+
+@pytest.mark.parametrize("width", [1280, 400])
+def test_the_dashboard_is_one_screen_and_one_column_on_a_phone(browser, folder, width):
+    """At 1280 x 800 every chart in view without scrolling, none over another; on a phone below each other."""
+    boxes = """[...document.querySelectorAll('.board > *')].map(e => {
+        const b = e.getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; })"""
+    for name in ARMS:
+        with Opened(browser, folder / name / "live.html", width) as opened:
+            page = opened.page
+            page.set_viewport_size({"width": width, "height": 800})
+            found = np.array(page.evaluate(boxes))
+            assert found.shape == (8, 4)
+            if width == 400:
+                assert (np.diff(found[:, 1]) > 0).all()
+                continue
+            assert page.evaluate("document.documentElement.scrollHeight") <= 800, name
+            assert page.evaluate("(e => e.scrollHeight - e.clientHeight)(document.querySelector('.side'))") <= 0, name
+            assert len({round(left) for left in found[1:4, 0]} & {round(left) for left in found[4:7, 0]}) == 3
+            area = ((found[:, 2] - found[:, 0]) * (found[:, 3] - found[:, 1])).sum()
+            assert area > 0.9 * 1280 * 800  # no holes
+
+
+def test_a_page_without_sampled_loop_slew_and_sensor_has_the_rest(browser, folder, tmp_path, monkeypatch):
+    (text,) = re.findall(r'id="live-data">(.*?)</script>', (folder / ARMS[0] / "live.html").read_text("utf-8"), re.S)
+    missing = dict.fromkeys(("sampled_map", "sampled_loop", "slew", "sensor"))
+    data = json.loads(text) | missing | {"no_sensor": "no polynomial follows"}
+    monkeypatch.setattr("tfarm.report.live.live_data", lambda *_: data)
+    (tmp_path / "arm").mkdir()
+    save_live(Case(tfarm.load(ARMS[0]), load_chain(ARMS[0])), tmp_path / "arm")
+    write_assets(tmp_path / ASSETS)
+    with Opened(browser, tmp_path / "arm" / "live.html") as opened:
+        page = opened.page
+        set_gains(page, HubFeedback(**data["start"]))
+        page.wait_for_function("live.rested", timeout=60_000)
+        assert texts(page, ["verdict", "sampled"]) == {"verdict": "stable", "sampled": "not computed"}
+        assert page.evaluate("live.now.locus.length") > 50

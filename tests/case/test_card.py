@@ -128,6 +128,18 @@ def test_damping_ratios_of_the_sampled_loop_tend_to_those_of_the_continuous_one(
     assert both.sampled.least_damping.ratio == pytest.approx(both.continuous.least_damping.ratio, rel=2e-3)
 
 
+@pytest.mark.parametrize(("K1", "K2"), [(34.83, 0.774), (381.0, 0.774)])
+def test_a_negative_real_pole_oscillates_at_half_the_sampling_rate(K1, K2):
+    """Whatever the sign of its rounded imaginary part: s = ln(z)/T = (ln abs(z) + i pi)/T, aliases of it alike."""
+    law = tfarm.HubFeedback(K1=K1, K2=K2)
+    found = tfarm.sampled(LAB, law).verdict.full
+    z = found.poles.z
+    (n,) = np.flatnonzero((z.real < -1) & (abs(z.imag) < 1e-9))
+    own = card.unaliased_poles(found)[int(found.poles.mode[n])]
+    assert own.real == pytest.approx(math.log(abs(z[n])) / 0.01, rel=1e-9)
+    assert own.imag % (2 * math.pi / 0.01) == pytest.approx(math.pi / 0.01, rel=1e-6)
+
+
 def test_a_law_in_z_has_a_sampled_card_alone():
     own = tfarm.result_card(LAB, tfarm.Law({"hub_rate": ([0.3, 0.0], [1.0, -0.1])}, period=0.01))
     assert own.continuous is None

@@ -95,6 +95,8 @@ BAD = [
     (["response", "sasaki2012", "--output", "root_moment", "--s", "71.50568246689015j"], "a natural frequency"),
     (["response", "sasaki2012", "--output", "root_moment", "--csv", "/no/such/folder/a.csv"], "--csv"),
     (["response", "sasaki2012", "--output", "root_moment", "--omega", "1", "--csv", "."], "--csv = '.'"),
+    (["bode", "sasaki2012-lab", "--K1", "1"], "give --loop too"),
+    (["bode", "sasaki2012-lab", "--loop", "--output", "hub_rate"], "the loop function has no output"),
     (["bode", "sasaki2012-lab", "--from", "-1"], "--from = -1.0: a positive frequency"),
     (["nyquist", "sasaki2012-lab", "--law", "no-such.toml"], "no-such.toml"),
     (["margins", "sasaki2012", "--K1", "nan"], "K1 = nan"),

@@ -33,6 +33,10 @@ def law(tmp_path):
 DRAWN = {
     "bode": ["bode", LAB, "--to", "300"],
     "nyquist": ["nyquist", LAB],
+    "nyquist disc": ["nyquist", LAB, "--disc"],
+    "loop": ["bode", LAB, "--loop", "--period", "0.01"],
+    "nichols of a law": ["nichols", LAB, "--law", "LAW"],
+    "sensitivity": ["sensitivity", LAB],
     "nyquist of a law": ["nyquist", LAB, "--law", "LAW"],
     "locus": ["locus", LAB, "--vary", "K2", "--from", "0", "--to", "2", "--points", "40", "--branches", "3"],
     "locus of a law": [

@@ -105,8 +105,8 @@ def test_a_dash_is_standard_output(verb, option, capfdbinary, tmp_path, monkeypa
     [
         ("map sasaki2012-lab --csv - --png -", "one thing at a time"),
         ("map sasaki2012-lab --csv=- --json", "one thing at a time"),
-        ("report sasaki2012-lab --out -", "only --csv, --png, --mat, --save may go there"),
-        ("sampled sasaki2012-lab --dsp -", "only --csv, --png, --mat, --save may go there"),
+        ("report sasaki2012-lab --out -", "only --csv, --figure, --png, --mat, --save may go there"),
+        ("sampled sasaki2012-lab --dsp -", "only --csv, --figure, --png, --mat, --save may go there"),
         ("reduce sasaki2012 --order 4 --mat -", "is no regular file"),
     ],
 )

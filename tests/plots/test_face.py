@@ -18,7 +18,7 @@ from tests.plots.labels import complaints, drawn
 from tests.shared import thinned
 from tfarm import Law
 from tfarm.digits import plain
-from tfarm.dsp import sampled_map
+from tfarm.dsp import Chain, sampled_map
 from tfarm.fitting.data import Measured
 from tfarm.loop.loci import reduced_locus
 from tfarm.loop.nyquist import compressed
@@ -33,8 +33,9 @@ LAB = tfarm.load("sasaki2012-lab")
 MICRO = Path(__file__).parents[1] / "data" / "reproductions" / "micro2.toml"
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
 LEAD = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_deflection": ([0.5], [0.02, 1.0])})
-AXES = {"comparison": 3, "bode": 2, "measured": 3, "modes": 3, "slew": 3}  # of a plot that has several
-OTHERS = [f"{name} of a rig" for name in ("gain_map", "nyquist", "bode", "locus")]
+AXES = {"comparison": 3, "bode": 2, "loop": 2, "measured": 3, "modes": 3, "slew": 3}  # of a plot that has several
+PICTURES = sorted({*tfarm.plots.__all__} - {"column"})
+OTHERS = [f"{name} of a rig" for name in ("gain_map", "nyquist", "disc", "bode", "locus", "loop", "nichols")]
 OTHERS += ["locus of a law", "gain_map of a law"]
 
 
@@ -64,6 +65,10 @@ def records():
         "measured": [tfarm.overlay(LAB, sweep())],
         "modes": [tfarm.modes(LAB, count=3)],
         "nyquist": [tfarm.nyquist(LAB, LAW)],
+        "disc": [tfarm.nyquist(LAB, LAW)],
+        "loop": [tfarm.loop_function(LAB, LAW, Chain())],
+        "nichols": [tfarm.margins(LAB, LAW)],
+        "sensitivity": [tfarm.loop_function(LAB, LAW)],
         "overlay": [plane, sampled_map(analysis.verdict.loop, K1, K2)],
         "sketch": [LAB],
         "tuned_gain": [tfarm.tune(LAB, Plan(trials=1))],
@@ -71,6 +76,9 @@ def records():
         "locus of a law": [tfarm.locus(LAB, LEAD, "gain", 0.0, 2.0, 10, 3)],
         "gain_map of a law": [tfarm.map(LAB, factors, delays, law=LEAD, vary=("gain", "delay"))],
         "bode of a rig": [tfarm.bode(rig, "root_moment", (1.0, 1000.0))],
+        "loop of a rig": [tfarm.loop_function(rig, law)],
+        "nichols of a rig": [tfarm.loop_function(rig, law)],
+        "disc of a rig": [tfarm.nyquist(rig, law)],
         "nyquist of a rig": [tfarm.nyquist(rig, law)],
         "locus of a rig": [tfarm.locus(rig, law, "K2", -unit, 1.6 * unit, points=40, branches=4)],
         "gain_map of a rig": [tfarm.map(rig, np.linspace(-1, 4, 40) * law.K1, np.linspace(-1, 1.5, 41) * unit)],
@@ -95,7 +103,7 @@ def as_tuple(axes):
     return tuple(np.ravel(np.asarray(axes, dtype=object)))
 
 
-@pytest.mark.parametrize("name", [*thinned(tfarm.plots.__all__, 2), *thinned(OTHERS, 2)])
+@pytest.mark.parametrize("name", [*thinned(PICTURES, 2), *thinned(OTHERS, 2)])
 def test_a_picture_in_given_axes_and_on_its_own(name, records):
     """Nothing else is opened for the first; the other has the look of the pages, whatever the user's settings are.
 
@@ -146,7 +154,7 @@ def test_a_number_of_a_law_has_its_unit(number, label):
     assert number_label(number, LAB, law) == label
 
 
-@pytest.mark.parametrize("name", tfarm.plots.__all__)
+@pytest.mark.parametrize("name", PICTURES)
 def test_a_wrong_argument_of_a_picture_is_refused_with_the_function_to_use(name, records):
     """The first and the last argument of each picture, one at a time; other figures are left alone."""
     right = records[name]
@@ -176,20 +184,21 @@ def test_bode_draws_the_response(records):
     upper, lower = tfarm.plots.bode(data, ax=axes_for(2))
     (curve,) = (line for line in upper.lines if line.get_label() == "flexible arm, exact")
     assert curve.get_xdata().tolist() == data.omega.tolist()
-    assert curve.get_ydata().tolist() == abs(data.value).tolist()
+    assert curve.get_ydata() == pytest.approx(20 * np.log10(abs(data.value)), rel=1e-13, abs=1e-12)
     assert lower.lines[-1].get_ydata().tolist() == data.phase.tolist()
-    assert "[N m/(N m)]" in upper.get_ylabel()
+    assert "[dB re 1 N m/(N m)]" in upper.get_ylabel()
     assert ("[rad/s]" in lower.get_xlabel(), lower.get_ylabel()) == (True, "phase [deg]")
 
 
-def test_nyquist_draws_the_loop_function_with_its_verdict(records):
-    """Off the arcs past poles every point of the contour is on a line, at r/(1 + r) for its size r."""
-    (data,) = records["nyquist"]
-    ax = tfarm.plots.nyquist(data, ax=axes_for(0), name="mine")
+@pytest.mark.parametrize("name", ["nyquist", "disc"])
+def test_nyquist_draws_the_loop_function_with_its_verdict(name, records):
+    """Off the arcs past poles every point of the contour is on a line, in a disc at r/(1 + r) for its size r."""
+    (data,) = records[name]
+    ax = getattr(tfarm.plots, name)(data, ax=axes_for(0), name="mine")
     drawn = {complex(x, y) for line in ax.lines for x, y in zip(*line.get_data(), strict=True)}
-    upper = compressed(data.L)[~data.is_arc]
+    upper = (data.L if name == "nyquist" else compressed(data.L))[~data.is_arc]
     assert set(upper.tolist()) | set(upper.conj().tolist()) <= drawn
-    assert ax.get_title().split("\n") == [
+    assert ax.get_title("left" if name == "nyquist" else "center").split("\n") == [
         f"mine: {data.verdict.verdict.upper()}",
         "K1 = 0.3, K2 = 0.3",
         f"encirclements of −1: {data.encirclements};  unstable poles: {data.verdict.unstable_roots}",
@@ -287,7 +296,7 @@ def test_a_comparison_draws_both_responses_and_both_regions(records):
     upper, lower, plane = tfarm.plots.comparison(found, ax=axes_for(3))
     for data, above, below in zip(found.responses, upper.lines, lower.lines, strict=False):
         assert above.get_xdata().tolist() == data.omega.tolist()
-        assert above.get_ydata().tolist() == abs(data.value).tolist()
+        assert above.get_ydata() == pytest.approx(20 * np.log10(abs(data.value)), rel=1e-13, abs=1e-12)
         assert below.get_ydata().tolist() == data.phase.tolist()
     drawn = {(float(x), float(y)) for line in plane.lines for x, y in zip(*line.get_data(), strict=True)}
     for region, side in zip(found.regions, found.sides, strict=True):

@@ -21,7 +21,7 @@ from tfarm.arm import to_toml
 from tfarm.cli import app as cli_app
 from tfarm.dsp import Chain, load_chain
 from tfarm.fitting.fit import fit
-from tfarm.report import write, writing
+from tfarm.report import overview, write, writing
 from tfarm.report.live import save_live
 from tfarm.report.page import Case, PageSection
 from tfarm.report.response_sections import fit_section
@@ -71,16 +71,17 @@ def without_a_section(monkeypatch, error):
 def test_a_section_that_cannot_be_made_has_its_reason_in_its_place(tmp_path, monkeypatch, error):
     without_a_section(monkeypatch, error)
     notices = []
-    page = write([ARM], tmp_path, only=("locus",), notice=notices.append).read_text(encoding="utf-8")
+    write([ARM], tmp_path, only=("modes", "locus"), notice=notices.append)
+    page, modes = ((tmp_path / NAME / f"{name}.html").read_text(encoding="utf-8") for name in ("locus", "modes"))
     assert "stopped short of the pole" in page.partition('id="locus"')[2]
-    assert "Parameters" in page
+    assert "Parameters" in modes
     assert len(notices) == 1
     assert "stopped short of the pole" in notices[0]
 
 
 def test_an_index_without_the_picture_of_an_arm_names_it(tmp_path, monkeypatch):
     without_a_section(monkeypatch, tfarm.ConvergenceError("no zeros found", None, None))
-    monkeypatch.setattr(writing, "bode", Unmakeable(tfarm.ConvergenceError("no zeros found", None, None)))
+    monkeypatch.setattr(overview, "bode", Unmakeable(tfarm.ConvergenceError("no zeros found", None, None)))
     write([ARM], tmp_path, only=("locus",))
     targets = Links(tmp_path / "index.html").targets
     assert not any(target.endswith(".svg") for target in targets)
@@ -104,12 +105,14 @@ def test_a_bug_of_ours_stays_loud(tmp_path, monkeypatch):
 
 
 def test_every_piece_has_the_anchor_of_its_section(pages):
-    ids = links_of(pages / NAME / "index.html").ids
-    assert [piece.anchor for piece in pieces_of(Case(ARM, Chain()))] == [i for i in ids if i in ANCHORS]
+    pieces = pieces_of(Case(ARM, Chain()))
+    for page in {piece.page for piece in pieces}:
+        ids = links_of(pages / NAME / f"{page}.html").ids
+        assert [piece.anchor for piece in pieces if piece.page == page] == [i for i in ids if i in ANCHORS]
 
 
 def test_a_page_has_the_same_sections_whatever_is_written_with_it(tmp_path, monkeypatch):
-    """The note on an arm without a loop is on the pages of the loop alone."""
+    """A page of the loop of an arm that has none has no section, but the reason."""
     kept = tuple(replace(each, make=partial(bare, each.anchor)) for each in PIECES)
     monkeypatch.setattr("tfarm.report.writing.PIECES", kept)
     monkeypatch.setattr(writing, "save_proof", lambda *_: None)
@@ -117,7 +120,8 @@ def test_a_page_has_the_same_sections_whatever_is_written_with_it(tmp_path, monk
     for only in (("modes",), ("locus",), ("modes", "locus")):
         write([HELD], tmp_path, only=only)
         ids = {page: [i for i in Links(tmp_path / HELD.name / f"{page}.html").ids if i in ANCHORS] for page in only}
-        assert ids == {page: {"modes": ["arm", "modes"], "locus": ["arm", "no-loop"]}[page] for page in only}
+        assert ids == {page: {"modes": ["arm", "modes"], "locus": []}[page] for page in only}
+    assert "The hub of this arm is locked" in (tmp_path / HELD.name / "locus.html").read_text(encoding="utf-8")
 
 
 def bare(anchor, *_):
@@ -287,6 +291,7 @@ def test_of_a_fit(tmp_path):
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     check_page(page, NAME)
     assert "\u202e" not in page
+    assert [each for each in links_of(tmp_path / "index.html").ids if each in ANCHORS] == ["fit"]
 
 
 def test_of_a_section_and_a_live_page_that_cannot_be_made(tmp_path, monkeypatch):

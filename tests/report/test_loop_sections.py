@@ -9,29 +9,25 @@ from matplotlib.contour import QuadContourSet
 
 import tfarm
 from tests.plots.labels import complaints
-from tests.report.written import coarsen
+from tests.report.written import coarsen, plain_cards
 from tfarm.arm import Hub, HubFeedback
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import Sampling
-from tfarm.dsp.verdict import sampled_brief
-from tfarm.errors import ConvergenceError
 from tfarm.loop import plane as edges
 from tfarm.loop.loci import loci
 from tfarm.loop.loop import band_of
-from tfarm.loop.nyquist import nyquist, nyquist_of
+from tfarm.loop.nyquist import nyquist
 from tfarm.loop.poles import closed_loop_poles
-from tfarm.loop.stability import stability
 from tfarm.report import loop_section as map_room
 from tfarm.report import page as cases
 from tfarm.report import write, writing
 from tfarm.report.loop_section import (
     draw_map_of_arm,
-    map_data,
     map_of_arm,
     map_section,
     margin_table,
     margins_section,
-    verdict_fact,
+    recommended_section,
 )
 from tfarm.report.page import DESIGNED_MODES, Case, brief_on, has_loop, margins_of, on_hub, prose
 from tfarm.spectrum.table import PAPER_GAINS, default_gains
@@ -116,7 +112,6 @@ def test_the_contours_are_the_damping_of_the_poles(lab):
 def test_the_verdict_comes_before_any_margin():
     """On the page and in the table; and where the loop is not stable there is no margin at all."""
     section = margins_section(Case(LAB, Chain()))
-    assert all(fact.value == "STABLE" for fact in section.facts)
     (table,) = (block for block in section.blocks if block.stem == "margins")
     quantities = table.columns[0].values
     assert quantities.index("stability") < min(n for n, name in enumerate(quantities) if "margin" in name)
@@ -155,8 +150,8 @@ def test_every_pole_on_the_axis_is_passed_on_its_right():
 
 @pytest.mark.parametrize(("inertia", "reason"), [(math.inf, "locked"), (0.0, "no inertia")])
 def test_an_arm_without_a_loop_gets_a_sentence(tmp_path, monkeypatch, inertia, reason):
-    for kept in ("save_proof", "save_card"):  # which have their own tests
-        monkeypatch.setattr(writing, kept, lambda *_: None)
+    monkeypatch.setattr(writing, "save_proof", lambda *_: None)
+    plain_cards(monkeypatch.setattr)
     arm = replace(PURE, name="held", hub=Hub(inertia=inertia))
     assert not has_loop(arm)
     page = write([arm], tmp_path, only=("margins",)).read_text()
@@ -181,61 +176,36 @@ def test_the_map_shows_its_proof(coarse, section):
 # ------------------------------------------------------------ the same gains, sampled
 
 
-def test_the_star_is_stable_at_the_period_of_its_page(lab, section):
-    """The best gains of a page are those of its own chain, and stable there; an unstable law has it in its card."""
+def test_the_star_is_stable_at_the_period_of_its_page(lab):
+    """The best gains of a page are those of its own chain: both loops of their card are stable, as by the poles."""
     assert all(brief_on(LAB, each.law, Chain()).is_stable for each in lab.case.in_s)
     labels = [text.get_text() for text in draw_map_of_arm.figure(lab).legends[0].get_texts()]
     assert any(label.startswith("best damping") and "stable when sampled every 10 ms" in label for label in labels)
-    assert "stable when sampled every 10 ms" in section.answer
-    facts = margins_section(Case(LAB, Chain())).facts
-    assert all(fact.note.endswith("; stable when sampled every 10 ms") for fact in facts)
     quick = Chain(sampling=Sampling(period=2e-3))
-    assert all(
-        fact.note.endswith("; stable when sampled every 2 ms") for fact in margins_section(Case(LAB, quick)).facts
-    )
+    for chain, period in ((Chain(), "10 ms"), (quick, "2 ms")):
+        section = recommended_section(Case(LAB, chain))
+        assert [(each.loop, each.pill.split(",")[0]) for each in section.card] == [
+            ("continuous-time", "stable"),
+            (f"sampled, {period}", "stable"),
+        ]
+        gains = Case(LAB, chain).in_s[1].law.gains
+        assert f"K1 = {gains.K1:.4g}" in section.answer
+        phase = tfarm.margins(LAB, gains).in_band.phase_margin.value
+        assert float(section.card[0].cells["phase_margin"].value) == pytest.approx(abs(phase), rel=5e-4)
     slow, fast = (Case(LAB, each).in_s[1].law.gains.K1 for each in (Chain(), quick))
     assert fast > slow
-    lost = on_hub(LAB, HubFeedback(K1=26.0, K2=-3.0), "best in continuous time", "best")
-    fact = verdict_fact(lost, margins_of(LAB, lost.law), sampled_brief(LAB, lost.law, Chain()).short)
-    assert fact.note.endswith("UNSTABLE when sampled every 10 ms")
-    assert set(map_data(lab)[0].values) == {"grid", "boundary"}
 
 
-@pytest.mark.parametrize("arm", [PURE, LAB], ids=lambda arm: arm.name)
-@pytest.mark.parametrize("Kp", [-1e-3, -1e-8, -1e-14])
-def test_a_small_unstable_pole_is_not_indented_away(arm, Kp):
-    """Kp < 0 leaves one real unstable pole near -Kp/K1, however near to the double pole of L at 0."""
-    law = HubFeedback(K1=0.3, K2=0.3, Kp=Kp)
-    plot = nyquist(arm, law)
-    assert (plot.unstable_by_nyquist, plot.verdict.unstable_roots) == (1, 1)
-    radius = abs(plot.s[plot.is_arc][plot.s[plot.is_arc].imag < 1e-2]).min()
-    assert radius < plot.verdict.poles.values.real.max() == pytest.approx(-Kp / 0.3, rel=1e-2)
+def test_intervals_are_short_facts_of_the_map(section):
+    rows = {row.name: row for row in margins_of(LAB, default_gains(LAB)).stability_intervals}
+    assert [fact.label for fact in section.facts] == ["K1, continuous", "K2, continuous"]
+    for fact, name in zip(section.facts, ("K1", "K2"), strict=True):
+        low, high = (float(end.strip("<> ")) for end in fact.value.strip("()").split(","))
+        assert (low, high) == pytest.approx(rows[name].around, rel=5e-4)
 
 
-def test_both_counts_of_a_nyquist_plot_are_compared():
-    """With a verdict that has lost its unstable poles there is no plot."""
-    law = HubFeedback(K1=0.3, K2=1.5)
-    verdict = replace(stability(LAB, law), unstable_roots=0)
-    with pytest.raises(ConvergenceError, match="by the encirclements of -1, 0 by finding all"):
-        nyquist_of(verdict)
-
-
-def test_poles_within_rounding_of_the_axis_may_count_on_either_side():
-    """On a hub of 10,000 beams modes grow by 1e-9 of a rad/s at 1e5: the verdict has them, encirclements may not."""
-    arm = PURE.having(hub_inertia=1e4 * PURE.carried_inertia)
-    plot = nyquist(arm, HubFeedback(K1=-0.05 * arm.total_inertia))
-    assert plot.verdict.unstable_roots_infinite
-    assert plot.on_axis > 0
-    assert plot.clear + plot.on_axis == plot.verdict.unstable_roots
-    assert plot.clear <= plot.unstable_by_nyquist <= plot.verdict.unstable_roots
-
-
-def test_a_rate_gain_that_only_takes_damping_is_not_shown_to_add_it():
-    """The geared rig's own friction damps its first mode most; more rate gain takes of it (poles at a few gains)."""
-    rig = tfarm.load("quanser-2dsfl")
-    law = default_gains(rig)
-    found = loci(rig, law, "K1", 0.0, 2 * law.K1)
-    branch = found.exact.branches[found.exact.mode == 1][0]
-    first = -branch.real / abs(branch)
-    assert (np.diff(first) < 0).all()
-    assert (found.best.gain, found.best.damping_ratio) == (0.0, pytest.approx(first[0]))
+def test_without_recommended_gains_there_is_a_sentence(monkeypatch):
+    monkeypatch.setattr(map_room, "best", lambda arm, chain: None)
+    section = recommended_section(Case(LAB, Chain()))
+    assert section.answer.startswith("None: the search")
+    assert not section.card

@@ -16,10 +16,10 @@ from tfarm.dsp import Chain
 from tfarm.dsp.crossings import sampled_map
 from tfarm.plots.motion import sketch
 from tfarm.report.arm_section import arm_section, assumptions_section
+from tfarm.report.overview import summary
 from tfarm.report.page import Case, has_loop, sign_words
 from tfarm.report.response_sections import locked_table
 from tfarm.report.tuner_section import why_not
-from tfarm.report.writing import summary
 
 RIGS = {arm.name: arm for arm in map(tfarm.load, ("tests/rigs/bench-rig.toml", "quanser-2dsfl", "quanser-flexlink"))}
 

@@ -3,18 +3,17 @@
 import math
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import tfarm
-from tests.odd_arms import odd_arms
 from tests.report.written import blocks_of, values_of
 from tfarm.arm import HubFeedback
-from tfarm.digits import kept_digits, plain, significant
+from tfarm.digits import kept_digits
 from tfarm.dsp import Chain, Simulator, sampled_loop, scenario, verdict
 from tfarm.dsp.chain import Converters, Sampling
-from tfarm.dsp.modes import dominant, mode_table
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
 from tfarm.plots import regions
@@ -22,6 +21,7 @@ from tfarm.plots.regions import CUT_RANGE, K2_RANGE, draw_overlay, stable_region
 from tfarm.report import sampled_section as page
 from tfarm.report.page import Case, prose
 from tfarm.report.sampled_section import CURVE_DIGITS, sampled_section
+from tfarm.schema import across, text
 from tfarm.spectrum.table import default_gains
 
 LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
@@ -91,52 +91,40 @@ def test_without_damping_the_layers_are_nested_and_name_their_number_of_modes(mo
 
 def test_facts_and_words_are_the_analysis(section):
     analysis = analysed(LAB, GAINS, Chain())
-    name = "default gains: "
-    assert [(fact.label.removeprefix(name), fact.value) for fact in section.facts] == [
-        ("K1 = 0.3, K2 = 0.3", "STABLE"),
-        ("delay margin", significant(analysis.delay_margin_seconds, 3)),
+    slew = tfarm.simulate(LAB, GAINS, duration=3.0)
+    assert [(fact.label, fact.value, fact.unit) for fact in section.facts] == [
+        ("K1, sampled, 10 ms", text(analysis.shown["K1"], 4), "N m s/rad"),
+        ("K2, sampled, 10 ms", "(-0.1526, 1.16388)", ""),
+        ("settling time of the slew", f"{slew.settling_time:.4g}", "s"),
     ]
-    assert f"|z| = {plain(math.exp(analysis.verdict.log_radius), 10)}" in section.facts[0].note
-    assert section.answer == (
-        "Default gains (K1 = 0.3, K2 = 0.3): stable when sampled every 10 ms, delay margin 12.8 ms (1.28 samples); "
-        f"{analysis.verdict.holds_for}."
-    )
     assert "stable for K2 in (< -50, 1.031), the sampled one for K2 in (-0.1526, 1.16388)" in section.blocks[0].caption
+
+
+def test_a_slew_that_does_not_settle_has_no_settling_time(section):
+    run = SimpleNamespace(settling_time=None, t=np.array([0.0, 3.0]), stopped=None)
+    fact = page.settling_fact(SimpleNamespace(name="PD"), run, True)
+    assert fact[:3] == ("settling time of the slew, PD", "not settled within 3.000", "s")
+    lost = tfarm.simulate(LAB, HubFeedback(K1=0.3, K2=3.0), duration=3.0)
+    assert page.settling_fact(SimpleNamespace(name="PD"), lost, False)[:2] == ("settling time of the slew", "unstable")
 
 
 def test_a_delay_margin_that_is_a_lower_bound_is_shown_so():
     """That of the 2-DOF rig, which the search of its first 20 modes does not reach."""
     rig = tfarm.load("quanser-2dsfl")
     (each, *_), found = Case(rig, Chain()).controllers, tfarm.sampled(rig, default_gains(rig))
-    margin = page.facts_on(each, found)[1]
+    rows = values_of(across({each.title: found}))
+    shown = dict(zip(rows["quantity"], rows[list(rows)[2]], strict=True))
     assert found.is_lower_bound
-    assert margin.value == f"≥ {plain(found.delay_margin_seconds, 3)}"
-    assert "delay margin at least" in prose("sampled_lead", found=[(each, found)], period=0.01)
+    assert str(shown["delay margin"]).startswith("≥") or "at least" in str(shown)
 
 
-def test_at_zero_damping_the_verdict_names_its_modes_and_the_damping_that_it_needs():
-    """By the poles: a little more damping is stable."""
-    (each,) = Case(PAPER, Chain()).controllers
-    first, *_, damping = page.facts_on(each, tfarm.sampled(PAPER, GAINS))
-    assert "model of the first 20 modes" in first.note
-    assert "dominant pole: mode 13" in first.note
-    assert (damping.value, damping.label) == (
-        "1.004e-14 s",
-        "default gains: minimum structural damping for stability",
-    )
+def test_at_zero_damping_a_little_more_than_the_least_that_is_needed_is_stable():
+    """By the poles."""
+    found = tfarm.sampled(PAPER, GAINS)
+    assert found.verdict.slowest == "mode 13"
+    assert f"{found.minimum_damping.value:.4g}" == "1.004e-14"
     healed = replace(PAPER, link=replace(PAPER.link, damping=1.01e-14))
     assert sampled_loop(healed, GAINS, Chain(), count=20).poles.is_stable
-
-
-@pytest.mark.parametrize("name", ["micro", "rubber"])
-def test_the_table_of_modes_has_the_pole_that_the_verdict_names(name):
-    """On the micro-arm mode 1, aliased to the edge of the strip, becomes two real poles: the slower one decides."""
-    arm = odd_arms()[name]
-    loop = sampled_loop(arm, default_gains(arm), Chain(), count=4)
-    table, named = mode_table(loop), dominant(loop)
-    assert table.log_radius.max() <= loop.poles.log_spectral_radius
-    if named.startswith("mode"):
-        assert table.log_radius[table.index == int(named.partition(" ")[2])] == [loop.poles.log_spectral_radius]
 
 
 def test_every_part_of_a_chain_is_named():

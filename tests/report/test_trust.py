@@ -1,4 +1,4 @@
-"""Why trust this: the proofs kept for each arm, the digits shown, formulas as MathML, and the page made of them."""
+"""Method and proofs: the proofs kept for each arm, the digits shown, formulas as MathML, and the page made of them."""
 
 import json
 import re
@@ -226,7 +226,7 @@ def test_one_page_of_an_arm_does_not_wait_for_the_audit(tmp_path, monkeypatch, e
     arm = replace(ARM, name="mine", hub=tfarm.Hub(inertia=np.inf))
     page = write([arm], tmp_path, only=("locus",))
     text = page.read_text(encoding="utf-8")
-    assert "why trust this" not in text
+    assert "Method and proofs" not in text
     assert 'href="proof.json"' in text
     assert (tmp_path / "mine" / "arm.toml").read_text(encoding="utf-8") == to_toml(arm)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["index.html", "mine"]

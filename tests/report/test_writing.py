@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import time
+from collections import defaultdict
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,16 +15,30 @@ from urllib.parse import unquote
 import pytest
 
 import tfarm
-from tests.hostile import LONG, NAME, PRINTED, check_drawing, check_page
+from tests.hostile import LONG, NAME, PRINTED, Read, check_drawing, check_page
 from tests.report.readme import PICTURES, write_pictures
-from tests.report.written import ARM, HELD, Links, coarsen, files_of, ids_of, links_of, plain_cards, validated
+from tests.report.written import (
+    ARM,
+    HELD,
+    Links,
+    Unmakeable,
+    coarsen,
+    files_of,
+    ids_of,
+    links_of,
+    plain_cards,
+    validated,
+)
+from tfarm.case.card import LoopCard
 from tfarm.dsp import Chain, load_chain
-from tfarm.report import write, writing
-from tfarm.report.page import TEMPLATES, Case, GivenLaw, prose, sheet
+from tfarm.plots.style import GOOD, LOW, MARGINAL, POOR, UNSTABLE
+from tfarm.report import overview, write, writing
+from tfarm.report.arm_section import arm_section
+from tfarm.report.overview import Card, pill_of, save_card
+from tfarm.report.page import TEMPLATES, Case, GivenLaw, best, explained, prose, sheet
 from tfarm.report.trust import write_trust, written_proofs
-from tfarm.report.writing import PIECES, Card, index_page, kept, pieces_of, save_card
-from tfarm.schema import Column
-from tfarm.schema.html import with_symbols
+from tfarm.report.writing import PIECES, QUESTIONS, index_page, kept, pieces_of
+from tfarm.schema import Column, quantities, to_dict
 from tfarm.spectrum.table import default_gains
 
 # ------------------------------------------------------------ the same bytes
@@ -97,14 +112,13 @@ def test_every_link_leads_somewhere_and_none_leaves_the_disk(pages):
 
 
 def test_every_picture_has_words(pages):
-    links = links_of(pages / NAME / "index.html")
-    pictures = [target for target in links.targets if target.endswith(".svg")]
-    assert len(set(pictures)) >= 5
-    assert all(alt and len(alt) > 30 for alt in links.alts)
+    for page in (pages / NAME).glob("*.html"):
+        assert all(alt and len(alt) > 30 for alt in links_of(page).alts)
+    assert len(links_of(pages / NAME / "index.html").alts) == 4
 
 
 def test_no_file_is_left_unlinked_or_half_written(pages):
-    linked = {unquote(target) for target in links_of(pages / NAME / "index.html").targets}
+    linked = {unquote(target) for page in (pages / NAME).glob("*.html") for target in links_of(page).targets}
     for file in files_of(pages / NAME):
         assert file in linked or file in {"index.html", "card.json", "pictures/card.svg"}
         assert (pages / NAME / file).stat().st_size > 50
@@ -117,7 +131,7 @@ def test_names_and_assumptions_are_text_and_nothing_else(pages):
     """On the page of the arm, the live one, the index and the one on trust, and in every drawing."""
     for page in pages.rglob("*.html"):
         check_page(page.read_text(encoding="utf-8"), NAME, scripts=3 * (page.name == "live.html"))
-    page = (pages / NAME / "index.html").read_text(encoding="utf-8")
+    page = (pages / NAME / "modes.html").read_text(encoding="utf-8")
     check_page(page, PRINTED.partition("I_h")[0], "second assumption", LONG)
     assert "I<sub>h</sub> in kg m² \u05e9" in page
     for drawing in pages.rglob("*.svg"):
@@ -136,32 +150,130 @@ def test_the_foot_has_the_command_to_write_the_page_again(pages):
 # ------------------------------------------------------------ what a reader sees at once
 
 
-def test_the_sign_of_the_gains_is_there_once_and_the_words_are_explained(pages):
-    text = (pages / NAME / "index.html").read_text(encoding="utf-8")
-    assert text.count("accelerates the hub") == 1
+BLOCKS = ("result", "margins-map", "margins", "sampled", "modes", "locus")  # of a first page, in their order
+
+
+def test_the_first_page_has_the_card_and_the_pictures_in_their_order(pages):
+    page = pages / NAME / "index.html"
+    text, links = page.read_text(encoding="utf-8"), links_of(page)
+    assert [each for each in links.ids if each in BLOCKS] == list(BLOCKS)
+    pictures = [target for target in links.targets if target.endswith(".svg")]
+    assert pictures == [f"pictures/{name}.svg" for name in ("map", "default-bode", "sampled-slew", "locus-K2")]
+    assert not links.tags & {"details", "figcaption"}
+    for anchor in BLOCKS[1:]:
+        heading = text.partition(f'id="{anchor}"')[2].partition("</h2>")[0]
+        assert f'href="{anchor.partition("-")[0]}.html"' in heading
+    shown = tfarm.modes(ARM, 5).natural_frequency[1:]
+    assert [row[1] for row in Read(text).rows if row[0].isdigit()] == [f"{omega:.6g}" for omega in shown]
+    assert ('href="margins.html#margins-recommended"' in text) == (best(ARM, Chain()) is not None)
+    assert tfarm.simulate(ARM, default_gains(ARM), duration=3.0).settling_time is None
+    assert "<dt>settling time of the slew</dt><dd>not settled within 3.000 s</dd>" in text
+
+
+def test_every_number_of_the_card_is_that_of_the_json(pages):
+    """The table of the first page against the answer of `tfarm margins --json`; on each page the same in one line."""
+    card = to_dict(tfarm.result_card(ARM, default_gains(ARM)))
+    page = (pages / NAME / "index.html").read_text(encoding="utf-8")
+    rows = {row[0]: row[1:] for row in Read(page.partition('id="result"')[2].partition("</section>")[0]).rows}
+    units = {"gain_margin_db": "dB", "gain_reduction_db": "dB", "phase_margin_deg": "deg", "delay_margin_ms": "ms",
+             "peak_sensitivity": ""}  # fmt: skip
+    for column, loop in enumerate(("continuous", "sampled")):
+        own = card[loop]
+        named = f"{own['stability']}, {own['grade']}: {', '.join(own['limited_by'])}"
+        assert rows["stability"][column].strip() == (named if own["limited_by"] else own["stability"])
+        for of in quantities(LoopCard).values():
+            if of.key in units:
+                value, cell = own[of.key], rows[of.label][column].replace("−", "-")
+                size = size_of(value["value"], units[of.key])
+                assert cell.startswith(f"{size} {value['grade']}" if value["grade"] != "-" else "-")
+        assert rows["disk margin"][column].strip() == size_of(own["disk_margin"])
+        assert rows["dominant time constant"][column].replace("−", "-").strip() == size_of(own["time_constant_s"], "s")
+        for name in (*QUESTIONS.keys() - {"law", "fit"},):
+            line = Read((pages / NAME / f"{name}.html").read_text(encoding="utf-8").partition("</ul>")[0]).texts
+            assert f"PM {size_of(own['phase_margin_deg']['value'], 'deg')}" in " ".join(" ".join(line).split())
+
+
+def size_of(value, unit=""):
+    """A number as a card has it."""
+    return "-" if value is None else "no limit" if value == math.inf else f"{value:.4g} {unit}".rstrip()
+
+
+def test_every_page_marks_itself_in_the_same_navigation(pages):
+    own = [page for page in (pages / NAME).glob("*.html") if page.name != "live.html"]
+    bars = set()
+    for page in own:
+        (bar,) = re.findall(r'<nav aria-label="Pages">.*?</nav>', page.read_text(encoding="utf-8"))
+        assert re.findall(r'href="([^"]*)" aria-current="page"', bar) == [page.name]
+        bars.add(bar.replace(' aria-current="page"', ""))
+    (bar,) = bars
+    leads = re.findall(r'href="([^"]*)"', bar)
+    assert {"../index.html", "live.html", "../trust/index.html", *(page.name for page in own)} == set(leads)
+
+
+def test_no_paragraph_is_on_two_pages_and_words_are_explained_in_one_place(pages):
+    own = [page for page in (pages / NAME).glob("*.html") if page.name != "live.html"]
+    texts = {page: page.read_text(encoding="utf-8") for page in (*own, pages / "trust" / "index.html")}
+    seen = defaultdict(set)
+    for page, text in texts.items():
+        for paragraph in re.findall(r"<(?:p|figcaption)[^>]*>(.{60,}?)</", text.partition("<footer>")[0]):
+            seen[paragraph].add(page)
+    assert len(seen) > 20
+    assert [paragraph for paragraph, where in seen.items() if len(where) > 1] == []
+    every = "".join(texts.values())
+    assert every.count("accelerates the hub") == 1
     for name in ("proven", "lyapunov-region"):
-        assert text.count(f'<dt id="word-{name}">') == 1
-    answers = text.partition('id="answers"')[2].partition("</section>")[0]
-    assert 'href="#word-default-gains">default gains</a>' in answers
+        assert every.count(f'<dt id="word-{name}">') == 1
+    first = texts[pages / NAME / "index.html"]
+    assert 'href="../trust/index.html#word-default-gains">default gains</a>' in first
 
 
-def test_long_matter_is_folded_and_answers_come_first(pages):
-    """No table outside <details>; the verdict in the contents; each answer at the top leads to its section."""
-    text = (pages / NAME / "index.html").read_text(encoding="utf-8")
-    assert "<table" not in re.sub(r"<details>.*?</details>", "", text, flags=re.DOTALL)
-    assert text.count("<details>") == text.count("</details>")
-    contents = text.partition('class="contents"')[2].partition("</nav>")[0]
-    assert 'href="#margins">Stability and stability margins <span class="verdict ok">stable</span>' in contents
-    answers = text.partition('id="answers"')[2].partition("</section>")[0]
-    assert "the loop is stable" in answers
-    assert {f'href="#{anchor}"' for anchor in ("margins-map", "margins", "sampled")} <= set(
-        re.findall(r'href="#[^"]*"', answers)
-    )
+def test_without_the_page_of_words_none_is_linked():
+    assert explained("Proven: `tfarm design`.") == "Proven: <code>tfarm design</code>."
+    assert 'href="x.html#word-proven">Proven</a>' in explained("Proven.", "x.html")
+
+
+def test_pills_have_the_colours_of_the_grades():
+    """Those of the pictures; the words of each are on it, for grey print."""
+    style_sheet = (TEMPLATES / "style.css").read_text(encoding="utf-8")
+    light, dark, paper = (part.partition("}")[0] for part in style_sheet.split(":root {")[1:4])
+    named = {"good": GOOD, "low": LOW, "poor": POOR, "marginal": MARGINAL, "unstable": UNSTABLE}
+    for name, colour in named.items():
+        assert f"--{name}: {colour};" in light
+        assert f"--{name}: {colour};" in paper
+        assert re.search(rf"--{name}: #", dark)
+        assert re.search(rf"^\.(verdict\.)?{name} {{.*var\(--{name}\)", style_sheet, flags=re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("stability", "grade", "limits", "pill"),
+    [
+        ("stable", "good", (), ("stable", "good")),
+        ("stable", "low", ("phase margin",), ("stable, low: phase margin", "low")),
+        ("stable", "poor", ("phase margin", "Ms"), ("stable, poor: phase margin, Ms", "poor")),
+        ("marginal", "-", (), ("marginal", "marginal")),
+        ("unstable", "-", (), ("unstable", "unstable")),
+    ],
+)
+def test_a_pill_is_green_for_a_good_loop_alone(stability, grade, limits, pill):
+    card = tfarm.result_card(ARM, default_gains(ARM)).continuous
+    assert pill_of(replace(card, stability=stability, grade=grade, limited_by=limits)) == pill
+
+
+def test_long_matter_is_folded_on_the_pages_of_sections(pages):
+    """No table outside <details>, but for a card."""
+    for page in (pages / NAME).glob("*.html"):
+        text = page.read_text(encoding="utf-8")
+        if page.name not in ("index.html", "live.html"):
+            outside = re.sub(r"<details>.*?</details>", "", text, flags=re.DOTALL)
+            assert outside.count("<table") == outside.count('<table class="result"') <= (page.name == "margins.html")
+            assert text.count("<details>") == text.count("</details>")
 
 
 def test_every_cell_of_a_narrow_page_has_its_title(pages):
     """A table is stacked on a phone: each cell has the title of its column."""
-    text = (pages / NAME / "index.html").read_text(encoding="utf-8")
+    own = [page for page in (pages / NAME).glob("*.html") if page.name != "live.html"]
+    text = "".join(page.read_text(encoding="utf-8") for page in own)
+    text += (pages / "index.html").read_text(encoding="utf-8")
     assert "<td" in text
     body = "".join(re.findall(r"<tbody>.*?</tbody>", text, flags=re.DOTALL))
     assert all('data-label="' in cell for cell in re.findall(r"<td[^>]*>", body))
@@ -180,13 +292,19 @@ def test_the_pages_of_an_arm_lead_to_each_other(tmp_path, monkeypatch):
     assert {"bode.html", "modes.html"} <= set(Links(tmp_path / "plain" / "locus.html").targets)
 
 
-def test_the_index_compares_the_arms(pages):
-    """The cells are those of `tfarm margins`: verdict and stability intervals of the default gains, with units."""
-    rows = {row.name: row for row in tfarm.margins(ARM, default_gains(ARM)).stability_intervals}
-    table = (pages / "index.html").read_text(encoding="utf-8").partition('id="compared"')[2].partition("</section>")[0]
-    assert '<span class="verdict ok">stable</span>' in table
-    for name, unit in (("K1", " N m s/rad"), ("K2", "")):
-        assert f">{with_symbols(rows[name].interval.as_text(5) + unit)}</td>" in table
+def test_the_index_has_a_row_a_loop(pages):
+    """Verdicts and margins are those of `tfarm margins`; with the small picture and the first three frequencies."""
+    card, text = tfarm.result_card(ARM, default_gains(ARM)), (pages / "index.html").read_text(encoding="utf-8")
+    assert text.count("<table") == 1
+    assert "pictures/card.svg" in text
+    rows = [row for row in Read(text).rows if row[0] != "arm"]
+    for row, own in zip(rows, (card.continuous, card.sampled), strict=True):
+        assert row[-5].strip() == pill_of(own)[0]
+        assert row[-3].startswith(size_of(own.phase_margin.value, "deg"))
+        assert row[-1].startswith(size_of(own.peak_sensitivity.value))
+        assert row[-3].endswith(own.phase_margin.grade)
+    for omega in tfarm.modes(ARM, 3).natural_frequency[1:]:
+        assert f"{omega:.6g}" in rows[0][2]
 
 
 # ------------------------------------------------------------ odd arms, the README
@@ -206,7 +324,7 @@ def test_an_arm_that_cannot_turn_nor_move_its_tip_is_reported_on_too(tmp_path, m
     text = page.read_text(encoding="utf-8")
     assert "From hub angle to root moment" in text
     assert "is zero at every frequency" in text
-    assert "states no assumptions" in text
+    assert "states no assumptions" in arm_section(Case(arm, Chain())).words[0]
 
 
 def test_the_pictures_of_the_readme(tmp_path, monkeypatch):
@@ -295,20 +413,27 @@ def rows_of(tmp_path, laws, chain):
 def test_a_law_has_its_own_verdicts_and_nothing_of_the_default_gains(tmp_path, law):
     """Those of the answers to `margins` and `sampled`; at 10 ms one of them does not hold."""
     chain = load_chain(LAB.name)
-    (row,), page = rows_of(tmp_path, [GivenLaw(law)], chain)
-    word = tfarm.sampled(LAB, law).verdict.word
-    assert row["law"] == law.name
-    assert row["verdict"] == tfarm.margins(LAB, law).stability.verdict == "stable"
-    assert row["sampled"].lower() == f"{word} when sampled every 10 ms"
-    assert row["sampled"].startswith("UNSTABLE") == (law is FAST)
-    assert f">{row['sampled']}</td>" in page
-    assert not {"K1", "K2"} & row.keys()
+    (row, sampled), page = rows_of(tmp_path, [GivenLaw(law)], chain)
+    assert row.controller == sampled.controller == law.name
+    assert row.pill.split(",")[0] == tfarm.margins(LAB, law).stability.verdict == "stable"
+    assert sampled.pill.split(",")[0] == tfarm.sampled(LAB, law).verdict.word
+    assert (sampled.look == "unstable") == (law is FAST)
+    assert sampled.loop == "sampled, 10 ms"
+    assert f">{sampled.pill}</span></td>" in page
     assert law.name in page
     assert "K1 = 0.3" not in page
 
 
 def test_each_law_has_a_row_and_one_in_z_no_continuous_verdict(tmp_path):
     rows, page = rows_of(tmp_path, [GivenLaw(SAMPLED), GivenLaw(tfarm.HubFeedback(K1=0.3, K2=0.3))], Chain())
-    assert [row.get("verdict") for row in rows] == [None, "stable"]
-    assert [row["sampled"] for row in rows] == ["stable when sampled every 10 ms"] * 2
-    assert page.count(f'{LAB.name}/index.html">{LAB.name}</a></td>') == 2
+    assert [row.loop for row in rows] == ["sampled, 10 ms", "continuous-time", "sampled, 10 ms"]
+    assert [row.pill.split(",")[0] for row in rows] == ["stable"] * 3
+    assert page.count('rowspan="3"') == 3
+
+
+def test_a_card_that_is_not_determined_has_its_reason(tmp_path, monkeypatch):
+    monkeypatch.setattr(overview, "card_of", Unmakeable(tfarm.ConvergenceError("stopped short", None, None)))
+    loops, page = rows_of(tmp_path, [], Chain())
+    assert (loops, "no loop" in page) == ((), True)
+    (card,) = kept(tmp_path, "card", Card).values()
+    assert "default gains: not determined, stopped short" in card.notes[0]

@@ -21,7 +21,7 @@ from tfarm.dsp import crossings as sampled_regions
 from tfarm.dsp import modes as sampled_loci
 from tfarm.loop import loci
 from tfarm.plots import regions
-from tfarm.report import live, loop_section, writing
+from tfarm.report import live, loop_section, overview, writing
 from tfarm.report.writing import PIECES
 
 COARSE = (
@@ -46,9 +46,9 @@ def coarsen(put=setattr):
 
 def plain_cards(put):
     """Cards of the index with an empty picture, for tests that are not about it: a response and a drawing each."""
-    put(writing, "bode", lambda *_: None)
-    put(writing, "draw_card", SimpleNamespace(figure=lambda _: None))
-    put(writing, "save_figure", lambda _, folder, stem, formats: (folder / f"{stem}.svg").write_text("<svg/>"))
+    put(overview, "bode", lambda *_: None)
+    put(overview, "draw_card", SimpleNamespace(figure=lambda _: None))
+    put(overview, "save_figure", lambda _, folder, stem, formats: (folder / f"{stem}.svg").write_text("<svg/>"))
 
 
 ASSUMPTIONS = (PRINTED, "second assumption", LONG)

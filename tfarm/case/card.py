@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -32,8 +32,9 @@ from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.crossings import CircleGrid, circle_grid
 from tfarm.dsp.verdict import Analysis, sampled
 from tfarm.errors import ConvergenceError
+from tfarm.loop.curve import LoopCurve, curve_of, gain_margin, lowest_drawn, refined
 from tfarm.loop.margins import LoopMargins, Margins, margins, margins_of_curve
-from tfarm.loop.stability import SMALL_GAIN
+from tfarm.loop.stability import SMALL_GAIN, stability
 from tfarm.records import record
 from tfarm.schema import Percent, Quantity, Table, across
 from tfarm.schema.html import as_html, with_symbols
@@ -52,9 +53,8 @@ GRADED = {  # names of the graded margins in the grade of the loop
 }
 GAIN_LIMITS, PHASE_LIMITS, PERIOD_LIMITS, PEAK_LIMITS = (6.0, 3.0), (45.0, 30.0), (1.0, 0.5), (2.0, 3.0)
 REFERENCE_RATIO = 1e-3  # damping ratio of mode 1 with which an undamped arm is graded
+ON_REAL_AXIS = 1e-9  # of its size: imaginary part of a sampled pole which is rounding
 SMALL_RATIO = 1e-3  # of mode 1: below it the minimum structural damping for stability is on the card
-MOST_FACTOR = 1e9  # on the controller: a larger gain margin is none
-SAME_FACTOR = 1e-6  # relative: by no more the gain margin differs from the factor at its phase crossover
 UNDAMPED = (
     "undamped model: margins and grades are those with C = {:.4g} s, 0.1 % of critical damping in mode 1; "
     "at C = 0 the exact delay and disk margins are 0 for every gain"
@@ -89,6 +89,7 @@ class LeastDamped(NamedTuple):
 
 
 NOT_DEFINED = Graded(None, None, UNDEFINED)
+_margins_of, _sampled_of = lru_cache(maxsize=16)(margins), lru_cache(maxsize=16)(sampled)  # card and curve of a page
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -179,12 +180,12 @@ def result_card(
     notes += [UNDAMPED.format(reference)] if arm.has_elastic_link else []
     loops: dict[str, Callable[[], tuple[LoopCard, Callable[[], LoopCard]]]] = {
         "continuous": lambda: (
-            continuous_card(continuous or margins(arm, law), T),
-            lambda: continuous_card(margins(damped, law), T),
+            continuous_card(continuous or _margins_of(arm, law), T),
+            lambda: continuous_card(_margins_of(damped, law), T),
         ),
         "sampled": lambda: (
-            sampled_card(at_samples or sampled(arm, law, chain)),
-            lambda: sampled_card(sampled(damped, law, chain)),
+            sampled_card(at_samples or _sampled_of(arm, law, chain)),
+            lambda: sampled_card(_sampled_of(damped, law, chain)),
         ),
     }
     cards: dict[str, LoopCard | None] = dict.fromkeys(loops)
@@ -227,8 +228,7 @@ def sampled_card(found: Analysis) -> LoopCard:
     verdict, loop, band = found.verdict, found.verdict.full, None
     arm, T = loop.plant.arm, loop.chain.sampling.period
     if verdict.is_stable:
-        curve = SampledCurve(loop)
-        band = margins_of_curve(curve, curve.grid.q / T, math.pi / T)
+        band = sampled_margins(SampledCurve(loop))
     is_small = arm.least_damping < SMALL_RATIO / REFERENCE_RATIO * reference_damping(arm)
     needed, word = found.minimum_damping if is_small else None, "converged" if verdict.is_converged else "approximate"
     return LoopCard(
@@ -273,10 +273,76 @@ class SampledCurve:
         return np.asarray(np.divide(fed_back, own, out=np.full(own.shape, np.inf + 0j), where=own != 0))
 
 
+def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurve:
+    """Return the loop function L(i w) of an arm under a law, or that of the sampled loop, with its margins.
+
+    Parameters
+    ----------
+    arm, law
+        The arm and the controller.
+    chain
+        Sampling: the curve is then L(e^{i w T}) up to pi/T, and `continuous` the continuous-time loop, None under a law
+        in z.  A law in z has the usual chain where none is given.
+
+    Returns
+    -------
+    LoopCurve
+        L (n,) at frequencies (n,) [rad/s].  An arm without damping is that of the result card, with 0.1 % of critical
+        damping in mode 1; its stability is that of the arm as it is.
+
+    Raises
+    ------
+    ParameterError
+        Where there is no loop.
+    ConvergenceError
+        Where its stability is not determined.
+    """
+    law = as_law(law)
+    damped, note = arm, ""
+    if arm.has_elastic_link:
+        reference = reference_damping(arm)
+        damped, note = arm.having(damping=reference), UNDAMPED.format(reference)
+
+    def as_card(curve: LoopCurve, own: str) -> LoopCurve:
+        return replace(curve, stability=own, note=note, margins=None if own == "unstable" else curve.margins)
+
+    found = None
+    if not law.is_discrete:
+        own = _margins_of(damped, law)
+        found = as_card(curve_of(own), (own.stability if damped is arm else stability(arm, law)).verdict)
+    if found is not None and chain is None:
+        return found
+    chain = chain_or_usual(chain)
+    at_samples = _sampled_of(damped, law, chain)
+    word = _sampled_of(arm, law, chain).verdict.word
+    return replace(as_card(sampled_curve(at_samples), word), continuous=found)
+
+
+def sampled_curve(found: Analysis) -> LoopCurve:
+    """The curve of a sampled loop."""
+    loop, band, T = found.verdict.full, None, found.verdict.full.chain.sampling.period
+    curve = SampledCurve(loop)
+    if found.verdict.is_stable:
+        own = sampled_margins(curve)
+        band = replace(own, gain=found.gain_factors or own.gain)
+    omega = curve.grid.q / T
+    omega, L = refined(curve.loop_function, omega[omega >= lowest_drawn(loop.plant.arm, band)])
+    return LoopCurve(
+        arm=loop.plant.arm, law=loop.given, stability=found.verdict.word, period=T, omega=omega, L=L, margins=band
+    )
+
+
+def sampled_margins(curve: SampledCurve) -> LoopMargins:
+    """The margins of a stable sampled loop up to half its sampling rate."""
+    T = curve.loop.chain.sampling.period
+    return margins_of_curve(curve, curve.grid.q / T, math.pi / T)
+
+
 def unaliased_poles(loop: Sampled) -> dict[int, complex]:
     """The poles s = ln(z)/T [1/s] with Im s > 0 by mode, each at the frequency that is nearest to that of its mode."""
     T, poles = loop.chain.sampling.period, loop.poles
-    upper = poles.z.imag > 0
+    # a real z < 0 oscillates at half the sampling rate; by rounding it may be one of a pair, or below the axis
+    upper = (poles.z.imag > 0) | ((poles.z.real < 0) & (abs(poles.z.imag) <= ON_REAL_AXIS * abs(poles.z)))
     table = modes(loop.plant.arm, max(1, int(poles.mode.max(initial=1))))
     natural = dict(zip(table.index.tolist(), table.natural_frequency.tolist(), strict=True))
     found: dict[int, complex] = {}
@@ -305,7 +371,7 @@ def _margins(
     if band is None or gain is None:
         undefined = {"grade": UNDEFINED, "limited_by": (), "delay_margin_periods": None, "disk_margin": None}
         return dict.fromkeys(GRADED, NOT_DEFINED) | undefined
-    down, up = (_decibels(band, factor) for factor in gain)
+    down, up = (gain_margin(band, factor) for factor in gain)
     phase, peak = band.phase_margin, band.sensitivity_peak
     periods = None if delay is None else float(delay) / period
     graded = (
@@ -323,14 +389,6 @@ def _margins(
         "delay_margin_periods": periods,
         "disk_margin": band.disk,
     }
-
-
-def _decibels(band: LoopMargins, factor: float) -> tuple[float, float | None]:
-    """Size [dB] of a factor that ends stability, and the frequency [rad/s] at which it does."""
-    if not 1 / MOST_FACTOR < factor < MOST_FACTOR:
-        return math.inf, None
-    near = [w for w, t in band.phase_crossovers if abs(t / factor - 1) < SAME_FACTOR]
-    return abs(20 * math.log10(factor)), near[0] if near else None
 
 
 def grade_of(size: float | None, limits: tuple[float, float]) -> str:

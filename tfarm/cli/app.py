@@ -98,6 +98,13 @@ def named(parser: Callable[[str], Any]) -> Callable[[str], tuple[str, Any]]:
     return parse
 
 
+def check_figure(path: Path | None) -> Path | None:
+    """Return the name of a file of a figure; one without a suffix, such as "-", is a PNG."""
+    if path is not None and path.suffix.lower() not in ("", ".png", ".svg", ".pdf"):
+        raise typer.BadParameter(f"{str(path)!r}: give a name that ends in .png, .svg or .pdf")
+    return path
+
+
 CONTROLLER, SAMPLING = "Controller", "Sampling"  # groups of options
 ArmName = Annotated[
     str, typer.Argument(metavar="ARM", help="preset or TOML file", autocompletion=preset_names, show_default=False)
@@ -105,7 +112,11 @@ ArmName = Annotated[
 TheoryName = Annotated[Theory | None, typer.Option("--theory", help="beam theory; by default that of the arm's file")]
 Json = Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")]
 Csv = Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="write the table to this file")]
-Png = Annotated[Path | None, typer.Option("--png", metavar="FILE", help="draw the picture into this file")]
+Png = Annotated[
+    Path | None,
+    typer.Option("--figure", "--png", metavar="FILE", callback=check_figure,
+                 help="draw the picture into this file: .png, or .pdf or .svg at the width of a paper's column"),
+]  # fmt: skip
 File = Annotated[Path | None, typer.Option(metavar="FILE")]  # to be written
 Place = Annotated[float | None, typer.Option("--x", help="place on the arm [m], for outputs along it")]
 SideName = Annotated[
@@ -299,8 +310,9 @@ def emit(
     also: Sequence[Path | None] = (),
     rows: bool = False,
     summary: Any = None,
+    picture: str | None = None,
 ) -> None:
-    """Write the curves or rows of a record to CSV and its picture to PNG, then print it as JSON or as text.
+    """Write the curves or rows of a record to CSV and its `picture` to a file, then print it as JSON or as text.
 
     `defaults` is what JSON has of default gains; `also` are files that are written already.  The text ends with the
     `rows` of the CSV file where they are wanted and not written, and begins with the result card `summary`, as the
@@ -312,10 +324,10 @@ def emit(
     if csv is not None:
         write_file(csv, as_csv(curve_table(record), units=True).encode(), key="--csv")
     if png is not None:
-        import tfarm.plots  # noqa: F401  every picture is registered once they are loaded
-        from tfarm.plots.style import FIGURES, save_png
+        from tfarm import plots  # every picture is registered once they are loaded
+        from tfarm.plots.style import FIGURES, save_picture
 
-        save_png(FIGURES[type(record)](record), png)
+        save_picture(getattr(plots, picture).figure if picture else FIGURES[type(record)], record, png)
     written = [path for path in (*also, csv, png) if path is not None]
     if any(map(is_standard_output, written)):
         return
@@ -335,6 +347,16 @@ def emit(
 
     words = f"by default {defaults['default_gains_in_words']}" if defaults and defaults["default_gains"] else ""
     show(record, curve_table(record) if rows and csv is None else None, words)
+
+
+def emit_loop(
+    picture: str, arm: str, theory: Theory | None, gains: Gains, law: Path | None, chain: Any, json: bool, **files: Any
+) -> None:
+    """Emit the loop function of a command with that picture of it; of the sampled loop where sampling is given."""
+    subject, controller, defaults = load_loop(arm, theory, gains, law)
+    is_sampled = any(value is not None for value in chain.keywords.values())
+    found = tfarm.loop_function(subject, controller, chain(arm) if is_sampled else None)
+    emit(found, json, defaults, picture=picture, **files)
 
 
 _state = ["running"]  # of the command, for the lines of progress

@@ -14,8 +14,10 @@ from tfarm.cli.app import (
     ArmName,
     Csv,
     File,
+    Gains,
     InputName,
     Json,
+    LawFile,
     Place,
     Png,
     SideName,
@@ -23,8 +25,10 @@ from tfarm.cli.app import (
     add_command,
     advance,
     emit,
+    emit_loop,
     interval,
     load_arm,
+    load_chain,
     named,
     numbers,
     outputs_on,
@@ -218,26 +222,45 @@ def check_range(start: float, stop: float) -> None:
 @command(epilog="bode sasaki2012-lab --output tip_displacement --png bode.png")
 def bode(
     arm: ArmName,
-    output: str = "root_moment",
+    output: str | None = None,
     start: Annotated[float | None, typer.Option("--from")] = None,
     stop: Annotated[float | None, typer.Option("--to")] = None,
     x: Place = None,
     side: SideName = None,
     driven: InputName = None,
+    loop: bool = False,
     png: Png = None,
     csv: Csv = None,
+    law: LawFile = None,
+    chain: Any = load_chain,
     theory: TheoryName = None,
     json: Json = False,
+    *,
+    gains: Gains,
 ) -> None:
     """Bode plot of the exact response to the arm's input, with the poles and zeros of that output.
 
+    With --loop of the loop function at the actuator, with its gain, phase and delay margin; with --period,
+    --delay-samples or --dsp of the sampled loop too.
+
     Options:
-    output: output, such as tip_displacement
+    output: output, such as tip_displacement; by default root_moment
     start: lowest frequency [rad/s]
     stop: highest frequency [rad/s]; by default above ten flexible modes
+    loop: loop function under the controller, in place of the response of an output
     """
+    if loop:
+        refuse(
+            {"--output": output, "--from": start, "--to": stop, "--x": x, "--side": side, "--input": driven},
+            "the loop function has no output and its own frequencies; leave this out",
+        )
+        emit_loop("loop", arm, theory, gains, law, chain, json, csv=csv, png=png)
+        return
+    of_loop = {f"--{name}": value for name, value in {**gains, "law": law, **chain.keywords}.items()}
+    refuse({key.replace("_", "-"): value for key, value in of_loop.items()}, "the loop function: give --loop too")
     from tfarm.response.frequency import resonant_band
 
+    output = "root_moment" if output is None else output
     subject, (wanted,) = load_arm(arm, theory, driven), outputs_on([output], side)
     low, high = resonant_band(tfarm.transfer(subject, wanted, x=x, input=driven).arm)
     band = low if start is None else start, high if stop is None else stop

@@ -21,6 +21,7 @@ from tfarm.cli.app import (
     TheoryName,
     add_command,
     emit,
+    emit_loop,
     interval,
     load_arm,
     load_chain,
@@ -73,6 +74,7 @@ def margins(arm: ArmName, law: LawFile = None, theory: TheoryName = None, json: 
 @command(epilog="nyquist sasaki2012-lab --K1 0.3 --K2 0.3 --png nyquist.png")
 def nyquist(
     arm: ArmName,
+    disc: bool = False,
     png: Png = None,
     csv: Csv = None,
     law: LawFile = None,
@@ -81,9 +83,52 @@ def nyquist(
     *,
     gains: Gains,
 ) -> None:
-    """Nyquist plot of the exact loop: encirclements of -1, and the unstable poles found in a box."""
+    """Nyquist plot of the exact loop: encirclements of -1, and the unstable poles found in a box.
+
+    Options:
+    disc: picture of the whole contour in a disc whose rim is infinity, in place of the linear plot with a zoom at -1
+    """
     subject, controller, defaults = load_loop(arm, theory, gains, law)
-    emit(tfarm.nyquist(subject, controller), json, defaults, csv=csv, png=png)
+    picture = "disc" if disc else "nyquist"
+    emit(tfarm.nyquist(subject, controller), json, defaults, csv=csv, png=png, picture=picture)
+
+
+@command(epilog="nichols sasaki2012-lab --K1 0.3 --K2 0.3 --png nichols.png")
+def nichols(
+    arm: ArmName,
+    png: Png = None,
+    csv: Csv = None,
+    law: LawFile = None,
+    chain: Any = load_chain,
+    theory: TheoryName = None,
+    json: Json = False,
+    *,
+    gains: Gains,
+) -> None:
+    """Nichols chart of the loop function, with its margins and contours of the closed loop.
+
+    With --period, --delay-samples or --dsp of the sampled loop too.
+    """
+    emit_loop("nichols", arm, theory, gains, law, chain, json, csv=csv, png=png)
+
+
+@command(epilog="sensitivity sasaki2012-lab --K1 0.3 --K2 0.3 --png sensitivity.png")
+def sensitivity(
+    arm: ArmName,
+    png: Png = None,
+    csv: Csv = None,
+    law: LawFile = None,
+    chain: Any = load_chain,
+    theory: TheoryName = None,
+    json: Json = False,
+    *,
+    gains: Gains,
+) -> None:
+    """Sensitivity S = 1/(1 + L) and complementary sensitivity T = L/(1 + L), with their peaks Ms and Mt.
+
+    With --period, --delay-samples or --dsp of the sampled loop too.
+    """
+    emit_loop("sensitivity", arm, theory, gains, law, chain, json, csv=csv, png=png)
 
 
 @command(epilog="spill sasaki2012-lab --K1 0.3 --K2 -2")

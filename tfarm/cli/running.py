@@ -16,7 +16,13 @@ from tfarm.cli.app import discard, print_line, progress, whole_command
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError, require
 from tfarm.files import STANDARD_OUTPUT
 
-STREAMED = ("--csv", "--png", "--mat", "--save")  # of files that may go to standard output instead, called "-"
+STREAMED = (
+    "--csv",
+    "--figure",
+    "--png",
+    "--mat",
+    "--save",
+)  # of files that may go to standard output instead, called "-"
 ONLY_STREAMED = f"- is standard output, and only {', '.join(STREAMED)} may go there: give a name"
 PATHS = (*STREAMED, "--out", "--dsp", "--law", "--controller")  # may be called 1_0
 ODD_NUMBER = re.compile(r"(?=.*(_|[^\x00-\x7f]))[-+.\d_eEij]*\d[-+.\d_eEij]*")  # to Python alone: 5_0, or other digits

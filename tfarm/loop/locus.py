@@ -288,10 +288,10 @@ def rounded(found: Locus) -> Locus:
     family, gain, rows, branches = found.varied, found.gain, found.followed, found.branches
     way, pinned, box = int(np.sign(gain[-1] - gain[0])), len(branches) - found.listed.size, found.box
     for _ in range(HALVING_ROUNDS):
-        frames = np.array([[*map(frame, branches)], [frame(branches)] * len(branches)])  # (2, b, 4)
-        width, height = frames[..., 1] - frames[..., 0], frames[..., 3] - frames[..., 2]
-        own, every = (loose(branches, width[n, :, None], height[n, :, None]) for n in (0, 1))
-        more = (gain[:-1] + gain[1:])[own | every] / 2
+        whole = [frame(branches)], [view(branches, found.origin)]
+        frames = np.array([[*map(frame, branches)], *(each * len(branches) for each in whole)])  # (3, b, 4)
+        sizes = np.diff(frames)[..., ::2, None]
+        more = (gain[:-1] + gain[1:])[np.any([loose(branches, *each.swapaxes(0, 1)) for each in sizes], axis=0)] / 2
         if not more.size or more.size + gain.size > MOST_LOCUS_POINTS:
             break
         order = np.argsort(way * np.r_[gain, more], kind="stable")
@@ -311,6 +311,16 @@ def frame(branches: Complex) -> tuple[float, float, float, float]:
     wide = max(right - left, LEAST_WIDTH * float(abs(points).max())) or 1.0  # where no pole moves from 0
     tall = max(high - low, LEAST_HEIGHT * high) or wide  # where none of them oscillates
     return left, left + wide, low, low + tall
+
+
+def view(branches: Complex, origin: Whole) -> tuple[float, float, float, float]:
+    """The same of a picture scaled to the modes, Im s >= 0: not to far real poles, nor to poles of other origins."""
+    swinging = branches[origin > 0]
+    swinging = swinging[swinging.imag > 0]
+    if not swinging.size:
+        return frame(branches)
+    left, right, _, high = frame(swinging)
+    return max(left, -high), min(right, high), 0.0, high
 
 
 @dataclass(frozen=True, slots=True)

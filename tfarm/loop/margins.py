@@ -26,7 +26,6 @@ from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.crossing import brackets, crossed, zeros_between
 from tfarm.records import record
 from tfarm.schema import At, Quantity
-from tfarm.spectrum.table import first_frequency
 
 from .loop import Loop, grid
 from .stability import BAND, Stability, is_quiet, stability
@@ -386,20 +385,6 @@ def dense(verdict: Stability) -> Real:
     slowest = abs(verdict.poles.moving).min(initial=omega[0])
     slow = np.geomspace(BELOW_SLOWEST_POLE * slowest, omega[0], SLOW_POINTS) if slowest < omega[0] else omega[:0]
     return np.unique(np.r_[omega, close[(close > 0) & (close < omega[-1])], slow])
-
-
-def loop_curve(found: Margins) -> tuple[Real, NDArray[np.complex128]]:
-    """Frequencies [rad/s] (n,) around every steep place of the loop, and the finite values of L there.
-
-    They begin below the first crossing and the first mode: further down L does not change.
-    """
-    band = found.in_band
-    crossed = [] if band is None else [w for w, _ in (*band.gain_crossovers, *band.phase_crossovers) if w > 0]
-    lowest = min([first_frequency(found.stability.loop.arm), *crossed]) / BELOW_SLOWEST
-    omega = dense(found.stability)
-    L = np.asarray(found.stability.loop.loop_function(1j * omega), dtype=np.complex128)
-    shown = np.isfinite(L) & (L != 0) & (omega >= lowest)
-    return omega[shown], L[shown]
 
 
 def gain_edges(loop: Loop, by_phase: tuple[PhaseCrossover, ...]) -> list[float]:

@@ -1,7 +1,6 @@
-"""Curves over frequency: exact responses, the loop function with its margins, and Nyquist plots.
+"""Curves over frequency: exact responses, in decibels, and measured ones.
 
-At an infinite resonance a Bode plot is broken and leaves the picture.  A Nyquist plot is a disc: infinity is the rim,
-poles on the axis are arcs beyond it.
+At an infinite resonance a Bode plot is broken and leaves the picture.
 """
 
 import math
@@ -13,33 +12,26 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator, NullFormatter
-from numpy.typing import NDArray
 
 from tfarm.arm import PLANE, HubFeedback
 from tfarm.arrays import Complex, Real
-from tfarm.digits import plain, significant
 from tfarm.exact.outputs import signal_words, unit_over
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit, Possible, response_band, share_stable
 from tfarm.fitting.overlay import Overlay
-from tfarm.loop.margins import LoopMargins, Margins, loop_curve
-from tfarm.loop.nyquist import Nyquist, compressed
+from tfarm.loop.curve import decibels
 from tfarm.response.frequency import Bode
 
 from .style import (
     BLUE,
     COLOURS,
     FAINT,
-    GREEN,
     GREY,
     INK,
     ORANGE,
-    PURPLE,
     axis_label,
     by_name,
-    gains_words,
     name_axes,
     picture,
     plain_ticks,
@@ -48,10 +40,7 @@ from .style import (
 
 RAD_PER_CYCLE = 2 * math.pi  # rad/s of 1 Hz
 NUMBER_STRIP = 0.085  # height of the strip of mode numbers above the magnitude, as a share of its axes: a line of them
-MOST_DRAWN = 1e3  # size of L that is drawn: so that the part near 1 shows
-RING_SIZES = (0.2, 0.5, 1.0, 2.0, 5.0, math.inf)  # |L| of the rings
-ARC_RADIUS, REACH = 1.04, 1.35  # of the first arc at infinity, and of the picture
-ARCS_ALIKE = math.radians(20.0)  # arcs whose ends are as near as that turn alike
+OFF_PICTURE = 20.0  # dB beyond the edge: where a broken curve ends
 TICKS_A_DECADE = (1.0, 2.0, 5.0)  # where a measurement covers few of them
 NOISE_ROOM = 2.5  # factor above and below the noise: two ticks a picture at least
 FREQUENCY_HZ = "frequency [Hz]"
@@ -69,8 +58,8 @@ def _title(data: Bode | Mapping[str, Bode]) -> str:
 def bode(data: Bode | Mapping[str, Bode], *, ax: Sequence[Axes]) -> None:
     """Magnitude over phase of a response (from `tfarm.bode`), in two axes, those given or new ones: these axes.
 
-    Several are given by name.  Magnitudes in the response's SI units, phases in degrees; an infinite resonance is
-    broken, a triangle at its place.
+    Several are given by name.  Magnitudes in decibels of the response's SI unit, phases in degrees; an infinite
+    resonance is broken, a triangle at its place.
     """
     draw_magnitude(data, ax=ax[0])
     draw_phase(data, ax=ax[1])
@@ -80,29 +69,29 @@ def bode(data: Bode | Mapping[str, Bode], *, ax: Sequence[Axes]) -> None:
 def draw_card(data: Bode, *, ax: Axes) -> None:
     """The magnitude alone, small, for the index."""
     draw_magnitude(data, ax=ax)
-    ax.set_ylabel(f"|{data.label}| [{data.gain_unit}]", fontsize=8.5)
+    ax.set_ylabel(f"|{data.label}| [dB]", fontsize=8.5)
     for each in (ax.legend(), *ax.texts, *ax.child_axes):
         each.set_visible(False)
 
 
 def draw_magnitude(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
-    """|G| on log scales: rad/s below, Hz above; roots on the axis, modes and cut-off are those of the first."""
+    """|G| [dB]: rad/s below, Hz above; roots on the axis, modes and cut-off are those of the first."""
     each = by_name(data, EXACT)
     first = next(iter(each.values()))
     limits = np.array([magnitude_limits(one) for one in each.values()])
     low, high = float(limits[:, 0].min()), float(limits[:, 1].max())
-    ax.set(xscale="log", yscale="log", xlim=first.band, ylim=(low, high), xlabel=FREQUENCY)
+    ax.set(xscale="log", xlim=first.band, ylim=(low, high), xlabel=FREQUENCY)
+    decibel_ticks(ax)
     for (name, one), colour in zip(each.items(), cycle(COLOURS), strict=False):
-        edges = np.r_[np.full(one.infinite.size, 10 * high), np.full(one.vanishing.size, low / 10)]
+        edges = np.repeat([high + OFF_PICTURE, low - OFF_PICTURE], [one.infinite.size, one.vanishing.size])
         jumps = np.r_[one.infinite, one.vanishing]
-        ax.plot(*broken(one.omega, np.abs(one.value), jumps, edges), color=colour, label=safe(name))
+        ax.plot(*broken(one.omega, decibels(one.value), jumps, edges), color=colour, label=safe(name))
     if np.any(first.rigid):
-        ax.plot(first.omega, abs(first.rigid), color=GREY, lw=1.0, ls=(0, (4, 3)), zorder=1.5, label="rigid arm")
+        ax.plot(first.omega, decibels(first.rigid), color=GREY, lw=1.0, ls=(0, (4, 3)), zorder=1.5, label="rigid arm")
     _mark_roots(first, ax)
     if first.arm.has_cutoff and first.band[0] < first.arm.shear_cutoff < first.band[1]:
         ax.axvline(first.arm.shear_cutoff, color=ORANGE, lw=1.0, ls="-.", label="shear cut-off")
-    ax.yaxis.set_minor_formatter(NullFormatter())
-    ax.set_ylabel(f"|{first.label} / {first.input_label}|  [{first.gain_unit}]")
+    ax.set_ylabel(f"|{first.label} / {first.input_label}|\nmagnitude [dB re 1 {first.gain_unit}]".replace("1 −", "1"))
     if first.is_zero:
         ax.text(0.5, 0.5, "zero at every frequency", ha="center", va="center", transform=ax.transAxes)
     hertz_axis(ax, 1.0 + NUMBER_STRIP)
@@ -118,6 +107,11 @@ def draw_phase(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
     ax.set(xscale="log", xlim=one.band, xlabel=FREQUENCY, ylabel=PHASE)
     ax.margins(y=0.1)
     ax.yaxis.set_major_locator(MaxNLocator(5, steps=(1, 1.8, 4.5, 9, 10)))  # right angles and parts of them
+
+
+def decibel_ticks(ax: Axes) -> None:
+    """Upright ticks at tens and twenties of decibels."""
+    ax.yaxis.set_major_locator(MaxNLocator(7, steps=(1, 2, 4, 5, 10)))
 
 
 def hertz_axis(ax: Axes, height: float) -> None:
@@ -145,14 +139,14 @@ def broken(x: Real, y: Real, at: Real, limit: Real) -> tuple[Real, Real]:
 
 
 def magnitude_limits(data: Bode) -> tuple[float, float]:
-    """Everything finite with a margin; roots on the axis leave the picture."""
+    """Everything finite, with a margin [dB]; roots on the axis leave the picture."""
     if data.is_zero:
-        return 0.1, 10.0
+        return -20.0, 20.0
     roots = np.r_[data.infinite, data.vanishing]
     away = (abs(data.omega[:, None] / roots - 1) > 0.004).all(axis=1)  # nearer ones set no limit of the picture
-    size = np.log10([each for each in (*abs(data.value[away]), *abs(data.rigid[:1])) if each > 0])
-    margin = max(0.25, 0.06 * np.ptp(size))
-    return 10 ** (size.min() - margin), 10 ** (size.max() + margin)
+    size = decibels(np.array([each for each in (*abs(data.value[away]), *abs(data.rigid[:1])) if each > 0]))
+    margin = max(5.0, 0.06 * np.ptp(size))
+    return size.min() - margin, size.max() + margin
 
 
 def _mark_roots(data: Bode, ax: Axes) -> None:
@@ -174,136 +168,9 @@ def _mark_roots(data: Bode, ax: Axes) -> None:
         if math.log(omega) - last > width:
             last = math.log(omega)
             ax.text(
-                omega, 1.0 + 0.38 * NUMBER_STRIP, str(number), transform=ax.get_xaxis_transform(), ha="center",
-                va="bottom", fontsize=8.0, color=GREY,
+                omega, 1.0 + 0.3 * NUMBER_STRIP, str(number), transform=ax.get_xaxis_transform(), ha="center",
+                va="baseline", fontsize=8.0, color=GREY,
             )  # fmt: skip
-
-
-def draw_loops(each: Mapping[str, tuple[Real, Complex]], upper: Axes, lower: Axes) -> None:
-    """|L| of each loop over its frequencies with the line 1, and its angle from -180 to 180 degrees."""
-    for (name, (omega, L)), colour in zip(each.items(), cycle(COLOURS), strict=False):
-        upper.plot(omega, abs(L), color=colour, label=safe(name) if len(each) > 1 else None)
-        draw_wrapped(omega, L, lower, color=colour)
-    upper.axhline(1.0, color=GREY, lw=0.9)
-    for edge in (-180, 180):
-        lower.axhline(edge, color=GREY, lw=0.9)
-    upper.set(xscale="log", yscale="log", ylabel="|L| [−]")
-    upper.margins(x=0)
-    low, high = upper.get_ylim()
-    upper.set_ylim(max(low, 1e-4 * min(1.0, high)), min(high, MOST_DRAWN * max(1.0, low)))
-    lower.set(xscale="log", xlim=upper.get_xlim(), xlabel=FREQUENCY)
-    hertz_axis(upper, 1.0)
-
-
-@picture(
-    size=(9.0, 5.8), rows=(1.5, 1.0),
-    title=lambda found, name: f"{found.stability.loop.arm.name}: the loop function L(iω) of {name}",
-)  # fmt: skip
-def draw_loop(found: Margins, name: str, *, ax: Sequence[Axes]) -> None:
-    """|L| above the phase from -180 to 180 deg; |L| = 1 and L < 0 marked where they are crossed."""
-    omega, L = loop_curve(found)
-    draw_loops({name: (omega, L)}, *ax)
-    if found.in_band is not None:
-        _mark_margins(found.in_band, omega, *ax)
-
-
-def _mark_margins(margins: LoopMargins, omega: Real, upper: Axes, lower: Axes) -> None:
-    """At each L < 0 the gain margin up to |L| = 1; at each |L| = 1 the phase margin, lag green and lead purple.
-
-    The legend has the least of each.
-    """
-    seen = [(w, 1 / factor) for w, factor in margins.phase_crossovers if omega[0] <= w <= omega[-1]]
-    if seen:
-        least = ", ".join(f"× {significant(factor, 3)}" for factor in margins.gain if 0 < factor < math.inf)
-        w, size = np.transpose(seen)
-        upper.vlines(w, size, 1.0, color=ORANGE, lw=1.0, ls=(0, (2, 1.5)))
-        upper.plot(w, size, "o", color=ORANGE, ms=4.5, label=f"L < 0, gain margin {least or 'unlimited'}")
-    for kind, colour, sign, margin in (
-        ("lag", GREEN, 1, margins.phase_lag), ("lead", PURPLE, -1, margins.phase_lead)
-    ):  # fmt: skip
-        if found := [each for each in margins.gain_crossovers if (each[1] > 0) == (sign > 0)]:
-            w, angle = np.transpose(found)
-            label = f"|L| = 1, phase margin {significant(margin, 3)}° for {kind}"
-            lower.vlines(w, -180 * sign, angle - 180 * sign, color=colour, lw=1.0, ls=(0, (2, 1.5)))
-            lower.plot(w, angle - 180 * sign, "D", color=colour, ms=4.5, zorder=4)
-            upper.plot(w, np.ones(w.size), "D", color=colour, ms=4.5, zorder=4, label=label)
-
-
-# ------------------------------------------------------------ Nyquist
-
-
-@picture(
-    (Nyquist, "tfarm.nyquist returns"), size=(5.0, 6.1),
-    title=lambda data: f"{data.verdict.loop.arm.name}: the loop function L(iω)",
-)  # fmt: skip
-def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
-    """L on Nyquist's contour (from `tfarm.nyquist`), stability and encirclements above it; the axes.
-
-    A size r of L is drawn as r/(1 + r): the rim is infinity, -1 lies half way.  `name`: that of the controller.
-    """
-    radii = [1.0 if math.isinf(size) else size / (1 + size) for size in RING_SIZES]
-    for radius in radii:
-        ax.add_patch(Circle((0, 0), radius, fill=False, ec=GREY if radius in (0.5, 1.0) else FAINT, lw=0.7, zorder=0.6))
-    ax.plot([-1, 1, math.nan, 0, 0], [0, 0, math.nan, -1, 1], color=FAINT, lw=0.7, zorder=0.5)
-    _curve(data, ax)
-    ax.plot([-0.5], [0], "+", color=ORANGE, ms=11, mew=2.2, zorder=6, ls="none", label="the point −1")
-    ax.set(aspect="equal", yticks=[], xlim=(-REACH, REACH), ylim=(-REACH, REACH), frame_on=False)
-    ax.set_xlabel("|L| at the rings [−]", loc="right")
-    ax.set_xticks(radii, [plain(size).replace("inf", "∞") for size in RING_SIZES], fontsize=7.5)
-    ax.grid(False)
-    verdict = data.verdict
-    gains = gains_words(verdict.loop.law).removeprefix(f"{name}, ")
-    counts = f"encirclements of −1: {data.encirclements:d};  unstable poles: {verdict.unstable_roots}"
-    lines = f"{safe(name)}{': ' * bool(name)}{verdict.verdict.upper()}\n{safe(gains)}\n{counts}"
-    ax.set_title(lines, fontsize=9.0, loc="center")
-
-
-@picture(
-    size=(5.6, 5.3),
-    title=lambda data, _: f"{data.verdict.loop.arm.name}: the loop function L(iω) up to "
-                          f"{significant(data.verdict.band, 5)} rad/s",
-)  # fmt: skip
-def draw_nyquist(data: Nyquist, name: str, *, ax: Axes) -> None:
-    """The disc of a controller, for its page."""
-    nyquist(data, ax=ax, name=name)
-
-
-def _curve(data: Nyquist, ax: Axes) -> None:
-    """Along the axis as a line, past poles as arcs beyond the rim, one for all that turn alike; arrows as w rises."""
-    z = compressed(data.L)
-    along = np.where(data.is_arc, np.nan, z)
-    ax.plot(along.real, along.imag, color=BLUE, lw=1.3, zorder=3, label="ω > 0, arrows as it rises")
-    ax.plot(along.real, -along.imag, color=BLUE, lw=0.6, alpha=0.55, zorder=2, label="ω < 0")
-    alike: dict[tuple[int, int], list[tuple[NDArray[np.int64], float, float]]] = {}
-    for piece in np.split(np.arange(z.size), np.flatnonzero(np.diff(data.is_arc.astype(int))) + 1):
-        if data.is_arc[piece[0]]:
-            first, *_, last = np.unwrap(np.angle(data.L[piece])).tolist()
-            alike.setdefault((round(first / ARCS_ALIKE), round(last / ARCS_ALIKE)), []).append((piece, first, last))
-    step = min(0.03, (1.2 - ARC_RADIUS) / max(1, len(alike) - 1))  # from one radius to the next, the last being 1.2
-    for number, same in enumerate(alike.values()):
-        piece, first, last = same[0]
-        turn: Complex = np.exp(1j * np.linspace(first, last, 61))
-        ring = (ARC_RADIUS + step * number) * turn
-        whole = np.r_[z[piece[0] - 1 : piece[0]], ring, z[piece[-1] + 1 : piece[-1] + 2]]
-        ax.plot(whole.real, whole.imag, color=BLUE, lw=0.8, ls=(0, (3, 1.5)), zorder=3, label="past poles on the axis")
-        _arrows(ring[1:], np.diff(ring), np.array([30]), ax)
-        if len(same) > 1:
-            place = 1.28 * turn[30]
-            ax.text(place.real, place.imag, f"{len(same)} ×", fontsize=8.0, color=BLUE, ha="center", va="center")
-    drawn = z[~data.is_arc]
-    way = np.diff(drawn)
-    length = np.cumsum(abs(way))
-    _arrows(drawn[1:], way, np.searchsorted(length, length[-1] * np.array([0.12, 0.4, 0.75])), ax)
-
-
-def _arrows(z: Complex, way: Complex, at: NDArray[np.int64], ax: Axes) -> None:
-    """Heads along the curve z with steps `way`."""
-    at = at[way[at] != 0]
-    unit = way[at] / abs(way[at])
-    ax.quiver(
-        z[at].real, z[at].imag, unit.real, unit.imag, angles="xy", pivot="mid", color=BLUE, zorder=4, scale=60,
-        width=0.003, headwidth=9, headlength=10, headaxislength=10,
-    )  # fmt: skip
 
 
 # ------------------------------------------------------------ measured responses

@@ -30,13 +30,12 @@ from tfarm.tuner.training import LearningCurves
 from .regions import overlay
 from .style import (
     BLUE,
-    COLOURS,
     FAINT,
-    GREEN,
     GREY,
     INK,
     ORANGE,
-    PURPLE,
+    REGIONS,
+    STABLE,
     by_name,
     picture,
     safe,
@@ -47,6 +46,7 @@ ALONG, DISPLACEMENT = "distance from the hub, x [m]", "displacement w(x), larges
 BESIDE_ARM = 0.2  # share of the length left of the hub and right of the tip
 HUB_WIDTH = 0.06  # width of the drawn hub, as a share of the length
 TIME = "time [s]"
+RUNS = ("#a3a3a3", INK, "#0b7f93", "#8a6d3b")  # several simulations, without feedback first: no colours of stability
 DASHED, DOTTED, LONG_DASHED = (0, (4, 3)), (0, (1, 2)), (0, (5, 3))
 
 
@@ -89,7 +89,7 @@ def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
         one.add_patch(Rectangle((-HUB_WIDTH * length, -0.25), HUB_WIDTH * length, 0.5, fc=GREY, ec="none", zorder=3))
         if payload.mass > 0 or payload.inertia > 0:
             one.plot(length, w[-1], "s", ms=8.0, mfc=GREY, mec="none", zorder=3)
-        one.plot(found.nodes[row], 0 * found.nodes[row], "o", ms=5.5, mfc="white", mec=ORANGE, mew=1.3, zorder=4)
+        one.plot(found.nodes[row], 0 * found.nodes[row], "o", ms=5.5, mfc="white", mec=INK, mew=1.3, zorder=4)
         one.set(xlim=(-0.085 * length, 1.11 * length), ylim=(-1.28, 1.28), yticks=[-1, 0, 1])
         one.xaxis.set_major_locator(MaxNLocator(5))
         omega, hertz = (significant(float(of[row]), 7) for of in (found.natural_frequency, found.natural_frequency_hz))
@@ -197,8 +197,7 @@ def slew(arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "", 
         scenario.t - scenario.period, scenario.rigid_moment, where="post", color=GREY, lw=1.0, ls=DASHED,
         label="rigid arm",
     )  # fmt: skip
-    colours = (ORANGE, BLUE, *COLOURS[2:]) if len(each) > 1 else (BLUE,)
-    for (name, run), colour in zip(each.items(), cycle(colours), strict=False):
+    for (name, run), colour in zip(each.items(), cycle(RUNS[len(each) == 1 :]), strict=False):
         _draw_curve(traces.curve_of(run, "root_moment"), moment, colour, label=name or None)
         _draw_curve(traces.tip_deviation(arm, run), tip, colour, scale=1e3)
         values = run.torque if run.volts is None else run.volts
@@ -259,10 +258,10 @@ def draw_measured_runs(each: Mapping[str, RunComparison], *, ax: Sequence[Axes])
 def tuned_gain(found: Tuning, *, ax: Axes) -> None:
     """A tuned gain over time (from `tfarm.tune`) in its guard, in the axes given or new ones; the axes."""
     guard, result = found.training.guard, found.training.result
-    ax.axhspan(guard.lo, guard.hi, color="#bfe3d6", lw=0, zorder=0.5, label="guard: proven for any K(t) in it")
+    ax.axhspan(guard.lo, guard.hi, color=REGIONS[0], lw=0, zorder=0.5, label="guard: proven for any K(t) in it")
     ax.step(result.t, result.K, where="post", color=INK, lw=1.4, label="the tuner's gain K(t)")
     best = found.best_constant.gain
-    ax.axhline(best, color=PURPLE, lw=1.2, ls=LONG_DASHED, label=f"best constant gain, {significant(best, 3)}")
+    ax.axhline(best, color=GREY, lw=1.2, ls=LONG_DASHED, label=f"best constant gain, {significant(best, 3)}")
     ax.axvline(found.trial.task.busy_until, color=INK, lw=0.8, ls=DOTTED)
     ax.axhline(0.0, color=GREY, lw=0.7)
     ax.set(xlim=(0.0, float(result.t[-1])), xlabel=TIME, ylabel=f"gain on the root moment, {MOMENT_GAIN} [−]")
@@ -281,7 +280,7 @@ def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap], *, 
     left.lines[-1].remove()  # the mark of one controller: the bar is at its rate gain
     guard, K = tuning.training.guard, tuning.training.result.K
     at, _ = tuning.trial.loop.gains.point
-    for ends, colour, width, alpha in ((guard.lo, guard.hi), GREEN, 9, 0.75), ((K.min(), K.max()), INK, 2.4, None):
+    for ends, colour, width, alpha in ((guard.lo, guard.hi), STABLE, 9, 0.75), ((K.min(), K.max()), INK, 2.4, None):
         left.plot([at, at], ends, solid_capstyle="butt", zorder=6, color=colour, lw=width, alpha=alpha)
     tuned_gain(tuning, ax=right)
     left.set_ylim(-0.25, 1.25)  # from 0 to the continuous loop's bound, 1, and a quarter to either side
@@ -300,10 +299,10 @@ def draw_curves(curves: LearningCurves, tuning: Tuning, *, ax: Axes) -> None:
     ax.plot(trial, np.minimum(curves.costs, 2 * top).T, color="#b9b9b9", lw=0.6, zorder=1)
     ax.fill_between(trial, low, high, color=BLUE, alpha=0.22, lw=0, zorder=2, label="middle half of the seeds")
     ax.plot(trial, middle, color=BLUE, lw=1.8, zorder=3, label="median")
-    for cost, colour, label in (
-        (tuning.without.cost, ORANGE, "no moment feedback"),
-        (tuning.best_constant.cost, PURPLE, "best constant gain"),
-        (tuning.bound.cost, INK, "linear-quadratic optimum: lower bound"),
+    for cost, ls, label in (
+        (tuning.without.cost, DOTTED, "no moment feedback"),
+        (tuning.best_constant.cost, DASHED, "best constant gain"),
+        (tuning.bound.cost, LONG_DASHED, "linear-quadratic optimum: lower bound"),
     ):
-        ax.axhline(cost, color=colour, lw=1.2, ls=LONG_DASHED, zorder=2.5, label=f"{label}, {significant(cost, 3)}")
+        ax.axhline(cost, color=INK, lw=1.2, ls=ls, zorder=2.5, label=f"{label}, {significant(cost, 3)}")
     ax.set(xlim=(1, max(2, trial[-1])), xlabel="trial number", ylim=(0.0, top), ylabel="cost of a trial [−]")

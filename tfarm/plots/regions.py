@@ -6,7 +6,7 @@ and in `dsp`); nothing is read off a raster.  Edges are rounded as they are seen
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,16 +41,14 @@ from tfarm.loop.plane import gain_map as counted
 from tfarm.schema import Column
 from tfarm.spectrum.table import default_gains
 
-from .frequency import MOST_DRAWN, bode, draw_loops
+from .frequency import bode
+from .loop_function import draw_loops
 from .style import (
-    BLUE,
-    COLOURS,
-    GREEN,
     GREY,
     INK,
     LYAPUNOV,
-    ORANGE,
-    PURPLE,
+    REGIONS,
+    STABLE,
     gains_words,
     law_words,
     name_axes,
@@ -59,8 +57,12 @@ from .style import (
     safe,
 )
 
-MOST_COLOUR = "#eebd95"  # of as many unstable poles as any gains have
+SLATE = "#5b7083"  # of contours of damping: no colour of stability
+DASHED, DASH_DOTTED = (0, (5, 2.5)), (0, (6, 2, 1, 2))  # edges of a sampled loop, and of a second one
+HATCHES = ("..", "\\\\\\\\", "////")  # of a sampled loop: with more damping, with less, with its own
+NUMBER_ROOM = (0.08, 0.045)  # of the width and the height: around a number
 NUMBERS_ACROSS = 0.14  # share of the picture's width between two frequencies
+MOST_DRAWN = 1e3  # factor on a controller
 HALO: list[AbstractPathEffect] = [withStroke(linewidth=3.0, foreground="white")]  # around numbers on a line
 K2_RANGE = (-1.0, 1.5)  # of the gain that balances a torque: 1 where the input is one, less for a motor's current
 CUT_RANGE = (-1.02, 1.52)  # of the same: where intervals are cut, just outside the picture: no cut is seen as an edge
@@ -83,12 +85,14 @@ def _title(found: Plane | GainMap) -> str:
 def gain_map(found: Plane | GainMap, *, ax: Axes) -> None:
     """The plane of both gains, or of two numbers of a law (from `tfarm.map`), in the axes given or in new ones.
 
-    Colours for the number of unstable poles; a black line for the exact boundary with frequencies [rad/s] along it, of
-    a law or a sampled loop dots where a pole is on the axis or the unit circle.  Returns the axes.
+    Colours for the number of unstable poles, hatched where a sampled loop is stable; a black line for the exact
+    boundary with frequencies [rad/s] along it, of a law or a sampled loop dots where a pole is on the axis or the unit
+    circle.  Returns the axes.
     """
     x, y = map(Axis.of, found.axes)
     if isinstance(found, GainMap):
         _counts(found, found.counts, ax)
+        draw_region(found.x, found.stable_intervals, "stable at the samples", ax, hatch="////")
         name_axes(found.vary, found.loop.plant.arm, found.loop.law, ax)
     else:
         ground(found, x, y, ax)
@@ -119,15 +123,13 @@ def _counts(found: Plane | GainMap, counts: NDArray[np.int64], ax: Axes) -> None
     image = colours(counts)
     ax.pcolormesh(found.x, found.y, image, shading="nearest", rasterized=True, zorder=0.1)
     ax.grid(False)
-    number = 0
+    most = len(REGIONS) - 1
     for count in np.unique(counts).tolist():
         inside = counts == count
         label = "infinitely many unstable poles (∞)" if count == INFINITE else how_many(count, "unstable pole")
-        number += count > 0
-        if number <= 6:
+        if count < most or count == counts.max():
+            label = f"{most} and more unstable poles, at most {count}" if count > most else label
             ax.fill_between([], [], [], color=image[inside][0], label=label if count else "stable")
-        elif count == counts.max():
-            ax.fill_between([], [], [], color=MOST_COLOUR, label=f"more unstable poles, at most {count}")
         regions, last = ndimage.label(inside)
         room = ndimage.distance_transform_edt(np.pad(inside, 1), np.divide(1, counts.shape))[1:-1, 1:-1]
         for region in range(1, last + 1) if count else ():
@@ -140,12 +142,10 @@ def _counts(found: Plane | GainMap, counts: NDArray[np.int64], ax: Axes) -> None
 
 
 def colours(unstable: NDArray[np.int64]) -> Real:
-    """Green where stable, orange the stronger the more poles are unstable."""
-    share = np.clip((unstable - 1) / max(1, unstable.max() - 1), 0, 1)[..., None]
-    image = np.array(to_rgb("#fbeadd")) * (1 - share) + np.array(to_rgb(MOST_COLOUR)) * share
-    image[unstable == INFINITE] = to_rgb("#f3d9c6")
-    image[unstable == 0] = to_rgb("#dcefe6")
-    return np.asarray(image)
+    """The colour of each count, the darkest from the last of `REGIONS` on."""
+    last = len(REGIONS) - 1
+    number = np.where(unstable == INFINITE, last, unstable).clip(0, last)
+    return np.array([to_rgb(colour) for colour in REGIONS])[number]
 
 
 def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
@@ -157,7 +157,7 @@ def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
     with np.errstate(invalid="ignore", divide="ignore"):  # by its logarithm, which is straighter
         logarithm = np.ma.masked_invalid(np.log(damping))
     lines = ax.contour(
-        across, up, logarithm, np.log(levels[-7:]), colors=BLUE, linewidths=0.9, linestyles="-", zorder=2.5
+        across, up, logarithm, np.log(levels[-5:]), colors=SLATE, linewidths=0.8, linestyles="-", zorder=2.5
     )
     longest = (max(pieces, key=len) for pieces in lines.allsegs if pieces)
     places: list[Real] = []
@@ -165,16 +165,16 @@ def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
         along = (
             piece[int(share * len(piece))] for share in (0.5, 0.35, 0.65, 0.2, 0.8) if len(piece) > 12
         )  # best first
-        places += next(([at] for at in along if _is_free(at, places, ax)), [])
+        places += next(([at] for at in along if is_free(at, places, ax)), [])
     for text in ax.clabel(lines, fontsize=8.0, fmt=lambda log: f"{plain(100 * math.exp(log), 3)} %", manual=places):
         text.set(path_effects=HALO, zorder=6)
-    ax.plot([], [], color=BLUE, lw=0.9, label="least damping ratio of the first two modes")
+    ax.plot([], [], color=SLATE, lw=0.8, label="least damping ratio of the first two modes")
 
 
-def _is_free(at: Real, places: Sequence[Real], ax: Axes) -> bool:
-    """Whether a number there touches none of those at the other places."""
+def is_free(at: Real, places: Sequence[Real], ax: Axes, room: tuple[float, float] = NUMBER_ROOM) -> bool:
+    """Whether a text there touches none of those at the other places; `room` in shares of the width and the height."""
     frame = ax.transData - ax.transAxes
-    away = (abs(frame.transform(place) - frame.transform(at)) > (0.08, 0.045) for place in places)
+    away = (abs(frame.transform(place) - frame.transform(at)) > room for place in places)
     return all(each.any() for each in away)
 
 
@@ -233,42 +233,45 @@ def draw_sampled(plane: GainMap | None, ax: Axes) -> None:
     if plane is not None:
         ms = plain(1e3 * plane.loop.chain.sampling.period)
         label = f"stable when sampled every {ms} ms (first {plane.modes_used} modes)"
-        looks: dict[str, Any] = {"facecolor": "none", "hatch": "////", "edgecolor": (*to_rgb(ORANGE), 0.45)}
-        draw_region(plane.x, plane.stable_intervals, ORANGE, label, ax, width=1.2, zorder=4.5, **looks)
+        draw_region(plane.x, plane.stable_intervals, label, ax, hatch="////")
 
 
 def draw_region(
-    across: Real, stable: Sequence[Sequence[Window]], edge: str, label: str, ax: Axes, *, width: float = 1.4,
-    zorder: float = 2.5, **looks: Any,
-) -> None:  # fmt: skip
-    """The intervals up at each value across, filled, with edges of that colour.
+    across: Real, stable: Sequence[Sequence[Window]], label: str, ax: Axes, *, hatch: str = "", ls: Any = "-"
+) -> None:
+    """The intervals up at each value across, filled, or hatched with a dashed edge, as those of a sampled loop are.
 
     Edges are upright where the region itself begins or ends.
     """
-    looks = {"facecolor": edge, "alpha": 0.22, "lw": 0} if not looks else {"lw": 0, **looks}
+    looks: dict[str, Any] = {"facecolor": REGIONS[0], "lw": 0}
+    line: dict[str, Any] = {"color": INK, "lw": 1.0, "ls": ls, "zorder": 2.5}
+    if hatch:
+        looks = {"facecolor": "none", "hatch": hatch, "edgecolor": (*to_rgb(STABLE), 0.5), "lw": 0}
+        line = {"color": STABLE, "lw": 1.4, "ls": DASHED, "zorder": 4.5}
     parts = pieces(across, stable)
     for piece in parts:
         x, low, high = np.array(piece.points).T
         ax.fill_between(x, low, high, zorder=1, **looks)
-        ax.plot(x, np.transpose([low, high]), color=edge, lw=width, zorder=zorder)
+        ax.plot(x, np.transpose([low, high]), **line)
         ends = np.nonzero([piece.begins and x[0] > across[0], piece.ends])[0]
-        ax.vlines(x[-ends], low[-ends], high[-ends], color=edge, lw=width, zorder=zorder)
-    ax.fill_between([], [], [], **looks, label=safe(label) + ("" if parts else ": nowhere in this picture"))
+        ax.vlines(x[-ends], low[-ends], high[-ends], **line)
+    key = looks if hatch else looks | {"edgecolor": INK, "ls": ls, "lw": 1.0}
+    ax.fill_between([], [], [], **key, label=safe(label) + ("" if parts else ": nowhere in this picture"))
 
 
 def draw_proven(arm: Arm, x: Axis, y: Axis, ax: Axes) -> None:
     """The quarter of the plane that is proven at C = 0; at C > 0 only the line without moment feedback is."""
-    dashes, kind = ("-", "proven") if arm.is_undamped else ((0, (5, 3)), "not a proof here")
+    dashes, kind = ("-", "proven") if arm.is_undamped else ((0, (1, 1)), "not a proof here")
     label = f"Lyapunov ({LYAPUNOV}): {kind}"
-    ax.plot([0, 0, x.high], [y.low, 1, 1], color=PURPLE, lw=1.6, ls=dashes, label=label)
+    ax.plot([0, 0, x.high], [y.low, 1, 1], color=GREY, lw=2.2, ls=dashes, label=label)
     if not arm.is_undamped:
-        ax.plot([0, x.high], [0, 0], color=PURPLE, lw=1.6, label=f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven")
+        ax.plot([0, x.high], [0, 0], color=GREY, lw=1.6, label=f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven")
 
 
 def law_mark(law: HubFeedback, is_best: bool, label: str, ax: Axes) -> None:
     """One controller, as a diamond, or as a star."""
     ax.plot(
-        *law.point, "*" if is_best else "D", ms=13.0 if is_best else 8.0, mfc=ORANGE, mec="white", mew=1.0, zorder=7,
+        *law.point, "*" if is_best else "D", ms=13.0 if is_best else 8.0, mfc=INK, mec="white", mew=1.0, zorder=7,
         ls="none", label=label,
     )  # fmt: skip
 
@@ -356,15 +359,14 @@ def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes
     name_axes(PLANE, continuous.arm, continuous.law, ax)
     convention = "u = −{} dθ/dt − {} M;  a positive root moment M accelerates the hub".format(*PLANE)
     ax.set_title(convention, loc="right", fontsize=8.5, color=GREY)
-    draw_region(
-        continuous.x, continuous.stable_intervals, ORANGE, "stable, continuous: every mode", ax, width=0.9,
-        facecolor="#f6dfcb",
-    )  # fmt: skip
-    for plane, colour in zip(planes, ("#c9dcef", "#7fb0da", "#2f7cbc")[len(planes) == 1 :], strict=False):
+    ax.set_facecolor(REGIONS[1])
+    draw_region(continuous.x, continuous.stable_intervals, "stable, continuous: every mode", ax)
+    ax.fill_between([], [], [], color=REGIONS[1], label="unstable, continuous")
+    for plane, hatch in zip(planes, HATCHES[-len(planes) :], strict=True):
         C = plane.loop.plant.arm.damping
         hypothesis = "" if continuous.arm.damping == C else f", if C were {scientific(C, 1)} s"
         label = f"stable, sampled every {ms} ms{hypothesis if C else f', C = 0: the first {plane.modes_used} modes'}"
-        draw_region(plane.x, plane.stable_intervals, BLUE, label, ax, width=0.9, facecolor=colour)
+        draw_region(plane.x, plane.stable_intervals, label, ax, hatch=hatch)
     if continuous.arm.is_uniform:  # of a rig the argument needs more: see `tfarm.loop.theorem`
         label = f"below it: proven by energy at C = 0 ({LYAPUNOV})"
         ax.axhline(1.0, color=INK, lw=1.1, ls=(0, (5, 3)), zorder=4, label=label)
@@ -376,6 +378,7 @@ def draw_overlay(data: StableRegions) -> Figure:
     """Both regions of an arm on a figure of its own, as high as moment gains are of use."""
     figure = overlay.figure(*data)
     figure.axes[0].set_ylim(*(data.continuous.arm.input_per_torque * end for end in K2_RANGE))
+    figure.again = partial(draw_overlay, data)  # to this height
     return figure
 
 
@@ -401,7 +404,7 @@ def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
         bode(dict(zip(names, data.responses, strict=True)), ax=(upper, lower))
     else:
         draw_loops(dict(zip(names, (side.loop_function for side in data.sides), strict=True)), upper, lower)
-        upper.set_ylabel("|L| at the samples [−]" if data.is_sampled else "|L|, loop opened at the input [−]")
+        upper.set_ylabel("|L| at the samples [dB]" if data.is_sampled else "|L|, loop opened at the input [dB]")
     upper.set_xlabel("")
     upper.tick_params(labelbottom=False)  # the frequencies of the phase below
     right.grid(False)
@@ -409,11 +412,12 @@ def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
         _factors(data, right)
         return
     first, other = data.regions
-    for found, side, colour in zip(data.regions, data.sides, COLOURS, strict=False):
-        edge, label = (GREEN, "stable") if first == other else (colour, f"{side.name}: stable")
-        draw_region(found.x, found.stable_intervals, edge, label, right)
+    right.set_facecolor(REGIONS[1])
+    for found, side, ls, mark in zip(data.regions, data.sides, ("-", DASH_DOTTED), "os", strict=True):
+        label = "stable" if first == other else f"{side.name}: stable"
+        draw_region(found.x, found.stable_intervals, label, right, ls=ls)
         assert side.gains is not None
-        right.plot(*side.gains.point, "o", mfc=colour, mec="white", ms=7.5, zorder=7)
+        right.plot(*side.gains.point, mark, mfc=INK, mec="white", ms=7.5, zorder=7)
     right.set(xlim=(first.x[0], first.x[-1]), ylim=(first.y[0], first.y[-1]))
     name_axes(PLANE, first.arm, first.law, right)
 
@@ -421,8 +425,9 @@ def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
 def _factors(data: Comparison, ax: Axes) -> None:
     """Factors that keep each loop stable, over the further delay of its controller."""
     delay, reaches = data.reaches
-    for stable, side, colour in zip(reaches, data.sides, COLOURS, strict=False):
-        draw_region(1e3 * delay, stable, colour, f"{side.name}: stable", ax)
+    ax.set_facecolor(REGIONS[1])
+    for stable, side, ls in zip(reaches, data.sides, ("-", DASH_DOTTED), strict=True):
+        draw_region(1e3 * delay, stable, f"{side.name}: stable", ax, ls=ls)
     ax.plot(
         [0.0], [1.0], "o", mfc=INK, mec="white", ms=7.5, zorder=7, clip_on=False, label="the controllers as they are"
     )

@@ -10,15 +10,20 @@ import re
 import textwrap
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextvars import ContextVar
 from functools import partial, wraps
+from itertools import product
 from pathlib import Path
 from typing import Any, get_args
 
+import matplotlib as mpl
 import matplotlib.style
 import numpy as np
 from matplotlib.axes import Axes as Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure as Figure  # which pages name too
+from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tfarm.arm import GAINS, LISTED, PLANE, AnyLaw, Arm, as_law, shown_unit
@@ -36,7 +41,7 @@ COLOURS = (BLUE, ORANGE, GREEN, PURPLE)  # of several records in one picture
 # stability, the same in every picture, page and live view; each has a mark of its own too, for grey print
 STABLE, MARGINAL, UNSTABLE = BLUE, PURPLE, ORANGE
 # regions of a map by the number of unstable poles, 0 first: ever darker in grey; green is kept for good margins
-REGIONS = ("#d3e6f5", "#fbdcc4", "#f3bd95", "#e89c67", "#d97c40")
+REGIONS = ("#dcecf9", "#f8d0b0", "#efb286", "#e29259", "#cf7132")
 # grades of margins; with those of a page's dark mode in style.css
 GOOD, LOW, POOR = GREEN, "#8a6100", "#b3310a"
 
@@ -53,6 +58,7 @@ OTHER_UNITS = ARM_PARAMETERS | {"delay": "s"}  # of numbers that vary
 METADATA: dict[str, dict[str, str | None]] = {
     "svg": {"Date": None, "Creator": "tfarm"},
     "png": {"Software": "tfarm"},
+    "pdf": {"Creator": "tfarm", "Producer": None, "CreationDate": None},
 }
 PICTURE_DOTS = 160  # an inch, of a PNG: lines of 0.6 points are more than a pixel wide
 COORDINATES, LONG_NUMBER, PATH_LETTER = (  # in an SVG
@@ -60,11 +66,58 @@ COORDINATES, LONG_NUMBER, PATH_LETTER = (  # in an SVG
 )
 
 
-STYLE = Path(__file__).with_name("tfarm.mplstyle")
-style = partial(matplotlib.style.context, ["default", STYLE])  # whatever the user's own settings are
+# An SVG on a dark page: each colour with its hue and the opposite luma, so that computed tints follow too; white
+# becomes the ground of style.css.  The exponent makes strong tints dark enough for letters on them.
+LUMA, DARK_GROUND, EXPONENT = (0.2126, 0.7152, 0.0722), (0x16, 0x19, 0x1D), 1.4
+_ROWS = " ".join(" ".join(f"{(row == of) - 2 * LUMA[of]:.6g}" for of in range(3)) + " 0 1" for row in range(3))
+_TRANSFERS = "".join(
+    f'<feFunc{name} type="gamma" exponent="{EXPONENT}" amplitude="{1 - level / 255:.6g}" offset="{level / 255:.6g}"/>'
+    for name, level in zip("RGB", DARK_GROUND, strict=True)
+)
+DARK = f"""<defs>
+  <style type="text/css">@media screen and (prefers-color-scheme: dark) {{#figure_1 {{filter: url(#dark)}}}}</style>
+  <filter id="dark" x="0" y="0" width="1" height="1" color-interpolation-filters="sRGB">
+   <feColorMatrix values="{_ROWS} 0 0 0 1 0"/><feComponentTransfer>{_TRANSFERS}</feComponentTransfer>
+  </filter>""".encode()
+
+STYLE, COLUMN = (Path(__file__).with_name(f"{name}.mplstyle") for name in ("tfarm", "column"))
+COLUMN_WIDTH, PAGE_WIDTH, WIDE = 3.5, 7.16, 9.5  # inches: one and both columns of an IEEE paper, and what needs both
+COLUMN_POINTS, SMALL_POINTS, THIN = 8.0, 6.5, 0.7  # largest letters, those inside axes; factor on lines and marks
+LONG_LABEL, LINE = 14, 46  # letters of a label up one of several axes, and of a line of a label below the axes
+LEGEND_LINE = 0.2  # inches
+SIZES_OF_LINES = ("linewidth", "markersize", "markeredgewidth")
+_in_column: ContextVar[bool] = ContextVar("_in_column", default=False)
 
 
-FIGURES: dict[Any, Callable[..., Figure]] = {}  # by the class of a record the picture of it as a figure of its own
+def style() -> AbstractContextManager[None]:
+    """The style of pictures, whatever the user's own settings are."""
+    return matplotlib.style.context(["default", STYLE, *[COLUMN] * _in_column.get()])
+
+
+@contextmanager
+def column() -> Iterator[None]:
+    """Draw pictures for a paper: at the width of its column, with letters that suit LaTeX, without a headline.
+
+    In this context a new figure is 3.5 inches wide, one column of an IEEE paper, or 7.16 inches, both columns, where
+    axes are side by side.  Letters are STIX, of 8 points at most; a PDF embeds them as TrueType.  The caption of the
+    paper takes the place of the headline.  Figures that are there already stay as they are.
+
+    Examples
+    --------
+    >>> arm = tfarm.load("sasaki2012-lab")
+    >>> with tfarm.plots.column():
+    ...     upper, lower = tfarm.plots.bode(tfarm.bode(arm, "root_moment"))
+    ...     upper.figure.savefig("bode.pdf")
+    """
+    before = _in_column.set(True)
+    try:
+        with style():
+            yield
+    finally:
+        _in_column.reset(before)
+
+
+FIGURES: dict[Any, Callable[..., Figure]] = {}  # by the class of a record its first picture as a figure of its own
 
 
 def check_records(of: Sequence[tuple[Any, str]], found: Sequence[Any]) -> None:
@@ -103,13 +156,21 @@ def picture(
 
         def figure(*found: Any, new: Callable[..., Figure] = Figure, **how: Any) -> Figure:
             with style():
-                drawn = new(figsize=size(*found) if callable(size) else size, layout="constrained")  # no label clipped
+                inches = size(*found) if callable(size) else size
+                fitted = column_size(inches, grid is not None) if _in_column.get() else inches
+                drawn = new(figsize=fitted, layout="constrained")  # no label clipped
                 make(drawn, *found)
                 draw(*found, ax=drawn.axes[0] if is_one else drawn.axes, **how)
                 for ax in drawn.axes[: len(rows) - 1] if grid is None else []:
                     ax.set_xlabel("")
-                legend_below(drawn)
-                headline(drawn, title(*found))
+                if _in_column.get():
+                    make_thin(drawn)
+                below = legend_below(drawn)
+                if _in_column.get():
+                    drawn.set_figheight(fitted[1] + below)
+                else:
+                    headline(drawn, title(*found))
+            drawn.again = partial(figure, *found, **how)  # type: ignore[attr-defined]  # in another style
             return drawn
 
         @wraps(draw)
@@ -128,25 +189,57 @@ def picture(
             return axes[0] if is_one else tuple(axes)
 
         for kind in get_args(of[0][0]) or (of[0][0],) if len(of) == 1 else ():
-            FIGURES[kind] = figure
+            FIGURES.setdefault(kind, figure)
         shown.figure = figure  # type: ignore[attr-defined]
         return shown
 
     return decorated
 
 
-def legend_below(figure: Figure) -> None:
-    """A legend, below the axes, of all labels that no axes has in a legend of its own; in as many columns as fit."""
+def column_size(inches: tuple[float, float], is_wide: bool) -> tuple[float, float]:
+    """Width and height of a picture in a paper, without its legend; in one column labels need more of the height."""
+    share = inches[1] / inches[0]
+    return (
+        (PAGE_WIDTH, PAGE_WIDTH * share)
+        if is_wide or inches[0] > WIDE
+        else (COLUMN_WIDTH, COLUMN_WIDTH * share**0.4 - LEGEND_LINE)
+    )
+
+
+def make_thin(figure: Figure) -> None:
+    """Letters that a picture made larger than those of a column, its lines and marks, made to fit one.
+
+    Where several axes share the height, a long label has its unit on a line of its own.
+    """
+    for text in (each for each in figure.findobj() if isinstance(each, Text)):
+        text.set_fontsize(min(text.get_fontsize(), COLUMN_POINTS))
+    for ax in figure.axes:
+        for each, of in (*product(ax.lines, SIZES_OF_LINES), *product(ax.collections, SIZES_OF_LINES[:1])):
+            each.set(**{of: THIN * np.asarray(getattr(each, f"get_{of}")())})
+        for text in ax.texts:
+            text.set_fontsize(min(text.get_fontsize(), SMALL_POINTS))
+        ax.set_xlabel(textwrap.fill(ax.get_xlabel(), LINE))
+        if len(figure.axes) > 1 and len(label := ax.get_ylabel()) > LONG_LABEL:
+            ax.set_ylabel(re.sub(r" +(?=\[)", "\n", label))
+
+
+def legend_below(figure: Figure) -> float:
+    """A legend, below the axes, of all labels that no axes has in a legend of its own: its height [inches].
+
+    It has as many columns as fit.
+    """
     each = (ax.get_legend_handles_labels() for ax in figure.axes if ax.get_legend() is None)
     keys = {label: handle for own in each for handle, label in zip(*own, strict=True)}
     for number in (5, 3, 2, 1) if keys else ():
         legend = figure.legend(
-            keys.values(), keys, loc="outside lower left", ncols=number, fontsize=8.2,
-            handlelength=1.8, columnspacing=1.2,
+            keys.values(), keys, loc="outside lower left", ncols=number,
+            fontsize=min(8.2, mpl.rcParams["legend.fontsize"]), handlelength=1.8, columnspacing=1.2,
         )  # fmt: skip
-        if number == 1 or legend.get_window_extent().width < WIDEST_LEGEND * figure.bbox.width:
-            return
+        box = legend.get_window_extent()
+        if number == 1 or box.width < WIDEST_LEGEND * figure.bbox.width:
+            return float(box.height / figure.dpi)
         legend.remove()
+    return 0.0
 
 
 def headline(figure: Figure, text: str) -> None:
@@ -232,10 +325,21 @@ def save_figure(figure: Figure, folder: Path, stem: str, formats: tuple[str, ...
         (folder / f"{stem}.{kind}").write_bytes(content)
 
 
-def save_png(figure: Figure, path: Path) -> None:
-    """The figure as one PNG file, written whole.  Raises ParameterError, naming --png, where it cannot."""
-    (content,) = _drawn(figure, ("png",), PICTURE_DOTS)
-    write_file(path, content, key="--png")
+def save_column(figure: Figure, folder: Path, stem: str) -> None:
+    """The same picture drawn for the column of a paper, as folder/stem.pdf."""
+    with column():
+        save_figure(figure.again(), folder, stem, formats=("pdf",))  # type: ignore[attr-defined]
+
+
+def save_picture(draw: Callable[[Any], Figure], record: Any, path: Path) -> None:
+    """The picture of a record as one file, written whole: an SVG or a PDF for a column, else a PNG.
+
+    Raises ParameterError, naming --figure, where it cannot be written.
+    """
+    kind = path.suffix.lower().removeprefix(".") or "png"
+    with nullcontext() if kind == "png" else column():
+        (content,) = _drawn(draw(record), (kind,), PICTURE_DOTS)
+    write_file(path, content, key="--figure")
 
 
 def _drawn(figure: Figure, formats: tuple[str, ...], dpi: int) -> Iterator[bytes]:
@@ -253,7 +357,8 @@ def _drawn(figure: Figure, formats: tuple[str, ...], dpi: int) -> Iterator[bytes
         for kind in formats:
             content = io.BytesIO()
             figure.savefig(content, format=kind, dpi=dpi, metadata=METADATA[kind])
-            yield COORDINATES.sub(_short, content.getvalue()) if kind == "svg" else content.getvalue()
+            drawn = content.getvalue()
+            yield COORDINATES.sub(_short, drawn).replace(b"<defs>", DARK, 1) if kind == "svg" else drawn
 
 
 def _short(part: re.Match[bytes]) -> bytes:

@@ -1,4 +1,4 @@
-"""The live page of an arm's loop: what it carries as numbers, and the scripts that all such pages share."""
+"""The live page of an arm's loop: what it carries as numbers, and the script that all such pages share."""
 
 import base64
 import json
@@ -9,14 +9,15 @@ from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
-import vl_convert
 from numpy.typing import NDArray
 
 from tfarm.arm import ANGLE_GAIN, FED_BACK, GAINS, MOMENT_GAIN, PLANE, Arm, HubFeedback, as_law, unit_of
+from tfarm.case.card import GAIN_LIMITS, PEAK_LIMITS, PERIOD_LIMITS, PHASE_LIMITS, UNDAMPED, reference_damping
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits, scientific
-from tfarm.dsp import Chain, PulseTransfer, Sampled, Scenario, Simulator, scenario
+from tfarm.dsp import Chain, PulseTransfer, Sampled, Scenario, Simulator, sampled_verdict, scenario
 from tfarm.dsp import GainMap as SampledMap
+from tfarm.dsp.edges import LONGEST_DELAY_SAMPLES
 from tfarm.dsp.plant import Plant, sensed_plant
 from tfarm.dsp.results import enough_modes, ideal_chain
 from tfarm.dsp.simulate import FOLDED_UP, quantisers
@@ -28,6 +29,7 @@ from tfarm.loop.plane import gain_map, moment_axis, rate_axis, rate_columns
 from tfarm.loop.stability import band_of_family, stability
 from tfarm.loop.windows import windows_of
 from tfarm.plots.regions import BEYOND_PICTURE, sampled_region
+from tfarm.plots.style import GOOD, LOW, MARGINAL, POOR, STABLE, UNSTABLE
 from tfarm.report.page import TEMPLATES, Case, argument, has_loop, is_preset, render, sign_words, write_text
 from tfarm.response import transfer
 from tfarm.spectrum.table import angle_unit, default_gains
@@ -36,8 +38,9 @@ MOST_LIVE_SAMPLES = 5000  # of a slew: 160 kB of references; a longer one is lef
 LIVE_COLUMNS = 90  # values of the gain across at which the continuous region is cut
 SENSED_MODES = 6  # whose frequencies and zeros the chart of sensors has
 SENSOR_DIGITS = 6  # of the numbers of that chart: far more than a screen has
-LIVE_PAGE, ASSETS = "live.html", "assets"
-RUNTIME, SCRIPT = f"vega-{vl_convert.get_vega_version()}.js", "live.js"
+LIVE_PAGE, ASSETS, SCRIPT = "live.html", "assets", "live.js"
+LIMITS = {"gain": GAIN_LIMITS, "phase": PHASE_LIMITS, "periods": PERIOD_LIMITS, "peak": PEAK_LIMITS}  # of the grades
+COLOURS = {"stable": STABLE, "marginal": MARGINAL, "unstable": UNSTABLE, "good": GOOD, "low": LOW, "poor": POOR}
 
 
 def packed(values: Any) -> str:
@@ -151,9 +154,10 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
         for name, axis in zip(PLANE, (x, y), strict=True)
     } | {ANGLE_GAIN: {"low": 0.0, "high": stiffest, "linear": 1e-4 * stiffest}}
     reference = default_gains(arm)
-    laws = (dict(zip(axes, each, strict=True)) for each in product(*((of["low"], of["high"]) for of in axes.values())))
-    band, is_quiet = band_of_family(Loop(arm, as_law(HubFeedback(**law))) for law in laws)
-    samples, across = loop_panels(arm, band), rate_columns(arm, x, LIVE_COLUMNS)
+    corners = product(*((of["low"], of["high"]) for of in axes.values()))
+    laws = [HubFeedback(**dict(zip(axes, each, strict=True))) for each in corners]
+    samples, is_quiet = _samples(arm, laws)
+    band, across = samples["band"], rate_columns(arm, x, LIVE_COLUMNS)
     beyond = np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])
     continuous = gain_map(arm, np.unique(np.r_[across, x.high]), beyond)
     sampled = sampled_region(arm, x, y, chain)
@@ -162,13 +166,7 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
         "units": {gain.name: unit_of(gain.name, arm) for gain in GAINS},
         "axes": axes,
         "start": {gain.name: (law or reference)[gain.name] for gain in GAINS},
-        "samples": packed(samples.values.transpose(1, 0, 2)),  # the bytes of doubles, by panel, part and point
-        "low": samples.low.tolist(),
-        "high": samples.high.tolist(),
-        "order": samples.order,
-        "error": float(f"{samples.error:.0e}"),
-        "places": np.asarray(steep_places(arm, 1.05 * samples.band)).tolist(),
-        "band": samples.band,
+        **samples,
         **_known(arm, is_quiet),
         "reference": {name: reference[name] for name in PLANE},
         "reference_count": stability(arm, reference, band).unstable_roots,
@@ -178,7 +176,36 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
         "slew": slew_numbers(arm, chain, law or reference),
         **sensor_numbers(arm),
         "lyapunov": arm.is_uniform,
+        "default": {gain.name: reference[gain.name] for gain in GAINS},
+        "period": chain.sampling.period,
+        "longest_delay": LONGEST_DELAY_SAMPLES * chain.sampling.period,
+        "outputs": {gain.name: gain.output for gain in GAINS},
+        "limits": LIMITS,
+        "graded": _graded(arm, laws, chain, reference) if arm.has_elastic_link else None,
     }
+
+
+def _samples(arm: Arm, laws: Sequence[HubFeedback]) -> tuple[dict[str, Any], bool]:
+    """Samples of the loop's parts in the band of these laws, and whether small gain holds beyond it."""
+    band, is_quiet = band_of_family(Loop(arm, as_law(law)) for law in laws)
+    samples = loop_panels(arm, band)
+    return {
+        "samples": packed(samples.values.transpose(1, 0, 2)),  # the bytes of doubles, by panel, part and point
+        "low": samples.low.tolist(),
+        "high": samples.high.tolist(),
+        "order": samples.order,
+        "error": float(f"{samples.error:.0e}"),
+        "places": np.asarray(steep_places(arm, 1.05 * samples.band)).tolist(),
+        "band": samples.band,
+    }, is_quiet
+
+
+def _graded(arm: Arm, laws: Sequence[HubFeedback], chain: Chain, law: HubFeedback) -> dict[str, Any]:
+    """The loop with whose damping an undamped arm is graded, and the words for that: `tfarm.case.card`."""
+    C = reference_damping(arm)
+    damped = arm.having(damping=C)
+    sampled = sampled_numbers(sampled_verdict(damped, law, chain).full)
+    return _samples(damped, laws)[0] | {"kind": "band", "sampled_loop": sampled, "words": UNDAMPED.format(C)}
 
 
 def _known(arm: Arm, is_quiet: bool) -> dict[str, Any]:
@@ -283,19 +310,13 @@ def save_live(case: Case, folder: Path) -> None:
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False).replace("<", "\\u003c")
     page = render("live.html", title=title, data=data, text=text, sign=sign_words(arm), columns=LIVE_COLUMNS,
                   samples=PANEL_SAMPLES * len(data["low"]), error=scientific(data["error"], 1),
-                  assets=f"../{ASSETS}", runtime=RUNTIME, script=SCRIPT)  # fmt: skip
+                  assets=f"../{ASSETS}", script=SCRIPT, colours=COLOURS)  # fmt: skip
     write_text(out, page)
 
 
 def write_assets(folder: Path) -> None:
-    """Vega's runtime, as vl-convert carries it, and this page's own script with its charts."""
+    """The script of the live pages."""
     folder.mkdir(exist_ok=True)
-    write_text(folder / RUNTIME, vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;"))
-    drawn = json.loads((TEMPLATES / "live_charts.json").read_text(encoding="utf-8"))
-    config = drawn.pop("config")  # of every chart; its colours are set by the page, for a light screen or a dark one
-    charts = {name: vl_convert.vegalite_to_vega({**chart, "config": config}) for name, chart in drawn.items()}
-    named = json.dumps(charts, separators=(",", ":"), sort_keys=True)
-    parts = ("loop", "sampled", "locus", "sets", "player", "sensor", "page")
+    parts = ("loop", "sampled", "locus", "sets", "chart", "player", "sensor", "page")
     scripts = "".join((TEMPLATES / f"live_{name}.js").read_text(encoding="utf-8") for name in parts)
-    own = f"(() => {{\nconst LIVE_CHARTS = {named};\n{scripts}}})();\n"  # the runtime has names of its own
-    write_text(folder / SCRIPT, own)
+    write_text(folder / SCRIPT, f"(() => {{\n{scripts}}})();\n")

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +13,18 @@ from tfarm.arm import GAINS, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, cancelled, show
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import REFERENCE, is_measured
 from tfarm.arrays import Real
+from tfarm.case.card import loop_function as loop_curves
 from tfarm.digits import plain, significant
+from tfarm.dsp import Chain
 from tfarm.dsp import GainMap as SampledMap
 from tfarm.dsp.discretise import rule_in_words
 from tfarm.errors import ConvergenceError, TfarmError
 from tfarm.loop import loci, loop, margins, nyquist, plane, poles, stability
-from tfarm.plots import frequency, regions, roots, style
+from tfarm.loop.curve import curve_of
+from tfarm.plots import loop_function, regions, roots, style
 from tfarm.plots.style import Axes
 from tfarm.records import record
+from tfarm.report.overview import card_of, results
 from tfarm.report.page import (
     DESIGNED_MODES,
     Case,
@@ -35,11 +39,12 @@ from tfarm.report.page import (
     picture,
     prose,
     sheet,
+    sign_words,
     upper,
 )
 from tfarm.response.signals import Signals, sign_convention
-from tfarm.schema import Column, Quantity, Table, across, curve_table, quantities, roots_table, table
-from tfarm.spectrum.table import default_gains, default_words, first_frequency, rate_unit
+from tfarm.schema import Column, Quantity, Table, across, curve_table, quantities, roots_table, table, text
+from tfarm.spectrum.table import default_gains, first_frequency, rate_unit
 from tfarm.synthesis import judge, models, structures
 
 GRID_COLUMNS, GRID_ROWS = 240, 200  # of the coloured grid
@@ -49,20 +54,15 @@ RANGE_OF_K2 = (-1.0, 1.6)  # of the locus, times what balances a torque: both si
 shortly = partial(plain, digits=4)  # how a gain is written in a title
 
 
-def no_loop_section(case: Case) -> PageSection:
-    """One sentence for an arm that has no loop."""
-    return PageSection(title="The loop", answer=prose("no_loop", arm=case.arm))
-
-
 # ------------------------------------------------------------ margins
 
 
 def margins_section(case: Case) -> PageSection:
-    """Verdict, margins, crossings and spillover of each controller, with the verdict on its sampled loop."""
+    """Verdict, margins, crossings and spillover of each controller."""
     found = [(each, margins_of(each.arm, each.law)) for each in case.in_s]
-    briefs = [(*pair, brief_on(pair[0].arm, pair[0].law, case.chain).short) for pair in found]
-    words: list[str] = []
-    blocks: list[Picture | Table] = [*(_bode_picture(*pair) for pair in found), margin_table(found)]
+    words = [] if case.has_loop else [prose("no_loop", arm=case.arm)]
+    words += [] if case.laws else [sign_words(case.arm)]
+    blocks: list[Picture | Table] = [*(_bode_picture(*pair, case.chain) for pair in found), margin_table(found)]
     for each, it in found:
         blocks += tables_of(each, it)
         try:
@@ -70,16 +70,7 @@ def margins_section(case: Case) -> PageSection:
             blocks.append(sheet("spill", table(few.models), stem=each.stem("spill"), each=each, found=few))
         except TfarmError as error:
             words.append(f"Spillover of {each.name} is not determined: {error}.")
-    return PageSection(
-        title="Stability and stability margins", answer=prose("margins_lead", found=briefs),
-        facts=[verdict_fact(*each) for each in briefs], words=words, blocks=blocks,
-    )  # fmt: skip
-
-
-def verdict_fact(each: Controller, found: margins.Margins, sampled: str) -> Fact:
-    """The verdict, the number of unstable poles in the frequency range, and the verdict on the sampled loop."""
-    it = found.stability
-    return Fact(each.title, it.verdict.upper(), note=prose("verdict", it=it, sampled=sampled))
+    return PageSection(title="Stability and stability margins", words=words, blocks=blocks)
 
 
 def margin_table(found: Sequence[tuple[Controller, margins.Margins]]) -> Table:
@@ -90,11 +81,19 @@ def margin_table(found: Sequence[tuple[Controller, margins.Margins]]) -> Table:
     return sheet("margins", own, undamped=undamped, leads=leads)
 
 
-def _bode_picture(each: Controller, found: margins.Margins) -> Picture:
-    omega, L = margins.loop_curve(found)
-    columns = Column("omega_rad_s", of=omega), Column("re_L", of=L.real), Column("im_L", of=L.imag)
-    figure, stem = frequency.draw_loop.figure(found, each.name), each.stem("bode")
-    return picture("loop_function", figure, stem=stem, data=columns, each=each, found=found)
+def _bode_picture(each: Controller, found: margins.Margins, chain: Chain) -> Picture:
+    """Bode plot of the continuous-time and the sampled loop function; of the first alone where the other has none."""
+    try:
+        curve = loop_curves(each.arm, each.law, chain)
+    except ConvergenceError:
+        curve = curve_of(found)
+    rows = [
+        (own.period or 0.0, *row) for own in curve.sides for row in zip(own.omega, own.L.real, own.L.imag, strict=True)
+    ]
+    keys = ("period_s", "omega_rad_s", "re_L", "im_L")
+    data = [Column(key, of=of) for key, of in zip(keys, zip(*rows, strict=True), strict=True)]
+    figure = loop_function.loop.figure(curve)
+    return picture("loop_function", figure, stem=each.stem("bode"), data=data, each=each, curve=curve)
 
 
 def tables_of(each: Controller, found: margins.Margins) -> Iterator[Table]:
@@ -112,11 +111,14 @@ def nyquist_section(case: Case) -> PageSection:
     """The loop function of each controller on a contour that hides nothing, its encirclements counted."""
     plots = [(each, nyquist.nyquist_of(margins_of(each.arm, each.law).stability)) for each in case.in_s]
     own = any(found.unstable_open for _, found in plots)
-    blocks: list[Picture | Table] = [
-        picture("nyquist_plot", frequency.draw_nyquist.figure(found, each.name), stem=each.stem("nyquist"),
-                data=curve_table(found), each=each, found=found)
-        for each, found in plots
-    ]  # fmt: skip
+    blocks: list[Picture | Table] = []
+    for each, found in plots:
+        linear, disc = (plot.figure(found, name=each.name) for plot in (loop_function.nyquist, loop_function.disc))
+        how: dict[str, Any] = {"each": each, "found": found}
+        blocks += [
+            picture("nyquist_plot", linear, stem=each.stem("nyquist"), data=curve_table(found), **how),
+            picture("nyquist_disc", disc, stem=each.stem("nyquist-disc"), **how),
+        ]
     blocks.append(sheet("nyquist_count", across({each.title: found for each, found in plots}), own=own))
     return PageSection(title="Nyquist plot: encirclements of −1", words=[prose("nyquist", own=own)], blocks=blocks)
 
@@ -148,6 +150,7 @@ def law_section(case: Case) -> PageSection:
               rule=rule_in_words(each.law), period=case.chain.sampling.period)
         for each in named
     ]  # fmt: skip
+    words.append(sign_words(case.arm))
     words.append(prose("not_on_page", discrete=[each.name for each in named if each.law.is_discrete]))
     entries = [entry for each in named for entry in entries_of(each)]
     blocks = [sheet("law_entries", table(entries))]
@@ -267,27 +270,34 @@ def map_data(data: MapOfArm) -> Sequence[Column]:
 
 
 def map_section(case: Case) -> PageSection:
-    """The stability regions of both gains, continuous and sampled, and the gains that damp best."""
-    arm, data, found = case.arm, map_of_arm(case), best(case.arm, case.chain)
+    """The stability regions of both gains, continuous and sampled."""
+    arm, data = case.arm, map_of_arm(case)
     drawn = picture(
         "map", draw_map_of_arm.figure(data), data=map_data(data), found=data, arm=arm,
         band=loop.band_of(arm, DESIGNED_MODES),
         unit=f"{plain(rate_unit(arm), 4)} {unit_of(RATE_GAIN, arm)}",
         deepest=plane.DEEPEST_MOMENT_GAIN * arm.input_per_torque,
     )  # fmt: skip
-    answer = intervals(arm)
-    if found is not None:
-        gains = ", ".join(found.law.gain_text(name, partial(significant, digits=4), arm) for name in PLANE)
-        brief = brief_on(arm, case.in_s[-1].law, case.chain)
-        answer += " " + prose("best_gains", found=found, modes=DESIGNED_MODES, gains=gains, brief=brief)
-    return PageSection(title="Stability region of both gains", answer=answer, blocks=(drawn,))
+    return PageSection(title="Stability region of both gains", facts=interval_facts(arm), blocks=(drawn,))
 
 
-def intervals(arm: Arm) -> str:
-    """The verdict on the default gains, and the stability interval of each."""
-    found = margins_of(arm, default_gains(arm))
-    rows = [row for row in found.stability_intervals if row.name in PLANE]
-    return prose("default_gains", gains=default_words(arm), verdict=found.stability.verdict, rows=rows)
+def interval_facts(arm: Arm) -> list[Fact]:
+    """The stability intervals of each gain of the continuous-time loop, the other at its default."""
+    return [
+        Fact(f"{row.name}, continuous", text(row.intervals, 4) or "no value", row.unit)
+        for row in margins_of(arm, default_gains(arm)).stability_intervals
+        if row.name in PLANE
+    ]
+
+
+def recommended_section(case: Case) -> PageSection:
+    """The gains that damp the first modes of the sampled loop best, with their result card."""
+    found, title = best(case.arm, case.chain), "Recommended gains: best damping"
+    if found is None:
+        return PageSection(title=title, answer=prose("no_best_gains", modes=DESIGNED_MODES))
+    gains = ", ".join(found.law.gain_text(name, partial(significant, digits=4), case.arm) for name in PLANE)
+    answer, each = prose("best_gains", found=found, modes=DESIGNED_MODES, gains=gains), case.in_s[-1]
+    return PageSection(title=title, answer=answer, card=results(card_of(each, case), each.title))
 
 
 # ------------------------------------------------------------ root loci

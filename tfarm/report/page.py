@@ -5,6 +5,7 @@ Texts are in templates/prose.txt, pages in the other templates; here is how both
 
 import json
 import math
+import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -20,6 +21,7 @@ from pydantic import TypeAdapter
 import tfarm
 from tfarm.arm import (
     ANGLE_GAIN,
+    LISTED,
     MOMENT_GAIN,
     PLANE,
     RATE_GAIN,
@@ -42,7 +44,7 @@ from tfarm.fitting.fit import Fit
 from tfarm.fitting.recording import MeasuredRun
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import Margins, margins
-from tfarm.plots.style import Figure, gains_words, save_figure
+from tfarm.plots.style import Figure, gains_words, save_column, save_figure
 from tfarm.records import record
 from tfarm.response.signals import Signals, sign_of
 from tfarm.schema import Column, Table, save_table, text
@@ -54,6 +56,10 @@ TEMPLATES = Path(__file__).parent / "templates"
 PICTURES, DATA = "pictures", "data"  # folders in that of an arm
 T = TypeVar("T")
 PART = "\ue000"  # between title and caption, which no name has in it
+PROMISES = (
+    "certified", "complete", "converged", "default gains", "enclosed", "Lyapunov region", "not determined", "proven",
+    "small gain", "winding number",
+)  # fmt: skip
 DESIGNED_MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
 
 
@@ -77,7 +83,8 @@ def templates() -> Environment:
         keep_trailing_newline=True,
     )
     environment.globals |= {"inf": math.inf, "rate": RATE_GAIN, "moment": MOMENT_GAIN, "angle": ANGLE_GAIN,
-                            "plane": " and ".join(PLANE)}  # fmt: skip
+                            "plane": " and ".join(PLANE), "arm_python": arm_python,
+                            "gains_python": gains_python}  # fmt: skip
     environment.filters.update(
         symbol=with_symbols, text=text, plain=plain, significant=significant, scientific=scientific, upper_first=upper,
         listed=listed, how_many=how_many, as_html=as_html,
@@ -115,8 +122,32 @@ class Fact(NamedTuple):
     note: str = ""
 
 
+class Cell(NamedTuple):
+    """A quantity of a loop as a card shows it: the frequency or the mode `at` which it is reached, and its grade."""
+
+    label: str
+    value: str
+    unit: str
+    at: str = ""
+    grade: str = ""
+
+
+@dataclass(frozen=True)
+class LoopResult:
+    """One loop as cards show it, its quantities by the names of `LoopCard`; `look` is the style of its pill."""
+
+    controller: str
+    loop: str
+    pill: str
+    look: str
+    cells: dict[str, Cell]
+
+
 class Picture(NamedTuple):
-    """A finished figure with its words.  `stem` names its files; `data` are the numbers that it draws."""
+    """A finished figure with its words.  `stem` names its files; `data` are the numbers that it draws.
+
+    `python` is the line of Python that draws it, empty where no public function does.
+    """
 
     stem: str
     title: str
@@ -124,14 +155,15 @@ class Picture(NamedTuple):
     alt: str
     figure: Figure
     data: tuple[Column, ...] = ()
+    python: str = ""
 
 
 def picture(
     kind: str, figure: Figure, *, data: Table | Iterable[Column] = (), stem: str = "", **values: Any
 ) -> Picture:
-    """A picture with the title, the caption and the alternative text of its kind; `stem` names its files."""
-    title, caption, alt = _parts(kind, values)
-    return Picture(stem or kind.replace("_", "-"), title, caption, alt, figure, _columns(data))
+    """A picture with title, caption, alternative text and line of Python of its kind; `stem` names its files."""
+    title, caption, alt, *python = _parts(kind, values)
+    return Picture(stem or kind.replace("_", "-"), title, caption, alt, figure, _columns(data), "".join(python))
 
 
 def sheet(kind: str, columns: Table | Iterable[Column], /, *, stem: str = "", **values: Any) -> Table:
@@ -145,17 +177,17 @@ def _columns(of: Table | Iterable[Column]) -> tuple[Column, ...]:
 
 
 class SavedBlock(NamedTuple):
-    """A picture or table as the page shows it, its files saved."""
+    """A picture or table as the page shows it, its files saved; `image` is the picture without words."""
 
     stem: str
     title: str
-    is_table: bool
     html: Markup
+    image: Markup | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PageSection:
-    """A part of a page.  `answer` is its result in a sentence or two, at the top of the full page too.
+    """A part of a page.  `answer` is its result in a sentence or two, `card` that of a controller of its own.
 
     `words` are paragraphs, `items` a list; `blocks` pictures and tables, of which one without columns is not shown.
     `failure` is the reason why the section could not be made, which its words have too; empty otherwise.
@@ -167,30 +199,47 @@ class PageSection:
     words: Sequence[str] = ()
     items: Sequence[str] = ()
     facts: Sequence[Fact] = ()
+    card: Sequence[LoopResult] = ()
     blocks: Sequence[Any] = ()
     failure: str = ""
 
 
-def save_section(section: PageSection, folder: Path) -> PageSection:
+def save_section(section: PageSection, folder: Path, is_paper: bool = False) -> PageSection:
     """The section with its blocks saved: what remains to be written are words."""
     for name in (PICTURES, DATA):
         (folder / name).mkdir(exist_ok=True)
     shown = [block for block in section.blocks if getattr(block, "columns", True)]
-    return replace(section, blocks=[save_block(block, folder) for block in shown])
+    return replace(section, blocks=[save_block(block, folder, is_paper) for block in shown])
 
 
-def save_block(block: Picture | Table, folder: Path) -> SavedBlock:
-    """A picture as pictures/*.svg, its numbers as data/*.csv; a table as data/*.csv and .json."""
+def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> SavedBlock:
+    """A picture as pictures/*.svg, for a paper *.pdf too, its data as data/*.csv; a table as data/*.csv and .json."""
     shape: Any = templates().get_template("blocks.html").module
-    is_table = isinstance(block, Table)
     if isinstance(block, Table):
-        html = shape.table(block, [f"{DATA}/{name}" for name in save_table(block, folder / DATA)])
-    else:
-        save_figure(block.figure, folder / PICTURES, block.stem, formats=("svg",))
-        numbers = Table(columns=block.data, stem=f"{block.stem}-data")
-        saved = save_table(numbers, folder / DATA, kinds=("csv",)) if block.data else ()
-        html = shape.picture(block, [f"{PICTURES}/{block.stem}.svg", *(f"{DATA}/{name}" for name in saved)])
-    return SavedBlock(block.stem, block.title, is_table, html)
+        files = [f"{DATA}/{name}" for name in save_table(block, folder / DATA)]
+        return SavedBlock(block.stem, block.title, shape.table(block, files))
+    save_figure(block.figure, folder / PICTURES, block.stem, formats=("svg",))
+    if is_paper:
+        save_column(block.figure, folder / PICTURES, block.stem)
+    numbers = Table(columns=block.data, stem=f"{block.stem}-data")
+    saved = save_table(numbers, folder / DATA, kinds=("csv",)) if block.data else ()
+    drawn = [f"{PICTURES}/{block.stem}.{kind}" for kind in ("svg", *["pdf"] * is_paper)]
+    files = [*drawn, *(f"{DATA}/{name}" for name in saved)]
+    return SavedBlock(block.stem, block.title, shape.picture(block, files), shape.image(block))
+
+
+def explained(text: str, words: str = "") -> Markup:
+    """A sentence as a page shows it, commands in `...`; a promise leads to its meaning on the page `words`, if any."""
+    shown = re.sub("`(.+?)`", r"<code>\1</code>", str(with_symbols(text)))
+    for word in PROMISES if words else ():
+        linked = rf'<a class="term" href="{words}#{word_id(word)}">\g<0></a>'
+        shown = re.sub(rf"\b{word}\b", linked, shown, count=1, flags=re.IGNORECASE)
+    return Markup(shown)
+
+
+def word_id(name: str) -> str:
+    """The anchor of a word of the glossary."""
+    return f"word-{name.lower().replace(' ', '-')}"
 
 
 def write_text(file: Path, text: str) -> None:
@@ -275,7 +324,7 @@ class Case(NamedTuple):
     """An arm, its chain, and the laws that the page is about; without any it is about the default gains.
 
     `fit` is the source of the arm's numbers, if they were fitted to measurements; `measured` are responses that are
-    drawn over its own.
+    drawn over its own.  Pictures are saved for a paper too where it `is_paper`.
     """
 
     arm: Arm
@@ -283,6 +332,7 @@ class Case(NamedTuple):
     laws: tuple[GivenLaw, ...] = ()
     fit: Fit | None = None
     measured: tuple[Measured, ...] = ()
+    is_paper: bool = False
 
     @property
     def controllers(self) -> tuple[Controller, ...]:
@@ -360,6 +410,20 @@ def is_preset(arm: Arm, chain: Chain) -> bool:
     return arm.name in presets() and (load(arm.name), load_chain(arm.name)) == (arm, chain)
 
 
+def arm_python(arm: Arm) -> str:
+    """Python that loads an arm: by its name where it comes with tfarm, else from the file in the folder of its page."""
+    name = arm.name if arm.name in presets() and load(arm.name) == arm else "arm.toml"
+    return f"tfarm.load({json.dumps(name)})"
+
+
+def gains_python(law: AnyLaw) -> str:
+    """Python that makes gains at the hub."""
+    gains = as_law(law).gains
+    assert gains is not None
+    values = {gain.name: float(gains[gain.name]) for gain in LISTED}
+    return f"tfarm.HubFeedback({', '.join(f'{name}={value!r}' for name, value in values.items() if value)})"
+
+
 def argument(name: str, preset: bool) -> str:
     """The name of an arm in a command."""
     return shlex.quote(name if preset else f"{name}.toml")
@@ -384,6 +448,6 @@ def command_of(case: Case, only: str) -> str:
     law = own_law(case)
     options = [] if law is not None else [f"--law {shlex.quote(each.file or 'FILE')}" for each in case.laws]
     options += [f"--measured {shlex.quote(f'{each.name}={each.source}')}" for each in case.measured]
-    options += [f"--only {only}"] * bool(only)
+    options += [f"--only {only}"] * bool(only) + ["--paper"] * case.is_paper
     name = argument(case.arm.name, law is None and is_preset(case.arm, case.chain))
     return " ".join(["tfarm report", name, *options, "--out reports"])

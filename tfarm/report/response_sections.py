@@ -149,7 +149,7 @@ def _shapes(modes: Modes) -> Picture:
         *(Column(f"mode_{number}", of=np.round(w, SHAPE_DIGITS - 1) + 0.0) for number, w in shapes.items()),
     )
     nodes = [own for number, own in zip(modes.index, modes.nodes, strict=True) if number in shapes]
-    return picture("mode_shapes", motion.modes.figure(modes), data=columns, nodes=nodes)
+    return picture("mode_shapes", motion.modes.figure(modes), data=columns, arm=modes.arm, nodes=nodes)
 
 
 def theories(arm: Arm) -> Table:

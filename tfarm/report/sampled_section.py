@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, shown_unit
 from tfarm.digits import kept_digits, plain, significant
 from tfarm.dsp import Analysis, Chain, Simulation, modes, results, sampled_verdict, traces, verdict
 from tfarm.dsp.chain import MOST_DELAY
@@ -18,7 +18,7 @@ from tfarm.errors import ParameterError
 from tfarm.fitting.recording import RunComparison, compare_run, overshoot
 from tfarm.plots import motion, regions, roots, style
 from tfarm.report.page import Case, Controller, Fact, PageSection, Picture, margins_of, on_hub, picture, prose, sheet
-from tfarm.schema import Column, Quantity, Table, across, quantities, table, text, with_unit
+from tfarm.schema import Column, Quantity, Table, across, table, text
 from tfarm.spectrum.table import default_gains
 
 MORE_DELAY = (0.0, 0.5, 1.0)  # samples of further delay for which the verdict is given
@@ -37,11 +37,10 @@ def sampled_section(case: Case) -> PageSection:
         planes = [overlay_picture(regions.stable_regions(arm, first.loop.gains, chain), first)]
         along = [loci_picture(first)]
     numbers = across({each.title: it for each, it in found}, keys=[each.key for each, _ in found])
-    pictures, words = slews(case)
+    pictures, words, facts = slews(case)
     return PageSection(
         title=f"The sampled loop, {plain(1e3 * chain.sampling.period)} ms",
-        answer=prose("sampled_lead", found=found, period=chain.sampling.period),
-        facts=[fact for each in found for fact in facts_on(*each)],
+        facts=[*(interval_facts(first) if not case.laws else ()), *facts],
         words=[chain_words(arm, chain), *words],
         blocks=[
             *planes,
@@ -61,16 +60,13 @@ def sampled_section(case: Case) -> PageSection:
 # ------------------------------------------------------------ verdict
 
 
-def facts_on(each: Controller, found: Analysis) -> list[Fact]:
-    """Verdict, delay margin and minimum structural damping of a sampled loop."""
-    verdict, damping = found.verdict, quantities(type(found))["minimum_damping"]
-    facts = [Fact(each.title, verdict.word.upper(), note=prose("dominant", it=verdict))]
-    if verdict.is_stable:
-        note = f"{significant(found.delay_margin_samples, 3)} samples"
-        facts.append(Fact(f"{each.name}: delay margin", text(found.delay_margin_seconds, 3), "s", note))
-    if found.minimum_damping is not None and (each.arm.has_elastic_link or not verdict.is_stable):
-        facts.append(Fact(f"{each.name}: {damping.label}", with_unit(found.minimum_damping, damping)))
-    return facts
+def interval_facts(found: Analysis) -> Iterator[Fact]:
+    """The stability intervals of both gains of a sampled loop."""
+    period, modes = plain(1e3 * found.loop.chain.sampling.period), f" (first {found.verdict.modes_used} modes)"
+    for name in PLANE:
+        unit, shown = shown_unit(name, found.loop.plant.arm), text(list(found.shown[name]), 4) or "no value"
+        known = f"{name}, sampled, {period} ms{modes if modes in shown else ''}"
+        yield Fact(known, shown.replace(modes, "").replace("?", "not determined"), unit)
 
 
 def chain_words(arm: Arm, chain: Chain) -> str:
@@ -147,15 +143,15 @@ def loci_data(data: modes.SampledLoci) -> Sequence[Column]:
 # ------------------------------------------------------------ in time
 
 
-def slews(case: Case) -> tuple[list[Picture | Table], list[str]]:
-    """The slew of the chain under each controller, and why one is not simulated; without one where runs are measured.
+def slews(case: Case) -> tuple[list[Picture | Table], list[str], list[Fact]]:
+    """The slew under each controller, reasons of a missing one, settling times; nothing where runs are measured.
 
     Of an arm's own gains the slew without moment feedback is there too.
     """
     if not case.arm.has_rigid_mode:
-        return [], [f"{prose('what_holds', arm=case.arm)}: no slew is simulated."]
+        return [], [f"{prose('what_holds', arm=case.arm)}: no slew is simulated."], []
     if all(each.given.measured is not None for each in case.controllers):
-        return [], []
+        return [], [], []
     bare = on_hub(case.arm, default_gains(case.arm).having(MOMENT_GAIN, 0.0), f"{MOMENT_GAIN} = 0", "without")
     runs: dict[str, Simulation] = {}
     words, task, simulated = [], case.chain.slew, []
@@ -167,9 +163,9 @@ def slews(case: Case) -> tuple[list[Picture | Table], list[str]]:
         except ParameterError as error:
             words.append(f"No slew of {each.name} is simulated: {error}.")
     if len({each.arm.input_unit for each in simulated}) > 1:
-        return [], [*words, "The controllers drive inputs of different units: their slews are not drawn together."]
+        return [], [*words, "The controllers drive inputs of different units: their slews are not drawn together."], []
     if not runs:
-        return [], words
+        return [], words, []
     arm, title = simulated[0].arm, prose("slew_title", task=task, reach=case.arm.reach)
     figure = motion.slew.figure(arm, {style.safe(name): run for name, run in runs.items()}, title)
     columns = response_columns(arm, {each.key: runs[each.name] for each in simulated})
@@ -178,10 +174,24 @@ def slews(case: Case) -> tuple[list[Picture | Table], list[str]]:
         *table(list(runs.values()), ("residual_moment", "settling_time")).columns,
         Column("finding", "finding", of=[run.finding for run in runs.values()]),
     )
-    return [
-        picture("sampled_slew", figure, data=columns, runs=runs, piece=piece_of_bands(runs), task=title),
-        sheet("slew_numbers", numbers, stem="sampled-slew-numbers"),
-    ], words
+    return (
+        [
+            picture("sampled_slew", figure, data=columns, runs=runs, piece=piece_of_bands(runs), task=title),
+            sheet("slew_numbers", numbers, stem="sampled-slew-numbers"),
+        ],
+        words,
+        [settling_fact(each, runs[each.name], len(case.laws) > 1) for each in simulated if each is not bare],
+    )
+
+
+def settling_fact(each: Controller, run: Simulation, is_named: bool) -> Fact:
+    """The settling time of a slew, or the time within which it is not reached."""
+    label = f"settling time of the slew{f', {each.name}' if is_named else ''}"
+    if run.stopped is not None:
+        return Fact(label, "unstable")
+    if run.settling_time is None:
+        return Fact(label, f"not settled within {significant(run.t[-1], 4)}", "s")
+    return Fact(label, text(run.settling_time, 4), "s")
 
 
 def piece_of_bands(runs: Mapping[str, Simulation]) -> float | None:

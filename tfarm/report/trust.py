@@ -1,4 +1,4 @@
-"""Why trust this: one page for all reports, with proofs, published numbers, the audit and how to make it all again."""
+"""Method and proofs, one page for all reports: proofs, published numbers, the audit, how to make it again, words."""
 
 import hashlib
 import platform
@@ -27,7 +27,20 @@ from tfarm.dsp.chain import file_text
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.plots.style import gains_words
-from tfarm.report.page import DATA, PageSection, argument, has_loop, keep, kept, render, save_section, sheet, write_text
+from tfarm.report.page import (
+    DATA,
+    PROMISES,
+    PageSection,
+    argument,
+    has_loop,
+    keep,
+    kept,
+    render,
+    save_section,
+    sheet,
+    word_id,
+    write_text,
+)
 from tfarm.report.response_sections import (
     BRACKET_DIGITS,
     PROVEN_DIGITS,
@@ -37,6 +50,7 @@ from tfarm.report.response_sections import (
 )
 from tfarm.response.frequency import BAND_POINTS, worst_error
 from tfarm.schema import Column, Quantity, Table, save_table, table
+from tfarm.schema.glossary import GLOSSARY_TERMS
 from tfarm.schema.html import GREEK, LETTER
 from tfarm.spectrum import DampedModes
 from tfarm.spectrum.table import default_gains
@@ -255,7 +269,6 @@ PACKAGES = (
     "control",
     "matplotlib",
     "latex2mathml",
-    "vl-convert-python",
 )
 
 
@@ -333,7 +346,7 @@ def write_trust(
     names = " ".join(argument(proof.name, proof.source == "preset") for proof in proofs)
     page = render(
         "trust.html",
-        title="Why trust this",
+        title="Method and proofs",
         sections=sections,
         proofs=proofs,
         digits=BRACKET_DIGITS,
@@ -344,6 +357,8 @@ def write_trust(
         anchor=anchor,
         in_letters=in_letters,
         is_zero=is_zero,
+        glossary=[term for term in GLOSSARY_TERMS if term.name in PROMISES],
+        word_id=word_id,
         command=f"tfarm report {names} --out reports",
     )
     write_text(folder / "index.html", page)

@@ -5,60 +5,51 @@ The sections of an arm's page in their order, its page by templates, the index, 
 
 import hashlib
 import os
-import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from markupsafe import Markup
-
-from tfarm.arm import PLANE, Arm
+from tfarm.arm import Arm
 from tfarm.case import Comparison
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError, TfarmError, must_be_known, require
 from tfarm.files import temporary_folder
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
-from tfarm.plots.frequency import draw_card
 from tfarm.plots.regions import comparison
-from tfarm.plots.style import save_figure
 from tfarm.processes import shared
-from tfarm.report.arm_section import arm_section, assumptions_section, headline_numbers
+from tfarm.report.arm_section import arm_section, assumptions_section
 from tfarm.report.live import ASSETS, LIVE_PAGE, is_live, save_live, write_assets
 from tfarm.report.loop_section import (
     law_section,
     locus_section,
     map_section,
     margins_section,
-    no_loop_section,
     nyquist_section,
+    recommended_section,
 )
+from tfarm.report.overview import SHORT, Card, blocks, save_card, summary
 from tfarm.report.page import (
-    PICTURES,
     Case,
-    Controller,
-    Fact,
     GivenLaw,
     PageSection,
-    brief_on,
     check_laws,
     command_of,
+    explained,
     file_of,
     has_loop,
     keep,
     kept,
     kept_in,
-    margins_of,
     picture,
     prose,
     render,
     save_section,
     sheet,
-    sign_words,
     upper,
     write_text,
 )
@@ -66,10 +57,7 @@ from tfarm.report.response_sections import bode_section, fit_section, measured_s
 from tfarm.report.sampled_section import sampled_section
 from tfarm.report.trust import TRUST_FOLDER, gather, save_proof, write_trust, written_proofs
 from tfarm.report.tuner_section import tuner_section
-from tfarm.response.frequency import bode
 from tfarm.schema import quantities, table
-from tfarm.schema.glossary import GLOSSARY_TERMS
-from tfarm.schema.html import with_symbols
 from tfarm.stopping import undone_if_stopped
 
 ReportProgress = Callable[[int, int, str], object]
@@ -77,19 +65,13 @@ Notice = Callable[[str], object]
 Calls = Mapping[str, Sequence[Callable[[], Any]]]  # by task: what one process does in turn
 MOST_WORKERS = 2  # processes that share the pieces of a report: as many cores as a small machine has
 WORTH_A_PROCESS = 8  # pieces for which a second process, which takes a second or two to start, is worth it
-EVIDENCE, SCRIPTS = "why trust this", "scripts of the live pages"  # tasks of no arm
+EVIDENCE, SCRIPTS = "method and proofs", "scripts of the live pages"  # tasks of no arm
 LOOP_TASK, SAMPLED_TASK = "continuous loop", "sampled loop"  # each of sections that share a design or damped modes
 LONGEST = (SAMPLED_TASK, LOOP_TASK, EVIDENCE)  # tasks of five seconds and more, which are begun first
 TRUST_PAGE, COMPARISON_PAGE = f"{TRUST_FOLDER}/index.html", "compare.html"
 RESERVED_NAMES = {  # of folders that no arm may have
     "index.html", "readme.md", "pictures", "bench.json", TRUST_FOLDER, "data", COMPARISON_PAGE, "compare.json", ASSETS,
 }  # fmt: skip
-BADGES = {"stable": "ok", "yes": "ok", "unstable": "corrected", "no": "corrected", "marginal": "undecided",
-            "undecided": "undecided"}  # fmt: skip
-PROMISES = (
-    "certified", "complete", "converged", "default gains", "enclosed", "Lyapunov region", "not determined", "proven",
-    "small gain", "winding number",
-)  # fmt: skip
 
 
 # ------------------------------------------------------------ the sections of a page
@@ -97,11 +79,10 @@ PROMISES = (
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """One section of one arm's page: a name for the progress bar, the section's anchor, and how to make it of a case.
+    """A section of an arm's pages: a name for the progress bar, the section's anchor, and how to make it of a case.
 
-    A page that it does not suit has no such section.  The page that `report --only` asks for is called by the first
-    word of its sections' anchors; its `title` is that of one of them, and `is_also_on` picks the other pages of that
-    kind that have the section.  The full page has all, and at its top the answers of those that have one.
+    A case that it does not suit has no such section.  The page that has it is called by the first word of its anchor,
+    or `on`; the `title` of the page is that of one of its sections.  The first page shows blocks of some.
     Sections of one `task` are made one after the other in one process.
     """
 
@@ -110,21 +91,13 @@ class Piece:
     make: Callable[[Case], PageSection]
     suits: Callable[[Case], Any] = lambda case: True
     title: str = ""
-    is_also_on: Callable[[str], bool] = lambda page: False
+    on: str = ""
     task: str = ""
 
     @property
     def page(self) -> str:
-        """The page that has it when it is asked for alone."""
-        return self.anchor.partition("-")[0]
-
-    def is_on(self, page: str | None) -> bool:
-        """Whether the page has the section: that one asked for alone, or the full one."""
-        return not page or page == self.page or self.is_also_on(page)
-
-
-LOOP_PAGES = ("margins", "locus", "sampled", "tune")  # on which an arm without a loop has nothing but that it has none
-OF_LAWS = (*LOOP_PAGES, "law", "no")  # first words of the sections that a page about laws begins with
+        """The page that has it."""
+        return self.on or self.anchor.partition("-")[0]
 
 
 def _in_s(case: Case) -> bool:
@@ -138,33 +111,31 @@ def _of_gains(case: Case) -> bool:
 
 
 PIECES = (
-    Piece("fit to measurements", "fit", fit_section, lambda case: case.fit),
     Piece("stability region of both gains", "margins-map", map_section, _of_gains, task=LOOP_TASK),
-    Piece("the arm", "arm", arm_section, is_also_on=lambda page: True),
+    Piece("recommended gains", "margins-recommended", recommended_section, _of_gains, task=LOOP_TASK),
+    Piece("stability margins", "margins", margins_section, _in_s, "Gains and margins", task=LOOP_TASK),
+    Piece("Nyquist plot", "margins-nyquist", nyquist_section, _in_s, task=LOOP_TASK),
     Piece("response of the root moment", "bode-root-moment", partial(bode_section, output="root_moment"),
           title="Bode plots"),
     Piece("response of the tip", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),
     Piece("measured responses", "bode-measured", measured_section, lambda case: case.measured),
-    Piece("modes", "modes", modes_section, title="Modes"),
-    Piece("the loop", "no-loop", no_loop_section, lambda case: not case.has_loop, is_also_on=LOOP_PAGES.__contains__),
-    Piece("stability margins", "margins", margins_section, _in_s, "Gains and margins", task=LOOP_TASK),
+    Piece("the arm", "arm", arm_section, on="modes"),
+    Piece("modes", "modes", modes_section, title="Arm and modes"),
     Piece("root loci", "locus", locus_section, _in_s, "Root loci", task=LOOP_TASK),
-    Piece("Nyquist plot", "margins-nyquist", nyquist_section, _in_s, task=LOOP_TASK),
     Piece("sampled loop", "sampled", sampled_section, lambda case: case.has_loop, "The sampled loop",
           task=SAMPLED_TASK),
-    Piece("controllers", "law", law_section, lambda case: case.laws and not case.arm.is_locked,
-           is_also_on=LOOP_PAGES.__contains__),
+    Piece("controllers", "law", law_section, lambda case: case.laws and not case.arm.is_locked, "The controller"),
     Piece("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", task=SAMPLED_TASK),
-    Piece("assumptions", "assumptions", assumptions_section, title="What the assumptions do"),
+    Piece("fit to measurements", "fit", fit_section, lambda case: case.fit, "Fitted numbers"),
+    Piece("assumptions", "assumptions", assumptions_section, title="Assumptions"),
 )  # fmt: skip
 QUESTIONS = {piece.page: piece.title for piece in PIECES if piece.title}  # pages that may be asked for alone
-PAGES = {"index": "full report", "live": "live loop", **QUESTIONS}
+PAGES = {"index": "Overview", "live": "Live loop", **QUESTIONS}
 
 
 def pieces_of(case: Case) -> list[Piece]:
-    """The sections of a page, in their order; a page about laws begins with its loops."""
-    suited = [piece for piece in PIECES if piece.suits(case)]
-    return sorted(suited, key=lambda piece: bool(case.laws) and piece.page not in OF_LAWS)
+    """The sections of a case, in their order."""
+    return [piece for piece in PIECES if piece.suits(case)]
 
 
 def make_section(name: str, anchor: str, make: Callable[[Case], PageSection], case: Case, folder: Path) -> PageSection:
@@ -174,7 +145,7 @@ def make_section(name: str, anchor: str, make: Callable[[Case], PageSection], ca
     except TfarmError as error:
         answer = f"This section could not be made for this arm: {error}."
         section = PageSection(anchor=anchor, title=upper(name), answer=answer, failure=str(error))
-    return save_section(section, folder)
+    return save_section(section, folder, case.is_paper)
 
 
 # ------------------------------------------------------------ a report
@@ -189,6 +160,7 @@ def write(
     fits: Sequence[Fit | None] | None = None,
     measured: Sequence[Measured] = (),
     only: tuple[str, ...] | None = None,
+    paper: bool = False,
     progress: ReportProgress | None = None,
     notice: Notice | None = None,
 ) -> Path:
@@ -198,7 +170,8 @@ def write(
     those that each arm's page is about; where there is none it is about the default gains.  `fits` are where the arms'
     numbers are from, if they were fitted to measurements: their pages begin with these.  Responses that were `measured`
     are laid over those of every arm.
-    `only` ("bode", "modes", "margins", ...) writes those pages alone, out/<name>/bode.html and so on.  `progress` gets
+    `only` ("bode", "modes", "margins", ...) writes those pages alone, out/<name>/bode.html and so on.  With `paper`
+    each picture of a section is a PDF at the width of a paper's column too, pictures/*.pdf.  `progress` gets
     (done, total, what runs) whenever a piece of work begins, and at the end.  A section that tfarm cannot make of an
     arm has the reason in its place, and `notice` gets the same in one line at the end.  Raises ParameterError before
     any work if `out` cannot be written, two arms share a name or there is none, or an arm or its chain does not suit a
@@ -207,7 +180,7 @@ def write(
     out, n, names, only = Path(out), len(arms), [arm.name for arm in arms], only or ()
     _check(names, only)
     each = zip(arms, chains or [Chain()] * n, laws or [()] * n, fits or [None] * n, strict=True)
-    cases = [Case(arm, chain, tuple(own), fit, tuple(measured)) for arm, chain, own, fit in each]
+    cases = [Case(arm, chain, tuple(own), fit, tuple(measured), paper) for arm, chain, own, fit in each]
     for case in cases:
         check_laws(case)
     with _temporary(out, "out", names + [TRUST_FOLDER, ASSETS] * (not only)) as place:
@@ -293,7 +266,7 @@ def tasks_of(case: Case, folder: Path, only: tuple[str, ...]) -> Calls:
     folder.mkdir()
     tasks: dict[str, list[Callable[[], Any]]] = defaultdict(list)
     for piece in pieces_of(case):
-        if any(map(piece.is_on, only or ("",))):
+        if not only or piece.page in only:
             make = partial(make_section, piece.name, piece.anchor, piece.make, case, folder)
             tasks[piece.task or piece.name].append(make)
     tasks[LOOP_TASK if LOOP_TASK in tasks else "card"].append(partial(save_card, case, folder))
@@ -338,52 +311,48 @@ def move_into(made: Path, folder: Path) -> None:
 def _write_pages(
     case: Case, folder: Path, made: Sequence[PageSection], only: Sequence[str], trust: str, earlier: Path
 ) -> None:
-    """The arm's file, with the chain that the page is about, and its page, or the page of each question asked.
+    """The arm's file with its chain, its first page and those of its sections, or `only` some.
 
     These lead to each other, to what is in the `earlier` folder of the arm, and to the page on `trust`, if any.
     """
-    arm, file, compared = case.arm, file_of(case), kept_comparison(earlier.parent)
+    file, by_anchor, own = file_of(case), {section.anchor: section for section in made}, defaultdict(list)
     write_text(folder / "arm.toml", file)
-    pages = [page for page in pages_in(earlier, only or ("index",)) if page[0] != LIVE_PAGE]
-    pages += [(f"../{COMPARISON_PAGE}", compared.title)] if arm.name in compared.arms else []
-    by_anchor = {section.anchor: section for section in made}
-    for question in only or ("",):
-        name = f"{question or 'index'}.html"
-        anchors = [piece.anchor for piece in pieces_of(case) if piece.is_on(question)]
-        page = render(
-            "arm.html",
-            title=f"{arm.name}: {QUESTIONS[question]}" if question else arm.name,
-            sections=[by_anchor[anchor] for anchor in anchors if anchor in by_anchor],
-            looks=BADGES,
-            open_pictures=2,  # of a section: those that answer its question; the rest is a click away
-            only=question,
-            others=[page for page in pages if page[0] != name],
-            signs="" if arm.is_locked else sign_words(arm),
-            glossary=[term for term in GLOSSARY_TERMS if term.name in PROMISES],
-            trust=f"../{trust}" if trust else "",
-            live=(folder / LIVE_PAGE).is_file(),
-            summary=summary(case),
-            sha256=hashlib.sha256(file.encode()).hexdigest(),
-            command=command_of(case, question),
-            has_proof=not (case.laws and question),
-            explained=explained,
-            word_id=word_id,
-        )
-        write_text(folder / name, page)
+    for piece in pieces_of(case):
+        if piece.anchor in by_anchor:
+            own[piece.page].append(by_anchor[piece.anchor])
+    written = only or ("index", *own)
+    pages = navigation(case.arm, pages_in(earlier, (*written, *_is_live(folder))), trust, earlier)
+    with_facts = (by_anchor.get(anchor, PageSection()) for anchor in ("margins-map", "sampled"))
+    shared = {
+        "card": kept_in(folder, "card", Card) or Card(case.arm.name, summary(case), "", (), (), ()),
+        "short": SHORT,
+        "pages": pages,
+        "titles": dict(pages),
+        "blocks": blocks(by_anchor),
+        "short_facts": [fact for section in with_facts for fact in section.facts],
+        "has_recommended": bool(by_anchor.get("margins-recommended", PageSection()).card),
+        "open_pictures": 2,  # of a section: those that answer its question; the rest is a click away
+        "has_proof": (folder / "proof.json").is_file(),
+        "sha256": hashlib.sha256(file.encode()).hexdigest(),
+        "explained": partial(explained, words=f"../{trust}" if trust else ""),
+    }
+    for name in written:
+        title = f"{case.arm.name}: {QUESTIONS[name]}" if name in QUESTIONS else case.arm.name
+        command = command_of(case, name if name in QUESTIONS else "")
+        page = render("arm.html", title=title, sections=own[name], here=f"{name}.html", command=command, **shared)
+        write_text(folder / f"{name}.html", page)
 
 
-def explained(text: str) -> Markup:
-    """A sentence as a page shows it; a word that promises something leads to its meaning at its first place."""
-    shown = str(with_symbols(text))
-    for word in PROMISES:
-        linked = rf'<a class="term" href="#{word_id(word)}">\g<0></a>'
-        shown = re.sub(rf"\b{word}\b", linked, shown, count=1, flags=re.IGNORECASE)
-    return Markup(shown)
+def _is_live(folder: Path) -> tuple[str, ...]:
+    """The name of the live page where it has been made."""
+    return ("live",) if (folder / LIVE_PAGE).is_file() else ()
 
 
-def word_id(name: str) -> str:
-    """The anchor of a word of the glossary on a page."""
-    return f"word-{name.lower().replace(' ', '-')}"
+def navigation(arm: Arm, own: Sequence[tuple[str, str]], trust: str, folder: Path) -> list[tuple[str, str]]:
+    """(file, title) of all that a page of an arm leads to."""
+    compared = kept_comparison(folder.parent)
+    more = [(f"../{COMPARISON_PAGE}", compared.title)] if arm.name in compared.arms else []
+    return [("../index.html", "All arms"), *own, *more, *([(f"../{trust}", "Method and proofs")] if trust else [])]
 
 
 def pages_in(folder: Path, written: Sequence[str] = ()) -> list[tuple[str, str]]:
@@ -392,57 +361,14 @@ def pages_in(folder: Path, written: Sequence[str] = ()) -> list[tuple[str, str]]
     return [(f"{name}.html", title) for name, title in there.items()]
 
 
-def summary(case: Case) -> str:
-    """The arm in one sentence, and the laws that its page is about in another."""
-    return prose("summary", arm=case.arm, laws=[each.name for each in case.laws])
-
-
 # ------------------------------------------------------------ the index
-
-
-@dataclass(frozen=True)
-class Card:
-    """An arm as the index shows it; `picture` is empty where there is none."""
-
-    name: str
-    summary: str
-    facts: list[Fact]
-    picture: str
-    loops: list[dict[str, str]]
-
-
-def save_card(case: Case, folder: Path) -> None:
-    """pictures/card.svg and card.json; a picture that cannot be made is left out, as its section on the page is."""
-    (folder / PICTURES).mkdir(exist_ok=True)
-    arm, picture = case.arm, ""
-    with suppress(TfarmError):
-        save_figure(draw_card.figure(bode(arm, "root_moment")), folder / PICTURES, "card", formats=("svg",))
-        picture = "card.svg"
-    loops = [loop_cells(each, case.chain) for each in case.controllers if case.laws or has_loop(arm)]
-    facts = list(headline_numbers(arm)[:4])
-    keep(folder, "card", asdict(Card(arm.name, summary(case), facts, picture, loops)))
-
-
-def loop_cells(each: Controller, chain: Chain) -> dict[str, str]:
-    """A controller in cells of the table of arms; a verdict that cannot be had is left out."""
-    cells = {"law": each.given.name}
-    with suppress(TfarmError):
-        if not each.law.is_discrete:
-            found = margins_of(each.arm, each.law)
-            cells["verdict"] = found.stability.verdict
-            for row in found.stability_intervals:
-                if row.name in PLANE:
-                    cells[row.name] = f"{row.interval.as_text(5)} {row.unit}".rstrip() if row.interval else "none"
-    with suppress(TfarmError):
-        cells["sampled"] = brief_on(each.arm, each.law, chain).short
-    return cells
 
 
 def index_page(out: Path, *, trust: str) -> str:
     """The page that leads to all others in a folder of reports."""
     cards = [(card, pages) for folder, card in kept(out, "card", Card).items() if (pages := pages_in(folder))]
     compared = kept_comparison(out).title
-    return render("index.html", title="tfarm reports", cards=cards, trust=trust, compared=compared, looks=BADGES)
+    return render("index.html", title="tfarm reports", cards=cards, trust=trust, compared=compared, short=SHORT)
 
 
 # ------------------------------------------------------------ a comparison

@@ -63,6 +63,6 @@ function linked(found, way, seen) {
     if (k) { const { to } = partners(found[k - 1], here, way, seen), before = pieces; pieces = here.points.map((_, i) => to.includes(i) ? before[to.indexOf(i)] : ++count); }
     here.points.forEach((p, i) => { if (seen(p)) rows.push({ re: p[0], im: p[1], gain: here.gain, piece: pieces[i] }); });
   });
-  return rows;
+  return rows.sort((a, b) => a.piece - b.piece); // one line after the other, each along the gain
 }
 if (typeof window !== "undefined") window.locus = locus;

@@ -1,7 +1,7 @@
 // Arithmetic of the live page: the loop of any gains from exact samples of its parts.  Complex numbers are [re, im].
 // Each formula is one of tfarm.loop (panels, margins, lines, regions); tests hold the two together.
 "use strict";
-const POINTS = 24, AT_POLE = 1e-9, LOWEST_DIPS = 6, SHOWN_POLES = 8;
+const POINTS = 24, AT_POLE = 1e-9, LOWEST_DIPS = 6;
 const X = [...Array(POINTS).keys()].map(j => Math.cos(Math.PI * (j + 0.5) / POINTS));
 const C = X.map((_, j) => (-1) ** j * Math.sin(Math.PI * (j + 0.5) / POINTS));
 const add = (a, b) => [a[0] + b[0], a[1] + b[1]], minus = (a, b) => [a[0] - b[0], a[1] - b[1]];
@@ -10,14 +10,110 @@ const size = a => Math.sqrt(a[0] * a[0] + a[1] * a[1]), conj = a => [a[0], -a[1]
 const div = (a, b) => times(1 / (b[0] * b[0] + b[1] * b[1]), mul(a, conj(b)));
 const geometric = (a, b, n) => [...Array(n).keys()].map(i => a * (b / a) ** (i / (n - 1)));
 const SERIES = X.map((_, k) => X.map((_, j) => (k ? 2 : 1) / POINTS * Math.cos(k * Math.PI * (j + 0.5) / POINTS)));
+const AWAY = geometric(0.05, 20, 12); // of the distance of a pole from the axis: where a curve has points near it
 const degrees = a => Math.atan2(a[1], a[0]) * 180 / Math.PI;
+
+// The zero of f between a and b, where its values fa and fb have opposite signs: Chandrupatla (1997)
+function zeroOf(f, a, fa, b, fb) {
+  for (let k = 0, t = 0.5, c, fc; k < 120; k++) {
+    const x = a + t * (b - a), fx = f(x);
+    if (fx > 0 === fa > 0) [c, fc] = [a, fa]; else [c, fc, b, fb] = [b, fb, a, fa];
+    [a, fa] = [x, fx];
+    const best = Math.abs(fa) < Math.abs(fb) ? a : b, least = 4e-16 * Math.abs(best) / Math.abs(b - c);
+    if (!fx || !(least < 0.5)) return best;
+    const xi = (a - b) / (c - b), phi = (fa - fb) / (fc - fb), curved = phi * phi < xi && (1 - phi) ** 2 < 1 - xi;
+    t = curved ? fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb) : 0.5;
+    t = Math.min(Math.max(t, least), 1 - least) || 0.5;
+  }
+  return (a + b) / 2;
+}
+
+// Zeros of f(re D, im D, re N, im N) along a curve of L = N/D: its frequencies w, values at them, and `at` any frequency
+function zerosOn({ w, D, N, at }, f) {
+  const found = [], value = q => f(...at(q));
+  let last = 0, before = f(D[0], D[1], N[0], N[1]);
+  for (let i = 1; i < w.length; i++) {
+    const after = f(D[2 * i], D[2 * i + 1], N[2 * i], N[2 * i + 1]);
+    if (after === 0) continue; // a zero on a point is between its neighbours
+    if (before * after < 0) found.push({ w: zeroOf(value, w[last], before, w[i], after), change: before > 0 ? 2 : -2 });
+    [before, last] = [after, i];
+  }
+  return found;
+}
+
+// The least value of f and where; its lowest dips refined by the golden section
+function lowestOn({ w, D, N, at }, f) {
+  const values = Float64Array.from(w, (_, i) => f(D[2 * i], D[2 * i + 1], N[2 * i], N[2 * i + 1])), dips = [], share = (Math.sqrt(5) - 1) / 2;
+  let best = { value: Infinity, at: 0 };
+  values.forEach((value, i) => {
+    if (value < best.value) best = { value, at: w[i] };
+    if (i && i < w.length - 1 && value <= values[i - 1] && value <= values[i + 1]) dips.push(i);
+  });
+  for (const i of dips.sort((a, b) => values[a] - values[b]).slice(0, LOWEST_DIPS)) {
+    let a = w[i - 1], b = w[i + 1], c = b - share * (b - a), d = a + share * (b - a), fc = f(...at(c)), fd = f(...at(d));
+    for (let k = 0; k < 34; k++) {
+      if (fc < fd) { b = d; d = c; fd = fc; c = b - share * (b - a); fc = f(...at(c)); }
+      else { a = c; c = d; fc = fd; d = a + share * (b - a); fd = f(...at(d)); }
+    }
+    if (Math.min(fc, fd) < best.value) best = { value: Math.min(fc, fd), at: fc < fd ? c : d };
+  }
+  return best;
+}
+
+// Crossings and margins of L but that of the gain; `all`: disk and peak of T too, which the card does not have
+const DISTANCES = {
+  S: (a, b, c, d) => ((a + c) ** 2 + (b + d) ** 2) / Math.max(a * a + b * b, 1e-300),
+  T: (a, b, c, d) => ((a + c) ** 2 + (b + d) ** 2) / Math.max(c * c + d * d, 1e-300),
+  disk: (a, b, c, d) => ((a + c) ** 2 + (b + d) ** 2) / Math.max((a - c) ** 2 + (b - d) ** 2, 1e-300),
+};
+function marginsOn(curve, all) {
+  const far = name => { const { value, at } = lowestOn(curve, DISTANCES[name]); return { value: Math.sqrt(value), at }; };
+  const minus = ([a, b, c, d]) => degrees([-(a * c + b * d), b * c - a * d]), factor = ([a, b, c, d]) => -(a * c + b * d) / (c * c + d * d);
+  const crossed = zerosOn(curve, (a, b, c, d) => Math.log((c * c + d * d) / (a * a + b * b))).map(({ w }) => ({ w, angle: minus(curve.at(w)) }));
+  const factors = zerosOn(curve, (a, b, c, d) => b * c - a * d).map(({ w }) => ({ w, factor: factor(curve.at(w)) }));
+  const least = (rows, value) => rows.reduce((best, row) => Math.abs(value(row)) < Math.abs(best.value) ? { value: value(row), at: row.w } : best, { value: Infinity, at: 0 });
+  const S = far("S"), found = {
+    crossed, factors, crossovers: factors.filter(row => row.factor > AT_POLE && row.factor < 1 / AT_POLE),
+    phase: least(crossed, row => row.angle), delay: least(crossed, row => (row.angle + 360) % 360 * Math.PI / 180 / row.w),
+    peak_sensitivity: { value: Math.max(1, 1 / S.value), at: S.at },
+  };
+  if (!all) return found;
+  const disk = far("disk"), T = far("T"), lead = crossed.filter(row => row.angle < 0);
+  return {
+    ...found, disk: { value: 2 * disk.value, at: disk.at }, peak_complementary: { value: 1 / T.value, at: T.at },
+    phase_lag: least(crossed.filter(row => row.angle > 0), row => row.angle), phase_lead: least(lead, row => -row.angle),
+  };
+}
+
+// A curve on fixed frequencies w with parts D and rows of N for each gain, and on more of them
+function curveOn({ w, D, rows }, gains, more, at) {
+  const extra = Float64Array.from(more).sort(), n = w.length + extra.length, curve = { w: new Float64Array(n), D: new Float64Array(2 * n), N: new Float64Array(2 * n), at };
+  for (let i = 0, j = 0, k = 0; k < n; k++) {
+    if (i < w.length && !(extra[j] < w[i])) {
+      curve.w[k] = w[i];
+      for (const c of [0, 1]) {
+        curve.D[2 * k + c] = D[2 * i + c];
+        for (let r = 0; r < 3; r++) curve.N[2 * k + c] += gains[r] * rows[r][2 * i + c];
+      }
+      i += 1;
+    } else {
+      const found = at(extra[j]);
+      curve.w[k] = extra[j++];
+      for (const c of [0, 1]) { curve.D[2 * k + c] = found[c]; curve.N[2 * k + c] = found[2 + c]; }
+    }
+  }
+  return curve;
+}
 
 class LiveLoop {
   constructor(data) {
     Object.assign(this, data);
     const bytes = Uint8Array.from(atob(data.samples), c => c.charCodeAt(0));
     this.values = new Float64Array(bytes.buffer); // panel, part, point, re and im
-    this.base = this.grid().map(w => this.at(w));
+    const base = this.grid().map(w => this.at(w)), units = [{ K1: 1, K2: 0, Kp: 0 }, { K1: 0, K2: 1, Kp: 0 }, { K1: 0, K2: 0, Kp: 1 }];
+    const all = (part, law) => Float64Array.from(base.flatMap(point => this.parts(point, law)[part]));
+    this.base = { w: Float64Array.from(base, point => point.w), D: all(0, units[0]), rows: units.map(unit => all(1, unit)) };
+    this.series = []; // by how many zeros at s = 0 are divided out
     this.moments = [data.moments[0] ?? -Infinity, data.moments[1] ?? Infinity];
   }
 
@@ -62,24 +158,13 @@ class LiveLoop {
     return [...new Set([...all.filter(w => w < band), band])].sort((a, b) => a - b);
   }
 
-  // Zeros of f between neighbours of the points where it changes its sign
-  zeros(points, f) {
-    const found = [];
-    let before = f(points[0]);
-    for (let i = 1, last = 0; i < points.length; i++) {
-      const after = f(points[i]);
-      if (after === 0) continue; // a zero on a point is between its neighbours
-      if (before * after < 0) {
-        let a = points[last].w, b = points[i].w;
-        for (let k = 0; k < 60 && b - a > 2e-16 * b; k++) {
-          const middle = (a + b) / 2;
-          if (f(this.at(middle)) * before > 0) a = middle; else b = middle;
-        }
-        found.push({ ...this.at((a + b) / 2), change: before > 0 ? 2 : -2 });
-      }
-      [before, last] = [after, i];
-    }
-    return found;
+  // D and N at w as four numbers
+  both(w, law) {
+    const [D, N] = this.parts(this.at(w), law);
+    return [...D, ...N];
+  }
+  curve(law, more = []) {
+    return curveOn(this.base, [law.K1, law.K2, law.Kp], more, w => this.both(w, law));
   }
 
   // Unstable poles of the band: those of the reference and what crosses the axis on the way, first with Kp = 0
@@ -99,9 +184,10 @@ class LiveLoop {
   crossings(from, to) {
     const way = { K1: to.K1 - from.K1, K2: to.K2 - from.K2, Kp: to.Kp - from.Kp };
     if (!(way.K1 || way.K2 || way.Kp)) return [];
-    const both = point => { const [drive, N] = this.parts(point, from); return [add(drive, N), this.parts(point, way)[1]]; };
-    const h = point => { const [a, b] = both(point); return a[1] * b[0] - a[0] * b[1]; };
-    return this.zeros(this.base, h).map(point => ({ t: -div(...both(point))[0], change: point.change })).filter(({ t }) => t > 0 && t < 1);
+    const { w, D, N } = this.curve(from), along = this.curve(way).N, A = D.map((d, i) => d + N[i]);
+    const at = q => { const [a, b, c, d] = this.both(q, from), [, , e, f] = this.both(q, way); return [a + c, b + d, e, f]; };
+    const found = zerosOn({ w, D: A, N: along, at }, (a, b, c, d) => b * c - a * d);
+    return found.map(each => { const [a, b, c, d] = at(each.w); return { t: -(a * c + b * d) / (c * c + d * d), change: each.change }; }).filter(({ t }) => t > 0 && t < 1);
   }
 
   // The intervals of K2 from low to high in which no pole of the band is unstable, and beyond it not every mode is driven
@@ -137,14 +223,11 @@ class LiveLoop {
     return takes > 0 ? ["stable", this.beyond] : ["stable in the frequency range", `no unstable pole up to ${band}; not determined beyond`];
   }
 
-  // The base points and more about each oscillating pole, as close as it is to the axis: `tfarm.loop.margins.dense`
+  // L at the base points and at more about each oscillating pole, as close as it is to the axis: `tfarm.loop.margins.dense`
   dense(poles, law) {
-    const away = geometric(0.05, 20, 12), top = this.band, slow = this.rigidCrossings(law).filter(w => w < this.base[0].w);
-    const close = poles.filter(s => s[1] > 0).flatMap(s => [0, ...away, ...away.map(x => -x)].map(x => s[1] + Math.abs(s[0]) * x));
-    const more = [...close, ...slow.flatMap(w => [w / 2, w, 2 * w])].filter(w => w > 0 && w < top).map(w => this.at(w));
-    const all = [...this.base, ...more].sort((a, b) => a.w - b.w);
-    for (const point of all) point.both = this.parts(point, law); // asked for again and again
-    return all;
+    const top = this.band, slow = this.rigidCrossings(law).filter(w => w < this.base.w[0]);
+    const close = poles.filter(s => s[1] > 0).flatMap(s => [0, ...AWAY, ...AWAY.map(x => -x)].map(x => s[1] + Math.abs(s[0]) * x));
+    return this.curve(law, [...close, ...slow.flatMap(w => [w / 2, w, 2 * w])].filter(w => w > 0 && w < top));
   }
 
   // Where the rigid arm has |L| = 1: (1 - k^2) w^4 - (2 b k + a^2) w^2 - b^2 = 0, a = K1/J, b = Kp/J
@@ -154,71 +237,33 @@ class LiveLoop {
     return this.rate_loss ? [] : [(B + root) / (2 * A), (B - root) / (2 * A)].filter(q => q > 0).map(Math.sqrt);
   }
 
-  margins(law, points) {
-    const both = point => point.both || this.parts(point, law);
-    const L = point => { const [D, N] = both(point); return div(N, D); };
-    const logsize = point => { const [D, N] = both(point); return Math.log(size(N) / size(D)); };
-    const crossed = this.zeros(points, logsize).map(point => ({ w: point.w, angle: degrees(times(-1, L(point))) }));
-    const least = (rows, value) => rows.reduce((best, row) => Math.abs(value(row)) < Math.abs(best.value) ? { value: value(row), at: row.w } : best, { value: Infinity, at: 0 });
-    const real = this.zeros(points, point => { const [D, N] = both(point); return D[1] * N[0] - D[0] * N[1]; });
-    const factors = real.map(point => { const [D, N] = both(point); return { w: point.w, factor: -div(D, N)[0] }; });
-    const ratio = (above, below) => point => { const [D, N] = both(point); return size(above(D, N)) / Math.max(size(below(D, N)), 1e-300); };
-    const disk = this.lowest(points, ratio(add, minus)), S = this.lowest(points, ratio(add, D => D)), T = this.lowest(points, ratio(add, (_, N) => N));
-    const crossovers = factors.filter(row => row.factor > AT_POLE && row.factor < 1 / AT_POLE);
-    const [D, N] = both(points[0]), low = size(N) ? times(-1, div(D, N)) : [0, 0];
-    if (low[0] > AT_POLE && Math.abs(low[1]) < 1e-3 * low[0]) crossovers.unshift({ w: 0, factor: low[0] });
-    return {
-      gain: this.gainMargin(law, factors.map(row => row.factor)), crossed, crossovers,
-      phase: least(crossed, row => row.angle), phase_lag: least(crossed.filter(row => row.angle > 0), row => row.angle),
-      phase_lead: least(crossed.filter(row => row.angle < 0), row => -row.angle),
-      delay: least(crossed, row => (row.angle + 360) % 360 * Math.PI / 180 / row.w),
-      disk: { value: 2 * disk.value, at: disk.at }, peak_sensitivity: { value: Math.max(1, 1 / S.value), at: S.at },
-      peak_complementary: { value: 1 / T.value, at: T.at },
-    };
+  margins(law, curve, all = true) {
+    const found = marginsOn(curve, all), [a, b, c, d] = [...curve.D.slice(0, 2), ...curve.N.slice(0, 2)], low = c || d ? times(-1, div([a, b], [c, d])) : [0, 0];
+    if (low[0] > AT_POLE && Math.abs(low[1]) < 1e-3 * low[0]) found.crossovers.unshift({ w: 0, factor: low[0] });
+    return { ...found, gain: this.gainMargin(law, found.factors.map(row => row.factor)) };
+  }
+
+  // The factor on all gains at which a pole is at s = 0
+  restOf(law) {
+    return law.Kp ? 0 : law.K1 ? -this.rate_loss / law.K1 : this.rate_loss ? NaN : this.inertia / this.gauged / law.K2;
   }
 
   // The factors on all gains, below and above 1, at which a pole reaches the axis
   gainMargin(law, factors) {
-    const rest = law.Kp ? 0 : law.K1 ? -this.rate_loss / law.K1 : this.rate_loss ? NaN : this.inertia / this.gauged / law.K2;
+    const rest = this.restOf(law);
     const edges = this.moments.filter(end => Number.isFinite(end) && law.K2 * end > 0).map(end => end / law.K2);
     const all = [...(this.kind === "reactive" ? edges : factors), rest];
     return [Math.max(0, ...all.filter(t => t >= 0 && t < 1)), Math.min(Infinity, ...all.filter(t => t > 1))];
   }
 
-  // The least value of f and where; its lowest dips refined by the golden section
-  lowest(points, f) {
-    const values = points.map(f), dips = [];
-    let best = { value: Infinity, at: 0 };
-    values.forEach((value, i) => {
-      if (value < best.value) best = { value, at: points[i].w };
-      if (i && i < values.length - 1 && value <= values[i - 1] && value <= values[i + 1]) dips.push(i);
-    });
-    for (const i of dips.sort((a, b) => values[a] - values[b]).slice(0, LOWEST_DIPS)) {
-      const share = (Math.sqrt(5) - 1) / 2;
-      let a = points[i - 1].w, b = points[i + 1].w, c = b - share * (b - a), d = a + share * (b - a);
-      let fc = f(this.at(c)), fd = f(this.at(d));
-      for (let k = 0; k < 34; k++) {
-        if (fc < fd) { b = d; d = c; fd = fc; c = b - share * (b - a); fc = f(this.at(c)); }
-        else { a = c; c = d; fc = fd; d = a + share * (b - a); fd = f(this.at(d)); }
-      }
-      if (Math.min(fc, fd) < best.value) best = { value: Math.min(fc, fd), at: fc < fd ? c : d };
-    }
-    return best;
-  }
-
   // Closed-loop poles s near the axis, up to `top`: every zero of each panel's Chebyshev series, those off its panel left
-  // out.  `near`: those of gains close by, from which they are soon found
-  poles(law, near = null, top = Infinity) {
+  // out.  `near`: those of gains close by, from which they are soon found; `enough`: no further panel is searched where more are found
+  poles(law, near = null, top = Infinity, enough = Infinity) {
     const found = [], zero = law.Kp ? 0 : law.K1 || this.rate_loss ? 1 : 2, zeros = [];
     this.low.forEach((low, p) => {
-      if (low > top) return;
-      const middle = (low + this.high[p]) / 2, half = (this.high[p] - low) / 2;
-      const f = X.map((x, j) => {
-        const w = middle + half * x, point = { w, d: this.sample(p, 0, j), theta: this.sample(p, 1, j), m: this.sample(p, 2, j) };
-        let value = add(...this.parts(point, law));
-        for (let k = 0; k < zero; k++) value = div(value, [0, w]);
-        return value;
-      });
+      if (low > top || found.length > enough) return;
+      const middle = (low + this.high[p]) / 2, half = (this.high[p] - low) / 2, [d, ...rows] = this.seriesOf(p, zero);
+      const f = Float64Array.from(d, (x, i) => x + law.K1 * rows[0][i] + law.K2 * rows[1][i] + law.Kp * rows[2][i]);
       zeros[p] = zerosOfSeries(f, near && near.zeros[p]);
       for (const z of zeros[p]) {
         const s = [-half * z[1], middle + half * z[0]], inside = Math.abs(z[0]) <= 1 && (p > 0 || s[1] > -1e-9 * half);
@@ -229,17 +274,33 @@ class LiveLoop {
     return Object.assign(apart, { zeros });
   }
 
+  // The Chebyshev series of D and of what each gain adds to N, over s^zero, on panel p
+  seriesOf(p, zero) {
+    const known = this.series[zero] ||= [];
+    return known[p] ||= [[0, 0], [1, 0], [1, 1], [1, 2]].map(([part, gain]) => {
+      const unit = { K1: +(gain === 0), K2: +(gain === 1), Kp: +(gain === 2) }, middle = (this.low[p] + this.high[p]) / 2, half = (this.high[p] - this.low[p]) / 2;
+      const f = X.map((x, j) => {
+        const w = middle + half * x;
+        let value = this.parts({ w, d: this.sample(p, 0, j), theta: this.sample(p, 1, j), m: this.sample(p, 2, j) }, unit)[part];
+        for (let k = 0; k < zero; k++) value = div(value, [0, w]);
+        return value;
+      });
+      return Float64Array.from(X.flatMap((_, k) => f.reduce((sum, value, j) => add(sum, times(SERIES[k][j], value)), [0, 0])));
+    });
+  }
+
   // K1, K2 with poles at +- i w: the D-decomposition curve at this Kp
-  boundary(point, law) {
+  boundary(w, law) {
+    const point = this.at(w);
     const cross = (a, b) => a[1] * b[0] - a[0] * b[1], [D, N] = this.parts(point, { K1: 0, K2: 0, Kp: law.Kp }), P = add(D, N);
     const a = this.parts(point, { K1: 1, K2: 0, Kp: 0 })[1], b = this.parts(point, { K1: 0, K2: 1, Kp: 0 })[1], det = cross(a, b);
-    return { K1: -cross(P, b) / det, K2: cross(P, a) / det, w: point.w };
+    return { K1: -cross(P, b) / det, K2: cross(P, a) / det, w };
   }
 }
 
-// The zeros of the polynomial through f at X, by Aberth's iteration (1973) on its Chebyshev series, cut where it is rounding
+// The zeros of a Chebyshev series, cut where it is rounding, by Aberth's iteration (1973)
 function zerosOfSeries(f, near = null) {
-  const a = X.map((_, k) => f.reduce((sum, value, j) => add(sum, times(SERIES[k][j], value)), [0, 0]));
+  const a = X.map((_, k) => [f[2 * k], f[2 * k + 1]]);
   const largest = Math.max(...a.map(size));
   while (a.length > 1 && size(a[a.length - 1]) < 1e-14 * largest) a.pop();
   const n = a.length - 1, warm = near && near.length === n, around = i => [1.25 * Math.cos(0.4 + 2 * Math.PI * i / n), 0.75 * Math.sin(0.4 + 2 * Math.PI * i / n)];

@@ -1,145 +1,119 @@
-// The live page: gains from sliders, fields and the map; numbers by LiveLoop, SampledLoop and Slew; charts by Vega.
+// The live page: gains from sliders, fields, keys, the map and the link; numbers by LiveLoop, SampledLoop and Slew; charts by `paint`.
 "use strict";
 (() => {
-  const $ = id => document.getElementById(id), read = id => JSON.parse($(id).textContent);
-  const data = read("live-data"), loop = new LiveLoop(data), law = { ...data.start }, names = ["K1", "K2", "Kp"];
-  const discrete = data.sampled_loop && new SampledLoop(data.sampled_loop), slew = data.slew && new Slew(data.slew);
-  const dark = matchMedia("(prefers-color-scheme: dark)").matches, REST = 200; // ms without a move until everything is drawn in full
-  const colours = dark
-    ? { ink: "#f2f2f2", grey: "#a8adb3", faint: "#3a3f45", blue: "#6db3f2", orange: "#f0a05a", green: "#5fc79a" }
-    : { ink: "#1a1a1a", grey: "#5a5a5a", faint: "#d9d9d9", blue: "#0060a8", orange: "#c2571a", green: "#00785a" };
-  const text = (id, words) => { $(id).textContent = words; };
-
-  // ---------------------------------------------------------------- charts: made when they come into view, and then kept up
-
-  const views = {}, inView = new Set(), charts = {
-    map: (now, fine) => ({
-      here: [{ K1: now.law.K1, K2: now.law.K2 }],
-      ...(views.map && mapped === now.law.Kp ? {} : { edge: loop.kind === "reactive" ? [] : edgeOf(w => loop.boundary(loop.at(w), now.law), loop.base.map(point => point.w), data.axes), areas: now.areas || [], stale: stale(now.law), proven: proven() }),
-    }),
-    poles: now => ({ poles: now.near.map(([re, im]) => ({ re, im, Hz: general(hertz(im), 5), "damping ratio": dampingRatio([re, im]) })), rays: rays(now.frame), locus: now.locus || [], pointed: [] }),
-    zplane: now => ({
-      poles: (now.z || []).map(({ z, growth }) => ({ re: z[0], im: z[1], inside: growth < 0, growth: general(growth, 4) })),
-      circle: unitCircle(), rays: spirals(), locus: now.discs || [], pointed: [],
-    }),
-    bode: (now, fine) => ({ curve: now.curve(fine), stems: stems(now.margins, now.curve(fine)[0].w), cursor_at: now.curve(fine).slice(0, 1) }),
-    nyquist: (now, fine) => ({ curve: now.curve(fine).filter(row => row.abs < 50), rings: rings(now.margins), cursor_at: [] }),
-    slew: (now, fine) => slewSets(slew, now.run, fine ? Math.ceil(20 * slew.fastest(now.run) * slew.period / (2 * Math.PI)) : 0, $("slew").clientWidth),
-  };
-  if (data.sensor) charts.sensor = () => sensor.sets();
-  const made = name => name !== "slew" && name !== "zplane" || (name === "slew" ? slew : discrete);
-
-  // A chart in the colours of the screen, with this arm's axes
-  const given = { ...colours, drive: slew ? `${slew.drive} [${slew.unit}]` : "" };
-  function spec(name) {
-    const found = JSON.parse(JSON.stringify(LIVE_CHARTS[name]).replace(/"@(\w+)"/g, (_, name) => JSON.stringify(given[name])));
-    const scale = of => found.scales.find(each => each.name === of);
-    if (name === "poles") for (const of of ["x", "y"]) {
-      found.signals = [...(found.signals || []), { name: `framed_${of}`, value: now.frame[of] }];
-      scale(of).domain = { signal: `framed_${of}` };
-    }
-    if (name === "map") for (const [of, gain] of [["x", "K1"], ["y", "K2"]]) {
-      const { low, high, linear } = data.axes[gain], axis = found.axes.find(each => each.scale === of), unit = data.units[gain];
-      Object.assign(scale(of), { domain: [low, high], ...(linear === null ? {} : { type: "symlog", constant: linear }) });
-      axis.title = unit === "1" ? gain : `${gain} [${unit}]`;
-      if (linear !== null) axis.values = ticks(low, high, linear);
-    }
-    return found;
+  const $ = id => document.getElementById(id), data = JSON.parse($("live-data").textContent), names = ["K1", "K2", "Kp"];
+  const loop = new LiveLoop(data), discrete = data.sampled_loop && new SampledLoop(data.sampled_loop), slew = data.slew && new Slew(data.slew);
+  const damped = data.graded && new LiveLoop({ ...data, ...data.graded }), dampedZ = damped && discrete && new SampledLoop(data.graded.sampled_loop); // that margins are graded with
+  const REST = 200, UNDOS = 100, law = { ...data.start }; // ms without a move until everything is drawn in full; states that are kept
+  const state = { plane: "poles", loop: "nyquist", vary: "K2", shown: "3" }, usual = { ...state }, past = [], colours = {};
+  const text = (id, words) => { const at = $(id); if (at && at.textContent !== words) at.textContent = words; };
+  function dress() { // colours of the screen, light or dark
+    const style = getComputedStyle(document.documentElement);
+    for (const [name, of] of Object.entries({ ink: "ink", grey: "grey", faint: "line", link: "link", stable: "stable", marginal: "marginal", unstable: "unstable", good: "good", low: "low", poor: "poor" })) colours[name] = style.getPropertyValue(`--${of}`).trim();
+    Object.assign(colours, { blue: colours.link, orange: colours.ink });
   }
-  // 0 and powers of ten, each second one where they are many
-  function ticks(low, high, linear) {
-    const sizes = [...Array(16).keys()].map(k => linear * 10 ** k).filter(x => x <= Math.max(high, -low));
-    const shown = sizes.filter((_, i) => sizes.length < 5 || (sizes.length - 1 - i) % 2 === 0);
-    return [0, ...shown, ...shown.map(x => -x)].filter(x => low <= x && x <= high);
-  }
-  async function draw(name) {
-    const drawn = spec(name), [width, height] = room(name), sets = charts[name](now, true);
-    drawn.width = width;
-    if (height) drawn.height = height;
-    for (const each of drawn.data) if (sets[each.name]) each.values = sets[each.name];
-    views[name] = (await vegaEmbed(`#${name}`, drawn, { mode: "vega", actions: false, renderer: "canvas" })).view;
-    if (name === "map") mapped = now.law.Kp;
-    begun[name]?.();
-  }
-  const STACKED = { bode: 580, slew: 520 }; // pixels of charts that are several, one below the other
-  function room(name) {
-    const wide = Math.max($(name).clientWidth - 70, 200);
-    if (name === "sensor") return [Math.min(wide - 40, 420), Math.min(wide, 340)]; // names are at its side
-    return STACKED[name] ? [wide, 0] : name === "zplane" ? [Math.min(wide, 340), Math.min(wide, 340)] : [Math.min(wide, 420), Math.min(wide, 340)];
-  }
-  function fit(name) {
-    const [width, height] = room(name);
-    views[name].width(width);
-    if (height) views[name].height(height);
-  }
-  const area = (what, list) => list.map(row => ({ ...row, what, part: `${what}${row.part}` })), sampledArea = () => data.sampled_map ? data.sampled_map.areas : [];
-  const continuousArea = list => area("stable, continuous", list);
-  // The regions where they are known at once: the sampled one is known at Kp = 0 alone, and Kp > 0 moves no edge of a lossless loop
-  const areas = ({ Kp }) => !Kp ? [...continuousArea(data.continuous), ...area("stable, sampled", sampledArea())] : loop.kind === "reactive" ? continuousArea(data.continuous) : null;
-  const stale = ({ Kp }) => Kp ? area("of Kp = 0", sampledArea()) : [];
-  const proven = () => data.lyapunov ? [[0, data.axes.K2.low], [0, 1], [data.axes.K1.high, 1]].map(([K1, K2], t) => ({ K1, K2, t })) : [];
-  let mapped = null; // of which Kp the map shows the curve
+  dress();
 
   // ---------------------------------------------------------------- numbers of these gains
 
   let now = null; // of the gains last moved to
-  now = numbers(law);
+  const slowest = poles => Math.max(...poles.map(s => s[0])), constant = x => x ? -1 / x : Infinity;
+  const ratio = poles => Math.min(...poles.filter(s => s[1] > 0).map(s => -s[0] / size(s)));
+  const word = growths => growths.length && Math.max(...growths) > 0 ? "unstable" : Math.max(...growths) < 0 ? "stable" : "marginal";
   function numbers(gains) {
-    const law = { ...gains }, poles = loop.poles(law, now?.poles), [verdict, why] = loop.verdict(law, poles), points = loop.dense(poles, law);
-    const margins = verdict.startsWith("stable") ? loop.margins(law, points) : null, near = poles.slice(0, +$("shown").value), top = 1.08 * Math.max(...near.map(s => s[1]), 1), drawn = {};
-    const lowest = Math.min(loop.places[0] / 200, ...(margins ? margins.crossed.map(row => row.w / 3) : []));
-    const left = 1.15 * Math.min(...near.map(s => s[0]), -1e-4 * top), right = Math.max(-0.05 * left, 1.3 * Math.max(...near.map(s => s[0])));
+    const law = { ...gains }, is_known = loop.kind === "reactive" && loop.verdict(law, [])[0] === "stable"; // without poles: those of the chart are enough
+    const poles = loop.poles(law, now?.poles, Infinity, is_known ? 12 : Infinity), [verdict, why] = loop.verdict(law, poles);
+    const seen = damped || loop, own = damped ? damped.poles(law, now?.own) : poles, curve = seen.dense(own, law);
+    const z = discrete && discrete.poles(law, now?.z), stable = verdict.startsWith("stable"), grows = verdict === "unstable" || poles.some(s => s[0] > 1e-9 * size(s)), near = poles.slice(0, +state.shown);
+    const is_seen = damped ? !grows && damped.verdict(law, own)[0].startsWith("stable") : stable;
+    const margins = is_seen ? seen.margins(law, curve, false) : null, shownPoles = damped && !grows ? own : poles;
+    const top = 1.08 * Math.max(...near.map(s => s[1]), 1), left = 1.15 * Math.min(...near.map(s => s[0]), -1e-4 * top), right = Math.max(-0.05 * left, 1.3 * Math.max(...near.map(s => s[0])));
+    const from = Math.min(loop.places[0] / 50, ...(margins ? margins.crossed.map(row => row.w / 3) : [])), drawn = {};
     return {
-      law, poles, verdict, why, margins, near, areas: now?.law.Kp === law.Kp ? now.areas : areas(law), frame: { x: [left, right], y: [0, top] },
-      z: discrete && discrete.poles(law, now?.z), run: slew && slew.run(law), curve: fine => drawn[fine] ||= curveOf(loop, law, points, fine, lowest),
+      law, poles, own, verdict, why, stable, grows, margins, near, frame: { x: [left, right], y: [0, top] }, ...sampledNumbers(law, z),
+      ratio: ratio(shownPoles), constant: constant(slowest(shownPoles)), from, run: slew && slew.run(law), curve: fine => drawn[fine] ||= curveOf(curve, fine, from),
+      areas: now && now.law.Kp === law.Kp ? now.areas : areas(law), edge: now && now.law.Kp === law.Kp ? now.edge : null,
     };
   }
+  function sampledNumbers(law, z) {
+    if (!z) return { z, zword: "not computed", zmargins: null };
+    const zword = word(z.map(each => each.growth)), of = zword === "unstable" || !dampedZ ? discrete : dampedZ, own = of === discrete ? z : of.poles(law, now?.zown);
+    if (!own) return { z, zword, zmargins: null };
+    const curve = of.curve(law, own), T = of.period, is_stable = word(own.map(each => each.growth)) === "stable";
+    const scaled = { ...curve, w: curve.w.map(q => q / T), at: w => curve.at(w * T) };
+    return {
+      z, zword, zown: of === discrete ? null : own, zmargins: is_stable ? of.margins(law, curve, loop.restOf(law)) : null, zratio: ratio(of.unaliased(own)),
+      zconstant: T * constant(Math.max(...own.map(each => each.growth))), zcurve: from => curveOf(scaled, false, from),
+    };
+  }
+
+  // ---------------------------------------------------------------- the card: tfarm.case.card
+
+  const grade = (size, [good, low]) => { const way = good > low ? 1 : -1; return way * size >= way * good ? "good" : way * size >= way * low ? "low" : "poor"; };
+  const infinite = x => Number.isFinite(x) ? general(x, 4) : "no limit", decibels = factor => factor > 1e-9 && factor < 1e9 ? Math.abs(dB(factor)) : Infinity;
+  function card(of, margins, period) {
+    const { limits } = data, cells = margins ? {
+      up: [decibels(margins.gain[1]), limits.gain], down: [decibels(margins.gain[0]), limits.gain], phase: [Math.abs(margins.phase.value), limits.phase],
+      delay: [1e3 * margins.delay.value, limits.periods.map(x => 1e3 * x * period)], peak: [margins.peak_sensitivity.value, limits.peak],
+    } : {};
+    for (const name of ["up", "down", "phase", "delay", "peak"]) {
+      const [value, limit] = cells[name] || [], found = limit ? grade(value, limit) : "";
+      const is_bound = of === "z" && name === "delay" && value > 1e3 * data.longest_delay; // where tfarm searches no further
+      text(`${of}-${name}`, limit ? is_bound ? `≥ ${general(1e3 * data.longest_delay, 4)}` : infinite(value) : "-");
+      text(`${of}-${name}-grade`, found);
+      $(`${of}-${name}-grade`).className = `grade ${found}`;
+    }
+  }
+  function pill(id, words, kind) {
+    text(id, words);
+    $(id).className = `pill ${kind}`;
+  }
   function show() {
-    const { law, verdict, why, margins } = now;
-    text("verdict", verdict);
-    $("verdict").className = `verdict ${verdict.startsWith("stable") ? "ok" : "corrected"}`;
-    text("why", why);
+    const { law, verdict, why, margins, zmargins, zword } = now, period = data.period;
+    pill("verdict", now.grows ? "unstable" : now.stable ? "stable" : "marginal", now.grows ? "unstable" : now.stable ? "stable" : "marginal");
+    pill("sampled", zword, now.z ? zword : "marginal");
+    text("why", `${why}.`);
+    card("s", margins, period);
+    card("z", zmargins, period);
+    text("s-ratio", Number.isFinite(now.ratio) ? general(100 * now.ratio, 4) : "-");
+    text("z-ratio", Number.isFinite(now.zratio) ? general(100 * now.zratio, 4) : "-");
+    text("s-constant", Number.isFinite(now.constant) ? general(now.constant, 4) : "-");
+    text("z-constant", Number.isFinite(now.zconstant) ? general(now.zconstant, 4) : "-");
+    if (slew) { now.figures = slew.figures(now.run); const { settled } = now.figures; text("slew-settled", Number.isFinite(settled) ? general(settled, 5) : `not settled within ${general((now.run.n - 1) * slew.period, 5)} s`); }
+    $("scaled").hidden = !names.every(name => law[name] === data.default[name]);
     names.forEach(name => { $(`slider-${name}`).value = place(data.axes[name], law[name]); if (document.activeElement !== $(name)) $(name).value = law[name]; });
-    const gains = `${data.command_name} --K1 ${law.K1} --K2 ${law.K2} --Kp ${law.Kp}`;
+    text("map-note", !law.Kp ? `K1 = ${general(law.K1, 4)}, K2 = ${general(law.K2, 4)}` : "The sampled region is known at Kp = 0 and not shown at this Kp; the verdict is that of the gains.");
+    rows("pole-rows", now.poles.slice(0, 5).map(s => [general(s[0], 5), general(s[1], 6), general(hertz(s[1]), 5), dampingRatio(s)]));
+    if ($("more").open) tables();
+  }
+  // What is below the dashboard: the loop as it is, with every margin and crossing
+  function tables() {
+    const { law, z } = now, margins = now.stable ? loop.margins(law, loop.dense(now.poles, law)) : null, gains = `${data.command_name} --K1 ${law.K1} --K2 ${law.K2} --Kp ${law.Kp}`;
+    for (const id of ["margins", "crossovers", "turnings"]) $(id).hidden = !margins;
+    $("no-margins").hidden = !!margins;
     text("command", `tfarm margins ${gains}`);
-    $("map-note").hidden = !law.Kp;
-    table(margins);
-    rows("pole-rows", now.poles.slice(0, 8).map(s => [general(s[0], 6), general(s[1], 7), general(hertz(s[1]), 5), dampingRatio(s)]));
-    showSampled(gains);
-    if (slew) showSlew(gains);
-  }
-  function showSampled(gains) {
-    const most = now.z && Math.max(...now.z.map(each => each.growth));
-    const word = most > 0 ? "unstable" : most < 0 ? "stable" : "marginal";
-    text("sampled", now.z ? word : "not computed");
-    $("sampled").className = `verdict ${now.z && most < 0 ? "ok" : "corrected"}`;
-    text("sampled-note", now.z ? `dominant pole: ln|z| = ${general(most, 3)} per sample; spectral radius ${general(Math.exp(most), 12)}, of the first ${discrete.modes} mode${discrete.modes > 1 ? "s" : ""}` : "not all sampled poles of these gains were found: not determined");
+    if (margins) {
+      text("m-gain", `${general(margins.gain[0], 8)} to ${general(margins.gain[1], 8)}`);
+      for (const name of ["phase", "phase_lag", "phase_lead", "delay", "disk", "peak_sensitivity", "peak_complementary"]) {
+        const { value, at } = margins[name];
+        text(`m-${name}`, general(reliable(value), 6));
+        text(`at-${name}`, at ? `${general(at, 6)} rad/s = ${general(hertz(at), 5)} Hz` : "");
+      }
+      text("whole", whole());
+      rows("gain-crossovers", margins.crossed.map(({ w, angle }) => [general(w, 7), general(hertz(w), 5), general(angle, 6)]));
+      rows("phase-crossovers", margins.crossovers.map(({ w, factor }) => [general(w, 7), general(hertz(w), 5), general(factor, 6)]));
+    }
+    const most = z && Math.max(...z.map(each => each.growth));
+    text("sampled-note", z ? `Dominant pole: ln|z| = ${general(most, 3)} per sample; spectral radius ${general(Math.exp(most), 12)}, of the first ${discrete.modes} mode${discrete.modes > 1 ? "s" : ""}.` : "Not all sampled poles of these gains were found: not determined.");
     text("sampled-command", discrete ? `tfarm sampled ${gains}` : "");
-    rows("z-rows", (now.z || []).filter(({ z }) => z[1] > -1e-14).sort((a, b) => b.growth - a.growth).slice(0, 8).map(({ z, growth }) => [general(z[0], 5), general(Math.abs(z[1]) > 1e-14 ? z[1] : 0, 5), general(Math.exp(growth), 7), general(growth, 4)]));
-  }
-  function showSlew(gains) {
-    const { moment, torque, residual, settled } = slew.figures(now.run), stopped = now.run.stopped;
+    rows("z-rows", (z || []).filter(({ z }) => z[1] > -1e-14).sort((a, b) => b.growth - a.growth).slice(0, 8).map(({ z, growth }) => [general(z[0], 5), general(Math.abs(z[1]) > 1e-14 ? z[1] : 0, 5), general(Math.exp(growth), 7), general(growth, 4)]));
+    if (!slew) return;
+    const { moment, torque, residual } = now.figures, { stopped } = now.run;
     text("slew-torque", general(torque, 5));
     text("slew-moment", general(moment, 5));
     text("slew-residual", residual === null ? "not computed" : general(residual, 5));
-    text("slew-settled", Number.isFinite(settled) ? general(settled, 5) : `not settled within ${general((now.run.n - 1) * slew.period, 5)} s`);
     text("slew-stopped", stopped === null ? "" : `Unstable: simulation stopped at ${general(stopped, 4)} s (deflection limit).`);
     text("slew-command", `tfarm simulate ${gains} --duration ${general(slew.n * slew.period - slew.period, 6)} --modes ${slew.modes}`);
-  }
-  function table(margins) {
-    $("margins").hidden = !margins;
-    $("no-margins").hidden = !!margins;
-    $("crossovers").hidden = !margins;
-    if (!margins) return;
-    text("m-gain", `${general(margins.gain[0], 8)} to ${general(margins.gain[1], 8)}`);
-    for (const name of ["phase", "phase_lag", "phase_lead", "delay", "disk", "peak_sensitivity", "peak_complementary"]) {
-      const { value, at } = margins[name];
-      text(`m-${name}`, general(reliable(value), 6));
-      text(`at-${name}`, at ? `${general(at, 6)} rad/s = ${general(hertz(at), 5)} Hz` : "");
-    }
-    text("whole", whole());
-    rows("gain-crossovers", margins.crossed.map(({ w, angle }) => [general(w, 7), general(hertz(w), 5), general(angle, 6)]));
-    rows("phase-crossovers", margins.crossovers.map(({ w, factor }) => [general(w, 7), general(hertz(w), 5), general(factor, 6)]));
   }
   const reliable = x => Number.isFinite(x) ? +x.toPrecision(9) : x; // to the digits that hold, as `tfarm margins` has it
   function rows(id, cells) {
@@ -156,60 +130,169 @@
     return law.K2 ? "Of the whole loop, whose undamped modes have no end, delay and disk margin are 0 and the peaks infinite." : "Of the whole loop, whose undamped modes have no end, the delay margin is 0; the others hold.";
   }
 
+  // ---------------------------------------------------------------- charts
+
+  const scales = {}, pointed = {};
+  let zoom = 1;
+  const area = (list, part) => list.map(row => ({ ...row, part: `${part}${row.part}` })), sampledAreas = data.sampled_map ? data.sampled_map.areas : [];
+  // The regions where they are known at once: the sampled one is known at Kp = 0 alone, and Kp > 0 moves no edge of a lossless loop
+  const areas = ({ Kp }) => !Kp || loop.kind === "reactive" ? area(data.continuous, "c") : null;
+  const proven = data.lyapunov ? [[0, data.axes.K2.low], [0, 1], [data.axes.K1.high, 1]].map(([K1, K2]) => ({ K1, K2 })) : [];
+  function gainAxis(name) {
+    const { low, high, linear } = data.axes[name], unit = data.units[name], sizes = linear === null ? [] : [...Array(16).keys()].map(k => linear * 10 ** k).filter(x => x <= Math.max(high, -low));
+    const shown = sizes.filter((_, i) => sizes.length < 5 || (sizes.length - 1 - i) % 2 === 0); // 0 and powers of ten, each second one where they are many
+    const values = linear === null ? undefined : [0, ...shown, ...shown.map(x => -x)].filter(x => low <= x && x <= high);
+    return { low, high, label: unit === "1" ? name : `${name} [${unit}]`, values, ...(linear === null ? {} : { kind: "symlog", constant: linear }) };
+  }
+  const plane = { x: gainAxis("K1"), y: gainAxis("K2") }, limited = (margins, of) => margins ? [margins.phase, margins.peak_sensitivity][of] : null;
+  const kindOf = x => x < 0 ? "stable" : x > 0 ? "unstable" : "marginal", shapes = { stable: CROSS, marginal: BOX, unstable: RING };
+  const polePoints = (list, x, y, sign) => ({ points: list, x, y, shape: row => shapes[kindOf(sign(row))], colour: row => colours[kindOf(sign(row))] });
+  function phaseMargin() {
+    const at = limited(now.margins, 0);
+    return at && at.at ? { w: at.at, low: -180, high: at.value - 180, colour: colours[grade(Math.abs(at.value), data.limits.phase)] } : null;
+  }
+  function gainStems() {
+    if (!now.margins) return [];
+    return now.margins.gain.flatMap(factor => now.margins.crossovers.filter(row => row.w > 0 && Math.abs(row.factor / factor - 1) < 1e-6).map(({ w }) => ({ w, low: Math.max(-dB(factor), -60), high: 0, colour: colours[grade(decibels(factor), data.limits.gain)] })));
+  }
+  const half = loop => circle(-1, 0.5).map(({ x, y }) => loop === "nyquist" ? { x, y } : { angle: degrees([-x, -y]) - 180, dB: dB(Math.hypot(x, y)) });
+  const turned = list => list.map(row => ({ ...row, angle: row.angle - 180 })), cursor = () => pointed.bode ? [{ rule: pointed.bode.w, along: "x", dash: [3, 3] }] : [];
+  const sampledCurve = () => now.zcurve ? (now.zrows ||= turned(now.zcurve(now.from))) : [], own = fine => (now.rows ||= {})[fine] ||= turned(now.curve(fine));
+  const charts = {
+    map: () => [{ ...plane, marks: [
+      { area: now.areas || [], x: "K1", low: "low", high: "high", by: "part", fill: colours.stable },
+      { area: now.law.Kp ? [] : sampledAreas, x: "K1", low: "low", high: "high", by: "part", hatch: colours.stable, dash: [5, 3] },
+      { line: now.edge || [], x: "K1", y: "K2", by: "piece", colour: colours.stable, width: 1 }, { line: proven, x: "K1", y: "K2", colour: colours.ink, dash: [2, 3] },
+      { rule: now.law.K1, along: "x" }, { rule: now.law.K2 }, { points: [now.law], x: "K1", y: "K2", shape: DOT, colour: colours.ink },
+    ] }],
+    poles: () => [{
+      x: { low: now.frame.x[0], high: now.frame.x[1], label: "Re s [1/s]" }, y: { low: now.frame.y[0], high: now.frame.y[1], label: "Im s [rad/s]" }, marks: [
+        { line: rays(now.frame), x: "re", y: "im", by: "ratio", colour: colours.grey, dash: [4, 3], width: 0.8 }, { words: rays(now.frame).filter(row => row.end), x: "re", y: "im", text: "ratio", colour: colours.grey },
+        { rule: 0, along: "x" }, { line: now.locus || [], x: "re", y: "im", by: "piece", colour: colours.link, width: 1 }, { points: pointed.poles ? [pointed.poles] : [], x: "re", y: "im", shape: DOT, colour: colours.link },
+        polePoints(now.near, 0, 1, s => s[0]),
+      ],
+    }],
+    zplane: () => {
+      const [wide, high] = equal("zplane", 1.25);
+      return [{ x: { low: -wide, high: wide, label: "Re z" }, y: { low: -high, high, label: "Im z" }, marks: [
+        { line: spirals(), x: "re", y: "im", by: "ratio", colour: colours.grey, dash: [4, 3], width: 0.8 }, { line: circle(0, 1), x: "x", y: "y", colour: colours.grey },
+        { line: now.discs || [], x: "re", y: "im", by: "piece", colour: colours.link, width: 1 }, { points: pointed.zplane ? [pointed.zplane] : [], x: "re", y: "im", shape: DOT, colour: colours.link },
+        polePoints((now.z || []).map(({ z, growth }) => ({ re: z[0], im: z[1], growth })), "re", "im", row => row.growth),
+      ] }];
+    },
+    bode: fine => {
+      const x = { low: now.from, high: (damped || loop).band, kind: "log", label: "frequency [rad/s]" }, phase = phaseMargin(), crossed = now.margins ? now.margins.crossed : [];
+      return [
+        { x, y: { low: -60, high: 40, label: "|L| [dB]" }, marks: [
+          { rule: 0 }, ...cursor(), { line: sampledCurve(), x: "w", y: "dB", colour: colours.grey, dash: [5, 3] }, { line: own(fine), x: "w", y: "dB", colour: colours.ink },
+          ...gainStems().map(each => ({ stems: [each], colour: each.colour })), { points: crossed.map(({ w }) => ({ w, y: 0 })), x: "w", y: "y", shape: RING, radius: 3, colour: colours.ink },
+        ] },
+        { x, y: { low: -360, high: 0, label: "angle of L [deg]", values: [-360, -270, -180, -90, 0] }, marks: [
+          { rule: -180 }, ...cursor(), { line: sampledCurve(), x: "w", y: "angle", by: "branch", colour: colours.grey, dash: [5, 3] }, { line: own(fine), x: "w", y: "angle", by: "branch", colour: colours.ink },
+          ...(phase ? [{ stems: [phase], colour: phase.colour }] : []),
+        ] },
+      ];
+    },
+    nyquist: fine => {
+      const here = pointed.bode ? turned([pointed.bode]) : [], [wide, high] = equal("nyquist", 2.5 * zoom);
+      if (state.loop === "sensitivity") return [{ x: { low: now.from, high: (damped || loop).band, kind: "log", label: "frequency [rad/s]" }, y: { low: -50, high: 30, label: "|S|, |T| [dB]" }, marks: [
+        { rule: 0 }, { rule: 6, dash: [2, 3] }, ...cursor(), { line: own(fine), x: "w", y: "T", colour: colours.link }, { line: own(fine), x: "w", y: "S", colour: colours.ink, width: 1.8 },
+      ] }];
+      const nichols = state.loop === "nichols", [x, y] = nichols ? ["angle", "dB"] : ["x", "y"], by = nichols ? "branch" : undefined;
+      const axes = nichols ? { x: { low: -360, high: 0, label: "angle of L [deg]", values: [-360, -270, -180, -90, 0] }, y: { low: -40 * zoom, high: 40 * zoom, label: "|L| [dB]" } }
+        : { x: { low: -wide, high: wide, label: "Re L" }, y: { low: -high, high, label: "Im L" } };
+      return [{ ...axes, marks: [
+        ...(nichols ? [{ rule: 0 }, { rule: -180, along: "x" }] : [{ line: circle(0, 1), x: "x", y: "y", colour: colours.grey, width: 1 }]), { line: half(state.loop), x, y, colour: colours.grey, dash: [2, 3], width: 1 },
+        { line: sampledCurve(), x, y, by, colour: colours.grey, dash: [5, 3] }, { line: own(fine), x, y, by, colour: colours.ink },
+        { points: [nichols ? { angle: -180, dB: 0 } : { x: -1, y: 0 }], x, y, shape: CROSS, colour: colours.ink }, { points: here, x, y, shape: DOT, colour: colours.link },
+      ] }];
+    },
+    slew: fine => {
+      const found = slewSets(slew, now.run, fine ? Math.ceil(20 * slew.fastest(now.run) * slew.period / (2 * Math.PI)) : 0, $("slew").clientWidth);
+      const x = { low: 0, high: (slew.n - 1) * slew.period, label: "time [s]" }, at = player ? [{ rule: player.time, along: "x" }] : [];
+      return [["angle", "y", "hub [rad]", [{ line: found.torque, x: "t", y: "reference", colour: colours.grey, dash: [5, 3] }]], ["torque", "torque", `${slew.drive.slice(0, 7)} [${slew.unit}]`], ["moment", "y", "root [N m]"], ["tip", "y", "tip [m]"]].map(([name, key, label, more = []]) => {
+        const values = found[name].map(row => row[key]), low = Math.min(...values), high = Math.max(...values), room = 0.06 * (high - low) || 1;
+        return { x, y: { low: low - room, high: high + room, label }, marks: [...more, { line: found[name], x: "t", y: key, colour: colours.ink, width: 1.2 }, ...at] };
+      });
+    },
+    sensor: () => sensor.plots(),
+  };
+  // Half of each axis where both have one scale, the shorter one `least`
+  function equal(name, least) {
+    const [wide, high] = room(name);
+    return [least * Math.max(1, wide / high), least * Math.max(1, high / wide)];
+  }
+  const canvasOf = name => $(name).querySelector("canvas");
+  function draw(name, fine = true) {
+    if ($(name) && $(name).offsetParent && $(name).clientHeight > 80) scales[name] = paint(canvasOf(name), charts[name](fine), colours);
+  }
+  const drawAll = fine => ["map", "poles", "zplane", "bode", "nyquist", ...(slew ? ["slew"] : [])].forEach(name => draw(name, fine));
+  const room = name => [canvasOf(name).clientWidth - LEFT - RIGHT, canvasOf(name).clientHeight - TOP - BELOW];
+  function notes() {
+    const { margins } = now, gain = margins && gainStems().map(({ w, low }) => `gain margin ${general(Math.abs(low), 4)} dB at ${general(w, 4)} rad/s`), phase = limited(margins, 0), peak = limited(margins, 1);
+    text("reading", margins ? [...gain, phase.at ? `phase margin ${general(Math.abs(phase.value), 4)}° ${phase.value < 0 ? "(lead)" : "(lag)"} at ${general(phase.at, 4)} rad/s` : ""].filter(Boolean).join("; ") : "An unstable loop has no margins.");
+    const circles = { nyquist: "Unit circle; dotted: Ms = 2. Shift and the wheel zoom.", nichols: "Cross: −1; dotted: Ms = 2. Shift and the wheel zoom.", sensitivity: "Thick: S; thin: T; dotted: 6 dB." };
+    text("loop-note", `${margins && peak.at ? `Ms ${general(peak.value, 4)} at ${general(peak.at, 4)} rad/s. ` : ""}${circles[state.loop]}`);
+  }
+
   // ---------------------------------------------------------------- moves: gains change here alone, a frame draws the last of them
 
   let waiting = false, resting = 0;
   function set(changes) {
-    for (const [name, value] of Object.entries(changes)) if (Number.isFinite(value)) law[name] = clip(value, data.axes[name].low, data.axes[name].high);
+    for (const [name, value] of Object.entries(changes)) {
+      if (name in law) { if (Number.isFinite(value)) law[name] = clip(value, data.axes[name].low, data.axes[name].high); } else state[name] = value;
+    }
     if (waiting) return;
     waiting = true;
     requestAnimationFrame(() => { waiting = false; move(); });
   }
-  async function move() {
+  function move() {
     const start = performance.now();
     clearTimeout(resting);
     now = numbers(law);
-    show();
-    await keepUp(false);
+    dressed();
+    drawAll(false); // first: what is written changes the layout, which a chart would wait for
     player?.show(now.run);
+    show();
+    notes();
     resting = setTimeout(rest, REST, now);
     window.live.moves.push(performance.now() - start);
   }
-  async function keepUp(fine) {
-    await Promise.all([...inView].filter(name => views[name] && name !== "sensor").map(name => update(name, fine)));
+  function dressed() { // what is chosen
+    for (const [id, key] of [["plane", "plane"], ["loop", "loop"]]) for (const button of $(id).children) button.setAttribute("aria-pressed", button.value === state[key]);
+    for (const id of ["vary", "shown"]) $(id).value = state[id];
+    for (const id of ["poles", "zplane"]) $(id).hidden = id !== state.plane;
   }
-  function update(name, fine) {
-    const view = views[name];
-    for (const [of, rows] of Object.entries(charts[name](now, fine))) view.data(of, rows);
-    if (name === "poles") view.signal("framed_x", now.frame.x).signal("framed_y", now.frame.y);
-    if (name === "map") mapped = now.law.Kp;
-    return view.runAsync();
-  }
-  // All points, and then the region and the loci of the charts in view, a few gains at a time
-  const WORK = [["map", "areas", inPlane, "areas"], ["poles", "locus", inS, "locus"], ["zplane", "discs", inZ, "locus"]];
+  // All points, and then the curve of gains on the axis, the region and the locus, a few gains at a time; link and undo keep this state
   async function rest(of) {
     if (of.resting) return;
     of.resting = true;
-    await keepUp(true);
-    for (let next; (next = WORK.find(([name, key]) => views[name] && (name === "poles" || inView.has(name)) && !of[key]));) {
-      const [name, key, work, set] = next, found = await inSlices(work(), of);
+    keep();
+    drawAll(true);
+    const work = [["map", "edge", onAxis], ["map", "areas", inPlane], state.plane === "poles" ? ["poles", "locus", inS] : ["zplane", "discs", inZ]];
+    for (const [name, key, make] of work) {
+      const found = of[key] || await inSlices(make(), of);
       if (!found) return;
       of[key] = found;
-      await views[name].data(set, found).runAsync();
+      draw(name);
     }
     of.resting = false;
     window.live.rested = of.law;
   }
   const along = gain => [share => gainAt(data.axes[gain], share, 8), K => ({ ...now.law, [gain]: K })];
+  function* onAxis() {
+    yield;
+    return loop.kind === "reactive" ? [] : edgeOf(w => loop.boundary(w, now.law), [...loop.base.w], data.axes);
+  }
   function* inPlane() {
-    return continuousArea(yield* regionOf(loop, now.law.Kp, data.axes));
+    return area(yield* regionOf(loop, now.law.Kp, data.axes), "c");
   }
   function inS() {
-    const [gain, law] = along($("vary").value), { frame } = now;
+    const [gain, law] = along(state.vary), { frame } = now;
     return locus((K, before) => { const found = loop.poles(law(K), before?.found, frame.y[1]); return { points: [...found], found }; }, gain, frame, room("poles"));
   }
   function inZ() {
-    const [gain, law] = along($("vary").value), view = { x: [-1.25, 1.25], y: [-1.25, 1.25] };
+    const [gain, law] = along(state.vary), view = { x: [-1.25, 1.25], y: [-1.25, 1.25] };
     return locus((K, before) => { const found = discrete.poles(law(K), before?.found, 1e-6); return { points: (found || []).filter(each => size(each.z) > FAINT).map(each => each.z), found }; }, gain, view, room("zplane"));
   }
   async function inSlices(work, of) {
@@ -223,79 +306,116 @@
     }
   }
 
-  // ---------------------------------------------------------------- pointing
+  // ---------------------------------------------------------------- states: link, undo, file
 
-  const canvas = view => view.container().querySelector("canvas").getBoundingClientRect();
-  function drag() {
-    const view = views.map;
-    let going = false;
-    const follow = event => {
-      const box = canvas(view), [left, top] = view.origin();
-      const x = view.scale("x").invert(event.clientX - box.left - left), y = view.scale("y").invert(event.clientY - box.top - top);
-      set({ K1: +x.toPrecision(4), K2: +y.toPrecision(4) });
-    };
-    view.container().addEventListener("pointerdown", event => { going = true; follow(event); });
-    window.addEventListener("pointermove", event => { if (going) follow(event); });
-    window.addEventListener("pointerup", () => { going = false; });
-    view.container().style.touchAction = "none";
+  let written = location.hash.slice(1);
+  const stateNow = () => ({ ...Object.fromEntries(names.map(name => [name, law[name]])), ...state });
+  function link() {
+    const shown = Object.entries(stateNow()).filter(([name, value]) => name in law ? value !== data.start[name] : value !== usual[name]);
+    return shown.map(([name, value]) => `${name}=${value}`).join("&");
   }
+  function linked() {
+    const pairs = new URLSearchParams(location.hash.slice(1)), found = { ...data.start, ...usual };
+    const choices = { plane: discrete ? ["poles", "zplane"] : ["poles"], loop: ["nyquist", "nichols", "sensitivity"], vary: names, shown: ["3", "5", "8", "12"] };
+    for (const [name, value] of pairs) if (name in law && value && Number.isFinite(+value)) found[name] = +value; else if (choices[name]?.includes(value)) found[name] = value;
+    return found;
+  }
+  function keep() {
+    if (written !== link()) location.replace(`#${written = link()}`); // from the disk too, where the history is closed
+    const here = stateNow(), last = past[past.length - 1];
+    $("undo").disabled = past.length < 2;
+    if (last && Object.keys(here).every(key => here[key] === last[key])) return;
+    past.push(here);
+    if (past.length > UNDOS) past.shift();
+    $("undo").disabled = past.length < 2;
+  }
+  function undo() {
+    keep();
+    if (past.length < 2) return;
+    past.pop();
+    set(past[past.length - 1]);
+  }
+  // The table of `tfarm.arm.writing.law_toml`
+  function lawFile() {
+    const used = ["Kp", "K1", "K2"].filter(name => law[name]), number = x => /[.e]/.test(String(x)) ? String(x) : `${x}.0`;
+    const signals = (used.length ? used : ["K1"]).map(name => `\n[law.${data.outputs[name]}]\ngain = ${number(law[name])}\n`);
+    return `[law]\nname = "gains at the hub"\nreferences = [${used.map(name => `"${data.outputs[name]}"`).join(", ")}]\n${signals.join("")}`;
+  }
+  function save() {
+    const at = Object.assign(document.createElement("a"), { href: URL.createObjectURL(new Blob([lawFile()], { type: "application/toml" })), download: `${data.name.replace(/[^\w.-]+/g, "_")}-law.toml` });
+    at.click();
+    setTimeout(() => URL.revokeObjectURL(at.href), 1000);
+  }
+  async function copy() {
+    keep();
+    try { await navigator.clipboard.writeText(location.href); text("copy", "Copied"); } catch { text("copy", "Copy the address"); }
+    setTimeout(() => text("copy", "Copy link"), 1500);
+  }
+
+  // ---------------------------------------------------------------- pointing and keys
+
+  function pointing(name, follow) {
+    canvasOf(name).addEventListener("pointermove", event => { const box = canvasOf(name).getBoundingClientRect(); follow(event.clientX - box.left, event.clientY - box.top, event); });
+  }
+  let dragged = false;
+  const toGains = (x, y) => { const [{ x: across, y: up }] = scales.map; set({ K1: +across.back(x).toPrecision(4), K2: +up.back(y).toPrecision(4) }); };
+  canvasOf("map").addEventListener("pointerdown", event => { dragged = true; canvasOf("map").setPointerCapture(event.pointerId); toGains(event.offsetX, event.offsetY); });
+  pointing("map", (x, y) => { if (dragged) toGains(x, y); });
+  addEventListener("pointerup", () => { dragged = false; });
+  $("map").addEventListener("keydown", event => {
+    const ways = { ArrowLeft: ["K1", -1], ArrowRight: ["K1", 1], ArrowDown: ["K2", -1], ArrowUp: ["K2", 1] }, way = ways[event.key];
+    if (!way) return;
+    event.preventDefault();
+    const [name, side] = way, axis = data.axes[name];
+    set({ [name]: gainAt(axis, clip(place(axis, law[name]) + side * (event.shiftKey ? 0.001 : 0.01), 0, 1)) });
+  });
+  addEventListener("keydown", event => {
+    const typing = event.target.type === "number";
+    if (event.key === "z" && (event.ctrlKey || event.metaKey || !typing)) { event.preventDefault(); undo(); }
+  });
   // What the curves are under the pointer, in words
-  function readCurves() {
-    const view = views.bode, group = () => view.scenegraph().root.items[0].items.find(mark => mark.marktype === "group").items[0];
-    view.container().addEventListener("pointermove", event => {
-      const w = view.scale("x").invert(event.clientX - canvas(view).left - view.origin()[0] - group().x), curve = now.curve(true);
-      let low = 0, high = curve.length - 1;
-      while (high - low > 1) { const middle = (low + high) >> 1; if (curve[middle].w < w) low = middle; else high = middle; }
-      const row = curve[high];
-      if (!row) return;
-      const both = x => `${general(x, 4)} dB (${general(10 ** (x / 20), 4)})`;
-      text("reading", `${general(row.w, 5)} rad/s = ${general(hertz(row.w), 5)} Hz: L ${both(row.dB)}, angle of −L ${general(row.angle, 4)}°, S ${both(row.S)}, T ${both(row.T)}`);
-      for (const name of ["bode", "nyquist"]) views[name]?.data("cursor_at", [row]).runAsync();
-    });
-  }
+  pointing("bode", x => {
+    const w = scales.bode[0].x.back(x), curve = now.curve(true), row = curve.find(each => each.w >= w);
+    if (!row) return;
+    pointed.bode = row;
+    text("reading", `${general(row.w, 5)} rad/s = ${general(hertz(row.w), 5)} Hz: L ${general(row.dB, 4)} dB, ${general(row.angle - 180, 4)}°, S ${general(row.S, 4)} dB, T ${general(row.T, 4)} dB`);
+    draw("bode");
+    draw("nyquist");
+  });
+  canvasOf("bode").addEventListener("pointerleave", () => { pointed.bode = null; notes(); draw("bode"); draw("nyquist"); });
+  canvasOf("nyquist").addEventListener("wheel", event => { if (event.shiftKey) { event.preventDefault(); zoom = clip(zoom * 1.002 ** (event.deltaY || event.deltaX), 0.02, 50); draw("nyquist"); } }, { passive: false });
   // The gain at the place of a locus that is nearest to the pointer
   function readLocus(name, key, words) {
-    const view = views[name];
-    view.container().addEventListener("pointermove", event => {
-      const box = canvas(view), x = event.clientX - box.left - view.origin()[0], y = event.clientY - box.top - view.origin()[1], [sx, sy] = [view.scale("x"), view.scale("y")];
+    pointing(name, (x, y) => {
+      const [{ x: across, y: up }] = scales[name];
       let best = null, gap = 30 ** 2;
-      for (const row of now[key] || []) { const far = (sx(row.re) - x) ** 2 + (sy(row.im) - y) ** 2; if (far < gap) [best, gap] = [row, far]; }
-      if (best) text(`${name}-reading`, `${$("vary").value} = ${general(best.gain, 5)}: ${words(best)}`);
-      view.data("pointed", best ? [best] : []).runAsync();
+      for (const row of now[key] || []) { const far = (across.at(row.re) - x) ** 2 + (up.at(row.im) - y) ** 2; if (far < gap) [best, gap] = [row, far]; }
+      text("poles-reading", best ? `${state.vary} = ${general(best.gain, 5)}: ${words(best)}` : "Point at a locus: its gain there.");
+      pointed[name] = best;
+      draw(name);
     });
   }
   const complex = ({ re, im }) => `${general(re, 5)} ${im < 0 ? "−" : "+"} ${general(Math.abs(im), 5)}i`;
-  const begun = {
-    map: drag,
-    bode: readCurves,
-    poles: () => readLocus("poles", "locus", row => `s = ${complex(row)} 1/s, ${general(hertz(row.im), 4)} Hz${row.im ? `, damping ratio ${dampingRatio([row.re, row.im])}` : ""}`),
-    zplane: () => readLocus("zplane", "discs", row => `z = ${complex(row)}, |z| = ${general(size([row.re, row.im]), 5)}`),
-    slew: () => player?.place(views.slew),
-    sensor: () => sensor.place(views.sensor),
-  };
+  readLocus("poles", "locus", row => `s = ${complex(row)} 1/s, ${general(hertz(row.im), 4)} Hz${row.im ? `, damping ratio ${dampingRatio([row.re, row.im])}` : ""}`);
+  readLocus("zplane", "discs", row => `z = ${complex(row)}, |z| = ${general(size([row.re, row.im]), 5)}`);
 
   for (const name of names) {
     $(`slider-${name}`).addEventListener("input", event => set({ [name]: gainAt(data.axes[name], +event.target.value) }));
     $(name).addEventListener("change", event => set({ [name]: +event.target.value }));
   }
-  $("reset").addEventListener("click", () => set(data.start));
-  for (const id of ["vary", "shown"]) $(id).addEventListener("change", () => set({}));
-  addEventListener("resize", () => { Object.keys(views).forEach(fit); set({}); });
-  const sensor = data.sensor && makeSensor(data.sensor, colours), player = slew && makePlayer(slew, colours, now.run);
-  window.live = { loop, discrete, slew, law, player, sensor, moves: [], set, room, get now() { return now; }, rested: null };
-  show();
-  const watcher = new IntersectionObserver(entries => {
-    const came = entries.filter(each => each.isIntersecting).map(each => each.target.id);
-    entries.forEach(each => inView[each.isIntersecting ? "add" : "delete"](each.target.id));
-    Promise.all(came.map(name => views[name] ? update(name, true) : draw(name))).then(() => {
-      window.live.ready ??= performance.now();
-      document.body.dataset.ready = "yes";
-      clearTimeout(resting);
-      resting = setTimeout(rest, REST, now);
-    });
-  }, { rootMargin: "100px" });
-  for (const name of Object.keys(charts).filter(made)) {
-    $(name).style.minHeight = `${STACKED[name] || room(name)[1] + 60}px`;
-    watcher.observe($(name));
-  }
+  for (const [id, act] of Object.entries({ reset: () => set({ ...data.start, ...usual }), undo, copy, save })) $(id).addEventListener("click", act);
+  for (const id of ["plane", "loop"]) $(id).addEventListener("click", event => { if (event.target.value) set({ [id]: event.target.value }); });
+  for (const id of ["vary", "shown"]) $(id).addEventListener("change", event => { now.locus = now.discs = null; set({ [id]: event.target.value }); });
+  $("more").addEventListener("toggle", () => { if ($("more").open) { tables(); draw("sensor"); } });
+  addEventListener("hashchange", () => { if (location.hash.slice(1) !== written) { written = location.hash.slice(1); set(linked()); } });
+  addEventListener("resize", () => { set({}); draw("sensor"); });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { dress(); set({}); draw("sensor"); });
+  const first = linked();
+  for (const [name, value] of Object.entries(first)) (name in law ? law : state)[name] = value;
+  now = numbers(law);
+  const sensor = data.sensor && makeSensor(data.sensor, colours, () => draw("sensor")), player = slew && makePlayer(slew, colours, now.run, () => draw("slew", false));
+  window.live = { loop, discrete, slew, law, player, sensor, moves: [], set, room, lawFile, past, link, get now() { return now; }, rested: null };
+  move();
+  window.live.ready = performance.now();
+  document.body.dataset.ready = "yes";
 })();

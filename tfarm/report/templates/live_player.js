@@ -8,10 +8,10 @@ function slewSets(slew, found, between, width) {
   return { angle: rows(angle), moment: rows(moment), tip: rows(tip), torque };
 }
 
-function makePlayer(slew, colours, first) {
+function makePlayer(slew, colours, first, moved) {
   const $ = id => document.getElementById(id), canvas = $("arm"), still = matchMedia("(prefers-reduced-motion: reduce)");
   const end = () => (found.n - 1) * slew.period, round = x => [1, 2, 5, 10].map(k => k * 10 ** Math.floor(Math.log10(x))).filter(k => k <= x * 1.0001).pop();
-  let found = first, t = 0, playing = false, last = 0, factor = 1, most = { torque: 1, moment: 1 }, view = null;
+  let found = first, t = 0, playing = false, last = 0, factor = 1, most = { torque: 1, moment: 1 };
 
   // Another run: how much its deflection is enlarged, and how long its bars are at most
   function show(run) {
@@ -28,7 +28,6 @@ function makePlayer(slew, colours, first) {
     const state = slew.at(found, t), { angle, deflection } = slew.shape(state), moment = slew.read(5, state.a, state.rigid, state.u);
     paint(angle, deflection, state.u, moment, slew.ideal[5 * state.k + 1]);
     $("frame").textContent = `t = ${t.toFixed(3)} s: hub ${angle.toFixed(4)} rad, ${slew.drive} ${general(state.u, 3)} ${slew.unit}, root moment ${general(moment, 3)} N m, tip deflection ${general(deflection[deflection.length - 1], 3)} m`;
-    mark();
   }
 
   // The arm from above: hub, its line, where the reference has it, and the arm as it is bent
@@ -37,7 +36,7 @@ function makePlayer(slew, colours, first) {
     if (canvas.width !== Math.round(width * ratio)) { canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio); }
     draw.setTransform(ratio, 0, 0, ratio, 0, 0);
     draw.clearRect(0, 0, width, height);
-    const side = slew.travel > 0 ? 1 : -1, x0 = 0.2 * Math.min(width, 500), y0 = side > 0 ? height - 46 : 46, scale = Math.min(width - x0 - 120, height - 90) / slew.reach;
+    const side = slew.travel > 0 ? 1 : -1, x0 = 0.1 * Math.min(width, 500), y0 = side > 0 ? height - 34 : 34, scale = Math.min(width - x0 - 110, height - 60) / slew.reach;
     const at = (along, across, turned) => [x0 + scale * (along * Math.cos(turned) - across * Math.sin(turned)), y0 - scale * (along * Math.sin(turned) + across * Math.cos(turned))];
     const line = (points, colour, thick, dash = []) => {
       draw.beginPath();
@@ -70,18 +69,12 @@ function makePlayer(slew, colours, first) {
     draw.fillText(name, x, height - 10);
   }
 
-  // The line over the curves at this time
-  function mark() {
-    if (!view) return;
-    const origin = view.origin()[0], group = view.scenegraph().root.items[0].items.find(each => each.marktype === "group").items[0];
-    $("played").style.left = `${origin + group.x + view.scale("x")(t)}px`;
-    $("played").hidden = false;
-  }
   function step(time) {
     if (!playing) return;
     const next = t + (time - last) / 1000 * +$("speed").value;
     last = time;
     go(next);
+    moved();
     if (next >= end()) pause(); else requestAnimationFrame(step);
   }
   function play() {
@@ -100,11 +93,11 @@ function makePlayer(slew, colours, first) {
     $("still").hidden = !still.matches;
   }
   $("play").addEventListener("click", () => playing ? pause() : play());
-  $("scrub").addEventListener("input", event => { pause(); go(+event.target.value * end()); });
+  $("scrub").addEventListener("input", event => { pause(); go(+event.target.value * end()); moved(); });
   still.addEventListener("change", heed);
   addEventListener("resize", () => go(t));
   heed();
   t = 0.4 * slew.rise; // a bent arm shows more than one at rest
   show(first);
-  return { show, go, play, pause, place: chart => { view = chart; mark(); }, get time() { return t; }, get playing() { return playing; } };
+  return { show, go, play, pause, get time() { return t; }, get playing() { return playing; } };
 }

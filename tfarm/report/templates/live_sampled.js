@@ -12,14 +12,18 @@ function held(p, t) {
 class SampledLoop {
   constructor(data) {
     Object.assign(this, data);
-    const T = this.period, f = this.fraction, p = doubles(data.eigenvalues), r = doubles(data.residues), m = p.length / 2;
+    const p = doubles(data.eigenvalues), r = doubles(data.residues), m = p.length / 2;
     this.p = [...Array(m).keys()].map(i => pair(p, i)).concat([[0, 0]]); // s = 0 is the last one
-    this.b = this.p.map(each => exp(times(T, each)));
-    this.early = this.p.map(each => held(each, (1 - f) * T));
-    this.late = this.p.map(each => mul(exp(times((1 - f) * T, each)), held(each, f * T)));
+    this.b = this.p.map(each => exp(times(this.period, each)));
     this.residues = this.rigid.map(([, once], o) => [...r.slice(2 * m * o, 2 * m * (o + 1)), once, 0]);
-    this.flat = { b: this.b.flat(), early: this.early.flat(), late: this.late.flat() };
-    this.ramps = [(1 - f) ** 2 * T * T / 2, f * (1 - f / 2) * T * T];
+    this.hold(this.delay, this.fraction);
+  }
+
+  // A zero-order hold that acts `delay` samples and the share f of another one late
+  hold(delay, f) {
+    const T = this.period, early = this.p.map(each => held(each, (1 - f) * T)), late = this.p.map(each => mul(exp(times((1 - f) * T, each)), held(each, f * T)));
+    const flat = { b: this.b.flat(), early: early.flat(), late: late.flat() };
+    return Object.assign(this, { delay, fraction: f, early, late, flat, ramps: [(1 - f) ** 2 * T * T / 2, f * (1 - f / 2) * T * T] });
   }
 
   // What the law makes of each output: residues and static parts of their weighted sum, the rate apart where it is a difference
@@ -95,10 +99,10 @@ class SampledLoop {
       if (size(root.z) < 1e-6) { settled[i] = true; return; } // it decides nothing
       const [g, slope] = this.characteristic(weights, root.z, root.base, root.offset);
       if (!(g[0] || g[1])) { settled[i] = true; return; }
-      let sum = div(slope, g);
+      const sum = div(slope, g), own = this.b[root.base];
       for (const { b, n } of all) {
-        const mine = b === this.b[root.base] ? n - 1 : n;
-        if (mine) sum = add(sum, div([mine, 0], b === this.b[root.base] ? root.offset : minus(root.z, b)));
+        const mine = b === own ? n - 1 : n, x = b === own ? root.offset[0] : root.z[0] - b[0], y = b === own ? root.offset[1] : root.z[1] - b[1], q = mine / (x * x + y * y);
+        if (mine) { sum[0] += x * q; sum[1] -= y * q; }
       }
       for (let k = 0; k < roots.length; k++) if (k !== i) {
         const other = roots[k], [u, v] = root.base === other.base ? [root.offset, other.offset] : [root.z, other.z];
@@ -117,6 +121,69 @@ class SampledLoop {
     const sum = roots.reduce((total, root) => add(total, root.z), [0, 0]);
     if (!bright || size(minus(sum, this.sumOfPoles(law, all))) > FAINT / 4) return null;
     return roots.map(({ z, base, offset }) => ({ z, growth: this.growth(base, offset, z) }));
+  }
+
+  // L at z = e^{iq} as D and N, D = 1, far from poles of the plant on the circle
+  both(q, weights) {
+    const z = [Math.cos(q), Math.sin(q)], T = this.delay;
+    let [value] = this.transfer(weights.law, z, -1, z);
+    if (weights.difference) value = add(value, mul(this.transfer(weights.difference, z, -1, z)[0], div(minus(z, [1, 0]), minus(z, [this.smoothing, 0]))));
+    return [1, 0, ...mul(value, [Math.cos(T * q), -Math.sin(T * q)])];
+  }
+  // What each gain adds to L at angles q near every pole of the plant
+  get base() {
+    const close = this.p.flatMap(([x, y], i) => {
+      const at = Math.abs(Math.atan2(this.b[i][1], this.b[i][0])), away = geometric(Math.max(-0.02 * x * this.period, 1e-6), Math.PI, 30);
+      return y < 0 || size(this.b[i]) < 1e-2 ? [] : [at, ...away.flatMap(x => [at - x, at + x])];
+    });
+    const w = Float64Array.from(new Set([...close.filter(q => q > 1e-6 && q < Math.PI), Math.PI])).sort();
+    const rows = [{ K1: 1, K2: 0, Kp: 0 }, { K1: 0, K2: 1, Kp: 0 }, { K1: 0, K2: 0, Kp: 1 }].map(unit => {
+      const weights = this.weighted(unit);
+      return Float64Array.from([...w].flatMap(q => this.both(q, weights).slice(2)));
+    });
+    Object.defineProperty(this, "base", { value: { w, D: Float64Array.from([...w].flatMap(() => [1, 0])), rows } });
+    return this.base;
+  }
+  curve(law, poles) {
+    const weights = this.weighted(law), at = q => this.both(q, weights);
+    const close = poles.flatMap(({ z, growth }) => z[1] > 0 ? [0, ...AWAY, ...AWAY.map(x => -x)].map(x => Math.atan2(z[1], z[0]) + Math.abs(growth) * x) : []);
+    return curveOn(this.base, [law.K1, law.K2, law.Kp], close.filter(q => q > 1e-6 && q < Math.PI), at);
+  }
+  // Margins, w in rad/s; `rest` is the factor at which a pole at z = 1 ends stability
+  margins(law, curve, rest) {
+    const found = marginsOn(curve, false), [, , last] = curve.at(Math.PI), all = [...found.factors.map(row => row.factor), -1 / last, rest], T = this.period;
+    const lag = row => (row.angle + 360) % 360 * Math.PI / 180 / row.w, near = [...found.crossed].sort((a, b) => lag(a) - lag(b));
+    const at = row => ({ ...row, at: row.at / T }), delays = near.filter((row, i) => i < 3 && lag(row) < 1.3 * lag(near[0]) + 0.3).map(row => this.delayAt(law, row.w, lag(row)));
+    return {
+      ...found, phase: at(found.phase), peak_sensitivity: at(found.peak_sensitivity), delay: { value: T * Math.min(Infinity, ...delays) },
+      gain: [Math.max(0, ...all.filter(t => t >= 0 && t < 1)), Math.min(Infinity, ...all.filter(t => t > 1))],
+    };
+  }
+  // The further delay [samples] at which the crossing of |L| = 1 near q is at -1; a fraction of a sample moves the crossing too
+  delayAt(law, q, from) {
+    let more = from;
+    for (let k = 0; k < 12; k++) {
+      const total = this.delay + this.fraction + more, later = Object.create(this).hold(Math.floor(total), total % 1), weights = later.weighted(law);
+      const f = q => { const [, , x, y] = later.both(q, weights); return Math.log(x * x + y * y); };
+      for (let h = (k ? 1e-5 : 1e-3) * q, j = 0; j < 10; j++, h *= 4) {
+        const [a, b] = [q - h, Math.min(q + h, Math.PI)], [fa, fb] = [f(a), f(b)];
+        if (fa * fb < 0) { q = zeroOf(f, a, fa, b, fb); break; }
+      }
+      const [, , x, y] = later.both(q, weights), step = Math.atan2(-y, -x) / q;
+      more += step + (more + step < 0 ? 2 * Math.PI / q : 0);
+      if (Math.abs(step) < 1e-8) break;
+    }
+    return more;
+  }
+
+  // The poles in s, each at the frequency nearest to that of the mode whose pole in z is nearest: tfarm.case.card
+  unaliased(poles) {
+    const oscillates = ([x, y]) => y > 0 || (x < 0 && y > 1e-12 * x); // a negative z at half the sampling rate
+    return poles.filter(({ z }) => oscillates(z)).map(({ z, growth }) => {
+      const q = Math.atan2(Math.abs(z[1]), z[0]), own = size(this.p[this.based(z).base]) * this.period || q;
+      const [a, b] = [1, -1].map(side => Math.abs(side * q + 2 * Math.PI * Math.round((own - side * q) / (2 * Math.PI))));
+      return [growth / this.period, (Math.abs(a - own) <= Math.abs(b - own) ? a : b) / this.period];
+    });
   }
 
   // What all poles add up to, by the two highest powers of z in F times its poles: none is missing then

@@ -1,4 +1,4 @@
-// What the charts of the live page draw: rows for Vega, of numbers by LiveLoop and SampledLoop.
+// What the charts of the live page draw: rows of numbers by LiveLoop and SampledLoop.
 "use strict";
 const dB = x => 20 * Math.log10(x), hertz = w => w / (2 * Math.PI), clip = (x, a, b) => Math.min(Math.max(x, a), b);
 const RATIOS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5], DISC_RATIOS = [0.02, 0.1, 0.3, 0.6], CROWDED = 0.05; // of the height: lower rays lie on each other
@@ -12,44 +12,32 @@ function gainAt(axis, share, digits = 4) {
   return +(axis.linear === null ? y : Math.sign(y) * axis.linear * Math.expm1(Math.abs(y))).toPrecision(digits);
 }
 
-// The curve over w: points too near to each other left out, others put in where L turns (`fine`); it begins at the frequency `from`
-function curveOf(loop, law, points, fine, from) {
-  const rows = [], small = L => times(1 / (1 + size(L)), L), apart = fine ? 2e-5 : 1e-3;
+// Points of L over w: those too near to each other left out, others put in where L turns (`fine`); it begins at the frequency `from`
+function curveOf({ w, D, N, at }, fine, from) {
+  const rows = [], small = row => { const k = 1 / (1 + row.abs); return [k * row.x, k * row.y]; }, apart = fine ? 2e-5 : 1e-3;
   let branch = 0, last = null;
-  const push = point => {
-    const [D, N] = point.both || loop.parts(point, law), L = div(N, D), abs = Math.max(size(L), 1e-12), angle = degrees(times(-1, L));
-    if (last && Math.abs(angle - last.angle) > 180) branch += 1;
-    const sum = Math.max(size(add(D, N)), 1e-300);
-    last = { w: point.w, x: L[0], y: L[1], abs, dB: dB(abs), angle, branch, S: dB(size(D) / sum), T: dB(Math.max(size(N) / sum, 1e-12)) };
-    rows.push(last);
+  const row = (w, a, b, c, d) => {
+    const q = a * a + b * b, x = (a * c + b * d) / q, y = (a * d - b * c) / q, sum = Math.max(Math.hypot(a + c, b + d), 1e-300), n = Math.hypot(c, d);
+    const abs = Math.max(n / Math.sqrt(q), 1e-12);
+    return { w, x, y, abs, dB: dB(abs), angle: degrees([-x, -y]), S: dB(Math.sqrt(q) / sum), T: dB(Math.max(n / sum, 1e-12)) };
   };
-  for (const point of points) {
-    if (point.w < from || (last && point.w < last.w * (1 + apart))) continue;
+  const push = each => {
+    if (last && Math.abs(each.angle - last.angle) > 180) branch += 1;
+    rows.push(last = Object.assign(each, { branch }));
+  };
+  for (let i = 0; i < w.length; i++) {
+    if (w[i] < from || (last && w[i] < last.w * (1 + apart))) continue;
+    const next = row(w[i], D[2 * i], D[2 * i + 1], N[2 * i], N[2 * i + 1]);
     if (last && fine) {
-      const [D, N] = point.both, from = last.w;
-      const steps = Math.min(12, Math.ceil(size(minus(small(div(N, D)), small([last.x, last.y]))) / 0.03));
-      for (let k = 1; k < steps; k++) push(loop.at(from + (point.w - from) * k / steps));
+      const start = last.w, steps = Math.min(12, Math.ceil(size(minus(small(next), small(last))) / 0.03));
+      for (let k = 1; k < steps; k++) { const q = start + (w[i] - start) * k / steps; push(row(q, ...at(q))); }
     }
-    push(point);
+    push(next);
   }
   return rows;
 }
 
-// Margins as lines; of each kind one without length: Vega asks every set for its range
-function stems(margins, w) {
-  const none = ["gain", "phase", "peak"].map(kind => ({ w, kind, low: 0, high: 0 }));
-  if (!margins) return none;
-  const gain = margins.crossovers.filter(row => row.w > 0).map(({ w, factor }) => ({ w, kind: "gain", low: Math.max(-dB(factor), -80), high: 0 }));
-  const phase = margins.crossed.map(({ w, angle }) => ({ w, kind: "phase", low: 0, high: angle }));
-  const peak = [margins.peak_sensitivity, margins.peak_complementary].map(({ value, at }) => ({ w: at, kind: "peak", low: 0, high: dB(value) }));
-  return [...none, ...gain, ...phase, ...peak.filter(row => row.w > 0 && Number.isFinite(row.high))];
-}
-function rings(margins) {
-  const circle = (ring, centre, radius) => [...Array(121).keys()].map(t => ({ t, ring, x: centre + radius * Math.cos(t * Math.PI / 60), y: radius * Math.sin(t * Math.PI / 60) }));
-  const a = margins ? margins.disk.value / 2 : 1; // no L within |1 + L| = a |1 - L|
-  const disk = a < 0.9 ? circle("disk margin", -(1 + a * a) / (1 - a * a), 2 * a / (1 - a * a)) : [];
-  return [...circle("unit circle", 0, 1), ...disk];
-}
+const circle = (x0, radius) => [...Array(121).keys()].map(t => ({ x: x0 + radius * Math.cos(t * Math.PI / 60), y: radius * Math.sin(t * Math.PI / 60) }));
 
 // Lines of equal damping ratio, in s up to `top` and in z
 function rays({ x, y }) {
@@ -64,7 +52,6 @@ function spirals() {
     return { ratio: side * ratio, re: r * Math.cos(q), im: side * r * Math.sin(q), at: k };
   })));
 }
-const unitCircle = () => [...Array(121).keys()].map(q => ({ q, re: Math.cos(q * Math.PI / 60), im: Math.sin(q * Math.PI / 60) }));
 
 // The curve of gains with a pole on the axis, or on the unit circle: `at(w)` is a point of it; halved where it is coarse, cut where it leaves the map
 function edgeOf(at, frequencies, { K1, K2 }) {

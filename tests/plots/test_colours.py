@@ -1,0 +1,72 @@
+"""The one colour code: what a map and a locus show at a point, by their pixels, and that grey print tells it apart."""
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_hex, to_rgb
+
+import tfarm
+from tfarm.dsp import sampled_map
+from tfarm.loop.locus import locus
+from tfarm.loop.stability import stability
+from tfarm.plots import gain_map, overlay, style
+from tfarm.plots import locus as locus_plot
+from tfarm.spectrum.table import default_gains
+
+LAB = tfarm.load("sasaki2012-lab")
+LAW = default_gains(LAB)
+K1, K2 = np.linspace(-0.5, 2.0, 60), np.linspace(-1.0, 1.5, 61)
+STEP = 4.0  # of CIELAB lightness, of 100: two greys that are told apart
+
+
+def lightness(colour):
+    """CIE 1976 L* of an sRGB colour."""
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in to_rgb(colour)]
+    return 116 * np.cbrt(np.dot((0.2126, 0.7152, 0.0722), linear)) - 16
+
+
+def colour_at(figure, places):
+    """The colours of the picture's pixels at places (x, y) of its first axes."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba())
+    columns, rows = figure.axes[0].transData.transform(places).round().astype(int).T
+    return [to_hex(pixel / 255) for pixel in pixels[pixels.shape[0] - 1 - rows, columns, :3]]
+
+
+def test_regions_are_ever_darker_and_told_apart_in_grey():
+    light = np.array([lightness(colour) for colour in style.REGIONS])
+    assert (np.diff(light) < -STEP).all()
+    assert lightness("#ffffff") == pytest.approx(100.0)
+    assert lightness("#777777") == pytest.approx(50.0, abs=0.2)  # the middle grey
+
+
+def test_a_map_has_the_colour_of_the_number_of_unstable_poles_of_the_loop():
+    figure = gain_map.figure(tfarm.map(LAB, K1, K2))
+    places = [(0.5, 0.5), (-0.05, 0.5), (1.5, 1.35), (-0.3, 0.55)]
+    counts = [stability(LAB, tfarm.HubFeedback(K1=x, K2=y)).unstable_roots for x, y in places]
+    assert counts == [0, 1, 2, 3]
+    assert colour_at(figure, places) == [style.REGIONS[count] for count in counts]
+
+
+def test_a_sampled_region_is_hatched_with_a_dashed_edge_in_the_colour_of_what_is_stable():
+    ax = overlay.figure(tfarm.map(LAB, K1, K2), sampled_map(tfarm.sampled(LAB, LAW).verdict.loop, K1, K2)).axes[0]
+    looks = dict(zip(*ax.get_legend_handles_labels()[::-1], strict=True))
+    one, other = (next(each for label, each in looks.items() if word in label) for word in ("every mode", "sampled"))
+    assert (to_hex(one.get_facecolor()[0]), one.get_hatch()) == (style.REGIONS[0], None)
+    assert other.get_facecolor().size == 0
+    assert other.get_hatch()
+    edges = [line for line in ax.lines if line.is_dashed() and to_hex(line.get_color()) == style.STABLE]
+    assert edges
+    assert to_hex(ax.get_facecolor()) == style.REGIONS[1]
+
+
+@pytest.mark.parametrize("start", [-1.0, 1.6])
+def test_a_branch_is_blue_left_of_the_axis_and_orange_right_of_it(start):
+    """By the pixels in the middle of two pieces of the real axis, on branches that have a pole there."""
+    figure = locus_plot.figure(locus(LAB, LAW, "K2", start, 0.6 - start, points=60, branches=5))
+    assert colour_at(figure, [(-3.2, 0.0), (3.0, 0.0), (3.0, 150.0)]) == [
+        style.STABLE,
+        style.UNSTABLE,
+        style.REGIONS[1],
+    ]
