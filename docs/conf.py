@@ -151,6 +151,11 @@ def write_references(app: Any) -> None:
             path.write_text(text, encoding="utf-8")
 
 
+def escape_bars(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """Keep |L| of a docstring a magnitude: in reStructuredText it is a substitution."""
+    lines[:] = [re.sub(r"(?<!\\)\|", r"\|", line) for line in lines]
+
+
 def write_kernel_settings(app: Any) -> None:
     """Write the profile of the kernels of notebooks, of whose messages only errors are shown; leave no older cache."""
     for each in Path(nb_execution_cache_path).parent.glob("*"):
@@ -209,6 +214,7 @@ def setup(app: Any) -> None:
     """Connect the pages and formulas above to Sphinx."""
     app.connect("builder-inited", write_references)
     app.connect("builder-inited", write_kernel_settings)
+    app.connect("autodoc-process-docstring", escape_bars, priority=900)  # after napoleon
     app.connect("build-finished", check_figures)
     app.connect("build-finished", make_accessible)
     app.add_html_math_renderer("mathml", (write_formula, None), (write_formula, None))
