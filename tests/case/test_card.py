@@ -10,7 +10,7 @@ import pytest
 import tfarm
 from tests.shell import answer, run
 from tfarm.case import card
-from tfarm.dsp import Chain, Sampling, sampled_verdict
+from tfarm.dsp import Chain, Sampling, load_chain, sampled_verdict
 
 BARE, LAB = tfarm.load("sasaki2012"), tfarm.load("sasaki2012-lab")
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
@@ -138,6 +138,14 @@ def test_a_negative_real_pole_oscillates_at_half_the_sampling_rate(K1, K2):
     own = card.unaliased_poles(found)[int(found.poles.mode[n])]
     assert own.real == pytest.approx(math.log(abs(z[n])) / 0.01, rel=1e-9)
     assert own.imag % (2 * math.pi / 0.01) == pytest.approx(math.pi / 0.01, rel=1e-6)
+
+
+def test_a_delay_margin_at_the_end_of_its_search_is_a_lower_bound():
+    rig, chain = tfarm.load("quanser-flexlink"), load_chain("quanser-flexlink")
+    rig, law = rig.having(damping=card.reference_damping(rig)), tfarm.default_gains(rig)
+    own, found = tfarm.result_card(rig, law, chain), tfarm.sampled(rig, law, chain)
+    assert found.is_lower_bound
+    assert own.sampled.delay_margin.as_text(4) == f"≥ {1e3 * found.delay_margin_seconds:g}, good"
 
 
 def test_a_law_in_z_has_a_sampled_card_alone():

@@ -36,7 +36,7 @@ from tfarm.loop.curve import LoopCurve, curve_of, gain_margin, lowest_drawn, ref
 from tfarm.loop.margins import LoopMargins, Margins, margins, margins_of_curve
 from tfarm.loop.stability import SMALL_GAIN, stability
 from tfarm.records import record
-from tfarm.schema import Percent, Quantity, Table, across
+from tfarm.schema import Percent, Quantity, Table, across, text
 from tfarm.schema.html import as_html, with_symbols
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import default_gains
@@ -73,7 +73,7 @@ class Graded(NamedTuple):
         """Value, frequency and grade."""
         if self.value is None:
             return UNDEFINED
-        size = "no limit" if math.isinf(self.value) else general(self.value, digits)
+        size = "no limit" if math.isinf(self.value) else text(self.value, digits)
         return f"{size}{'' if self.omega is None else f' at {general(self.omega, digits)} rad/s'}, {self.grade}"
 
 
@@ -373,12 +373,12 @@ def _margins(
         return dict.fromkeys(GRADED, NOT_DEFINED) | undefined
     down, up = (gain_margin(band, factor) for factor in gain)
     phase, peak = band.phase_margin, band.sensitivity_peak
-    periods = None if delay is None else float(delay) / period
+    periods = None if delay is None else type(delay)(delay / period)
     graded = (
         Graded(*up, grade_of(up[0], GAIN_LIMITS)),
         Graded(*down, grade_of(down[0], GAIN_LIMITS)),
         Graded(abs(phase.value), phase.omega, grade_of(abs(phase.value), PHASE_LIMITS)),
-        Graded(None if delay is None else 1e3 * float(delay), None, grade_of(periods, PERIOD_LIMITS)),
+        Graded(None if delay is None else type(delay)(1e3 * delay), None, grade_of(periods, PERIOD_LIMITS)),
         Graded(peak.value, peak.omega, grade_of(peak.value, PEAK_LIMITS)),
     )
     worst = max((each.grade for each in graded), key=GRADES.index)
