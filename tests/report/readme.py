@@ -8,7 +8,7 @@ from tfarm.digits import plain
 from tfarm.dsp import load_chain
 from tfarm.plots.frequency import bode as bode_plot
 from tfarm.plots.motion import modes
-from tfarm.plots.regions import draw_overlay, stable_regions
+from tfarm.plots.regions import overlay, stable_regions
 from tfarm.plots.style import save_figure
 from tfarm.response.frequency import bode, resonant_band
 from tfarm.spectrum.table import default_gains
@@ -24,7 +24,7 @@ def write_pictures(out: Path) -> None:
     both = {label: bode(arm, "root_moment", band) for label, arm in zip(labels, (undamped, lab), strict=True)}
     figures = {
         "bode-root-moment": bode_plot.figure(both),
-        "gains": draw_overlay(stable_regions(lab, default_gains(lab), load_chain(lab.name))),
+        "gains": overlay.figure(*stable_regions(lab, default_gains(lab), load_chain(lab.name))),
         "mode-shapes": modes.figure(tfarm.modes(lab, count=4)),  # two rows
     }
     for stem, figure in figures.items():

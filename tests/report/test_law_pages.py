@@ -16,13 +16,14 @@ from tests.shared import sized
 from tests.shell import answer, run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.arm.law_tables import load_law
+from tfarm.case.card import margins_of
 from tfarm.dsp import Chain, load_chain
 from tfarm.dsp.sampled import sampled_loop
 from tfarm.errors import one_line
 from tfarm.fitting.recording import compare_run, load_run, overshoot
 from tfarm.report import writing
 from tfarm.report.loop_section import law_section, margins_section
-from tfarm.report.page import Case, GivenLaw, file_of, margins_of
+from tfarm.report.page import Case, GivenLaw, file_of
 from tfarm.report.sampled_section import sampled_section, step_rows
 from tfarm.report.writing import PIECES, pieces_of
 from tfarm.schema import to_json

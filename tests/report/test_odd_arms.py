@@ -14,6 +14,7 @@ from tests.report import plausible
 from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.arm import implausible
+from tfarm.case.card import margins_of
 from tfarm.dsp import Chain
 from tfarm.loop import loci as loci_room
 from tfarm.loop.locus import locus
@@ -27,7 +28,7 @@ from tfarm.report.loop_section import (
     margin_table,
     margins_section,
 )
-from tfarm.report.page import Case, has_loop, margins_of, on_hub, prose
+from tfarm.report.page import Case, has_loop, on_hub, prose
 from tfarm.report.response_sections import bode_section, damped_tables, modal_table
 from tfarm.report.writing import pieces_of
 from tfarm.spectrum import DampedModes
@@ -200,12 +201,12 @@ def test_a_free_pin_has_its_rate_loop(monkeypatch):
 def test_a_margin_without_end_has_no_frequency(monkeypatch):
     monkeypatch.setattr(cases, "best", lambda arm, chain: None)
     named = on_hub(ARMS["pinned"], HubFeedback(K1=5.0338, K2=-3.0), "default gains", "default")
-    found = cases.margins_of(ARMS["pinned"], named.law)
+    found = margins_of(ARMS["pinned"], named.law)
     table = margin_table([(named, found)])
     rows = dict(zip(column(table, "quantity").values, table.columns[2].values, strict=True))
     assert rows["margins in the frequency range: phase margin for lead"] == math.inf
     assert rows["margins in the frequency range: phase margin for lag"][1] == pytest.approx(488.89, rel=1e-4)
-    passive = cases.margins_of(ARMS["free-pin"], HubFeedback(K1=0.283))
+    passive = margins_of(ARMS["free-pin"], HubFeedback(K1=0.283))
     table = margin_table([(named, passive)])
     rows = dict(zip(column(table, "quantity").values, table.columns[2].values, strict=True))
     assert rows["margins in the frequency range: disk margin"] == pytest.approx(2.0)

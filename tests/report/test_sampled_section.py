@@ -17,7 +17,7 @@ from tfarm.dsp.chain import Converters, Sampling
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
 from tfarm.plots import regions
-from tfarm.plots.regions import CUT_RANGE, K2_RANGE, draw_overlay, stable_regions
+from tfarm.plots.regions import CUT_RANGE, K2_RANGE, overlay, stable_regions
 from tfarm.report import sampled_section as page
 from tfarm.report.page import Case, prose
 from tfarm.report.sampled_section import CURVE_DIGITS, sampled_section
@@ -52,7 +52,7 @@ def test_the_picture_of_a_rig_is_as_high_as_its_own_gains(monkeypatch):
     monkeypatch.setattr("tfarm.plots.regions.LITTLE_DAMPINGS", ())
     rig = tfarm.load("quanser-2dsfl")
     data = stable_regions(rig, default_gains(rig), Chain())
-    low, high = draw_overlay(data).axes[0].get_ylim()
+    low, high = overlay.figure(*data).axes[0].get_ylim()
     assert 0.112 < high < 0.2
     (sampled,) = data.sampled
     ((bottom, top),) = sampled.stable_intervals[0]

@@ -1,6 +1,7 @@
 """The pages as a reader gets them: complete, the same on every run, and all or nothing."""
 
 import hashlib
+import json
 import math
 import re
 import subprocess
@@ -29,13 +30,14 @@ from tests.report.written import (
     plain_cards,
     validated,
 )
-from tfarm.case.card import LoopCard
+from tfarm.case.card import Graded, LoopCard
 from tfarm.dsp import Chain, load_chain
+from tfarm.dsp.edges import LowerBound
 from tfarm.plots.style import GOOD, LOW, MARGINAL, POOR, UNSTABLE
 from tfarm.report import overview, write, writing
 from tfarm.report.arm_section import arm_section
-from tfarm.report.overview import Card, pill_of, save_card
-from tfarm.report.page import TEMPLATES, Case, GivenLaw, best, explained, prose, sheet
+from tfarm.report.overview import Card, results, save_card
+from tfarm.report.page import TEMPLATES, Case, GivenLaw, best, explained, prose, sheet, templates
 from tfarm.report.trust import write_trust, written_proofs
 from tfarm.report.writing import PIECES, QUESTIONS, index_page, kept, pieces_of
 from tfarm.schema import Column, quantities, to_dict
@@ -130,7 +132,10 @@ def test_no_file_is_left_unlinked_or_half_written(pages):
 def test_names_and_assumptions_are_text_and_nothing_else(pages):
     """On the page of the arm, the live one, the index and the one on trust, and in every drawing."""
     for page in pages.rglob("*.html"):
-        check_page(page.read_text(encoding="utf-8"), NAME, scripts=3 * (page.name == "live.html"))
+        text, is_live = page.read_text(encoding="utf-8"), page.name == "live.html"
+        check_page(text, NAME, scripts=2 * is_live)
+        kinds = ['type="application/json" id="live-data"', 'src="../assets/live.js"']  # its numbers, its code
+        assert re.findall(r"<script ([^>]*)>", text) == kinds * is_live
     page = (pages / NAME / "modes.html").read_text(encoding="utf-8")
     check_page(page, PRINTED.partition("I_h")[0], "second assumption", LONG)
     assert "I<sub>h</sub> in kg m² \u05e9" in page
@@ -255,8 +260,12 @@ def test_pills_have_the_colours_of_the_grades():
     ],
 )
 def test_a_pill_is_green_for_a_good_loop_alone(stability, grade, limits, pill):
-    card = tfarm.result_card(ARM, default_gains(ARM)).continuous
-    assert pill_of(replace(card, stability=stability, grade=grade, limited_by=limits)) == pill
+    card = tfarm.result_card(ARM, default_gains(ARM))
+    own = replace(card.continuous, stability=stability, grade=grade, limited_by=limits)
+    (loop,) = results(replace(card, continuous=own, sampled=None), "gains")
+    words, look = pill
+    shown = templates().get_template("blocks.html").module.pill(loop)
+    assert shown == f'<span class="verdict {look}">{words}</span>'
 
 
 def test_long_matter_is_folded_on_the_pages_of_sections(pages):
@@ -299,7 +308,7 @@ def test_the_index_has_a_row_a_loop(pages):
     assert "pictures/card.svg" in text
     rows = [row for row in Read(text).rows if row[0] != "arm"]
     for row, own in zip(rows, (card.continuous, card.sampled), strict=True):
-        assert row[-5].strip() == pill_of(own)[0]
+        assert row[-5].strip() == own.finding
         assert row[-3].startswith(size_of(own.phase_margin.value, "deg"))
         assert row[-1].startswith(size_of(own.peak_sensitivity.value))
         assert row[-3].endswith(own.phase_margin.grade)
@@ -414,25 +423,44 @@ def test_a_law_has_its_own_verdicts_and_nothing_of_the_default_gains(tmp_path, l
     """Those of the answers to `margins` and `sampled`; at 10 ms one of them does not hold."""
     chain = load_chain(LAB.name)
     (row, sampled), page = rows_of(tmp_path, [GivenLaw(law)], chain)
-    assert row.controller == sampled.controller == law.name
-    assert row.pill.split(",")[0] == tfarm.margins(LAB, law).stability.verdict == "stable"
-    assert sampled.pill.split(",")[0] == tfarm.sampled(LAB, law).verdict.word
-    assert (sampled.look == "unstable") == (law is FAST)
-    assert sampled.loop == "sampled, 10 ms"
-    assert f">{sampled.pill}</span></td>" in page
+    assert row["controller"] == sampled["controller"] == law.name
+    assert row["finding"].split(",")[0] == tfarm.margins(LAB, law).stability.verdict == "stable"
+    assert sampled["finding"].split(",")[0] == tfarm.sampled(LAB, law).verdict.word
+    assert (sampled["stability"] == "unstable") == (law is FAST)
+    assert sampled["loop"] == "sampled, 10 ms"
+    assert f">{sampled['finding']}</span></td>" in page
     assert law.name in page
     assert "K1 = 0.3" not in page
 
 
 def test_each_law_has_a_row_and_one_in_z_no_continuous_verdict(tmp_path):
     rows, page = rows_of(tmp_path, [GivenLaw(SAMPLED), GivenLaw(tfarm.HubFeedback(K1=0.3, K2=0.3))], Chain())
-    assert [row.loop for row in rows] == ["sampled, 10 ms", "continuous-time", "sampled, 10 ms"]
-    assert [row.pill.split(",")[0] for row in rows] == ["stable"] * 3
+    assert [row["loop"] for row in rows] == ["sampled, 10 ms", "continuous-time", "sampled, 10 ms"]
+    assert [row["finding"].split(",")[0] for row in rows] == ["stable"] * 3
     assert page.count('rowspan="3"') == 3
 
 
+def test_an_arm_without_hub_inertia_has_its_loops_and_the_reason_why_there_is_no_other(tmp_path):
+    bare = replace(LAB, hub=tfarm.Hub(inertia=0.0))
+    save_card(Case(bare, Chain()), tmp_path)
+    card = json.loads((tmp_path / "card.json").read_text(encoding="utf-8"))
+    assert [loop["loop"] for loop in card["loops"]] == ["continuous-time", "sampled, 10 ms"]
+    assert "The hub of this arm has no inertia" in card["notes"][0]
+    writing._write_pages(Case(bare, Chain()), tmp_path, [], (), "", tmp_path)
+    assert "The hub of this arm has no inertia" in (tmp_path / "index.html").read_text(encoding="utf-8")
+
+
+def test_a_lower_bound_is_one_on_a_card():
+    card = tfarm.result_card(LAB, tfarm.HubFeedback(K1=0.3))
+    margin = replace(card.sampled, delay_margin=Graded(LowerBound(200.0), None, "good"), delay_margin_periods=20.0)
+    (loop,) = results(replace(card, continuous=None, sampled=margin), "gains")
+    cell = str(templates().get_template("blocks.html").module.cell(loop, "delay_margin_ms"))
+    words = " ".join("".join(Read(cell).texts).split())
+    assert words == "≥ 200 ms good 20 periods"
+
+
 def test_a_card_that_is_not_determined_has_its_reason(tmp_path, monkeypatch):
-    monkeypatch.setattr(overview, "card_of", Unmakeable(tfarm.ConvergenceError("stopped short", None, None)))
+    monkeypatch.setattr(overview, "result_card", Unmakeable(tfarm.ConvergenceError("stopped short", None, None)))
     loops, page = rows_of(tmp_path, [], Chain())
     assert (loops, "no loop" in page) == ((), True)
     (card,) = kept(tmp_path, "card", Card).values()

@@ -15,7 +15,9 @@ import pytest
 import tfarm
 from tests.hostile import NAME
 from tests.report.written import ARM
+from tfarm.report.page import DRAWN_DIGITS
 from tfarm.report.response_sections import sensitivity_table
+from tfarm.schema import curve_table
 from tfarm.spectrum.table import default_gains
 
 
@@ -64,6 +66,21 @@ def test_every_cell_rounds_the_value_under_its_key(pages):
         assert untraced_cells(keys, cells, tables(pages, stem)[1], law) == [], stem
         count += sum(len(shown_in(cell)) for row in cells for cell in row)
     assert count > 700
+
+
+def test_the_data_of_a_picture_have_the_digits_that_it_shows(pages):
+    """Against the curve itself; tables have every digit."""
+    with open(pages / NAME / "data" / "bode-root-moment-data.csv", encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    found = tfarm.bode(ARM, "root_moment")
+    curve = {column.key: column.values for column in curve_table(found).columns}
+    assert set(rows[0]) == set(curve)
+    for key, values in curve.items():
+        shown = [row[key] for row in rows]
+        assert [float(each) for each in shown] == pytest.approx(values, rel=0.51 * 10.0 ** (1 - DRAWN_DIGITS), abs=0)
+        assert max(len(re.sub(r"e.*|\D", "", each).lstrip("0")) for each in shown) <= DRAWN_DIGITS + 1  # 12345.0
+    size = sum(file.stat().st_size for file in (pages / NAME / "data").iterdir())
+    assert size < 2.2e6
 
 
 def test_the_modal_table_is_the_api_to_the_digits_that_hold_everywhere(pages):

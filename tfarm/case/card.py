@@ -89,7 +89,7 @@ class LeastDamped(NamedTuple):
 
 
 NOT_DEFINED = Graded(None, None, UNDEFINED)
-_margins_of, _sampled_of = lru_cache(maxsize=16)(margins), lru_cache(maxsize=16)(sampled)  # card and curve of a page
+margins_of, _sampled_of = lru_cache(maxsize=64)(margins), lru_cache(maxsize=16)(sampled)  # card and curve of a page
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,8 +180,8 @@ def result_card(
     notes += [UNDAMPED.format(reference)] if arm.has_elastic_link else []
     loops: dict[str, Callable[[], tuple[LoopCard, Callable[[], LoopCard]]]] = {
         "continuous": lambda: (
-            continuous_card(continuous or _margins_of(arm, law), T),
-            lambda: continuous_card(_margins_of(damped, law), T),
+            continuous_card(continuous or margins_of(arm, law), T),
+            lambda: continuous_card(margins_of(damped, law), T),
         ),
         "sampled": lambda: (
             sampled_card(at_samples or _sampled_of(arm, law, chain)),
@@ -308,7 +308,7 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
 
     found = None
     if not law.is_discrete:
-        own = _margins_of(damped, law)
+        own = margins_of(damped, law)
         found = as_card(curve_of(own), (own.stability if damped is arm else stability(arm, law)).verdict)
     if found is not None and chain is None:
         return found

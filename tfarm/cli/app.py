@@ -21,7 +21,7 @@ import tfarm
 from tfarm.arm import ANGLE_GAIN, LISTED, MOMENT_GAIN, RATE_GAIN, AnyLaw, Arm, Theory, implausible
 from tfarm.errors import one_line, require
 from tfarm.files import is_standard_output, write_file
-from tfarm.schema import as_csv, to_json
+from tfarm.schema import as_csv, curve_table, to_dict, to_json
 
 app = typer.Typer(name="tfarm", rich_markup_mode="rich", pretty_exceptions_enable=False)
 GROUPS = ("Arm", "Loop", "Sampled loop", "Design", "Measurement", "Report")  # of commands in the help, in its order
@@ -316,35 +316,30 @@ def emit(
 
     `defaults` is what JSON has of default gains; `also` are files that are written already.  The text ends with the
     `rows` of the CSV file where they are wanted and not written, and begins with the result card `summary`, as the
-    "summary" of JSON.  Nothing is printed where standard output is one of
-    the files.
+    "summary" of JSON.  Nothing is printed where standard output is one of the files.
     """
-    from tfarm.schema import curve_table, to_dict
-
     if csv is not None:
         write_file(csv, as_csv(curve_table(record), units=True).encode(), key="--csv")
     if png is not None:
         from tfarm import plots  # every picture is registered once they are loaded
-        from tfarm.plots.style import FIGURES, save_picture
 
-        save_picture(getattr(plots, picture).figure if picture else FIGURES[type(record)], record, png)
+        plots.style.save_picture(
+            getattr(plots, picture).figure if picture else plots.style.FIGURES[type(record)], record, png
+        )
     written = [path for path in (*also, csv, png) if path is not None]
     if any(map(is_standard_output, written)):
         return
     for path in written:
         print(f"written: {path}", file=sys.stderr)
     if json:
-        own = {} if summary is None else {"summary": to_dict(summary)}
-        print(to_json({**own, **to_dict(record), **(defaults or {})}))
+        print(to_json({**({"summary": to_dict(summary)} if summary else {}), **to_dict(record), **(defaults or {})}))
         return
     from tfarm.schema.terminal import show, show_table, show_text
 
     if summary is not None:
         show_table(summary.table)
-        for note in summary.notes:
-            show_text(note)
+        show_text("\n".join(summary.notes))
         print()
-
     words = f"by default {defaults['default_gains_in_words']}" if defaults and defaults["default_gains"] else ""
     show(record, curve_table(record) if rows and csv is None else None, words)
 
@@ -354,8 +349,9 @@ def emit_loop(
 ) -> None:
     """Emit the loop function of a command with that picture of it; of the sampled loop where sampling is given."""
     subject, controller, defaults = load_loop(arm, theory, gains, law)
-    is_sampled = any(value is not None for value in chain.keywords.values())
-    found = tfarm.loop_function(subject, controller, chain(arm) if is_sampled else None)
+    found = tfarm.loop_function(
+        subject, controller, chain(arm) if any(value is not None for value in chain.keywords.values()) else None
+    )
     emit(found, json, defaults, picture=picture, **files)
 
 

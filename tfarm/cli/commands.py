@@ -260,8 +260,7 @@ def bode(
     refuse({key.replace("_", "-"): value for key, value in of_loop.items()}, "the loop function: give --loop too")
     from tfarm.response.frequency import resonant_band
 
-    output = "root_moment" if output is None else output
-    subject, (wanted,) = load_arm(arm, theory, driven), outputs_on([output], side)
+    subject, (wanted,) = load_arm(arm, theory, driven), outputs_on(["root_moment" if output is None else output], side)
     low, high = resonant_band(tfarm.transfer(subject, wanted, x=x, input=driven).arm)
     band = low if start is None else start, high if stop is None else stop
     check_range(*band)
@@ -417,5 +416,4 @@ def ring(
     """
     from tfarm.fitting import recording, resonances
 
-    decay = recording.read_recording(record)
-    emit(resonances.ring(decay, signal, start=start, stop=stop, modes=modes), json)
+    emit(resonances.ring(recording.read_recording(record), signal, start=start, stop=stop, modes=modes), json)

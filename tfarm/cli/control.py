@@ -67,8 +67,7 @@ def margins(arm: ArmName, law: LawFile = None, theory: TheoryName = None, json: 
     """Result card, stability, the stability interval of each gain, and the margins of the exact loop function."""
     subject, controller, defaults = load_loop(arm, theory, gains, law)
     found = tfarm.margins(subject, controller)
-    card = tfarm.result_card(subject, controller, load_chain(arm), continuous=found)
-    emit(found, json, defaults, summary=card)
+    emit(found, json, defaults, summary=tfarm.result_card(subject, controller, load_chain(arm), continuous=found))
 
 
 @command(epilog="nyquist sasaki2012-lab --K1 0.3 --K2 0.3 --png nyquist.png")
@@ -89,8 +88,7 @@ def nyquist(
     disc: picture of the whole contour in a disc whose rim is infinity, in place of the linear plot with a zoom at -1
     """
     subject, controller, defaults = load_loop(arm, theory, gains, law)
-    picture = "disc" if disc else "nyquist"
-    emit(tfarm.nyquist(subject, controller), json, defaults, csv=csv, png=png, picture=picture)
+    emit(tfarm.nyquist(subject, controller), json, defaults, csv=csv, png=png, picture="disc" if disc else "nyquist")
 
 
 @command(epilog="nichols sasaki2012-lab --K1 0.3 --K2 0.3 --png nichols.png")
@@ -256,8 +254,7 @@ def sampled(
     subject, controller, defaults = load_loop(arm, theory, gains, law)
     sampling = chain(arm)
     found = tfarm.sampled(subject, controller, sampling, count=modes)
-    card = tfarm.result_card(subject, controller, sampling, at_samples=found)
-    emit(found, json, defaults, summary=card)
+    emit(found, json, defaults, summary=tfarm.result_card(subject, controller, sampling, at_samples=found))
 
 
 @sampled_command(epilog="simulate sasaki2012-lab --scenario slew --output tip_rotation --csv slew.csv")
@@ -296,10 +293,11 @@ def simulate(
         subject, control, defaults = load_loop(arm, theory, gains, law)
         found = simulated_run(subject, control, chain(arm), scenario, duration, **how)
     else:
-        from tfarm.tuner.trial import load_tuner
-        from tfarm.tuner.tuning import controlled_run
+        from tfarm.tuner import load_tuner, tuning
 
-        found = controlled_run(load_arm(arm, theory), load_tuner(controller), chain(arm), scenario, duration, **how)
+        found = tuning.controlled_run(
+            load_arm(arm, theory), load_tuner(controller), chain(arm), scenario, duration, **how
+        )
     if mat is not None:
         name = partial(re.sub, r"\W", "_")  # as MATLAB takes it: strain_0_05 of strain@0.05
         signals: dict[str, Any] = {name(key): values for key, values in found.signals.items() if len(values)}

@@ -164,24 +164,23 @@ def tune(
     save: write the tuner to this JSON file
     """
     from tfarm import tuner
-    from tfarm.tuner.trial import usual_rate_gain
-    from tfarm.tuner.tuning import usual_plan
+    from tfarm.tuner import trial, tuning
 
     subject, sampling = load_arm(arm, theory), chain(arm)
     law, defaults = load_law(subject, arm, {RATE_GAIN: k1, MOMENT_GAIN: 0.0})
     rate = cast("tfarm.HubFeedback", law)[RATE_GAIN]
     if k1 is None and kp:
-        rate = usual_rate_gain(subject, kp)
+        rate = trial.usual_rate_gain(subject, kp)
         defaults = {
             "default_gains": [RATE_GAIN],
             "default_gains_in_words": f"{RATE_GAIN} = {rate:.4g} (damping ratio 0.71 of the rigid arm under Kp)",
         }
-    tuning = tuner.tune(subject, plan(usual_plan(subject, sampling), {RATE_GAIN: rate, ANGLE_GAIN: kp}), sampling)
-    drawn = tuner.learning_curves(tuning, curves, advance) if curves else None
-    compared = tuner.compare_controllers(tuning.trial, tuning.gain(), tuning.training.guard) if compare else None
+    tuned = tuner.tune(subject, plan(tuning.usual_plan(subject, sampling), {RATE_GAIN: rate, ANGLE_GAIN: kp}), sampling)
+    drawn = tuner.learning_curves(tuned, curves, advance) if curves else None
+    compared = tuner.compare_controllers(tuned.trial, tuned.gain(), tuned.training.guard) if compare else None
     if save is not None:
-        tuner.save_tuner(tuning.saved(), save)
-    found = tuner.TuningResult(tuning, drawn, compared)
+        tuner.save_tuner(tuned.saved(), save)
+    found = tuner.TuningResult(tuned, drawn, compared)
     if found.stopped is not None:
         print_line(f"{found.stopped}; the tuner is that of the trial before")
     emit(found, json, defaults, also=(save,))

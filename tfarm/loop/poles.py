@@ -119,9 +119,9 @@ class Poles:
         """The largest real part [1/s] in the box, apart from poles at 0."""
         return float(self.moving.real.max(initial=-np.inf))
 
-    def certified(self) -> Poles:
+    def certified(self, digits: int = DOUBLE_DIGITS) -> Poles:
         """The same with the discs of `certify`."""
-        return replace(self, discs=self.certify())
+        return replace(self, discs=self.certify(digits))
 
     def certify(self, digits: int = DOUBLE_DIGITS) -> tuple[Disc, ...]:
         """Return a disc around each pole with Im >= 0 apart from 0, proven to contain all poles of the box.

@@ -3,15 +3,11 @@
 At an infinite resonance a Bode plot is broken and leaves the picture.
 """
 
-import math
-from collections.abc import Mapping, Sequence
-from functools import partial
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import cycle
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, NullFormatter
 
 from tfarm.arm import PLANE, HubFeedback
@@ -30,31 +26,28 @@ from .style import (
     GREY,
     INK,
     ORANGE,
-    axis_label,
+    Axes,
     by_name,
     name_axes,
+    note,
     picture,
     plain_ticks,
     safe,
 )
 
-RAD_PER_CYCLE = 2 * math.pi  # rad/s of 1 Hz
+RAD_PER_CYCLE = 2 * np.pi  # rad/s of 1 Hz
 NUMBER_STRIP = 0.085  # height of the strip of mode numbers above the magnitude, as a share of its axes: a line of them
-OFF_PICTURE = 20.0  # dB beyond the edge: where a broken curve ends
 TICKS_A_DECADE = (1.0, 2.0, 5.0)  # where a measurement covers few of them
-NOISE_ROOM = 2.5  # factor above and below the noise: two ticks a picture at least
-FREQUENCY_HZ = "frequency [Hz]"
+FREQUENCY, FREQUENCY_HZ, PHASE = "angular frequency [rad/s]", "frequency [Hz]", "phase [deg]"
 POINTS: dict[str, Any] = {"ls": "none", "marker": ".", "ms": 3.5, "color": ORANGE, "zorder": 3}
 EXACT = "flexible arm, exact"
-FREQUENCY, PHASE = axis_label(Bode, "omega"), axis_label(Bode, "phase")
+Drawn = tuple[Real, Complex, dict[str, Any]]  # a curve over x: its values and looks
 
 
-def _title(data: Bode | Mapping[str, Bode]) -> str:
-    first = next(iter(by_name(data, EXACT).values()))
-    return f"{first.arm.name}: {first.input_label} to {first.label}"
-
-
-@picture((Bode, "tfarm.bode returns"), size=(9.0, 6.2), rows=(1.75, 1.0), title=_title)
+@picture(
+    (Bode, "tfarm.bode returns"), size=(9.0, 6.2), rows=(1.75, 1.0),
+    title=lambda data: "{0.arm.name}: {0.input_label} to {0.label}".format(next(iter(by_name(data).values()))),
+)  # fmt: skip
 def bode(data: Bode | Mapping[str, Bode], *, ax: Sequence[Axes]) -> None:
     """Magnitude over phase of a response (from `tfarm.bode`), in two axes, those given or new ones: these axes.
 
@@ -80,10 +73,11 @@ def draw_magnitude(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
     first = next(iter(each.values()))
     limits = np.array([magnitude_limits(one) for one in each.values()])
     low, high = float(limits[:, 0].min()), float(limits[:, 1].max())
-    ax.set(xscale="log", xlim=first.band, ylim=(low, high), xlabel=FREQUENCY)
-    decibel_ticks(ax)
+    label = f"|{first.label} / {first.input_label}|\nmagnitude [dB re 1 {first.gain_unit}]".replace("1 −", "1")
+    over_frequency(ax, label, 1.0 + NUMBER_STRIP)
+    ax.set(xlim=first.band, ylim=(low, high))
     for (name, one), colour in zip(each.items(), cycle(COLOURS), strict=False):
-        edges = np.repeat([high + OFF_PICTURE, low - OFF_PICTURE], [one.infinite.size, one.vanishing.size])
+        edges = np.repeat([high + 20.0, low - 20.0], [one.infinite.size, one.vanishing.size])  # off the picture
         jumps = np.r_[one.infinite, one.vanishing]
         ax.plot(*broken(one.omega, decibels(one.value), jumps, edges), color=colour, label=safe(name))
     if np.any(first.rigid):
@@ -91,10 +85,8 @@ def draw_magnitude(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
     _mark_roots(first, ax)
     if first.arm.has_cutoff and first.band[0] < first.arm.shear_cutoff < first.band[1]:
         ax.axvline(first.arm.shear_cutoff, color=ORANGE, lw=1.0, ls="-.", label="shear cut-off")
-    ax.set_ylabel(f"|{first.label} / {first.input_label}|\nmagnitude [dB re 1 {first.gain_unit}]".replace("1 −", "1"))
     if first.is_zero:
         ax.text(0.5, 0.5, "zero at every frequency", ha="center", va="center", transform=ax.transAxes)
-    hertz_axis(ax, 1.0 + NUMBER_STRIP)
 
 
 def draw_phase(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
@@ -109,25 +101,28 @@ def draw_phase(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
     ax.yaxis.set_major_locator(MaxNLocator(5, steps=(1, 1.8, 4.5, 9, 10)))  # right angles and parts of them
 
 
-def decibel_ticks(ax: Axes) -> None:
-    """Upright ticks at tens and twenties of decibels."""
+def over_frequency(ax: Axes, label: str, height: float = 1.0) -> None:
+    """Decibels, with ticks at tens and twenties, over rad/s and, at that height above the axes, Hz."""
+    ax.set(xscale="log", xlabel=FREQUENCY, ylabel=label, xmargin=0)
     ax.yaxis.set_major_locator(MaxNLocator(7, steps=(1, 2, 4, 5, 10)))
-
-
-def hertz_axis(ax: Axes, height: float) -> None:
-    """A second frequency axis in Hz, at that height above the axes."""
-    ratios = (partial(np.multiply, 1 / RAD_PER_CYCLE), partial(np.multiply, RAD_PER_CYCLE))
+    ratios = (lambda omega: np.divide(omega, RAD_PER_CYCLE), lambda hertz: np.multiply(hertz, RAD_PER_CYCLE))
     upper = ax.secondary_xaxis(height, functions=ratios)
     upper.set_xlabel(FREQUENCY_HZ, labelpad=5.0)
     plain_ticks(upper.xaxis)
 
 
-def draw_wrapped(x: Real, values: Complex, ax: Axes, **looks: Any) -> None:
-    """The angle [deg] between -180 and 180 of a curve over x, with a gap where it passes half a turn."""
-    angle = np.degrees(np.angle(values))
+def draw_curves(curves: Iterable[Drawn], size: Callable[[Complex], Real], upper: Axes, lower: Axes) -> None:
+    """The size of each curve over its angle between -180 and 180 degrees."""
+    for x, values, looks in curves:
+        upper.plot(x, size(values), **looks)
+        lower.plot(*parted(np.degrees(np.angle(values)), x)[::-1], **looks)
+    lower.set(ylim=(-190, 190), yticks=[-180, -90, 0, 90, 180], ylabel=PHASE)
+
+
+def parted(angle: Real, other: Real) -> tuple[Real, Real]:
+    """Both coordinates of a curve with a gap where its angle [deg] passes half a turn."""
     jump = np.flatnonzero(abs(np.diff(angle)) > 180) + 1
-    ax.plot(np.insert(x, jump, np.nan), np.insert(angle, jump, np.nan), **looks)
-    ax.set(ylim=(-190, 190), yticks=[-180, -90, 0, 90, 180], ylabel=PHASE)
+    return np.insert(angle, jump, np.nan), np.insert(other, jump, np.nan)
 
 
 def broken(x: Real, y: Real, at: Real, limit: Real) -> tuple[Real, Real]:
@@ -151,8 +146,8 @@ def magnitude_limits(data: Bode) -> tuple[float, float]:
 
 def _mark_roots(data: Bode, ax: Axes) -> None:
     """Triangles at the top edge where |G| is infinite, at the bottom edge where it is 0; numbers above resonances."""
-    for root in (*data.infinite, *data.vanishing, *data.resonances.imag):
-        ax.axvline(root, color=FAINT, lw=0.8, zorder=0.5)
+    every = np.r_[data.infinite, data.vanishing, data.resonances.imag]
+    ax.vlines(every, 0, 1, color=FAINT, lw=0.8, zorder=0.5, transform=ax.get_xaxis_transform())
     for roots, height, marker, label in (
         (data.infinite, 1.0, "^", "pole on the imaginary axis: infinite"),
         (data.vanishing, 0.0, "v", "zero on the imaginary axis: 0"),
@@ -162,23 +157,15 @@ def _mark_roots(data: Bode, ax: Axes) -> None:
                 roots, np.full(roots.size, height), marker, transform=ax.get_xaxis_transform(), clip_on=False,
                 mfc="white", mec=INK, ms=6.0, mew=1.0, zorder=5, label=label,
             )  # fmt: skip
-    # nearer than that share of the width two mode numbers would touch: two digits of 8 points on 9 inches
-    last, width = -math.inf, 0.019 * math.log(data.band[1] / data.band[0])
-    for number, omega in enumerate(data.resonances.imag, 1):
-        if math.log(omega) - last > width:
-            last = math.log(omega)
-            ax.text(
-                omega, 1.0 + 0.3 * NUMBER_STRIP, str(number), transform=ax.get_xaxis_transform(), ha="center",
-                va="baseline", fontsize=8.0, color=GREY,
-            )  # fmt: skip
+    for number, omega in enumerate(data.resonances.imag, 1):  # that far apart two digits do not touch
+        note(str(number), (omega, ax.get_ylim()[1]), ax, (0.019, 1.0), xytext=(0, 5), ha="center", va="baseline",
+             color=GREY)  # fmt: skip
 
 
 # ------------------------------------------------------------ measured responses
 
 
-def _over_measured(
-    one: Measured, curves: Sequence[tuple[Real, Complex, dict[str, Any]]], upper: Axes, lower: Axes
-) -> None:
+def _over_measured(one: Measured, curves: Sequence[Drawn], upper: Axes, lower: Axes) -> None:
     """Magnitude over phase [Hz, deg]: measured points, and curves (omega [rad/s], values, looks).
 
     An infinite peak of a curve leaves the picture.
@@ -186,9 +173,7 @@ def _over_measured(
     hertz, size = one.omega / RAD_PER_CYCLE, abs(one.values)
     upper.plot(hertz, size, label="measured", **POINTS)
     lower.plot(hertz, np.degrees(np.angle(one.values)), **POINTS)
-    for omega, values, looks in curves:
-        upper.plot(omega / RAD_PER_CYCLE, abs(values), **looks)
-        draw_wrapped(omega / RAD_PER_CYCLE, values, lower, **looks)
+    draw_curves([(omega / RAD_PER_CYCLE, values, looks) for omega, values, looks in curves], np.abs, upper, lower)
     within = np.log10([each for each in (*size, *(np.median(abs(values)) for _, values, _ in curves)) if each > 0])
     margin = 0.15 + 0.125 * np.ptp(within)  # an infinite peak of the exact curve leaves the picture
     upper.set(yscale="log", ylim=10 ** np.array([within.min() - margin, within.max() + margin]))
@@ -198,13 +183,10 @@ def _over_measured(
         plain_ticks(ax.xaxis, 4, TICKS_A_DECADE)
 
 
-def _fit_grid(figure: Figure, fit: Fit) -> Any:
-    return figure.subplots(2, max(1, len(fit.responses)), sharex="col", height_ratios=[1.75, 1.0], squeeze=False)
-
-
 @picture(
-    (Fit, "tfarm.fit returns"), size=lambda fit: (max(7.0, 5.2 * len(fit.responses)), 6.0), grid=_fit_grid,
+    (Fit, "tfarm.fit returns"), size=lambda fit: (max(7.0, 5.2 * len(fit.responses)), 6.0),
     title=lambda fit: f"{fit.before.name}: {fit.verdict}",
+    grid=lambda figure, fit: figure.subplots(2, max(1, len(fit.responses)), sharex="col", height_ratios=(1.75, 1.0)),
 )  # fmt: skip
 def fitted(fit: Fit, *, ax: Sequence[Axes]) -> None:
     """Each measured response with the arm's before and after: magnitude over phase, a column a response.
@@ -290,7 +272,8 @@ def measured(data: Overlay, *, ax: Sequence[Axes]) -> None:
         known = (size > 0) & np.isfinite(data.noise.sigma)
         share = data.noise.sigma[known] / size[known]
         lower.plot(hertz[known], share, color=GREY, lw=1.0)
-        lower.set(yscale="log", ylim=(share.min() / NOISE_ROOM, share.max() * NOISE_ROOM), ylabel="noise/value [−]")
+        # two ticks at least
+        lower.set(yscale="log", ylim=(share.min() / 2.5, share.max() * 2.5), ylabel="noise/value [−]")
         plain_ticks(lower.yaxis, 1, TICKS_A_DECADE if np.ptp(np.log10(share)) < 1 else (1.0,))
     lower.set(xscale=upper.get_xscale(), xlim=upper.get_xlim(), xlabel=FREQUENCY_HZ)
     plain_ticks(lower.xaxis, 4, TICKS_A_DECADE)

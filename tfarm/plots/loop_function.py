@@ -6,34 +6,29 @@ is the rim, poles on the axis are arcs beyond it.
 
 import cmath
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import cycle
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Rectangle
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import Complex, Real, Whole
 from tfarm.digits import general, plain
 from tfarm.loop.curve import LoopCurve, curve_of, decibels, gain_margin
 from tfarm.loop.margins import LoopMargins, Margins, loop_margins
 from tfarm.loop.nyquist import Nyquist, compressed
 
-from .frequency import FREQUENCY, decibel_ticks, draw_wrapped, hertz_axis
-from .style import BLUE, COLOURS, FAINT, GREY, INK, UNSTABLE, gains_words, picture, safe
+from .frequency import FREQUENCY, Drawn, draw_curves, over_frequency, parted
+from .style import BLUE, FAINT, GREY, INK, UNSTABLE, Axes, arrows, gains_words, note, picture, safe
 
 HIGHEST, LOWEST = 60.0, -80.0  # dB of L that are drawn: so that the part near 0 dB shows
-NICHOLS_HIGHEST, NICHOLS_LOWEST = 40.0, -40.0
 USUAL_PEAK = 2.0  # Ms that is usual at most
 CLOSED_LOOP = (-20.0, -12.0, -6.0, -3.0, -1.0, 0.25, 0.5, 1.0, 3.0, 6.0)  # dB: |T| of the contours of a Nichols chart
 CONTOURS = ", ".join(f"{size:g}" for size in CLOSED_LOOP if size > 0) + " dB, the larger the nearer to −1"
 AROUND: Complex = np.exp(1j * math.pi * np.linspace(-1, 1, 721) ** 3)  # a circle, dense at 1, where T/(1 - T) is steep
-MOST_LINEAR, LEAST_LINEAR = 20.0, 1.5  # |L| at the edge of a linear Nyquist plot
+MOST_LINEAR, LEAST_LINEAR = 20.0, 2.2  # |L| at the edge of a linear Nyquist plot: at least as far as the zoom
 ZOOM = (-2.2, 0.4, -1.3, 1.3)  # of L around -1: Re from and to, Im from and to
-ZOOM_GAP = 0.5  # between both, in half widths of the plot
 RING_SIZES = (0.2, 0.5, 1.0, 2.0, 5.0, math.inf)  # |L| of the rings
 ARC_RADIUS, REACH = 1.04, 1.35  # of the first arc at infinity, and of the picture
 ARCS_ALIKE = math.radians(20.0)  # arcs whose ends are as near as that turn alike
@@ -42,11 +37,11 @@ DIGITS = 4  # of a margin, as on a card
 Looks = dict[str, Any]
 
 
-Mark = tuple[float, complex, str, str]  # of a margin: frequency [rad/s], nan without one, L there, label, marker
+def decisive(band: LoopMargins) -> Iterator[tuple[float, complex, str, str]]:
+    """The gain margins upwards, and downwards where there is a limit, and the phase margin of least size.
 
-
-def decisive(band: LoopMargins) -> Iterator[Mark]:
-    """The gain margins upwards, and downwards where there is a limit, and the phase margin of least size."""
+    Of each its frequency [rad/s], nan without one, L there, label and marker.
+    """
     for factor, name in zip(band.gain[::-1] if band.gain[0] else band.gain[1:], ("GM", "GM downwards"), strict=False):
         size, omega = gain_margin(band, factor)
         yield omega or math.nan, -1 / factor, f"{name} {_at(size, 'dB', omega)}", GAIN
@@ -60,18 +55,11 @@ def _at(size: float, unit: str, omega: float | None) -> str:
     return f"{general(size, DIGITS)} {unit}{where}" if math.isfinite(size) else "no limit"
 
 
-def _name(curve: LoopCurve, of: str = "") -> str:
-    kind = "continuous-time" if curve.period is None else f"sampled, {general(1e3 * curve.period, DIGITS)} ms"
-    return f"{of}{kind}: {curve.stability}"
-
-
-def _dashes(curve: LoopCurve) -> Any:
+def _looks(curve: LoopCurve, of: str = "", color: str = BLUE) -> Looks:
     """Solid lines of a continuous-time loop, dashed ones of a sampled loop."""
-    return "-" if curve.period is None else (0, (5, 2))
-
-
-def _looks(curve: LoopCurve) -> Looks:
-    return {"color": BLUE, "ls": _dashes(curve), "label": _name(curve)}
+    kind = "continuous-time" if curve.period is None else f"sampled, {general(1e3 * curve.period, DIGITS)} ms"
+    ls = "-" if curve.period is None else (0, (5, 2))
+    return {"color": color, "ls": ls, "label": f"{of}{kind}: {curve.stability}"}
 
 
 def _marked(curve: LoopCurve, label: str, marker: str, size: float = 6.5) -> Looks:
@@ -90,22 +78,15 @@ def _of_loop(words: str, **how: Any) -> Callable[[Callable[..., None]], Any]:
     return picture((Margins | LoopCurve, "tfarm.margins or tfarm.loop_function returns"), title=title, **how)
 
 
-def draw_loops(each: Mapping[str, tuple[Real, Complex]], upper: Axes, lower: Axes, looks: Sequence[Looks] = ()) -> None:
-    """|L| [dB] of each loop over its frequencies with the line 0 dB, and its angle from -180 to 180 degrees."""
-    own = looks or [{"color": colour, "label": safe(name)} for name, colour in zip(each, cycle(COLOURS), strict=False)]
-    for (omega, L), how in zip(each.values(), own, strict=True):
-        upper.plot(omega, decibels(L), **how)
-        draw_wrapped(omega, L, lower, **how)
+def draw_loops(curves: Iterable[Drawn], label: str, upper: Axes, lower: Axes) -> None:
+    """|L| [dB] of loops over their frequencies with the line 0 dB, and its angle from -180 to 180 degrees."""
+    draw_curves(curves, decibels, upper, lower)
     upper.axhline(0.0, color=GREY, lw=0.9)
-    for edge in (-180, 180):
-        lower.axhline(edge, color=GREY, lw=0.9)
-    upper.set(xscale="log", ylabel="|L| [dB]")
-    upper.margins(x=0)
+    lower.hlines([-180, 180], 0, 1, color=GREY, lw=0.9, transform=lower.get_yaxis_transform())
+    over_frequency(upper, label)
     low, high = upper.get_ylim()
-    upper.set_ylim(max(low, LOWEST + min(0.0, high)), min(high, HIGHEST + max(0.0, low)))
-    decibel_ticks(upper)
+    upper.set_ylim(max(low, LOWEST + min(0.0, high)), np.clip(high, 5.0, HIGHEST + max(0.0, low)))
     lower.set(xscale="log", xlim=upper.get_xlim(), xlabel=FREQUENCY)
-    hertz_axis(upper, 1.0)
 
 
 @_of_loop("loop function L", size=(9.0, 6.4), rows=(1.5, 1.0))
@@ -117,20 +98,16 @@ def loop(found: Margins | LoopCurve, *, ax: Sequence[Axes]) -> None:
     """
     upper, lower = ax
     sides = curve_of(found).sides
-    draw_loops({_name(each): (each.omega, each.L) for each in sides}, upper, lower, [_looks(each) for each in sides])
-    upper.set_ylim(top=max(5.0, upper.get_ylim()[1]))
+    draw_loops([(each.omega, each.L, _looks(each)) for each in sides], "|L| [dB]", upper, lower)
     for each in sides:
         if each.margins is not None:
             _crossovers(each.margins, upper)
             for omega, L, label, marker in decisive(each.margins):
-                size, angle = float(decibels(abs(L))), math.degrees(cmath.phase(L))
-                line: Looks = {"color": INK, "lw": 1.6, "ls": _dashes(each), "zorder": 4}
+                size, angle = float(decibels(abs(L))), math.degrees(float(np.angle(L)))
                 upper.plot([omega], [size], **_marked(each, label, marker))
-                if marker == GAIN:
-                    upper.plot([omega, omega], [size, 0.0], **line)
-                else:
-                    lower.plot([omega, omega], [math.copysign(180.0, angle), angle], **line)
-                    lower.plot([omega], [angle], **_marked(each, label, marker))
+                lower.plot([omega], [angle], **_marked(each, label, marker))
+                place, ends = (upper, (size, 0)) if marker == GAIN else (lower, (math.copysign(180, angle), angle))
+                place.plot([omega, omega], ends, color=INK, lw=1.6, ls=_looks(each)["ls"], zorder=4)
 
 
 def _crossovers(margins: LoopMargins, ax: Axes) -> None:
@@ -146,9 +123,7 @@ def _crossovers(margins: LoopMargins, ax: Axes) -> None:
 
 def _chart(L: Complex) -> tuple[Real, Real]:
     """Phase in (-360, 0] deg and size [dB] of points L, with a gap where the phase wraps."""
-    angle, size = -np.mod(-np.degrees(np.angle(L)), 360.0), decibels(L)
-    jump = np.flatnonzero(abs(np.diff(angle)) > 180.0) + 1
-    return np.insert(angle, jump, np.nan), np.insert(size, jump, np.nan)
+    return parted(-np.mod(-np.degrees(np.angle(L)), 360.0), decibels(L))
 
 
 @_of_loop("Nichols chart", size=(7.6, 6.8))
@@ -160,18 +135,19 @@ def nichols(found: Margins | LoopCurve, *, ax: Axes) -> None:
     """
     sides = curve_of(found).sides
     sizes = np.concatenate([each.magnitude for each in sides])
-    low, high = max(min(sizes) - 3, NICHOLS_LOWEST), min(max(*sizes, 7) + 3, NICHOLS_HIGHEST)
-    low = min(low, -10.0)
-    ax.set(xlim=(-360, 0), ylim=(low, high), xlabel="phase of L [deg]", ylabel="|L| [dB]")
-    ax.xaxis.set_major_locator(MaxNLocator(8, steps=(4.5, 9)))
-    decibel_ticks(ax)
+    low, high = np.clip((min(*sizes, -7) - 3, max(*sizes, 7) + 3), -40.0, 40.0)
+    ax.set(
+        xticks=range(-360, 1, 45), yticks=range(-40, 41, 10), xlim=(-360, 0), ylim=(low, high),
+        xlabel="phase of L [deg]", ylabel="|L| [dB]",
+    )  # fmt: skip
     ax.grid(False)
     for size in CLOSED_LOOP:
         T = 10 ** (size / 20) * AROUND
         ax.plot(*_chart(T / (1 - T)), color=GREY, lw=0.6, zorder=1, label="|T| = |L/(1 + L)|: " + CONTOURS)
-    at = {plain(size): float(decibels(1 / (10 ** (-size / 20) - 1))) for size in CLOSED_LOOP if size < 0}
-    at = {name: height for name, height in at.items() if low <= height <= high}
-    ax.secondary_yaxis("right").set_yticks(list(at.values()), [f"|T| = {name} dB" for name in at], fontsize=7.5)
+    for size in CLOSED_LOOP:
+        height = -float(decibels(10 ** (-size / 20) - 1))
+        if size < 0 and low <= height <= high:
+            note(f"|T| = {plain(size)} dB", (0, height), ax, xytext=(4, 0), fontsize=7.5)
     label = f"Ms = {USUAL_PEAK:g}"
     ax.plot(*_chart(-1 + AROUND / USUAL_PEAK), color=INK, lw=1.0, ls=":", zorder=2, label=label)
     ax.plot([-180], [0], "+", color=UNSTABLE, ms=12, mew=2.2, zorder=6, label="the point −1")
@@ -192,18 +168,15 @@ def sensitivity(found: Margins | LoopCurve, *, ax: Axes) -> None:
         for name, values, colour, width, marker, size in (
             ("S", each.sensitivity, BLUE, 1.5, "o", 9.0), ("T", each.complementary, INK, 1.0, "s", 5.0)
         ):  # fmt: skip
-            ax.plot(each.omega, values, color=colour, lw=width, ls=_dashes(each), label=_name(each, f"|{name}|, "))
+            ax.plot(each.omega, values, lw=width, **_looks(each, f"|{name}|, ", colour))
             if each.margins is not None:
                 peak, omega = each.margins.sensitivity_peak if name == "S" else each.margins.complementary_peak
                 label = f"M{name.lower()} {_at(peak, '', omega).replace('  ', ' ')}"
                 ax.plot([omega or math.nan], [decibels(peak)], **_marked(each, label, marker, size))
     ax.axhline(0.0, color=GREY, lw=0.9)
     ax.axhline(float(decibels(USUAL_PEAK)), color=GREY, lw=0.9, ls=":", label=f"Ms = {USUAL_PEAK:g}")
-    low, high = ax.get_ylim()
-    ax.set(xscale="log", xlabel=FREQUENCY, ylabel="|S|, |T| [dB]", ylim=(max(low, LOWEST), high))
-    ax.margins(x=0)
-    decibel_ticks(ax)
-    hertz_axis(ax, 1.0)
+    over_frequency(ax, "|S|, |T| [dB]")
+    ax.set_ylim(bottom=max(ax.get_ylim()[0], LOWEST))
 
 
 # ------------------------------------------------------------ Nyquist
@@ -229,34 +202,27 @@ def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     """
     L = np.where(data.is_arc | ~np.isfinite(data.L), np.nan, data.L)
     edge = float(np.clip(1.1 * np.nanmax(abs(L)), LEAST_LINEAR, MOST_LINEAR))
-    whole = 2 * edge * (1 + ZOOM_GAP / 2 + 1)
-    zoom = ax.inset_axes((edge * (2 + ZOOM_GAP) / whole, 0.0, 2 * edge / whole, 1.0))
-    ax.set(aspect="equal", frame_on=False, xlim=(-edge, whole - edge), ylim=(-edge, edge), ylabel="Im L [−]")
-    ax.set_xlabel("Re L [−]", loc="left")
-    frame = Rectangle((-edge, -edge), 2 * edge, 2 * edge, fill=False, ec=GREY, lw=0.8, clip_on=False)
-    ax.add_patch(frame)
+    zoom = ax.inset_axes((5 / 9, 0, 4 / 9, 1))  # as wide as the plot, a quarter of that between both
     ticks = [tick for tick in MaxNLocator(5, steps=(1, 2, 5, 10)).tick_values(-edge, edge) if abs(tick) <= edge]
-    ax.set(xticks=ticks, yticks=ticks)
-    low, high, down, up = ZOOM
-    zoom.set(xlim=(low, high), ylim=(down, up), xlabel="Re L [−]")
-    zoom.set_title("zoom at −1", fontsize=9.0)
+    ax.set(
+        aspect="equal", frame_on=False, xticks=ticks, yticks=ticks, xlim=(-edge, 3.5 * edge), ylim=(-edge, edge),
+        ylabel="Im L [−]",
+    )  # fmt: skip
+    ax.set_xlabel("Re L [−]", loc="left")
+    frame = ax.add_patch(Rectangle((-edge, -edge), 2 * edge, 2 * edge, fill=False, ec=GREY, lw=0.8, clip_on=False))
+    zoom.set(xlim=ZOOM[:2], ylim=ZOOM[2:], xlabel="Re L [−]", title="zoom at −1")
     circles: list[tuple[complex, float, Looks]] = [
         (0.0, 1.0, {"color": GREY, "ls": "-", "label": "|L| = 1"}),
         (-1.0, 1 / USUAL_PEAK, {"color": INK, "ls": ":", "label": f"Ms = {USUAL_PEAK:g}"}),
     ]
-    if data.verdict.is_stable:
-        peak = loop_margins(data.verdict).sensitivity_peak
+    for peak in [loop_margins(data.verdict).sensitivity_peak] if data.verdict.is_stable else []:
         label = f"radius 1/Ms, Ms {_at(peak.value, '', peak.omega).replace('  ', ' ')}"
         circles.append((-1.0, 1 / peak.value, {"color": INK, "ls": "--", "label": label}))
-    for place, (x, X, y, Y) in ((ax, (-edge, edge, -edge, edge)), (zoom, ZOOM)):
-        place.grid(False)
-        place.plot([x, X, math.nan, 0, 0], [0, 0, math.nan, y, Y], color=FAINT, lw=0.7, zorder=0.5)
+    for place in (ax, zoom):
         for centre, radius, looks in circles:
             circle = centre + radius * AROUND
             place.plot(circle.real, circle.imag, lw=0.9, zorder=2, **looks)
-        _both_halves(L, place)
-        _arrows_along(L[(L.real >= x) & (L.real <= X) & (abs(L.imag) <= Y)], 0.5 * (Y - y), place)
-        place.plot([-1], [0], "+", color=UNSTABLE, ms=11, mew=2.2, zorder=6, ls="none", label="the point −1")
+        _curve(L, -1.0, edge, place)
     for line in ax.lines:
         line.set_clip_path(frame)
     ax.set_title(_words(data, name), fontsize=9.0, loc="left")
@@ -272,38 +238,30 @@ def disc(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     A size r of L is drawn as r/(1 + r): the rim is infinity, -1 lies half way.  `name`: that of the controller.
     """
     radii = [1.0 if math.isinf(size) else size / (1 + size) for size in RING_SIZES]
+    ax.set(aspect="equal", yticks=[], xlim=(-REACH, REACH), ylim=(-REACH, REACH), frame_on=False)
     for radius in radii:
         ax.add_patch(Circle((0, 0), radius, fill=False, ec=GREY if radius in (0.5, 1.0) else FAINT, lw=0.7, zorder=0.6))
-    ax.plot([-1, 1, math.nan, 0, 0], [0, 0, math.nan, -1, 1], color=FAINT, lw=0.7, zorder=0.5)
-    _curve(data, ax)
-    ax.plot([-0.5], [0], "+", color=UNSTABLE, ms=11, mew=2.2, zorder=6, ls="none", label="the point −1")
-    ax.set(aspect="equal", yticks=[], xlim=(-REACH, REACH), ylim=(-REACH, REACH), frame_on=False)
+    _curve(np.where(data.is_arc, np.nan, compressed(data.L)), -0.5, 1.0, ax)
+    _arcs(data, ax)
     ax.set_xlabel("|L| at the rings [−]", loc="right")
     ax.set_xticks(radii, [plain(size).replace("inf", "∞") for size in RING_SIZES], fontsize=7.5)
-    ax.grid(False)
     ax.set_title(_words(data, name), fontsize=9.0, loc="center")
 
 
-def _both_halves(z: Complex, ax: Axes) -> None:
-    """The curve of rising w, and its mirror image for w < 0."""
+def _curve(z: Complex, critical: float, edge: float, ax: Axes) -> None:
+    """The curve of rising w with arrows, its mirror image for w < 0, the point -1, and both axes out to the edge."""
+    ax.grid(False)
+    ax.plot([-edge, edge, math.nan, 0, 0], [0, 0, math.nan, -edge, edge], color=FAINT, lw=0.7, zorder=0.5)
     ax.plot(z.real, z.imag, color=BLUE, lw=1.3, zorder=3, label="ω > 0, arrows as it rises")
     ax.plot(z.real, -z.imag, color=BLUE, lw=0.6, alpha=0.55, zorder=2, label="ω < 0")
+    arrows(np.where(z.real < edge, z, np.nan), ax, (0.12, 0.4, 0.75), BLUE)
+    ax.plot([critical], [0], "+", color=UNSTABLE, ms=11, mew=2.2, zorder=6, ls="none", label="the point −1")
 
 
-def _arrows_along(z: Complex, longest: float, ax: Axes) -> None:
-    """Three heads along a curve, none on a step that is longer, as one from an arc to the next is."""
-    if z.size < 3:
-        return
-    way = np.where(abs(np.diff(z)) < longest, np.diff(z), 0.0)
-    length = np.cumsum(abs(way))
-    _arrows(z[1:], way, np.searchsorted(length, length[-1] * np.array([0.12, 0.4, 0.75])), ax)
-
-
-def _curve(data: Nyquist, ax: Axes) -> None:
-    """Along the axis as a line, past poles as arcs beyond the rim, one for all that turn alike; arrows as w rises."""
+def _arcs(data: Nyquist, ax: Axes) -> None:
+    """Past poles as arcs beyond the rim, one for all that turn alike."""
     z = compressed(data.L)
-    _both_halves(np.where(data.is_arc, np.nan, z), ax)
-    alike: dict[tuple[int, int], list[tuple[NDArray[np.int64], float, float]]] = {}
+    alike: dict[tuple[int, int], list[tuple[Whole, float, float]]] = {}
     for piece in np.split(np.arange(z.size), np.flatnonzero(np.diff(data.is_arc.astype(int))) + 1):
         if data.is_arc[piece[0]]:
             first, *_, last = np.unwrap(np.angle(data.L[piece])).tolist()
@@ -311,22 +269,10 @@ def _curve(data: Nyquist, ax: Axes) -> None:
     step = min(0.03, (1.2 - ARC_RADIUS) / max(1, len(alike) - 1))  # from one radius to the next, the last being 1.2
     for number, same in enumerate(alike.values()):
         piece, first, last = same[0]
-        turn: Complex = np.exp(1j * np.linspace(first, last, 61))
-        ring = (ARC_RADIUS + step * number) * turn
+        ring = (ARC_RADIUS + step * number) * np.exp(1j * np.linspace(first, last, 61))
         whole = np.r_[z[piece[0] - 1 : piece[0]], ring, z[piece[-1] + 1 : piece[-1] + 2]]
         ax.plot(whole.real, whole.imag, color=BLUE, lw=0.8, ls=(0, (3, 1.5)), zorder=3, label="past poles on the axis")
-        _arrows(ring[1:], np.diff(ring), np.array([30]), ax)
+        arrows(ring, ax, color=BLUE)
         if len(same) > 1:
-            place = 1.28 * turn[30]
+            place = 1.28 * ring[30] / abs(ring[30])
             ax.text(place.real, place.imag, f"{len(same)} ×", fontsize=8.0, color=BLUE, ha="center", va="center")
-    _arrows_along(z[~data.is_arc], math.inf, ax)
-
-
-def _arrows(z: Complex, way: Complex, at: NDArray[np.int64], ax: Axes) -> None:
-    """Heads along the curve z with steps `way`."""
-    at = at[way[at] != 0]
-    unit = way[at] / abs(way[at])
-    ax.quiver(
-        z[at].real, z[at].imag, unit.real, unit.imag, angles="xy", pivot="mid", color=BLUE, zorder=4, scale=60,
-        width=0.003, headwidth=9, headlength=10, headaxislength=10,
-    )  # fmt: skip

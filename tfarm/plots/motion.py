@@ -11,8 +11,6 @@ from itertools import cycle
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
@@ -36,6 +34,8 @@ from .style import (
     ORANGE,
     REGIONS,
     STABLE,
+    Axes,
+    Figure,
     by_name,
     picture,
     safe,
@@ -43,7 +43,6 @@ from .style import (
 
 SHAPE_POINTS = 401  # of a drawn mode: about one to a pixel of its picture
 ALONG, DISPLACEMENT = "distance from the hub, x [m]", "displacement w(x), largest = 1 [−]"
-BESIDE_ARM = 0.2  # share of the length left of the hub and right of the tip
 HUB_WIDTH = 0.06  # width of the drawn hub, as a share of the length
 TIME = "time [s]"
 RUNS = ("#a3a3a3", INK, "#0b7f93", "#8a6d3b")  # several simulations, without feedback first: no colours of stability
@@ -111,7 +110,7 @@ def _depth(link: Link) -> float:
 def _frame(arm: Arm) -> tuple[float, float, float]:
     """Left end, right end and half the height [m] of the picture."""
     tip = arm.length + arm.hub.radius + max(0.0, arm.payload.offset)
-    return -BESIDE_ARM * arm.length, tip + BESIDE_ARM * arm.length, max(0.12 * arm.length, 0.6 * _deepest(arm))
+    return -0.2 * arm.length, tip + 0.2 * arm.length, max(0.12 * arm.length, 0.6 * _deepest(arm))
 
 
 def _deepest(arm: Arm) -> float:
@@ -132,11 +131,10 @@ def sketch(arm: Arm, *, ax: Axes) -> None:
     ax.set(aspect="equal", xlim=(left, right), ylim=(-half, half), yticks=[], xlabel="distance from the hub's axis [m]")
     ax.spines[["left", "right", "top"]].set_visible(False)
     ax.axhline(0, color=FAINT, lw=0.8, ls=(0, (6, 3, 1, 3)), zorder=0)
-    start = root
-    for link, colour in zip(arm.links, cycle(("#cfe0ee", "#e3ecd5")), strict=False):
+    starts = root + np.cumsum([0.0, *(link.length for link in arm.links)])
+    for start, link, colour in zip(starts, arm.links, cycle(("#cfe0ee", "#e3ecd5")), strict=False):
         deep = _depth(link)
         ax.add_patch(Rectangle((start, -deep / 2), link.length, deep, fc=colour, ec=BLUE, lw=1.0, zorder=2))
-        start += link.length
     ax.plot([0, root], [0, 0], color=INK, lw=4.0, solid_capstyle="butt", zorder=1.5)
     if not arm.clamp.is_rigid:
         ax.plot(root, 0, "o", ms=7.0, mfc="white", mec=ORANGE, mew=1.4, zorder=5)
@@ -175,13 +173,9 @@ def _numbers(arm: Arm) -> Iterator[str]:
 # ------------------------------------------------------------ over time
 
 
-def _slew_title(arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "") -> str:
-    return f"{arm.name}: {what or next(iter(by_name(runs).values())).scenario.name}"
-
-
 @picture(
     (Arm, "tfarm.load returns"), (Simulation, "tfarm.simulate returns"), size=(9.0, 7.0), rows=(1.35, 1.0, 1.0),
-    title=_slew_title,
+    title=lambda arm, runs, what="": f"{arm.name}: {what or next(iter(by_name(runs).values())).scenario.name}",
 )  # fmt: skip
 def slew(arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "", *, ax: Sequence[Axes]) -> None:
     """Simulations of one scenario (from `tfarm.simulate`; several by name) in three axes, given or new; these.

@@ -4,22 +4,17 @@ Each region is a list of intervals of one gain at each value of the other, with 
 and in `dsp`); nothing is read off a raster.  Edges are rounded as they are seen in a picture of that plane.
 """
 
-import math
 from collections.abc import Mapping, Sequence
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
-from matplotlib.figure import Figure
-from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import LogLocator
-from numpy.typing import NDArray
 from scipy import ndimage
 
 from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback
-from tfarm.arrays import Real
+from tfarm.arrays import Real, Whole
 from tfarm.case import Comparison
 from tfarm.crossing import Window, pieces
 from tfarm.digits import how_many, plain, scientific, significant
@@ -44,14 +39,18 @@ from tfarm.spectrum.table import default_gains
 from .frequency import bode
 from .loop_function import draw_loops
 from .style import (
+    COLOURS,
     GREY,
     INK,
     LYAPUNOV,
     REGIONS,
     STABLE,
+    Axes,
+    Figure,
     gains_words,
     law_words,
     name_axes,
+    note,
     picture,
     plain_ticks,
     safe,
@@ -60,10 +59,6 @@ from .style import (
 SLATE = "#5b7083"  # of contours of damping: no colour of stability
 DASHED, DASH_DOTTED = (0, (5, 2.5)), (0, (6, 2, 1, 2))  # edges of a sampled loop, and of a second one
 HATCHES = ("..", "\\\\\\\\", "////")  # of a sampled loop: with more damping, with less, with its own
-NUMBER_ROOM = (0.08, 0.045)  # of the width and the height: around a number
-NUMBERS_ACROSS = 0.14  # share of the picture's width between two frequencies
-MOST_DRAWN = 1e3  # factor on a controller
-HALO: list[AbstractPathEffect] = [withStroke(linewidth=3.0, foreground="white")]  # around numbers on a line
 K2_RANGE = (-1.0, 1.5)  # of the gain that balances a torque: 1 where the input is one, less for a motor's current
 CUT_RANGE = (-1.02, 1.52)  # of the same: where intervals are cut, just outside the picture: no cut is seen as an edge
 OVERLAY_COLUMNS = 72  # values of the gain across, and either side of upright edges
@@ -99,8 +94,9 @@ def gain_map(found: Plane | GainMap, *, ax: Axes) -> None:
         if found.is_of_gains:
             draw_boundary(found, edge(found, x, y), x, y, ax)
             return
-    there = zip(found.x, found.crossings, strict=False)
-    points = [(at, t) for at, each in there for t in each.within(y.low, y.high).gain]
+    points = [
+        (at, t) for at, each in zip(found.x, found.crossings, strict=False) for t in each.within(y.low, y.high).gain
+    ]
     if points:
         ax.plot(*np.transpose(points), ".", color=INK, ms=2.0, label="a pole on the stability limit, exact")
 
@@ -118,7 +114,7 @@ def ground(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
         ax.set_xlabel(f"{ax.get_xlabel()}; linear up to {plain(x.linear)}, logarithmic beyond")
 
 
-def _counts(found: Plane | GainMap, counts: NDArray[np.int64], ax: Axes) -> None:
+def _counts(found: Plane | GainMap, counts: Whole, ax: Axes) -> None:
     """The colours of the counts (rows, columns), and in each region, where it has most room, its count."""
     image = colours(counts)
     ax.pcolormesh(found.x, found.y, image, shading="nearest", rasterized=True, zorder=0.1)
@@ -132,50 +128,39 @@ def _counts(found: Plane | GainMap, counts: NDArray[np.int64], ax: Axes) -> None
             ax.fill_between([], [], [], color=image[inside][0], label=label if count else "stable")
         regions, last = ndimage.label(inside)
         room = ndimage.distance_transform_edt(np.pad(inside, 1), np.divide(1, counts.shape))[1:-1, 1:-1]
-        for region in range(1, last + 1) if count else ():
-            own = np.where(regions == region, room, 0.0)
-            if own.max() > 0.028:  # of the picture's width or height: else there is no room for a number
-                middles = np.argwhere(own > 0.9 * own.max())
-                row, column = min(middles, key=lambda at: abs(at - middles.mean(axis=0)).sum())
+        middle = room * ndimage.gaussian_filter(room, np.divide(counts.shape, 8))
+        for row, column in np.reshape(ndimage.maximum_position(middle, regions, range(1, last + 1)), (-1, 2)).tolist():
+            # of the picture's width or height: else there is no room for a number
+            if count and room[row, column] > 0.028:
                 text = "∞" if count == INFINITE else str(count)
                 ax.text(found.x[column], found.y[row], text, fontsize=9.0, ha="center", va="center", clip_on=True)
 
 
-def colours(unstable: NDArray[np.int64]) -> Real:
+def colours(unstable: Whole) -> Real:
     """The colour of each count, the darkest from the last of `REGIONS` on."""
-    last = len(REGIONS) - 1
-    number = np.where(unstable == INFINITE, last, unstable).clip(0, last)
-    return np.array([to_rgb(colour) for colour in REGIONS])[number]
+    number = np.where(unstable == INFINITE, len(REGIONS), unstable)
+    return np.take([to_rgb(colour) for colour in REGIONS], number, axis=0, mode="clip")
 
 
 def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
     """Of the least damping ratio (up, across), where it is a number: inside the stable region."""
-    ends = np.nanmin(damping, initial=math.inf), np.nanmax(damping, initial=0.0)
+    ends = np.nanmin(damping, initial=np.inf), np.nanmax(damping, initial=0.0)
     levels = [level for level in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(*ends) if ends[0] < level < ends[1]]
     if not levels:
         return
-    with np.errstate(invalid="ignore", divide="ignore"):  # by its logarithm, which is straighter
-        logarithm = np.ma.masked_invalid(np.log(damping))
+    logarithm = np.ma.log(np.ma.masked_invalid(damping))  # by which lines are straighter
     lines = ax.contour(
         across, up, logarithm, np.log(levels[-5:]), colors=SLATE, linewidths=0.8, linestyles="-", zorder=2.5
     )
-    longest = (max(pieces, key=len) for pieces in lines.allsegs if pieces)
-    places: list[Real] = []
-    for piece in longest:
-        along = (
-            piece[int(share * len(piece))] for share in (0.5, 0.35, 0.65, 0.2, 0.8) if len(piece) > 12
-        )  # best first
-        places += next(([at] for at in along if is_free(at, places, ax)), [])
-    for text in ax.clabel(lines, fontsize=8.0, fmt=lambda log: f"{plain(100 * math.exp(log), 3)} %", manual=places):
-        text.set(path_effects=HALO, zorder=6)
+    for level, parts in zip(lines.levels, lines.allsegs, strict=True):
+        longest = max(parts, key=len, default=())
+        name = f"{plain(100 * np.exp(level), 3)} %"
+        any(
+            note(name, longest[int(share * len(longest))], ax, ha="center", color=SLATE, zorder=6)
+            for share in (0.5, 0.35, 0.65, 0.2, 0.8)  # best place first
+            if len(longest) > 12
+        )
     ax.plot([], [], color=SLATE, lw=0.8, label="least damping ratio of the first two modes")
-
-
-def is_free(at: Real, places: Sequence[Real], ax: Axes, room: tuple[float, float] = NUMBER_ROOM) -> bool:
-    """Whether a text there touches none of those at the other places; `room` in shares of the width and the height."""
-    frame = ax.transData - ax.transAxes
-    away = (abs(frame.transform(place) - frame.transform(at)) > room for place in places)
-    return all(each.any() for each in away)
 
 
 def draw_boundary(found: Plane, points: Real, x: Axis, y: Axis, ax: Axes) -> None:
@@ -189,13 +174,11 @@ def draw_boundary(found: Plane, points: Real, x: Axis, y: Axis, ax: Axes) -> Non
         if at is not None:
             line(at, color=INK, lw=1.6)
     along = stable_edge(found, points, x, y)
-    last = max(0.0, float(x.place(np.array(0.0))))
-    for place, (across, up, omega) in sorted(zip(x.place(along[:, 0]).tolist(), along.tolist(), strict=True)):
-        if last + NUMBERS_ACROSS / 2 < place < 1 - NUMBERS_ACROSS / 2 and y.low < up < y.high:
-            last = place + NUMBERS_ACROSS / 2
-            ax.text(
-                across, up, significant(omega, 3), fontsize=8.0, ha="center", va="center", path_effects=HALO, zorder=5
-            )
+    place = x.place(along[:, 0])
+    first = max(0.0, float(x.place(np.array(0.0))))
+    inside = (first + 0.07 < place) & (place < 0.93) & (y.low < along[:, 1]) & (along[:, 1] < y.high)
+    for across, up, omega in sorted(along[inside].tolist()):
+        note(significant(omega, 3), (across, up), ax, (0.14, 1.0), ha="center")
 
 
 def _undamped_boundary(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
@@ -214,18 +197,11 @@ def _undamped_boundary(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
         ax.hlines(whole, x.low, x.high, color=INK, lw=0.8, label=f"every mode with the hub at rest: {omega} … rad/s")
         ax.vlines(found.upright, whole, y.high, color=INK, lw=0.8)
         return
-    resting = sorted((each.t, each.at) for each in found.crossings[-1].within(y.low, y.high))
-    levels = np.array([t for t, _ in resting])
     label = "a mode with the hub at rest, ω in rad/s at the right"
-    ax.hlines(levels, found.upright, x.high, color=INK, lw=0.5, label=label)
-    last = -math.inf
-    for (t, w), place in zip(resting, y.place(levels), strict=True):
-        if place > last + 0.05:
-            last = place
-            ax.annotate(
-                significant(w, 4), (1.0, t), xytext=(4, 0), va="center", fontsize=7.5, textcoords="offset points",
-                xycoords=ax.get_yaxis_transform(),
-            )  # fmt: skip
+    resting = found.crossings[-1].within(y.low, y.high)
+    ax.hlines(resting.gain, found.upright, x.high, color=INK, lw=0.5, label=label)
+    for t, omega in sorted(zip(resting.gain.tolist(), resting.at.tolist(), strict=True)):
+        note(significant(omega, 4), (x.high, t), ax, (1.0, 0.05), xytext=(4, 0), fontsize=7.5)
 
 
 def draw_sampled(plane: GainMap | None, ax: Axes) -> None:
@@ -243,11 +219,16 @@ def draw_region(
 
     Edges are upright where the region itself begins or ends.
     """
-    looks: dict[str, Any] = {"facecolor": REGIONS[0], "lw": 0}
-    line: dict[str, Any] = {"color": INK, "lw": 1.0, "ls": ls, "zorder": 2.5}
-    if hatch:
-        looks = {"facecolor": "none", "hatch": hatch, "edgecolor": (*to_rgb(STABLE), 0.5), "lw": 0}
-        line = {"color": STABLE, "lw": 1.4, "ls": DASHED, "zorder": 4.5}
+    line: dict[str, Any] = (
+        {"color": STABLE, "lw": 1.4, "ls": DASHED, "zorder": 4.5}
+        if hatch
+        else {"color": INK, "lw": 1.0, "ls": ls, "zorder": 2.5}
+    )
+    looks: dict[str, Any] = (
+        {"facecolor": "none", "hatch": hatch, "edgecolor": (*to_rgb(STABLE), 0.5), "lw": 0}
+        if hatch
+        else {"facecolor": REGIONS[0], "lw": 0}
+    )
     parts = pieces(across, stable)
     for piece in parts:
         x, low, high = np.array(piece.points).T
@@ -352,7 +333,8 @@ def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes
     planes = sampled if isinstance(sampled, Sequence) else [sampled]
     ms = plain(1e3 * planes[0].loop.chain.sampling.period)
     (low, *_, high), (bottom, *_, top) = continuous.axes
-    ax.set(xscale="log" if low > 0 else "linear", xlim=(low, high), ylim=(bottom, top))
+    inside = 0.008 * (top - bottom)  # so that where intervals are cut no edge is seen
+    ax.set(xscale="log" if low > 0 else "linear", xlim=(low, high), ylim=(bottom + inside, top - inside))
     plain_ticks(ax.xaxis)
     ax.grid(False)
     ax.axhline(0.0, color=GREY, lw=0.7, zorder=3.5)
@@ -374,14 +356,6 @@ def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes
     ax.plot(*law.point, "o", color="white", mec=INK, mew=1.4, ms=7, zorder=6, ls="none", label=gains_words(law))
 
 
-def draw_overlay(data: StableRegions) -> Figure:
-    """Both regions of an arm on a figure of its own, as high as moment gains are of use."""
-    figure = overlay.figure(*data)
-    figure.axes[0].set_ylim(*(data.continuous.arm.input_per_torque * end for end in K2_RANGE))
-    figure.again = partial(draw_overlay, data)  # to this height
-    return figure
-
-
 # ------------------------------------------------------------ two arms, or two laws on one arm
 
 
@@ -399,20 +373,21 @@ def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
     a law in z all is of the loops at their samples.
     """
     upper, lower, right = ax
-    names = [side.name for side in data.sides]
     if data.is_of_arms:
-        bode(dict(zip(names, data.responses, strict=True)), ax=(upper, lower))
+        bode(dict(zip(data.names, data.responses, strict=True)), ax=(upper, lower))
     else:
-        draw_loops(dict(zip(names, (side.loop_function for side in data.sides), strict=True)), upper, lower)
-        upper.set_ylabel("|L| at the samples [dB]" if data.is_sampled else "|L|, loop opened at the input [dB]")
+        looks = ({"color": colour, "label": safe(name)} for name, colour in zip(data.names, COLOURS, strict=False))
+        loops = [(*side.loop_function, how) for side, how in zip(data.sides, looks, strict=True)]
+        place = "at the samples" if data.is_sampled else "loop opened at the input"
+        draw_loops(loops, f"|L|, {place} [dB]", upper, lower)
     upper.set_xlabel("")
     upper.tick_params(labelbottom=False)  # the frequencies of the phase below
     right.grid(False)
+    right.set_facecolor(REGIONS[1])
     if data.is_sampled or data.regions is None:
         _factors(data, right)
         return
     first, other = data.regions
-    right.set_facecolor(REGIONS[1])
     for found, side, ls, mark in zip(data.regions, data.sides, ("-", DASH_DOTTED), "os", strict=True):
         label = "stable" if first == other else f"{side.name}: stable"
         draw_region(found.x, found.stable_intervals, label, right, ls=ls)
@@ -425,12 +400,13 @@ def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
 def _factors(data: Comparison, ax: Axes) -> None:
     """Factors that keep each loop stable, over the further delay of its controller."""
     delay, reaches = data.reaches
-    ax.set_facecolor(REGIONS[1])
     for stable, side, ls in zip(reaches, data.sides, ("-", DASH_DOTTED), strict=True):
         draw_region(1e3 * delay, stable, f"{side.name}: stable", ax, ls=ls)
     ax.plot(
         [0.0], [1.0], "o", mfc=INK, mec="white", ms=7.5, zorder=7, clip_on=False, label="the controllers as they are"
     )
     ax.axhline(1.0, color=INK, lw=0.6)
-    limits = {"xlim": (0.0, 1e3 * delay[-1]), "ylim": (0.0, min(ax.get_ylim()[1], MOST_DRAWN))}
-    ax.set(xlabel="further delay [ms]", ylabel="factor on the controller [−]", **limits)
+    ax.set(
+        xlabel="further delay [ms]", ylabel="factor on the controller [−]", xlim=(0.0, 1e3 * delay[-1]),
+        ylim=(0.0, min(ax.get_ylim()[1], 1e3)),
+    )  # fmt: skip

@@ -23,17 +23,18 @@ import numpy as np
 from matplotlib.axes import Axes as Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure as Figure  # which pages name too
-from matplotlib.text import Text
+from matplotlib.patheffects import AbstractPathEffect, withStroke
+from matplotlib.text import Annotation, Text
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tfarm.arm import GAINS, LISTED, PLANE, AnyLaw, Arm, as_law, shown_unit
 from tfarm.arm.law import NUMBER
+from tfarm.arrays import Complex
 from tfarm.digits import plain
 from tfarm.errors import require
 from tfarm.exact.outputs import signal_words, unit_over
 from tfarm.files import write_file
 from tfarm.loop.varied import ARM_PARAMETERS
-from tfarm.schema import quantities
 
 INK, GREY, FAINT = "#1a1a1a", "#6b6b6b", "#d4d4d4"
 BLUE, ORANGE, GREEN, PURPLE = "#0060a8", "#c4500a", "#00795a", "#8a3b8f"  # distinct for the colour-blind too
@@ -47,12 +48,10 @@ GOOD, LOW, POOR = GREEN, "#8a6100", "#b3310a"
 
 
 WIDEST_LEGEND = 0.95  # of a figure's width: letters are a little wider or narrower in a file of other dots an inch
-LETTERS_PER_INCH = 11.5  # of a headline
+NUMBER_ROOM = (0.08, 0.045)  # of the width and the height: around a number
+HALO: list[AbstractPathEffect] = [withStroke(linewidth=3.0, foreground="white")]  # around numbers on a line
 
 LYAPUNOV = "{} > 0, {} < 1".format(*PLANE)  # proven by the argument of the paper at C = 0
-NOT_THE_PAPERS = ("hub_angle",)  # outputs whose gain is an extension of the paper's law: named where it is used
-UNNAMED = "law"  # of a law without a name
-FACTORS = ("gain", "all")  # on a whole controller
 OTHER_UNITS = ARM_PARAMETERS | {"delay": "s"}  # of numbers that vary
 
 METADATA: dict[str, dict[str, str | None]] = {
@@ -66,26 +65,11 @@ COORDINATES, LONG_NUMBER, PATH_LETTER = (  # in an SVG
 )
 
 
-# An SVG on a dark page: each colour with its hue and the opposite luma, so that computed tints follow too; white
-# becomes the ground of style.css.  The exponent makes strong tints dark enough for letters on them.
-LUMA, DARK_GROUND, EXPONENT = (0.2126, 0.7152, 0.0722), (0x16, 0x19, 0x1D), 1.4
-_ROWS = " ".join(" ".join(f"{(row == of) - 2 * LUMA[of]:.6g}" for of in range(3)) + " 0 1" for row in range(3))
-_TRANSFERS = "".join(
-    f'<feFunc{name} type="gamma" exponent="{EXPONENT}" amplitude="{1 - level / 255:.6g}" offset="{level / 255:.6g}"/>'
-    for name, level in zip("RGB", DARK_GROUND, strict=True)
-)
-DARK = f"""<defs>
-  <style type="text/css">@media screen and (prefers-color-scheme: dark) {{#figure_1 {{filter: url(#dark)}}}}</style>
-  <filter id="dark" x="0" y="0" width="1" height="1" color-interpolation-filters="sRGB">
-   <feColorMatrix values="{_ROWS} 0 0 0 1 0"/><feComponentTransfer>{_TRANSFERS}</feComponentTransfer>
-  </filter>""".encode()
-
+DARK = Path(__file__).with_name("dark.svg").read_bytes()  # in an SVG: its colours on a dark page
 STYLE, COLUMN = (Path(__file__).with_name(f"{name}.mplstyle") for name in ("tfarm", "column"))
 COLUMN_WIDTH, PAGE_WIDTH, WIDE = 3.5, 7.16, 9.5  # inches: one and both columns of an IEEE paper, and what needs both
 COLUMN_POINTS, SMALL_POINTS, THIN = 8.0, 6.5, 0.7  # largest letters, those inside axes; factor on lines and marks
 LONG_LABEL, LINE = 14, 46  # letters of a label up one of several axes, and of a line of a label below the axes
-LEGEND_LINE = 0.2  # inches
-SIZES_OF_LINES = ("linewidth", "markersize", "markeredgewidth")
 _in_column: ContextVar[bool] = ContextVar("_in_column", default=False)
 
 
@@ -165,10 +149,9 @@ def picture(
                     ax.set_xlabel("")
                 if _in_column.get():
                     make_thin(drawn)
-                below = legend_below(drawn)
-                if _in_column.get():
-                    drawn.set_figheight(fitted[1] + below)
+                    drawn.set_figheight(fitted[1] + legend_below(drawn))
                 else:
+                    legend_below(drawn)
                     headline(drawn, title(*found))
             drawn.again = partial(figure, *found, **how)  # type: ignore[attr-defined]  # in another style
             return drawn
@@ -202,7 +185,7 @@ def column_size(inches: tuple[float, float], is_wide: bool) -> tuple[float, floa
     return (
         (PAGE_WIDTH, PAGE_WIDTH * share)
         if is_wide or inches[0] > WIDE
-        else (COLUMN_WIDTH, COLUMN_WIDTH * share**0.4 - LEGEND_LINE)
+        else (COLUMN_WIDTH, COLUMN_WIDTH * share**0.4 - 0.2)  # less a line of a legend
     )
 
 
@@ -211,13 +194,13 @@ def make_thin(figure: Figure) -> None:
 
     Where several axes share the height, a long label has its unit on a line of its own.
     """
+    inside = [text for ax in figure.axes for text in ax.texts]
     for text in (each for each in figure.findobj() if isinstance(each, Text)):
-        text.set_fontsize(min(text.get_fontsize(), COLUMN_POINTS))
+        text.set_fontsize(min(text.get_fontsize(), SMALL_POINTS if text in inside else COLUMN_POINTS))
     for ax in figure.axes:
-        for each, of in (*product(ax.lines, SIZES_OF_LINES), *product(ax.collections, SIZES_OF_LINES[:1])):
+        sizes = product(ax.lines, ("linewidth", "markersize", "markeredgewidth"))
+        for each, of in (*sizes, *product(ax.collections, ("linewidth",))):
             each.set(**{of: THIN * np.asarray(getattr(each, f"get_{of}")())})
-        for text in ax.texts:
-            text.set_fontsize(min(text.get_fontsize(), SMALL_POINTS))
         ax.set_xlabel(textwrap.fill(ax.get_xlabel(), LINE))
         if len(figure.axes) > 1 and len(label := ax.get_ylabel()) > LONG_LABEL:
             ax.set_ylabel(re.sub(r" +(?=\[)", "\n", label))
@@ -244,9 +227,37 @@ def legend_below(figure: Figure) -> float:
 
 def headline(figure: Figure, text: str) -> None:
     """Text above everything, at the left, its lines folded where they do not fit."""
-    width = round(LETTERS_PER_INCH * figure.get_figwidth())
+    width = round(11.5 * figure.get_figwidth())  # letters
     lines = [textwrap.fill(line, width) for line in text.replace(" = ", "\u00a0=\u00a0").splitlines()]
     figure.suptitle(safe("\n".join(lines)), x=0.012, ha="left", fontsize=10.5, color=INK)
+
+
+def note(text: str, at: tuple[float, float], ax: Axes, room: tuple[float, float] = NUMBER_ROOM, **looks: Any) -> bool:
+    """A text with a halo at a place where the room around it, of the width and the height, is free of other notes.
+
+    Returns whether it is.
+    """
+    to_view = ax.transData - ax.transAxes
+    others = [to_view.transform(each.xy) for each in ax.texts if isinstance(each, Annotation) and each.get_text()]
+    is_free = bool((abs(np.reshape(others, (-1, 2)) - to_view.transform(at)) > room).any(axis=1).all())
+    if is_free:
+        own: Any = {"fontsize": 8.0, "textcoords": "offset points", "xytext": (0, 0), "va": "center", "zorder": 5}
+        ax.annotate(text, at, annotation_clip=False, path_effects=HALO, **own | looks)
+    return is_free
+
+
+def arrows(z: Complex, ax: Axes, shares: Sequence[float] = (0.5,), color: str = INK) -> None:
+    """Heads in the direction in which a curve runs, at these shares of its length in view, where that is enough."""
+    to_view = ax.transData - ax.transAxes
+    at = to_view.transform(np.c_[z.real, z.imag])
+    seen = np.flatnonzero(((at > 0) & (at < 1)).all(axis=1))
+    way = np.diff(at[seen], axis=0) * (np.diff(seen) == 1)[:, None]  # none from where it leaves the view to its return
+    along = np.cumsum(np.hypot(*way.T))
+    for n in np.searchsorted(along, along[-1] * np.array(shares)) if along.max(initial=0.0) > 0.05 else ():
+        half = 0.015 * way[n] / np.hypot(*way[n])
+        tail, head = to_view.inverted().transform(at[seen[n]] + way[n] / 2 + [-half, half]).tolist()
+        looks = {"arrowstyle": "-|>", "color": color, "lw": 0.0, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 15}
+        ax.annotate("", head, tail, arrowprops=looks, zorder=3.5)
 
 
 def by_name(records: Any, name: str = "") -> Mapping[str, Any]:
@@ -257,12 +268,6 @@ def by_name(records: Any, name: str = "") -> Mapping[str, Any]:
 def safe(text: str) -> str:
     """A name that a person gave as a picture shows it: a dollar begins no formula."""
     return text.replace("$", r"\$")
-
-
-def axis_label(kind: Any, name: str) -> str:
-    """Label and unit of a quantity as its class of records declares it."""
-    of = quantities(kind)[name]
-    return f"{of.label} [{of.unit}]"
 
 
 def plain_ticks(axis: Axis, digits: int = 3, subs: Sequence[float] = (1.0,)) -> None:
@@ -276,7 +281,7 @@ def plain_ticks(axis: Axis, digits: int = 3, subs: Sequence[float] = (1.0,)) -> 
 def law_words(law: AnyLaw) -> str:
     """A controller by its name, where it has one of its own."""
     name = as_law(law).name
-    return "the controller" if name == UNNAMED else name
+    return "the controller" if name == "law" else name  # which is that of one without a name
 
 
 def gains_words(law: AnyLaw, digits: int = 4, but: str = "") -> str:
@@ -285,7 +290,7 @@ def gains_words(law: AnyLaw, digits: int = 4, but: str = "") -> str:
     if any_law.gains is None:
         return f"{law_words(law)}, of {', '.join(any_law.signals)}"
     gains = any_law.gains
-    named = [gain.name for gain in LISTED if gains[gain.name] or gain.output not in NOT_THE_PAPERS]
+    named = [gain.name for gain in LISTED if gains[gain.name] or gain.output != "hub_angle"]  # beyond the paper's law
     return ", ".join(f"{name} = {plain(gains[name], digits)}" for name in named if name != but)
 
 
@@ -302,7 +307,7 @@ def number_label(name: str, arm: Arm, law: AnyLaw) -> str:
     signal, of, place = NUMBER.fullmatch(name).groups("")  # type: ignore[union-attr]
     any_law = as_law(law)
     if not place and signal not in any_law.part_gains:
-        return f"{name}, factor on the {'controller' if signal in FACTORS else signal_words(signal)[0]} [−]"
+        return f"{name}, factor on the {'controller' if signal in ('gain', 'all') else signal_words(signal)[0]} [−]"
     (block,) = (part.block for part in any_law.parts if part.signals == (signal,))
     power = len(getattr(block, of)) - 1 - int(place) if place and not any_law.is_discrete else 0
     unit = "" if of == "den" else unit_over(arm.input_unit, signal_words(signal)[1])

@@ -23,13 +23,13 @@ def arm_section(case: Case) -> PageSection:
         prose("units", odd="; ".join(implausible(arm))), prose("rig", arm=arm, input=input),
         "" if arm.assumptions else "This arm states no assumptions.",
     )  # fmt: skip
-    rows = list(parameters(arm, tomllib.loads(file_text(arm, case.chain))))
     return PageSection(
         title="The arm", facts=headline_numbers(arm), words=list(filter(None, words)),
         items=arm.assumptions,
         blocks=(
             picture("arm", sketch.figure(arm), arm=arm, input=input),
-            sheet("parameters", table(rows), is_rig=not arm.is_uniform),
+            sheet("parameters", table([*parameters(arm, tomllib.loads(file_text(arm, case.chain)))]),
+                  is_rig=not arm.is_uniform),
             derived_table(arm),
         ),
     )  # fmt: skip
@@ -38,18 +38,20 @@ def arm_section(case: Case) -> PageSection:
 def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
     """First natural frequencies (at C = 0), total inertia, slenderness, shear cut-off, damping."""
 
-    def frequency(label: str, omega: float) -> Fact:
-        return Fact(label, significant(omega, 8), "rad/s", f"{significant(omega / (2 * math.pi), 8)} Hz")
-
     modes = tfarm.modes(arm, count=3)  # the rigid body's 0 is not shown
     slenderness = arm.link.slenderness if arm.is_uniform else arm.length / arm.link.section.radius_of_gyration
-    numbered = zip(modes.index, modes.natural_frequency, strict=True)
+    frequencies = {
+        f"natural frequency {number}": omega
+        for number, omega in zip(modes.index, modes.natural_frequency, strict=True)
+        if number > 0
+    }
+    frequencies |= {"shear cut-off √(κGA/ρI)": arm.shear_cutoff} if arm.has_cutoff else {}
     return (
-        *(frequency(f"natural frequency {number}", omega) for number, omega in numbered if number > 0),
+        *(Fact(label, significant(omega, 8), "rad/s", f"{significant(omega / (2 * math.pi), 8)} Hz")
+          for label, omega in frequencies.items()),
         Fact("total inertia J about the hub", significant(arm.total_inertia, 8), "kg m²",
              "the arm cannot turn as a rigid body" * (not arm.has_rigid_mode)),
         Fact("slenderness L/√(I/A)", significant(slenderness, 5)),
-        *([frequency("shear cut-off √(κGA/ρI)", arm.shear_cutoff)] if arm.has_cutoff else []),
         Fact("damping C", plain(arm.damping), "s", prose("damping_note", arm=arm)),
     )  # fmt: skip
 

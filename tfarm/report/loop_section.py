@@ -7,12 +7,12 @@ from functools import partial
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tfarm.arm import GAINS, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, cancelled, shown_unit, unit_of
+from tfarm.arm import GAINS, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, cancelled, shown_unit, unit_of
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import REFERENCE, is_measured
 from tfarm.arrays import Real
+from tfarm.case.card import POOR, margins_of, result_card
 from tfarm.case.card import loop_function as loop_curves
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain
@@ -24,7 +24,7 @@ from tfarm.loop.curve import curve_of
 from tfarm.plots import loop_function, regions, roots, style
 from tfarm.plots.style import Axes
 from tfarm.records import record
-from tfarm.report.overview import card_of, results
+from tfarm.report.overview import results
 from tfarm.report.page import (
     DESIGNED_MODES,
     Case,
@@ -34,8 +34,8 @@ from tfarm.report.page import (
     Picture,
     best,
     brief_on,
+    columns_of,
     has_loop,
-    margins_of,
     picture,
     prose,
     sheet,
@@ -50,8 +50,8 @@ from tfarm.synthesis import judge, models, structures
 GRID_COLUMNS, GRID_ROWS = 240, 200  # of the coloured grid
 DAMPING_EVERY = 4  # of them, the damping is computed at one in four
 DAMPING_MODES = 8  # of the model whose poles that is of: it is right to a few digits, more than a contour shows
+RECOMMENDED = "Recommended gains (best damping)"
 RANGE_OF_K2 = (-1.0, 1.6)  # of the locus, times what balances a torque: both sides of 0, and beyond 1
-shortly = partial(plain, digits=4)  # how a gain is written in a title
 
 
 # ------------------------------------------------------------ margins
@@ -64,7 +64,11 @@ def margins_section(case: Case) -> PageSection:
     words += [] if case.laws else [sign_words(case.arm)]
     blocks: list[Picture | Table] = [*(_bode_picture(*pair, case.chain) for pair in found), margin_table(found)]
     for each, it in found:
-        blocks += tables_of(each, it)
+        crossovers = {"gain_crossovers": it.gain_crossovers, "phase_crossovers": it.phase_crossovers}
+        for kind, rows in crossovers.items():
+            blocks.append(sheet(kind, table(rows), stem=each.stem(kind.replace("_", "-")), each=each))
+        own = table(it.stability_intervals)
+        blocks.append(sheet("intervals", own, stem=each.stem("windows"), each=each, note=it.intervals_note))
         try:
             few = stability.spill(each.arm, each.law, 12)
             blocks.append(sheet("spill", table(few.models), stem=each.stem("spill"), each=each, found=few))
@@ -87,21 +91,13 @@ def _bode_picture(each: Controller, found: margins.Margins, chain: Chain) -> Pic
         curve = loop_curves(each.arm, each.law, chain)
     except ConvergenceError:
         curve = curve_of(found)
-    rows = [
+    rows = (
         (own.period or 0.0, *row) for own in curve.sides for row in zip(own.omega, own.L.real, own.L.imag, strict=True)
-    ]
-    keys = ("period_s", "omega_rad_s", "re_L", "im_L")
-    data = [Column(key, of=of) for key, of in zip(keys, zip(*rows, strict=True), strict=True)]
-    figure = loop_function.loop.figure(curve)
-    return picture("loop_function", figure, stem=each.stem("bode"), data=data, each=each, curve=curve)
-
-
-def tables_of(each: Controller, found: margins.Margins) -> Iterator[Table]:
-    """Every crossing of |L| = 1 and of L < 0 in the range, ascending, and the stability interval of each number."""
-    for kind, rows in (("gain_crossovers", found.gain_crossovers), ("phase_crossovers", found.phase_crossovers)):
-        yield sheet(kind, table(rows), stem=each.stem(kind.replace("_", "-")), each=each)
-    columns = table(found.stability_intervals).columns
-    yield sheet("intervals", columns, stem=each.stem("windows"), each=each, note=found.intervals_note)
+    )
+    data = columns_of(("period_s", "omega_rad_s", "re_L", "im_L"), rows)
+    return picture(
+        "loop_function", loop_function.loop.figure(curve), stem=each.stem("bode"), data=data, each=each, curve=curve
+    )
 
 
 # ------------------------------------------------------------ Nyquist
@@ -123,22 +119,6 @@ def nyquist_section(case: Case) -> PageSection:
     return PageSection(title="Nyquist plot: encirclements of −1", words=[prose("nyquist", own=own)], blocks=blocks)
 
 
-# ------------------------------------------------------------ poles
-
-
-def poles_tables(case: Case) -> tuple[list[str], list[Table]]:
-    """The first closed-loop poles of each controller, complete in a box; a sentence where they are not determined."""
-    words, tables, of = list[str](), list[Table](), quantities(poles.Poles)["values"]
-    for each in case.in_s:
-        try:
-            found = poles.closed_loop_poles(each.arm, each.law)
-            columns = roots_table(found.values, of).columns
-            tables.append(sheet("poles", columns, stem=each.stem("poles"), each=each, box=found.box))
-        except TfarmError as error:
-            words.append(f"{upper(each.name)}: poles not determined, {error}.")
-    return words, tables
-
-
 # ------------------------------------------------------------ laws
 
 
@@ -152,10 +132,10 @@ def law_section(case: Case) -> PageSection:
     ]  # fmt: skip
     words.append(sign_words(case.arm))
     words.append(prose("not_on_page", discrete=[each.name for each in named if each.law.is_discrete]))
-    entries = [entry for each in named for entry in entries_of(each)]
-    blocks = [sheet("law_entries", table(entries))]
-    title = "The controller" if len(named) == 1 else "The controllers"
-    return PageSection(title=title, answer=prose("laws", each=named), words=words, blocks=blocks)
+    blocks = [sheet("law_entries", table([entry for each in named for entry in entries_of(each)]))]
+    return PageSection(
+        title="The controller" + "s" * (len(named) > 1), answer=prose("laws", each=named), words=words, blocks=blocks
+    )
 
 
 class Entry(NamedTuple):
@@ -181,8 +161,7 @@ def entries_of(each: Controller) -> Iterator[Entry]:
             signal = name.removeprefix(REFERENCE)
             enters = "less its reference" if name in law.references else "as it is"
             enters = enters if is_measured(name) else "its reference alone"
-            unit = Signals(each.arm, (signal,)).units[0]
-            yield Entry(each.name, signal, unit, enters, num, den)
+            yield Entry(each.name, signal, Signals(each.arm, (signal,)).units[0], enters, num, den)
 
 
 # ------------------------------------------------------------ the map of both gains
@@ -195,8 +174,7 @@ class MapOfArm:
 
     `region` is the exact count on the coloured grid, `edge` (n, 3) the exact boundary, both gains and w, within the
     picture with rows of nan where it leaves it; `damping` (rows, columns) the least damping ratio of the first
-    `DESIGNED_MODES` modes at `axes`, every fourth value of each gain on the grid and the frame's, and `counts` the
-    unstable poles there.  `sampled` is the
+    `DESIGNED_MODES` modes on the `coarse` grid, of every fourth value of each gain and the frame's.  `sampled` is the
     region of the loop sampled by the case's chain, None where that is not determined.
     """
 
@@ -205,9 +183,8 @@ class MapOfArm:
     y: plane.Axis
     region: plane.Plane
     edge: Real
-    axes: tuple[Real, Real]
+    coarse: plane.Plane
     damping: Real
-    counts: NDArray[np.int64]
     sampled: SampledMap | None
 
 
@@ -216,17 +193,17 @@ def map_of_arm(case: Case) -> MapOfArm:
     arm, x = case.arm, plane.rate_axis(case.arm)
     y = plane.moment_axis(arm, x)
     found = plane.gain_map(arm, x.grid(GRID_COLUMNS), y.grid(GRID_ROWS))
-    half = DAMPING_EVERY // 2
     across, up = (
-        np.r_[axis.low, each[half::DAMPING_EVERY], axis.high] for axis, each in zip((x, y), found.axes, strict=True)
+        np.r_[axis.low, each[DAMPING_EVERY // 2 :: DAMPING_EVERY], axis.high]
+        for axis, each in zip((x, y), found.axes, strict=True)
     )
-    sampled = regions.sampled_region(arm, x, y, case.chain)
-    damping, counts = damping_over(arm, across, up), plane.gain_map(arm, across, up).unstable
-    return MapOfArm(case, x, y, found, plane.edge(found, x, y), (across, up), damping, counts, sampled)
+    coarse, sampled = plane.gain_map(arm, across, up), regions.sampled_region(arm, x, y, case.chain)
+    return MapOfArm(case, x, y, found, plane.edge(found, x, y), coarse, damping_over(coarse), sampled)
 
 
-def damping_over(arm: Arm, across: Real, up: Real) -> Real:
+def damping_over(coarse: plane.Plane) -> Real:
     """The least damping ratio (rows, columns) of the first modes over both gains."""
+    arm, (across, up) = coarse.arm, coarse.axes
     signals = tuple(each.output for name in PLANE for each in GAINS if each.name == name)
     model = models.continuous_model(arm, signals, DESIGNED_MODES, DAMPING_MODES, first_frequency(arm))
     points = np.reshape(np.meshgrid(across, up), (2, -1))
@@ -246,7 +223,7 @@ def draw_map_of_arm(data: MapOfArm, *, ax: Axes) -> None:
     case, found, x, y = data.case, data.region, data.x, data.y
     designed = best(case.arm, case.chain)
     regions.ground(found, x, y, ax)
-    regions.contours(*data.axes, np.where(data.counts == 0, data.damping, np.nan), ax)
+    regions.contours(*data.coarse.axes, np.where(data.coarse.unstable == 0, data.damping, np.nan), ax)
     regions.draw_boundary(found, data.edge, x, y, ax)
     regions.draw_sampled(data.sampled, ax)
     if case.arm.is_uniform:
@@ -261,12 +238,12 @@ def draw_map_of_arm(data: MapOfArm, *, ax: Axes) -> None:
 
 def map_data(data: MapOfArm) -> Sequence[Column]:
     """The grid with counts and damping, then the boundary with its frequencies; the sampled region has its own file."""
-    points = zip(*map(np.ravel, np.meshgrid(*data.axes)), data.counts.ravel(), data.damping.ravel(), strict=True)
+    own = np.meshgrid(*data.coarse.axes)
+    points = zip(*map(np.ravel, (*own, data.coarse.unstable, data.damping)), strict=True)
     grid = [("grid", K1, K2, math.inf if count < 0 else int(count), damping, "") for K1, K2, count, damping in points]
     line = [("boundary", K1, K2, "", "", omega) for K1, K2, omega in data.edge.tolist() if not math.isnan(K1)]
     rate = "_".join([PLANE[0], *shown_unit(PLANE[0], data.case.arm).replace("/", " ").split()])
-    keys = ("what", rate, PLANE[1], "unstable_poles", "least_damping_ratio", "omega_rad_s")
-    return [Column(key, of=own) for key, own in zip(keys, zip(*grid, *line, strict=True), strict=True)]
+    return columns_of(("what", rate, PLANE[1], "unstable_poles", "least_damping_ratio", "omega_rad_s"), [*grid, *line])
 
 
 def map_section(case: Case) -> PageSection:
@@ -285,19 +262,26 @@ def interval_facts(arm: Arm) -> list[Fact]:
     """The stability intervals of each gain of the continuous-time loop, the other at its default."""
     return [
         Fact(f"{row.name}, continuous", text(row.intervals, 4) or "no value", row.unit)
-        for row in margins_of(arm, default_gains(arm)).stability_intervals
+        for row in margins_of(arm, as_law(default_gains(arm))).stability_intervals
         if row.name in PLANE
     ]
 
 
 def recommended_section(case: Case) -> PageSection:
-    """The gains that damp the first modes of the sampled loop best, with their result card."""
-    found, title = best(case.arm, case.chain), "Recommended gains: best damping"
+    """The gains that damp the first modes of the sampled loop best, with their result card.
+
+    They are recommended unless a margin of the sampled loop is poor.
+    """
+    found = best(case.arm, case.chain)
     if found is None:
-        return PageSection(title=title, answer=prose("no_best_gains", modes=DESIGNED_MODES))
+        return PageSection(title=RECOMMENDED, answer=prose("no_best_gains", modes=DESIGNED_MODES))
     gains = ", ".join(found.law.gain_text(name, partial(significant, digits=4), case.arm) for name in PLANE)
     answer, each = prose("best_gains", found=found, modes=DESIGNED_MODES, gains=gains), case.in_s[-1]
-    return PageSection(title=title, answer=answer, card=results(card_of(each, case), each.title))
+    card = results(result_card(each.arm, each.law, case.chain), each.title)
+    title = (
+        "Gains of best damping" if POOR in (each["grade"] for each in card[-1:]) else RECOMMENDED
+    )  # of the sampled one
+    return PageSection(title=title, answer=answer, card=card)
 
 
 # ------------------------------------------------------------ root loci
@@ -305,7 +289,14 @@ def recommended_section(case: Case) -> PageSection:
 
 def locus_section(case: Case) -> PageSection:
     """Poles of the controllers; of an arm's own page root loci along each gain too."""
-    words, tables = poles_tables(case)
+    words, tables, of = list[str](), list[Table](), quantities(poles.Poles)["values"]
+    for each in case.in_s:
+        try:
+            listed = poles.closed_loop_poles(each.arm, each.law)
+            shown = roots_table(listed.values, of)
+            tables.append(sheet("poles", shown, stem=each.stem("poles"), each=each, box=listed.box))
+        except TfarmError as error:
+            words.append(f"{upper(each.name)}: poles not determined, {error}.")
     if case.laws:
         return PageSection(title="Closed-loop poles", words=words, blocks=tables)
     arm, gains, blocks = case.arm, default_gains(case.arm), list[Picture | Table]()
@@ -315,21 +306,21 @@ def locus_section(case: Case) -> PageSection:
     found: dict[str, loci.Loci] = {}
     for name, (start, stop) in ranges.items():
         try:
-            found[name] = loci.loci(arm, gains, name, start, stop)
-            blocks += locus_blocks(found[name])
+            found[name] = own = loci.loci(arm, gains, name, start, stop)
+            stem = f"locus-{name}"
+            blocks += [
+                picture("locus", roots.draw_loci.figure(own), stem=stem, data=locus_data(own), found=own),
+                sheet("branches", table(own.rows), stem=f"{stem}-branches", found=own),
+                sheet("crossings", table(own.exact.crossings), stem=f"{stem}-crossings", found=own),
+            ]
         except ConvergenceError:
             words.append(prose("not_followed", name=name))
-    others = {name: gains.gain_text(other, shortly, arm) for name, other in zip(PLANE, reversed(PLANE), strict=True)}
+    others = {
+        name: gains.gain_text(other, partial(plain, digits=4), arm)
+        for name, other in zip(PLANE, reversed(PLANE), strict=True)
+    }
     answer = prose("locus_lead", found=found, gains=others)
     return PageSection(title="Root loci", answer=answer, words=words, blocks=[*blocks, *tables])
-
-
-def locus_blocks(data: loci.Loci) -> Iterator[Picture | Table]:
-    """The picture of a locus, its branches, and their crossings of the imaginary axis."""
-    stem = f"locus-{data.name}"
-    yield picture("locus", roots.draw_loci.figure(data), stem=stem, data=locus_data(data), found=data)
-    yield sheet("branches", table(data.rows), stem=f"{stem}-branches", found=data)
-    yield sheet("crossings", table(data.exact.crossings), stem=f"{stem}-crossings", found=data)
 
 
 def locus_data(data: loci.Loci) -> Sequence[Column]:

@@ -35,7 +35,8 @@ from tfarm.arm import (
     presets,
 )
 from tfarm.arm.writing import law_toml
-from tfarm.digits import how_many, listed, plain, scientific, significant
+from tfarm.case.card import LoopCard
+from tfarm.digits import how_many, kept_digits, listed, plain, scientific, significant
 from tfarm.dsp import Chain, discretise, load_chain, verdict
 from tfarm.dsp.chain import file_text
 from tfarm.errors import ConvergenceError, ParameterError, one_line
@@ -43,23 +44,25 @@ from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.fitting.recording import MeasuredRun
 from tfarm.loop.loop import Loop
-from tfarm.loop.margins import Margins, margins
 from tfarm.plots.style import Figure, gains_words, save_column, save_figure
 from tfarm.records import record
 from tfarm.response.signals import Signals, sign_of
-from tfarm.schema import Column, Table, save_table, text
+from tfarm.schema import Column, Table, quantities, save_table, text, to_json
 from tfarm.schema.html import as_html, with_symbols
 from tfarm.spectrum.table import default_gains
 from tfarm.synthesis.design import Design, design
 
 TEMPLATES = Path(__file__).parent / "templates"
 PICTURES, DATA = "pictures", "data"  # folders in that of an arm
+DRAWN_DIGITS = 5  # of the numbers of a picture in its file: a hundredth of the width of a line is four
 T = TypeVar("T")
 PART = "\ue000"  # between title and caption, which no name has in it
 PROMISES = (
     "certified", "complete", "converged", "default gains", "enclosed", "Lyapunov region", "not determined", "proven",
     "small gain", "winding number",
 )  # fmt: skip
+IN_PILL = ("stability", "grade", "limited_by", "delay_margin_periods")  # quantities without a cell of their own
+CARD_ROWS = {of.key: of for name, of in quantities(LoopCard).items() if name not in IN_PILL}
 DESIGNED_MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
 
 
@@ -84,7 +87,7 @@ def templates() -> Environment:
     )
     environment.globals |= {"inf": math.inf, "rate": RATE_GAIN, "moment": MOMENT_GAIN, "angle": ANGLE_GAIN,
                             "plane": " and ".join(PLANE), "arm_python": arm_python,
-                            "gains_python": gains_python}  # fmt: skip
+                            "gains_python": gains_python, "card_rows": CARD_ROWS}  # fmt: skip
     environment.filters.update(
         symbol=with_symbols, text=text, plain=plain, significant=significant, scientific=scientific, upper_first=upper,
         listed=listed, how_many=how_many, as_html=as_html,
@@ -122,27 +125,6 @@ class Fact(NamedTuple):
     note: str = ""
 
 
-class Cell(NamedTuple):
-    """A quantity of a loop as a card shows it: the frequency or the mode `at` which it is reached, and its grade."""
-
-    label: str
-    value: str
-    unit: str
-    at: str = ""
-    grade: str = ""
-
-
-@dataclass(frozen=True)
-class LoopResult:
-    """One loop as cards show it, its quantities by the names of `LoopCard`; `look` is the style of its pill."""
-
-    controller: str
-    loop: str
-    pill: str
-    look: str
-    cells: dict[str, Cell]
-
-
 class Picture(NamedTuple):
     """A finished figure with its words.  `stem` names its files; `data` are the numbers that it draws.
 
@@ -176,6 +158,11 @@ def _columns(of: Table | Iterable[Column]) -> tuple[Column, ...]:
     return of.columns if isinstance(of, Table) else tuple(of)
 
 
+def columns_of(keys: Sequence[str], rows: Iterable[Sequence[Any]]) -> list[Column]:
+    """The columns of these rows, as the data of a picture have them."""
+    return [Column(key, of=of) for key, of in zip(keys, zip(*rows, strict=True), strict=True)]
+
+
 class SavedBlock(NamedTuple):
     """A picture or table as the page shows it, its files saved; `image` is the picture without words."""
 
@@ -187,7 +174,7 @@ class SavedBlock(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PageSection:
-    """A part of a page.  `answer` is its result in a sentence or two, `card` that of a controller of its own.
+    """A part of a page.  `answer` is its result in a sentence or two, `card` the loops of a controller of its own.
 
     `words` are paragraphs, `items` a list; `blocks` pictures and tables, of which one without columns is not shown.
     `failure` is the reason why the section could not be made, which its words have too; empty otherwise.
@@ -199,7 +186,7 @@ class PageSection:
     words: Sequence[str] = ()
     items: Sequence[str] = ()
     facts: Sequence[Fact] = ()
-    card: Sequence[LoopResult] = ()
+    card: Sequence[Mapping[str, Any]] = ()
     blocks: Sequence[Any] = ()
     failure: str = ""
 
@@ -208,8 +195,9 @@ def save_section(section: PageSection, folder: Path, is_paper: bool = False) -> 
     """The section with its blocks saved: what remains to be written are words."""
     for name in (PICTURES, DATA):
         (folder / name).mkdir(exist_ok=True)
-    shown = [block for block in section.blocks if getattr(block, "columns", True)]
-    return replace(section, blocks=[save_block(block, folder, is_paper) for block in shown])
+    return replace(section, blocks=[
+        save_block(block, folder, is_paper) for block in section.blocks if getattr(block, "columns", True)
+    ])  # fmt: skip
 
 
 def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> SavedBlock:
@@ -221,25 +209,30 @@ def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> 
     save_figure(block.figure, folder / PICTURES, block.stem, formats=("svg",))
     if is_paper:
         save_column(block.figure, folder / PICTURES, block.stem)
-    numbers = Table(columns=block.data, stem=f"{block.stem}-data")
-    saved = save_table(numbers, folder / DATA, kinds=("csv",)) if block.data else ()
+    columns = tuple(replace(each, of=list(map(drawn_value, each.of))) for each in block.data)
+    saved = save_table(Table(columns=columns, stem=f"{block.stem}-data"), folder / DATA, ("csv",)) if columns else ()
     drawn = [f"{PICTURES}/{block.stem}.{kind}" for kind in ("svg", *["pdf"] * is_paper)]
     files = [*drawn, *(f"{DATA}/{name}" for name in saved)]
     return SavedBlock(block.stem, block.title, shape.picture(block, files), shape.image(block))
+
+
+def drawn_value(value: Any) -> Any:
+    """A value of a picture to more digits than it shows; words and counts as they are."""
+    return kept_digits((value,), DRAWN_DIGITS)[0] if isinstance(value, float) else value
 
 
 def explained(text: str, words: str = "") -> Markup:
     """A sentence as a page shows it, commands in `...`; a promise leads to its meaning on the page `words`, if any."""
     shown = re.sub("`(.+?)`", r"<code>\1</code>", str(with_symbols(text)))
     for word in PROMISES if words else ():
-        linked = rf'<a class="term" href="{words}#{word_id(word)}">\g<0></a>'
+        linked = rf'<a class="term" href="{words}#{anchor("word", word)}">\g<0></a>'
         shown = re.sub(rf"\b{word}\b", linked, shown, count=1, flags=re.IGNORECASE)
     return Markup(shown)
 
 
-def word_id(name: str) -> str:
-    """The anchor of a word of the glossary."""
-    return f"word-{name.lower().replace(' ', '-')}"
+def anchor(kind: str, name: str) -> str:
+    """A name for links: the equation "(A.1)" becomes "eq-a-1"."""
+    return f"{kind}-{re.sub(r'[^a-z0-9]+', '-', name.lower()).strip('-')}"
 
 
 def write_text(file: Path, text: str) -> None:
@@ -252,8 +245,8 @@ def write_text(file: Path, text: str) -> None:
 
 def keep(folder: Path, kind: str, content: Mapping[str, Any]) -> None:
     """kind.json, with a mark of what it is."""
-    text = json.dumps({f"tfarm_{kind}": 1, **content}, ensure_ascii=False, indent=1) + "\n"
-    write_text(folder / f"{kind}.json", text)
+    text = to_json({f"tfarm_{kind}": 1, **content}, ensure_ascii=False, indent=1)
+    write_text(folder / f"{kind}.json", f"{text}\n")
 
 
 def kept_in(folder: Path, kind: str, record: type[T]) -> T | None:
@@ -267,8 +260,8 @@ def kept_in(folder: Path, kind: str, record: type[T]) -> T | None:
 def kept(out: Path, kind: str, record: type[T]) -> dict[Path, T]:
     """The records of that kind in the folders of arms, by folder; what is none of ours is passed over."""
     folders = sorted((f for f in out.iterdir() if f.is_dir() and not f.name.startswith(".")), key=lambda f: f.name)
-    found = ((folder, kept_in(folder, kind, record)) for folder in folders)
-    return {folder: each for folder, each in found if each is not None and getattr(each, "name", "") == folder.name}
+    found = {folder: each for folder in folders if (each := kept_in(folder, kind, record)) is not None}
+    return {folder: each for folder, each in found.items() if getattr(each, "name", "") == folder.name}
 
 
 # ------------------------------------------------------------ the case
@@ -397,12 +390,6 @@ def best(arm: Arm, chain: Chain) -> Design | None:
 
 
 brief_on = lru_cache(maxsize=64)(verdict.sampled_brief)  # each computed once for all sections of a page
-_margins = lru_cache(maxsize=64)(margins)
-
-
-def margins_of(arm: Arm, law: AnyLaw) -> Margins:
-    """Verdict and margins, computed once for all sections."""
-    return _margins(arm, as_law(law))
 
 
 def is_preset(arm: Arm, chain: Chain) -> bool:

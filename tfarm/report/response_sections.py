@@ -1,7 +1,7 @@
 """The arm without a controller: modes, shapes, theories, sensitivities; frequency responses, computed and measured."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from decimal import Decimal, localcontext
 from functools import lru_cache, partial
@@ -11,12 +11,11 @@ import numpy as np
 
 import tfarm
 from tfarm.arm import Arm, Theory
-from tfarm.arrays import Real
 from tfarm.digits import fixed, kept_digits, lined, listed, plain
 from tfarm.errors import CertificationError, ConvergenceError
-from tfarm.fitting.fit import ARMS, Possible, possible
+from tfarm.fitting.fit import ARMS, possible
 from tfarm.fitting.overlay import overlay
-from tfarm.loop.margins import Margins, margins
+from tfarm.loop.margins import margins
 from tfarm.loop.plane import ranges_of
 from tfarm.plots import frequency, motion
 from tfarm.plots.style import gains_words
@@ -24,7 +23,7 @@ from tfarm.report.page import Case, PageSection, Picture, has_loop, picture, pro
 from tfarm.response.frequency import AXIS_SHARE, Bode, bode
 from tfarm.schema import Column, Table, curve_table, table
 from tfarm.spectrum import DampedModes, Modes, damped_modes, modes
-from tfarm.spectrum.listing import SHAPE_DIGITS, ListedMode, beyond_the_box, listed_modes
+from tfarm.spectrum.listing import SHAPE_DIGITS, beyond_the_box, listed_modes
 from tfarm.spectrum.proofs import Certificate
 from tfarm.spectrum.table import default_gains
 
@@ -32,7 +31,7 @@ PROVEN_MODES, BRACKET_DIGITS = 10, 20  # flexible modes of each arm, as its page
 PROVEN_DIGITS = 12  # of an eigenvalue: more than a page prints of any
 TWO_PI = Decimal("6.2831853071795864769252867665590057683943387987502")
 TABLED_MODES, DRAWN_MODES = 10, 6  # as `tfarm modes` lists them; shapes in three rows of two
-SIMPLER: tuple[Theory, ...] = ("shear", "rayleigh", "euler-bernoulli")
+THEORIES: tuple[Theory, ...] = ("timoshenko", "shear", "rayleigh", "euler-bernoulli")
 
 
 def modes_section(case: Case) -> PageSection:
@@ -47,12 +46,19 @@ def modes_section(case: Case) -> PageSection:
             blocks += damped_tables(found)
         except (ConvergenceError, CertificationError) as error:
             words.append(prose("no_damped_table", why=error))
-    blocks += [_shapes(tfarm.modes(arm, count=DRAWN_MODES)), theories(arm), sensitivity_table(found)]
+    drawn = tfarm.modes(arm, count=DRAWN_MODES)
+    shapes = motion.scaled(drawn, DRAWN_MODES)
+    columns = (
+        Column("x_m", of=np.linspace(0.0, arm.length, motion.SHAPE_POINTS)),
+        *(Column(f"mode_{number}", of=np.round(w, SHAPE_DIGITS - 1) + 0.0) for number, w in shapes.items()),
+    )
+    nodes = [own for number, own in zip(drawn.index, drawn.nodes, strict=True) if number in shapes]
+    blocks += [
+        picture("mode_shapes", motion.modes.figure(drawn), data=columns, arm=arm, nodes=nodes),
+        theories(arm),
+        sensitivity_table(found),
+    ]
     return PageSection(title="Modes", words=words, blocks=blocks)
-
-
-def _flexible(modes: Modes) -> Real:
-    return modes.natural_frequency[modes.index > 0]
 
 
 # ------------------------------------------------------------ natural frequencies, and their proof
@@ -60,18 +66,15 @@ def _flexible(modes: Modes) -> Real:
 
 def modal_table(modes: Modes) -> Table:
     """Frequencies, hub participation, modal moment and nodes."""
-    rows = [_rounded(row, modes.arm.length) for row in listed_modes(modes).modes]
+    decimals, rows = SHAPE_DIGITS - 1 - math.floor(math.log10(modes.arm.length)), []
+    for row in listed_modes(modes).modes:  # what depends on a shape to the digits that hold on every processor
+        participation, moment = kept_digits((row.hub_participation, row.modal_moment + 0.0), SHAPE_DIGITS)
+        nodes = np.round(row.nodes, decimals).tolist()
+        rows.append(replace(row, hub_participation=participation, modal_moment=moment, nodes=nodes))
     names = ("index", "natural_frequency", "natural_frequency_hz", "hub_participation", "modal_moment", "nodes")
     columns = table(rows, names).columns
     proof = how_proven(modes, columns[1].cells, columns[2].cells)
     return sheet("modal_table", columns, arm=modes.arm, proof=proof)
-
-
-def _rounded(row: ListedMode, length: float) -> ListedMode:
-    """The row with all that depends on a mode's shape to the digits that hold on every processor."""
-    participation, moment = kept_digits((row.hub_participation, row.modal_moment + 0.0), SHAPE_DIGITS)
-    nodes = np.round(row.nodes, SHAPE_DIGITS - 1 - math.floor(math.log10(length))).tolist()
-    return replace(row, hub_participation=participation, modal_moment=moment, nodes=nodes)
 
 
 @lru_cache(maxsize=8)  # for the arm's page and the page on trust, as the damped ones below
@@ -142,21 +145,11 @@ def locked_table(found: Modes) -> Table:
 # ------------------------------------------------------------ shapes, theories, sensitivities
 
 
-def _shapes(modes: Modes) -> Picture:
-    shapes = motion.scaled(modes, DRAWN_MODES)
-    columns = (
-        Column("x_m", of=np.linspace(0.0, modes.arm.length, motion.SHAPE_POINTS)),
-        *(Column(f"mode_{number}", of=np.round(w, SHAPE_DIGITS - 1) + 0.0) for number, w in shapes.items()),
-    )
-    nodes = [own for number, own in zip(modes.index, modes.nodes, strict=True) if number in shapes]
-    return picture("mode_shapes", motion.modes.figure(modes), data=columns, arm=modes.arm, nodes=nodes)
-
-
 def theories(arm: Arm) -> Table:
     """Natural frequencies by the four beam theories, and differences from the first in per cent."""
-    names: tuple[Theory, ...] = ("timoshenko", *SIMPLER)
-    omega = {theory: _flexible(tfarm.modes(arm, TABLED_MODES, theory=theory)) for theory in names}
-    differences = {theory: 100 * (omega[theory] / omega["timoshenko"] - 1) for theory in SIMPLER}
+    found = {theory: tfarm.modes(arm, TABLED_MODES, theory=theory) for theory in THEORIES}
+    omega = {theory: each.natural_frequency[each.index > 0] for theory, each in found.items()}
+    differences = {theory: 100 * (omega[theory] / omega["timoshenko"] - 1) for theory in THEORIES[1:]}
     columns = (
         Column("mode", "mode", of=range(1, TABLED_MODES + 1)),
         *(Column(f"{theory.replace('-', '_')}_rad_s", theory.title(), "rad/s", of=each, digits=lined(8, 7))
@@ -181,8 +174,9 @@ def sensitivity_table(modes: Modes) -> Table:
         *(Column(f"mode_{number}", f"mode {number}", "%/%", of=values, digits=partial(fixed, decimals=3),
                  tint=list(map(tint, values))) for number, values in by_mode),
     )  # fmt: skip
-    dropped = [name for name in rows if name not in shown]
-    return sheet("sensitivities", columns, is_rig=not modes.arm.is_uniform, dropped=dropped)
+    return sheet(
+        "sensitivities", columns, is_rig=not modes.arm.is_uniform, dropped=[name for name in rows if name not in shown]
+    )
 
 
 def tint(x: float) -> str:
@@ -203,7 +197,12 @@ def bode_section(case: Case, output: str) -> PageSection:
     if data.is_zero:
         none = f"The {data.label} is zero at every frequency: this arm's tip is pinned."
         return PageSection(title=f"From {what}", words=(none,))
-    roots, facts = table([*data.pole_list, *data.zero_list], parent=data).columns, {"data": data, "boxes": _boxes(data)}
+    boxes = [
+        f"{name} in {plain(left, 5)} < Re s < {plain(right, 5)} 1/s"
+        for name, (left, right) in (("poles", data.pole_width), ("zeros", data.zero_width))
+        if not math.isinf(left)
+    ]
+    roots, facts = table([*data.pole_list, *data.zero_list], parent=data).columns, {"data": data, "boxes": boxes}
     blocks = (
         picture("bode", frequency.bode.figure(data), stem=stem, data=curve_table(data), **bode_facts(data)),
         sheet("bode_table", roots, stem=f"{stem}-roots", **facts),
@@ -217,16 +216,6 @@ def bode_facts(data: Bode) -> dict[str, Any]:
     right = data.zeros[data.zeros.real > AXIS_SHARE * abs(data.zeros)]
     count, slowest = int(np.sum(right.imag == 0) + 2 * np.sum(right.imag > 0)), float(abs(right).min(initial=np.inf))
     return {"found": data, "right": count, "slowest": slowest, "turned": float(np.ptp(data.phase))}
-
-
-def _boxes(data: Bode) -> list[str]:
-    """The widths in which poles and zeros are complete."""
-    widths = {"poles": data.pole_width, "zeros": data.zero_width}
-    return [
-        f"{name} in {plain(left, 5)} < Re s < {plain(right, 5)} 1/s"
-        for name, (left, right) in widths.items()
-        if not math.isinf(left)
-    ]
 
 
 # ------------------------------------------------------------ fitted to measurements
@@ -251,22 +240,22 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
         words.append(f"What the data leave of a loop is not drawn: {error}.")
     else:
         every = [margins(each, default_gains(fit.arm)) for each in those.arms if has_loop(fit.arm)]
-        words += [prose("fit_share", gains=gains_words(default_gains(fit.arm)), every=every)] if every else []
-        blocks += _of_all_arms(those, every)
+        gains, stable = (
+            gains_words(default_gains(fit.arm)),
+            [each.in_band for each in every if each.in_band is not None],
+        )
+        if fit.responses:
+            figure = frequency.draw_band.figure(those, "root_moment")
+            blocks.append(picture("fit_band", figure, arms=those.arms))
+        if every:
+            words.append(prose("fit_share", gains=gains, every=every))
+            columns = table(stable, ("phase_margin", "delay_margin", "disk_margin"))
+            blocks += [
+                picture("fit_map", frequency.draw_share.figure(those, ranges_of(fit.arm))),
+                sheet("fit_margins", columns, gains=gains),
+            ]
     answer = prose("fit", verdict=fit.verdict, found=fit.in_words)
     return PageSection(title="Fitted to measurements", answer=answer, words=words, blocks=blocks)
-
-
-def _of_all_arms(those: Possible, every: list[Margins]) -> Iterator[Picture | Table]:
-    """The band of a response, and of an arm with a loop the share of arms over its gains, and the margins over all."""
-    if those.fit.responses:
-        yield picture("fit_band", frequency.draw_band.figure(those, "root_moment"), arms=those.arms)
-    if not every:
-        return
-    yield picture("fit_map", frequency.draw_share.figure(those, ranges_of(those.fit.arm)))
-    stable = [each.in_band for each in every if each.in_band is not None]
-    columns = table(stable, ("phase_margin", "delay_margin", "disk_margin"))
-    yield sheet("fit_margins", columns, gains=gains_words(default_gains(those.fit.arm)))
 
 
 # ------------------------------------------------------------ measured

@@ -10,14 +10,26 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, shown_unit
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, shown_unit
+from tfarm.case.card import margins_of
 from tfarm.digits import kept_digits, plain, significant
 from tfarm.dsp import Analysis, Chain, Simulation, modes, results, sampled_verdict, traces, verdict
 from tfarm.dsp.chain import MOST_DELAY
 from tfarm.errors import ParameterError
 from tfarm.fitting.recording import RunComparison, compare_run, overshoot
 from tfarm.plots import motion, regions, roots, style
-from tfarm.report.page import Case, Controller, Fact, PageSection, Picture, margins_of, on_hub, picture, prose, sheet
+from tfarm.report.page import (
+    Case,
+    Controller,
+    Fact,
+    PageSection,
+    Picture,
+    columns_of,
+    on_hub,
+    picture,
+    prose,
+    sheet,
+)
 from tfarm.schema import Column, Quantity, Table, across, table, text
 from tfarm.spectrum.table import default_gains
 
@@ -90,9 +102,12 @@ def delays_table(found: Sequence[tuple[Controller, Analysis]], chain: Chain) -> 
         if not more or own + more + each.law.delay / T <= MOST_DELAY
     ]
     names, delays, verdicts = zip(*rows, strict=True)
-    first = Column("law", "controller", of=names), Column("further_delay_ms", "further delay", "ms", of=delays)
-    is_free = any(verdict.loop.has_free_angle for verdict in verdicts)
-    return sheet("sampled_delays", (*first, *table(verdicts, VERDICT_COLUMNS).columns), free=is_free)
+    columns = (
+        Column("law", "controller", of=names),
+        Column("further_delay_ms", "further delay", "ms", of=delays),
+        *table(verdicts, VERDICT_COLUMNS).columns,
+    )
+    return sheet("sampled_delays", columns, free=any(verdict.loop.has_free_angle for verdict in verdicts))
 
 
 # ------------------------------------------------------------ pictures of gains
@@ -101,10 +116,10 @@ def delays_table(found: Sequence[tuple[Controller, Analysis]], chain: Chain) -> 
 def overlay_picture(both: regions.StableRegions, found: Analysis) -> Picture:
     """Stability regions of the continuous and of the sampled loop in one plane, with the intervals of K2 below it."""
     arm, gains = both.continuous.arm, found.loop.gains
-    rows = [row for row in margins_of(arm, gains).stability_intervals if row.name == MOMENT_GAIN]
+    rows = [row for row in margins_of(arm, as_law(gains)).stability_intervals if row.name == MOMENT_GAIN]
     return picture(
         "sampled_overlay",
-        regions.draw_overlay(both),
+        regions.overlay.figure(*both),
         data=regions.region_columns(both),
         arm=arm,
         low=float(both.continuous.axes[0][0]),
@@ -116,28 +131,23 @@ def overlay_picture(both: regions.StableRegions, found: Analysis) -> Picture:
 
 
 def loci_picture(found: Analysis) -> Picture:
-    """Root loci of the sampled loop in the z-plane, along each gain."""
+    """Root loci of the sampled loop in the z-plane, along each gain; its data are the poles with Im z >= 0."""
     loop, arm = found.loop, found.loop.plant.arm
     turning = arm.hub_side_inertia * arm.input_per_torque  # at the hub, in the unit of the input times s^2
     # past the rate gain at which sampling alone makes the hub unstable; K2 over the stable interval of most arms
     top = max(1.25 * 2 * turning / loop.chain.sampling.period, modes.STRONGER * loop.gains[RATE_GAIN])
     loci = modes.sampled_loci(loop, top, (-0.5, 1.5))
     aliased = int((found.modes.band > 0).sum())
-    return picture(
-        "sampled_loci", roots.draw_sampled_loci.figure(loci), data=loci_data(loci), half=loci.half_rate, aliased=aliased
-    )
-
-
-def loci_data(data: modes.SampledLoci) -> Sequence[Column]:
-    """Every pole of the loci with Im z >= 0: a row a gain and a branch."""
-    rows = []
-    for name, locus in data.by.items():
+    rows = []  # a gain and a branch each
+    for name, locus in loci.by.items():
         for value, poles in zip(locus.values.tolist(), locus.z, strict=True):
-            loop = locus.loop.having(**{locus.gain: value})
-            each = zip(locus.mode.tolist(), poles, strict=True)
-            rows += [(name, *map(loop.number, PLANE), mode, z.real, z.imag) for mode, z in each if not z.imag < 0]
-    keys = ("locus", *PLANE, "mode", "real", "imaginary")
-    return [Column(key, of=cells) for key, cells in zip(keys, zip(*rows, strict=True), strict=True)]
+            own, each = locus.loop.having(**{locus.gain: value}), zip(locus.mode.tolist(), poles, strict=True)
+            rows += [(name, *map(own.number, PLANE), mode, z.real, z.imag) for mode, z in each if not z.imag < 0]
+    data, figure = (
+        columns_of(("locus", *PLANE, "mode", "real", "imaginary"), rows),
+        roots.draw_sampled_loci.figure(loci),
+    )
+    return picture("sampled_loci", figure, data=data, half=loci.half_rate, aliased=aliased)
 
 
 # ------------------------------------------------------------ in time
@@ -153,15 +163,15 @@ def slews(case: Case) -> tuple[list[Picture | Table], list[str], list[Fact]]:
     if all(each.given.measured is not None for each in case.controllers):
         return [], [], []
     bare = on_hub(case.arm, default_gains(case.arm).having(MOMENT_GAIN, 0.0), f"{MOMENT_GAIN} = 0", "without")
-    runs: dict[str, Simulation] = {}
-    words, task, simulated = [], case.chain.slew, []
-    for each in (*([] if case.laws else [bare]), *case.controllers):
+    runs, words, task = dict[str, Simulation](), list[str](), case.chain.slew
+    duration = traces.RECORD_LENGTH * task.rise_time
+    candidates = [*([] if case.laws else [bare]), *case.controllers]
+    for each in candidates:
         try:
-            duration = traces.RECORD_LENGTH * task.rise_time
             runs[each.name] = results.drawn(each.arm, each.law, case.chain, "slew", duration)
-            simulated.append(each)
         except ParameterError as error:
             words.append(f"No slew of {each.name} is simulated: {error}.")
+    simulated = [each for each in candidates if each.name in runs]
     if len({each.arm.input_unit for each in simulated}) > 1:
         return [], [*words, "The controllers drive inputs of different units: their slews are not drawn together."], []
     if not runs:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from decimal import Decimal, localcontext
 from difflib import SequenceMatcher
+from functools import partial
 from importlib.metadata import version
 from itertools import pairwise
 from pathlib import Path
@@ -18,7 +19,7 @@ from markupsafe import Markup, escape
 
 import tfarm
 from tfarm import audit
-from tfarm.arm import Arm, HubFeedback, load, presets
+from tfarm.arm import Arm, load, presets
 from tfarm.audit import AuditRow, published
 from tfarm.audit.rows import is_zero
 from tfarm.digits import powers, scientific, significant, unit
@@ -31,6 +32,7 @@ from tfarm.report.page import (
     DATA,
     PROMISES,
     PageSection,
+    anchor,
     argument,
     has_loop,
     keep,
@@ -38,7 +40,6 @@ from tfarm.report.page import (
     render,
     save_section,
     sheet,
-    word_id,
     write_text,
 )
 from tfarm.report.response_sections import (
@@ -146,10 +147,9 @@ def prove(arm: Arm, chain: Chain | None = None) -> ArmProof:
     flexible = modes.natural_frequency[modes.index > 0]
     band = float(0.1 * flexible[0]), float(1.1 * flexible[-1])
     errors = ((output, worst_error(arm, output, band)) for output in PROVEN_OUTPUTS)
-    found: dict[str, Any]
     try:
         proof = proven_modes(arm, PROVEN_MODES)
-        found = {"brackets": proof.brackets, "count": proof.count, "below": proof.below}
+        found: dict[str, Any] = {"brackets": proof.brackets, "count": proof.count, "below": proof.below}
     except CertificationError as error:
         found = {"failure": str(error)}
     return ArmProof(
@@ -170,19 +170,15 @@ def boxed(arm: Arm) -> Iterator[Boxed]:
         boxes[f"damped modes, C = {arm.damping:g} s"] = lambda: proven_damped_modes(arm, PROVEN_MODES)
     if has_loop(arm):
         law = default_gains(arm)
-        boxes[f"closed loop, {gains_words(law, 6)}"] = lambda: _proven_poles(arm, law)
+        boxes[f"closed loop, {gains_words(law, 6)}"] = lambda: closed_loop_poles(arm, law, PROVEN_MODES).certified(
+            PROVEN_DIGITS
+        )
     for what, proven in boxes.items():
         try:
             found = proven()
             yield Boxed(arm=arm.name, what=what, count=found.count, box=list(map(float, found.box)))
         except (CertificationError, ConvergenceError) as error:
             yield Boxed(arm=arm.name, what=what, failure=str(error))
-
-
-def _proven_poles(arm: Arm, law: HubFeedback) -> Poles:
-    poles = closed_loop_poles(arm, law, PROVEN_MODES)
-    poles.certify(PROVEN_DIGITS)
-    return poles
 
 
 def hash_of(arm: Arm, chain: Chain | None = None) -> str:
@@ -211,9 +207,8 @@ def proof_tables(proofs: Sequence[ArmProof]) -> list[Table]:
         *(Column(f"{name}_rad_s", name, "rad/s", of=own, shown=[f"{text}…" if text else UNPROVEN for text in own])
           for name, own in digits.items()),
     )  # fmt: skip
-    counts = table(proofs, ("name", "has_rigid_mode", "enclosed", "count", "count_below", "verdict"))
     return [
-        sheet("counts", counts),
+        sheet("counts", table(proofs, ("name", "has_rigid_mode", "enclosed", "count", "count_below", "verdict"))),
         sheet("digits", columns, modes=PROVEN_MODES, digits=BRACKET_DIGITS),
         sheet("boxes", table([each for proof in proofs for each in proof.boxes]), digits=PROVEN_DIGITS),
     ]
@@ -222,23 +217,21 @@ def proof_tables(proofs: Sequence[ArmProof]) -> list[Table]:
 def accuracy_table(proofs: Sequence[ArmProof]) -> Table:
     """The worst error of each arm's two responses."""
     errors = {output: [dict(proof.errors).get(output) for proof in proofs] for output in PROVEN_OUTPUTS}
-    columns = (
+    return sheet("accuracy", (
         Column("arm", "arm", of=[proof.name for proof in proofs]),
         Column("band_rad_s", "from … to, rad/s", of=[" … ".join(significant(x, 4) for x in p.band) for p in proofs]),
         *(Column(output, output.replace("_", " "), of=own,
                  shown=["zero throughout" if error is None else scientific(error, 2) for error in own])
           for output, own in errors.items()),
-    )  # fmt: skip
-    return sheet("accuracy", columns)
+    ))  # fmt: skip
 
 
 def published_tables(found: published.Validation) -> list[Table]:
     """The sources of printed numbers and how many of each agree; the numbers that differ, by reason; all of them."""
     agrees = [[row.agrees for row in found.rows if row.source == source.key] for source in found.sources]
     counts = Column("numbers", "numbers", of=map(len, agrees)), Column("agree", "agree", of=map(sum, agrees))
-    columns = (*table(found.sources).columns, *counts)
     return [
-        sheet("sources", columns),
+        sheet("sources", (*table(found.sources).columns, *counts)),
         sheet("differences", table(found.differences)),
         sheet("published", table(found.rows)),
     ]
@@ -280,14 +273,9 @@ def in_letters(text: str) -> Markup:
     )
 
 
-def anchor(equation: str) -> str:
-    """A name for links: "(A.1)" becomes "eq-a-1"."""
-    return "eq-" + re.sub(r"[^a-z0-9]+", "-", equation.lower()).strip("-")
-
-
 def compared_formulas(printed: str, corrected: str) -> tuple[list[Markup], list[Markup]]:
     """Both as MathML, a line each, the symbols in which they differ of the class "changed"."""
-    both = _set(printed), _set(corrected)
+    both = [*_set(printed)], [*_set(corrected)]
     a, b = ([leaf for line in each for leaf in line.iter() if leaf.tag in ("mi", "mo", "mn", "mtext")] for each in both)
     matcher = SequenceMatcher(a=[leaf.text for leaf in a], b=[leaf.text for leaf in b], autojunk=False)
     for what, i, j, k, m in matcher.get_opcodes():
@@ -297,9 +285,8 @@ def compared_formulas(printed: str, corrected: str) -> tuple[list[Markup], list[
     return left, right
 
 
-def _set(tex: str) -> list[ElementTree.Element]:
+def _set(tex: str) -> Iterator[ElementTree.Element]:
     """A formula a line, without the name space that a file of XML would need and a page of HTML does not."""
-    found = []
     for line in re.split(r"(?<=[,;])\\quad\s*", tex):
         upright = re.sub(r"\\mathrm\{(\w)\}", r"\\text{\1}", line.strip())  # a single letter would be slanted
         root = ElementTree.fromstring(re.sub(r' xmlns="[^"]*"', "", convert(upright, display="block"), count=1))
@@ -307,8 +294,7 @@ def _set(tex: str) -> list[ElementTree.Element]:
         for row in root.iter("mrow"):
             for before, leaf in pairwise([ElementTree.Element("mo"), *row]):
                 _correct(leaf, before)
-        found.append(root)
-    return found
+        yield root
 
 
 def _correct(leaf: ElementTree.Element, before: ElementTree.Element) -> None:
@@ -337,14 +323,13 @@ def write_trust(
     """index.html and its tables, into a folder of their own."""
     folder.mkdir()
     found = published.Validation(tuple(printed))
-    tables = {"proofs": proof_tables(proofs), "accuracy": [accuracy_table(proofs)],
+    blocks = {"proofs": proof_tables(proofs), "accuracy": [accuracy_table(proofs)],
               "published": published_tables(found), "again": again_tables(proofs)}  # fmt: skip
-    sections = {name: save_section(PageSection(blocks=own), folder)
-                for name, own in tables.items()}  # fmt: skip
+    sections = {name: save_section(PageSection(blocks=own), folder) for name, own in blocks.items()}
     save_table(table(audited, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation"), folder / DATA)
     errors = [error for proof in proofs for _, error in proof.errors]
     names = " ".join(argument(proof.name, proof.source == "preset") for proof in proofs)
-    page = render(
+    write_text(folder / "index.html", render(
         "trust.html",
         title="Method and proofs",
         sections=sections,
@@ -354,11 +339,10 @@ def write_trust(
         worst=scientific(max(errors), 2) if errors else "",
         found=found,
         equations=[(row, *compared_formulas(row.printed_tex, row.corrected_tex)) for row in audited],
-        anchor=anchor,
+        anchor=partial(anchor, "eq"),
         in_letters=in_letters,
         is_zero=is_zero,
         glossary=[term for term in GLOSSARY_TERMS if term.name in PROMISES],
-        word_id=word_id,
+        word_id=partial(anchor, "word"),
         command=f"tfarm report {names} --out reports",
-    )
-    write_text(folder / "index.html", page)
+    ))  # fmt: skip

@@ -12,7 +12,7 @@ from tfarm.plots import motion, regions
 from tfarm.records import record
 from tfarm.report.page import Case, Fact, PageSection, Picture, has_loop, picture, prose, sheet
 from tfarm.report.sampled_section import chain_words, piece_of_bands, response_columns
-from tfarm.schema import Column, table
+from tfarm.schema import Column, Table, table
 from tfarm.tuner import LearningCurves, Tuning, compare_controllers, learning_curves, tried_loops, tune
 from tfarm.tuner.baselines import Outcomes, quantised_chain
 from tfarm.tuner.tuning import usual_plan
@@ -107,10 +107,13 @@ def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
 
 def section_of(data: TunerNumbers) -> PageSection:
     """The section on numbers that were computed already."""
-    costs = sheet("tune_comparison", table(data.rows), data=data)
-    blocks = [_gain_picture(data), *slew_pictures(data), costs, _curves_picture(data)]
-    words = [prose("tuner", guard=data.tuning.training.guard.sentence)]
-    return PageSection(title=TITLE, answer=tuner_in_short(data), facts=tuner_facts(data), words=words, blocks=blocks)
+    return PageSection(
+        title=TITLE,
+        answer=tuner_in_short(data),
+        facts=tuner_facts(data),
+        words=[prose("tuner", guard=data.tuning.training.guard.sentence)],
+        blocks=list(blocks_of(data)),
+    )
 
 
 def saved_cost(data: TunerNumbers) -> float:
@@ -144,30 +147,27 @@ def tuner_facts(data: TunerNumbers) -> tuple[Fact, ...]:
 # ------------------------------------------------------------ pictures
 
 
-def _gain_picture(data: TunerNumbers) -> Picture:
-    tuning, result = data.tuning, data.tuning.training.result
+def blocks_of(data: TunerNumbers) -> Iterator[Picture | Table]:
+    """The gain, slews without and with the tuner, the costs, and the learning curves.
+
+    The slews are through ideal converters, then with those and the delay of the arm's own chain.
+    """
+    tuning, result, curves = data.tuning, data.tuning.training.result, data.curves
     plane = regions.stable_regions(data.arm, tuning.constant, tuning.trial.loop.chain)
     columns = Column("t_s", of=result.t), Column("K", of=result.K), Column("x_N_m", of=result.x)
     gain = tuning.constant.gain_text(RATE_GAIN, plain)
-    return picture("tune_gain", motion.draw_gain.figure(tuning, *plane), data=columns, tuning=tuning, gain=gain)
-
-
-def slew_pictures(data: TunerNumbers) -> Iterator[Picture]:
-    """The slew without and with the tuner: through ideal converters, then with those and the delay of its chain."""
+    yield picture("tune_gain", motion.draw_gain.figure(tuning, *plane), data=columns, tuning=tuning, gain=gain)
     chain = chain_words(data.arm, data.coarse[WITHOUT].chain)
     for kind, runs, how in (
         ("tune_slew", data.slews, "ideal converters"), ("tune_dsp", data.coarse, "with converters and delay"),
     ):  # fmt: skip
         figure = motion.slew.figure(data.arm, runs, f"the slew, {how}")
-        columns = response_columns(data.arm, dict(zip(("without", "tuner"), runs.values(), strict=True)))
-        yield picture(kind, figure, data=columns, runs=runs, piece=piece_of_bands(runs), how=how, chain=chain)
-
-
-def _curves_picture(data: TunerNumbers) -> Picture:
-    curves = data.curves
-    columns = (
+        slews = response_columns(data.arm, dict(zip(("without", "tuner"), runs.values(), strict=True)))
+        yield picture(kind, figure, data=slews, runs=runs, piece=piece_of_bands(runs), how=how, chain=chain)
+    yield sheet("tune_comparison", table(data.rows), data=data)
+    learned = (
         Column("trial", of=range(1, curves.costs.shape[1] + 1)),
         *(Column(name, of=costs) for name, costs in curves.quartile_curves.items()),
         *(Column(f"seed_{seed}", of=costs) for seed, costs in enumerate(curves.costs)),
     )
-    return picture("tune_curves", motion.draw_curves.figure(curves, data.tuning), data=columns, curves=curves)
+    yield picture("tune_curves", motion.draw_curves.figure(curves, tuning), data=learned, curves=curves)

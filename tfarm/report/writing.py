@@ -23,7 +23,7 @@ from tfarm.fitting.fit import Fit
 from tfarm.plots.regions import comparison
 from tfarm.processes import shared
 from tfarm.report.arm_section import arm_section, assumptions_section
-from tfarm.report.live import ASSETS, LIVE_PAGE, is_live, save_live, write_assets
+from tfarm.report.live import ASSETS, is_live, save_live, write_assets
 from tfarm.report.loop_section import (
     law_section,
     locus_section,
@@ -61,7 +61,6 @@ from tfarm.schema import quantities, table
 from tfarm.stopping import undone_if_stopped
 
 ReportProgress = Callable[[int, int, str], object]
-Notice = Callable[[str], object]
 Calls = Mapping[str, Sequence[Callable[[], Any]]]  # by task: what one process does in turn
 MOST_WORKERS = 2  # processes that share the pieces of a report: as many cores as a small machine has
 WORTH_A_PROCESS = 8  # pieces for which a second process, which takes a second or two to start, is worth it
@@ -143,8 +142,12 @@ def make_section(name: str, anchor: str, make: Callable[[Case], PageSection], ca
     try:
         section = replace(make(case), anchor=anchor)
     except TfarmError as error:
-        answer = f"This section could not be made for this arm: {error}."
-        section = PageSection(anchor=anchor, title=upper(name), answer=answer, failure=str(error))
+        section = PageSection(
+            anchor=anchor,
+            title=upper(name),
+            answer=f"This section could not be made for this arm: {error}.",
+            failure=str(error),
+        )
     return save_section(section, folder, case.is_paper)
 
 
@@ -162,7 +165,7 @@ def write(
     only: tuple[str, ...] | None = None,
     paper: bool = False,
     progress: ReportProgress | None = None,
-    notice: Notice | None = None,
+    notice: Callable[[str], object] | None = None,
 ) -> Path:
     """Write the report of each arm to out/<name>/, out/trust/ and out/index.html; the page to open first.
 
@@ -321,16 +324,17 @@ def _write_pages(
         if piece.anchor in by_anchor:
             own[piece.page].append(by_anchor[piece.anchor])
     written = only or ("index", *own)
-    pages = navigation(case.arm, pages_in(earlier, (*written, *_is_live(folder))), trust, earlier)
-    with_facts = (by_anchor.get(anchor, PageSection()) for anchor in ("margins-map", "sampled"))
+    pages = navigation(case.arm, pages_in(earlier, folder, written=written), trust, earlier)
     shared = {
         "card": kept_in(folder, "card", Card) or Card(case.arm.name, summary(case), "", (), (), ()),
         "short": SHORT,
         "pages": pages,
         "titles": dict(pages),
-        "blocks": blocks(by_anchor),
-        "short_facts": [fact for section in with_facts for fact in section.facts],
-        "has_recommended": bool(by_anchor.get("margins-recommended", PageSection()).card),
+        "blocks": [*blocks(by_anchor)],
+        "short_facts": [
+            fact for name in ("margins-map", "sampled") if name in by_anchor for fact in by_anchor[name].facts
+        ],
+        "recommended": by_anchor.get("margins-recommended"),
         "open_pictures": 2,  # of a section: those that answer its question; the rest is a click away
         "has_proof": (folder / "proof.json").is_file(),
         "sha256": hashlib.sha256(file.encode()).hexdigest(),
@@ -343,22 +347,17 @@ def _write_pages(
         write_text(folder / f"{name}.html", page)
 
 
-def _is_live(folder: Path) -> tuple[str, ...]:
-    """The name of the live page where it has been made."""
-    return ("live",) if (folder / LIVE_PAGE).is_file() else ()
-
-
 def navigation(arm: Arm, own: Sequence[tuple[str, str]], trust: str, folder: Path) -> list[tuple[str, str]]:
     """(file, title) of all that a page of an arm leads to."""
     compared = kept_comparison(folder.parent)
-    more = [(f"../{COMPARISON_PAGE}", compared.title)] if arm.name in compared.arms else []
+    more = [(f"../{COMPARISON_PAGE}", compared["title"])] if arm.name in compared["arms"] else []
     return [("../index.html", "All arms"), *own, *more, *([(f"../{trust}", "Method and proofs")] if trust else [])]
 
 
-def pages_in(folder: Path, written: Sequence[str] = ()) -> list[tuple[str, str]]:
-    """(file, title) of the pages in an arm's folder, and of those that are being written."""
-    there = {name: title for name, title in PAGES.items() if name in written or (folder / f"{name}.html").is_file()}
-    return [(f"{name}.html", title) for name, title in there.items()]
+def pages_in(*folders: Path, written: Sequence[str] = ()) -> list[tuple[str, str]]:
+    """(file, title) of the pages in the folders of an arm, and of those that are being written."""
+    there = {*written, *(file.stem for folder in folders for file in folder.glob("*.html"))}
+    return [(f"{name}.html", title) for name, title in PAGES.items() if name in there]
 
 
 # ------------------------------------------------------------ the index
@@ -367,25 +366,19 @@ def pages_in(folder: Path, written: Sequence[str] = ()) -> list[tuple[str, str]]
 def index_page(out: Path, *, trust: str) -> str:
     """The page that leads to all others in a folder of reports."""
     cards = [(card, pages) for folder, card in kept(out, "card", Card).items() if (pages := pages_in(folder))]
-    compared = kept_comparison(out).title
-    return render("index.html", title="tfarm reports", cards=cards, trust=trust, compared=compared, short=SHORT)
+    return render(
+        "index.html", title="tfarm reports", cards=cards, trust=trust, compared=kept_comparison(out)["title"],
+        short=SHORT,
+    )  # fmt: skip
 
 
 # ------------------------------------------------------------ a comparison
 
 
-@dataclass(frozen=True)
-class KeptComparison:
-    """The title of the comparison in a folder of reports, and the arms that it compares."""
-
-    title: str = ""
-    arms: tuple[str, ...] = ()
-
-
-def kept_comparison(out: Path) -> KeptComparison:
-    """The comparison in a folder of reports; an empty one where there is none."""
-    found = kept_in(out, "compare", KeptComparison) if (out / COMPARISON_PAGE).is_file() else None
-    return found or KeptComparison()
+def kept_comparison(out: Path) -> dict[str, Any]:
+    """The title of the comparison in a folder of reports, and the arms that it compares; empty where there is none."""
+    found = kept_in(out, "compare", dict[str, Any]) if (out / COMPARISON_PAGE).is_file() else None
+    return {"title": "", "arms": (), **(found or {})}
 
 
 def write_comparison(found: Comparison, out: Path) -> Path:
@@ -396,10 +389,17 @@ def write_comparison(found: Comparison, out: Path) -> Path:
     """
     title = f"{found.one.name} and {found.other.name} compared"
     arms = list(dict.fromkeys(side.arm.name for side in found.sides))
+    drawn = picture("comparison_picture", comparison.figure(found), stem="comparison", found=found)
+    rows = (
+        (of, getattr(found, name)) for name, of in quantities(Comparison).items() if of.label and name != "is_sampled"
+    )
+    first, *tables = (sheet("compared", table(each), stem=f"compare-{of.key}", of=of) for of, each in rows)
     with _temporary(out, "--out") as made:
-        saved = save_section(_comparison_section(found), made)
-        others = [("index.html", "all arms"), *((f"{name}/index.html", name) for name in arms)]
-        pages = [(file, name) for file, name in others if (out / file).is_file()]
+        saved = save_section(
+            PageSection(words=[prose("comparison", found=found)], blocks=[first, drawn, *tables]), made
+        )
+        others = {"index.html": "all arms"} | {f"{name}/index.html": name for name in arms}
+        pages = [(file, name) for file, name in others.items() if (out / file).is_file()]
         write_text(made / COMPARISON_PAGE, render(COMPARISON_PAGE, title=title, saved=saved, pages=pages))
         keep(made, "compare", {"title": title, "arms": arms})
         move_into(made, out)
@@ -407,13 +407,3 @@ def write_comparison(found: Comparison, out: Path) -> Path:
             write_text(made / "index.html", index_page(out, trust=TRUST_PAGE if (out / TRUST_PAGE).is_file() else ""))
             move_into(made, out)
     return out / COMPARISON_PAGE
-
-
-def _comparison_section(found: Comparison) -> PageSection:
-    """The verdicts and the picture of a comparison, then its tables of differences."""
-    drawn = picture("comparison_picture", comparison.figure(found), stem="comparison", found=found)
-    rows = (
-        (of, getattr(found, name)) for name, of in quantities(Comparison).items() if of.label and name != "is_sampled"
-    )
-    first, *tables = (sheet("compared", table(each), stem=f"compare-{of.key}", of=of) for of, each in rows)
-    return PageSection(words=[prose("comparison", found=found)], blocks=[first, drawn, *tables])
