@@ -73,8 +73,8 @@ tune: $(INSTALLED) ## write one arm's gain tuner beside what it has to beat (ARM
 audit: $(INSTALLED) ## check the paper equation by equation
 	@$(BIN)/tfarm audit
 
-docs: $(DOCS_INSTALLED) ## write the documentation to docs/_build/index.html
-	@$(BIN)/python -m sphinx -q -W --keep-going docs docs/_build && echo docs/_build/index.html
+docs: $(DOCS_INSTALLED) ## write the documentation to docs/_build/html/index.html
+	@$(BIN)/python -m sphinx -q -W --keep-going docs docs/_build/html && echo docs/_build/html/index.html
 
 test: $(INSTALLED) ## run the tests
 	@PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --dist worksteal # else each process compiles what it loads

@@ -1,8 +1,12 @@
-"""Sphinx configuration.  Pages are prose in MyST; those of commands, JSON keys and files are made from the code."""
+"""Sphinx configuration.  Pages are prose in MyST, tutorials are notebooks; references and tables come from the code."""
 
+import hashlib
 import inspect
+import logging
+import os
 import re
-from collections.abc import Iterable
+import shutil
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +26,15 @@ from tfarm.fitting.recording import RunTable
 from tfarm.schema.glossary import CERTAINTY, declared_records
 
 HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE), str(HERE.parent)]  # `tables`; and `tests`, with the surveys that tables are measured by
+
+from tables import markdown_table  # noqa: E402
 
 project = "tfarm"
 author = copyright = "The tfarm authors"
 release = version = tfarm.__version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-myst_enable_extensions = ["colon_fence", "dollarmath", "deflist", "substitution"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "tables"]
+myst_enable_extensions = ["colon_fence", "dollarmath", "amsmath", "deflist", "substitution"]
 myst_heading_anchors = 3
 html_theme = "furo"
 html_math_renderer = "mathml"
@@ -41,6 +48,30 @@ add_module_names = False
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 exclude_patterns = ["_build"]
+html_static_path = ["static"]
+html_css_files = ["notebook.css"]
+
+
+def hash_of_sources() -> str:
+    """Return a hash of the package: what a notebook shows is kept until the package changes."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(tfarm.__file__).parent.rglob("*")):
+        if path.suffix in (".py", ".toml"):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+nb_execution_mode = "cache"
+nb_execution_cache_path = str(HERE / "_build" / "notebooks" / hash_of_sources())
+nb_execution_in_temp = True
+nb_execution_timeout = 120
+nb_execution_raise_on_error = True
+nb_output_stderr = "remove"  # progress and names of written files
+nb_merge_streams = True
+os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # the command tfarm, in notebooks
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+os.environ["IPYTHONDIR"] = str(HERE / "_build" / "ipython")  # no profile of the user's own
+logging.getLogger("traitlets").setLevel(logging.WARNING)
 
 
 FILE_TABLES: dict[str, type[StrictTable]] = {
@@ -51,13 +82,6 @@ FILE_TABLES: dict[str, type[StrictTable]] = {
     **CHAIN_TABLES,
     "measured": RunTable,
 }
-
-
-def markdown_table(titles: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
-    """Return the lines of a table."""
-    cells = ([cell.replace("|", r"\|").replace("\n", " ") for cell in row] for row in rows)
-    head = [*titles]
-    return [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *cells)]
 
 
 def commands_page() -> str:
@@ -146,6 +170,56 @@ def write_references(app: Any) -> None:
             path.write_text(text, encoding="utf-8")
 
 
+def escape_bars(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """Keep |L| of a docstring a magnitude: in reStructuredText it is a substitution."""
+    lines[:] = [re.sub(r"(?<!\\)\|", r"\|", line) for line in lines]
+
+
+def write_kernel_settings(app: Any) -> None:
+    """Write the profile of the kernels of notebooks, of whose messages only errors are shown; leave no older cache."""
+    for each in Path(nb_execution_cache_path).parent.glob("*"):
+        if each.name != Path(nb_execution_cache_path).name:
+            shutil.rmtree(each)
+    profile = Path(os.environ["IPYTHONDIR"]) / "profile_default"
+    (profile / "startup").mkdir(parents=True, exist_ok=True)
+    (profile / "startup" / "kernel.py").write_bytes((HERE / "kernel.py").read_bytes())
+    settings = 'get_config().IPKernelApp.log_level = "ERROR"\n'
+    (profile / "ipython_kernel_config.py").write_text(settings, encoding="utf-8")
+
+
+def check_figures(app: Any, error: Exception | None) -> None:
+    """Raise ExtensionError for a tutorial with fewer figures than its cells draw."""
+    from sphinx.errors import ExtensionError
+
+    for path in () if error else (HERE / "tutorials").glob("*.md"):
+        drawn = path.read_text(encoding="utf-8").count("tfarm.plots.")
+        shown = (Path(app.outdir) / "tutorials" / f"{path.stem}.html").read_text(encoding="utf-8").count("<img ")
+        if shown < drawn:
+            raise ExtensionError(f"{path.name}: {drawn} figures are drawn, {shown} shown")
+
+
+ACCESSIBLE = (  # of the theme's pages: names and levels that a screen reader wants, and scrolling by keyboard
+    ('role="heading">', 'role="heading" aria-level="2">'),
+    ('<aside class="sidebar-drawer">', '<aside class="sidebar-drawer" aria-label="pages">'),
+    ('<aside class="toc-drawer', '<aside aria-label="contents of this page" class="toc-drawer'),
+    ("<pre>", '<pre tabindex="0">'),
+    ('<div class="table-wrapper', '<div tabindex="0" class="table-wrapper'),
+    ('<div class="output text_html">', '<div tabindex="0" class="output text_html">'),
+    ('display="block">', 'display="block" tabindex="0">'),
+)
+
+
+def make_accessible(app: Any, error: Exception | None) -> None:
+    """Complete the attributes of finished pages."""
+    for path in () if error else Path(app.outdir).rglob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        made = text
+        for old, new in ACCESSIBLE:
+            made = made.replace(old, new)
+        if made != text:
+            path.write_text(made, encoding="utf-8")
+
+
 def write_formula(translator: Any, node: Any) -> None:
     """Write a formula as MathML, which browsers draw without a script or the network."""
     from docutils import nodes  # comes with Sphinx; the tests read this file without
@@ -158,4 +232,8 @@ def write_formula(translator: Any, node: Any) -> None:
 def setup(app: Any) -> None:
     """Connect the pages and formulas above to Sphinx."""
     app.connect("builder-inited", write_references)
+    app.connect("builder-inited", write_kernel_settings)
+    app.connect("autodoc-process-docstring", escape_bars, priority=900)  # after napoleon
+    app.connect("build-finished", check_figures)
+    app.connect("build-finished", make_accessible)
     app.add_html_math_renderer("mathml", (write_formula, None), (write_formula, None))

@@ -1,0 +1,218 @@
+"""Tables of the documentation that are computed when it is built: the directive `computed` and its functions.
+
+    ```{computed} published
+    ```
+
+A function returns lines of Markdown.  No number is typed here: all come from the package, its data and its surveys.
+"""
+
+import ast
+import json
+import tomllib
+from collections import defaultdict
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import tfarm
+from tfarm.arm.law_tables import load_law
+from tfarm.audit.published import Validation, validate
+from tfarm.digits import general
+from tfarm.dsp.chain import load_chain
+from tfarm.fitting.recording import compare_run, load_run, overshoot, read_recording
+from tfarm.fitting.resonances import ring
+from tfarm.spectrum.table import hub_locked
+
+ROOT = Path(__file__).parent.parent
+RIG = ROOT / "tests" / "data" / "quanser-2dsfl"
+BENCH = ROOT / "reports" / "bench.json"
+ARMS, SEED = 300, 5  # of the survey of accuracy that a build makes
+TABLES: dict[str, Callable[[], list[str]]] = {}
+
+
+def table(make: Callable[[], list[str]]) -> Callable[[], list[str]]:
+    """Register a function as the table of its name."""
+    TABLES[make.__name__.replace("_", "-")] = make
+    return make
+
+
+def markdown_table(titles: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
+    """Return the lines of a table."""
+    cells = ([cell.replace("|", r"\|").replace("\n", " ") for cell in row] for row in rows)
+    head = [*titles]
+    return [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *cells)]
+
+
+@table
+def published() -> list[str]:
+    """Published numbers by source: how many, how many agree, and the largest relative difference."""
+    found = Validation(validate())
+    rows = []
+    for source in found.sources:
+        of = [row for row in found.rows if row.source == source.key]
+        largest = max(abs(row.difference) for row in of)
+        rows.append([source.citation, str(len(of)), str(sum(row.agrees for row in of)), f"{largest:.1e}"])
+    rows.append(["all", str(len(found.rows)), str(found.agree), ""])
+    return markdown_table(("source", "numbers", "agree to the last printed digit", "largest difference"), rows)
+
+
+@table
+def differences() -> list[str]:
+    """Published numbers whose printed digits are not reached, with the reason of each."""
+    rows = (
+        [each.source, each.case, each.modes, f"{each.largest:.1e}", each.why]
+        for each in Validation(validate()).differences
+    )
+    return markdown_table(("source", "case", "modes", "difference", "reason"), rows)
+
+
+@table
+def audit() -> list[str]:
+    """Equations of the paper that are not right as printed, each with both readings and the check."""
+    from tfarm.audit import audit as audited
+
+    lines = []
+    for row in (rows := audited()):
+        if row.verdict != "ok":
+            lines += [f"**{row.equation}**, {row.verdict}", "", "as printed", f": $$ {row.printed_tex} $$", ""]
+            lines += ["as corrected", f": $$ {row.corrected_tex} $$", "", "check", f": {row.evidence}", ""]
+    return [*lines, f"Right as printed: {', '.join(row.equation for row in rows if row.verdict == 'ok')}."]
+
+
+@table
+def accuracy() -> list[str]:
+    """Errors of float64 values against ball arithmetic: a small survey, made when the documentation is built."""
+    from tests.exact.accuracy import measure
+    from tests.strategies import some_arm, some_s
+
+    rng, errors = np.random.default_rng(SEED), defaultdict(list)
+    while len(errors["hub_angle"]) < ARMS:
+        arm = some_arm(rng)
+        for point in measure(arm, some_s(rng), float(rng.random())):
+            if not point.flagged:
+                errors[point.name].append(point.error)
+    rows = (
+        [f"`{name}`", str(len(each)), f"{np.median(each):.1e}", f"{max(each):.1e}"]
+        for name, each in sorted(errors.items())
+    )
+    return markdown_table(("output", "values", "median error", "largest error"), rows)
+
+
+@table
+def speed() -> list[str]:
+    """What `make bench` measured on this machine, if it was run."""
+    if not BENCH.exists():
+        return ["*Not measured on the machine that built this page: run `make bench` first.*"]
+    kept = json.loads(BENCH.read_text(encoding="utf-8"))
+    rows = (
+        [each["what"], str(each["n"]), _time(each["seconds"]),
+         "" if each["ratio"] is None else f"{general(each['ratio'], 3)} × {each['to']}",
+         "" if each["error"] is None else f"{each['error']:.0e}"]
+        for each in kept["rows"]
+    )  # fmt: skip
+    versions = ", ".join(f"{name} {version}" for name, version in kept["versions"].items())
+    titles = ("computation", "number", "time of each", "ratio", "largest error")
+    return [*markdown_table(titles, rows), "", f"Versions: {versions}."]
+
+
+def _time(seconds: float) -> str:
+    unit, scale = next(each for each in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9)) if seconds >= each[1])
+    return f"{general(seconds / scale, 3)} {unit}"
+
+
+@table
+def rig_laws() -> list[str]:
+    """Verdicts on the two controllers of a real rig, and their measured steps against the exact sampled loop."""
+    arm, chain = tfarm.load(str(RIG / "rig.toml")), load_chain(RIG / "rig.toml")
+    rows = []
+    for name in ("lqg", "hinf"):
+        law, run = load_law(RIG / f"{name}.toml"), load_run(RIG / f"{name}.toml")
+        found = compare_run(arm, law, chain, run)
+        step, end = run.step, run.reference[-1]
+        shares = (overshoot(each, step, end) for each in (run.hub_angle, found.hub_angle))
+        rows.append(
+            [name, tfarm.sampled(arm, law, chain).verdict.sentence, *(f"{100 * each:.1f} %" for each in shares)]
+        )
+    return markdown_table(("controller", "sampled loop", "overshoot, measured", "overshoot, exact loop"), rows)
+
+
+@table
+def rig_ring() -> list[str]:
+    """Measured decays of a real rig, and its exact frequency with a locked hub."""
+    locked = hub_locked(tfarm.modes(tfarm.load("quanser-2dsfl"), 1)).natural_frequency_hz[-1]
+    rows = []
+    for name in ("ring-20deg", "ring-neg-10deg"):
+        found = ring(read_recording(RIG / f"{name}.csv"), "tip_angle_against_hub", start=2.0)
+        (mode,) = found.modes
+        rows.append([name, f"{mode.frequency:.4g}", f"{mode.frequency_low:.4g} to {mode.frequency_high:.4g}",
+                     f"{locked:.4g}"])  # fmt: skip
+    return markdown_table(("record", "measured [Hz]", "95 % interval [Hz]", "exact, hub locked [Hz]"), rows)
+
+
+@table
+def rooms() -> list[str]:
+    """The rooms of the package, from the highest to the lowest, each with the first line of its docstring."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
+    layers = "|".join(settings["contracts"][0]["layers"]).replace("(", "").replace(")", "")
+    names = [name.strip() for name in layers.split("|") if "__main__" not in name]
+    return markdown_table(("room", "purpose"), ([f"`tfarm.{name}`", _purpose(name)] for name in names))
+
+
+def _purpose(name: str) -> str:
+    folder = Path(tfarm.__file__).parent / name
+    path = folder / "__init__.py" if folder.is_dir() else folder.with_suffix(".py")
+    meaning = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+    return meaning.split("\n\n")[0].rstrip(":")
+
+
+@table
+def presets() -> list[str]:
+    """The arms that come with the package, and what each assumes."""
+    arms = [tfarm.load(name) for name in tfarm.presets()]
+    rows = (
+        [f"`{arm.name}`", f"{arm.length:g}", f"{arm.damping:g}", f"{arm.hub.inertia:g}", f"{arm.payload.mass:g}"]
+        for arm in arms
+    )
+    lines = markdown_table(("name", "length [m]", "damping C [s]", "hub inertia [kg m²]", "payload [kg]"), rows)
+    for arm in arms:
+        lines += ["", f"**{arm.name}**", "", *(f"* {each}" for each in arm.assumptions)]
+    return lines
+
+
+@table
+def outputs() -> list[str]:
+    """Named outputs, their units and places."""
+    from tfarm.exact.outputs import OUTPUTS
+
+    rows = ([f"`{name}`", each.label, each.unit] for name, each in OUTPUTS.items())
+    return markdown_table(("name", "meaning", "unit"), rows)
+
+
+@table
+def dependencies() -> list[str]:
+    """Packages that the package needs, with the lowest version of each."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    return [f"* `{each}`" for each in project["dependencies"]]
+
+
+def setup(app: Any) -> dict[str, bool]:
+    """Register the directive; Sphinx is imported here, as tests read the functions without it."""
+    from docutils import nodes
+    from docutils.statemachine import StringList
+    from sphinx.util.docutils import SphinxDirective
+
+    class Computed(SphinxDirective):
+        """The table of a name."""
+
+        required_arguments = 1
+
+        def run(self) -> list[nodes.Node]:
+            self.env.note_reread()  # with every build: no table is older than the code
+            part, name = nodes.container(), self.arguments[0]
+            self.state.nested_parse(StringList(TABLES[name](), source=name), self.content_offset, part)
+            return part.children
+
+    app.add_directive("computed", Computed)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
