@@ -12,6 +12,7 @@ import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, shown_unit
 from tfarm.case.card import margins_of
+from tfarm.case.step import Step, step
 from tfarm.digits import plain, significant
 from tfarm.dsp import Analysis, Chain, Simulation, modes, results, sampled_verdict, traces, verdict
 from tfarm.dsp.chain import MOST_DELAY
@@ -180,6 +181,7 @@ def slews(case: Case) -> tuple[list[Picture | Table], list[str], list[Fact]]:
     figure = motion.slew.figure(arm, {style.safe(name): run for name, run in runs.items()}, title)
     columns = response_columns(arm, {each.key: runs[each.name] for each in simulated})
     moving = [each for each in simulated if each is not bare and runs[each.name].stopped is None]
+    responses = [(each, step(each.arm, each.law, case.chain, "slew")) for each in moving[:1]]
     numbers = (
         Column("law", "controller", of=list(runs)),
         *table(list(runs.values()), ("residual_moment", "settling_time")).columns,
@@ -190,10 +192,19 @@ def slews(case: Case) -> tuple[list[Picture | Table], list[str], list[Fact]]:
             picture("sampled_slew", figure, data=columns, runs=runs, piece=piece_of_bands(runs), task=title),
             *(film_picture(each, runs[each.name], task.rise_time) for each in moving[:1]),
             sheet("slew_numbers", numbers, stem="sampled-slew-numbers"),
+            *(sheet("time_responses", it.table, each=each, found=it) for each, it in responses),
         ],
         words,
-        [settling_fact(each, runs[each.name], len(case.laws) > 1) for each in simulated if each is not bare],
+        [settling_fact(each, runs[each.name], len(case.laws) > 1) for each in simulated if each is not bare]
+        + [tip_fact(it) for _, it in responses],
     )
+
+
+def tip_fact(found: Step) -> Fact:
+    """The settling time of the tip in each loop."""
+    times = {name.partition(",")[0]: each.tip and each.tip.settling_time for name, each in found.loops.items()}
+    words = (f"{name} {'not settled' if each is None else f'{text(each, 4)} s'}" for name, each in times.items())
+    return Fact("settling time of the tip", ", ".join(words))
 
 
 def film_picture(each: Controller, run: Simulation, rise: float) -> Picture:
