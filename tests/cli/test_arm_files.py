@@ -65,6 +65,8 @@ def test_each_line_of_the_file_has_a_comment_and_the_examples_in_it_are_right(ca
     assert bare == ["[link.section]"]
     assert "# material steel: ρ = 7850 kg/m^3, E = 210 GPa, ν = 0.3 (EN 1993-1-1:2005" in "\n".join(lines)
     spare = [line[2:] for line in lines if re.match(r"# (\[|\w+ = )", line)]
+    damped = tomllib.loads("\n".join(line.replace("# damping", "damping") for line in lines))
+    assert damped["link"]["damping"] == float(spare.pop(0).split()[2])
     top = [line for line in spare if line.startswith(("assumptions", "theory", "input"))]
     own = [line for line in lines if not line.startswith("#")]
     tables = tomllib.loads("\n".join([*top, *own, *spare[len(top) :]]))

@@ -83,6 +83,16 @@ def test_json_has_every_quantity_under_its_key_with_the_unit():
     assert '"limit_s": "inf"' in to_json(to_dict(replace(RECORD, inner=Inner("stable", math.inf))))
 
 
+def test_stability_intervals_are_read_directly_after_the_card():
+    """A terminal of 50 lines shows the card and the intervals of both loops."""
+    for found in (tfarm.margins(LAB, PAPER_GAINS), tfarm.sampled(LAB, PAPER_GAINS)):
+        table, values, *others = sections(found)
+        assert table.title == "stability intervals"
+        assert [next(iter(row.values())) for row in table.table] == ["K1", "K2", "Kp"]
+        assert ("stability", "stable") in values.pairs
+        assert "stability intervals" not in [each.title for each in others]
+
+
 def test_a_person_reads_labels_values_and_units_then_tables():
     first, nested, rows = sections(RECORD)
     assert first.pairs == [
@@ -92,6 +102,7 @@ def test_a_person_reads_labels_values_and_units_then_tables():
         ("twice", "6"),
     ]
     assert (nested.title, nested.pairs) == ("nested", [("stability", "unstable"), ("limit", "-")])
+    assert rows.title == "modes"
     lines = table_lines(rows.table, 80)
     assert rows.title == "modes"
     assert lines[0].split() == ["mode", "frequency", "[rad/s]"]

@@ -190,7 +190,7 @@ class Analysis:
     damping_modes: int = UNDAMPED_MODES
 
     @cached_property
-    def stability_intervals(self) -> Annotated[list[SampledNumber], Quantity("stability intervals",
+    def stability_intervals(self) -> Annotated[list[SampledNumber], Quantity("stability intervals", first=True,
             help="stability intervals of each number of the controller, the others constant")]:  # fmt: skip
         """One row for each gain at the hub, or number of another law, the others constant."""
         if not self.loop.is_of_gains:
@@ -371,7 +371,7 @@ def brief_of(found: Verdict | ConvergenceError, law: AnyLaw, chain: Chain) -> Sa
     origin = LAWS_PERIOD if as_law(law).is_discrete else origin
     verdict = None if isinstance(found, ConvergenceError) else found
     word, _, rest = (f"undecided: {found}" if verdict is None else verdict.sentence).partition(" ")
-    is_stable, late = None if verdict is None else verdict.is_stable, f", {delay:g} samples late" if delay else ""
+    is_stable, late = None if verdict is None else verdict.is_stable, f", {delay:g} sample{'s' * (delay != 1)} late" if delay else ""
     at = f"sampled every {1e3 * T:g} ms{late}{origin and f' ({origin})'}"
     return SampledBrief(
         period=T,

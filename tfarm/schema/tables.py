@@ -196,15 +196,15 @@ class Section:
 
 
 def sections(record: Any, title: str = "") -> list[Section]:
-    """A record as a person reads it: its single values first, then its tables and the records inside it."""
-    own, later = Section(title), []
+    """A record as a person reads it: a table declared `first`, single values, other tables and the records inside it."""
+    first, own, later = [], Section(title), []
     for value, of, owner in with_flat(record):
         if not of.label or ((value is None or of.curve) and not of.is_number):
             continue
         if value is None or of.curve:
             own.pairs.append((of.label, NO_VALUE))
         elif is_table(value) or is_list_of_records(value):
-            later.append(Section(of.label, table=table(value, parent=owner)))
+            (first if of.first else later).append(Section(of.label, table=table(value, parent=owner)))
         elif is_declared(value) and not isinstance(value, At) and not hasattr(value, "as_text"):
             later += sections(value, of.label)
         elif isinstance(value, np.ndarray) and np.iscomplexobj(value) and value.size:
@@ -215,7 +215,7 @@ def sections(record: Any, title: str = "") -> list[Section]:
         later.append(Section(whole.title, table=whole))
     if hasattr(record, "drawing"):
         later.append(Section(drawing=record.drawing))
-    return [own, *later]
+    return [*first, own, *later]
 
 
 # ------------------------------------------------------------------------------------------------------------ files

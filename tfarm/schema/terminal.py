@@ -25,8 +25,8 @@ PIPE_WIDTH = 10**6  # columns of a pipe: more than any row has
 def show(record: Any, rows: Table | None = None, last: str = "") -> None:
     """Print a record as a person reads it, then a table of rows and a last line of text, if there are any."""
     for number, each in enumerate([*sections(record), Section(table=rows)]):
-        if number and (each.pairs or each.table or each.drawing):
-            print()
+        if each.pairs or each.table or each.drawing:
+            print(end="\n" * bool(number))
             show_text(each.title)
         if each.pairs:
             print("\n".join(pair_lines(each.pairs, terminal_width())))
