@@ -74,7 +74,8 @@ class SignalFigures:
     overshoot: Annotated[Percent | None, Quantity("overshoot", "", 4,
             help="excess of the largest value over the final one, as a share of that")]  # fmt: skip
     settling_time: Annotated[float | None, Quantity("settling time (5 %)", "s", 4,
-            help="time after which deviations stay within 5 % of the final value, or of the peak where that is 0")]  # fmt: skip
+            help="time after which deviations stay within 5 % of the final value, "
+            "or of the largest where there is no reference")]  # fmt: skip
     steady_state_error: Annotated[float | None, Quantity("steady-state error", digits=4, unit_of="unit",
             help="reference less final value")]  # fmt: skip
     residual_rms: Annotated[float | None, Quantity("residual vibration (rms)", digits=4, unit_of="unit",

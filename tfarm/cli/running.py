@@ -109,7 +109,8 @@ def usage(error: Any) -> str:
     if text.startswith("No such option"):
         known = [option for each in error.ctx.command.params for option in each.opts]
         meant = [option for option, others in hints["options"].items() if name in others and option in known]
-        return f"No such option: {name}. Did you mean {' or '.join(meant)}?" if meant else text
+        other = hints["other_commands"].get(name, "")
+        return f"No such option: {name}. Did you mean {' or '.join(meant)}?" if meant else text + other
     for problem in getattr(error.__cause__, "errors", list)():  # of pydantic, which converts for Typer
         low, high = error.param.min, error.param.max
         within = f", from {low} to {high}" if None not in (low, high) else ""

@@ -371,7 +371,8 @@ def brief_of(found: Verdict | ConvergenceError, law: AnyLaw, chain: Chain) -> Sa
     origin = LAWS_PERIOD if as_law(law).is_discrete else origin
     verdict = None if isinstance(found, ConvergenceError) else found
     word, _, rest = (f"undecided: {found}" if verdict is None else verdict.sentence).partition(" ")
-    is_stable, late = None if verdict is None else verdict.is_stable, f", {delay:g} sample{'s' * (delay != 1)} late" if delay else ""
+    is_stable = None if verdict is None else verdict.is_stable
+    late = f", {delay:g} sample{'s' * (delay != 1)} late" if delay else ""
     at = f"sampled every {1e3 * T:g} ms{late}{origin and f' ({origin})'}"
     return SampledBrief(
         period=T,

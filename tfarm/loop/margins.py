@@ -63,9 +63,7 @@ IN_RANGE = Quantity(
 )
 LYAPUNOV = Quantity("Lyapunov function of the paper", help="energy argument for constant gains at the hub")
 PASSIVITY = Quantity("passivity of the controller", help="sign of the controller from hub angle or rate to torque")
-INTERVALS = Quantity(
-    "stability intervals", first=True, help="of each gain or coefficient alone, the others constant"
-)
+INTERVALS = Quantity("stability intervals", first=True, help="of each gain or coefficient alone, the others constant")
 INTERVALS_NOTE = Quantity("limits of the intervals", help="frequency range in which the intervals are known")
 GAIN_CROSSOVERS = Quantity("gain crossovers, abs(L) = 1", help="all in the frequency range, ascending")
 PHASE_CROSSOVERS = replace(GAIN_CROSSOVERS, label="phase crossovers, L < 0")

@@ -24,11 +24,11 @@ class Quantity:
     """Label, unit, digits for a person and meaning of one entry of a record.
 
     `key` is its name in JSON and CSV, by default that of the attribute with its unit.  An entry without a label is in
-    JSON alone.  A record (or dictionary) that is `flat` has its entries in the place of its own; a table that is `first`
-    is read before all other entries; the arrays that are a
-    `curve` are of one length: columns in CSV, and not printed.  Where a number (`is_number`, by its type) has no value
-    a person reads "-", and nothing where a text or a record has none.  `unit_of` is the attribute with the unit where
-    that depends on the record, or on the one whose row it is.
+    JSON alone.  A record (or dictionary) that is `flat` has its entries in the place of its own; a table that is
+    `first` is read before all other entries; the arrays that are a `curve` are of one length: columns in CSV, and not
+    printed.  Where a number (`is_number`, by its type) has no value a person reads "-", and nothing where a text or a
+    record has none.  `unit_of` is the attribute with the unit where that depends on the record, or on the one whose row
+    it is.
     """
 
     label: str = ""
