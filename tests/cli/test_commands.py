@@ -74,6 +74,7 @@ BAD = [
     (["design", "sasaki2012", "--K1", "0,1_0"], "write numbers as 50"),
     (["sampled", "sasaki2012", "--Ts", "0.01"], "Did you mean --period?"),
     (["modes", "sasaki2012", "--n", "3"], "Did you mean --count?"),
+    (["margins", "sasaki2012", "--period", "0.01"], "tfarm sampled ARM --period 0.01"),
     (["rlocus", "sasaki2012"], 'Did you mean "locus"?'),
     (["response", "sasaki2012", "--output", "tip"], 'did you mean "tip_displacement"'),
     (["modes", "sasaki2012", "--cuont", "3"], "Possible options: --count"),

@@ -206,7 +206,8 @@ class Comparison:
     def rows(
         self,
     ) -> Annotated[
-        list[SideRow], Quantity("stability of both loops", key="sides", help="verdicts of both loops, a row each")
+        list[SideRow],
+        Quantity("stability of both loops", first=True, key="sides", help="verdicts of both loops, a row each"),
     ]:
         """A row a side."""
         return [
@@ -258,7 +259,10 @@ class Comparison:
     ) -> Annotated[
         list[Difference],
         Quantity(
-            "stability and margins", key="margins", help="every quantity that both loops have, an interval as text"
+            "stability and margins",
+            key="margins",
+            first=True,
+            help="every quantity that both loops have, an interval as text",
         ),
     ]:
         """Every quantity that both loops have."""

@@ -187,8 +187,8 @@ class Figure:
         return f"{self.value:.{self.digits}g}" if self.digits else "?"
 
     def as_text(self, _: int) -> str:
-        """The same, for tables; "≥ 20" of a lower bound."""
-        shown = f"≥ {self.text}" if self.is_bound else self.text
+        """The same, for tables; "≥ 20" of a lower bound, "not determined" without digits."""
+        shown = f"≥ {self.text}" if self.is_bound else self.text.replace("?", "not determined")
         return shown if self.modes is None else f"{shown} (first {self.modes} modes)"
 
 

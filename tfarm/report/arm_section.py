@@ -129,4 +129,4 @@ def assumptions_section(case: Case) -> PageSection:
         found["assumptions_hub"] = hub_study(arm)
     blocks = [sheet(kind, table(study.candidates), study=study) for kind, study in found.items()]
     words = (prose("assumptions", arm=arm, has_hub=has_hub_inertia(arm)),)
-    return PageSection(title="What the assumptions do", words=words, blocks=blocks)
+    return PageSection(title="Effect of the assumptions", words=words, blocks=blocks)

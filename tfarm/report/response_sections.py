@@ -237,7 +237,7 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
     try:
         those = possible(fit, count)
     except ConvergenceError as error:
-        words.append(f"What the data leave of a loop is not drawn: {error}.")
+        words.append(f"The loops of the arms that agree with the data are not drawn: {error}.")
     else:
         every = [margins(each, default_gains(fit.arm)) for each in those.arms if has_loop(fit.arm)]
         gains, stable = (

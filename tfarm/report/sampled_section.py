@@ -79,7 +79,7 @@ def interval_facts(found: Analysis) -> Iterator[Fact]:
     for name in PLANE:
         unit, shown = shown_unit(name, found.loop.plant.arm), text(list(found.shown[name]), 4) or "no value"
         known = f"{name}, sampled, {period} ms{modes if modes in shown else ''}"
-        yield Fact(known, shown.replace(modes, "").replace("?", "not determined"), unit)
+        yield Fact(known, shown.replace(modes, ""), unit)
 
 
 def chain_words(arm: Arm, chain: Chain) -> str:

@@ -197,7 +197,9 @@ class Section:
 
 def sections(record: Any, title: str = "") -> list[Section]:
     """A record as a person reads it: tables declared `first`, single values, other tables, the records inside it."""
-    first, own, later = [], Section(title), []
+    own = Section(title)
+    first: list[Section] = []
+    later: list[Section] = []
     for value, of, owner in with_flat(record):
         if not of.label or ((value is None or of.curve) and not of.is_number):
             continue
