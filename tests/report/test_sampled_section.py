@@ -98,7 +98,7 @@ def test_facts_and_words_are_the_analysis(section):
     assert [(fact.label, fact.value, fact.unit) for fact in section.facts] == [
         ("K1, sampled, 10 ms", text(analysis.shown["K1"], 4), "N m s/rad"),
         ("K2, sampled, 10 ms", "(-0.1526, 1.16388)", ""),
-        ("settling time of the slew", f"{slew.settling_time:.4g}", "s"),
+        ("settling time of the root moment", f"{slew.settling_time:.4g}", "s"),
         ("settling time of the tip", f"continuous-time {tip[0]:.4g} s, sampled {tip[1]:.4g} s", ""),
     ]
     assert "stable for K2 in (< -50, 1.031), the sampled one for K2 in (-0.1526, 1.16388)" in section.blocks[0].caption
@@ -107,9 +107,9 @@ def test_facts_and_words_are_the_analysis(section):
 def test_a_slew_that_does_not_settle_has_no_settling_time(section):
     run = SimpleNamespace(settling_time=None, t=np.array([0.0, 3.0]), stopped=None)
     fact = page.settling_fact(SimpleNamespace(name="PD"), run, True)
-    assert fact[:3] == ("settling time of the slew, PD", "not settled within 3.000", "s")
+    assert fact[:3] == ("settling time of the root moment, PD", "not settled within 3.000", "s")
     lost = tfarm.simulate(LAB, HubFeedback(K1=0.3, K2=3.0), duration=3.0)
-    assert page.settling_fact(SimpleNamespace(name="PD"), lost, False)[:2] == ("settling time of the slew", "unstable")
+    assert page.settling_fact(SimpleNamespace(name="PD"), lost, False)[:2] == ("settling time of the root moment", "unstable")
 
 
 def test_a_delay_margin_that_is_a_lower_bound_is_shown_so():

@@ -172,7 +172,7 @@ def test_the_first_page_has_the_card_and_the_pictures_in_their_order(pages):
     assert [row[1] for row in Read(text).rows if row[0].isdigit()] == [f"{omega:.6g}" for omega in shown]
     assert ('href="margins.html#margins-recommended"' in text) == (best(ARM, Chain()) is not None)
     assert tfarm.simulate(ARM, default_gains(ARM), duration=3.0).settling_time is None
-    assert "<dt>settling time of the slew</dt><dd>not settled within 3.000 s</dd>" in text
+    assert "<dt>settling time of the root moment</dt><dd>not settled within 3.000 s</dd>" in text
 
 
 def test_every_number_of_the_card_is_that_of_the_json(pages):

@@ -108,7 +108,7 @@ def _warnings(tables: Mapping[str, Any], arm: Arm, slenderness: float, error: fl
     if arm.has_elastic_link:
         yield (
             "link.damping = 0: undamped model, in which any delay destabilises a mode; "
-            f"C = {reference_damping(arm):.3g} s is a damping ratio of 0.1 % in mode 1"
+            f"damping = {reference_damping(arm):.3g} in [link] is a damping ratio of 0.1 % in mode 1"
         )
 
 

@@ -216,7 +216,7 @@ def film_picture(each: Controller, run: Simulation, rise: float) -> Picture:
 
 def settling_fact(each: Controller, run: Simulation, is_named: bool) -> Fact:
     """The settling time of a slew, or the time within which it is not reached."""
-    label = f"settling time of the slew{f', {each.name}' if is_named else ''}"
+    label = f"settling time of the root moment{f', {each.name}' if is_named else ''}"
     if run.stopped is not None:
         return Fact(label, "unstable")
     if run.settling_time is None:
