@@ -109,7 +109,10 @@ def test_a_slew_that_does_not_settle_has_no_settling_time(section):
     fact = page.settling_fact(SimpleNamespace(name="PD"), run, True)
     assert fact[:3] == ("settling time of the root moment, PD", "not settled within 3.000", "s")
     lost = tfarm.simulate(LAB, HubFeedback(K1=0.3, K2=3.0), duration=3.0)
-    assert page.settling_fact(SimpleNamespace(name="PD"), lost, False)[:2] == ("settling time of the root moment", "unstable")
+    assert page.settling_fact(SimpleNamespace(name="PD"), lost, False)[:2] == (
+        "settling time of the root moment",
+        "unstable",
+    )
 
 
 def test_a_delay_margin_that_is_a_lower_bound_is_shown_so():
