@@ -6,8 +6,9 @@ one pair of exponentials at any damping, so the response of the loop to it is ex
 the tip is an equilibrium only where the hub is kept at its angle.)
 
 Figures, as in textbooks (Ogata, Modern Control Engineering, 2010, sec. 5-3): the final value is the mean of the last
-tenth of the record; rise time from 10 to 90 % of it; overshoot beyond it, over it; settling within 5 % of it, as for
-`tfarm simulate`.  Of a signal without a reference, and of root moment and torque, the 5 % are of its largest value.
+tenth of the record; rise time from 10 to 90 % of it; overshoot beyond it, over it; settling within 5 % of it.  Of a
+signal without a reference, and of root moment and torque, the 5 % are of its largest value: as for `tfarm simulate`,
+which reads the samples alone.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from tfarm.dsp.chain import PERIOD, TIME_ROUNDING, chain_or_usual
 from tfarm.dsp.plant import sensed_plant
 from tfarm.dsp.results import ENOUGH_CHANGE, simulated
 from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, described, scenario, unit_step
-from tfarm.dsp.simulate import LEFT_OF_RECORD, MOST_BETWEEN, SETTLED_SHARE, first_mode
+from tfarm.dsp.simulate import LEFT_OF_RECORD, MOST_BETWEEN, first_mode, settled_from
 from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import must_be_known, require
 from tfarm.loop.loop import Loop
@@ -80,7 +81,7 @@ class SignalFigures:
     residual_rms: Annotated[float | None, Quantity("residual vibration (rms)", digits=4, unit_of="unit",
             help="rms about the final value once the slew or the pulse is over")]  # fmt: skip
     remainder_bound: Annotated[float | None, Quantity("remainder bound at the peak", digits=2, unit_of="unit",
-            help="contribution of the omitted poles at the peak at most, as measured")]  # fmt: skip
+            help="contribution of the omitted poles at the peak at most, as measured; at least its rounding, 2e-16")]  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -340,16 +341,15 @@ class _Record:
         final = 0.0 if name == MOMENT else float(y[LEFT_OF_RECORD * t >= (LEFT_OF_RECORD - 1) * t[-1]].mean())
         away = abs(y - final)
         scale = float(away.max()) if reference is None else abs(final)
-        settled = 1 + int(np.flatnonzero(away > SETTLED_SHARE * scale).max(initial=-1))
-        is_settled = not settled or LEFT_OF_RECORD * (t.size - 1 - settled) >= t.size - 1
-        share = y / final if is_settled and reference is not None and final else None
+        settled = settled_from(away, scale)
+        share = y / final if settled is not None and reference is not None and final else None
         after = t >= self.busy * (1 - TIME_ROUNDING)
         return SignalFigures(
             signal=name, unit=unit_of(self.arm, name), peak=peak, peak_time=peak_time,
-            final_value=final if is_settled and name != MOMENT else None,
+            final_value=final if settled is not None and name != MOMENT else None,
             rise_time=None if share is None else _reached(t, share, 0.9) - _reached(t, share, 0.1),
             overshoot=None if share is None else Percent(max(0.0, float(share.max()) - 1)),
-            settling_time=float(t[settled]) if is_settled else None,
+            settling_time=None if settled is None else float(t[settled]),
             steady_state_error=None if share is None or reference is None else float(reference[-1]) - final,
             residual_rms=float(np.sqrt(np.mean((y - final)[after] ** 2))) if self.busy and after.any() else None,
             remainder_bound=bound,
