@@ -81,7 +81,7 @@ class SignalFigures:
     residual_rms: Annotated[float | None, Quantity("residual vibration (rms)", digits=4, unit_of="unit",
             help="rms about the final value once the slew or the pulse is over")]  # fmt: skip
     remainder_bound: Annotated[float | None, Quantity("remainder bound at the peak", digits=2, unit_of="unit",
-            help="contribution of the omitted poles at the peak at most, as measured; at least its rounding, 2e-16")]  # fmt: skip
+            help="of the omitted poles at the peak, as measured; at least the rounding of the peak")]  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -151,9 +151,8 @@ def unit_step(signal: str, chain: Chain, duration: float) -> Scenario:
 
 def described(task: Scenario, arm: Arm, chain: Chain) -> str:
     """A scenario with its size, in words."""
-    travel = chain.slew.travel_of(arm.reach)
     words = {
-        "slew": f"a slew: the tip moves {travel:.4g} m in {chain.slew.rise_time:g} s",
+        "slew": f"a slew: the tip moves {chain.slew.travel_of(arm.reach):.4g} m in {chain.slew.rise_time:g} s",
         "step": f"a step of {task.feedforward[0]:.4g} {arm.input_unit}",
         "decay": f"the first mode released with the tip at {task.tip_offset:.4g} m",
         "impulse": f"an impulse of {task.impulse:.4g} {arm.input_unit} s on the hub",
