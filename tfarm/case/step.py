@@ -128,8 +128,8 @@ class Step:
     @property
     def loops(self) -> dict[str, LoopResponse]:
         """The loops by name."""
-        continuous = {"continuous-time": self.continuous} if self.continuous else {}
-        return {**continuous, f"sampled, {1e3 * self.period:g} ms": self.sampled}
+        names = "continuous-time", f"sampled, {1e3 * self.period:g} ms"
+        return {name: loop for name, loop in zip(names, (self.continuous, self.sampled), strict=True) if loop}
 
     @property
     def finding(self) -> Annotated[str, Quantity("finding", help="stability of each loop")]:
@@ -196,7 +196,7 @@ def step(
     chain, is_step = chain_or_usual(chain), scenario_name == "reference"
     hub, law = followed(law) if is_step else (AT_HUB[0], law)
     arm, law = tracked(arm, law)
-    full, of_angle, response, continuous = as_law(law), hub == AT_HUB[0], None, None
+    full, of_angle, response = as_law(law), hub == AT_HUB[0], None
     poles = None if full.is_discrete else usual_poles(Loop(arm, full))
     length = usual_duration(poles, chain) if duration is None else duration
     task = unit_step(hub, chain, length) if is_step else scenario(SAMPLED_NAMES[scenario_name], arm, chain, length)
@@ -209,12 +209,11 @@ def step(
         angle = traces.reference_angle(task, t) if of_angle else np.ones(t.size)
         reference = {hub: angle, tip: arm.reach * angle}
     record = _Record(arm, names, task.busy_until, t, reference)
-    if response is not None:
-        continuous = record.continuous(response)
     return Step(
         arm=arm, controller=controller(full, arm), scenario=scenario_name, duration=length, period=task.period,
-        scenario_in_words=described(task, arm, chain), continuous=continuous, sampled=record.sampled(law, chain, task),
-        t=t, names=(*names[:3], TORQUE), reference=reference, response=response,
+        scenario_in_words=described(task, arm, chain), sampled=record.sampled(law, chain, task), t=t,
+        continuous=None if response is None else record.continuous(response),
+        names=(*names[:3], TORQUE), reference=reference, response=response,
     )  # fmt: skip
 
 
@@ -260,8 +259,7 @@ def excitation(loop: Loop, law: Law, chain: Chain, task: Scenario, names: Sequen
     references: dict[str, Transform] = {
         angle: lambda s: 1 / s**3, rate: lambda s: 1 / s**2, moment: lambda s: -read / s
     }  # fmt: skip
-    inputs = _through(law, references)
-    inputs[ACTUATOR] = lambda s: arm.turned_inertia / s + arm.rate_loss / s**2
+    inputs = {**_through(law, references), ACTUATOR: lambda s: arm.turned_inertia / s + arm.rate_loss / s**2}
     return Excitation(inputs, (0.0, rise / 2, rise), (a, -2 * a, a))
 
 
@@ -311,32 +309,33 @@ class _Record:
         signals = dict(zip(response.names, response.at(self.t), strict=True))
         peaks = {name: response.peak(name, self.t) for name in signals}
         is_converged = all(bound <= CONVERGED * abs(peak) for _, peak, bound in peaks.values())
-        certainty = f"{'converged' if is_converged else 'approximate'}, {response.poles.count} poles"
-        return self._loop(verdict_on(response.poles.loop).verdict, certainty, signals, peaks)
+        word, count = verdict_on(response.poles.loop).verdict, f"{response.poles.count} poles"
+        return self._loop(word, is_converged, count, signals, peaks)
 
     def sampled(self, law: AnyLaw, chain: Chain, task: Scenario) -> LoopResponse:
         """The sampled loop."""
-        between = round(task.period / self.t[1]) - 1
-        run, used = simulated(self.arm, law, chain, task, between=between, outputs=self.names)
+        steps = round(task.period / self.t[1])
+        run, used = simulated(self.arm, law, chain, task, between=steps - 1, outputs=self.names)
         signals = {name: traces.continuous(run, name)[1][: self.t.size] for name in self.names}
         signals[TORQUE] = traces.held_at(run, run.torque, self.t[: signals[MOMENT].size])
-        at = {name: int(abs(y).argmax()) for name, y in signals.items() if y.size}
-        peaks = {name: (float(self.t[n]), float(signals[name][n]), None) for name, n in at.items()}
         is_converged = used.change is not None and used.change <= ENOUGH_CHANGE
-        certainty = f"{'converged' if is_converged else 'approximate'}, {used.modes} modes"
         word = UNSTABLE if run.stopped else sampled_verdict(self.arm, law, chain).word
-        return self._loop(word, certainty, signals, peaks)
+        return self._loop(word, is_converged, f"{used.modes} modes", signals, {})
 
     def _loop(
-        self, stability: str, certainty: str, signals: dict[str, Real], peaks: Mapping[str, Peak]
-    ) -> LoopResponse:
+        self, stability: str, is_converged: bool, count: str, signals: dict[str, Real],
+        peaks: Mapping[str, Peak],
+    ) -> LoopResponse:  # fmt: skip
         """The figures of a loop; of an unstable one those of its signals are left out."""
         names = zip(PARTS, (*self.names[:3], TORQUE), strict=True) if stability != UNSTABLE else ()
-        of = {part: self._figures(name, signals[name], *peaks[name]) for part, name in names}
+        of = {part: self._figures(name, signals[name], peaks.get(name)) for part, name in names}
+        certainty = f"{'converged' if is_converged else 'approximate'}, {count}"
         return LoopResponse(stability=stability, certainty=certainty, signals=signals, **of)
 
-    def _figures(self, name: str, y: Real, peak_time: float, peak: float, bound: float | None) -> SignalFigures:
-        """Figures of one signal at the times of the record."""
+    def _figures(self, name: str, y: Real, peak: Peak | None = None) -> SignalFigures:
+        """Figures of one signal at the times of the record; its peak is the largest there unless given."""
+        n = int(abs(y).argmax())
+        peak_time, largest, bound = peak or (float(self.t[n]), float(y[n]), None)
         t, reference = self.t, self.reference.get(name)
         final = 0.0 if name == MOMENT else float(y[LEFT_OF_RECORD * t >= (LEFT_OF_RECORD - 1) * t[-1]].mean())
         away = abs(y - final)
@@ -345,7 +344,7 @@ class _Record:
         share = y / final if settled is not None and reference is not None and final else None
         after = t >= self.busy * (1 - TIME_ROUNDING)
         return SignalFigures(
-            signal=name, unit=unit_of(self.arm, name), peak=peak, peak_time=peak_time,
+            signal=name, unit=unit_of(self.arm, name), peak=largest, peak_time=peak_time,
             final_value=final if settled is not None and name != MOMENT else None,
             rise_time=None if share is None else _reached(t, share, 0.9) - _reached(t, share, 0.1),
             overshoot=None if share is None else Percent(max(0.0, float(share.max()) - 1)),

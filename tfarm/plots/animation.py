@@ -52,8 +52,8 @@ class Motion(NamedTuple):
 
     def words(self, frame: int) -> str:
         """Time and input."""
-        t = self.t[frame]
-        return f"t = {t:.2f} s,  u = {traces.held_at(self.run, self.run.torque, t):.3g} {self.arm.input_unit}"
+        u = traces.held_at(self.run, self.run.torque, self.t[frame])
+        return f"t = {self.t[frame]:.2f} s,  u = {u:.3g} {self.arm.input_unit}"
 
 
 def motion_of(arm: Arm, run: Simulation, until: float = math.inf, most: int = MOST_FRAMES) -> Motion:

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
-from matplotlib.ticker import MaxNLocator
 
 from tfarm.arm import MOMENT_GAIN, Arm, Link
 from tfarm.arrays import Real
@@ -59,7 +58,6 @@ HATCH = "/////"
 LEAST_RISE = 1 / 3000  # of the height of a curve: rise from point to point that counts
 MOST_TURNS = 400  # of a line; with more it is a band
 FEW_SAMPLES = 60  # of a run: each is marked
-STEP_ROWS = (1.0, 1.0, 1.0, 1.0)  # heights of hub, tip, root moment and torque
 SHOWN_SETTLED = 1.5  # times the last settling time: end of the picture
 OFF_FRAME = 0.3  # of the height of a stable response: margin beyond it for an unstable one
 
@@ -105,7 +103,7 @@ def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
             one.plot(length, w[-1], "s", ms=8.0, mfc=GREY, mec="none", zorder=3)
         one.plot(found.nodes[row], 0 * found.nodes[row], "o", ms=5.5, mfc="white", mec=INK, mew=1.3, zorder=4)
         one.set(xlim=(-0.085 * length, 1.11 * length), ylim=(-1.28, 1.28), yticks=[-1, 0, 1])
-        one.xaxis.set_major_locator(MaxNLocator(5))
+        one.locator_params(axis="x", nbins=5)
         omega, hertz = (significant(float(of[row]), 7) for of in (found.natural_frequency, found.natural_frequency_hz))
         places = ", ".join(plain(float(node), 3) for node in found.nodes[row]) or "none"
         one.set_title(f"Mode {number}:  {omega} rad/s  ({hertz} Hz)\nnodes [m]: {places}", fontsize=9.5)
@@ -177,12 +175,10 @@ def _numbers(arm: Arm) -> Iterator[str]:
     yield hub + (f",  r = {plain(arm.hub.radius, 6)} m" if arm.hub.radius else "")
     depths = f"{len(arm.links)} segments, at most" if arm.outer else "depth"
     yield f"link  L = {plain(arm.length, 6)} m,  {depths} {plain(_deepest(arm), 4)} m{' deep' if arm.outer else ''}"
-    if not (payload.mass or payload.inertia):
-        yield "free tip, no payload"
-        return
     masses = "tip pinned" if math.isinf(payload.mass) else f"m = {plain(payload.mass, 6)} kg"
     turns = "tip cannot rotate" if math.isinf(payload.inertia) else f"$I_c$ = {plain(payload.inertia, 6)} {inertia}"
-    yield f"payload  {masses},  {turns}" + (f",  e = {plain(payload.offset, 6)} m" if payload.offset else "")
+    offset = f",  e = {plain(payload.offset, 6)} m" if payload.offset else ""
+    yield f"payload  {masses},  {turns}{offset}" if payload.mass or payload.inertia else "free tip, no payload"
 
 
 # ------------------------------------------------------------ over time
@@ -255,7 +251,7 @@ def _draw_signal(ax: Axes, t: Real, y: Real, looks: tuple[str, str], every: int 
 
 
 @picture(
-    (Step, "tfarm.step returns"), size=(9.0, 10.0), rows=STEP_ROWS,
+    (Step, "tfarm.step returns"), size=(9.0, 10.0), rows=(1.0, 1.0, 1.0, 1.0),
     title=lambda found: f"{found.arm.name}: {found.scenario_in_words}",
 )  # fmt: skip
 def step(found: Step, *, ax: Sequence[Axes]) -> None:
