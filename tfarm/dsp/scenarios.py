@@ -145,8 +145,8 @@ def resting(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:
 def unit_step(signal: str, chain: Chain, duration: float) -> Scenario:
     """Return a reference of 1 rad of the hub angle, or of 1 rad/s of the hub rate, from t = 0 on."""
     zero = np.zeros(_samples(duration, chain.sampling.period))
-    resting_task = Scenario("reference", chain.sampling.period, zero, zero, zero, zero, zero)
-    return replace(resting_task, **{signal: zero + 1.0})  # type: ignore[arg-type]  # of an array of references
+    task = Scenario("reference", chain.sampling.period, zero, zero, zero, zero, zero)
+    return replace(task, **{signal: zero + 1.0})  # type: ignore[arg-type]  # of an array of references
 
 
 def described(task: Scenario, arm: Arm, chain: Chain) -> str:

@@ -59,8 +59,8 @@ class Motion(NamedTuple):
 def motion_of(arm: Arm, run: Simulation, until: float = math.inf, most: int = MOST_FRAMES) -> Motion:
     """The motion of a run up to a time [s]: its torques are applied to the arm again, with more outputs."""
     require(run.t.size > 1, "run", run.t.size, "give a simulation with more than one sample")
-    end, x, torque = min(until, float(run.t[-1])), np.linspace(0.0, arm.length, STATIONS), 0 * run.scenario.t
-    torque[: run.torque.size] = run.torque
+    end, x = min(until, float(run.t[-1])), np.linspace(0.0, arm.length, STATIONS)
+    torque = np.pad(run.torque, (0, run.scenario.t.size - run.torque.size))
     names = [f"deflection@{each!r}" for each in x.tolist()]
     again = Simulator(arm, run.chain, run.scenario, between=BETWEEN, outputs=names)
     found = again.controller(lambda measured: float(torque[measured.k]))

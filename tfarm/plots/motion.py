@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
 
-from tfarm.arm import MOMENT_GAIN, Arm, Link
+from tfarm.arm import MOMENT_GAIN, Arm
 from tfarm.arrays import Real
 from tfarm.case.step import Step
 from tfarm.digits import how_many, plain, significant, unit
@@ -114,20 +114,18 @@ def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
 # ------------------------------------------------------------ the arm
 
 
-def _depth(link: Link) -> float:
-    """The depth [m] of one segment: that of its shape, or sqrt(12) times the radius of gyration, as of a rectangle."""
-    own = link.section.half_depth
-    return math.sqrt(12) * link.section.radius_of_gyration if own is None else 2 * own
+def _depths(arm: Arm) -> list[float]:
+    """The depth [m] of each segment: that of its shape, or sqrt(12) times the radius of gyration, as of a rectangle."""
+    return [
+        math.sqrt(12) * of.radius_of_gyration if of.half_depth is None else 2 * of.half_depth
+        for of in (link.section for link in arm.links)
+    ]
 
 
 def _frame(arm: Arm) -> tuple[float, float, float]:
     """Left end, right end and half the height [m] of the picture."""
     tip = arm.length + arm.hub.radius + max(0.0, arm.payload.offset)
-    return -0.2 * arm.length, tip + 0.2 * arm.length, max(0.12 * arm.length, 0.6 * _deepest(arm))
-
-
-def _deepest(arm: Arm) -> float:
-    return max(map(_depth, arm.links))
+    return -0.2 * arm.length, tip + 0.2 * arm.length, max(0.12 * arm.length, 0.6 * max(_depths(arm)))
 
 
 def _sketch_size(arm: Arm) -> tuple[float, float]:
@@ -145,8 +143,7 @@ def sketch(arm: Arm, *, ax: Axes) -> None:
     ax.spines[["left", "right", "top"]].set_visible(False)
     ax.axhline(0, color=FAINT, lw=0.8, ls=(0, (6, 3, 1, 3)), zorder=0)
     starts = root + np.cumsum([0.0, *(link.length for link in arm.links)])
-    for start, link, colour in zip(starts, arm.links, cycle(("#cfe0ee", "#e3ecd5")), strict=False):
-        deep = _depth(link)
+    for start, link, deep, colour in zip(starts, arm.links, _depths(arm), cycle(("#cfe0ee", "#e3ecd5")), strict=False):
         ax.add_patch(Rectangle((start, -deep / 2), link.length, deep, fc=colour, ec=BLUE, lw=1.0, zorder=2))
     ax.plot([0, root], [0, 0], color=INK, lw=4.0, solid_capstyle="butt", zorder=1.5)
     if not arm.clamp.is_rigid:
@@ -155,7 +152,7 @@ def sketch(arm: Arm, *, ax: Axes) -> None:
         ax.plot(root + each.x, 0, "o", ms=5.0, color=INK, zorder=5)
     if arm.payload.mass or arm.payload.inertia:
         at = root + arm.length + arm.payload.offset
-        side = max(0.03 * arm.length, min(bore, 0.75 * _deepest(arm)))
+        side = max(0.03 * arm.length, min(bore, 0.75 * max(_depths(arm))))
         ax.plot([root + arm.length, at], [0, 0], color=INK, lw=2.0, zorder=2.5)
         ax.add_patch(Rectangle((at - side, -side), 2 * side, 2 * side, fc="#8c8c8c", ec=INK, lw=1.0, zorder=3))
     ax.add_patch(Circle((0, 0), bore, fc="#e9e9e9" if arm.hub.inertia else "white", ec=INK, lw=1.2, zorder=3))
@@ -174,7 +171,7 @@ def _numbers(arm: Arm) -> Iterator[str]:
     hub = "hub locked: driven by its angle" if arm.is_locked else free
     yield hub + (f",  r = {plain(arm.hub.radius, 6)} m" if arm.hub.radius else "")
     depths = f"{len(arm.links)} segments, at most" if arm.outer else "depth"
-    yield f"link  L = {plain(arm.length, 6)} m,  {depths} {plain(_deepest(arm), 4)} m{' deep' if arm.outer else ''}"
+    yield f"link  L = {plain(arm.length, 6)} m,  {depths} {plain(max(_depths(arm)), 4)} m{' deep' if arm.outer else ''}"
     masses = "tip pinned" if math.isinf(payload.mass) else f"m = {plain(payload.mass, 6)} kg"
     turns = "tip cannot rotate" if math.isinf(payload.inertia) else f"$I_c$ = {plain(payload.inertia, 6)} {inertia}"
     offset = f",  e = {plain(payload.offset, 6)} m" if payload.offset else ""

@@ -123,8 +123,7 @@ def slew_numbers(arm: Arm, chain: Chain, law: HubFeedback) -> dict[str, Any] | N
         task = scenario("slew", arm, chain, RECORD_LENGTH * chain.slew.rise_time)
         if task.t.size > MOST_LIVE_SAMPLES:
             return None
-        linear = ideal_chain(chain)
-        count = enough_modes(lambda number: Simulator(arm, linear, task, count=number).linear(law)).modes
+        count = enough_modes(lambda number: Simulator(arm, ideal_chain(chain), task, count=number).linear(law)).modes
         plant = _upper(Simulator(arm, chain, task, count=count).plant)
         ideal = task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference, task.rigid_moment
         return {
