@@ -20,13 +20,11 @@ from tfarm.digits import how_many, plain, significant, unit
 from tfarm.dsp import GainMap, Simulation, traces
 from tfarm.dsp.results import Run
 from tfarm.dsp.simulate import SETTLED_SHARE
-from tfarm.dsp.traces import POINTS_A_PERIOD, TimeCurve
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.fitting.recording import RunComparison
 from tfarm.loop.plane import Plane
 from tfarm.spectrum import Modes
-from tfarm.tuner import Tuning
-from tfarm.tuner.training import LearningCurves
+from tfarm.tuner import LearningCurves, Tuning
 
 from .regions import overlay
 from .style import (
@@ -211,11 +209,13 @@ def slew(arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "", 
         axes.axhline(0.0, color=GREY, lw=0.6)
         axes.set(xlim=(0.0, float(scenario.t[-1])), xlabel=TIME, ylabel=label)
     points, finer = min(traces.points_a_period(arm, run) for run in each.values())
-    coarse = f"{plain(points, 2)} points a period of the fastest mode shown; between={finer} gives {POINTS_A_PERIOD}"
-    moment.set_title(coarse if points < POINTS_A_PERIOD else "", loc="right", fontsize=8.0, color=GREY)
+    coarse = (
+        f"{plain(points, 2)} points a period of the fastest mode shown; between={finer} gives {traces.POINTS_A_PERIOD}"
+    )
+    moment.set_title(coarse if points < traces.POINTS_A_PERIOD else "", loc="right", fontsize=8.0, color=GREY)
 
 
-def _draw_curve(curve: TimeCurve, ax: Axes, colour: str, *, scale: float = 1.0, **looks: Any) -> None:
+def _draw_curve(curve: traces.TimeCurve, ax: Axes, colour: str, *, scale: float = 1.0, **looks: Any) -> None:
     """The line, or the band."""
     low, high = scale * curve.low, scale * curve.high
     if curve.is_band:
@@ -276,8 +276,12 @@ def step(found: Step, *, ax: Sequence[Axes]) -> None:
 
 def _shown_until(found: Step) -> float:
     """End of the picture [s]: some time after every signal of a stable loop has settled, else that of the record."""
-    each = [of for loop in found.loops.values() for of in (loop.hub, loop.tip, loop.root_moment, loop.torque) if of]
-    ends = [math.inf if of.settling_time is None else SHOWN_SETTLED * of.settling_time for of in each]
+    ends = [
+        math.inf if of.settling_time is None else SHOWN_SETTLED * of.settling_time
+        for loop in found.loops.values()
+        for of in (loop.hub, loop.tip, loop.root_moment, loop.torque)
+        if of
+    ]
     return min(max(ends, default=math.inf), float(found.t[-1]))
 
 

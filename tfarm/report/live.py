@@ -34,13 +34,12 @@ from tfarm.arrays import Complex
 from tfarm.case.card import GAIN_LIMITS, GRADED, PEAK_LIMITS, PERIOD_LIMITS, PHASE_LIMITS, UNDAMPED, reference_damping
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits, scientific
-from tfarm.dsp import Chain, GainMap, PulseTransfer, Sampled, Simulator, sampled_verdict, scenario
+from tfarm.dsp import Chain, GainMap, PulseTransfer, Sampled, Simulator, sampled_verdict, scenario, traces
 from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.edges import LONGEST_DELAY_SAMPLES
 from tfarm.dsp.plant import Plant, sensed_plant
 from tfarm.dsp.results import enough_modes, ideal_chain
 from tfarm.dsp.simulate import FOLDED_UP, quantisers
-from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.errors import TfarmError, require
 from tfarm.loop.loop import Loop, steep_places
 from tfarm.loop.panels import PANEL_SAMPLES, Sensor, loop_panels, positions, sensed_places
@@ -59,7 +58,6 @@ SENSED_MODES = 6  # whose frequencies and zeros the chart of sensors has
 SENSOR_DIGITS = 6  # of the numbers of that chart: far more than a screen has
 FRAME = 780  # pixels: height of the page in a notebook
 LIVE_PAGE, ASSETS, SCRIPT = "live.html", "assets", "live.js"
-LIMITS = {"gain": GAIN_LIMITS, "phase": PHASE_LIMITS, "periods": PERIOD_LIMITS, "peak": PEAK_LIMITS}  # of the grades
 BEYOND = "|L| < 0.5 beyond the frequency range at all gains of this page: no unstable pole there (small gain)"
 AT_HUB = {  # `rows`: of each gain a part of the samples, and the power of s on it
     "names": ["K1", "K2", "Kp"],
@@ -70,7 +68,6 @@ AT_HUB = {  # `rows`: of each gain a part of the samples, and the power of s on 
 }
 MOST_PARTS = 4  # of a law: |L| beyond the frequency range is bounded at all 2^n corners of their ranges
 REACH = 10.0  # of a gain of a law, up and down: the range of its slider
-COLOURS = {"stable": STABLE, "marginal": MARGINAL, "unstable": UNSTABLE, "good": GOOD, "low": LOW, "poor": POOR}
 
 
 def packed(values: Any) -> str:
@@ -86,8 +83,12 @@ def sampled_numbers(loop: Sampled) -> dict[str, Any]:
     These are 2, 1 where it is damped or driven through a motor, or 0.
     """
     plant = sensed_plant(loop.plant.arm, loop.chain, FED_BACK, loop.plant.count).together
-    pulse = PulseTransfer(plant, loop.chain.sampling).folded()
-    return {**_sampling(loop.chain), **_plant(pulse.plant), "states": _orders(plant)[0], "modes": plant.count}
+    return {
+        **_sampling(loop.chain),
+        **_plant(PulseTransfer(plant, loop.chain.sampling).folded().plant),
+        "states": _orders(plant)[0],
+        "modes": plant.count,
+    }
 
 
 def law_in_page(loop: Sampled, names: Sequence[str]) -> dict[str, Any]:
@@ -120,17 +121,17 @@ def slew_numbers(arm: Arm, chain: Chain, law: HubFeedback) -> dict[str, Any] | N
     """The slew of the chain for three times as long as it takes, with the modes that it takes under `law`, and the
     arm's shapes; None where there is no such slew."""
     try:
-        task = scenario("slew", arm, chain, RECORD_LENGTH * chain.slew.rise_time)
+        task = scenario("slew", arm, chain, traces.RECORD_LENGTH * chain.slew.rise_time)
         if task.t.size > MOST_LIVE_SAMPLES:
             return None
         count = enough_modes(lambda number: Simulator(arm, ideal_chain(chain), task, count=number).linear(law)).modes
         plant = _upper(Simulator(arm, chain, task, count=count).plant)
-        ideal = task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference, task.rigid_moment
+        ideal = np.c_[task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference, task.rigid_moment]
         return {
             **_sampling(chain),
             **_plant(plant),
             **_shapes(arm, plant),
-            "ideal": packed(np.stack(ideal, axis=-1)),
+            "ideal": packed(ideal),
             "converters": [[x if math.isfinite(x) else None for x in row] for row in quantisers(chain).tolist()],
             "single": chain.converters.arithmetic == "float32",
             "bound": FOLDED_UP * arm.bending_scale,
@@ -182,8 +183,8 @@ def _shapes(arm: Arm, plant: Plant) -> dict[str, Any]:
     """
     s = plant.poles.astype(complex) * (1 + 1e-9)  # off poles of both outputs; the ratio is off by as much
     x = np.linspace(0.0, arm.length, 25)
-    ratios = [np.divide(*transfer(arm, ["displacement", "tip_displacement"], x=each)(s)) for each in x.tolist()]
-    return {"x": x.tolist(), "offset": arm.reach - arm.length, "shapes": packed(ratios)}
+    shapes = [np.divide(*transfer(arm, ["displacement", "tip_displacement"], x=each)(s)) for each in x.tolist()]
+    return {"x": x.tolist(), "offset": arm.reach - arm.length, "shapes": packed(shapes)}
 
 
 def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[str, Any]:
@@ -198,8 +199,10 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
         for name, axis in zip(PLANE, (x, y), strict=True)
     } | {ANGLE_GAIN: {"low": 0.0, "high": stiffest, "linear": 1e-4 * stiffest}}
     reference = default_gains(arm)
-    corners = product(*((of["low"], of["high"]) for of in axes.values()))
-    laws = [as_law(HubFeedback(**dict(zip(axes, each, strict=True)))) for each in corners]
+    laws = [
+        as_law(HubFeedback(**dict(zip(axes, each, strict=True))))
+        for each in product(*((of["low"], of["high"]) for of in axes.values()))
+    ]
     across = np.r_[rate_columns(arm, x, LIVE_COLUMNS), x.high]
     continuous = gain_map(arm, np.unique(across), np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE]))
     sampled = sampled_region(arm, x, y, chain)
@@ -225,7 +228,6 @@ def law_data(arm: Arm, chain: Chain, law: Law) -> dict[str, Any]:
 
     The slew is of gains at the hub alone.  Raises ParameterError for other laws.
     """
-    head, *_ = law_toml(law).split("\n\n")
     gains = {name: value for name, (_, value) in law.part_gains.items()}
     corners = [law.weighted(each) for each in product((1 / REACH, REACH), repeat=len(law.parts))]
     unit = law.weighted([1.0 / value for value in gains.values()])
@@ -237,7 +239,7 @@ def law_data(arm: Arm, chain: Chain, law: Law) -> dict[str, Any]:
         "labels": {name: "" if name in law.signals else "factor" for name in gains},
         "plane": list(gains)[:2] if len(gains) > 1 else None,
         "rows": [[place, 0] for place in range(1, 1 + len(gains))],
-        "of_law": {"head": head, "parts": tables},
+        "of_law": {"head": law_toml(law).partition("\n\n")[0], "parts": tables},
         "units": dict.fromkeys(gains, "1"),
         "axes": {  # without 0, at which poles may join those at s = 0
             name: {
@@ -266,7 +268,7 @@ def _page(arm: Arm, chain: Chain, laws: Sequence[Law], law: AnyLaw, unit: Law | 
         **sensor_numbers(arm),
         "period": chain.sampling.period,
         "longest_delay": LONGEST_DELAY_SAMPLES * chain.sampling.period,
-        "limits": LIMITS,
+        "limits": {"gain": GAIN_LIMITS, "phase": PHASE_LIMITS, "periods": PERIOD_LIMITS, "peak": PEAK_LIMITS},
         **samples,
         **_known(arm, is_quiet, unit is None),
         "reference_count": stability(arm, law, samples["band"]).unstable_roots,
@@ -411,17 +413,19 @@ def save_live(case: Case, folder: Path) -> None:
         write_text(out, render("live_failed.html", title=title, why=str(error)))
         return
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False).replace("<", "\\u003c")
-    page = render("live.html", title=title, data=data, text=text, sign=sign_words(arm), columns=LIVE_COLUMNS,
-                  samples=PANEL_SAMPLES * len(data["low"]), error=scientific(data["error"], 1),
-                  assets=f"../{ASSETS}", script=SCRIPT, colours=COLOURS)  # fmt: skip
-    write_text(out, page)
+    colours = {"stable": STABLE, "marginal": MARGINAL, "unstable": UNSTABLE, "good": GOOD, "low": LOW, "poor": POOR}
+    write_text(out, render("live.html", title=title, data=data, text=text, sign=sign_words(arm), columns=LIVE_COLUMNS,
+                           samples=PANEL_SAMPLES * len(data["low"]), error=scientific(data["error"], 1),
+                           assets=f"../{ASSETS}", script=SCRIPT, colours=colours))  # fmt: skip
 
 
 def write_assets(folder: Path) -> None:
     """The script of the live pages."""
     folder.mkdir(exist_ok=True)
-    parts = ("loop", "sampled", "locus", "sets", "chart", "player", "sensor", "page")
-    scripts = "".join((TEMPLATES / f"live_{name}.js").read_text(encoding="utf-8") for name in parts)
+    scripts = "".join(
+        (TEMPLATES / f"live_{name}.js").read_text(encoding="utf-8")
+        for name in ("loop", "sampled", "locus", "sets", "chart", "player", "sensor", "page")
+    )
     write_text(folder / SCRIPT, f"(() => {{\n{scripts}}})();\n")
 
 
@@ -439,8 +443,10 @@ class LivePage:
         link, script = f'<script src="../{ASSETS}/{SCRIPT}">', self.path.parents[1] / ASSETS / SCRIPT
         page = self.path.read_text(encoding="utf-8").replace(link, f"<script>{script.read_text(encoding='utf-8')}")
         text = base64.b64encode(page.encode()).decode("ascii")  # no srcdoc: its links lead into the notebook's own page
-        source = f'src="data:text/html;charset=utf-8;base64,{text}" title="live page"'
-        return f'<iframe {source} style="width:100%;height:{FRAME}px;border:0"></iframe>'
+        return (
+            f'<iframe src="data:text/html;charset=utf-8;base64,{text}" title="live page" '
+            f'style="width:100%;height:{FRAME}px;border:0"></iframe>'
+        )
 
 
 def explore(arm: Arm, law: AnyLaw | None = None, chain: Chain | None = None) -> LivePage:
