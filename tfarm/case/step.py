@@ -203,12 +203,12 @@ class Step(_Record):
     @property
     def csv_table(self) -> Table:
         """The signals of both loops at the same times, empty where a run was stopped."""
-        columns = [Column("t", "time", "s", of=self.t)]
-        for prefix, loop in (("", self.continuous), ("sampled_", self.sampled)):
-            for name, y in loop.signals.items() if loop else ():
-                cells = [*y.tolist(), *[""] * (self.t.size - y.size)]
-                columns.append(Column(prefix + name, unit=unit_of(self.arm, name), of=cells))
-        return Table(columns=tuple(columns))
+        signals = (
+            Column(prefix + name, unit=unit_of(self.arm, name), of=[*y.tolist(), *[""] * (self.t.size - y.size)])
+            for prefix, loop in (("", self.continuous), ("sampled_", self.sampled))
+            for name, y in (loop.signals.items() if loop else ())
+        )
+        return Table(columns=(Column("t", "time", "s", of=self.t), *signals))
 
     def _repr_html_(self) -> str:
         return as_html(self.table)
@@ -258,16 +258,18 @@ def step(
     full, of_angle, response = as_law(law), hub == AT_HUB[0], None
     poles = None if full.is_discrete else usual_poles(Loop(arm, full))
     length = usual_duration(poles, chain) if duration is None else duration
-    name = SAMPLED_NAMES[scenario_name]
-    task = resting(name, arm, chain, length, hub) if is_step else scenario(name, arm, chain, length)
+    task = (
+        resting("reference", arm, chain, length, hub)
+        if is_step
+        else scenario(SAMPLED_NAMES[scenario_name], arm, chain, length)
+    )
     tip = "tip_displacement" if of_angle else f"velocity@{arm.length!r}"
     names = tuple(dict.fromkeys((hub, tip, MOMENT, *outputs)))
     if poles is not None:
         response = time_response(poles, names, excitation(poles.loop, full, chain, task, names), length)
-    t, reference = _times(response, task), {}
-    if is_step or scenario_name == "slew":
-        angle = traces.reference_angle(task, t) if of_angle else np.ones(t.size)
-        reference = {hub: angle, tip: arm.reach * angle}
+    t = _times(response, task)
+    angle = traces.reference_angle(task, t) if of_angle else np.ones(t.size)
+    reference = {hub: angle, tip: arm.reach * angle} if is_step or scenario_name == "slew" else {}
     found = _Record(arm, (*names[:3], TORQUE), task.busy_until, t, reference)
     return Step(
         **vars(found), controller=controller(full, arm), scenario=scenario_name, duration=length, period=task.period,
@@ -284,8 +286,8 @@ def followed(law: AnyLaw) -> tuple[str, AnyLaw]:
     full = as_law(law)
     known = {*full.references, *(name.removeprefix(REFERENCE) for name in full.wanted)}
     hub = next((name for name in AT_HUB[:2] if name in known.union(full.signals)), "")
-    remedy = "the controller feeds back neither hub angle nor hub rate; choose slew, pulse or deflection"
-    require(hub, "scenario", "reference", remedy)
+    require(hub, "scenario", "reference",
+            "the controller feeds back neither hub angle nor hub rate; choose slew, pulse or deflection")  # fmt: skip
     return hub, law if hub in known else replace(full, references=(*full.references, hub))
 
 

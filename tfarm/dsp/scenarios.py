@@ -164,6 +164,8 @@ def scenario(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:
 def _samples(duration: float, period: float) -> int:
     """Number of samples in 0 .. duration, both ends included."""
     length = positive("duration", duration, "a duration is a positive, finite number of seconds")
-    remedy = f"at most {MOST_TASK_SAMPLES} samples of {period:g} s; a shorter one, or a longer period"
-    require(length / period < MOST_TASK_SAMPLES, "duration", length, remedy)
+    require(
+        length / period < MOST_TASK_SAMPLES, "duration", length,
+        f"at most {MOST_TASK_SAMPLES} samples of {period:g} s; a shorter one, or a longer period",
+    )  # fmt: skip
     return math.floor(length / period * (1 + TIME_ROUNDING)) + 1

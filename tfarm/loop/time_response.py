@@ -135,10 +135,10 @@ def time_response(poles: Poles, names: tuple[str, ...], excitation: Excitation, 
     Raises ParameterError for a loop that grows beyond a double.
     """
     growth = float(poles.values.real.max(initial=0.0)) * duration
-    remedy = (
-        f"the loop is unstable and grows by e^{growth:.0f}; at most {MOST_GROWTH * duration / max(growth, 1):.3g} s"
-    )
-    require(growth < MOST_GROWTH, "duration", duration, remedy)
+    require(
+        growth < MOST_GROWTH, "duration", duration,
+        f"the loop is unstable and grows by e^{growth:.0f}; at most {MOST_GROWTH * duration / max(growth, 1):.3g} s",
+    )  # fmt: skip
 
     def transform(s: Complex) -> Complex:
         return transformed(poles.loop, names, excitation, s)

@@ -229,8 +229,10 @@ def _draw_curve(curve: traces.TimeCurve, ax: Axes, colour: str, *, scale: float 
 def _name_signals(arm: Arm, names: Sequence[str], ax: Sequence[Axes]) -> None:
     """Along the axes: the signals with their units, the last being the input of the arm, and time."""
     of_input = "motor torque [N m]" if arm.input_unit == "N m" else f"motor [{arm.input_unit}]"
-    known = [OUTPUTS[name.partition("@")[0]] for name in names[:-1]]
-    labels = [f"{each.label.replace('at x', 'of the tip')} [{each.unit}]" for each in known]
+    labels = [
+        f"{of.label.replace('at x', 'of the tip')} [{of.unit}]"
+        for of in (OUTPUTS[name.partition("@")[0]] for name in names[:-1])
+    ]
     for one, label in zip(ax, (*labels, of_input), strict=True):
         one.axhline(0.0, color=GREY, lw=0.6)
         one.set(xlabel=TIME, ylabel=label)

@@ -94,11 +94,10 @@ def sampled_numbers(loop: Sampled) -> dict[str, Any]:
 def law_in_page(loop: Sampled, names: Sequence[str]) -> dict[str, Any]:
     """The sampled loop of a law: `columns` are its parts by name, in delta = z - 1; `ones` poles at z = 1."""
     plant, in_z = loop.pulse.plant, loop.in_z
-    ones = max(_orders(plant)[row] - int((zeros == 0).sum()) for _, row, _, zeros in in_z.columns)
     return {
         **_sampling(loop.chain),
         **_plant(plant),
-        "ones": max(0, ones),
+        "ones": max(0, *(_orders(plant)[row] - int((zeros == 0).sum()) for _, row, _, zeros in in_z.columns)),
         "modes": loop.plant.count,
         "columns": [
             {"name": names[n], "row": row, "g": g, "zeros": _pairs(zeros), "poles": _pairs(in_z.part_poles[n])}
@@ -394,8 +393,11 @@ def is_live(case: Case) -> bool:
 
 def has_sliders(law: Law) -> bool:
     """Whether a page can have a slider for each part of a law: gains at the hub, or few rational parts in s."""
-    are_rational = all(hasattr(part.block, "num") for part in law.parts)
-    return not law.is_discrete and are_rational and len(law.part_gains) == len(law.parts) <= MOST_PARTS
+    return (
+        not law.is_discrete
+        and len(law.part_gains) == len(law.parts) <= MOST_PARTS
+        and all(hasattr(part.block, "num") for part in law.parts)
+    )
 
 
 def save_live(case: Case, folder: Path) -> None:
