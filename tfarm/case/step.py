@@ -6,8 +6,9 @@ one pair of exponentials at any damping, so the response of the loop to it is ex
 the tip is an equilibrium only where the hub is kept at its angle.)
 
 Figures, as in textbooks (Ogata, Modern Control Engineering, 2010, sec. 5-3): the final value is the mean of the last
-tenth of the record; rise time from 10 to 90 % of it; overshoot beyond it, over it; settling within 5 % of it, as for
-`tfarm simulate`.  Of a signal without a reference, and of root moment and torque, the 5 % are of its largest value.
+tenth of the record; rise time from 10 to 90 % of it; overshoot beyond it, over it; settling within 5 % of it.  Of a
+signal without a reference, and of root moment and torque, the 5 % are of its largest value: as for `tfarm simulate`,
+which reads the samples alone.
 """
 
 from __future__ import annotations
@@ -22,13 +23,12 @@ import numpy as np
 from tfarm.arm import AT_HUB, AnyLaw, Arm, Law, as_law, tracked
 from tfarm.arm.law import REFERENCE
 from tfarm.arrays import LEAST_SIZE, Real
-from tfarm.dsp import Chain, traces
+from tfarm.dsp import Chain, sampled_verdict, traces
 from tfarm.dsp.chain import PERIOD, TIME_ROUNDING, chain_or_usual
 from tfarm.dsp.plant import sensed_plant
 from tfarm.dsp.results import ENOUGH_CHANGE, simulated
-from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, described, scenario, unit_step
-from tfarm.dsp.simulate import LEFT_OF_RECORD, MOST_BETWEEN, SETTLED_SHARE, first_mode
-from tfarm.dsp.verdict import sampled_verdict
+from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, described, resting, scenario
+from tfarm.dsp.simulate import LEFT_OF_RECORD, MOST_BETWEEN, first_mode, settled_from
 from tfarm.errors import must_be_known, require
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import Poles
@@ -81,7 +81,7 @@ class SignalFigures:
     residual_rms: Annotated[float | None, Quantity("residual vibration (rms)", digits=4, unit_of="unit",
             help="rms about the final value once the slew or the pulse is over")]  # fmt: skip
     remainder_bound: Annotated[float | None, Quantity("remainder bound at the peak", digits=2, unit_of="unit",
-            help="contribution of the omitted poles at the peak at most, as measured")]  # fmt: skip
+            help="of the omitted poles at the peak, as measured; at least the rounding of the peak")]  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,17 +102,80 @@ class LoopResponse:
             help="input of the arm by the motor: torque, voltage or current")] = None  # fmt: skip
 
 
+@dataclass(frozen=True)
+class _Record:
+    """Times [s] of the signals of a loop, the names of those of hub and tip, root moment and torque, and references.
+
+    `busy_until` [s] is the end of the input.
+    """
+
+    arm: Arm
+    names: tuple[str, ...]
+    busy_until: float
+    t: Real
+    reference: Mapping[str, Real]
+
+    def _of_continuous(self, response: TimeResponse) -> LoopResponse:
+        """The continuous-time loop."""
+        signals = dict(zip(response.names, response.at(self.t), strict=True))
+        peaks = {name: response.peak(name, self.t) for name in signals}
+        is_converged = all(bound <= CONVERGED * abs(peak) for _, peak, bound in peaks.values())
+        word, count = verdict_on(response.poles.loop).verdict, f"{response.poles.count} poles"
+        return self._loop(word, is_converged, count, signals, peaks)
+
+    def _of_sampled(self, law: AnyLaw, chain: Chain, task: Scenario, names: Sequence[str]) -> LoopResponse:
+        """The sampled loop, with the signals of these names."""
+        between = round(task.period / self.t[1]) - 1
+        run, used = simulated(self.arm, law, chain, task, between=between, outputs=names)
+        signals = {name: traces.continuous(run, name)[1][: self.t.size] for name in names}
+        signals[TORQUE] = traces.held_at(run, run.torque, self.t[: signals[MOMENT].size])
+        is_converged = used.change is not None and used.change <= ENOUGH_CHANGE
+        word = UNSTABLE if run.stopped else sampled_verdict(self.arm, law, chain).word
+        return self._loop(word, is_converged, f"{used.modes} modes", signals, {})
+
+    def _loop(
+        self, stability: str, is_converged: bool, count: str, signals: dict[str, Real],
+        peaks: Mapping[str, Peak],
+    ) -> LoopResponse:  # fmt: skip
+        """The figures of a loop; of an unstable one those of its signals are left out."""
+        names = zip(PARTS, self.names, strict=True) if stability != UNSTABLE else ()
+        of = {part: self._figures(name, signals[name], peaks.get(name)) for part, name in names}
+        certainty = f"{'converged' if is_converged else 'approximate'}, {count}"
+        return LoopResponse(stability=stability, certainty=certainty, signals=signals, **of)
+
+    def _figures(self, name: str, y: Real, peak: Peak | None = None) -> SignalFigures:
+        """Figures of one signal at the times of the record; its peak is the largest there unless given."""
+        n = int(abs(y).argmax())
+        peak_time, largest, bound = peak or (float(self.t[n]), float(y[n]), None)
+        t, reference = self.t, self.reference.get(name)
+        final = 0.0 if name == MOMENT else float(y[LEFT_OF_RECORD * t >= (LEFT_OF_RECORD - 1) * t[-1]].mean())
+        away = abs(y - final)
+        scale = float(away.max()) if reference is None else abs(final)
+        settled = settled_from(away, scale)
+        share = y / final if settled is not None and reference is not None and final else None
+        after = t >= self.busy_until * (1 - TIME_ROUNDING)
+        return SignalFigures(
+            signal=name, unit=unit_of(self.arm, name), peak=largest, peak_time=peak_time,
+            final_value=final if settled is not None and name != MOMENT else None,
+            rise_time=None if share is None else _reached(t, share, 0.9) - _reached(t, share, 0.1),
+            overshoot=None if share is None else Percent(max(0.0, float(share.max()) - 1)),
+            settling_time=None if settled is None else float(t[settled]),
+            steady_state_error=None if share is None or reference is None else float(reference[-1]) - final,
+            residual_rms=float(np.sqrt(np.mean((y - final)[after] ** 2))) if self.busy_until and after.any() else None,
+            remainder_bound=bound,
+        )  # fmt: skip
+
+
 @dataclass(frozen=True, kw_only=True)
 @record
-class Step:
+class Step(_Record):
     """Time responses of an arm under a controller, continuous-time and sampled, at the times `t` [s].
 
     A law in z has no continuous-time loop; the signals of a sampled loop end where it was stopped.  `names` are the
     signals of hub and tip, root moment and torque, `reference` is that of hub and tip, `response` the continuous-time
-    response at any time.
+    response at any time, `busy_until` [s] the end of the input.
     """
 
-    arm: Arm
     controller: Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]
     scenario: Annotated[str, Quantity(help="reference, slew, pulse or deflection")]
     scenario_in_words: Annotated[str, Quantity("scenario", help="input with its size")]
@@ -120,16 +183,13 @@ class Step:
     period: Annotated[float, PERIOD]
     continuous: Annotated[LoopResponse | None, Quantity(help="continuous-time loop; null under a law in z")]
     sampled: Annotated[LoopResponse, Quantity(help="sampled loop")]
-    t: Real
-    names: tuple[str, ...]
-    reference: dict[str, Real]
     response: TimeResponse | None
 
     @property
     def loops(self) -> dict[str, LoopResponse]:
         """The loops by name."""
-        continuous = {"continuous-time": self.continuous} if self.continuous else {}
-        return {**continuous, f"sampled, {1e3 * self.period:g} ms": self.sampled}
+        names = "continuous-time", f"sampled, {1e3 * self.period:g} ms"
+        return {name: loop for name, loop in zip(names, (self.continuous, self.sampled), strict=True) if loop}
 
     @property
     def finding(self) -> Annotated[str, Quantity("finding", help="stability of each loop")]:
@@ -144,12 +204,12 @@ class Step:
     @property
     def csv_table(self) -> Table:
         """The signals of both loops at the same times, empty where a run was stopped."""
-        columns = [Column("t", "time", "s", of=self.t)]
-        for prefix, loop in (("", self.continuous), ("sampled_", self.sampled)):
-            for name, y in loop.signals.items() if loop else ():
-                cells = [*y.tolist(), *[""] * (self.t.size - y.size)]
-                columns.append(Column(prefix + name, unit=unit_of(self.arm, name), of=cells))
-        return Table(columns=tuple(columns))
+        signals = (
+            Column(prefix + name, unit=unit_of(self.arm, name), of=[*y.tolist(), *[""] * (self.t.size - y.size)])
+            for prefix, loop in (("", self.continuous), ("sampled_", self.sampled))
+            for name, y in (loop.signals.items() if loop else ())
+        )
+        return Table(columns=(Column("t", "time", "s", of=self.t), *signals))
 
     def _repr_html_(self) -> str:
         return as_html(self.table)
@@ -196,25 +256,26 @@ def step(
     chain, is_step = chain_or_usual(chain), scenario_name == "reference"
     hub, law = followed(law) if is_step else (AT_HUB[0], law)
     arm, law = tracked(arm, law)
-    full, of_angle, response, continuous = as_law(law), hub == AT_HUB[0], None, None
+    full, of_angle, response = as_law(law), hub == AT_HUB[0], None
     poles = None if full.is_discrete else usual_poles(Loop(arm, full))
     length = usual_duration(poles, chain) if duration is None else duration
-    task = unit_step(hub, chain, length) if is_step else scenario(SAMPLED_NAMES[scenario_name], arm, chain, length)
+    task = (
+        resting("reference", arm, chain, length, hub)
+        if is_step
+        else scenario(SAMPLED_NAMES[scenario_name], arm, chain, length)
+    )
     tip = "tip_displacement" if of_angle else f"velocity@{arm.length!r}"
     names = tuple(dict.fromkeys((hub, tip, MOMENT, *outputs)))
     if poles is not None:
         response = time_response(poles, names, excitation(poles.loop, full, chain, task, names), length)
-    t, reference = _times(response, task), {}
-    if is_step or scenario_name == "slew":
-        angle = traces.reference_angle(task, t) if of_angle else np.ones(t.size)
-        reference = {hub: angle, tip: arm.reach * angle}
-    record = _Record(arm, names, task.busy_until, t, reference)
-    if response is not None:
-        continuous = record.continuous(response)
+    t = _times(response, task)
+    angle = traces.reference_angle(task, t) if of_angle else np.ones(t.size)
+    reference = {hub: angle, tip: arm.reach * angle} if is_step or scenario_name == "slew" else {}
+    found = _Record(arm, (*names[:3], TORQUE), task.busy_until, t, reference)
     return Step(
-        arm=arm, controller=controller(full, arm), scenario=scenario_name, duration=length, period=task.period,
-        scenario_in_words=described(task, arm, chain), continuous=continuous, sampled=record.sampled(law, chain, task),
-        t=t, names=(*names[:3], TORQUE), reference=reference, response=response,
+        **vars(found), controller=controller(full, arm), scenario=scenario_name, duration=length, period=task.period,
+        scenario_in_words=described(task, arm, chain), sampled=found._of_sampled(law, chain, task, names),
+        continuous=None if response is None else found._of_continuous(response), response=response,
     )  # fmt: skip
 
 
@@ -226,8 +287,8 @@ def followed(law: AnyLaw) -> tuple[str, AnyLaw]:
     full = as_law(law)
     known = {*full.references, *(name.removeprefix(REFERENCE) for name in full.wanted)}
     hub = next((name for name in AT_HUB[:2] if name in known.union(full.signals)), "")
-    remedy = "the controller feeds back neither hub angle nor hub rate; choose slew, pulse or deflection"
-    require(hub, "scenario", "reference", remedy)
+    require(hub, "scenario", "reference",
+            "the controller feeds back neither hub angle nor hub rate; choose slew, pulse or deflection")  # fmt: skip
     return hub, law if hub in known else replace(full, references=(*full.references, hub))
 
 
@@ -260,8 +321,7 @@ def excitation(loop: Loop, law: Law, chain: Chain, task: Scenario, names: Sequen
     references: dict[str, Transform] = {
         angle: lambda s: 1 / s**3, rate: lambda s: 1 / s**2, moment: lambda s: -read / s
     }  # fmt: skip
-    inputs = _through(law, references)
-    inputs[ACTUATOR] = lambda s: arm.turned_inertia / s + arm.rate_loss / s**2
+    inputs = {**_through(law, references), ACTUATOR: lambda s: arm.turned_inertia / s + arm.rate_loss / s**2}
     return Excitation(inputs, (0.0, rise / 2, rise), (a, -2 * a, a))
 
 
@@ -294,67 +354,6 @@ def _times(response: TimeResponse | None, task: Scenario) -> Real:
     steps = int(np.clip(math.ceil(T / finest), 1, min(MOST_BETWEEN, max(1, MOST_POINTS // n))))
     k = np.arange((n - 1) * steps + 1)
     return T * (k // steps + k % steps / steps)
-
-
-@dataclass(frozen=True)
-class _Record:
-    """The times [s] of a record, when its input is over, and its signals: those of hub and tip, the moment, others."""
-
-    arm: Arm
-    names: tuple[str, ...]
-    busy: float
-    t: Real
-    reference: Mapping[str, Real]
-
-    def continuous(self, response: TimeResponse) -> LoopResponse:
-        """The continuous-time loop."""
-        signals = dict(zip(response.names, response.at(self.t), strict=True))
-        peaks = {name: response.peak(name, self.t) for name in signals}
-        is_converged = all(bound <= CONVERGED * abs(peak) for _, peak, bound in peaks.values())
-        certainty = f"{'converged' if is_converged else 'approximate'}, {response.poles.count} poles"
-        return self._loop(verdict_on(response.poles.loop).verdict, certainty, signals, peaks)
-
-    def sampled(self, law: AnyLaw, chain: Chain, task: Scenario) -> LoopResponse:
-        """The sampled loop."""
-        between = round(task.period / self.t[1]) - 1
-        run, used = simulated(self.arm, law, chain, task, between=between, outputs=self.names)
-        signals = {name: traces.continuous(run, name)[1][: self.t.size] for name in self.names}
-        signals[TORQUE] = traces.held_at(run, run.torque, self.t[: signals[MOMENT].size])
-        at = {name: int(abs(y).argmax()) for name, y in signals.items() if y.size}
-        peaks = {name: (float(self.t[n]), float(signals[name][n]), None) for name, n in at.items()}
-        is_converged = used.change is not None and used.change <= ENOUGH_CHANGE
-        certainty = f"{'converged' if is_converged else 'approximate'}, {used.modes} modes"
-        word = UNSTABLE if run.stopped else sampled_verdict(self.arm, law, chain).word
-        return self._loop(word, certainty, signals, peaks)
-
-    def _loop(
-        self, stability: str, certainty: str, signals: dict[str, Real], peaks: Mapping[str, Peak]
-    ) -> LoopResponse:
-        """The figures of a loop; of an unstable one those of its signals are left out."""
-        names = zip(PARTS, (*self.names[:3], TORQUE), strict=True) if stability != UNSTABLE else ()
-        of = {part: self._figures(name, signals[name], *peaks[name]) for part, name in names}
-        return LoopResponse(stability=stability, certainty=certainty, signals=signals, **of)
-
-    def _figures(self, name: str, y: Real, peak_time: float, peak: float, bound: float | None) -> SignalFigures:
-        """Figures of one signal at the times of the record."""
-        t, reference = self.t, self.reference.get(name)
-        final = 0.0 if name == MOMENT else float(y[LEFT_OF_RECORD * t >= (LEFT_OF_RECORD - 1) * t[-1]].mean())
-        away = abs(y - final)
-        scale = float(away.max()) if reference is None else abs(final)
-        settled = 1 + int(np.flatnonzero(away > SETTLED_SHARE * scale).max(initial=-1))
-        is_settled = not settled or LEFT_OF_RECORD * (t.size - 1 - settled) >= t.size - 1
-        share = y / final if is_settled and reference is not None and final else None
-        after = t >= self.busy * (1 - TIME_ROUNDING)
-        return SignalFigures(
-            signal=name, unit=unit_of(self.arm, name), peak=peak, peak_time=peak_time,
-            final_value=final if is_settled and name != MOMENT else None,
-            rise_time=None if share is None else _reached(t, share, 0.9) - _reached(t, share, 0.1),
-            overshoot=None if share is None else Percent(max(0.0, float(share.max()) - 1)),
-            settling_time=float(t[settled]) if is_settled else None,
-            steady_state_error=None if share is None or reference is None else float(reference[-1]) - final,
-            residual_rms=float(np.sqrt(np.mean((y - final)[after] ** 2))) if self.busy and after.any() else None,
-            remainder_bound=bound,
-        )  # fmt: skip
 
 
 def _reached(t: Real, share: Real, level: float) -> float:

@@ -119,8 +119,8 @@ def trial_weights(arm: Arm, chain: Chain) -> tuple[float, float]:
     return a / torque_unit(arm, chain) ** 2, b / torque_unit(arm, chain) ** 2
 
 
-def resting(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:
-    """Return a scenario without references.
+def resting(name: str, arm: Arm, chain: Chain, duration: float, signal: str = "hub_angle") -> Scenario:
+    """Return a scenario without references, or "reference", one of 1 rad or 1 rad/s of a `signal` of the hub.
 
     A step of the torque r at t = 0, 0.1 of the arm's unit of torque; the decay of the first mode from rest with the tip
     displaced by 0.01 L; a disturbance on the hub of 0.1 of that unit for a tenth of the slew; or an impulse there just
@@ -138,29 +138,21 @@ def resting(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:
         "step": {"feedforward": zero + STEP_TORQUE * unit},
         "decay": {"tip_offset": TIP_OFFSET * arm.length},
         "impulse": {"impulse": IMPULSE * unit},
+        "reference": {signal: zero + 1.0},
     }
     return replace(Scenario(name, T, zero, zero, zero, zero, zero), **sizes[name])
 
 
-def unit_step(signal: str, chain: Chain, duration: float) -> Scenario:
-    """Return a reference of 1 rad of the hub angle, or of 1 rad/s of the hub rate, from t = 0 on."""
-    zero = np.zeros(_samples(duration, chain.sampling.period))
-    resting_task = Scenario("reference", chain.sampling.period, zero, zero, zero, zero, zero)
-    return replace(resting_task, **{signal: zero + 1.0})  # type: ignore[arg-type]  # of an array of references
-
-
 def described(task: Scenario, arm: Arm, chain: Chain) -> str:
     """A scenario with its size, in words."""
-    travel = chain.slew.travel_of(arm.reach)
-    words = {
-        "slew": f"a slew: the tip moves {travel:.4g} m in {chain.slew.rise_time:g} s",
+    return {
+        "slew": f"a slew: the tip moves {chain.slew.travel_of(arm.reach):.4g} m in {chain.slew.rise_time:g} s",
         "step": f"a step of {task.feedforward[0]:.4g} {arm.input_unit}",
         "decay": f"the first mode released with the tip at {task.tip_offset:.4g} m",
         "impulse": f"an impulse of {task.impulse:.4g} {arm.input_unit} s on the hub",
         "pulse": f"{task.disturbance[0]:.4g} {arm.input_unit} on the hub for {task.busy_until:.4g} s",
         "reference": f"a unit step of the reference of the hub {'angle' if task.hub_angle[0] else 'rate'}",
-    }
-    return words[task.name]
+    }[task.name]
 
 
 def scenario(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:
@@ -172,6 +164,8 @@ def scenario(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:
 def _samples(duration: float, period: float) -> int:
     """Number of samples in 0 .. duration, both ends included."""
     length = positive("duration", duration, "a duration is a positive, finite number of seconds")
-    remedy = f"at most {MOST_TASK_SAMPLES} samples of {period:g} s; a shorter one, or a longer period"
-    require(length / period < MOST_TASK_SAMPLES, "duration", length, remedy)
+    require(
+        length / period < MOST_TASK_SAMPLES, "duration", length,
+        f"at most {MOST_TASK_SAMPLES} samples of {period:g} s; a shorter one, or a longer period",
+    )  # fmt: skip
     return math.floor(length / period * (1 + TIME_ROUNDING)) + 1

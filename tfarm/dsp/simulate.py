@@ -51,6 +51,13 @@ def quantisers(chain: Chain) -> Real:
     return np.array([encoder, _converter(of.moment_bits, of.moment_range), [step, max(low, -limit), min(high, limit)]])
 
 
+def settled_from(away: Real, scale: float) -> int | None:
+    """Index from which on deviations (n,) stay within 5 % of a scale; None where too little of the record is left."""
+    first = 1 + int(np.flatnonzero(away > SETTLED_SHARE * scale).max(initial=-1))
+    is_late = first > 0 and LEFT_OF_RECORD * (away.size - 1 - first) < away.size - 1
+    return None if is_late else first
+
+
 def _converter(bits: int | None, span: float | None) -> list[float]:
     high = math.inf if span is None else span
     step = 0.0 if bits is None else 2 * high / 2**bits
@@ -170,9 +177,8 @@ class Simulation:
             help="time from which on the root moment stays within 5 % of its largest")]:  # fmt: skip
         """None where the simulation stopped, or less than a tenth of the record is left to show it."""
         moment = abs(self.at_samples.root_moment)
-        first = 1 + np.flatnonzero(moment > SETTLED_SHARE * moment.max(initial=0.0)).max(initial=-1)
-        is_late = first > 0 and LEFT_OF_RECORD * (moment.size - 1 - first) < moment.size - 1
-        return None if self.stopped or is_late else float(self.t[first])
+        first = settled_from(moment, moment.max(initial=0.0))
+        return None if self.stopped or first is None else float(self.t[first])
 
     @property
     def saturated(self) -> Annotated[dict[str, int], Quantity("saturated samples", key="saturated_samples",

@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from tfarm.arrays import LEAST_SIZE, Complex, Real
+from tfarm.arrays import LEAST_SIZE, MACHINE_EPS, Complex, Real
 from tfarm.errors import require
 from tfarm.records import record
 from tfarm.response.signals import Signals
@@ -108,14 +108,17 @@ class TimeResponse:
         return found
 
     def peak(self, name: str, t: Real) -> tuple[float, float, float]:
-        """Return time [s] and value of a signal where it is largest in size, near that of `t`, and the bound there."""
+        """Return time [s] and value of a signal where it is largest in size, near that of `t`, and the bound there.
+
+        A bound below the rounding of the value, 2.2e-16 of its size, is that.
+        """
         row = self.names.index(name)
         for _ in range(ZOOMS):
             n = int(abs(self.at(t)[row]).argmax())
             t = np.linspace(t[max(n - 1, 0)], t[min(n + 1, t.size - 1)], ZOOM_POINTS)
         y = self.at(t)[row]
         n = int(abs(y).argmax())
-        return float(t[n]), float(y[n]), float(self.remainder(t[[n]])[row, 0])
+        return float(t[n]), float(y[n]), max(float(self.remainder(t[[n]])[row, 0]), MACHINE_EPS * abs(float(y[n])))
 
 
 def usual_poles(loop: Loop, count: int = USUAL_COUNT) -> Poles:
@@ -132,10 +135,10 @@ def time_response(poles: Poles, names: tuple[str, ...], excitation: Excitation, 
     Raises ParameterError for a loop that grows beyond a double.
     """
     growth = float(poles.values.real.max(initial=0.0)) * duration
-    remedy = (
-        f"the loop is unstable and grows by e^{growth:.0f}; at most {MOST_GROWTH * duration / max(growth, 1):.3g} s"
-    )
-    require(growth < MOST_GROWTH, "duration", duration, remedy)
+    require(
+        growth < MOST_GROWTH, "duration", duration,
+        f"the loop is unstable and grows by e^{growth:.0f}; at most {MOST_GROWTH * duration / max(growth, 1):.3g} s",
+    )  # fmt: skip
 
     def transform(s: Complex) -> Complex:
         return transformed(poles.loop, names, excitation, s)

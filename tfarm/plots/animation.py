@@ -35,16 +35,15 @@ WIDTH, LETTERS, DOTS, INKS, WHITE = 6.0, 0.9, 80, 48, 250  # inches across, abov
 
 
 class Motion(NamedTuple):
-    """The motion at each frame: `t` (n,) [s], input `u` (n,), and places x + i y [m] with the hub's axis at 0.
+    """The motion of a run at each frame: `t` (n,) [s], and places x + i y [m] with the hub's axis at 0.
 
     `link` (n, m) are those of the drawn link, whose deflection is `factor` times the arm's, `reference` (n, 2) the ends
     of a line along the reference.  `speed` is that of the film, `still` the frame with the largest deflection.
     """
 
     arm: Arm
-    name: str
+    run: Simulation
     t: Real
-    u: Real
     link: Complex
     reference: Complex
     factor: int
@@ -53,14 +52,15 @@ class Motion(NamedTuple):
 
     def words(self, frame: int) -> str:
         """Time and input."""
-        return f"t = {self.t[frame]:.2f} s,  u = {self.u[frame]:.3g} {self.arm.input_unit}"
+        u = traces.held_at(self.run, self.run.torque, self.t[frame])
+        return f"t = {self.t[frame]:.2f} s,  u = {u:.3g} {self.arm.input_unit}"
 
 
 def motion_of(arm: Arm, run: Simulation, until: float = math.inf, most: int = MOST_FRAMES) -> Motion:
     """The motion of a run up to a time [s]: its torques are applied to the arm again, with more outputs."""
     require(run.t.size > 1, "run", run.t.size, "give a simulation with more than one sample")
-    end, x, torque = min(until, float(run.t[-1])), np.linspace(0.0, arm.length, STATIONS), 0 * run.scenario.t
-    torque[: run.torque.size] = run.torque
+    end, x = min(until, float(run.t[-1])), np.linspace(0.0, arm.length, STATIONS)
+    torque = np.pad(run.torque, (0, run.scenario.t.size - run.torque.size))
     names = [f"deflection@{each!r}" for each in x.tolist()]
     again = Simulator(arm, run.chain, run.scenario, between=BETWEEN, outputs=names)
     found = again.controller(lambda measured: float(torque[measured.k]))
@@ -73,8 +73,7 @@ def motion_of(arm: Arm, run: Simulation, until: float = math.inf, most: int = MO
     link = np.exp(1j * angle)[:, None] * (from_axis + 1j * factor * deflection)
     wanted = np.exp(1j * traces.reference_angle(run.scenario, t))
     reference, still = np.outer(wanted, [arm.hub.radius, BEYOND * arm.reach]), int(np.argmax(abs(deflection[:, -1])))
-    u = traces.held_at(run, run.torque, t)
-    return Motion(arm, run.scenario.name, t, u, link, reference, factor, 1 / slower, still)
+    return Motion(arm, run, t, link, reference, factor, 1 / slower, still)
 
 
 def exaggeration(share: float) -> int:
@@ -95,7 +94,7 @@ def _size(motion: Motion) -> tuple[float, float]:
     return WIDTH, LETTERS + WIDTH * min(1.0, up / across)
 
 
-@picture(size=_size, title=lambda motion: f"{motion.arm.name}: {motion.name}, from above")
+@picture(size=_size, title=lambda motion: f"{motion.arm.name}: {motion.run.scenario.name}, from above")
 def draw_motion(motion: Motion, *, ax: Axes) -> None:
     """The arm from above at its largest deflection [m], thin its reference."""
     xlim, ylim = _edges(motion)

@@ -12,22 +12,19 @@ from typing import Any
 
 import numpy as np
 from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
-from matplotlib.ticker import MaxNLocator
 
-from tfarm.arm import MOMENT_GAIN, Arm, Link
+from tfarm.arm import MOMENT_GAIN, Arm
 from tfarm.arrays import Real
 from tfarm.case.step import Step
 from tfarm.digits import how_many, plain, significant, unit
 from tfarm.dsp import GainMap, Simulation, traces
 from tfarm.dsp.results import Run
 from tfarm.dsp.simulate import SETTLED_SHARE
-from tfarm.dsp.traces import POINTS_A_PERIOD, TimeCurve
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.fitting.recording import RunComparison
 from tfarm.loop.plane import Plane
 from tfarm.spectrum import Modes
-from tfarm.tuner import Tuning
-from tfarm.tuner.training import LearningCurves
+from tfarm.tuner import LearningCurves, Tuning
 
 from .regions import overlay
 from .style import (
@@ -59,7 +56,6 @@ HATCH = "/////"
 LEAST_RISE = 1 / 3000  # of the height of a curve: rise from point to point that counts
 MOST_TURNS = 400  # of a line; with more it is a band
 FEW_SAMPLES = 60  # of a run: each is marked
-STEP_ROWS = (1.0, 1.0, 1.0, 1.0)  # heights of hub, tip, root moment and torque
 SHOWN_SETTLED = 1.5  # times the last settling time: end of the picture
 OFF_FRAME = 0.3  # of the height of a stable response: margin beyond it for an unstable one
 
@@ -105,7 +101,7 @@ def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
             one.plot(length, w[-1], "s", ms=8.0, mfc=GREY, mec="none", zorder=3)
         one.plot(found.nodes[row], 0 * found.nodes[row], "o", ms=5.5, mfc="white", mec=INK, mew=1.3, zorder=4)
         one.set(xlim=(-0.085 * length, 1.11 * length), ylim=(-1.28, 1.28), yticks=[-1, 0, 1])
-        one.xaxis.set_major_locator(MaxNLocator(5))
+        one.locator_params(axis="x", nbins=5)
         omega, hertz = (significant(float(of[row]), 7) for of in (found.natural_frequency, found.natural_frequency_hz))
         places = ", ".join(plain(float(node), 3) for node in found.nodes[row]) or "none"
         one.set_title(f"Mode {number}:  {omega} rad/s  ({hertz} Hz)\nnodes [m]: {places}", fontsize=9.5)
@@ -116,20 +112,18 @@ def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
 # ------------------------------------------------------------ the arm
 
 
-def _depth(link: Link) -> float:
-    """The depth [m] of one segment: that of its shape, or sqrt(12) times the radius of gyration, as of a rectangle."""
-    own = link.section.half_depth
-    return math.sqrt(12) * link.section.radius_of_gyration if own is None else 2 * own
+def _depths(arm: Arm) -> list[float]:
+    """The depth [m] of each segment: that of its shape, or sqrt(12) times the radius of gyration, as of a rectangle."""
+    return [
+        math.sqrt(12) * of.radius_of_gyration if of.half_depth is None else 2 * of.half_depth
+        for of in (link.section for link in arm.links)
+    ]
 
 
 def _frame(arm: Arm) -> tuple[float, float, float]:
     """Left end, right end and half the height [m] of the picture."""
     tip = arm.length + arm.hub.radius + max(0.0, arm.payload.offset)
-    return -0.2 * arm.length, tip + 0.2 * arm.length, max(0.12 * arm.length, 0.6 * _deepest(arm))
-
-
-def _deepest(arm: Arm) -> float:
-    return max(map(_depth, arm.links))
+    return -0.2 * arm.length, tip + 0.2 * arm.length, max(0.12 * arm.length, 0.6 * max(_depths(arm)))
 
 
 def _sketch_size(arm: Arm) -> tuple[float, float]:
@@ -147,8 +141,7 @@ def sketch(arm: Arm, *, ax: Axes) -> None:
     ax.spines[["left", "right", "top"]].set_visible(False)
     ax.axhline(0, color=FAINT, lw=0.8, ls=(0, (6, 3, 1, 3)), zorder=0)
     starts = root + np.cumsum([0.0, *(link.length for link in arm.links)])
-    for start, link, colour in zip(starts, arm.links, cycle(("#cfe0ee", "#e3ecd5")), strict=False):
-        deep = _depth(link)
+    for start, link, deep, colour in zip(starts, arm.links, _depths(arm), cycle(("#cfe0ee", "#e3ecd5")), strict=False):
         ax.add_patch(Rectangle((start, -deep / 2), link.length, deep, fc=colour, ec=BLUE, lw=1.0, zorder=2))
     ax.plot([0, root], [0, 0], color=INK, lw=4.0, solid_capstyle="butt", zorder=1.5)
     if not arm.clamp.is_rigid:
@@ -157,7 +150,7 @@ def sketch(arm: Arm, *, ax: Axes) -> None:
         ax.plot(root + each.x, 0, "o", ms=5.0, color=INK, zorder=5)
     if arm.payload.mass or arm.payload.inertia:
         at = root + arm.length + arm.payload.offset
-        side = max(0.03 * arm.length, min(bore, 0.75 * _deepest(arm)))
+        side = max(0.03 * arm.length, min(bore, 0.75 * max(_depths(arm))))
         ax.plot([root + arm.length, at], [0, 0], color=INK, lw=2.0, zorder=2.5)
         ax.add_patch(Rectangle((at - side, -side), 2 * side, 2 * side, fc="#8c8c8c", ec=INK, lw=1.0, zorder=3))
     ax.add_patch(Circle((0, 0), bore, fc="#e9e9e9" if arm.hub.inertia else "white", ec=INK, lw=1.2, zorder=3))
@@ -176,13 +169,11 @@ def _numbers(arm: Arm) -> Iterator[str]:
     hub = "hub locked: driven by its angle" if arm.is_locked else free
     yield hub + (f",  r = {plain(arm.hub.radius, 6)} m" if arm.hub.radius else "")
     depths = f"{len(arm.links)} segments, at most" if arm.outer else "depth"
-    yield f"link  L = {plain(arm.length, 6)} m,  {depths} {plain(_deepest(arm), 4)} m{' deep' if arm.outer else ''}"
-    if not (payload.mass or payload.inertia):
-        yield "free tip, no payload"
-        return
+    yield f"link  L = {plain(arm.length, 6)} m,  {depths} {plain(max(_depths(arm)), 4)} m{' deep' if arm.outer else ''}"
     masses = "tip pinned" if math.isinf(payload.mass) else f"m = {plain(payload.mass, 6)} kg"
     turns = "tip cannot rotate" if math.isinf(payload.inertia) else f"$I_c$ = {plain(payload.inertia, 6)} {inertia}"
-    yield f"payload  {masses},  {turns}" + (f",  e = {plain(payload.offset, 6)} m" if payload.offset else "")
+    offset = f",  e = {plain(payload.offset, 6)} m" if payload.offset else ""
+    yield f"payload  {masses},  {turns}{offset}" if payload.mass or payload.inertia else "free tip, no payload"
 
 
 # ------------------------------------------------------------ over time
@@ -218,11 +209,13 @@ def slew(arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "", 
         axes.axhline(0.0, color=GREY, lw=0.6)
         axes.set(xlim=(0.0, float(scenario.t[-1])), xlabel=TIME, ylabel=label)
     points, finer = min(traces.points_a_period(arm, run) for run in each.values())
-    coarse = f"{plain(points, 2)} points a period of the fastest mode shown; between={finer} gives {POINTS_A_PERIOD}"
-    moment.set_title(coarse if points < POINTS_A_PERIOD else "", loc="right", fontsize=8.0, color=GREY)
+    coarse = (
+        f"{plain(points, 2)} points a period of the fastest mode shown; between={finer} gives {traces.POINTS_A_PERIOD}"
+    )
+    moment.set_title(coarse if points < traces.POINTS_A_PERIOD else "", loc="right", fontsize=8.0, color=GREY)
 
 
-def _draw_curve(curve: TimeCurve, ax: Axes, colour: str, *, scale: float = 1.0, **looks: Any) -> None:
+def _draw_curve(curve: traces.TimeCurve, ax: Axes, colour: str, *, scale: float = 1.0, **looks: Any) -> None:
     """The line, or the band."""
     low, high = scale * curve.low, scale * curve.high
     if curve.is_band:
@@ -236,8 +229,10 @@ def _draw_curve(curve: TimeCurve, ax: Axes, colour: str, *, scale: float = 1.0, 
 def _name_signals(arm: Arm, names: Sequence[str], ax: Sequence[Axes]) -> None:
     """Along the axes: the signals with their units, the last being the input of the arm, and time."""
     of_input = "motor torque [N m]" if arm.input_unit == "N m" else f"motor [{arm.input_unit}]"
-    known = [OUTPUTS[name.partition("@")[0]] for name in names[:-1]]
-    labels = [f"{each.label.replace('at x', 'of the tip')} [{each.unit}]" for each in known]
+    labels = [
+        f"{of.label.replace('at x', 'of the tip')} [{of.unit}]"
+        for of in (OUTPUTS[name.partition("@")[0]] for name in names[:-1])
+    ]
     for one, label in zip(ax, (*labels, of_input), strict=True):
         one.axhline(0.0, color=GREY, lw=0.6)
         one.set(xlabel=TIME, ylabel=label)
@@ -255,7 +250,7 @@ def _draw_signal(ax: Axes, t: Real, y: Real, looks: tuple[str, str], every: int 
 
 
 @picture(
-    (Step, "tfarm.step returns"), size=(9.0, 10.0), rows=STEP_ROWS,
+    (Step, "tfarm.step returns"), size=(9.0, 10.0), rows=(1.0, 1.0, 1.0, 1.0),
     title=lambda found: f"{found.arm.name}: {found.scenario_in_words}",
 )  # fmt: skip
 def step(found: Step, *, ax: Sequence[Axes]) -> None:
@@ -283,8 +278,12 @@ def step(found: Step, *, ax: Sequence[Axes]) -> None:
 
 def _shown_until(found: Step) -> float:
     """End of the picture [s]: some time after every signal of a stable loop has settled, else that of the record."""
-    each = [of for loop in found.loops.values() for of in (loop.hub, loop.tip, loop.root_moment, loop.torque) if of]
-    ends = [math.inf if of.settling_time is None else SHOWN_SETTLED * of.settling_time for of in each]
+    ends = [
+        math.inf if of.settling_time is None else SHOWN_SETTLED * of.settling_time
+        for loop in found.loops.values()
+        for of in (loop.hub, loop.tip, loop.root_moment, loop.torque)
+        if of
+    ]
     return min(max(ends, default=math.inf), float(found.t[-1]))
 
 

@@ -6,14 +6,13 @@ import math
 import sys
 import webbrowser
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any, cast, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import (
     ANGLE_GAIN,
@@ -30,23 +29,20 @@ from tfarm.arm import (
     unit_of,
 )
 from tfarm.arm.blocks import Rational
-from tfarm.arm.law import Part
 from tfarm.arm.writing import law_toml
 from tfarm.arrays import Complex
 from tfarm.case.card import GAIN_LIMITS, GRADED, PEAK_LIMITS, PERIOD_LIMITS, PHASE_LIMITS, UNDAMPED, reference_damping
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits, scientific
-from tfarm.dsp import Chain, PulseTransfer, Sampled, Scenario, Simulator, sampled_verdict, scenario
-from tfarm.dsp import GainMap as SampledMap
+from tfarm.dsp import Chain, GainMap, PulseTransfer, Sampled, Simulator, sampled_verdict, scenario, traces
 from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.edges import LONGEST_DELAY_SAMPLES
 from tfarm.dsp.plant import Plant, sensed_plant
 from tfarm.dsp.results import enough_modes, ideal_chain
 from tfarm.dsp.simulate import FOLDED_UP, quantisers
-from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.errors import TfarmError, require
 from tfarm.loop.loop import Loop, steep_places
-from tfarm.loop.panels import PANEL_SAMPLES, Positions, Sensor, loop_panels, positions, sensed_places
+from tfarm.loop.panels import PANEL_SAMPLES, Sensor, loop_panels, positions, sensed_places
 from tfarm.loop.plane import gain_map, moment_axis, rate_axis, rate_columns
 from tfarm.loop.stability import band_of_family, stability
 from tfarm.loop.windows import windows_of
@@ -62,7 +58,6 @@ SENSED_MODES = 6  # whose frequencies and zeros the chart of sensors has
 SENSOR_DIGITS = 6  # of the numbers of that chart: far more than a screen has
 FRAME = 780  # pixels: height of the page in a notebook
 LIVE_PAGE, ASSETS, SCRIPT = "live.html", "assets", "live.js"
-LIMITS = {"gain": GAIN_LIMITS, "phase": PHASE_LIMITS, "periods": PERIOD_LIMITS, "peak": PEAK_LIMITS}  # of the grades
 BEYOND = "|L| < 0.5 beyond the frequency range at all gains of this page: no unstable pole there (small gain)"
 AT_HUB = {  # `rows`: of each gain a part of the samples, and the power of s on it
     "names": ["K1", "K2", "Kp"],
@@ -73,7 +68,6 @@ AT_HUB = {  # `rows`: of each gain a part of the samples, and the power of s on 
 }
 MOST_PARTS = 4  # of a law: |L| beyond the frequency range is bounded at all 2^n corners of their ranges
 REACH = 10.0  # of a gain of a law, up and down: the range of its slider
-COLOURS = {"stable": STABLE, "marginal": MARGINAL, "unstable": UNSTABLE, "good": GOOD, "low": LOW, "poor": POOR}
 
 
 def packed(values: Any) -> str:
@@ -89,28 +83,32 @@ def sampled_numbers(loop: Sampled) -> dict[str, Any]:
     These are 2, 1 where it is damped or driven through a motor, or 0.
     """
     plant = sensed_plant(loop.plant.arm, loop.chain, FED_BACK, loop.plant.count).together
-    twice, once = plant.rigid[0]
-    states = {"states": 2 if twice else 1 if once else 0, "modes": plant.count}
-    return _sampling(loop.chain) | _plant(PulseTransfer(plant, loop.chain.sampling).folded().plant) | states
+    return {
+        **_sampling(loop.chain),
+        **_plant(PulseTransfer(plant, loop.chain.sampling).folded().plant),
+        "states": _orders(plant)[0],
+        "modes": plant.count,
+    }
 
 
 def law_in_page(loop: Sampled, names: Sequence[str]) -> dict[str, Any]:
     """The sampled loop of a law: `columns` are its parts by name, in delta = z - 1; `ones` poles at z = 1."""
     plant, in_z = loop.pulse.plant, loop.in_z
-    orders = [2 if twice else 1 if once else 0 for twice, once in plant.rigid.tolist()]
-    ones = max(orders[row] - int((zeros == 0).sum()) for _, row, _, zeros in in_z.columns)
-    return (
-        _sampling(loop.chain)
-        | _plant(plant)
-        | {
-            "ones": max(0, ones),
-            "modes": loop.plant.count,
-            "columns": [
-                {"name": names[n], "row": row, "g": g, "zeros": _pairs(zeros), "poles": _pairs(in_z.part_poles[n])}
-                for n, row, g, zeros in in_z.columns
-            ],
-        }
-    )
+    return {
+        **_sampling(loop.chain),
+        **_plant(plant),
+        "ones": max(0, *(_orders(plant)[row] - int((zeros == 0).sum()) for _, row, _, zeros in in_z.columns)),
+        "modes": loop.plant.count,
+        "columns": [
+            {"name": names[n], "row": row, "g": g, "zeros": _pairs(zeros), "poles": _pairs(in_z.part_poles[n])}
+            for n, row, g, zeros in in_z.columns
+        ],
+    }
+
+
+def _orders(plant: Plant) -> list[int]:
+    """The order of the pole of each output at s = 0."""
+    return [2 if twice else 1 if once else 0 for twice, once in plant.rigid.tolist()]
 
 
 def _pairs(values: Complex) -> list[list[float]]:
@@ -122,26 +120,41 @@ def slew_numbers(arm: Arm, chain: Chain, law: HubFeedback) -> dict[str, Any] | N
     """The slew of the chain for three times as long as it takes, with the modes that it takes under `law`, and the
     arm's shapes; None where there is no such slew."""
     try:
-        task = scenario("slew", arm, chain, RECORD_LENGTH * chain.slew.rise_time)
+        task = scenario("slew", arm, chain, traces.RECORD_LENGTH * chain.slew.rise_time)
         if task.t.size > MOST_LIVE_SAMPLES:
             return None
-        linear = ideal_chain(chain)
-        count = enough_modes(lambda number: Simulator(arm, linear, task, count=number).linear(law)).modes
-        plant = Simulator(arm, chain, task, count=count).plant
-        return _sampling(chain) | _upper(plant) | _task(task, chain, arm) | {"modes": count} | _shapes(arm, plant)
+        count = enough_modes(lambda number: Simulator(arm, ideal_chain(chain), task, count=number).linear(law)).modes
+        plant = _upper(Simulator(arm, chain, task, count=count).plant)
+        ideal = np.c_[task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference, task.rigid_moment]
+        return {
+            **_sampling(chain),
+            **_plant(plant),
+            **_shapes(arm, plant),
+            "ideal": packed(ideal),
+            "converters": [[x if math.isfinite(x) else None for x in row] for row in quantisers(chain).tolist()],
+            "single": chain.converters.arithmetic == "float32",
+            "bound": FOLDED_UP * arm.bending_scale,
+            "rise": task.busy_until,
+            "drive": arm.input.split("_")[1],
+            "unit": arm.input_unit,
+            "reach": arm.reach,
+            "length": arm.length,
+            "travel": chain.slew.travel_of(arm.reach),
+            "modes": count,
+            "mode": plant.mode.tolist(),
+        }
     except TfarmError:
         return None
 
 
 def _sampling(chain: Chain) -> dict[str, Any]:
     """The period [s], the delay in samples, and how the hub rate is had: `smoothing` is the rate filter's pole."""
-    converters, T = chain.converters, chain.sampling.period
-    differences = converters.hub_rate == "difference"
+    T, of = chain.sampling.period, chain.converters
     return {
         "period": T,
         "delay": chain.sampling.whole_delay,
         "fraction": chain.sampling.fraction,
-        "smoothing": math.exp(-converters.rate_filter * T) if differences else None,
+        "smoothing": math.exp(-of.rate_filter * T) if of.hub_rate == "difference" else None,
     }
 
 
@@ -155,48 +168,22 @@ def _plant(plant: Plant) -> dict[str, Any]:
     }
 
 
-def _upper(plant: Plant) -> dict[str, Any]:
+def _upper(plant: Plant) -> Plant:
     """The same with the poles whose imaginary part is not negative alone, those with a conjugate counted twice."""
-    upper, weight = _kept(plant)
-    return _plant(plant) | {
-        "eigenvalues": packed(plant.poles[upper].astype(complex)),
-        "residues": packed((plant.residues[:, upper] * weight).astype(complex)),
-        "mode": plant.mode[upper].tolist(),
-    }
-
-
-def _kept(plant: Plant) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    upper = np.nonzero(plant.poles.imag >= 0)[0]
-    return upper, np.where(plant.poles[upper].imag > 0, 2.0, 1.0)
-
-
-def _task(task: Scenario, chain: Chain, arm: Arm) -> dict[str, Any]:
-    """References a sample, converters, and the numbers of the slew."""
-    ideal = np.c_[task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference, task.rigid_moment]
-    return {
-        "ideal": packed(ideal),
-        "converters": [[x if math.isfinite(x) else None for x in row] for row in quantisers(chain).tolist()],
-        "single": chain.converters.arithmetic == "float32",
-        "bound": FOLDED_UP * arm.bending_scale,
-        "rise": task.busy_until,
-        "drive": arm.input.split("_")[1],
-        "unit": arm.input_unit,
-        "reach": arm.reach,
-        "length": arm.length,
-        "travel": chain.slew.travel_of(arm.reach),
-    }
+    upper = plant.poles.imag >= 0
+    residues = plant.residues * np.where(plant.poles.imag > 0, 2.0, 1.0)
+    return replace(plant, poles=plant.poles[upper], residues=residues[:, upper], mode=plant.mode[upper])
 
 
 def _shapes(arm: Arm, plant: Plant) -> dict[str, Any]:
-    """Displacement along the arm over that of the tip, (stations, m) at each kept pole, which the clamp's comes first.
+    """Displacement along the arm over that of the tip, (stations, m) at each pole, that of the clamp first.
 
     The ratio of residues is that of the numerators, whatever drives the hub.
     """
-    upper, _ = _kept(plant)
-    s = plant.poles[upper].astype(complex) * (1 + 1e-9)  # off poles of both outputs; the ratio is off by as much
+    s = plant.poles.astype(complex) * (1 + 1e-9)  # off poles of both outputs; the ratio is off by as much
     x = np.linspace(0.0, arm.length, 25)
-    ratios = [np.divide(*transfer(arm, ["displacement", "tip_displacement"], x=each)(s)) for each in x.tolist()]
-    return {"x": x.tolist(), "offset": arm.reach - arm.length, "shapes": packed(ratios)}
+    shapes = [np.divide(*transfer(arm, ["displacement", "tip_displacement"], x=each)(s)) for each in x.tolist()]
+    return {"x": x.tolist(), "offset": arm.reach - arm.length, "shapes": packed(shapes)}
 
 
 def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[str, Any]:
@@ -211,31 +198,27 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
         for name, axis in zip(PLANE, (x, y), strict=True)
     } | {ANGLE_GAIN: {"low": 0.0, "high": stiffest, "linear": 1e-4 * stiffest}}
     reference = default_gains(arm)
-    corners = product(*((of["low"], of["high"]) for of in axes.values()))
-    laws = [as_law(HubFeedback(**dict(zip(axes, each, strict=True)))) for each in corners]
-    samples, is_quiet = _samples(arm, laws)
-    band, across = samples["band"], rate_columns(arm, x, LIVE_COLUMNS)
-    beyond = np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])
-    continuous = gain_map(arm, np.unique(np.r_[across, x.high]), beyond)
+    laws = [
+        as_law(HubFeedback(**dict(zip(axes, each, strict=True))))
+        for each in product(*((of["low"], of["high"]) for of in axes.values()))
+    ]
+    across = np.r_[rate_columns(arm, x, LIVE_COLUMNS), x.high]
+    continuous = gain_map(arm, np.unique(across), np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE]))
     sampled = sampled_region(arm, x, y, chain)
     return {
-        **_page(arm, chain),
+        **_page(arm, chain, laws, reference),
         **AT_HUB,
         "units": {gain.name: unit_of(gain.name, arm) for gain in GAINS},
         "axes": axes,
         "start": {gain.name: (law or reference)[gain.name] for gain in GAINS},
-        **samples,
-        **_known(arm, is_quiet),
         "reference": {name: reference[name] for name in PLANE},
-        "reference_count": stability(arm, reference, band).unstable_roots,
         "continuous": _areas(continuous.axes[0], continuous.stable_intervals),
-        "sampled_map": None if sampled is None else _sampled(sampled, chain),
+        "sampled_map": None if sampled is None else _sampled(sampled),
         "sampled_loop": None if sampled is None else sampled_numbers(sampled.loop),
         "slew": slew_numbers(arm, chain, law or reference),
         "lyapunov": arm.is_uniform,
         "default": {gain.name: reference[gain.name] for gain in GAINS},
         "outputs": {gain.name: gain.output for gain in GAINS},
-        "graded": _graded(arm, laws, chain, reference) if arm.has_elastic_link else None,
     }
 
 
@@ -244,56 +227,51 @@ def law_data(arm: Arm, chain: Chain, law: Law) -> dict[str, Any]:
 
     The slew is of gains at the hub alone.  Raises ParameterError for other laws.
     """
-    head, *_ = law_toml(law).split("\n\n")
     gains = {name: value for name, (_, value) in law.part_gains.items()}
     corners = [law.weighted(each) for each in product((1 / REACH, REACH), repeat=len(law.parts))]
     unit = law.weighted([1.0 / value for value in gains.values()])
-    samples, is_quiet = _samples(arm, corners, unit)
+    blocks = zip(gains, unit.signals, (cast(Rational, part.block) for part in unit.parts), strict=True)
+    tables = [{"name": name, "signal": signal, "num": of.num, "den": of.den} for name, signal, of in blocks]
     return {
-        **_page(arm, chain),
+        **_page(arm, chain, corners, law, unit),
         "names": list(gains),
         "labels": {name: "" if name in law.signals else "factor" for name in gains},
         "plane": list(gains)[:2] if len(gains) > 1 else None,
         "rows": [[place, 0] for place in range(1, 1 + len(gains))],
-        "of_law": {"head": head, "parts": [_table(name, part) for name, part in zip(gains, unit.parts, strict=True)]},
+        "of_law": {"head": law_toml(law).partition("\n\n")[0], "parts": tables},
         "units": dict.fromkeys(gains, "1"),
-        "axes": {name: _gain_axis(value) for name, value in gains.items()},
+        "axes": {  # without 0, at which poles may join those at s = 0
+            name: {
+                "low": min(value / REACH, value * REACH),
+                "high": max(value / REACH, value * REACH),
+                "linear": abs(value) / REACH,
+            }
+            for name, value in gains.items()
+        },
         "start": gains,
         "reference": gains,
-        "reference_count": stability(arm, law, samples["band"]).unstable_roots,
-        **samples,
-        **_known(arm, is_quiet),
-        "kind": "quiet" if is_quiet else "band",
-        "by_sign": False,
-        "moments": [None, None],
-        "beyond": BEYOND,
         **dict.fromkeys(("continuous", "sampled_map", "slew", "lyapunov", "default", "outputs")),
         "sampled_loop": law_in_page(sampled_verdict(arm, law, chain).full, list(gains)),
-        "graded": _graded(arm, corners, chain, law, unit) if arm.has_elastic_link else None,
     }
 
 
-def _gain_axis(value: float) -> dict[str, float]:
-    """The range of a gain of a law, without 0, at which poles may join those at s = 0."""
-    low, high = sorted((value / REACH, value * REACH))
-    return {"low": low, "high": high, "linear": abs(value) / REACH}
+def _page(arm: Arm, chain: Chain, laws: Sequence[Law], law: AnyLaw, unit: Law | None = None) -> dict[str, Any]:
+    """What every live page has: `laws` are the corners of its gains, `law` its reference, `unit` one with gains of 1.
 
-
-def _table(name: str, part: Part) -> dict[str, Any]:
-    """A part of a law whose gain is 1, for the table of its signal."""
-    block = cast(Rational, part.block)
-    return {"name": name, "signal": part.signals[0], "num": block.num, "den": block.den}
-
-
-def _page(arm: Arm, chain: Chain) -> dict[str, Any]:
-    """What every live page has."""
-    T = chain.sampling.period
+    Gains at the hub have no `unit`.
+    """
+    samples, is_quiet = _samples(arm, laws, unit)
     return {
         "name": arm.name,
+        "command_name": argument(arm.name, is_preset(arm, chain)),
         **sensor_numbers(arm),
-        "period": T,
-        "longest_delay": LONGEST_DELAY_SAMPLES * T,
-        "limits": LIMITS,
+        "period": chain.sampling.period,
+        "longest_delay": LONGEST_DELAY_SAMPLES * chain.sampling.period,
+        "limits": {"gain": GAIN_LIMITS, "phase": PHASE_LIMITS, "periods": PERIOD_LIMITS, "peak": PEAK_LIMITS},
+        **samples,
+        **_known(arm, is_quiet, unit is None),
+        "reference_count": stability(arm, law, samples["band"]).unstable_roots,
+        "graded": _graded(arm, laws, chain, law, unit) if arm.has_elastic_link else None,
         "margin_names": dict(zip(("up", "down", "phase", "delay", "peak"), GRADED.values(), strict=True)),
     }
 
@@ -332,18 +310,20 @@ def _graded(arm: Arm, laws: Sequence[Law], chain: Chain, law: AnyLaw, unit: Law 
     }
 
 
-def _known(arm: Arm, is_quiet: bool) -> dict[str, Any]:
-    """Theorems and bounds beyond the frequency range, and the static balance, on which verdicts rest."""
-    kind = "reactive" if arm.is_reactive else "quiet" if is_quiet else "band"
-    by_energy = "C = 0: every mode beyond the frequency range is damped (Lyapunov), with a decay rate that tends to 0"
-    if arm.is_reactive and not arm.reads_hub_moment:
-        by_energy = "C = 0: no mode of the frequency range is driven; not determined beyond"
-    moments = _stable_moments(arm) if arm.is_reactive else (-math.inf, math.inf)
+def _known(arm: Arm, is_quiet: bool, are_gains: bool) -> dict[str, Any]:
+    """Theorems on gains at the hub, bounds beyond the frequency range, and the static balance: they decide verdicts."""
+    is_reactive = are_gains and arm.is_reactive
+    kind = "reactive" if is_reactive else "quiet" if is_quiet else "band"
+    by_energy = (
+        "C = 0: no mode of the frequency range is driven; not determined beyond"
+        if arm.is_reactive and not arm.reads_hub_moment
+        else "C = 0: every mode beyond the frequency range is damped (Lyapunov), with a decay rate that tends to 0"
+    )
     return {
         "kind": kind,
-        "beyond": BEYOND if kind == "quiet" else by_energy,
-        "moments": [None if math.isinf(end) else end for end in moments],  # JSON has no infinity
-        "by_sign": arm.has_elastic_link and arm.reads_hub_moment and not arm.input_lags,
+        "beyond": by_energy if are_gains and kind != "quiet" else BEYOND,
+        "moments": _stable_moments(arm) if is_reactive else [None, None],
+        "by_sign": are_gains and arm.has_elastic_link and arm.reads_hub_moment and not arm.input_lags,
         "hub_alone": arm.loses_at_hub_alone,
         "whole": arm.input_per_torque,
         "rate_loss": arm.rate_loss,
@@ -352,33 +332,30 @@ def _known(arm: Arm, is_quiet: bool) -> dict[str, Any]:
     }
 
 
-def _stable_moments(arm: Arm) -> tuple[float, float]:
-    """Between which K2 no mode is driven by K1 > 0 without damping; infinite where no limit was found."""
+def _stable_moments(arm: Arm) -> list[float | None]:
+    """Between which K2 no mode is driven by K1 > 0 without damping; None where no limit was found."""
     found = windows_of(stability(arm, default_gains(arm).having(MOMENT_GAIN, 0.0)), [MOMENT_GAIN])[MOMENT_GAIN]
-    low, high = found.around or (-math.inf, math.inf)
-    return low if found.end(low) == "edge" else -math.inf, high if found.end(high) == "edge" else math.inf
+    return [end if found.end(end) == "edge" else None for end in found.around or (-math.inf, math.inf)]
 
 
 def _areas(across: Any, intervals: Sequence[Sequence[tuple[float, float]]]) -> list[dict[str, float]]:
     """Rows across, low, high of the parts of a region, each part with its number."""
-    parts = enumerate(pieces(across, intervals))
-    keys = ("part", PLANE[0], "low", "high")
     return [
-        dict(zip(keys, (number, *kept_digits(point, 7)), strict=True))
-        for number, piece in parts
-        for point in piece.points
+        {"part": number, PLANE[0]: x, "low": low, "high": high}
+        for number, piece in enumerate(pieces(across, intervals))
+        for x, low, high in (kept_digits(point, 7) for point in piece.points)
     ]
 
 
-def _sampled(plane: SampledMap, chain: Chain) -> dict[str, Any]:
+def _sampled(plane: GainMap) -> dict[str, Any]:
     """The sampled region, its columns with exact ends, and what it holds for."""
-    ms = f"{1e3 * chain.sampling.period:g} ms"
-    C = plane.loop.plant.arm.damping
+    loop = plane.loop
+    modes = "" if loop.plant.arm.damping else f", of the first {plane.modes_used} modes"
     return {
         "areas": _areas(plane.axes[0], plane.stable_intervals),
         PLANE[0]: plane.axes[0].tolist(),
         "intervals": plane.stable_intervals,
-        "words": f"every {ms}" + ("" if C else f", of the first {plane.modes_used} modes"),
+        "words": f"every {1e3 * loop.chain.sampling.period:g} ms{modes}",
     }
 
 
@@ -390,24 +367,22 @@ def sensor_numbers(arm: Arm) -> dict[str, Any]:
 
     None where they cannot be had, and then `no_sensor` is the reason.
     """
-    x, sensors = np.linspace(0.0, arm.length, 17), {}
     try:
-        for kind in get_args(Sensor):
-            sensors[kind] = _numbers(positions(arm, kind, sensed_places(arm, kind, x, SENSED_MODES), SENSED_MODES))
+        return {"sensor": {kind: _positions(arm, kind) for kind in get_args(Sensor)}}
     except TfarmError as error:
         return {"sensor": None, "no_sensor": str(error)}
-    return {"sensor": sensors}
 
 
-def _numbers(found: Positions) -> dict[str, Any]:
-    """The positions in a few digits."""
-    zeros = [_pairs(each) for each in found.known_zeros]
+def _positions(arm: Arm, kind: Sensor) -> dict[str, Any]:
+    """The positions of one kind of sensor in a few digits."""
+    x = sensed_places(arm, kind, np.linspace(0.0, arm.length, 17), SENSED_MODES)
+    found = positions(arm, kind, x, SENSED_MODES)
     return {
         "x": kept_digits(found.x, SENSOR_DIGITS),
         "band": found.band,
         "modes": kept_digits(found.natural_frequency, SENSOR_DIGITS),
         "participation": [kept_digits(column, SENSOR_DIGITS) for column in found.participation.T],
-        "zeros": [[kept_digits(zero, SENSOR_DIGITS) for zero in each] for each in zeros],
+        "zeros": [[kept_digits(zero, SENSOR_DIGITS) for zero in _pairs(each)] for each in found.known_zeros],
     }
 
 
@@ -418,8 +393,11 @@ def is_live(case: Case) -> bool:
 
 def has_sliders(law: Law) -> bool:
     """Whether a page can have a slider for each part of a law: gains at the hub, or few rational parts in s."""
-    are_rational = all(hasattr(part.block, "num") for part in law.parts)
-    return not law.is_discrete and are_rational and len(law.part_gains) == len(law.parts) <= MOST_PARTS
+    return (
+        not law.is_discrete
+        and len(law.part_gains) == len(law.parts) <= MOST_PARTS
+        and all(hasattr(part.block, "num") for part in law.parts)
+    )
 
 
 def save_live(case: Case, folder: Path) -> None:
@@ -436,19 +414,20 @@ def save_live(case: Case, folder: Path) -> None:
     except TfarmError as error:
         write_text(out, render("live_failed.html", title=title, why=str(error)))
         return
-    data["command_name"] = argument(arm.name, is_preset(arm, chain))
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False).replace("<", "\\u003c")
-    page = render("live.html", title=title, data=data, text=text, sign=sign_words(arm), columns=LIVE_COLUMNS,
-                  samples=PANEL_SAMPLES * len(data["low"]), error=scientific(data["error"], 1),
-                  assets=f"../{ASSETS}", script=SCRIPT, colours=COLOURS)  # fmt: skip
-    write_text(out, page)
+    colours = {"stable": STABLE, "marginal": MARGINAL, "unstable": UNSTABLE, "good": GOOD, "low": LOW, "poor": POOR}
+    write_text(out, render("live.html", title=title, data=data, text=text, sign=sign_words(arm), columns=LIVE_COLUMNS,
+                           samples=PANEL_SAMPLES * len(data["low"]), error=scientific(data["error"], 1),
+                           assets=f"../{ASSETS}", script=SCRIPT, colours=colours))  # fmt: skip
 
 
 def write_assets(folder: Path) -> None:
     """The script of the live pages."""
     folder.mkdir(exist_ok=True)
-    parts = ("loop", "sampled", "locus", "sets", "chart", "player", "sensor", "page")
-    scripts = "".join((TEMPLATES / f"live_{name}.js").read_text(encoding="utf-8") for name in parts)
+    scripts = "".join(
+        (TEMPLATES / f"live_{name}.js").read_text(encoding="utf-8")
+        for name in ("loop", "sampled", "locus", "sets", "chart", "player", "sensor", "page")
+    )
     write_text(folder / SCRIPT, f"(() => {{\n{scripts}}})();\n")
 
 
@@ -466,8 +445,10 @@ class LivePage:
         link, script = f'<script src="../{ASSETS}/{SCRIPT}">', self.path.parents[1] / ASSETS / SCRIPT
         page = self.path.read_text(encoding="utf-8").replace(link, f"<script>{script.read_text(encoding='utf-8')}")
         text = base64.b64encode(page.encode()).decode("ascii")  # no srcdoc: its links lead into the notebook's own page
-        source = f'src="data:text/html;charset=utf-8;base64,{text}" title="live page"'
-        return f'<iframe {source} style="width:100%;height:{FRAME}px;border:0"></iframe>'
+        return (
+            f'<iframe src="data:text/html;charset=utf-8;base64,{text}" title="live page" '
+            f'style="width:100%;height:{FRAME}px;border:0"></iframe>'
+        )
 
 
 def explore(arm: Arm, law: AnyLaw | None = None, chain: Chain | None = None) -> LivePage:
