@@ -58,7 +58,8 @@ UNDAMPED = (
     "undamped model: margins and grades are those with C = {:.4g} s, 0.1 % of critical damping in mode 1; "
     "at C = 0 the exact delay and disk margins are 0 for every gain"
 )
-SCALED = "default gains: scaled from the paper's, not a design; `tfarm design` recommends gains"
+SCALED = "default gains: scaled from the paper's, not a design; "
+RECOMMENDED = "`tfarm design` recommends gains", "without damping of the link no design is robust"
 
 
 class Graded(NamedTuple):
@@ -117,7 +118,7 @@ class LoopCard:
     least_damping: Annotated[LeastDamped | None, Quantity("least damping ratio", "", 4,
             help="of the oscillating closed-loop poles in the range of the verdict")]  # fmt: skip
     time_constant: Annotated[float | None, Quantity("dominant time constant", "s", 4, key="time_constant_s",
-            help="of the slowest closed-loop pole, below 0 of a growing one; without a free hub angle")]  # fmt: skip
+            help="of the slowest closed-loop pole of a stable loop; without a free hub angle")]  # fmt: skip
     minimum_damping: Annotated[float | None, Quantity("minimum structural damping for stability", "s", 4,
             help="Kelvin-Voigt damping C of the link from which on the loop is stable")]  # fmt: skip
 
@@ -175,7 +176,7 @@ def result_card(
     law, chain = as_law(law), chain_or_usual(chain)
     T, reference = chain.sampling.period, reference_damping(arm)
     damped = arm.having(damping=reference) if arm.has_elastic_link else arm
-    notes = [SCALED] if law.gains == default_gains(arm) else []
+    notes = [SCALED + RECOMMENDED[arm.has_elastic_link]] if law.gains == default_gains(arm) else []
     notes += [UNDAMPED.format(reference)] if arm.has_elastic_link else []
     loops: dict[str, Callable[[], tuple[LoopCard, Callable[[], LoopCard]]]] = {
         "continuous": lambda: (
@@ -217,7 +218,7 @@ def continuous_card(found: Margins, period: float) -> LoopCard:
         certainty=f"converged to {verdict.band:.4g} rad/s{beyond}",
         **_margins(band, None if band is None else band.gain, delay, period),
         least_damping=_least_damped(poles_by_mode(moving[moving.imag > 0], {n: s for n, s in own.items() if n})),
-        time_constant=-1 / abscissa if abscissa and math.isfinite(abscissa) else None,
+        time_constant=-1 / abscissa if abscissa < 0 and math.isfinite(abscissa) else None,
         minimum_damping=None,
     )
 
@@ -237,7 +238,7 @@ def sampled_card(found: Analysis) -> LoopCard:
         else f"{word}, first {verdict.modes_used} modes",
         **_margins(band, found.gain_factors, found.delay_margin_seconds, T),
         least_damping=_least_damped(unaliased_poles(loop)),
-        time_constant=verdict.time_constant,
+        time_constant=verdict.time_constant if verdict.is_stable else None,
         minimum_damping=None if needed is None else needed.value,
     )
 

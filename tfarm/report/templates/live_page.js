@@ -17,7 +17,7 @@
   // ---------------------------------------------------------------- numbers of these gains
 
   let now = null; // of the gains last moved to
-  const slowest = poles => Math.max(...poles.map(s => s[0])), constant = x => x ? -1 / x : Infinity;
+  const slowest = poles => Math.max(...poles.map(s => s[0])), constant = x => x < 0 ? -1 / x : Infinity; // of a stable loop
   const ratio = poles => Math.min(...poles.filter(s => s[1] > 0).map(s => -s[0] / size(s)));
   const word = growths => growths.length && Math.max(...growths) > 0 ? "unstable" : Math.max(...growths) < 0 ? "stable" : "marginal";
   function numbers(gains) {
