@@ -199,6 +199,7 @@ def step(
     poles = None if full.is_discrete else usual_poles(Loop(arm, full))
     length = usual_duration(poles, chain) if duration is None else duration
     task = unit_step(hub, chain, length) if is_step else scenario(SAMPLED_NAMES[scenario_name], arm, chain, length)
+    require(task.t.size > 1, "duration", length, f"at least one sampling period, {task.period:g} s")
     tip = "tip_displacement" if of_angle else f"velocity@{arm.length!r}"
     names = tuple(dict.fromkeys((hub, tip, MOMENT, *outputs)))
     if poles is not None:
