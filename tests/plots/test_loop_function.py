@@ -13,7 +13,7 @@ from tests.odd_arms import odd_arms
 from tests.plots.labels import complaints
 from tfarm.case.card import continuous_card, reference_damping
 from tfarm.dsp import Chain, Sampling
-from tfarm.loop.curve import curve_of
+from tfarm.loop.curve import curve_of, refined
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
@@ -135,6 +135,15 @@ def test_the_curve_has_each_frequency_once_and_reaches_its_peak(T):
     found = tfarm.loop_function(odd_arms()["micro"], law, Chain(sampling=Sampling(period=T)))
     assert np.diff(found.omega).min() > 0
     assert 10 ** (found.sensitivity.max() / 20) == pytest.approx(found.margins.peak_sensitivity, rel=1e-2)
+
+
+def test_a_refined_grid_has_each_frequency_once():
+    """Also where L jumps between neighbouring numbers, and where the grid has one twice."""
+    low = 1.0
+    high = np.nextafter(low, 2.0)
+    omega, L = refined(lambda s: np.where(s.imag > low, 100.0, 1.0) + 0j, np.array([0.5, low, low, high, 2.0]))
+    np.testing.assert_array_equal(omega, [0.5, low, high, 2.0])
+    np.testing.assert_array_equal(L, [1.0, 1.0, 100.0, 100.0])
 
 
 def test_the_sampled_loop_is_that_of_a_hold_and_a_sampler(both):

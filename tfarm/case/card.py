@@ -327,7 +327,7 @@ def sampled_curve(found: Analysis) -> LoopCurve:
     if found.verdict.is_stable:
         own = sampled_margins(curve)
         band = replace(own, gain=found.gain_factors or own.gain)
-    omega = np.unique(curve.grid.q / T)  # where rounding has made one of two angles
+    omega = curve.grid.q / T
     omega, L = refined(curve.loop_function, omega[omega >= lowest_drawn(loop.plant.arm, band)])
     return LoopCurve(
         arm=loop.plant.arm, law=loop.given, stability=found.verdict.word, period=T, omega=omega, L=L, margins=band

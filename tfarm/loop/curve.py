@@ -89,7 +89,7 @@ def refined(L: Callable[[Complex], Complex], omega: Real) -> tuple[Real, Complex
         steps = abs(np.diff(np.log(np.where(sizes == 0, 1.0, sizes))))
         (coarse,) = np.nonzero((steps[0] > LONGEST_STEP) | (steps[1] > LONGEST_OF_S))
         if number < FINER_ROUNDS - 1:
-            omega = np.insert(omega, coarse + 1, np.sqrt(omega[coarse] * omega[coarse + 1]))
+            omega = np.union1d(omega, np.sqrt(omega[coarse] * omega[coarse + 1]))  # each once, by rounding too
     return omega, values
 
 
