@@ -130,6 +130,24 @@ def test_damping_ratios_of_the_sampled_loop_tend_to_those_of_the_continuous_one(
     assert both.sampled.least_damping.ratio == pytest.approx(both.continuous.least_damping.ratio, rel=2e-3)
 
 
+@pytest.mark.parametrize(("gain", "w", "ratio"), [(-0.1, 172.0, 1.5e-3), (0.3, 16.0, 1.3e-3), (0.5, 300.0, 3e-3)])
+def test_the_least_damped_pole_may_be_of_the_controller(gain, w, ratio):
+    """A resonant filter has a pair of poles more than the arm; all pairs by python-control, to what a model leaves."""
+    law = tfarm.Law({"hub_angle": 1.0, "hub_rate": 0.3, "root_moment": ([gain * w * w], [1, 2 * ratio * w, w * w])})
+    own = tfarm.result_card(LAB, law).continuous
+    plant = tfarm.reduce(LAB, ["hub_angle", "hub_rate", "root_moment"], order=40).state_space()
+    C = control.append(
+        control.ss([], [], [], [[1.0, 0.3]]), control.ss(control.tf([gain * w * w], [1, 2 * ratio * w, w * w]))
+    )
+    L = control.ss([], [], [], [[1.0, 1.0]]) * C * plant
+    poles = control.feedback(L, 1).poles()
+    poles = poles[(poles.imag > 0) & (abs(poles) < 1000)]
+    least = poles[np.argmin(-poles.real / abs(poles))]
+    assert own.least_damping.ratio == pytest.approx(-least.real / abs(least), rel=1e-3)
+    assert own.least_damping.mode == "the hub or the controller"
+    assert (own.least_damping.ratio < 0) == (own.stability == "unstable")
+
+
 @pytest.mark.parametrize(("K1", "K2"), [(34.83, 0.774), (381.0, 0.774)])
 def test_a_negative_real_pole_oscillates_at_half_the_sampling_rate(K1, K2):
     """Whatever the sign of its rounded imaginary part: s = ln(z)/T = (ln abs(z) + i pi)/T, aliases of it alike."""

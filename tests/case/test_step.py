@@ -2,6 +2,7 @@
 
 import csv
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -121,6 +122,7 @@ def test_a_column_of_references_is_the_reference_of_its_signal():
     ("arm", "law", "scenario", "words"),
     [
         (LAB.having(hub_inertia=math.inf), LAW, "slew", "locked hub"),
+        (replace(LAB, input="hub_angle"), LAW, "slew", "input = .hub_angle."),
         (LAB.having(hub_inertia=0.0), LAW, "slew", "K2 = 0.3"),
         (LAB, LAW, "impulse", "scenario = .impulse"),
         (LAB, tfarm.HubFeedback(K2=0.3), "reference", "neither hub angle nor hub rate"),
@@ -131,10 +133,27 @@ def test_a_column_of_references_is_the_reference_of_its_signal():
             "references = .tip_deflection",
         ),
         (LAB.having(payload_mass=math.inf), LAW, "deflection", "scenario = .deflection.: no free decay"),
+        (
+            LAB.having(payload_mass=math.inf),
+            tfarm.Law({"hub_rate": 0.3}, period=0.01),
+            "deflection",
+            "scenario = .deflection.: no free decay",
+        ),
         (LAB, LAW, "deflection", None),
         (LAB.having(hub_inertia=0.0), tfarm.HubFeedback(K1=0.3), "pulse", None),
     ],
-    ids=["locked", "algebraic", "unknown", "no reference", "no such reference", "pinned", "free", "massless hub"],
+    ids=[
+        "locked",
+        "driven angle",
+        "algebraic",
+        "unknown",
+        "no reference",
+        "no such reference",
+        "pinned",
+        "pinned, in z",
+        "free",
+        "massless hub",
+    ],
 )
 def test_what_has_no_response_is_refused_in_a_line(arm, law, scenario, words):
     if words is None:
@@ -144,6 +163,13 @@ def test_what_has_no_response_is_refused_in_a_line(arm, law, scenario, words):
         return
     with pytest.raises(tfarm.ParameterError, match=words):
         tfarm.step(arm, law, scenario_name=scenario)
+
+
+@pytest.mark.parametrize("scenario", ["reference", "slew", "pulse", "deflection"])
+def test_a_record_shorter_than_a_period_is_refused(scenario):
+    with pytest.raises(tfarm.ParameterError, match=r"duration = 0\.004: at least one sampling period, 0\.01 s"):
+        tfarm.step(LAB, LAW, None, scenario, 0.004)
+    assert tfarm.step(LAB, LAW, None, scenario, 0.011).t[-1] >= 0.01
 
 
 def test_the_command_prints_both_loops_and_writes_their_signals(capsys, tmp_path):

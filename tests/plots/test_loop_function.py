@@ -9,10 +9,11 @@ import pytest
 from matplotlib.figure import Figure
 
 import tfarm
+from tests.odd_arms import odd_arms
 from tests.plots.labels import complaints
 from tfarm.case.card import continuous_card, reference_damping
 from tfarm.dsp import Chain, Sampling
-from tfarm.loop.curve import curve_of
+from tfarm.loop.curve import curve_of, refined
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
@@ -125,6 +126,24 @@ def test_s_and_t_add_to_one_and_peak_at_their_marks(both):
             marks = [(each, MARGIN.fullmatch(str(each.get_label()))) for each in ax.get_lines()]
             (mark,) = (each for each, of in marks if of and (of[1], of[4] or "") == (f"M{name.lower()}", words))
             assert mark.get_ydata()[0] == pytest.approx(drawn, abs=0.02)
+
+
+@pytest.mark.parametrize("T", [2.5e-4, 0.00025186900597782517])
+def test_the_curve_has_each_frequency_once_and_reaches_its_peak(T):
+    """Where the sampled loop has a pole so near to the circle that angles about it are equal by rounding."""
+    law = tfarm.Law({"hub_angle": ([0.02645123039008574, -0.023806107351077167], [1.0, -0.2])}, period=T)
+    found = tfarm.loop_function(odd_arms()["micro"], law, Chain(sampling=Sampling(period=T)))
+    assert np.diff(found.omega).min() > 0
+    assert 10 ** (found.sensitivity.max() / 20) == pytest.approx(found.margins.peak_sensitivity, rel=1e-2)
+
+
+def test_a_refined_grid_has_each_frequency_once():
+    """Also where L jumps between neighbouring numbers, and where the grid has one twice."""
+    low = 1.0
+    high = np.nextafter(low, 2.0)
+    omega, L = refined(lambda s: np.where(s.imag > low, 100.0, 1.0) + 0j, np.array([0.5, low, low, high, 2.0]))
+    np.testing.assert_array_equal(omega, [0.5, low, high, 2.0])
+    np.testing.assert_array_equal(L, [1.0, 1.0, 100.0, 100.0])
 
 
 def test_the_sampled_loop_is_that_of_a_hold_and_a_sampler(both):

@@ -211,6 +211,8 @@ def test_explore_writes_the_page_that_a_report_has_and_opens_it(tmp_path, monkey
     assert "<script src=" not in page
     with pytest.raises(tfarm.ParameterError, match="hub turns freely"):
         tfarm.explore(arm.having(hub_inertia=math.inf))
+    with pytest.raises(tfarm.ParameterError, match="is no Arm"):
+        tfarm.explore(arm.name)
 
 
 def test_an_arm_that_cannot_turn_freely_has_no_samples():

@@ -163,3 +163,10 @@ def test_a_locus_begins_at_every_one_of_them() -> None:
     damped = tfarm.damped_modes(tfarm.modes(arm, 4))
     listed = np.r_[damped.unassigned_pairs, damped.eigenvalues[damped.is_assigned]].ravel()
     np.testing.assert_array_equal(np.sort_complex(poles), np.sort_complex(listed[np.isfinite(listed) & (listed != 0)]))
+
+
+def test_an_eigenvalue_that_is_not_known_has_no_origin(recwarn: pytest.WarningsRecorder) -> None:
+    arm = tfarm.load(STIFF_FRICTION)
+    (slow, *_), k = tfarm.damped_modes(tfarm.modes(arm, 4)).unassigned, tfarm.modes(arm, 4).system
+    assert origins_of(k, np.array([slow.eigenvalue, np.nan])) == [slow.origin, NOT_ASSIGNED]
+    assert not recwarn.list

@@ -9,7 +9,7 @@ import pytest
 import tfarm
 from tests.shell import answer
 from tests.synthesis.held_loop import HeldLoop
-from tfarm import ConvergenceError
+from tfarm import ConvergenceError, ParameterError
 from tfarm.arm import as_law
 from tfarm.arm.law_tables import load_law
 from tfarm.dsp import sampled_verdict
@@ -104,3 +104,15 @@ def test_a_pi_law_of_a_motor_with_back_emf_is_saved_and_read_back(capsys, monkey
     (part,) = load_law(file).parts
     assert (part.block.num, part.block.den) == ((values["Kp"], values["Ki"]), (1.0, 0.0))
     assert answer(capsys, "sampled", "quanser-flexlink", "--law", str(file))["stable"] is True
+
+
+def test_a_pinned_tip_has_laws_of_all_structures_and_a_locked_hub_none():
+    """Sizes are those of the finite parts: the inertia of an arm with a pinned tip is infinite."""
+    pinned, locked = LAB.having(payload_mass=np.inf), LAB.having(hub_inertia=np.inf)
+    for name in ("PD", "PD+notch", "lead", "PI", "PID", "PPF", "strain-rate"):
+        form = structure_of(name, pinned, Kp=0.0, modes=2, period=T, bounds={})
+        assert np.isfinite([form.origin, *form.box]).all()
+        assert 0.0 < form.fixed["Kp"] < np.inf
+        with pytest.raises(ParameterError, match="locked hub"):
+            design(locked, structure=name)
+    assert design(pinned, structure="PD").verdict.is_stable

@@ -25,7 +25,7 @@ from tfarm.arm.feedback import (
 from tfarm.arm.law import AnyLaw, Law, arm_and_law, as_law, cancelled, full_law, must_not_be_algebraic, tracked
 from tfarm.arm.parts import Attachment, Gauge, Hub, Link, Motor, Payload, RotarySpring, Section
 from tfarm.arm.reading import implausible, load, presets
-from tfarm.arm.records import Arm, must_be_arm, must_turn
+from tfarm.arm.records import Arm, must_be_arm, must_have_free_hub, must_turn
 from tfarm.arm.writing import to_toml
 
 __all__ = [
@@ -70,6 +70,7 @@ __all__ = [
     "law_of",
     "load",
     "must_be_arm",
+    "must_have_free_hub",
     "must_not_be_algebraic",
     "must_turn",
     "presets",

@@ -394,6 +394,14 @@ def must_be_arm(arm: object) -> None:
         raise ParameterError(key="arm", value=arm, remedy=f"is no Arm; give tfarm.load({shown(name)})")
 
 
+def must_have_free_hub(arm: Arm) -> None:
+    """Raise ParameterError where the hub angle is the input, so that nothing can be fed back to the hub."""
+    remedy = "a locked hub (inertia = inf) has no loop: give the hub a finite inertia"
+    require(not math.isinf(arm.hub.inertia), "hub.inertia", arm.hub.inertia, remedy)
+    remedy = "a hub whose angle is the input has no loop: take the torque of the hub, or a motor's input"
+    require(not arm.is_locked, "input", arm.input, remedy)
+
+
 def must_turn(arm: Arm) -> None:
     """Raise ParameterError, naming the infinite part or the spring, for an arm that cannot slew."""
     parts = {

@@ -16,7 +16,7 @@ Such an arm is graded with 0.1 % of critical damping in its first mode; its stab
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Annotated, Any, NamedTuple
@@ -208,6 +208,9 @@ def continuous_card(found: Margins, period: float) -> LoopCard:
     verdict, band = found.stability, found.in_band
     moving, table = verdict.poles.moving, modes(verdict.loop.arm, up_to=verdict.band)
     own = dict(zip(table.index.tolist(), (1j * table.natural_frequency).tolist(), strict=True))
+    oscillating = moving[moving.imag > 0]
+    by_mode = poles_by_mode(oscillating, {n: s for n, s in own.items() if n})
+    is_of_mode = np.isin(oscillating, list(by_mode.values()))
     abscissa = verdict.spectral_abscissa
     beyond = (
         ", small gain beyond" if verdict.tail == SMALL_GAIN else ", theorem beyond" if verdict.is_known_beyond else ""
@@ -217,7 +220,7 @@ def continuous_card(found: Margins, period: float) -> LoopCard:
         stability=verdict.verdict,
         certainty=f"converged to {verdict.band:.4g} rad/s{beyond}",
         **_margins(band, None if band is None else band.gain, delay, period),
-        least_damping=_least_damped(poles_by_mode(moving[moving.imag > 0], {n: s for n, s in own.items() if n})),
+        least_damping=_least_damped([*by_mode.items(), *((HUB, s) for s in oscillating[~is_of_mode].tolist())]),
         time_constant=-1 / abscissa if abscissa < 0 and math.isfinite(abscissa) else None,
         minimum_damping=None,
     )
@@ -237,7 +240,7 @@ def sampled_card(found: Analysis) -> LoopCard:
         if verdict.band
         else f"{word}, first {verdict.modes_used} modes",
         **_margins(band, found.gain_factors, found.delay_margin_seconds, T),
-        least_damping=_least_damped(unaliased_poles(loop)),
+        least_damping=_least_damped(unaliased_poles(loop).items()),
         time_constant=verdict.time_constant if verdict.is_stable else None,
         minimum_damping=None if needed is None else needed.value,
     )
@@ -355,13 +358,13 @@ def unaliased_poles(loop: Sampled) -> dict[int, complex]:
     return found
 
 
-def _least_damped(by_mode: Mapping[int, complex]) -> LeastDamped | None:
-    """The pole of least damping ratio."""
-    ratios = {n: Percent(-s.real / abs(s) + 0.0) for n, s in by_mode.items()}
+def _least_damped(poles: Iterable[tuple[int, complex]]) -> LeastDamped | None:
+    """The pole of least damping ratio among some with their modes."""
+    ratios = [(Percent(-s.real / abs(s) + 0.0), n) for n, s in poles]
     if not ratios:
         return None
-    least = min(ratios, key=lambda n: ratios[n])
-    return LeastDamped(ratios[least], "the hub or the controller" if least == HUB else f"mode {least}")
+    ratio, n = min(ratios)
+    return LeastDamped(ratio, "the hub or the controller" if n == HUB else f"mode {n}")
 
 
 def _margins(

@@ -264,8 +264,11 @@ def step(
         if is_step
         else scenario(SAMPLED_NAMES[scenario_name], arm, chain, length)
     )
+    require(task.t.size > 1, "duration", length, f"at least one sampling period, {task.period:g} s")
     tip = "tip_displacement" if of_angle else f"velocity@{arm.length!r}"
     names = tuple(dict.fromkeys((hub, tip, MOMENT, *outputs)))
+    if task.tip_offset:
+        first_mode(sensed_plant(arm, Chain(), ("tip_displacement",), 1).unfiltered, task.tip_offset, scenario_name)
     if poles is not None:
         response = time_response(poles, names, excitation(poles.loop, full, chain, task, names), length)
     t = _times(response, task)

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, must_have_free_hub
 from tfarm.arrays import Complex, Real
 from tfarm.dsp.chain import Chain, Sampling
 from tfarm.errors import ConvergenceError, require
@@ -123,7 +123,7 @@ def damped_at_hub(arm: Arm, chain: Chain) -> Arm:
 
 def undelayed_plant(arm: Arm, outputs: Sequence[str], count: int, x: float | None = None) -> Plant:
     """The arm with `count` flexible modes, its outputs not filtered; `x` [m] is the place of outputs along the arm."""
-    require(not arm.is_locked, "hub.inertia", math.inf, "a locked hub has no loop; give it a finite inertia")
+    must_have_free_hub(arm)
     return with_modes(_modelled_once(arm, tuple(outputs), count, x), count)
 
 

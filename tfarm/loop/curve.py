@@ -20,7 +20,7 @@ from .margins import BELOW_SLOWEST, IN_RANGE, LoopMargins, Margins, dense
 
 MOST_FACTOR = 1e9  # on the controller: a larger gain margin is none
 SAME_FACTOR = 1e-6  # relative: by no more the gain margin differs from the factor at its phase crossover
-LONGEST_STEP, FINER_ROUNDS = 0.15, 6  # of ln L from point to point, and rounds in which longer ones are halved
+LONGEST_STEP, LONGEST_OF_S, FINER_ROUNDS = 0.15, 0.4, 6  # of ln L and ln S, and rounds in which longer steps are halved
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,14 +80,16 @@ class LoopCurve:
 
 
 def refined(L: Callable[[Complex], Complex], omega: Real) -> tuple[Real, Complex]:
-    """Frequencies (n,), more of them where L (of s = i w) changes by much from one to the next, and L there."""
+    """Frequencies (n,), more of them where L or 1 + L (s = i w) changes by much from one to the next, and L there."""
     for number in range(FINER_ROUNDS):
         values = np.asarray(L(1j * omega), dtype=np.complex128)
         known = np.isfinite(values) & ((values != 0) | (not values.any()))
         omega, values = omega[known], values[known]
-        (coarse,) = np.nonzero(abs(np.diff(np.log(np.where(values == 0, 1.0, values)))) > LONGEST_STEP)
+        sizes = np.array([values, 1 + values])
+        steps = abs(np.diff(np.log(np.where(sizes == 0, 1.0, sizes))))
+        (coarse,) = np.nonzero((steps[0] > LONGEST_STEP) | (steps[1] > LONGEST_OF_S))
         if number < FINER_ROUNDS - 1:
-            omega = np.insert(omega, coarse + 1, np.sqrt(omega[coarse] * omega[coarse + 1]))
+            omega = np.union1d(omega, np.sqrt(omega[coarse] * omega[coarse + 1]))  # each once, by rounding too
     return omega, values
 
 

@@ -23,7 +23,17 @@ from typing import Annotated, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback, Law, as_law, cancelled, full_law, must_be_arm, must_not_be_algebraic
+from tfarm.arm import (
+    Arm,
+    HubFeedback,
+    Law,
+    as_law,
+    cancelled,
+    full_law,
+    must_be_arm,
+    must_have_free_hub,
+    must_not_be_algebraic,
+)
 from tfarm.arrays import Complex
 from tfarm.errors import require
 from tfarm.exact.characteristic import Analytic, Feedback, LoopParts, deflated, difference_steps, feedback
@@ -73,8 +83,7 @@ class Loop:
         law = as_law(self.law)
         if law.input is not None and law.input != self.arm.input:
             object.__setattr__(self, "arm", replace(self.arm, input=law.input))  # type: ignore[arg-type]
-        remedy = "a locked hub (inertia = inf) has no loop: give the hub a finite inertia"
-        require(not self.arm.is_locked, "hub.inertia", self.arm.hub_inertia, remedy)
+        must_have_free_hub(self.arm)
         remedy = "a law in z has a sampled loop: ask for that, or leave the period out of a law in s"
         require(not law.is_discrete, "period", law.period, remedy)
         object.__setattr__(self, "law", full_law(law))

@@ -26,6 +26,7 @@ from tfarm.arm import (
     Law,
     arm_and_law,
     as_law,
+    must_be_arm,
     unit_of,
 )
 from tfarm.arm.blocks import Rational
@@ -473,8 +474,9 @@ def explore(arm: Arm, law: AnyLaw | None = None, chain: Chain | None = None) -> 
     Raises
     ------
     ParameterError
-        For an arm whose hub does not turn freely or has no inertia.
+        For what is no arm, and one whose hub does not turn freely or has no inertia.
     """
+    must_be_arm(arm)
     case = Case(arm, chain_or_usual(chain), () if law is None else (GivenLaw(law),))
     require(is_live(case), "arm", arm.name, "give one whose hub turns freely and has inertia")
     place = Path(mkdtemp(prefix="tfarm-"))

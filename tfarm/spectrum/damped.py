@@ -267,15 +267,15 @@ def origins_of(k: System, s: Complex) -> list[str]:
     if not parts:
         return [NOT_ASSIGNED] * s.size
     found: list[list[str]] = [[] for _ in s]
-    here = function_of(k)(s)
-    for part in parts:
-        larger = k.drive._replace(**{part: getattr(k.drive, part) * (1 + PART_STEP)})
-        there = function_of(replace(k, drive=larger))(s)
-        with np.errstate(invalid="ignore"):  # of zeros that are not known
+    with np.errstate(invalid="ignore"):  # of zeros that are not known
+        here = function_of(k)(s)
+        for part in parts:
+            larger = k.drive._replace(**{part: getattr(k.drive, part) * (1 + PART_STEP)})
+            there = function_of(replace(k, drive=larger))(s)
             change = there.value * np.exp(there.scale - here.scale) - here.value
             is_large = abs(change / (here.slope * s)) > LEAST_INFLUENCE * PART_STEP
-        for n in np.flatnonzero(is_large).tolist():
-            found[n].append(DRIVE_PARTS[part])
+            for n in np.flatnonzero(is_large).tolist():
+                found[n].append(DRIVE_PARTS[part])
     return [" and ".join(names) or NOT_ASSIGNED for names in found]
 
 

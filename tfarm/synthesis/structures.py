@@ -175,7 +175,7 @@ def structure_of(
     if name != TWO_GAINS and not (0.0 <= Kp < np.inf):
         raise ParameterError(key=ANGLE_GAIN, value=Kp, remedy="the hub angle gain is zero (chosen) or positive")
     speed = ANGLE_SPEED * min(first_frequency(arm), 1 / period)
-    usual = 0.0 if name == TWO_GAINS else float(f"{arm.turned_inertia * speed**2:.3g}")
+    usual = 0.0 if name == TWO_GAINS else float(f"{turning_inertia(arm) * speed**2:.3g}")
     form = STRUCTURES[name](arm, Kp or usual, modes, period)
     if "root_moment" in form.signals:
         must_not_be_algebraic(arm, "structure", name)
@@ -216,7 +216,7 @@ ONE = np.ones((1, 1))
 
 def _rate_gain(arm: Arm, Kp: float) -> Coefficient:
     """K1, usually that of damping ratio 1/sqrt(2) of the rigid arm under Kp, without friction."""
-    return positive("K1", float(np.sqrt(2 * Kp * arm.turned_inertia)))
+    return positive("K1", float(np.sqrt(2 * Kp * turning_inertia(arm))))
 
 
 def _servo(Kp: float, K1: Real) -> tuple[Entry, Entry]:
@@ -275,7 +275,7 @@ def _lead(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
 
 def _integral_gain(arm: Arm, Kp: float) -> Coefficient:
     """Ki, from its lower limit on."""
-    least = INTEGRAL_SPEED * Kp * float(np.sqrt(Kp / arm.turned_inertia))
+    least = INTEGRAL_SPEED * Kp * float(np.sqrt(Kp / turning_inertia(arm)))
     return Coefficient("Ki", LOGARITHMIC * least, (least, REACH * least), (least, np.inf), 2 * least)
 
 
