@@ -71,10 +71,10 @@ def prose_of(page):
 
 
 class Run:
-    """The blocks of a page, executed in sequence in the current folder; `said` is all that they print."""
+    """The blocks of a page, executed in sequence in the current folder; `printed` is all that they print."""
 
     def __init__(self):
-        self.names, self.said, self.last = {}, "", ""
+        self.names, self.printed, self.last = {}, "", ""
 
     def block(self, block):
         """Execute one block, by its kind."""
@@ -85,7 +85,7 @@ class Run:
             lines = [line.split() for line in self.last.splitlines()]
             assert all(line.split() in lines for line in text.splitlines() if line.strip(" .")), (text, self.last)
             return
-        before = len(self.said)
+        before = len(self.printed)
         if kind == "ipython3" and text.startswith("%%writefile "):
             head, _, text = text.partition("\n")
             self.file(head.split()[1], text)
@@ -98,7 +98,7 @@ class Run:
             self.file(block.options["caption"], text)
         else:
             raise AssertionError(f"no way to execute a block of {kind!r}")
-        self.last = self.said[before:]
+        self.last = self.printed[before:]
 
     def python(self, text):
         """Execute statements; the value of a last expression is shown, unless a semicolon ends it, as in a notebook."""
@@ -107,10 +107,10 @@ class Run:
         with contextlib.redirect_stdout(out):
             exec(compile(tree, "block", "exec"), self.names)
             value = eval(compile(ast.Expression(last.value), "block", "eval"), self.names) if last else None
-        self.said += out.getvalue()
+        self.printed += out.getvalue()
         if value is not None and not text.rstrip().endswith(";"):
             shown = value._repr_html_() if hasattr(value, "_repr_html_") else repr(value)
-            self.said += html.unescape(re.sub(r"<[^>]*>", " ", shown)) + "\n"
+            self.printed += html.unescape(re.sub(r"<[^>]*>", " ", shown)) + "\n"
 
     def command(self, line):
         """Run a command of tfarm; of other programs only verbs of the Makefile and modules of the tests are known."""
@@ -127,7 +127,7 @@ class Run:
                 ):  # fmt: skip
                     main(arguments)
                 assert not stop.value.code, (line, heard(err.getvalue()))
-                self.said += out.getvalue()
+                self.printed += out.getvalue()
             case ["make", *verbs]:
                 makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
                 assert all("=" in verb or f"\n{verb}:" in makefile for verb in verbs), line
@@ -188,7 +188,7 @@ def test_every_block_of_a_page_runs(name, folder):
         run.block(block)
     if name.startswith("tutorials/"):
         code = "\n".join(block.text for block in blocks)
-        assert unprinted(prose_of(page), code + run.said) == [], run.said
+        assert unprinted(prose_of(page), code + run.printed) == [], run.printed
 
 
 def anchors_of(name):

@@ -1,4 +1,4 @@
-"""`tfarm new` and `tfarm check`: files that load as asked for, questions on a terminal, and numbers of textbooks."""
+"""`tfarm new` and `tfarm check`: files that load as required, questions on a terminal, and numbers of textbooks."""
 
 import io
 import math
@@ -141,8 +141,8 @@ def test_on_a_terminal_it_asks_for_what_is_missing_and_again_where_an_answer_is_
     monkeypatch.setattr(sys, "stdin", Terminal("\n0.3\ntube\nwide\n0.02\n0.018\n0.05\n"))
     code, out, err = run(capsys, "new", str(file))
     assert (code, out.strip()) == (0, f"written: {file}; next: tfarm check {file}")
-    asked = re.findall(r"(length of the link \[m\]|section:|outer diameter|inner diameter|inertia of the hub)", err)
-    assert [*dict.fromkeys(asked)] == ["length of the link [m]", "section:", "outer diameter", "inner diameter",
+    questions = re.findall(r"(length of the link \[m\]|section:|outer diameter|inner diameter|inertia of the hub)", err)
+    assert [*dict.fromkeys(questions)] == ["length of the link [m]", "section:", "outer diameter", "inner diameter",
                                        "inertia of the hub"]  # fmt: skip
     arm = tfarm.load(file)
     assert arm.link.section == tfarm.Section.tube(outer_diameter=0.02, inner_diameter=0.018)

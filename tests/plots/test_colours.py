@@ -1,4 +1,4 @@
-"""The one colour code: what a map and a locus show at a point, by their pixels, and that grey print tells it apart."""
+"""The one colour code: what a map and a locus show at a point, by their pixels, distinct in grey print."""
 
 import numpy as np
 import pytest

@@ -171,13 +171,13 @@ def test_branches_that_cannot_be_followed_are_left_out_with_a_word(monkeypatch):
 
     def follow(arm, law, vary, start, stop, points, branches):
         if vary == "K1":
-            raise tfarm.ConvergenceError("the damped mode 1 cannot be told from its neighbours", None, None)
+            raise tfarm.ConvergenceError("the damped mode 1 cannot be separated from its neighbours", None, None)
         return locus(arm, law, vary, start, stop, points, branches)
 
     monkeypatch.setattr(loci_room, "locus", follow)
     section = locus_section(Case(arm, Chain()))
     words = " ".join(section.words)
-    assert "told from its neighbours" not in words
+    assert "separated from its neighbours" not in words
     assert "Along K1 the branches of this arm could not be followed" in words
     stems = ["locus-K2", "locus-K2-branches", "locus-K2-crossings"]
     assert [block.stem for block in section.blocks][:3] == stems

@@ -17,7 +17,7 @@ SECTIONS = "rectangle (--width, --depth), round (--diameter) or tube (--outer-di
 Size = Annotated[float | None, typer.Option(rich_help_panel="Section")]
 
 
-def asked(option: str, value: Any, text: str, kind: type = float, usual: Any = None) -> Any:
+def entered(option: str, value: Any, text: str, kind: type = float, usual: Any = None) -> Any:
     """Return the value of an option, where it is None the answer to a question on a terminal.
 
     Raises ParameterError where standard input is no terminal.
@@ -38,9 +38,9 @@ def link_table(*, material: str | None = None, length: float | None = None) -> d
     """
     from tfarm.arm.materials import materials
 
-    chosen = asked("--material", material, f"material ({', '.join(materials())})", str, "steel")
+    chosen = entered("--material", material, f"material ({', '.join(materials())})", str, "steel")
     must_be_known("--material", chosen, materials())
-    return {"length": asked("--length", length, "length of the link [m]"), "material": chosen}
+    return {"length": entered("--length", length, "length of the link [m]"), "material": chosen}
 
 
 def section_table(
@@ -65,10 +65,10 @@ def section_table(
     last = (given or ["width"])[-1]
     shapes = [shape for shape, of in SHAPES.items() if set(given) <= set(of.dimensions)]
     require(shapes, options[last], sizes[last], f"give the sizes of one section: {SECTIONS}")
-    shape = shapes[0] if given else asked(options[last], None, f"section: {SECTIONS}", str, "rectangle")
+    shape = shapes[0] if given else entered(options[last], None, f"section: {SECTIONS}", str, "rectangle")
     must_be_known("section", shape, SHAPES)
     return {"shape": shape} | {
-        name: asked(options[name], sizes[name], "{0.label} ({0.help}) [m]".format(file_key(f"link.section.{name}")))
+        name: entered(options[name], sizes[name], "{0.label} ({0.help}) [m]".format(file_key(f"link.section.{name}")))
         for name in SHAPES[shape].dimensions
     }
 
@@ -108,7 +108,7 @@ def new(
     tables = {
         "name": file.stem,
         "link": ({} if damping is None else {"damping": damping}) | link() | {"section": section()},
-        "hub": {"inertia": asked("--hub-inertia", hub_inertia, "inertia of the hub about the axis [kg m^2]")},
+        "hub": {"inertia": entered("--hub-inertia", hub_inertia, "inertia of the hub about the axis [kg m^2]")},
         "payload": {"mass": payload_mass, "inertia": payload_inertia},
         **({} if period is None else {"sampling": {"period": period}}),
     }
