@@ -1,7 +1,9 @@
 """What is dear and the same for every test: made once a session, by the first of its processes to want it."""
 
 import fcntl
+import importlib.util
 import os
+from pathlib import Path
 
 import pytest
 
@@ -55,3 +57,11 @@ def remember(monkeypatch, module, name):
     """Replace a module's function by its `remembered` form for one test, where several commands call it alike."""
     getattr(tfarm, name, None)  # tfarm keeps the function once it is read: not the replacement
     monkeypatch.setattr(module, name, remembered(getattr(module, name)))
+
+
+def docs_module(name):
+    """The module docs/NAME.py; it needs no Sphinx to be imported."""
+    spec = importlib.util.spec_from_file_location(f"docs_{name}", Path(__file__).parent.parent / "docs" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

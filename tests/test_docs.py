@@ -1,11 +1,11 @@
 """The pages of the documentation that are made from the code name every command, option, key and public name."""
 
-import importlib.util
 import re
 from pathlib import Path
 
 import pytest
 
+from tests.shared import docs_module
 from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES
 from tfarm.cli.app import whole_command
 from tfarm.schema.glossary import declared_records
@@ -15,11 +15,7 @@ DOCS = Path(__file__).parent.parent / "docs"
 
 @pytest.fixture(scope="module")
 def conf():
-    """docs/conf.py; it needs no Sphinx to be imported."""
-    spec = importlib.util.spec_from_file_location("docs_conf", DOCS / "conf.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return docs_module("conf")
 
 
 def test_every_command_and_option_is_on_the_page_of_commands(conf):

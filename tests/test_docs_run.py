@@ -19,6 +19,7 @@ from matplotlib import pyplot
 
 import tfarm
 from tests.bench import Row
+from tests.shared import docs_module
 from tests.shell import heard
 from tfarm.arm.law_tables import load_law
 from tfarm.audit import audit
@@ -214,11 +215,7 @@ def test_links_of_a_page_lead_somewhere(name):
 
 @pytest.fixture(scope="module")
 def tables():
-    """docs/tables.py; it needs no Sphinx to be imported."""
-    spec = importlib.util.spec_from_file_location("docs_tables", DOCS / "tables.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return docs_module("tables")
 
 
 def test_every_computed_table_is_on_a_page_and_every_one_on_a_page_is_computed(tables):

@@ -92,6 +92,11 @@ NOT_DEFINED = Graded(None, None, UNDEFINED)
 margins_of, _sampled_of = lru_cache(maxsize=64)(margins), lru_cache(maxsize=16)(sampled)  # card and curve of a page
 
 
+def loop_names(period: float) -> tuple[str, str]:
+    """The continuous-time loop and the one sampled every `period` [s], as tables name them."""
+    return "continuous-time", f"sampled, {1e3 * period:g} ms"
+
+
 @dataclass(frozen=True, kw_only=True)
 @record
 class LoopCard:
@@ -143,8 +148,8 @@ class ResultCard:
     @property
     def loops(self) -> dict[str, LoopCard]:
         """The loops that are determined, by name."""
-        both = {"continuous-time": self.continuous, f"sampled, {1e3 * self.period:g} ms": self.sampled}
-        return {name: each for name, each in both.items() if each is not None}
+        both = zip(loop_names(self.period), (self.continuous, self.sampled), strict=True)
+        return {name: each for name, each in both if each is not None}
 
     @property
     def finding(self) -> str:
@@ -174,10 +179,9 @@ def result_card(
     ParameterError where there is no loop.
     """
     law, chain = as_law(law), chain_or_usual(chain)
-    T, reference = chain.sampling.period, reference_damping(arm)
-    damped = arm.having(damping=reference) if arm.has_elastic_link else arm
+    T, (damped, undamped) = chain.sampling.period, graded_arm(arm)
     notes = [SCALED + RECOMMENDED[arm.has_elastic_link]] if law.gains == default_gains(arm) else []
-    notes += [UNDAMPED.format(reference)] if arm.has_elastic_link else []
+    notes += [undamped] if undamped else []
     loops: dict[str, Callable[[], tuple[LoopCard, Callable[[], LoopCard]]]] = {
         "continuous": lambda: (
             continuous_card(continuous or margins_of(arm, law), T),
@@ -201,6 +205,14 @@ def result_card(
 def reference_damping(arm: Arm) -> float:
     """Kelvin-Voigt damping C [s] with which the first mode of an undamped arm has the damping ratio 0.1 %."""
     return 2 * REFERENCE_RATIO / float(modes(arm, 1).natural_frequency[-1])
+
+
+def graded_arm(arm: Arm) -> tuple[Arm, str]:
+    """The arm whose margins are graded, with the damping of reference where its link has none, and the note of that."""
+    if not arm.has_elastic_link:
+        return arm, ""
+    reference = reference_damping(arm)
+    return arm.having(damping=reference), UNDAMPED.format(reference)
 
 
 def continuous_card(found: Margins, period: float) -> LoopCard:
@@ -300,11 +312,7 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
     ConvergenceError
         Where its stability is not determined.
     """
-    law = as_law(law)
-    damped, note = arm, ""
-    if arm.has_elastic_link:
-        reference = reference_damping(arm)
-        damped, note = arm.having(damping=reference), UNDAMPED.format(reference)
+    law, (damped, note) = as_law(law), graded_arm(arm)
 
     def as_card(curve: LoopCurve, own: str) -> LoopCurve:
         return replace(curve, stability=own, note=note, margins=None if own == "unstable" else curve.margins)

@@ -48,6 +48,8 @@ from tfarm.schema import Column, Percent, Quantity, Table, across
 from tfarm.schema.html import as_html
 from tfarm.spectrum.table import first_frequency
 
+from .card import loop_names
+
 SAMPLED_NAMES = {"reference": "reference", "slew": "slew", "pulse": "pulse", "deflection": "decay"}  # by scenario
 MOMENT, UNSTABLE, GROWS = AT_HUB[-1], "unstable", " (the response grows, its figures are not defined)"
 PARTS = ("hub", "tip", "root_moment", "torque")
@@ -188,7 +190,7 @@ class Step(_Record):
     @property
     def loops(self) -> dict[str, LoopResponse]:
         """The loops by name."""
-        names = "continuous-time", f"sampled, {1e3 * self.period:g} ms"
+        names = loop_names(self.period)
         return {name: loop for name, loop in zip(names, (self.continuous, self.sampled), strict=True) if loop}
 
     @property

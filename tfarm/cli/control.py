@@ -334,14 +334,19 @@ def simulate(
             load_arm(arm, theory), load_tuner(controller), chain(arm), scenario, duration, **how
         )
     if mat is not None:
-        name = partial(re.sub, r"\W", "_")  # as MATLAB takes it: strain_0_05 of strain@0.05
-        signals: dict[str, Any] = {name(key): values for key, values in found.signals.items() if len(values)}
-        if found.between:
-            signals["between"] = {name(key): values for key, values in found.between.items()}
-        write_mat(mat, signals, key="--mat")
+        write_mat(mat, matlab_signals(found), key="--mat")
     if animate is not None:
         tfarm.plots.animate(found.arm, found.simulation).save(animate)
     if found.stopped_at is not None:
         mode = f"mode {found.growing_mode}" if found.growing_mode else "the hub"
         print_line(f"unstable: stopped at {found.stopped_at:.6g} s, {mode} grows")
     emit(found, json, defaults, csv=csv, png=png, also=(mat, animate))
+
+
+def matlab_signals(found: Any) -> dict[str, Any]:
+    """The signals of a run under names that MATLAB takes, strain_0_05 of strain@0.05; those between samples apart."""
+    name = partial(re.sub, r"\W", "_")
+    signals: dict[str, Any] = {name(key): values for key, values in found.signals.items() if len(values)}
+    if found.between:
+        signals["between"] = {name(key): values for key, values in found.between.items()}
+    return signals

@@ -52,7 +52,7 @@ def decisive(band: LoopMargins) -> Iterator[tuple[float, complex, str, str]]:
 def _at(size: float, unit: str, omega: float | None) -> str:
     """A margin with its frequency."""
     where = f" at {general(omega, DIGITS)} rad/s" if omega else ""
-    return f"{general(size, DIGITS)} {unit}{where}" if math.isfinite(size) else "no limit"
+    return f"{general(size, DIGITS)}{unit and f' {unit}'}{where}" if math.isfinite(size) else "no limit"
 
 
 def _looks(curve: LoopCurve, of: str = "", color: str = BLUE) -> Looks:
@@ -171,7 +171,7 @@ def sensitivity(found: Margins | LoopCurve, *, ax: Axes) -> None:
             ax.plot(each.omega, values, lw=width, **_looks(each, f"|{name}|, ", colour))
             if each.margins is not None:
                 peak, omega = each.margins.sensitivity_peak if name == "S" else each.margins.complementary_peak
-                label = f"M{name.lower()} {_at(peak, '', omega).replace('  ', ' ')}"
+                label = f"M{name.lower()} {_at(peak, '', omega)}"
                 ax.plot([omega or math.nan], [decibels(peak)], **_marked(each, label, marker, size))
     ax.axhline(0.0, color=GREY, lw=0.9)
     ax.axhline(float(decibels(USUAL_PEAK)), color=GREY, lw=0.9, ls=":", label=f"Ms = {USUAL_PEAK:g}")
@@ -216,7 +216,7 @@ def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
         (-1.0, 1 / USUAL_PEAK, {"color": INK, "ls": ":", "label": f"Ms = {USUAL_PEAK:g}"}),
     ]
     for peak in [loop_margins(data.verdict).sensitivity_peak] if data.verdict.is_stable else []:
-        label = f"radius 1/Ms, Ms {_at(peak.value, '', peak.omega).replace('  ', ' ')}"
+        label = f"radius 1/Ms, Ms {_at(peak.value, '', peak.omega)}"
         circles.append((-1.0, 1 / peak.value, {"color": INK, "ls": "--", "label": label}))
     for place in (ax, zoom):
         for centre, radius, looks in circles:

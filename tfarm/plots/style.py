@@ -161,9 +161,7 @@ def picture(
                 pyplot.draw_if_interactive()  # type: ignore[no-untyped-call]
                 axes = figure(*found, new=pyplot.figure, **how).axes
             else:
-                axes = list(np.ravel(np.asarray(ax, dtype=object)))
-                remedy = f"{len(rows)} axes, as figure.subplots({len(rows)}) makes them"
-                require(grid is not None or len(axes) == len(rows), "ax", len(axes), remedy)
+                axes = given_axes(ax, None if grid else len(rows))
                 with style():
                     draw(*found, ax=axes[0] if is_one else axes, **how)
             return axes[0] if is_one else tuple(axes)
@@ -174,6 +172,13 @@ def picture(
         return shown
 
     return decorated
+
+
+def given_axes(ax: Any, count: int | None) -> list[Axes]:
+    """The axes that a picture is drawn in.  Raises ParameterError for another number of them than `count`, if any."""
+    axes = list(np.ravel(np.asarray(ax, dtype=object)))
+    require(count in (None, len(axes)), "ax", len(axes), f"{count} axes, as figure.subplots({count}) makes them")
+    return axes
 
 
 def column_size(inches: tuple[float, float], is_wide: bool) -> tuple[float, float]:
