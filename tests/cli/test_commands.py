@@ -115,6 +115,8 @@ BAD = [
     (["assumptions", BENCH], "one Timoshenko beam on a hub"),
     (["response", "sasaki2012-lab", "--s", "1j", "--theory", "shear", "--method", "appendix"], "Timoshenko"),
     (["completion", "fsh"], "'fish'"),
+    (["step", "sasaki2012-lab", "--figure", "t.pdf", "--csv", "t.pdf"], "two results in one file"),
+    (["simulate", "sasaki2012-lab", "--animate", "x.gif", "--figure", "nowhere/a.png"], "is in no folder"),
     (["compare", "sasaki2012"], "give a second arm, or --law FILE twice"),
     (["compare", "sasaki2012", "sasaki2012-lab", "stocky-steel"], "two at most"),
     (["compare", "sasaki2012", "--law", "a.toml"], "does not exist"),

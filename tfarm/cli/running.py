@@ -24,7 +24,8 @@ STREAMED = (
     "--save",
 )  # of files that may go to standard output instead, called "-"
 ONLY_STREAMED = f"- is standard output, and only {', '.join(STREAMED)} may go there: give a name"
-PATHS = (*STREAMED, "--animate", "--out", "--dsp", "--law", "--controller")  # may be called 1_0
+WRITTEN = (*STREAMED, "--animate")
+PATHS = (*WRITTEN, "--out", "--dsp", "--law", "--controller")  # may be called 1_0
 ODD_NUMBER = re.compile(r"(?=.*(_|[^\x00-\x7f]))[-+.\d_eEij]*\d[-+.\d_eEij]*")  # to Python alone: 5_0, or other digits
 
 
@@ -88,6 +89,7 @@ def check_words(arguments: list[str]) -> None:
     words = [word for argument in arguments for word in argument.split("=", 1 if argument.startswith("--") else 0)]
     options = [(option, text) for option, text in pairwise(words) if option.startswith("--")]
     takers = [option for option, text in options if text == STANDARD_OUTPUT] + ["--json"] * ("--json" in words)
+    files = [text for option, text in options if option in WRITTEN and text != STANDARD_OUTPUT]
     for option, text in options:
         is_odd = option not in PATHS and any(map(ODD_NUMBER.fullmatch, re.split("[,=]", text)))
         is_output = text == STANDARD_OUTPUT
@@ -96,6 +98,8 @@ def check_words(arguments: list[str]) -> None:
             (option in PATHS and not text.strip(), "give a path"),
             (is_output and option not in STREAMED, ONLY_STREAMED),
             (is_output and len(takers) > 1, "standard output takes one thing at a time: name a file"),
+            (option in WRITTEN and files.count(text) > 1, "two results in one file: name another"),
+            (option in WRITTEN and not Path(text).parent.is_dir(), "is in no folder: make that first"),
         ):
             require(not is_wrong, option, text, remedy)
 
