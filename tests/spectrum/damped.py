@@ -49,6 +49,8 @@ def judge(arm, count, *, certify=True, model=True):
     wrong = []
     if inside.size + damped.undamped.system.at_rest != damped.count:
         wrong.append(f"{inside.size} flexible eigenvalues listed in the box of {damped.count}")
+    if (flexible.real > 0).any():
+        wrong.append("an eigenvalue right of the axis, of an arm that dissipates")
     if model:
         wrong += compared(arm, damped, inside)
     if proof is not None and [len(discs) for discs in proof] != [

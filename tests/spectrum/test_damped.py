@@ -62,6 +62,17 @@ def test_extreme_ends(damping: tuple[float, float], ends: tuple[float, float, fl
         assert found.outcome == "right", (count, found.words)
 
 
+def test_eigenvalues_beyond_the_box_are_zeros_too() -> None:
+    """Two branches of this arm once ended at 4e11 1/s, where a slope by differences was none, right of the axis."""
+    arm = tfarm.load("sasaki2012-lab").having(damping=1e-3)
+    found = pairs(listed(arm, 20))
+    found = found[np.isfinite(found)]
+    assert found.size > 30
+    assert found.real.max() <= 0
+    steps = np.array([newton_step(arm, complex(s)) for s in found[found.imag >= 0]])
+    assert steps.max() < 1e-8
+
+
 @pytest.mark.parametrize("overdamping", thinned([3.0, 0.05, 30.0], 3))
 def test_the_papers_determinant_vanishes_there(overdamping: float) -> None:
     rng = np.random.default_rng(12)

@@ -46,6 +46,7 @@ FED = tuple(OUTPUTS[gain.output] for gain in GAINS)
 assert all(each.place != "x" for each in FED)  # a gain is on an output with a place of its own
 NEXT_TO_REST = 1e-60  # 1/s, for s = 0: there D over a power of s is at its limit, and no power is 0
 DIFFERENCE_STEP = 1e-6  # of |s|, or of the way to -1/C, for differences
+LONGEST_DIFFERENCE = 1.0  # of ln abs(D) between two of these points: beyond, a difference is no slope
 
 
 class Analytic(NamedTuple):
@@ -93,6 +94,12 @@ def quick_characteristics(k: System, s: Complex, at_zero: int = 0) -> Analytic:
     values = parts.drive / at**at_zero
     up, down = values[1:] * np.exp(parts.scale[1:] - parts.scale[0])
     return Analytic(values[0], (up - down) / (2.0 * h), parts.scale[0])
+
+
+def has_slope(k: System, s: Complex) -> NDArray[np.bool_]:
+    """Return where D grows by less than a factor of e over the difference of a slope."""
+    growth = loop_parts(k, np.array([s, s + difference_steps(k, s)])).scale.real
+    return np.asarray(abs(growth[1] - growth[0]) < LONGEST_DIFFERENCE)
 
 
 def float_units(k: System) -> Real:

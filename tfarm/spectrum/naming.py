@@ -13,7 +13,7 @@ import numpy as np
 
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
-from tfarm.exact.characteristic import DIFFERENCE_STEP, quick_characteristics
+from tfarm.exact.characteristic import DIFFERENCE_STEP, has_slope, quick_characteristics
 from tfarm.exact.compiled import compiled
 from tfarm.exact.layout import Reading, readings
 from tfarm.exact.sweep import AXIS, fill_free
@@ -177,6 +177,8 @@ def named(undamped: Modes, count: int, steps: float) -> tuple[Complex, Complex]:
             (share, start), stray = lost.best, lost.residual
             start = np.where(stray, LOST, start)
     found = np.full(start.size, LOST) if ends else settled(function_of(k), start / family.level)
+    with np.errstate(invalid="ignore"):  # of lost ones
+        found[~has_slope(k, found)] = LOST  # so far out that Newton's method converges anywhere
     again = np.triu(abs(found[:, None] - found) <= REAL_SHARE * abs(found), 1).any(axis=0)
     found[again] = LOST
     return in_pairs(found[: len(alone)], found[len(alone) :].reshape(-1, 2))
