@@ -7,6 +7,7 @@ result counts as not stable.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,21 +17,17 @@ import numpy as np
 from scipy import stats
 
 from tfarm.arrays import Real
-from tfarm.errors import require
 from tfarm.schema import Percent, Quantity
 
-from .quantities import COLUMNS, LOOPS, asked_columns
+from .quantities import COLUMNS, LOOPS
 
 CONFIDENCE = 0.95
 QUANTILES = {"least": 0.0, "low": 0.05, "median": 0.5, "high": 0.95, "largest": 1.0}
+SHOWN = 1e4  # parts of a share that are shown: a hundredth of a per cent, rounded downwards
 SIGNIFICANT = 0.05  # of a rank correlation: a larger probability of chance names no driver
 FEWEST_RANKED = 10  # rows of a rank correlation
 CERTAINTIES = ("exact", "certified", "converged", "approximate", "not determined")
 STABLE = "stable"
-LARGER_IS_WORSE = (
-    "peak_sensitivity", "settling_time_s", "overshoot", "time_constant_s", "residual_rms", "cost", "unstable",
-    "minimum_damping_s", "rise_time_s",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,26 +76,19 @@ def least_share(successes: int, count: int, confidence: float = CONFIDENCE) -> f
 
 
 def shares_of(table: Mapping[str, Any], names: Sequence[str], is_independent: bool) -> tuple[StableShare, ...]:
-    """Return the stable shares of the loops whose stability was asked for."""
+    """Return the stable shares of the loops whose stability was computed."""
     found = []
-    for loop in LOOPS:
-        if f"{loop}.stability" not in names:
-            continue
+    for loop in [each for each in LOOPS if f"{each}.stability" in names]:
         words = table[f"{loop}.stability"]
-        is_stable = words == STABLE
-        stable, undetermined = int(is_stable.sum()), int((words == "").sum())
-        texts = table.get(f"{loop}.certainty", np.full(len(words), ""))[is_stable].tolist()
-        certainty = max(({text.split(" ")[0] for text in texts} & {*CERTAINTIES}) or {""}, key=_rank)
+        stable, undetermined, count = int((words == STABLE).sum()), int((words == "").sum()), len(words)
+        texts = table.get(f"{loop}.certainty", np.full(count, ""))[words == STABLE].tolist()
+        at_least = math.floor(SHOWN * least_share(stable, count)) / SHOWN if is_independent else 0.0
         found.append(StableShare(
             loop=loop.replace("continuous", "continuous-time"), stable=stable, open=undetermined,
-            other=len(words) - stable - undetermined, certainty=certainty,
-            at_least=Percent(least_share(stable, len(words))) if is_independent and len(words) else None,
+            other=count - stable - undetermined, at_least=Percent(at_least) if at_least else None,
+            certainty=max((text.split(" ")[0] for text in texts), key=(*CERTAINTIES, "").index, default=""),
         ))  # fmt: skip
     return tuple(found)
-
-
-def _rank(word: str) -> int:
-    return CERTAINTIES.index(word) if word else -1
 
 
 def spreads_of(table: Mapping[str, Any], names: Sequence[str], keys: Sequence[str]) -> tuple[Spread, ...]:
@@ -120,32 +110,17 @@ def spreads_of(table: Mapping[str, Any], names: Sequence[str], keys: Sequence[st
 
 def _driver(inputs: Mapping[str, Real], values: Real) -> tuple[str | None, float | None]:
     """Return the varied number of the largest significant rank correlation, and that."""
-    found = {}
-    for key, column in inputs.items():
-        if len(values) >= FEWEST_RANKED and np.ptp(column) > 0 and np.ptp(values) > 0:
-            of = stats.spearmanr(column, values)
-            if of.pvalue < SIGNIFICANT / len(inputs):  # Bonferroni: of several numbers one is often near it by chance
-                found[key] = float(of.statistic)
-    if not found:
-        return None, None
-    key = max(found, key=lambda each: abs(found[each]))
-    return key, found[key]
+    known = {key: stats.spearmanr(column, values) for key, column in inputs.items()
+             if len(values) >= FEWEST_RANKED and np.ptp(column) > 0 and np.ptp(values) > 0}  # fmt: skip
+    level = SIGNIFICANT / max(1, len(inputs))  # Bonferroni: of several numbers one is often near it by chance
+    found = {key: float(of.statistic) for key, of in known.items() if of.pvalue < level}
+    return max(found.items(), key=lambda each: abs(each[1]), default=(None, None))
 
 
 def failures_of(table: Mapping[str, Any]) -> tuple[Failure, ...]:
     """Return the reasons of missing results with their counts."""
-    first: dict[str, int] = {}
-    count: dict[str, int] = {}
+    rows: dict[str, list[int]] = {}
     for row, text in zip(table["row"].tolist(), table["failed"].tolist(), strict=True):
-        reason = re.sub(r"[-+]?\d[\d.eE+-]*", "N", text)
-        if reason:
-            first.setdefault(reason, int(row))
-            count[reason] = count.get(reason, 0) + 1
-    return tuple(Failure(reason, count[reason], row) for reason, row in first.items())
-
-
-def quantity_named(word: str, key: str) -> str:
-    """Return the one column of numbers of a word.  Raises ParameterError for none or several."""
-    names = [name for name in asked_columns([word]) if not COLUMNS[name].is_text and COLUMNS[name].of.label]
-    require(len(names) == 1 or word in names, key, word, f"names several quantities: {', '.join(names[:6])}")
-    return word if word in names else names[0]
+        if text:
+            rows.setdefault(re.sub(r"[-+]?\d[\d.eE+-]*", "N", text), []).append(int(row))
+    return tuple(Failure(reason, len(own), own[0]) for reason, own in rows.items())

@@ -15,7 +15,7 @@ import math
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property, partial
 from itertools import islice
 from pathlib import Path
@@ -32,11 +32,12 @@ from tfarm.files import locked, read_file, write_file
 from tfarm.processes import shared
 
 from .extras import has_parquet, on_cluster, parquet_bytes, parquet_columns, versions
-from .quantities import COLUMNS, values_of
+from .quantities import COLUMNS, FAILED, values_of
 from .space import Listing, Space, Subjects
 
 Progress = Callable[[int, int, str], object]
-ROW, FAILED = "row", "failed"  # columns of every part: number of the row, and the reason of a missing result
+Task = tuple[int, Callable[[], dict[str, list[Any]]]]  # number of a part, and the call that returns its table
+ROW = "row"  # column of the number of the row, from 0
 FILE, PREFIX = "study.json", "part-"
 MOST_BYTES = 1 << 20  # of that file
 PILOT = 4  # rows whose cost is measured
@@ -76,7 +77,9 @@ class Plan:
         """Return all that the results depend on, as JSON has it."""
         space = self.space
         return {
-            "arm": file_text(self.arm, self.chain), "law": repr(as_law(self.law)), "names": list(self.names),
+            "arm": file_text(self.arm, self.chain),
+            "law": json.dumps(asdict(as_law(self.law)), default=np.ndarray.tolist),
+            "names": list(self.names),
             "distributions": {key: [each.kind, *each.numbers] for key, each in space.distributions.items()},
             "grids": {key: list(values) for key, values in space.grids.items()},
             "posterior": None if space.posterior is None else hashlib.sha256(
@@ -99,39 +102,46 @@ def table_of(plan: Plan, first: int, rows: Real) -> dict[str, list[Any]]:
         found: dict[str, Any] = {ROW: number, **dict(zip(plan.space.keys, row, strict=True))}
         try:
             found |= values_of(plan.subjects.at(row), plan.names)
-        except TfarmError as error:
-            found[FAILED] = one_line(str(error), LONGEST_REASON)
         except Exception as error:  # one arm never ends a study: its reason is kept, and counted
-            found[FAILED] = one_line(f"{type(error).__name__}: {error}", LONGEST_REASON)
+            found[FAILED] = str(error) if isinstance(error, TfarmError) else f"{type(error).__name__}: {error}"
+        found[FAILED] = found[FAILED] and one_line(found[FAILED], LONGEST_REASON)
         for name, column in table.items():
             column.append(found.get(name))
     return table
 
 
+def first_rows(plan: Plan, count: int, listing: Listing | None) -> Real:
+    """Return the values of the first rows (rows, keys), at most that number."""
+    count = min(count, plan.space.count)
+    return plan.space.rows(0, count, None if listing is None else np.array(list(islice(listing.rows(), count))))
+
+
 def check_rows(plan: Plan, listing: Listing | None) -> None:
     """Raise ParameterError where a number of the first rows is illegal, with their number and the first reason."""
-    count = min(CHECKED, plan.space.count)
-    rows = plan.space.rows(0, count, None if listing is None else np.array(list(islice(listing.rows(), count))))
-    errors: dict[int, ParameterError] = {}
+    rows, errors = first_rows(plan, CHECKED, listing), dict[int, ParameterError]()
     for number, row in enumerate(rows.tolist()):
         try:
             plan.subjects.at(row)
         except ParameterError as error:
             errors[number] = error
     for number, first in errors.items():
-        remedy = f"{len(errors)} of {count} arms are illegal, the first in row {number}: {first.remedy}"
+        remedy = f"{len(errors)} of {len(rows)} arms are illegal, the first in row {number}: {first.remedy}"
         raise ParameterError(key=first.key, value=first.value, remedy=remedy)
+
+
+def seconds_an_arm(plan: Plan, rows: Real) -> float:
+    """Return the median time of the first rows of values (rows, keys) [s]."""
+    times = []
+    for row in rows[:PILOT]:
+        began = time.perf_counter()
+        table_of(plan, 0, row[None])
+        times.append(time.perf_counter() - began)
+    return float(np.median(times[1:] or times))  # the first one compiles
 
 
 def rows_a_chunk(plan: Plan, workers: int, listing: Listing | None) -> int:
     """Return the rows of a chunk of 5 to 30 s by the median cost of a few arms."""
-    times, count = [], min(PILOT, plan.space.count)
-    ends = [(n, n + 1) for n in range(count)]
-    for (first, last), listed in zip(ends, [None] * count if listing is None else listing.blocks(ends), strict=True):
-        began = time.perf_counter()
-        chunk(plan, first, last, listed)
-        times.append(time.perf_counter() - began)
-    cost = float(np.median(times[1:] or times))  # the first one compiles
+    cost = seconds_an_arm(plan, first_rows(plan, PILOT, listing))
     whole = cost * plan.space.count / (CHUNKS_A_WORKER * workers)
     seconds = min(max(whole, LEAST_SECONDS), MOST_SECONDS)
     return max(1, min(round(seconds / cost), MOST_ROWS, math.ceil(plan.space.count / workers)))
@@ -259,17 +269,14 @@ def run(
     missing = [number for number in range(parts.count) if number not in done]
     with locked(parts.folder / FILE, "--out"):
         tasks = _tasks(parts, listing, missing, began + (math.inf if stop_after is None else stop_after))
-        results = on_cluster(tasks, client) if client is not None else shared(tasks, workers)
-        for ready, (number, table) in enumerate(results, start=1):
+        for ready, (number, table) in enumerate(computed(tasks, workers, client), start=1):
             parts.write(number, table)
             if progress is not None:
                 left = (time.monotonic() - began) / ready * (len(missing) - ready)
                 progress(parts.count - len(missing) + ready, parts.count, f"parts of the study, {left:.0f} s left")
 
 
-def _tasks(
-    parts: Parts, listing: Listing | None, missing: Sequence[int], deadline: float
-) -> Iterator[tuple[int, Callable[[], dict[str, list[Any]]]]]:
+def _tasks(parts: Parts, listing: Listing | None, missing: Sequence[int], deadline: float) -> Iterator[Task]:
     """Yield the number of each missing part with the call that returns its table."""
     ends = [parts.ends(number) for number in missing]
     points = parts.plan.space.points
@@ -279,6 +286,11 @@ def _tasks(
         if time.monotonic() >= deadline:
             return
         yield number, partial(chunk, parts.plan, first, last, listed)
+
+
+def computed(tasks: Iterator[Task], workers: int, client: Any) -> Iterator[tuple[int, dict[str, list[Any]]]]:
+    """Yield the number and the table of each task, from processes of this machine or from a client of Dask."""
+    return on_cluster(tasks, client) if client is not None else shared(tasks, workers)
 
 
 def usual_workers() -> int:
