@@ -7,13 +7,14 @@ result counts as not stable.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from scipy import stats
+import scipy  # whose statistics take half a second to load
 
 from tfarm.arrays import Real
 from tfarm.errors import require
@@ -38,19 +39,31 @@ class StableShare:
     """Stable arms of one loop."""
 
     loop: Annotated[str, Quantity("loop", help="continuous-time or sampled")]
-    stable: Annotated[int, Quantity("stable", help="arms with a stable loop")]
-    other: Annotated[int, Quantity("not stable", help="arms with a marginal or unstable loop")]
-    open: Annotated[int, Quantity("not determined", key="not_determined", help="arms without a result")]
-    certainty: Annotated[str, Quantity("certainty", help="weakest word of certainty among the stable arms")]
-    at_least: Annotated[Percent | None, Quantity("stable share, at least", "", 4,
-            help="with 95 % confidence, one-sided, Clopper and Pearson; independent draws only")]  # fmt: skip
+    stable: Annotated[int, Quantity(help="arms with a stable loop")]
+    other: Annotated[int, Quantity(key="not_stable", help="arms with a marginal or unstable loop")]
+    open: Annotated[int, Quantity(key="not_determined", help="arms without a result")]
+    certainty: Annotated[str, Quantity(help="weakest word of certainty among the stable arms")]
+    at_least: Annotated[Percent | None, Quantity(
+            help="share of stable arms with 95 % confidence, one-sided, Clopper and Pearson; independent draws only")]  # fmt: skip
+
+    @property
+    def finding(self) -> Annotated[str, Quantity("finding", help="stable arms, with their confidence in per cent")]:
+        """Stable arms with certainty and confidence."""
+        count = self.stable + self.other + self.open
+        text = f"{self.certainty if self.stable else ''} stable on {self.stable:,} of {count:,} arms".strip()
+        others = (f"{self.other:,} not stable" * bool(self.other), f"{self.open:,} not determined" * bool(self.open))
+        text += f" ({', '.join(filter(None, others))})" * any(others)
+        if self.at_least is None:
+            return text
+        percent = math.floor(1e4 * self.at_least) / 100  # never more than was shown
+        return f"{text}: at least {percent:g} % of all with {100 * CONFIDENCE:g} % confidence"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Spread:
     """Distribution of a quantity over the arms."""
 
-    name: Annotated[str, Quantity("name", help="column of the table")]
+    name: Annotated[str, Quantity(help="column of the table")]
     label: Annotated[str, Quantity("quantity", key="quantity", help="label of the quantity")]
     unit: Annotated[str, Quantity("unit", help="SI unit")]
     arms: Annotated[int, Quantity("arms", help="arms with a finite value")]
@@ -74,7 +87,7 @@ class Failure:
 
 def least_share(successes: int, count: int, confidence: float = CONFIDENCE) -> float:
     """Return the share that is exceeded with that confidence, one-sided (Clopper and Pearson, 1934)."""
-    interval = stats.binomtest(successes, count, alternative="greater").proportion_ci(confidence, method="exact")
+    interval = scipy.stats.binomtest(successes, count, alternative="greater").proportion_ci(confidence, method="exact")
     return float(interval.low)
 
 
@@ -123,7 +136,7 @@ def _driver(inputs: Mapping[str, Real], values: Real) -> tuple[str | None, float
     found = {}
     for key, column in inputs.items():
         if len(values) >= FEWEST_RANKED and np.ptp(column) > 0 and np.ptp(values) > 0:
-            of = stats.spearmanr(column, values)
+            of = scipy.stats.spearmanr(column, values)
             if of.pvalue < SIGNIFICANT / len(inputs):  # Bonferroni: of several numbers one is often near it by chance
                 found[key] = float(of.statistic)
     if not found:

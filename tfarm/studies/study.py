@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from scipy import stats
+import scipy  # whose statistics take half a second to load
 from scipy.optimize import minimize
 
 from tfarm.arm import AnyLaw, Arm
@@ -43,7 +43,7 @@ from .quantities import CARD, COLUMNS, asked_columns
 from .running import ROW, Parts, Plan, Progress, opened, run, table_of, usual_workers
 from .space import MOST_ROWS, MOST_SEED, Listing, Subjects, space_of
 
-INTERVAL = "(Clopper-Pearson, one-sided)"
+SHARES = "stable arms (confidence one-sided, Clopper-Pearson)"
 WORST_FILE = "worst.toml"
 STEPS_A_NUMBER, LEAST_STEPS = 20, 20  # evaluations of the search of the worst arm
 BEYOND = 1e9  # a value that any unstable loop exceeds in the order of worse arms
@@ -111,7 +111,7 @@ class Study:
         return self.done == self.rows
 
     @cached_property
-    def shares(self) -> Annotated[tuple[StableShare, ...], Quantity("stable arms", help="by loop")]:
+    def shares(self) -> Annotated[tuple[StableShare, ...], Quantity(SHARES, help="by loop", first=True)]:
         """Stable arms of each loop; a confidence of a complete study alone."""
         plan = self.parts.plan
         return shares_of(self._table, plan.names, plan.space.is_independent and self.is_complete)
@@ -127,17 +127,10 @@ class Study:
         return failures_of(self._table)
 
     @property
-    def finding(self) -> Annotated[str, Quantity("finding", help="stable arms of each loop, with their confidence")]:
+    def finding(self) -> Annotated[str, Quantity(help="stable arms of each loop, with their confidence")]:
         """Stable arms of each loop."""
-        texts = []
-        for each in self.shares:
-            word = f"{each.certainty} stable" if each.stable and each.certainty else "stable"
-            text = f"{each.loop}: {word} on {each.stable:,} of {self.done:,} arms"
-            if each.at_least is not None:
-                percent = math.floor(1e4 * each.at_least) / 100  # never more than was shown
-                text += f" drawn, at least {percent:g} % of them with {CONFIDENCE:.0%} confidence {INTERVAL}"
-            texts.append(text)
-        return "; ".join(texts) or f"{self.done:,} of {self.rows:,} arms computed"
+        words = [f"{each.loop}: {each.finding}" for each in self.shares]
+        return "; ".join(words) or f"{self.done:,} of {self.rows:,} arms computed"
 
     @property
     def csv_table(self) -> Table:
@@ -332,7 +325,9 @@ def sobol_indices(plan: Plan, size: int, workers: int, progress: Progress | None
         sampled.append(found)
         return np.nan_to_num(found, posinf=0.0, neginf=0.0)
 
-    indices: Any = stats.sobol_indices(func=known, n=size, dists=dists, rng=np.random.default_rng(plan.space.seed))
+    indices: Any = scipy.stats.sobol_indices(
+        func=known, n=size, dists=dists, rng=np.random.default_rng(plan.space.seed)
+    )
     ends = indices.bootstrap(confidence_level=CONFIDENCE)
     has_all = np.all([np.isfinite(each).reshape(len(numbers), -1).all(axis=1) for each in sampled], axis=0)
     varies = np.max([np.ptp(each.reshape(len(numbers), -1), axis=1) for each in sampled], axis=0) > 0
