@@ -12,6 +12,7 @@ from tfarm.cli.app import (
     Gains,
     Json,
     LawFile,
+    Png,
     TheoryName,
     add_command,
     advance,
@@ -60,7 +61,9 @@ def study(
     workers: Annotated[int | None, typer.Option(min=1)] = None,
     scheduler: str | None = None,
     stop_after: Annotated[float | None, typer.Option(min=0)] = None,
+    report: Annotated[bool, typer.Option("--report")] = False,
     csv: Csv = None,
+    png: Png = None,
     law: LawFile = None,
     chain: Any = load_chain,
     theory: TheoryName = None,
@@ -85,11 +88,13 @@ def study(
     workers: processes; by default one a processor
     scheduler: Dask scheduler, such as tcp://host:8786 (trusted networks only) or tls://host:8786
     stop_after: seconds after which no further part is begun
+    report: write a page, index.html, to that folder
     """
     from tfarm.arm.reading import load_tables
     from tfarm.studies import declared
     from tfarm.studies import study as run
     from tfarm.studies.extras import cluster
+    from tfarm.studies.running import usual_workers
 
     typed: dict[str, Any] = {
         "over": dict(over or []) or None, "ask": ask and ask.split(","), "draws": draws, "seed": seed, "rows": rows,
@@ -111,4 +116,9 @@ def study(
     else:
         with cluster(scheduler) as client:
             found = run(**arguments, **places, client=client)
-    emit(found, json, defaults, csv=csv)
+    page = None
+    if report:
+        from tfarm.report.writing import write_study
+
+        page = write_study(found, workers or usual_workers())
+    emit(found, json, defaults, csv=csv, png=png, also=(page,))

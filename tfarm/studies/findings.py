@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from scipy import stats
+import scipy  # whose statistics take half a second to load
 
 from tfarm.arrays import Real
 from tfarm.schema import Percent, Quantity
@@ -23,7 +23,6 @@ from .quantities import COLUMNS, LOOPS
 
 CONFIDENCE = 0.95
 QUANTILES = {"least": 0.0, "low": 0.05, "median": 0.5, "high": 0.95, "largest": 1.0}
-SHOWN = 1e4  # parts of a share that are shown: a hundredth of a per cent, rounded downwards
 SIGNIFICANT = 0.05  # of a rank correlation: a larger probability of chance names no driver
 FEWEST_RANKED = 10  # rows of a rank correlation
 CERTAINTIES = ("exact", "certified", "converged", "approximate", "not determined")
@@ -35,19 +34,31 @@ class StableShare:
     """Stable arms of one loop."""
 
     loop: Annotated[str, Quantity("loop", help="continuous-time or sampled")]
-    stable: Annotated[int, Quantity("stable", help="arms with a stable loop")]
-    other: Annotated[int, Quantity("not stable", help="arms with a marginal or unstable loop")]
-    open: Annotated[int, Quantity("not determined", key="not_determined", help="arms without a result")]
-    certainty: Annotated[str, Quantity("certainty", help="weakest word of certainty among the stable arms")]
-    at_least: Annotated[Percent | None, Quantity("stable share, at least", "", 4,
-            help="with 95 % confidence, one-sided, Clopper and Pearson; independent draws only")]  # fmt: skip
+    stable: Annotated[int, Quantity(help="arms with a stable loop")]
+    other: Annotated[int, Quantity(key="not_stable", help="arms with a marginal or unstable loop")]
+    open: Annotated[int, Quantity(key="not_determined", help="arms without a result")]
+    certainty: Annotated[str, Quantity(help="weakest word of certainty among the stable arms")]
+    at_least: Annotated[Percent | None, Quantity(
+            help="share of stable arms with 95 % confidence, one-sided, Clopper and Pearson; independent draws only")]  # fmt: skip
+
+    @property
+    def finding(self) -> Annotated[str, Quantity("finding", help="stable arms, with their confidence in per cent")]:
+        """Stable arms with certainty and confidence."""
+        count = self.stable + self.other + self.open
+        text = f"{self.certainty if self.stable else ''} stable on {self.stable:,} of {count:,} arms".strip()
+        others = (f"{self.other:,} not stable" * bool(self.other), f"{self.open:,} not determined" * bool(self.open))
+        text += f" ({', '.join(filter(None, others))})" * any(others)
+        if self.at_least is None:
+            return text
+        percent = math.floor(1e4 * self.at_least) / 100  # never more than was shown
+        return f"{text}: at least {percent:g} % of all with {100 * CONFIDENCE:g} % confidence"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Spread:
     """Distribution of a quantity over the arms."""
 
-    name: Annotated[str, Quantity("name", help="column of the table")]
+    name: Annotated[str, Quantity(help="column of the table")]
     label: Annotated[str, Quantity("quantity", key="quantity", help="label of the quantity")]
     unit: Annotated[str, Quantity("unit", help="SI unit")]
     arms: Annotated[int, Quantity("arms", help="arms with a finite value")]
@@ -71,7 +82,7 @@ class Failure:
 
 def least_share(successes: int, count: int, confidence: float = CONFIDENCE) -> float:
     """Return the share that is exceeded with that confidence, one-sided (Clopper and Pearson, 1934)."""
-    interval = stats.binomtest(successes, count, alternative="greater").proportion_ci(confidence, method="exact")
+    interval = scipy.stats.binomtest(successes, count, alternative="greater").proportion_ci(confidence, method="exact")
     return float(interval.low)
 
 
@@ -82,10 +93,10 @@ def shares_of(table: Mapping[str, Any], names: Sequence[str], is_independent: bo
         words = table[f"{loop}.stability"]
         stable, undetermined, count = int((words == STABLE).sum()), int((words == "").sum()), len(words)
         texts = table.get(f"{loop}.certainty", np.full(count, ""))[words == STABLE].tolist()
-        at_least = math.floor(SHOWN * least_share(stable, count)) / SHOWN if is_independent else 0.0
+        at_least = Percent(least_share(stable, count)) if is_independent else None
         found.append(StableShare(
             loop=loop.replace("continuous", "continuous-time"), stable=stable, open=undetermined,
-            other=count - stable - undetermined, at_least=Percent(at_least) if at_least else None,
+            other=count - stable - undetermined, at_least=at_least,
             certainty=max((text.split(" ")[0] for text in texts), key=(*CERTAINTIES, "").index, default=""),
         ))  # fmt: skip
     return tuple(found)
@@ -110,7 +121,7 @@ def spreads_of(table: Mapping[str, Any], names: Sequence[str], keys: Sequence[st
 
 def _driver(inputs: Mapping[str, Real], values: Real) -> tuple[str | None, float | None]:
     """Return the varied number of the largest significant rank correlation, and that."""
-    known = {key: stats.spearmanr(column, values) for key, column in inputs.items()
+    known = {key: scipy.stats.spearmanr(column, values) for key, column in inputs.items()
              if len(values) >= FEWEST_RANKED and np.ptp(column) > 0 and np.ptp(values) > 0}  # fmt: skip
     level = SIGNIFICANT / max(1, len(inputs))  # Bonferroni: of several numbers one is often near it by chance
     found = {key: float(of.statistic) for key, of in known.items() if of.pvalue < level}

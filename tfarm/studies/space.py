@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
 import numpy as np
-from scipy import stats
+import scipy  # whose statistics take half a second to load, and do so where they are used
 
 from tfarm.arm import AnyLaw, Arm
 from tfarm.arm.checks import number
@@ -40,10 +40,13 @@ TUNER_NUMBERS = (*NUMBERS, *NUMBERS_OF_LEARNING)
 LEAST_UNIFORM = 2.0**-54  # in the place of 0, where the inverse of a normal distribution is infinite
 ENDS = LEAST_UNIFORM, 1 - 2.0**-53  # least and largest uniform number
 FORMS: dict[str, tuple[str, Callable[..., Any]]] = {  # kind of a distribution: its numbers in words, and SciPy's
-    "uniform": ("LOW, HIGH", lambda low, high: low < high and stats.uniform(low, high - low)),
-    "loguniform": ("LOW, HIGH, above 0", lambda low, high: 0 < low < high and stats.loguniform(low, high)),
-    "normal": ("MEAN, DEVIATION", lambda mean, deviation: deviation > 0 and stats.norm(mean, deviation)),
-    "lognormal": ("MEDIAN, DEVIATION of ln", lambda median, s: min(median, s) > 0 and stats.lognorm(s, scale=median)),
+    "uniform": ("LOW, HIGH", lambda low, high: low < high and scipy.stats.uniform(low, high - low)),
+    "loguniform": ("LOW, HIGH, above 0", lambda low, high: 0 < low < high and scipy.stats.loguniform(low, high)),
+    "normal": ("MEAN, DEVIATION", lambda mean, deviation: deviation > 0 and scipy.stats.norm(mean, deviation)),
+    "lognormal": (
+        "MEDIAN, DEVIATION of ln",
+        lambda median, s: min(median, s) > 0 and scipy.stats.lognorm(s, scale=median),
+    ),
 }
 GRIDS: dict[str, tuple[str, Callable[..., Any]]] = {
     "grid": ("LOW, HIGH, COUNT", lambda low, high, count:
@@ -137,7 +140,7 @@ class Space:
         found = np.array([*fixed.values()]).reshape(len(fixed), len(uniform)).T
         if self.posterior is None:
             return found
-        return np.hstack([found, self.posterior.draws(fixed, stats.norm.ppf(uniform[:, len(fixed) :]))])
+        return np.hstack([found, self.posterior.draws(fixed, scipy.stats.norm.ppf(uniform[:, len(fixed) :]))])
 
     def uniform(self, n: int) -> Real:
         """Return the uniform numbers (drawn,) of draw n, in (0, 1)."""

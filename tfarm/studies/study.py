@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from scipy import stats
+import scipy  # whose statistics take half a second to load
 from scipy.optimize import minimize
 
 from tfarm.arm import AnyLaw, Arm, as_law
@@ -32,7 +32,6 @@ from tfarm.spectrum.table import default_gains
 
 from .findings import (
     CONFIDENCE,
-    SHOWN,
     STABLE,
     Failure,
     Spread,
@@ -45,7 +44,7 @@ from .quantities import CARD, COLUMNS, LOOPS, asked_columns, column_of
 from .running import ROW, Parts, Plan, Progress, computed, opened, run, seconds_an_arm, table_of, usual_workers
 from .space import ENDS, MOST_ROWS, MOST_SEED, Listing, space_of
 
-INTERVAL = "(Clopper-Pearson, one-sided)"
+SHARES = "stable arms (confidence one-sided, Clopper-Pearson)"
 WORST_FILE = "worst.toml"
 STEPS_A_NUMBER, LEAST_STEPS = 20, 20  # evaluations of the search of the worst arm
 FIRST_STEP = 0.05  # of that search, in the probability of each number
@@ -120,7 +119,7 @@ class Study:
         return self.done == self.rows
 
     @cached_property
-    def shares(self) -> Annotated[tuple[StableShare, ...], Quantity("stable arms", help="by loop")]:
+    def shares(self) -> Annotated[tuple[StableShare, ...], Quantity(SHARES, help="by loop", first=True)]:
         """Stable arms of each loop; a confidence of a complete study alone."""
         plan = self.parts.plan
         return shares_of(self._table, plan.names, plan.space.is_independent and self.is_complete)
@@ -136,17 +135,10 @@ class Study:
         return failures_of(self._table)
 
     @property
-    def finding(self) -> Annotated[str, Quantity("finding", help="stable arms of each loop, with their confidence")]:
+    def finding(self) -> Annotated[str, Quantity(help="stable arms of each loop, with their confidence")]:
         """Stable arms of each loop."""
-        texts = []
-        for each in self.shares:
-            word = f"{each.certainty} stable" if each.stable and each.certainty else "stable"
-            text = f"{each.loop}: {word} on {each.stable:,} of {self.done:,} arms"
-            if each.at_least is not None:
-                share = each.at_least.as_text(len(str(SHOWN)))
-                text += f" drawn, at least {share} of them with {100 * CONFIDENCE:g} % confidence {INTERVAL}"
-            texts.append(text)
-        return "; ".join(texts) or f"{self.done:,} of {self.rows:,} arms computed"
+        words = [f"{each.loop}: {each.finding}" for each in self.shares]
+        return "; ".join(words) or f"{self.done:,} of {self.rows:,} arms computed"
 
     @property
     def csv_table(self) -> Table:
@@ -339,7 +331,7 @@ def sobol_indices(plan: Plan, size: int, workers: int, client: Any, progress: Pr
     The first progress has their number and time.  A quantity without a finite value on each arm has no indices.
     """
     keys, names = plan.space.keys, [name for name in plan.names if COLUMNS[name].of.label and not COLUMNS[name].is_text]
-    A, B = np.hsplit(stats.qmc.Sobol(2 * len(keys), rng=np.random.default_rng(plan.space.seed)).random(size), 2)
+    A, B = np.hsplit(scipy.stats.qmc.Sobol(2 * len(keys), rng=np.random.default_rng(plan.space.seed)).random(size), 2)
     pages = [np.where(np.arange(len(keys)) == n, B, A) for n in range(len(keys))]  # A with one column of B
     rows = plan.space.values(np.clip(np.vstack([A, B, *pages]), *ENDS))
     seconds = seconds_an_arm(plan, rows) * len(rows) / workers
@@ -363,9 +355,9 @@ def _indices(names: Sequence[str], keys: Sequence[str], values: Real) -> Iterato
     if not names:
         return
     f_A, f_B, *f_AB = np.moveaxis(values.reshape(len(keys) + 2, -1, len(names)), 2, 1)
-    found: Any = stats.sobol_indices(func={"f_A": f_A, "f_B": f_B, "f_AB": np.array(f_AB)}, n=f_A.shape[1])
+    found: Any = scipy.stats.sobol_indices(func={"f_A": f_A, "f_B": f_B, "f_AB": np.array(f_AB)}, n=f_A.shape[1])
     with warnings.catch_warnings(), np.errstate(all="ignore"):  # an index that does not vary has no interval
-        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
+        warnings.simplefilter("ignore", scipy.stats.DegenerateDataWarning)
         ends = found.bootstrap(confidence_level=CONFIDENCE)
     columns = dict[str, Any]()
     for name in ("first", "total"):
