@@ -21,6 +21,7 @@ from tfarm.cli.app import (
     load_chain,
     load_law,
     named,
+    print_line,
     refuse,
 )
 from tfarm.errors import require
@@ -44,6 +45,13 @@ Over = Annotated[
     typer.Option("--over", metavar="KEY=KIND:NUMBERS", parser=named(varied), help=""),
 ]
 Words = Annotated[str | None, typer.Option("--ask", metavar="QUANTITY,...")]
+
+
+def announce(done: int, total: int, text: str) -> None:
+    """Set the line of progress, and print it where nothing of it is done: the cost of Sobol' indices."""
+    advance(done, total, text)
+    if not done:
+        print_line(text)
 
 
 @command(epilog="study sasaki2012-lab --over payload.mass=uniform:0,0.2 --ask card --draws 100 --out study")
@@ -110,7 +118,7 @@ def study(
         subject = load_arm(arm, theory)
         controller, defaults = load_law(subject, arm, gains, law)
         arguments = {"arm": subject, "law": controller, "chain": chain(arm), **own}
-    places: dict[str, Any] = {"out": out, "workers": workers, "stop_after": stop_after, "progress": advance}
+    places: dict[str, Any] = {"out": out, "workers": workers, "stop_after": stop_after, "progress": announce}
     if scheduler is None:
         found = run(**arguments, **places)
     else:

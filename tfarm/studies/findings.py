@@ -39,7 +39,7 @@ class StableShare:
     open: Annotated[int, Quantity(key="not_determined", help="arms without a result")]
     certainty: Annotated[str, Quantity(help="weakest word of certainty among the stable arms")]
     at_least: Annotated[Percent | None, Quantity(
-            help="share of stable arms with 95 % confidence, one-sided, Clopper and Pearson; independent draws only")]  # fmt: skip
+            help="least share of stable arms, 95 % confidence, one-sided, Clopper and Pearson; independent draws")]  # fmt: skip
 
     @property
     def finding(self) -> Annotated[str, Quantity("finding", help="stable arms, with their confidence in per cent")]:
@@ -97,7 +97,7 @@ def shares_of(table: Mapping[str, Any], names: Sequence[str], is_independent: bo
         found.append(StableShare(
             loop=loop.replace("continuous", "continuous-time"), stable=stable, open=undetermined,
             other=count - stable - undetermined, at_least=at_least,
-            certainty=max((text.split(" ")[0] for text in texts), key=(*CERTAINTIES, "").index, default=""),
+            certainty=max((text.partition(" ")[0].rstrip(",") for text in texts), key=(*CERTAINTIES, "").index, default=""),
         ))  # fmt: skip
     return tuple(found)
 

@@ -26,7 +26,7 @@ from tfarm.arm.feedback import OUTPUT_OF
 from tfarm.arm.writing import KeyedArms
 from tfarm.arrays import Real
 from tfarm.dsp import Chain
-from tfarm.errors import ParameterError, must_be_known, naming, require
+from tfarm.errors import ParameterError, close_to, must_be_known, naming, require
 from tfarm.fitting.posterior import Posterior
 from tfarm.records import record
 from tfarm.tuner.tuning import NUMBERS, NUMBERS_OF_LEARNING
@@ -50,7 +50,7 @@ FORMS: dict[str, tuple[str, Callable[..., Any]]] = {  # kind of a distribution: 
 }
 GRIDS: dict[str, tuple[str, Callable[..., Any]]] = {
     "grid": ("LOW, HIGH, COUNT", lambda low, high, count:
-             low < high and count in range(1, MOST_ROWS + 1) and np.linspace(low, high, int(count)).tolist()),
+             low < high and count % 1 == 0 < count <= MOST_ROWS and np.linspace(low, high, int(count)).tolist()),
     "values": ("at least one number", lambda *values: values),
 }  # fmt: skip
 KINDS = {**FORMS, **GRIDS}
@@ -180,10 +180,12 @@ def _distribution(place: str, entry: Any) -> Distribution:
     require(isinstance(numbers, Sequence | np.ndarray), place, numbers, remedy)
     found = Distribution(kind, tuple(number(place, each, remedy) for each in numbers))
     try:
-        made = make(*found.numbers)
+        with np.errstate(all="ignore"):
+            made = all(map(math.isfinite, found.numbers)) and make(*found.numbers)
+            is_finite = made and np.isfinite(made.ppf(ENDS) if kind in FORMS else made).all()
     except TypeError:  # another count of numbers
-        made = False
-    require(made and np.isfinite(made.ppf(ENDS) if kind in FORMS else made).all(), place, numbers, remedy)
+        is_finite = False
+    require(is_finite, place, numbers, remedy)
     return found
 
 
@@ -213,7 +215,8 @@ class Subjects:
         try:
             self._arms = KeyedArms(arm, own, "over")
         except ParameterError as error:
-            remedy = f"{error.remedy}; of the sampled loop: {', '.join(numbers)}; of the controller: {LAW}NUMBER"
+            near = "".join(f'did you mean "{each}"? ' for each in close_to(str(error.value), numbers))
+            remedy = f"{near}{error.remedy}; of the sampled loop: {', '.join(numbers)}; of the controller: {LAW}NUMBER"
             raise ParameterError(key=error.key, value=error.value, remedy=remedy) from None
 
     def at(self, row: Sequence[float]) -> Subject:
