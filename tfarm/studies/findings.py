@@ -39,7 +39,7 @@ class StableShare:
     open: Annotated[int, Quantity(key="not_determined", help="arms without a result")]
     certainty: Annotated[str, Quantity(help="weakest word of certainty among the stable arms")]
     at_least: Annotated[Percent | None, Quantity(
-            help="least share of stable arms, 95 % confidence, one-sided, Clopper and Pearson; independent draws")]  # fmt: skip
+            help="least stable share, 95 % confidence, one-sided, Clopper and Pearson; independent draws")]  # fmt: skip
 
     @property
     def finding(self) -> Annotated[str, Quantity("finding", help="stable arms, with their confidence in per cent")]:
@@ -93,11 +93,12 @@ def shares_of(table: Mapping[str, Any], names: Sequence[str], is_independent: bo
         words = table[f"{loop}.stability"]
         stable, undetermined, count = int((words == STABLE).sum()), int((words == "").sum()), len(words)
         texts = table.get(f"{loop}.certainty", np.full(count, ""))[words == STABLE].tolist()
+        known = [text.partition(" ")[0].rstrip(",") for text in texts]
         at_least = Percent(least_share(stable, count)) if is_independent else None
         found.append(StableShare(
             loop=loop.replace("continuous", "continuous-time"), stable=stable, open=undetermined,
             other=count - stable - undetermined, at_least=at_least,
-            certainty=max((text.partition(" ")[0].rstrip(",") for text in texts), key=(*CERTAINTIES, "").index, default=""),
+            certainty=max(known, key=(*CERTAINTIES, "").index, default=""),
         ))  # fmt: skip
     return tuple(found)
 

@@ -109,7 +109,7 @@ def _modes_of(one: Subject, _: Set[str]) -> dict[str, float | None]:
 def _damped_of(one: Subject, _: Set[str]) -> dict[str, float | None]:
     found = damped_modes(modes(one.arm, LISTED))
     s = found.eigenvalues[found.index > 0, 0]
-    return _numbered(RATIO, np.divide(-s.real, abs(s), out=np.full(s.shape, np.nan), where=s != 0))
+    return _numbered(RATIO, -s.real / abs(s))
 
 
 def _poles_of(one: Subject, _: Set[str]) -> dict[str, float | None]:

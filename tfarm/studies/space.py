@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -23,10 +24,10 @@ import scipy  # whose statistics take half a second to load, and do so where the
 from tfarm.arm import AnyLaw, Arm
 from tfarm.arm.checks import number
 from tfarm.arm.feedback import OUTPUT_OF
-from tfarm.arm.writing import KeyedArms
+from tfarm.arm.writing import KeyedArms, numbers_of
 from tfarm.arrays import Real
 from tfarm.dsp import Chain
-from tfarm.errors import ParameterError, close_to, must_be_known, naming, require
+from tfarm.errors import ParameterError, must_be_known, naming, require
 from tfarm.fitting.posterior import Posterior
 from tfarm.records import record
 from tfarm.tuner.tuning import NUMBERS, NUMBERS_OF_LEARNING
@@ -39,6 +40,7 @@ MOST_SEED = 2**63
 TUNER_NUMBERS = (*NUMBERS, *NUMBERS_OF_LEARNING)
 LEAST_UNIFORM = 2.0**-54  # in the place of 0, where the inverse of a normal distribution is infinite
 ENDS = LEAST_UNIFORM, 1 - 2.0**-53  # least and largest uniform number
+PLAIN_NUMBER = re.compile(r" *[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)? *", re.ASCII)
 FORMS: dict[str, tuple[str, Callable[..., Any]]] = {  # kind of a distribution: its numbers in words, and SciPy's
     "uniform": ("LOW, HIGH", lambda low, high: low < high and scipy.stats.uniform(low, high - low)),
     "loguniform": ("LOW, HIGH, above 0", lambda low, high: 0 < low < high and scipy.stats.loguniform(low, high)),
@@ -212,12 +214,9 @@ class Subjects:
         for name in of_tuner:
             must_be_known("tuner", name, TUNER_NUMBERS)
         own = [key for key in keys if not key.startswith((LAW, TUNER)) and key not in numbers]
-        try:
-            self._arms = KeyedArms(arm, own, "over")
-        except ParameterError as error:
-            near = "".join(f'did you mean "{each}"? ' for each in close_to(str(error.value), numbers))
-            remedy = f"{near}{error.remedy}; of the sampled loop: {', '.join(numbers)}; of the controller: {LAW}NUMBER"
-            raise ParameterError(key=error.key, value=error.value, remedy=remedy) from None
+        for key in own:
+            must_be_known("over", key, [*numbers_of(arm), *numbers, f"{LAW}NUMBER", f"{TUNER}NUMBER"])
+        self._arms = KeyedArms(arm, own, "over")
 
     def at(self, row: Sequence[float]) -> Subject:
         """Return the arm and loop of a row.  Raises ParameterError for an illegal value."""
@@ -292,9 +291,6 @@ class Listing:
 
 def _cell(value: Any, row: int, column: str) -> float:
     """Return a finite number of a cell.  Raises ParameterError, naming row and column."""
-    try:
-        found = math.nan if isinstance(value, bool) or "_" in str(value) else float(value)
-    except (TypeError, ValueError):
-        found = math.nan
-    require(math.isfinite(found), f"row {row}, column {column}", value, "every cell is a finite number")
-    return found
+    is_finite = PLAIN_NUMBER.fullmatch(str(value)) and math.isfinite(float(value))
+    require(is_finite, f"row {row}, column {column}", value, "every cell is a finite number")
+    return float(value)
