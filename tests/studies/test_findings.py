@@ -248,7 +248,7 @@ def test_the_order_of_worse_arms(word, stability, values, worst):
 
 
 def test_a_word_of_several_quantities_is_no_order():
-    with pytest.raises(ParameterError, match="one quantity of numbers"):
+    with pytest.raises(ParameterError, match="2 quantities of numbers, not one"):
         order_of("delay_margin_ms")
     assert order_of("damping_ratio.2") == Order("damped_modes.damping_ratio.2", ".stability", ".least_damping")
 

@@ -10,6 +10,7 @@ from scipy import stats
 import tfarm
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
+from tfarm.fitting.posterior import Posterior
 from tfarm.studies import space
 from tfarm.studies.running import Plan
 from tfarm.studies.space import ENDS, Listing, Subjects, space_of
@@ -75,6 +76,41 @@ def test_inverses_are_finite_at_both_ends_of_the_uniform_numbers(monkeypatch):
 
     monkeypatch.setattr(space.np.random, "Generator", Zero)
     assert made({"a": {"normal": [0, 1]}}).uniform(3).tolist() == [ENDS[0]]
+
+
+POSTERIOR = Posterior(
+    keys=("a", "b", "c"), value=np.array([2.0, 5.0, 7.0]), size=np.array([0.0, 2.0, 1.0]),  # a by its logarithm
+    covariance=np.array([[0.04, 0.06, 0.0], [0.06, 0.25, 0.1], [0.0, 0.1, 0.09]]), intervals=((None, None),) * 3,
+    not_determined=(),
+)  # fmt: skip
+
+
+def test_draws_of_a_posterior_have_its_covariance():
+    found = made(posterior=POSTERIOR, draws=4000)
+    a, b, c = found.rows(0, 4000, None).T
+    coordinates = np.array([np.log(a / 2), (b - 5) / 2, c - 7])
+    deviation = np.sqrt(np.diag(POSTERIOR.covariance))
+    for own, size in zip(coordinates, deviation, strict=True):
+        assert stats.kstest(own / size, "norm").pvalue > CHANCE
+    gap = (np.cov(coordinates) - POSTERIOR.covariance) / np.outer(deviation, deviation)
+    assert abs(gap).max() < 4 * math.sqrt(2 / 4000)  # four deviations of a sample variance
+    assert (found.is_independent, found.is_searchable) == (True, False)
+    assert np.array_equal(found.rows(17, 19, None), found.rows(0, 4000, None)[17:19])
+
+
+def test_a_number_with_a_range_of_its_own_conditions_the_others():
+    """The mean of b and c is linear in ln a, their covariance the Schur complement."""
+    found = made({"a": {"loguniform": [1.0, 4.0]}}, posterior=POSTERIOR, draws=4000)
+    assert found.keys == ("a", "b", "c")
+    a, b, c = found.rows(0, 4000, None).T
+    assert stats.kstest(np.log2(a) / 2, "uniform").pvalue > CHANCE
+    C = POSTERIOR.covariance
+    slope = C[1:, 0] / C[0, 0]
+    rest = np.array([(b - 5) / 2, c - 7]) - np.outer(slope, np.log(a / 2))
+    schur = C[1:, 1:] - np.outer(C[1:, 0], C[0, 1:]) / C[0, 0]
+    size = np.sqrt(np.diag(schur))
+    assert abs((np.cov(rest) - schur) / np.outer(size, size)).max() < 4 * math.sqrt(2 / 4000)
+    assert abs(rest.mean(axis=1) / size).max() < 4 / math.sqrt(4000)
 
 
 BAD_RANGES = [

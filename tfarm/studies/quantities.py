@@ -183,7 +183,8 @@ def asked_columns(words: Sequence[str]) -> tuple[str, ...]:
 def column_of(word: str, key: str) -> str:
     """Return the one column of numbers of a word.  Raises ParameterError for none or several."""
     names = [name for name in asked_columns([word]) if not COLUMNS[name].is_text and COLUMNS[name].of.label]
-    require(len(names) == 1 or word in names, key, word, f"one quantity of numbers; it names: {', '.join(names[:6])}")
+    remedy = f"{len(names)} quantities of numbers, not one: {', '.join(names[:6])}"
+    require(len(names) == 1 or word in names, key, word, remedy)
     return word if word in names else names[0]
 
 

@@ -37,9 +37,7 @@ from .extras import parquet_rows
 LAW, TUNER = "law.", "tuner."  # prefixes of the numbers of the controller and of the tuner
 MOST_ROWS = 10_000_000  # of one study
 MOST_SEED = 2**63
-TUNER_NUMBERS = (*NUMBERS, *NUMBERS_OF_LEARNING)
-LEAST_UNIFORM = 2.0**-54  # in the place of 0, where the inverse of a normal distribution is infinite
-ENDS = LEAST_UNIFORM, 1 - 2.0**-53  # least and largest uniform number
+ENDS = 2.0**-54, 1 - 2.0**-53  # of uniform numbers: at 0 and 1 the inverse of a normal distribution is infinite
 PLAIN_NUMBER = re.compile(r" *[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)? *", re.ASCII)
 FORMS: dict[str, tuple[str, Callable[..., Any]]] = {  # kind of a distribution: its numbers in words, and SciPy's
     "uniform": ("LOW, HIGH", lambda low, high: low < high and scipy.stats.uniform(low, high - low)),
@@ -147,7 +145,7 @@ class Space:
     def uniform(self, n: int) -> Real:
         """Return the uniform numbers (drawn,) of draw n, in (0, 1)."""
         generator = np.random.Generator(np.random.Philox(key=self.seed, counter=n << 64))
-        return np.maximum(generator.random(len(self.drawn)), LEAST_UNIFORM)
+        return np.maximum(generator.random(len(self.drawn)), ENDS[0])
 
 
 def space_of(
@@ -212,7 +210,7 @@ class Subjects:
         signals = [OUTPUT_OF.get(name, name).removesuffix(".gain") for name in of_law]
         require(len(set(signals)) == len(signals), "over", of_law, "two keys are one number of the controller")
         for name in of_tuner:
-            must_be_known("tuner", name, TUNER_NUMBERS)
+            must_be_known("tuner", name, (*NUMBERS, *NUMBERS_OF_LEARNING))
         own = [key for key in keys if not key.startswith((LAW, TUNER)) and key not in numbers]
         for key in own:
             must_be_known("over", key, [*numbers_of(arm), *numbers, f"{LAW}NUMBER", f"{TUNER}NUMBER"])

@@ -143,11 +143,11 @@ class Study:
     @property
     def csv_table(self) -> Table:
         """Every row of the study."""
-        names = self.parts.plan.columns
-        units = {name: COLUMNS[name].of.unit for name in self.parts.plan.names}
-        return Table(
-            columns=tuple(Column(name, unit=units.get(name, ""), of=_cells(self._table[name])) for name in names)
-        )
+        return Table(columns=tuple(
+            Column(name, unit=COLUMNS[name].of.unit if name in COLUMNS else "",
+                   of=["" if each != each else each for each in values.tolist()])
+            for name, values in self._table.items()
+        ))  # fmt: skip
 
 
 class StudyTable(dict[str, Any]):
@@ -156,10 +156,6 @@ class StudyTable(dict[str, Any]):
     def to_pandas(self) -> Any:
         """Return a pandas data frame.  Raises ImportError without pandas."""
         return import_module("pandas").DataFrame(self)
-
-
-def _cells(values: Any) -> list[Any]:
-    return ["" if each != each else each for each in values.tolist()]
 
 
 def study(
