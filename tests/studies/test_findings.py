@@ -92,7 +92,7 @@ def test_counts_alone_of_a_grid_a_list_and_a_study_that_is_not_complete(lossless
     assert whole.shares[0].at_least == pytest.approx(0.05**0.25, rel=1e-12)
 
 
-@pytest.mark.parametrize("size", sized(10, 200))
+@pytest.mark.parametrize("size", sized(5, 200))
 def test_studies_keep_their_confidence(size):
     outcomes, _, wrong = survey.tally(confidence, size, 1)
     assert (outcomes["right"], wrong) == (size, 0)
@@ -318,9 +318,9 @@ def test_indices_of_a_product_are_the_closed_form(lab, tmp_path):
 
 
 def test_a_quantity_without_a_value_on_each_arm_has_no_indices(lab, tmp_path):
-    over = {"law.K1": {"uniform": [-0.1, 0.3]}, "payload.mass": {"uniform": [0.0, 0.1]}}
-    asked = ["continuous.time_constant_s", FIRST, "damped_modes.damping_ratio.1", "poles.unstable"]
-    found = run(lab, over, asked[:3], tfarm.HubFeedback(K1=0.3), draws=3, sobol=4, out=tmp_path / "s").sobol
+    over = {"law.K1": {"uniform": [-0.3, 0.3]}, "payload.mass": {"uniform": [0.0, 0.1]}}
+    asked = ["continuous.time_constant_s", FIRST]
+    found = run(lab, over, asked, tfarm.HubFeedback(K1=0.3), draws=1, sobol=2, out=tmp_path / "s").sobol
     by_name = {each.quantity: each for each in found}
     assert by_name["continuous.time_constant_s"].note.startswith("no finite value on ")
     assert by_name["continuous.time_constant_s"].first is None
