@@ -8,6 +8,7 @@ from tfarm.plots import studies as drawn
 from tfarm.report.page import Fact, PageSection, Picture, picture, prose, sheet
 from tfarm.schema import Column, Table, curve_table, table, text
 from tfarm.studies.bands import ResponseBand, frequency_band, step_band
+from tfarm.studies.findings import Spread
 from tfarm.studies.study import Study
 
 OUTPUTS = ("root_moment", "tip_displacement")  # of the frequency responses

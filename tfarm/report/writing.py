@@ -56,8 +56,8 @@ from tfarm.report.page import (
 )
 from tfarm.report.response_sections import bode_section, fit_section, measured_section, modes_section
 from tfarm.report.sampled_section import sampled_section
-from tfarm.report.study_sections import sections_of
 from tfarm.report.trust import TRUST_FOLDER, gather, save_proof, write_trust, written_proofs
+from tfarm.report.study_sections import sections_of
 from tfarm.report.tuner_section import tuner_section
 from tfarm.schema import quantities, table
 from tfarm.stopping import undone_if_stopped
