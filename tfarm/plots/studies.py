@@ -92,7 +92,7 @@ def _ticks(ax: Axes) -> None:
 
 
 def _folded(label: str) -> str:
-    return textwrap.fill(safe(label), LINE)
+    return textwrap.fill(safe(label).replace(" [", "\u00a0["), LINE).replace("\u00a0", " ")
 
 
 def loop_of(name: str) -> str:
@@ -116,8 +116,10 @@ def _shown(found: Study, quantity: str | None = None) -> tuple[list[Spread], lis
 
 
 @picture(
-    (Study, "tfarm.study returns"), size=lambda *of: (9.0, 1.0 + 1.7 * len(_shown(*of)[0])),
-    grid=lambda figure, *of: figure.subplots(*(len(each) for each in _shown(*of)), squeeze=False, sharex="col", sharey="row"),
+    (Study, "tfarm.study returns"), size=lambda *of: (9.0, 1.0 + 1.9 * len(_shown(*of)[0])),
+    grid=lambda figure, *of: figure.subplots(
+        *(len(each) for each in _shown(*of)), squeeze=False, sharex="col", sharey="row"
+    ),
     title=lambda found, *_: f"{found.arm}: quantities over the varied numbers",
 )  # fmt: skip
 def study_scatter(found: Study, quantity: str | None = None, *, ax: Sequence[Axes]) -> None:
@@ -140,9 +142,9 @@ def study_scatter(found: Study, quantity: str | None = None, *, ax: Sequence[Axe
                     if (here := own & (words == word)).any():
                         one.plot(table[key][drawn][here], height[here], mark, color=colour, ms=3.4, alpha=0.75,
                                  transform=transform, label=word or "not determined")  # fmt: skip
-            one.set(xlabel=_folded(key_label(key, found.parts.plan)) * (of is rows[-1]))
+            one.set(xlabel=_folded(key_label(key, found.parts.plan)) * one.xaxis.get_tick_params()["labelbottom"])
+            one.set(ylabel=_folded(f"{of.label} [{of.unit or '−'}]") * one.yaxis.get_tick_params()["labelleft"])
             _ticks(one)
-        line[0].set_ylabel(_folded(f"{of.label} [{of.unit or '−'}]"))
 
 
 @picture(

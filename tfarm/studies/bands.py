@@ -45,10 +45,10 @@ def frequency_band(study: Study, output: str = "root_moment") -> ResponseBand:
 
     Raises ParameterError for an unknown output, and where no arm has that response.
     """
-    arm, (name, unit) = study.parts.plan.arm, signal_words(output)
-    omega = np.geomspace(*resonant_band(arm), POINTS)
+    arm = study.parts.plan.arm
+    omega, row = np.geomspace(*resonant_band(arm), POINTS), transfer(arm, output).rows[0]
     curves = _curves(study, CURVES, lambda one: decibels(transfer(one.arm, output)(1j * omega)))
-    label = f"{name} [dB re 1 {unit_over(unit, arm.input_unit)}]"
+    label = f"{row.label} [dB re 1 {unit_over(row.unit, arm.input_unit)}]"
     return ResponseBand(arm=study.arm, label=label, abscissa="angular frequency [rad/s]", at=omega, curves=curves)
 
 
@@ -58,7 +58,7 @@ def slew_band(study: Study, signal: str = "root_moment") -> ResponseBand:
     Raises ParameterError for an unknown signal, and where no arm has that response.
     """
     plan = study.parts.plan
-    t = np.linspace(0.0, step(plan.arm, plan.law, plan.chain, SCENARIO).duration, POINTS)
+    t = np.linspace(0.0, step(plan.arm, plan.law, plan.chain, SCENARIO, outputs=(signal,)).duration, POINTS)
 
     def curve(one: Subject) -> Real:
         found = step(one.arm, one.law, one.chain, SCENARIO, float(t[-1]), outputs=(signal,))
