@@ -107,12 +107,14 @@ def test_the_same_study_is_the_same_bytes(found, tmp_path):
 
 def test_a_section_has_the_reason_of_a_missing_response(found, monkeypatch):
     def refused(*_):
-        raise tfarm.ParameterError(key="response", value="x", remedy="no arm of the study has it")
+        raise tfarm.ParameterError(key="response", value=TEXT, remedy="no arm of the study has it")
 
     monkeypatch.setattr(writing, "frequency_band", refused)
     (section,) = (each for each in writing.study_sections(found) if each.title == "Responses")
     assert list(section.blocks) == []
-    assert section.words[0] == "root_moment: response = 'x': no arm of the study has it."
+    assert section.words[0].startswith("root_moment: response = ")
+    page = writing.render("study.html", title="x", sections=[section], explained=writing.explained, found=found)
+    check_page(page, "no arm of the study has it")
 
 
 def test_the_command_writes_page_and_figure_and_prints_the_findings(capsys, tmp_path):
