@@ -102,7 +102,6 @@ def study(
     from tfarm.studies import declared
     from tfarm.studies import study as run
     from tfarm.studies.extras import cluster
-    from tfarm.studies.running import usual_workers
 
     typed: dict[str, Any] = {
         "over": dict(over or []) or None, "ask": ask and ask.split(","), "draws": draws, "seed": seed, "rows": rows,
@@ -128,5 +127,5 @@ def study(
     if report:
         from tfarm.report.writing import write_study
 
-        page = write_study(found, workers or usual_workers())
+        page = write_study(found)
     emit(found, json, defaults, csv=csv, png=png, also=(page,))

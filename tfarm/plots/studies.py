@@ -2,18 +2,17 @@
 
 import math
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from tfarm.arm.schema import file_key, file_keys
-from tfarm.arrays import Real
 from tfarm.digits import how_many
 from tfarm.errors import require
-from tfarm.studies.bands import ENDS, ResponseBand
-from tfarm.studies.findings import Spread
+from tfarm.studies.bands import ResponseBand
+from tfarm.studies.findings import QUANTILES, Spread
 from tfarm.studies.quantities import COLUMNS, LOOPS, asked_columns
 from tfarm.studies.running import Plan
 from tfarm.studies.space import LAW
@@ -21,86 +20,84 @@ from tfarm.studies.study import Study
 
 from .frequency import over_frequency
 from .motion import OF_STABILITY
-from .style import BLUE, GREY, INK, WIDE, Axes, number_label, picture, plain_ticks, safe
+from .style import BLUE, GREY, INK, Axes, number_label, picture, plain_ticks, safe
 
 BINS = 24  # at most, of a histogram
 ACROSS, MOST_QUANTITIES = 4, 12  # axes of distributions side by side, and in all
-MOST_NUMBERS, MOST_ROWS = 4, 3  # axes of a scatter picture
-MOST_POINTS = 1000  # arms of a scatter picture
-LINE = 24  # letters of a label of such small axes
+MOST_NUMBERS, MOST_ROWS, MOST_MARKS = 4, 3, 1000  # of a scatter picture: axes, and arms
+LINE, SINGLE = 24, 12  # letters of a label of such small axes; single curves in a band
 FIRST = ("gain_margin_db", "phase_margin_deg", "delay_margin_ms", "peak_sensitivity")  # where there are too many
-LOOKS: tuple[dict[str, Any], ...] = (
-    {"fill": True, "color": BLUE, "alpha": 0.4}, {"fill": False, "color": INK, "lw": 1.1}
-)  # fmt: skip
-MARKS = {**OF_STABILITY, "": (GREY, "^")}
-SINGLE = 12  # curves of single arms in a band
-NOT_DETERMINED = "not determined"
+LOOKS: dict[str, dict[str, Any]] = {
+    "continuous": {"fill": True, "color": BLUE, "alpha": 0.4, "label": "continuous-time"},
+    "sampled": {"fill": False, "color": INK, "lw": 1.1, "label": "sampled"},
+    "": {"fill": True, "color": BLUE, "alpha": 0.4, "label": "arms"},
+}
+MARKS = {**OF_STABILITY, "": (GREY, "^"), "arm": (BLUE, "o")}
 
 
-def distributions(found: Study, quantity: str | None = None, most: int = MOST_QUANTITIES) -> dict[str, list[Spread]]:
+def distributions(found: Study, quantity: str | None = None, most: int = MOST_QUANTITIES) -> list[list[Spread]]:
     """Return the distributions of a quantity, or of all, those of both loops together: first margins, then others.
 
     Raises ParameterError where the study has no number of it.
     """
-    names = {each.name for each in found.spreads} & set(asked_columns([quantity]) if quantity else COLUMNS)
-    require(names, "quantity", quantity, "the study has no number of it: name it in `ask`")
     both: dict[str, list[Spread]] = {}
-    for each in found.spreads:
-        if each.name in names:
-            both.setdefault(".".join(part for part in each.name.split(".") if part not in LOOPS), []).append(each)
-    return {name: both[name] for name in sorted(both, key=lambda name: name not in FIRST)[:most]}
+    names = asked_columns([quantity]) if quantity else COLUMNS
+    for each in (each for each in found.spreads if each.name in names):
+        both.setdefault(".".join(part for part in each.name.split(".") if part not in LOOPS), []).append(each)
+    require(both, "quantity", quantity, "the study has no number of it: name it in `ask`")
+    return [both[name] for name in sorted(both, key=lambda name: name not in FIRST)][:most]
 
 
-def _grid(found: Study, quantity: str | None = None) -> tuple[int, int]:
-    """Rows and columns of the axes of distributions."""
-    count = len(distributions(found, quantity))
-    return math.ceil(count / ACROSS), min(count, ACROSS)
-
-
-def _histograms(figure: Any, found: Study, quantity: str | None = None) -> None:
-    count, (rows, columns) = len(distributions(found, quantity)), _grid(found, quantity)
-    for ax in np.ravel(figure.subplots(rows, columns, squeeze=False))[count:]:
+def _grid(figure: Any, *of: Any) -> None:
+    count = len(distributions(*of))
+    for ax in figure.subplots(math.ceil(count / ACROSS), min(count, ACROSS), squeeze=False).ravel()[count:]:
         ax.remove()
 
 
 @picture(
-    (Study, "tfarm.study returns"), grid=_histograms,
-    size=lambda *of: (max(4.5, 2.4 * _grid(*of)[1]), 0.9 + 2.0 * _grid(*of)[0]),
+    (Study, "tfarm.study returns"), grid=_grid,
+    size=lambda *of: (max(4.5, 2.4 * min(n := len(distributions(*of)), ACROSS)), 0.9 + 2.0 * math.ceil(n / ACROSS)),
     title=lambda found, *_: f"{found.arm}: distributions over {how_many(found.done, 'arm')}",
 )  # fmt: skip
 def study(found: Study, quantity: str | None = None, *, ax: Sequence[Axes]) -> None:
     """Distribution of each quantity of a study (from `tfarm.study`), or of one, in axes of its own; the axes.
 
-    Continuous-time loops are filled, sampled ones drawn as an outline; the bar above is from the 5 % to the 95 %
-    quantile, with the median.  Values without a limit or undefined are left out, and their number is in the title.
+    Continuous-time loops are filled, sampled ones an outline.  The bar above is from the 5 % to the 95 % quantile with
+    the median.  Where some arms have no finite value the title is the number of those that have one.
     """
     table = found.table()
-    for one, each in zip(ax, distributions(found, quantity).values(), strict=False):
+    for one, each in zip(ax, distributions(found, quantity), strict=False):
         values = [table[of.name][np.isfinite(table[of.name])] for of in each]
-        every = np.concatenate(values)
-        room = 0.02 * (abs(every).max() or 1.0) if np.ptp(every) <= 1e-9 * abs(every).max() else 0.0
-        edges = np.linspace(every.min() - room, every.max() + room, min(BINS, 2 + math.isqrt(every.size)))
+        low, high = min(of.least for of in each), max(of.largest for of in each)
+        room = 0.02 * (abs(high) or 1.0) if high - low <= 1e-9 * abs(high) else 0.0
+        edges = np.linspace(low - room, high + room, min(BINS, 2 + math.isqrt(max(map(len, values)))))
         counts = [np.histogram(own, edges)[0] for own in values]
-        top = max(own.max() for own in counts)
-        for n, (of, own, looks) in enumerate(zip(each, counts, LOOKS, strict=False)):
-            loop = _loop_of(of.name)
-            one.stairs(own, edges, label=loop.replace("continuous", "continuous-time") or "arms", **looks)
-            one.plot([of.low, of.high], [top * (1.08 + 0.1 * n)] * 2, color=looks["color"], lw=1.2)
-            one.plot([of.median], [top * (1.08 + 0.1 * n)], "|", ms=7, mew=1.6, color=looks["color"])
-        one.set(xlabel=_folded(COLUMNS[each[0].name].of.label, each[0].unit), ylabel="arms [−]", ylim=(0, 1.27 * top))
-        if fewer := [f"{of.arms}" for of in each if of.arms < found.done]:
-            one.set_title(f"{' and '.join(fewer)} of {found.done} arms", fontsize=8.0)
+        for n, (of, own) in enumerate(zip(each, counts, strict=True)):
+            looks, height = LOOKS[loop_of(of.name)], np.max(counts) * (1.08 + 0.1 * n)
+            one.stairs(own, edges, **looks)
+            one.plot(
+                [of.low, of.median, of.high], [height] * 3, "|-", ms=7, markevery=[1], color=looks["color"], lw=1.2
+            )
+        label = _folded(f"{COLUMNS[each[0].name].of.label} [{each[0].unit or '−'}]")
+        counted = " and ".join(str(of.arms) for of in each if of.arms < found.done)
+        one.set(xlabel=label, ylabel="arms [−]", ylim=(0, 1.27 * np.max(counts)))
+        one.set_title(f"{counted} of {found.done} arms" * bool(counted), fontsize=8.0)
         one.yaxis.set_major_locator(MaxNLocator(3, integer=True))
-        one.xaxis.set_major_locator(MaxNLocator(4))
-        plain_ticks(one.xaxis)
+        _ticks(one)
 
 
-def _loop_of(name: str) -> str:
+def _ticks(ax: Axes) -> None:
+    ax.xaxis.set_major_locator(MaxNLocator(4))
+    plain_ticks(ax.xaxis)
+
+
+def _folded(label: str) -> str:
+    return textwrap.fill(safe(label).replace(" [", "\u00a0["), LINE).replace("\u00a0", " ")
+
+
+def loop_of(name: str) -> str:
+    """Return the loop of a column, empty for one of the arm alone."""
     return next((loop for loop in LOOPS if loop in name.split(".")), "")
-
-
-def _folded(label: str, unit: str) -> str:
-    return textwrap.fill(f"{safe(label)} [{unit or '−'}]", LINE)
 
 
 def key_label(key: str, plan: Plan) -> str:
@@ -111,22 +108,18 @@ def key_label(key: str, plan: Plan) -> str:
     return f"{key} [{(file_key(key, plan.arm).unit if is_known else '') or '−'}]"
 
 
-def _shown(found: Study, quantity: str | None = None) -> tuple[list[Spread], tuple[str, ...]]:
-    """Quantities up and numbers along the axes: of both loops the sampled one, and those that drive most first."""
-    rows = [each[-1] for each in distributions(found, quantity, MOST_ROWS).values()]
+def _shown(found: Study, quantity: str | None = None) -> tuple[list[Spread], list[str]]:
+    """Quantities up, of both loops the sampled one, and numbers along the axes: those that drive most first."""
+    rows = [each[-1] for each in distributions(found, quantity, MOST_ROWS)]
     drivers = [each.driver for each in rows]
-    keys = sorted(found.parts.plan.space.keys, key=drivers.count, reverse=True)
-    return rows, tuple(keys[:MOST_NUMBERS])
-
-
-def _scatter_axes(figure: Any, *of: Any) -> Any:
-    rows, keys = _shown(*of)
-    return figure.subplots(len(rows), len(keys), squeeze=False, sharex="col", sharey="row")
+    return rows, sorted(found.parts.plan.space.keys, key=drivers.count, reverse=True)[:MOST_NUMBERS]
 
 
 @picture(
-    (Study, "tfarm.study returns"), grid=_scatter_axes,
-    size=lambda *of: (max(4.5, min(WIDE, 2.6 * len(_shown(*of)[1]) + 0.6)), 1.0 + 1.9 * len(_shown(*of)[0])),
+    (Study, "tfarm.study returns"), size=lambda *of: (9.0, 1.0 + 1.9 * len(_shown(*of)[0])),
+    grid=lambda figure, *of: figure.subplots(
+        *(len(each) for each in _shown(*of)), squeeze=False, sharex="col", sharey="row"
+    ),
     title=lambda found, *_: f"{found.arm}: quantities over the varied numbers",
 )  # fmt: skip
 def study_scatter(found: Study, quantity: str | None = None, *, ax: Sequence[Axes]) -> None:
@@ -136,50 +129,35 @@ def study_scatter(found: Study, quantity: str | None = None, *, ax: Sequence[Axe
     no value.  Of more than a thousand arms as many are drawn, even over the rows.
     """
     table, (rows, keys) = found.table(), _shown(found, quantity)
-    drawn = np.unique(np.linspace(0, found.done - 1, min(found.done, MOST_POINTS)).round().astype(int))
+    drawn = np.unique(np.linspace(0, found.done - 1, min(found.done, MOST_MARKS)).round().astype(int))
     for of, line in zip(rows, np.reshape(np.array(ax, dtype=object), (len(rows), len(keys))), strict=True):
-        before, loop, _ = of.name.partition(_loop_of(of.name) or "\n")
-        words = table.get(f"{before}{loop}.stability", np.full(found.done, "stable" if not loop else ""))[drawn]
+        y, (before, loop, _) = table[of.name][drawn], of.name.partition(loop_of(of.name) or "\n")
+        words = table.get(f"{before}{loop}.stability", np.full(found.done, "arm"))[drawn]
         for key, one in zip(keys, line, strict=True):
-            _scatter(table[key][drawn], table[of.name][drawn], words, one)
-            one.set(xlabel=_folded(*_split(key_label(key, found.parts.plan))) if of is rows[-1] else "")
-            one.xaxis.set_major_locator(MaxNLocator(4))
-            plain_ticks(one.xaxis)
-        line[0].set_ylabel(_folded(of.label, of.unit))
-
-
-def _split(label: str) -> tuple[str, str]:
-    words, _, unit = label.rpartition(" [")
-    return words, unit.removesuffix("]")
-
-
-def _scatter(x: Real, y: Real, words: Any, ax: Axes) -> None:
-    """Marks by stability; without a limit at the upper edge, without a value at the lower one."""
-    edges = np.where(np.isposinf(y), 0.98, 0.02)
-    for word, (colour, mark) in MARKS.items():
-        looks: dict[str, Any] = {"ls": "none", "color": colour, "marker": mark, "ms": 3.4, "alpha": 0.75}
-        own, inside = words == word, np.isfinite(y)
-        if own.any():
-            ax.plot(x[own & inside], y[own & inside], label=word or NOT_DETERMINED, **looks)
-            ax.plot(x[own & ~inside], edges[own & ~inside], transform=ax.get_xaxis_transform(), **looks)
+            for word, (colour, mark) in MARKS.items():
+                for own, height, transform in (
+                    (np.isfinite(y), y, one.transData), (y == np.inf, 0 * drawn + 0.98, one.get_xaxis_transform()),
+                    (np.isnan(y), 0 * drawn + 0.02, one.get_xaxis_transform()),
+                ):  # fmt: skip
+                    if (here := own & (words == word)).any():
+                        one.plot(table[key][drawn][here], height[here], mark, color=colour, ms=3.4, alpha=0.75,
+                                 transform=transform, label=word or "not determined")  # fmt: skip
+            one.set(xlabel=_folded(key_label(key, found.parts.plan)) * one.xaxis.get_tick_params()["labelbottom"])
+            one.set(ylabel=_folded(f"{of.label} [{of.unit or '−'}]") * one.yaxis.get_tick_params()["labelleft"])
+            _ticks(one)
 
 
 @picture(
     (ResponseBand, "tfarm.studies.bands.frequency_band returns"), size=(9.0, 4.6),
-    title=lambda band: f"{band.arm}: {band.response} over {how_many(band.arms, 'arm')}",
+    title=lambda band: f"{band.arm}: {band.label.partition(' [')[0]} of {how_many(len(band.curves), 'arm')}",
 )  # fmt: skip
 def study_band(band: ResponseBand, *, ax: Axes) -> None:
-    """Band of the exact responses of the arms of a study: 5, 50 and 95 % at each point; in the axes, or new ones."""
-    low, median, high = (band.quantile(end) for end in ENDS)
+    """Exact responses of the arms of a study, their 5, 50 and 95 % at each point; in the axes, or new ones."""
+    low, median, high = np.quantile(band.curves, [QUANTILES[end] for end in ("low", "median", "high")], axis=0)
     ax.fill_between(band.at, low, high, color=BLUE, alpha=0.3, lw=0, label="5 to 95 % of the arms, at each point")
-    ax.plot(band.at, band.curves[:: max(1, band.arms // SINGLE)].T, color=GREY, lw=0.4, alpha=0.6, zorder=1.5)
-    ax.plot([], [], color=GREY, lw=0.8, label="single arms")
+    for n, curve in enumerate(band.curves[:: max(1, len(band.curves) // SINGLE)]):
+        ax.plot(band.at, curve, color=GREY, lw=0.5, alpha=0.6, zorder=1.5, label="single arms" * (not n))
     ax.plot(band.at, median, color=BLUE, lw=1.4, label="median, at each point")
-    ax.set(xlabel=band.abscissa, ylabel=f"{band.response} [{band.unit}]", xlim=band.at[[0, -1]])
-    if band.unit.startswith("dB"):
-        over_frequency(ax, ax.get_ylabel())
-
-
-def band_data(band: ResponseBand) -> Mapping[str, Real]:
-    """Columns of the quantiles of a band."""
-    return {"at": band.at, **{end: band.quantile(end) for end in ENDS}}
+    ax.set(xlabel=band.abscissa, ylabel=band.label, xlim=band.at[[0, -1]])
+    if " [dB" in band.label:
+        over_frequency(ax, band.label)

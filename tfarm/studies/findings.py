@@ -39,7 +39,7 @@ class StableShare:
     open: Annotated[int, Quantity(key="not_determined", help="arms without a result")]
     certainty: Annotated[str, Quantity(help="weakest word of certainty among the stable arms")]
     at_least: Annotated[Percent | None, Quantity(
-            help="least stable share, 95 % confidence, one-sided, Clopper and Pearson; independent draws")]  # fmt: skip
+            help="least share of stable arms, with 95 % confidence; of independent draws only")]  # fmt: skip
 
     @property
     def finding(self) -> Annotated[str, Quantity("finding", help="stable arms, with their confidence in per cent")]:
@@ -50,7 +50,7 @@ class StableShare:
         text += f" ({', '.join(filter(None, others))})" * any(others)
         if self.at_least is None:
             return text
-        percent = math.floor(1e4 * self.at_least) / 100  # never more than was shown
+        percent = math.floor(1e4 * self.at_least + 1e-6) / 100  # never more than was shown
         return f"{text}: at least {percent:g} % of all with {100 * CONFIDENCE:g} % confidence"
 
 

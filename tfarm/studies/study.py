@@ -96,7 +96,7 @@ class Study:
     parts: Parts
     arm: Annotated[str, Quantity("arm", help="arm whose numbers are varied")]
     rows: Annotated[int, Quantity("arms", help="rows of the whole study")]
-    rows_a_part: Annotated[int, Quantity("arms a part", help="rows of one file of the results")]
+    rows_a_part: Annotated[int, Quantity(help="rows of one file of the results")]
     worst: Annotated[WorstArm | None, Quantity("worst arm", help="in one quantity")] = None
     sobol: Annotated[tuple[SobolIndex, ...], Quantity("Sobol' indices", help="of a sample of their own")] = ()
 
