@@ -15,7 +15,7 @@ def test_each_task_has_its_result_and_the_running_ones_are_named(monkeypatch):
     monkeypatch.delenv(BLAS, raising=False)
     tasks = {name: partial(str.upper, name) for name in "abcd"} | {"threads": partial(os.getenv, BLAS)}
     seen = []
-    found = dict(shared(tasks, 2, begun=seen.append))
+    found = dict(shared(tasks.items(), 2, begun=seen.append))
     assert found == {"a": "A", "b": "B", "c": "C", "d": "D", "threads": "1"}
     assert seen[0] == ["a", "b"]
     assert {name for names in seen for name in names} == set(tasks)
@@ -27,11 +27,11 @@ def test_an_error_of_a_task_is_raised_and_the_rest_is_not_begun(tmp_path):
     tasks = {"fails": partial(os.listdir, tmp_path / "none"), "slow": partial(time.sleep, 0.3)}
     tasks |= {i: partial(os.mkdir, tmp_path / str(i)) for i in range(9)}
     with pytest.raises(FileNotFoundError):
-        list(shared(tasks, 2))
+        list(shared(tasks.items(), 2))
     assert len(os.listdir(tmp_path)) < 9
 
 
 def test_a_killed_process_is_an_error_of_one_line():
     with pytest.raises(tfarm.ConvergenceError, match="worker process ended before its work was done") as caught:
-        list(shared({"dies": partial(os._exit, 9), "other": time.time}, 2))
+        list(shared({"dies": partial(os._exit, 9), "other": time.time}.items(), 2))
     assert "\n" not in str(caught.value)

@@ -188,6 +188,16 @@ def _locked(path: Path, *, wait: bool) -> Iterator[None]:
         os.close(handle)
 
 
+@contextmanager
+def locked(path: Path, key: str) -> Iterator[None]:
+    """Hold the lock of a file.  Raises ParameterError where another process has it."""
+    try:
+        with _locked(path, wait=False):
+            yield
+    except BlockingIOError:
+        raise ParameterError(key=key, value=os.fspath(path), remedy="another run has it: wait for its end") from None
+
+
 def _remove(path: Path) -> None:
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path, ignore_errors=True)

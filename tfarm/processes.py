@@ -3,7 +3,7 @@
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -22,7 +22,7 @@ Result = TypeVar("Result")
 
 
 def shared(
-    tasks: Mapping[Task, Callable[[], Result]],
+    tasks: Iterable[tuple[Task, Callable[[], Result]]],
     count: int,
     begun: Callable[[Sequence[Task]], object] = lambda _: None,
 ) -> Iterator[tuple[Task, Result]]:
@@ -32,16 +32,16 @@ def shared(
     ones have ended; the others are not begun.  Raises ConvergenceError where a process dies.
     """
     if count == 1 or not may_start_processes():
-        for task, call in tasks.items():
+        for task, call in tasks:
             begun([task])
             yield task, call()
         return
-    waiting = iter(tasks)
+    waiting = iter(tasks)  # which may make each task only when there is a process for it
     running: dict[Future[Result], Task] = {}
     with _pool(count) as pool:
         while True:
             with _signals_blocked():  # of the process that this may start, as long as it lives
-                running |= {pool.submit(tasks[task]): task for task in islice(waiting, count - len(running))}
+                running |= {pool.submit(call): task for task, call in islice(waiting, count - len(running))}
             if not running:
                 return
             begun(list(running.values()))
@@ -74,6 +74,7 @@ def _pool(count: int) -> Iterator[ProcessPoolExecutor]:
         try:
             yield pool
         except BrokenProcessPool:
+            kill()  # one that never began its work would be waited for
             words = "a worker process ended before its work was done, perhaps for want of memory; ask for less"
             raise ConvergenceError(words, None, None) from None
         except KeyboardInterrupt:

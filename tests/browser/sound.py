@@ -22,12 +22,13 @@ from tests.browser.pages import Opened, browser  # noqa: F401, a fixture
 from tests.hostile import NAME, TEXT
 from tests.report.written import ARM, report_elsewhere
 from tests.shared import once
+from tests.studies.pictured import planted_study
 from tfarm.dsp import load_chain
 from tfarm.fitting.fit import fit
 from tfarm.report import write, writing
 from tfarm.report.live import ASSETS, save_live, write_assets
 from tfarm.report.page import Case, GivenLaw
-from tfarm.report.writing import PIECES, pieces_of, write_comparison
+from tfarm.report.writing import PIECES, pieces_of, write_comparison, write_study
 
 LAB = replace(tfarm.load("sasaki2012-lab"), name=NAME, assumptions=ARM.assumptions)
 LAW = tfarm.Law({"hub_angle": ([2.0, 8.0], [0.02, 1.0]), "hub_rate": 0.4}, name=TEXT)
@@ -47,7 +48,7 @@ SCROLLED = """() => [...document.querySelectorAll(".scroll, .contents")].filter(
 
 @pytest.fixture(scope="module")
 def few(tmp_path_factory):
-    """Index, pages of one question, of a law, of a fit, of a comparison, and a live one: with few sections."""
+    """Index, pages of one question, of a law, a fit, a comparison and a study, and a live one: with few sections."""
     out = tmp_path_factory.mktemp("few")
     chain = load_chain("sasaki2012-lab")
     few = [piece for piece in PIECES if piece.anchor in ("arm", "modes", "margins", "law")]
@@ -66,6 +67,7 @@ def few(tmp_path_factory):
     write_assets(out / ASSETS)
     laws_of_gains = [tfarm.HubFeedback(K1=0.3, K2=0.3), tfarm.HubFeedback(K1=14.7, K2=-0.26)]
     write_comparison(tfarm.compare(LAB, laws_of_gains, names=("as in the paper", TEXT), modes=2), out / "compared")
+    write_study(planted_study(out / "study"))
     return out
 
 

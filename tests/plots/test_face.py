@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 import tfarm
 from tests.plots.labels import complaints, drawn
 from tests.shared import thinned
+from tests.studies.pictured import planted_study
 from tfarm import Law
 from tfarm.digits import plain
 from tfarm.dsp import Chain, sampled_map
@@ -25,6 +26,7 @@ from tfarm.loop.nyquist import compressed
 from tfarm.plots.regions import colours, contours
 from tfarm.plots.style import number_label
 from tfarm.spectrum.table import default_gains
+from tfarm.studies.bands import frequency_band
 from tfarm.tuner import Plan
 
 mpl.use("Agg")
@@ -41,6 +43,8 @@ AXES = {
     "modes": 3,
     "slew": 3,
     "step": 4,
+    "study": 4,
+    "study_scatter": 6,
 }  # of a plot that has several
 PICTURES = sorted({*tfarm.plots.__all__} - {"animate", "column"})
 OTHERS = [f"{name} of a rig" for name in ("gain_map", "nyquist", "disc", "bode", "locus", "loop", "nichols")]
@@ -58,11 +62,12 @@ def no_figure_left_open():
 
 
 @pytest.fixture(scope="module")
-def records():
+def records(tmp_path_factory):
     """What a plot takes, by its name and further words: of any law, and of a rig without damping, driven by voltage."""
     K1, K2 = np.linspace(0.05, 2.0, 40), np.linspace(-1.0, 1.5, 41)
     plane, analysis = tfarm.map(LAB, K1, K2), tfarm.sampled(LAB, LAW, count=8)
     rig = tfarm.load("quanser-flexlink")
+    study = planted_study(tmp_path_factory.mktemp("study"))
     law, unit = default_gains(rig), rig.input_per_torque
     factors, delays = np.linspace(0.1, 3.0, 8), np.linspace(0.0, 0.03, 9)
     return {
@@ -81,6 +86,9 @@ def records():
         "sketch": [LAB],
         "tuned_gain": [tfarm.tune(LAB, Plan(trials=1))],
         "slew": [LAB, tfarm.simulate(LAB, LAW, duration=2.0, count=8, between=4)],
+        "study": [study],
+        "study_band": [frequency_band(study)],
+        "study_scatter": [study],
         "step": [tfarm.step(LAB, LAW, scenario_name="slew")],
         "locus of a law": [tfarm.locus(LAB, LEAD, "gain", 0.0, 2.0, 10, 3)],
         "gain_map of a law": [tfarm.map(LAB, factors, delays, law=LEAD, vary=("gain", "delay"))],

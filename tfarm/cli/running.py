@@ -11,7 +11,7 @@ from typing import Any
 import typer
 from typer.exceptions import TyperException
 
-from tfarm.cli import arm_files, commands, control, designing  # noqa: F401  each adds its commands
+from tfarm.cli import arm_files, commands, control, designing, studying  # noqa: F401  each adds its commands
 from tfarm.cli.app import discard, print_line, progress, whole_command
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError, require
 from tfarm.files import STANDARD_OUTPUT
@@ -25,7 +25,7 @@ STREAMED = (
 )  # of files that may go to standard output instead, called "-"
 ONLY_STREAMED = f"- is standard output, and only {', '.join(STREAMED)} may go there: give a name"
 WRITTEN = (*STREAMED, "--animate")
-PATHS = (*WRITTEN, "--out", "--dsp", "--law", "--controller")  # may be called 1_0
+PATHS = (*WRITTEN, "--out", "--dsp", "--law", "--controller", "--list", "--posterior")  # such as 1_0
 ODD_NUMBER = re.compile(r"(?=.*(_|[^\x00-\x7f]))[-+.\d_eEij]*\d[-+.\d_eEij]*")  # to Python alone: 5_0, or other digits
 
 

@@ -37,6 +37,7 @@ from tfarm.schema import Quantity
 from .data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of
 from .model import Parameter, Problem, Response, RingMode, parameters
 from .overlay import ResonanceShift, ratio_of, resonance_shifts
+from .posterior import posterior_of, posterior_path, save_posterior
 from .solve import (
     FIT_SEED,
     OPEN_DEVIATION,
@@ -450,5 +451,7 @@ def repeats(fit: Fit, draws: int = DRAWS) -> Repeats | None:
 
 
 def save_fit(fit: Fit, path: Path) -> None:
-    """Write the fitted arm to a temporary file, then rename it."""
+    """Write the fitted arm, and its posterior to a file of the same name; only the arm where that is a stream."""
     write_file(path, to_toml(fit.arm).encode(), key="--save")
+    if path.is_file() and any("." in each.key for each in fit.parameters):
+        save_posterior(posterior_of(fit, fit.parameters, fit.not_determined), fit.arm.name, posterior_path(path))

@@ -15,11 +15,13 @@ from typing import Any
 
 from tfarm.arm import Arm
 from tfarm.case import Comparison
+from tfarm.digits import how_many
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError, TfarmError, must_be_known, require
 from tfarm.files import temporary_folder
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
+from tfarm.plots import studies
 from tfarm.plots.regions import comparison
 from tfarm.processes import shared
 from tfarm.report.arm_section import arm_section, assumptions_section
@@ -35,8 +37,10 @@ from tfarm.report.loop_section import (
 from tfarm.report.overview import SHORT, Card, blocks, save_card, summary
 from tfarm.report.page import (
     Case,
+    Fact,
     GivenLaw,
     PageSection,
+    anchor,
     check_laws,
     command_of,
     explained,
@@ -57,8 +61,11 @@ from tfarm.report.response_sections import bode_section, fit_section, measured_s
 from tfarm.report.sampled_section import sampled_section
 from tfarm.report.trust import TRUST_FOLDER, gather, save_proof, write_trust, written_proofs
 from tfarm.report.tuner_section import tuner_section
-from tfarm.schema import quantities, table
+from tfarm.schema import Column, quantities, table, text
 from tfarm.stopping import undone_if_stopped
+from tfarm.studies.bands import frequency_band, slew_band
+from tfarm.studies.space import Space
+from tfarm.studies.study import Study
 
 ReportProgress = Callable[[int, int, str], object]
 Calls = Mapping[str, Sequence[Callable[[], Any]]]  # by task: what one process does in turn
@@ -290,7 +297,7 @@ def make_all(tasks: Calls, progress: ReportProgress | None) -> dict[str, Sequenc
             progress(len(done), len(tasks), ", ".join(running))
 
     count = MOST_WORKERS if len(tasks) >= WORTH_A_PROCESS else 1
-    for task, results in shared({task: partial(_in_turn, tasks[task]) for task in longest}, count, begun):
+    for task, results in shared(((task, partial(_in_turn, tasks[task])) for task in longest), count, begun):
         done[task] = results  # noqa: PERF403  `begun` counts them meanwhile
     begun(["pages"])
     return done
@@ -407,3 +414,70 @@ def write_comparison(found: Comparison, out: Path) -> Path:
             write_text(made / "index.html", index_page(out, trust=TRUST_PAGE if (out / TRUST_PAGE).is_file() else ""))
             move_into(made, out)
     return out / COMPARISON_PAGE
+
+
+# ------------------------------------------------------------ a study
+
+
+def write_study(found: Study) -> Path:
+    """Write index.html with its pictures and tables to the folder of a study: the page.
+
+    Raises ParameterError where it cannot be written.
+    """
+    folder = found.parts.folder
+    with _temporary(folder, "--out") as made:
+        sections = [save_section(each, made) for each in study_sections(found)]
+        title = f"{found.arm}: study of {how_many(found.rows, 'arm')}"
+        page = render("study.html", title=title, sections=sections, explained=explained, found=found)
+        write_text(made / "index.html", page)
+        move_into(made, folder)
+    return folder / "index.html"
+
+
+def study_sections(found: Study) -> list[PageSection]:
+    """Findings, distributions, drivers, responses, worst arm and failures of a study, as far as it has them."""
+    plan, worst, missing = found.parts.plan, found.worst, list[str]()
+    facts = [
+        Fact(each.loop, f"{each.stable:,}", f"of {found.done:,} arms stable", each.finding) for each in found.shares
+    ]
+    facts.append(Fact("arms computed", f"{found.done:,}", note=f"of {found.rows:,}"))
+    pictures = [
+        picture("study_distributions", studies.study.figure(found), found=found),
+        picture("study_scatter", studies.study_scatter.figure(found), found=found),
+    ] if found.spreads else []  # fmt: skip
+    calls = {each: partial(frequency_band, found, each) for each in ("root_moment", "tip_displacement")}
+    calls |= {"slew": partial(slew_band, found)} if any(name.startswith("step.") for name in plan.names) else {}
+    bands = []
+    for name, call in calls.items():
+        try:
+            band, stem = call(), f"study-{name.replace('_', '-')}"
+            bands.append(picture("study_band", studies.study_band.figure(band), stem=stem, band=band))
+        except TfarmError as error:
+            missing.append(f"{name}: {error}.")
+    sections: tuple[tuple[str, list[str], list[Any]], ...] = (
+        ("Findings", [prose("study", found=found)], [sheet("study_ranges", table(found.spreads)),
+         sheet("study_numbers", _numbers(plan.space, {} if worst is None else worst.numbers), found=found)]),
+        ("Distributions", [], pictures[:1]),
+        ("Drivers", [], [*pictures[1:], sheet("study_sobol", table(found.sobol))]),
+        ("Responses", missing, bands),
+        ("Worst arm", [] if worst is None else [prose("study_worst", worst=worst)], []),
+        ("Arms without a result", [], [sheet("study_failures", table(found.failures))]),
+    )  # fmt: skip
+    return [
+        PageSection(anchor=anchor("study", title), title=title, facts=facts[: len(facts) * (title == "Findings")],
+                    words=words, blocks=blocks)
+        for title, words, blocks in sections if words or any(getattr(each, "columns", True) for each in blocks)
+    ]  # fmt: skip
+
+
+def _numbers(space: Space, worst: Mapping[str, float]) -> list[Column]:
+    """A row a varied number: its distribution or grid, and its value of the worst arm where that was searched."""
+    kinds = {key: f"{each.kind} {', '.join(map(text, each.numbers))}" for key, each in space.distributions.items()}
+    kinds |= {
+        key: f"{len(values)} values, {text(values[0])} to {text(values[-1])}" for key, values in space.grids.items()
+    }
+    columns = [
+        Column("key", "number", of=space.keys),
+        Column("distribution", "distribution", of=[kinds.get(key, "list or posterior") for key in space.keys]),
+    ]
+    return columns + [Column("worst", "worst arm", of=list(worst.values()))] * bool(worst)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple
 
@@ -18,7 +18,7 @@ from tfarm.dsp.chain import Reading, chain_or_usual
 from tfarm.dsp.results import Run, enough_modes, ideal_chain
 from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, described, torque_unit
 from tfarm.dsp.simulate import RESIDUAL
-from tfarm.errors import require
+from tfarm.errors import must_be_known, require
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import default_gains
@@ -42,6 +42,10 @@ from tfarm.tuner.trial import (
 Advance = Callable[[int, int, str], None]
 
 MOST_SEEDS = 10_000  # of learning curves
+NUMBERS: dict[str, Callable[[float], float]] = {  # of a plan, by which studies may vary it
+    "trials": int, "seed": int, "K1": float, "Kp": float, "duration": float, "hidden": int, "scale": float,
+}  # fmt: skip
+NUMBERS_OF_LEARNING = ("eta", "alpha", "clip", "enough")
 TRAINING_THREADS = 2  # a report uses no more cores
 SHAPED_NOTE = "no moment feedback; cost of the shaped slew, which arrives later: cost_lq_bound is no bound of it"
 BOUND_NOTES = {
@@ -171,6 +175,19 @@ def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuni
         bound=lq_bound(trial),
         shaped=shaped,
     )
+
+
+def tuned(arm: Arm, chain: Chain, **numbers: float) -> Tuning:
+    """Tune with the usual plan and other values of some of its numbers, such as seed, eta and alpha.
+
+    Raises ParameterError for a name that is no number of a plan or of its learning.
+    """
+    plan = usual_plan(arm, chain)
+    for name in numbers:
+        must_be_known("tuner", name, (*NUMBERS, *NUMBERS_OF_LEARNING))
+    learning: dict[str, Any] = {name: value for name, value in numbers.items() if name in NUMBERS_OF_LEARNING}
+    own: dict[str, Any] = {name: NUMBERS[name](value) for name, value in numbers.items() if name in NUMBERS}
+    return tune(arm, replace(plan, learning=replace(plan.learning, **learning), **own), chain)
 
 
 def learning_curves(tuning: Tuning, seeds: int, advance: Advance | None = None) -> LearningCurves:

@@ -1,0 +1,163 @@
+"""Pictures of a study: distributions of its quantities, their values over the varied numbers, bands of responses."""
+
+import math
+import textwrap
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+
+from tfarm.arm.schema import file_key, file_keys
+from tfarm.digits import how_many
+from tfarm.errors import require
+from tfarm.studies.bands import ResponseBand
+from tfarm.studies.findings import QUANTILES, Spread
+from tfarm.studies.quantities import COLUMNS, LOOPS, asked_columns
+from tfarm.studies.running import Plan
+from tfarm.studies.space import LAW
+from tfarm.studies.study import Study
+
+from .frequency import over_frequency
+from .motion import OF_STABILITY
+from .style import BLUE, GREY, INK, Axes, number_label, picture, plain_ticks, safe
+
+BINS = 24  # at most, of a histogram
+ACROSS, MOST_QUANTITIES = 4, 12  # axes of distributions side by side, and in all
+MOST_NUMBERS, MOST_ROWS, MOST_MARKS = 4, 3, 1000  # of a scatter picture: axes, and arms
+LINE, SINGLE = 24, 12  # letters of a label of such small axes; single curves in a band
+FIRST = ("gain_margin_db", "phase_margin_deg", "delay_margin_ms", "peak_sensitivity")  # where there are too many
+LOOKS: dict[str, dict[str, Any]] = {
+    "continuous": {"fill": True, "color": BLUE, "alpha": 0.4, "label": "continuous-time"},
+    "sampled": {"fill": False, "color": INK, "lw": 1.1, "label": "sampled"},
+    "": {"fill": True, "color": BLUE, "alpha": 0.4, "label": "arms"},
+}
+MARKS = {**OF_STABILITY, "": (GREY, "^"), "arm": (BLUE, "o")}
+
+
+def distributions(found: Study, quantity: str | None = None, most: int = MOST_QUANTITIES) -> list[list[Spread]]:
+    """Return the distributions of a quantity, or of all, those of both loops together: first margins, then others.
+
+    Raises ParameterError where the study has no number of it.
+    """
+    both: dict[str, list[Spread]] = {}
+    names = asked_columns([quantity]) if quantity else COLUMNS
+    for each in (each for each in found.spreads if each.name in names):
+        both.setdefault(".".join(part for part in each.name.split(".") if part not in LOOPS), []).append(each)
+    require(both, "quantity", quantity, "the study has no number of it: name it in `ask`")
+    return [both[name] for name in sorted(both, key=lambda name: name not in FIRST)][:most]
+
+
+def _grid(figure: Any, *of: Any) -> None:
+    count = len(distributions(*of))
+    for ax in figure.subplots(math.ceil(count / ACROSS), min(count, ACROSS), squeeze=False).ravel()[count:]:
+        ax.remove()
+
+
+@picture(
+    (Study, "tfarm.study returns"), grid=_grid,
+    size=lambda *of: (max(4.5, 2.4 * min(n := len(distributions(*of)), ACROSS)), 0.9 + 2.0 * math.ceil(n / ACROSS)),
+    title=lambda found, *_: f"{found.arm}: distributions over {how_many(found.done, 'arm')}",
+)  # fmt: skip
+def study(found: Study, quantity: str | None = None, *, ax: Sequence[Axes]) -> None:
+    """Distribution of each quantity of a study (from `tfarm.study`), or of one, in axes of its own; the axes.
+
+    Continuous-time loops are filled, sampled ones an outline.  The bar above is from the 5 % to the 95 % quantile with
+    the median.  Where some arms have no finite value the title is the number of those that have one.
+    """
+    table = found.table()
+    for one, each in zip(ax, distributions(found, quantity), strict=False):
+        values = [table[of.name][np.isfinite(table[of.name])] for of in each]
+        low, high = min(of.least for of in each), max(of.largest for of in each)
+        room = 0.02 * (abs(high) or 1.0) if high - low <= 1e-9 * abs(high) else 0.0
+        edges = np.linspace(low - room, high + room, min(BINS, 2 + math.isqrt(max(map(len, values)))))
+        counts = [np.histogram(own, edges)[0] for own in values]
+        for n, (of, own) in enumerate(zip(each, counts, strict=True)):
+            looks, height = LOOKS[loop_of(of.name)], np.max(counts) * (1.08 + 0.1 * n)
+            one.stairs(own, edges, **looks)
+            one.plot(
+                [of.low, of.median, of.high], [height] * 3, "|-", ms=7, markevery=[1], color=looks["color"], lw=1.2
+            )
+        label = _folded(f"{COLUMNS[each[0].name].of.label} [{each[0].unit or '−'}]")
+        counted = " and ".join(str(of.arms) for of in each if of.arms < found.done)
+        one.set(xlabel=label, ylabel="arms [−]", ylim=(0, 1.27 * np.max(counts)))
+        one.set_title(f"{counted} of {found.done} arms" * bool(counted), fontsize=8.0)
+        one.yaxis.set_major_locator(MaxNLocator(3, integer=True))
+        _ticks(one)
+
+
+def _ticks(ax: Axes) -> None:
+    ax.xaxis.set_major_locator(MaxNLocator(4))
+    plain_ticks(ax.xaxis)
+
+
+def _folded(label: str) -> str:
+    return textwrap.fill(safe(label).replace(" [", "\u00a0["), LINE).replace("\u00a0", " ")
+
+
+def loop_of(name: str) -> str:
+    """Return the loop of a column, empty for one of the arm alone."""
+    return next((loop for loop in LOOPS if loop in name.split(".")), "")
+
+
+def key_label(key: str, plan: Plan) -> str:
+    """A varied number with its SI unit."""
+    if key.startswith(LAW):
+        return number_label(key.removeprefix(LAW), plan.arm, plan.law)
+    is_known = ".".join(word for word in key.split(".") if not word.isdecimal()) in file_keys()
+    return f"{key} [{(file_key(key, plan.arm).unit if is_known else '') or '−'}]"
+
+
+def _shown(found: Study, quantity: str | None = None) -> tuple[list[Spread], list[str]]:
+    """Quantities up, of both loops the sampled one, and numbers along the axes: those that drive most first."""
+    rows = [each[-1] for each in distributions(found, quantity, MOST_ROWS)]
+    drivers = [each.driver for each in rows]
+    return rows, sorted(found.parts.plan.space.keys, key=drivers.count, reverse=True)[:MOST_NUMBERS]
+
+
+@picture(
+    (Study, "tfarm.study returns"), size=lambda *of: (9.0, 1.0 + 1.9 * len(_shown(*of)[0])),
+    grid=lambda figure, *of: figure.subplots(
+        *(len(each) for each in _shown(*of)), squeeze=False, sharex="col", sharey="row"
+    ),
+    title=lambda found, *_: f"{found.arm}: quantities over the varied numbers",
+)  # fmt: skip
+def study_scatter(found: Study, quantity: str | None = None, *, ax: Sequence[Axes]) -> None:
+    """Values of a study (from `tfarm.study`) over each varied number, of three quantities or of one; the axes.
+
+    A mark is an arm, in the colour of the stability of its loop; at the upper edge it has no limit, at the lower edge
+    no value.  Of more than a thousand arms as many are drawn, even over the rows.
+    """
+    table, (rows, keys) = found.table(), _shown(found, quantity)
+    drawn = np.unique(np.linspace(0, found.done - 1, min(found.done, MOST_MARKS)).round().astype(int))
+    for of, line in zip(rows, np.reshape(np.array(ax, dtype=object), (len(rows), len(keys))), strict=True):
+        y, (before, loop, _) = table[of.name][drawn], of.name.partition(loop_of(of.name) or "\n")
+        words = table.get(f"{before}{loop}.stability", np.full(found.done, "arm"))[drawn]
+        for key, one in zip(keys, line, strict=True):
+            for word, (colour, mark) in MARKS.items():
+                for own, height, transform in (
+                    (np.isfinite(y), y, one.transData), (y == np.inf, 0 * drawn + 0.98, one.get_xaxis_transform()),
+                    (np.isnan(y), 0 * drawn + 0.02, one.get_xaxis_transform()),
+                ):  # fmt: skip
+                    if (here := own & (words == word)).any():
+                        one.plot(table[key][drawn][here], height[here], mark, color=colour, ms=3.4, alpha=0.75,
+                                 transform=transform, label=word or "not determined")  # fmt: skip
+            one.set(xlabel=_folded(key_label(key, found.parts.plan)) * one.xaxis.get_tick_params()["labelbottom"])
+            one.set(ylabel=_folded(f"{of.label} [{of.unit or '−'}]") * one.yaxis.get_tick_params()["labelleft"])
+            _ticks(one)
+
+
+@picture(
+    (ResponseBand, "tfarm.studies.bands.frequency_band returns"), size=(9.0, 4.6),
+    title=lambda band: f"{band.arm}: {band.label.partition(' [')[0]} of {how_many(len(band.curves), 'arm')}",
+)  # fmt: skip
+def study_band(band: ResponseBand, *, ax: Axes) -> None:
+    """Exact responses of the arms of a study, their 5, 50 and 95 % at each point; in the axes, or new ones."""
+    low, median, high = np.quantile(band.curves, [QUANTILES[end] for end in ("low", "median", "high")], axis=0)
+    ax.fill_between(band.at, low, high, color=BLUE, alpha=0.3, lw=0, label="5 to 95 % of the arms, at each point")
+    for n, curve in enumerate(band.curves[:: max(1, len(band.curves) // SINGLE)]):
+        ax.plot(band.at, curve, color=GREY, lw=0.5, alpha=0.6, zorder=1.5, label="single arms" * (not n))
+    ax.plot(band.at, median, color=BLUE, lw=1.4, label="median, at each point")
+    ax.set(xlabel=band.abscissa, ylabel=band.label, xlim=band.at[[0, -1]])
+    if " [dB" in band.label:
+        over_frequency(ax, band.label)
