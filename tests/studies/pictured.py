@@ -29,7 +29,7 @@ def planted(one, names):
             f"{loop}.delay_margin_ms": 12.5,
             f"{loop}.least_damping": 0.1 * (1 - K2),
         }
-    return {name: found.get(name) for name in names}
+    return {name: found.get(name) for name in (*names, "failed")}
 
 
 def planted_study(folder, draws=DRAWS, **how):
