@@ -79,9 +79,7 @@ class Plan:
             "arm": file_text(self.arm, self.chain), "law": repr(as_law(self.law)), "names": list(self.names),
             "distributions": {key: [each.kind, *each.numbers] for key, each in space.distributions.items()},
             "grids": {key: list(values) for key, values in space.grids.items()},
-            "posterior": None if space.posterior is None else hashlib.sha256(
-                repr((space.posterior.keys, space.posterior.value.tolist(), space.posterior.size.tolist(),
-                      space.posterior.covariance.tolist())).encode()).hexdigest(),
+            "posterior": space.posterior and hashlib.sha256(space.posterior.model_dump_json().encode()).hexdigest(),
             "list": None if listing is None else listing.sha256, "draws": space.draws, "seed": space.seed,
             "versions": versions(),
         }  # fmt: skip
