@@ -1,4 +1,4 @@
-"""The posterior of a fit: its covariance, its draws, those conditional on ranged numbers, its coverage, and its file."""
+"""The posterior of a fit: its covariance, its draws, also given ranged numbers, its coverage, and its file."""
 
 import json
 import math
@@ -18,7 +18,7 @@ from tfarm.fitting.fit import fit, save_fit
 from tfarm.fitting.posterior import Posterior, PosteriorNumber, load_posterior
 from tfarm.studies.declared import load_study
 
-MASS, OFFSET, E, I = "payload.mass", "payload.offset", "link.youngs_modulus", "link.section.second_moment"  # noqa: E741
+MASS, OFFSET, E, I = "payload.mass", "payload.offset", "link.youngs_modulus", "link.section.second_moment"
 COVARIANCE = [[0.04, -0.018], [-0.018, 0.01]]  # of ln mass, and of offset/0.05: correlation -0.9
 ROWS = 40_000
 TIP = Path("tests/data/sweep/tip.csv").resolve()

@@ -27,9 +27,10 @@ from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arrays import Real
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import file_text
-from tfarm.errors import ParameterError, TfarmError, one_line, require
+from tfarm.errors import ConvergenceError, ParameterError, TfarmError, one_line, require
 from tfarm.files import locked, read_file, write_file
 from tfarm.processes import shared
+from tfarm.tuner import Plan as TunerPlan
 
 from .extras import has_parquet, on_cluster, parquet_bytes, parquet_columns, versions
 from .quantities import COLUMNS, values_of
@@ -56,6 +57,7 @@ class Plan:
     chain: Chain
     space: Space
     names: tuple[str, ...]
+    tuner: TunerPlan | None = None  # the usual one of each arm by default
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -70,7 +72,7 @@ class Plan:
     @cached_property
     def subjects(self) -> Subjects:
         """The arms and loops of the rows."""
-        return Subjects(self.arm, self.law, self.chain, self.space.keys)
+        return Subjects(self.arm, self.law, self.chain, self.space.keys, self.tuner)
 
     def inputs(self, listing: Listing | None) -> dict[str, Any]:
         """Return all that the results depend on, as JSON has it."""
@@ -103,6 +105,14 @@ def table_of(plan: Plan, first: int, rows: Real) -> dict[str, list[Any]]:
             found[FAILED] = one_line(f"{type(error).__name__}: {error}", LONGEST_REASON)
         for name, column in table.items():
             column.append(found.get(name))
+    return table
+
+
+def results(plan: Plan, first: int, last: int) -> dict[str, list[Any]]:
+    """Return the table of rows first to last - 1.  Raises ConvergenceError for the first row without a result."""
+    table = chunk(plan, first, last)
+    for reason in filter(None, table[FAILED]):
+        raise ConvergenceError(reason, None, None)
     return table
 
 
