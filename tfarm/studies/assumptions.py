@@ -60,10 +60,10 @@ class Candidate:
         Quantity("I_h", "kg m^2", 4, key="hub_inertia_kg_m2", help="candidate inertia of hub and rotor about the axis"),
     ] = None
     natural_frequency: Annotated[
-        Sequence[float],
+        list[float],
         Quantity("natural frequencies", "rad/s", help="flexible modes of the candidate from the first, undamped"),
     ]
-    sensitivity: Annotated[Sequence[float], Quantity("sensitivities", "%/%", 4, "of frequency to I or I_h, exact")]
+    sensitivity: Annotated[list[float], Quantity("sensitivities", "%/%", 4, "of frequency to I or I_h, exact")]
     verdict: Annotated[
         str,
         Quantity(
@@ -191,7 +191,7 @@ def _candidates(arm: Arm, count: int, key: str, own: int, known: Mapping[str, Se
     names = (*chain.from_iterable(lists.values()), *words)
     table = results(Plan(arm, default_gains(arm), Chain(), space, names), 0, space.count)
     columns: dict[str, Sequence[Any]] = {
-        **known, **{name: list(zip(*(table[each] for each in of), strict=True)) for name, of in lists.items()},
+        **known, **{name: [*map(list, zip(*(table[each] for each in of), strict=True))] for name, of in lists.items()},
     }  # fmt: skip
     if words:
         columns |= {"verdict": table[STABILITY], "K2_below": table[LIMIT],

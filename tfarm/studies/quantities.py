@@ -31,7 +31,7 @@ LOOPS = ("continuous", "sampled")
 SCENARIO = "slew"  # of the time response
 CARD = "card"  # the result card of both loops
 FREQUENCY, RATIO = "modes.natural_frequency_rad_s", "damped_modes.damping_ratio"
-SENSITIVITY, INTERVAL, STABILITY, TRIAL_COST = "sensitivity", "interval", "interval.stability", "tuner.trial_cost"
+SENSITIVITY, INTERVAL, STABILITY, TRIAL_COST = "sensitivity", "interval", "interval.verdict", "tuner.trial_cost"
 UNSTABLE, REAL, IMAGINARY = "poles.unstable", "poles.re_1_s", "poles.im_rad_s"
 
 
