@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from scipy import stats
+import scipy  # whose statistics load when they are used: half a second
 
 from tfarm.arrays import Real
 from tfarm.errors import require
@@ -74,7 +74,7 @@ class Failure:
 
 def least_share(successes: int, count: int, confidence: float = CONFIDENCE) -> float:
     """Return the share that is exceeded with that confidence, one-sided (Clopper and Pearson, 1934)."""
-    interval = stats.binomtest(successes, count, alternative="greater").proportion_ci(confidence, method="exact")
+    interval = scipy.stats.binomtest(successes, count, alternative="greater").proportion_ci(confidence, method="exact")
     return float(interval.low)
 
 
@@ -123,7 +123,7 @@ def _driver(inputs: Mapping[str, Real], values: Real) -> tuple[str | None, float
     found = {}
     for key, column in inputs.items():
         if len(values) >= FEWEST_RANKED and np.ptp(column) > 0 and np.ptp(values) > 0:
-            of = stats.spearmanr(column, values)
+            of = scipy.stats.spearmanr(column, values)
             if of.pvalue < SIGNIFICANT / len(inputs):  # Bonferroni: of several numbers one is often near it by chance
                 found[key] = float(of.statistic)
     if not found:

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import stats
+import scipy  # whose statistics load when they are used: half a second
 
 from tfarm.arm import AnyLaw, Arm
 from tfarm.arm.writing import KeyedArms
@@ -36,10 +36,10 @@ MOST_ROWS = 10_000_000  # of one study
 MOST_SEED = 2**63
 BATCH = 10_000  # rows of a list that are read at a time
 FORMS: dict[str, tuple[str, Callable[..., Any]]] = {  # kind of a distribution: its numbers in words, and SciPy's
-    "uniform": ("LOW, HIGH", lambda low, high: stats.uniform(low, high - low)),
-    "loguniform": ("LOW, HIGH", stats.loguniform),
-    "normal": ("MEAN, DEVIATION", stats.norm),
-    "lognormal": ("MEDIAN, DEVIATION of the natural logarithm", lambda median, s: stats.lognorm(s, scale=median)),
+    "uniform": ("LOW, HIGH", lambda low, high: scipy.stats.uniform(low, high - low)),
+    "loguniform": ("LOW, HIGH", lambda low, high: scipy.stats.loguniform(low, high)),
+    "normal": ("MEAN, DEVIATION", lambda mean, deviation: scipy.stats.norm(mean, deviation)),
+    "lognormal": ("MEDIAN, DEVIATION of the natural logarithm", lambda median, s: scipy.stats.lognorm(s, scale=median)),
 }
 GRIDS: dict[str, tuple[str, Callable[..., Sequence[float]]]] = {
     "grid": ("LOW, HIGH, COUNT", lambda low, high, count: np.linspace(low, high, int(count)).tolist()),
@@ -127,7 +127,7 @@ class Space:
         if self.posterior is None:
             return found
         fixed = dict(zip(self.distributions, found.T, strict=True))
-        rest = self.posterior.draws(fixed, stats.norm.ppf(uniform[:, own:]))
+        rest = self.posterior.draws(fixed, scipy.stats.norm.ppf(uniform[:, own:]))
         return np.hstack([found, rest])
 
     def uniform(self, n: int) -> Real:

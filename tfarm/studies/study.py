@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from scipy import stats
+import scipy  # whose statistics load when they are used: half a second
 from scipy.optimize import minimize
 
 from tfarm.arm import AnyLaw, Arm
@@ -332,7 +332,9 @@ def sobol_indices(plan: Plan, size: int, workers: int, progress: Progress | None
         sampled.append(found)
         return np.nan_to_num(found, posinf=0.0, neginf=0.0)
 
-    indices: Any = stats.sobol_indices(func=known, n=size, dists=dists, rng=np.random.default_rng(plan.space.seed))
+    indices: Any = scipy.stats.sobol_indices(
+        func=known, n=size, dists=dists, rng=np.random.default_rng(plan.space.seed)
+    )
     ends = indices.bootstrap(confidence_level=CONFIDENCE)
     has_all = np.all([np.isfinite(each).reshape(len(numbers), -1).all(axis=1) for each in sampled], axis=0)
     varies = np.max([np.ptp(each.reshape(len(numbers), -1), axis=1) for each in sampled], axis=0) > 0
