@@ -27,6 +27,7 @@ from tfarm.records import record
 from tfarm.schema import Column, Quantity, Table
 from tfarm.spectrum.table import default_gains
 
+from .extras import cluster_size
 from .findings import (
     CONFIDENCE,
     LARGER_IS_WORSE,
@@ -40,13 +41,14 @@ from .findings import (
     spreads_of,
 )
 from .quantities import CARD, COLUMNS, asked_columns
-from .running import ROW, Parts, Plan, Progress, opened, run, table_of, usual_workers
+from .running import ROW, Parts, Plan, Progress, run, table_of, usual_workers
 from .space import MOST_ROWS, MOST_SEED, Listing, Subjects, space_of
 
 INTERVAL = "(Clopper-Pearson, one-sided)"
 WORST_FILE = "worst.toml"
 STEPS_A_NUMBER, LEAST_STEPS = 20, 20  # evaluations of the search of the worst arm
 BEYOND = 1e9  # a value that any unstable loop exceeds in the order of worse arms
+MOST_WORKERS = 1024
 SOBOL_BLOCK = 64  # rows of the sample of Sobol' indices that are computed at a time
 
 
@@ -240,9 +242,14 @@ def study(
         sobol,
         "needs independent distributions",
     )
-    workers = usual_workers() if workers is None else whole("workers", workers, 1, 1024, "processes, at least 1")
-    parts = opened(Path(out), plan, listing, workers, part)
-    run(parts, listing, workers, client, stop_after, progress)
+    require(client is None or workers is None, "workers", workers, "those of the client are used: leave it out")
+    if workers is None:
+        workers = usual_workers() if client is None else cluster_size(client)
+    whole("workers", workers, 1, MOST_WORKERS, "processes, at least 1")
+    whole("part", 1 if part is None else part, 1, MOST_ROWS, "rows of a part, at least 1")
+    declared = {"over": over or {}, "ask": ask, "draws": draws, "seed": seed, "rows": rows, "posterior": posterior,
+                "worst": worst, "sobol": sobol}  # fmt: skip
+    parts = run(Path(out), plan, listing, declared, workers, client, stop_after, part, progress or (lambda *_: None))
     found = Study(parts=parts, arm=arm.name, rows=space.count, rows_a_part=parts.rows)
     if sobol and found.is_complete:
         found = replace(found, sobol=sobol_indices(plan, sobol, workers, progress))
