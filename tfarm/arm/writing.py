@@ -124,7 +124,7 @@ class KeyedArms:
 
     def __init__(self, arm: Arm, keys: Sequence[str], what: str = "free") -> None:
         self.arm, self.keys = arm, tuple(keys)
-        self._table, self._numbers = arm_table(arm), _numbers(arm)
+        self._table, self._numbers = arm_table(arm), numbers_of(arm)
         for key in keys:
             must_be_known(what, key, self._numbers)
             require(keys.count(key) == 1, what, key, "is named twice; once is enough")
@@ -147,7 +147,7 @@ class KeyedArms:
         return self._numbers[key]
 
 
-def _numbers(arm: Arm) -> dict[str, float]:
+def numbers_of(arm: Arm) -> dict[str, float]:
     """Return all numbers of an arm by their keys, also those at their defaults."""
     links = {f"link.{n}" if arm.outer else "link": link for n, link in enumerate(arm.links, 1)}
     found = {f"{place}.{name}": getattr(link, name) for place, link in links.items() for name in LINK_NUMBERS}

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from tfarm.case.card import LoopCard, result_card
+from tfarm.case.card import LoopCard, certainty_of, certainty_of_samples, loop_cards
 from tfarm.case.step import LoopResponse, step
-from tfarm.errors import must_be_known, require
+from tfarm.dsp.verdict import sampled
+from tfarm.errors import TfarmError, must_be_known, require
 from tfarm.loop.poles import closed_loop_poles
+from tfarm.loop.stability import stability
 from tfarm.schema import Percent, Quantity
 from tfarm.schema.quantities import quantities
 from tfarm.spectrum import damped_modes, modes
@@ -20,15 +22,14 @@ from tfarm.tuner.tuning import tuned
 
 from .space import Subject
 
+FAILED = "failed"  # column of the reason of a missing result
 LISTED = 5  # modes and poles of a row
 LOOPS = ("continuous", "sampled")
 SCENARIO = "slew"  # of the time response
 CARD = "card"  # the result card of both loops
+NO_PARENT = Quantity()
 FREQUENCY, RATIO = "modes.natural_frequency_rad_s", "damped_modes.damping_ratio"
 UNSTABLE, REAL, IMAGINARY = "poles.unstable", "poles.re_1_s", "poles.im_rad_s"
-
-
-NO_PARENT = Quantity()
 
 
 class Column(NamedTuple):
@@ -39,10 +40,10 @@ class Column(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """A record of an arm: its columns by dotted name, and their values."""
+    """Columns of an arm by dotted name, and the function of their values and of the names that are needed."""
 
     columns: Mapping[str, Column]
-    values: Callable[[Subject], Mapping[str, Any]]
+    values: Callable[[Subject, Set[str]], Mapping[str, Any]]
 
 
 def entries_of(kind: Any, value: Any, under: str, parent: Quantity = NO_PARENT) -> Iterator[tuple[str, Column, Any]]:
@@ -78,30 +79,40 @@ def _plain(value: Any) -> Any:
     return float(value) if isinstance(value, Percent | int) else value
 
 
-def _of_loops(kind: Any, under: str, find: Callable[[Subject], Any]) -> Asked:
-    """Return the entries that a record has of the continuous-time and of the sampled loop."""
+def _card_of(loop: str) -> Asked:
+    """Return the entries of the card of a loop, of which stability and its certainty need the verdict alone."""
+    words = f"{loop}.stability", f"{loop}.certainty"
 
-    def entries(record: Any) -> Iterator[tuple[str, Column, Any]]:
-        for loop in LOOPS:
-            yield from entries_of(kind, getattr(record, loop, None), f"{under}{loop}")
+    def values(one: Subject, names: Set[str]) -> dict[str, Any]:
+        card = loop_cards(one.arm, one.law, one.chain).get(loop)
+        if card is None or not names <= {*words}:
+            return {name: value for name, _, value in entries_of(LoopCard, card and card(), loop)}
+        if loop == "sampled":
+            of_samples = sampled(one.arm, one.law, one.chain).verdict
+            return dict(zip(words, (of_samples.word, certainty_of_samples(of_samples)), strict=True))
+        verdict = stability(one.arm, one.law)
+        return dict(zip(words, (verdict.verdict, certainty_of(verdict)), strict=True))
 
-    return Asked(
-        {name: column for name, column, _ in entries(None)},
-        lambda one: {name: value for name, _, value in entries(find(one))},
-    )
+    return Asked({name: column for name, column, _ in entries_of(LoopCard, None, loop)}, values)
 
 
-def _modes_of(one: Subject) -> dict[str, float | None]:
+def _step_of(one: Subject, _: Set[str]) -> dict[str, Any]:
+    found = step(one.arm, one.law, one.chain, SCENARIO)
+    return {name: value for loop in LOOPS
+            for name, _, value in entries_of(LoopResponse, getattr(found, loop), f"step.{loop}")}  # fmt: skip
+
+
+def _modes_of(one: Subject, _: Set[str]) -> dict[str, float | None]:
     return _numbered(FREQUENCY, modes(one.arm, LISTED).natural_frequency[-LISTED:])
 
 
-def _damped_of(one: Subject) -> dict[str, float | None]:
+def _damped_of(one: Subject, _: Set[str]) -> dict[str, float | None]:
     found = damped_modes(modes(one.arm, LISTED))
     s = found.eigenvalues[found.index > 0, 0]
-    return _numbered(RATIO, np.divide(-s.real, abs(s), out=np.full(s.shape, np.nan), where=s != 0))
+    return _numbered(RATIO, -s.real / abs(s))
 
 
-def _poles_of(one: Subject) -> dict[str, float | None]:
+def _poles_of(one: Subject, _: Set[str]) -> dict[str, float | None]:
     found = closed_loop_poles(one.arm, one.law)
     s = found.values[:LISTED]
     return {UNSTABLE: float(found.unstable), **_numbered(REAL, s.real), **_numbered(IMAGINARY, s.imag)}
@@ -118,7 +129,7 @@ def _columns(name: str, label: str, unit: str, meaning: str) -> dict[str, Column
     return {f"{name}.{n}": Column(Quantity(f"{label} {n}", unit, help=meaning)) for n in range(1, LISTED + 1)}
 
 
-def _tuner_of(one: Subject) -> dict[str, Any]:
+def _tuner_of(one: Subject, _: Set[str]) -> dict[str, Any]:
     tuning = tuned(one.arm, one.chain, **one.tuner)
     training = tuning.training
     return {
@@ -129,52 +140,60 @@ def _tuner_of(one: Subject) -> dict[str, Any]:
     }
 
 
-ASKED = {
-    CARD: _of_loops(LoopCard, "", lambda one: result_card(one.arm, one.law, one.chain)),
-    "modes": Asked(_columns(FREQUENCY, "natural frequency, mode", "rad/s", "of the undamped arm"), _modes_of),
-    "damped_modes": Asked(_columns(RATIO, "damping ratio, mode", "", "of the arm without controller"), _damped_of),
-    "poles": Asked(
-        {
-            UNSTABLE: Column(Quantity("unstable poles", help="conjugates counted")),
-            **_columns(REAL, "real part, pole", "1/s", "of the continuous-time loop, ascending in frequency"),
-            **_columns(IMAGINARY, "imaginary part, pole", "rad/s", "of the continuous-time loop, ascending"),
-        },
-        _poles_of,
-    ),
-    "step": _of_loops(LoopResponse, "step.", lambda one: step(one.arm, one.law, one.chain, SCENARIO)),
-    "tuner": Asked(
-        {
-            "tuner.cost": Column(Quantity("cost of the tuned slew", "", 4, "none where training diverged")),
-            "tuner.cost_best_constant": Column(Quantity("cost with the best constant gain", "", 4)),
-            "tuner.trials": Column(Quantity("trials", help="slews of the training")),
-            "tuner.stopped": Column(Quantity("stopped", help="trial and sample of a divergence"), is_text=True),
-        },
-        _tuner_of,
-    ),
-}
-COLUMNS = {name: column for asked in ASKED.values() for name, column in asked.columns.items()}
+ASKED = (
+    *map(_card_of, LOOPS),
+    Asked(_columns(FREQUENCY, "natural frequency, mode", "rad/s", "of the undamped arm"), _modes_of),
+    Asked(_columns(RATIO, "damping ratio, mode", "", "of the arm without controller"), _damped_of),
+    Asked({
+        UNSTABLE: Column(Quantity("unstable poles", help="conjugates counted")),
+        **_columns(REAL, "real part, pole", "1/s", "of the continuous-time loop, ascending in frequency"),
+        **_columns(IMAGINARY, "imaginary part, pole", "rad/s", "of the continuous-time loop, ascending"),
+    }, _poles_of),
+    Asked({name: column for loop in LOOPS
+           for name, column, _ in entries_of(LoopResponse, None, f"step.{loop}")}, _step_of),
+    Asked({
+        "tuner.cost": Column(Quantity("cost of the tuned slew", "", 4, "none where training diverged")),
+        "tuner.cost_best_constant": Column(Quantity("cost with the best constant gain", "", 4)),
+        "tuner.trials": Column(Quantity("trials", help="slews of the training")),
+        "tuner.stopped": Column(Quantity("stopped", help="trial and sample of a divergence"), is_text=True),
+    }, _tuner_of),
+)  # fmt: skip
+COLUMNS = {name: column for asked in ASKED for name, column in asked.columns.items()}
 
 
 def asked_columns(words: Sequence[str]) -> tuple[str, ...]:
     """Return the names of the columns that are asked for: "card", "sampled.delay_margin_ms", "delay_margin_ms".
 
-    A word is a record, or whole parts of dotted names.  Raises ParameterError for a word of no column.
+    A word is whole parts of dotted names, of which those where it is nearest to the front are meant.  Raises
+    ParameterError for a word of no column.
     """
     found: dict[str, None] = {}
     for word in words:
-        own = list(ASKED[word].columns) if word in ASKED else [n for n in COLUMNS if f".{word}." in f".{n}."]
-        if not own:
-            parts = {part for name in COLUMNS for part in (name, *name.split(".")) if not part.isdigit()}
-            must_be_known("ask", word, sorted({*ASKED, *parts}))
-        found |= dict.fromkeys(own)
-    require(found, "ask", "", f"name at least one quantity: {', '.join(ASKED)}, or one of theirs")
+        for part in LOOPS if word == CARD else (word,):
+            heads = {name: f".{name}.".partition(f".{part}.") for name in COLUMNS}
+            depth = {name: head.count(".") for name, (head, is_there, _) in heads.items() if is_there}
+            if not depth:
+                parts = {each for name in COLUMNS for each in (name, *name.split(".")) if not each.isdigit()}
+                must_be_known("ask", word, sorted({CARD, *parts}))
+            found |= {name: None for name, place in depth.items() if place == min(depth.values())}
+    require(found, "ask", "", f"name at least one quantity: {CARD}, modes, damped_modes, poles, step, tuner")
     return tuple(found)
 
 
+def column_of(word: str, key: str) -> str:
+    """Return the one column of numbers of a word.  Raises ParameterError for none or several."""
+    names = [name for name in asked_columns([word]) if not COLUMNS[name].is_text and COLUMNS[name].of.label]
+    require(len(names) == 1 or word in names, key, word, f"one quantity of numbers; it names: {', '.join(names[:6])}")
+    return word if word in names else names[0]
+
+
 def values_of(one: Subject, names: Sequence[str]) -> dict[str, Any]:
-    """Return the values of these columns for an arm."""
-    found: dict[str, Any] = {}
-    for asked in ASKED.values():
-        if not asked.columns.keys().isdisjoint(names):
-            found |= asked.values(one)
-    return {name: found.get(name) for name in names}
+    """Return the values of these columns for an arm, and under `FAILED` the reason of missing ones."""
+    found, reasons = dict[str, Any](), []
+    for asked in ASKED:
+        if own := asked.columns.keys() & {*names}:
+            try:
+                found |= asked.values(one, own)
+            except TfarmError as error:
+                reasons.append(f"{min(own).split('.')[0]}: {error}")
+    return {**{name: found.get(name) for name in names}, FAILED: "; ".join(reasons) or None}

@@ -14,7 +14,7 @@ import json
 import math
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import islice
@@ -32,13 +32,14 @@ from tfarm.processes import shared
 
 from .declared import STUDY_FILE, files_of
 from .extras import has_parquet, on_cluster, parquet_bytes, parquet_columns, versions
-from .quantities import COLUMNS, values_of
+from .quantities import COLUMNS, FAILED, values_of
 from .space import Listing, Space, Subjects
 
 Progress = Callable[[int, int, str], object]
 Chunk = dict[str, list[Any]]  # columns of a range of rows
 OUT = "--out"  # the key of errors of the folder
-ROW, FAILED = "row", "failed"  # columns of every part: number of the row, and the reason of a missing result
+Task = tuple[int, Callable[[], Chunk]]  # number of a part, and the call that returns its table
+ROW = "row"  # column of the number of the row, from 0
 FILE, PREFIX, PARQUET = "study.json", "part-", ".parquet"
 MOST_BYTES = 1 << 20  # of that file
 PILOT = 4  # rows whose cost is measured
@@ -87,36 +88,39 @@ def table_of(plan: Plan, first: int, rows: Real) -> Chunk:
         found: dict[str, Any] = {ROW: number, **dict(zip(plan.space.keys, row, strict=True))}
         try:
             found |= values_of(plan.subjects.at(row), plan.names)
-        except TfarmError as error:
-            found[FAILED] = one_line(str(error), LONGEST_REASON)
         except Exception as error:  # one arm never ends a study: its reason is kept, and counted
-            found[FAILED] = one_line(f"{type(error).__name__}: {error}", LONGEST_REASON)
+            found[FAILED] = str(error) if isinstance(error, TfarmError) else f"{type(error).__name__}: {error}"
+        found[FAILED] = found[FAILED] and one_line(found[FAILED], LONGEST_REASON)
         for name, column in table.items():
             column.append(found.get(name))
     return table
 
 
+def first_rows(plan: Plan, count: int, listing: Listing | None) -> Real:
+    """Return the values of the first rows (rows, keys), at most that number."""
+    count = min(count, plan.space.count)
+    return plan.space.rows(0, count, None if listing is None else np.array(list(islice(listing.rows(), count))))
+
+
 def check_rows(plan: Plan, listing: Listing | None) -> None:
     """Raise ParameterError where a number of the first rows is illegal, with their number and the first reason."""
-    count = min(CHECKED, plan.space.count)
-    rows = plan.space.rows(0, count, None if listing is None else np.array(list(islice(listing.rows(), count))))
-    errors: dict[int, ParameterError] = {}
+    rows, errors = first_rows(plan, CHECKED, listing), dict[int, ParameterError]()
     for number, row in enumerate(rows.tolist()):
         try:
             plan.subjects.at(row)
         except ParameterError as error:
             errors[number] = error
     for number, first in errors.items():
-        remedy = f"{len(errors)} of {count} arms are illegal, the first in row {number}: {first.remedy}"
+        remedy = f"{len(errors)} of {len(rows)} arms are illegal, the first in row {number}: {first.remedy}"
         raise ParameterError(key=first.key, value=first.value, remedy=remedy)
 
 
-def measured_cost(plan: Plan, listing: Listing | None) -> float:
-    """Return the median cost [s] of a few arms."""
-    times, ends = [], [(n, n + 1) for n in range(min(PILOT, plan.space.count))]
-    for (first, last), listed in zip(ends, _blocks(listing, ends), strict=True):
+def seconds_an_arm(plan: Plan, rows: Real) -> float:
+    """Return the median time of the first rows of values (rows, keys) [s]."""
+    times = []
+    for row in rows[:PILOT]:
         began = time.perf_counter()
-        chunk(plan, first, last, listed)
+        table_of(plan, 0, row[None])
         times.append(time.perf_counter() - began)
     return float(np.median(times[1:] or times))  # the first one compiles
 
@@ -218,7 +222,7 @@ def opened(
         if parts.suffix == PARQUET and not has_parquet():
             raise _refusal(folder, "has Parquet parts: pip install 'tfarm[study]'")
         return parts
-    cost = measured_cost(plan, listing)
+    cost = seconds_an_arm(plan, first_rows(plan, PILOT, listing))
     rows = size or rows_a_chunk(cost, space.count, workers)
     parts = Parts(folder, plan, digest, rows, PARQUET if has_parquet() else ".csv", cost)
     if parts.written:
@@ -256,7 +260,6 @@ def run(
     check_rows(plan, listing)
     make_folder(folder, key=OUT)
     with locked(folder, OUT):
-        progress(0, 0, "cost of an arm")
         parts = opened(folder, plan, listing, declared, workers, size)
         done, began = set(parts.written), time.monotonic()
         missing = [number for number in range(parts.count) if number not in done]
@@ -267,7 +270,7 @@ def run(
 
         advance(0, parts.cost * parts.rows * len(missing) / workers)
         try:
-            for ready, (number, table) in enumerate(results(tasks, workers, client), start=1):
+            for ready, (number, table) in enumerate(computed(tasks, workers, client), start=1):
                 parts.write(number, table)
                 advance(ready, (time.monotonic() - began) / ready * (len(missing) - ready))
         except ConvergenceError as error:
@@ -276,22 +279,19 @@ def run(
     return parts
 
 
-def _tasks(
-    parts: Parts, listing: Listing | None, missing: Sequence[int], deadline: float
-) -> Iterator[tuple[int, Callable[[], Chunk]]]:
+def _tasks(parts: Parts, listing: Listing | None, missing: Sequence[int], deadline: float) -> Iterator[Task]:
     """Yield the number of each missing part with the call that returns its table."""
     ends = [parts.ends(number) for number in missing]
-    for number, (first, last), listed in zip(missing, ends, _blocks(listing, ends), strict=True):
+    blocks = [None] * len(ends) if listing is None else listing.blocks(ends)
+    for number, (first, last), listed in zip(missing, ends, blocks, strict=True):
         if time.monotonic() >= deadline:
             return
         yield number, partial(chunk, parts.plan, first, last, listed)
 
 
-def _blocks(listing: Listing | None, ends: Sequence[tuple[int, int]]) -> Iterable[Real | None]:
-    return [None] * len(ends) if listing is None else listing.blocks(ends)
-
-
-def results(tasks: Iterator[tuple[int, Callable[[], Chunk]]], workers: int, client: Any) -> Iterator[tuple[int, Chunk]]:
+def computed(
+    tasks: Iterator[tuple[int, Callable[[], Chunk]]], workers: int, client: Any
+) -> Iterator[tuple[int, Chunk]]:
     """Yield each task with its table as it comes, from processes of this machine or from those of a Dask client."""
     return shared(tasks, workers) if client is None else on_cluster(tasks, client)
 
