@@ -36,8 +36,8 @@ def grid(key, points, names):
 def test_a_mode_of_any_number_has_a_column():
     omega = tfarm.modes(LAB, 9).natural_frequency[-9:]
     name = "modes.natural_frequency_rad_s.9"
-    assert values([name]) == {name: pytest.approx(omega[8], rel=1e-12)}
-    assert list(values(["modes"]).values()) == pytest.approx(omega[:5], rel=1e-12)
+    assert values([name]) == {"failed": None, name: pytest.approx(omega[8], rel=1e-12)}
+    assert list(values(["modes"]).values())[:5] == pytest.approx(omega[:5], rel=1e-12)
     assert room.COLUMNS[name].of.label == "natural frequency, mode 9"
     assert room.COLUMNS[name].of.unit == "rad/s"
     for word in ("modes.natural_frequency_rad_s.0", "poles.unstable.2", "modes.colour.1"):
@@ -50,7 +50,7 @@ def test_sensitivities_are_the_quotients_of_differences():
     found, step = values(names), 1e-4
     for key, parameter in (("hub.inertia", "hub_inertia"), ("link.length", "length")):
         own = {"hub.inertia": LAB.hub.inertia, "link.length": LAB.length}[key]
-        low, high = (np.array([*values(["modes"], **{key: own * factor}).values()]) for factor in (1 - step, 1 + step))
+        low, high = (np.array([*values(["modes"], **{key: own * factor}).values()][:5], dtype=float) for factor in (1 - step, 1 + step))
         slopes = np.log(high / low) / math.log((1 + step) / (1 - step))
         for n in (1, 3):  # the error is of second order in the step
             assert found[f"sensitivity.{parameter}.{n}"] == pytest.approx(slopes[n - 1], rel=1e-5)

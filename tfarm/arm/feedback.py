@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from tfarm.arm.checks import INPUT_UNITS, LARGEST_NUMBER, number
 from tfarm.arm.records import Arm
-from tfarm.errors import require
+from tfarm.errors import must_be_known, require
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +93,8 @@ class HubFeedback:
         return f"{name} = {how(self[name])}{'' if arm is None else written_unit(name, arm)}"
 
     def having(self, name: str, value: float) -> HubFeedback:
-        """Return the law with another value of one gain."""
+        """Return the law with another value of one gain.  Raises ParameterError for an unknown one."""
+        must_be_known("law", name, NAMES)
         return replace(self, **{name: value})
 
     def times(self, factor: float) -> HubFeedback:

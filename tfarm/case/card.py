@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -30,11 +30,11 @@ from tfarm.digits import general
 from tfarm.dsp import Chain, Sampled
 from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.crossings import CircleGrid, circle_grid
-from tfarm.dsp.verdict import Analysis, sampled
+from tfarm.dsp.verdict import Analysis, Verdict, sampled
 from tfarm.errors import ConvergenceError
 from tfarm.loop.curve import LoopCurve, curve_of, gain_margin, lowest_drawn, refined
 from tfarm.loop.margins import LoopMargins, Margins, margins, margins_of_curve
-from tfarm.loop.stability import SMALL_GAIN, stability
+from tfarm.loop.stability import SMALL_GAIN, Stability, stability
 from tfarm.records import record
 from tfarm.schema import Percent, Quantity, Table, across, text
 from tfarm.schema.html import as_html, with_symbols
@@ -179,27 +179,31 @@ def result_card(
     ParameterError where there is no loop.
     """
     law, chain = as_law(law), chain_or_usual(chain)
-    T, (damped, undamped) = chain.sampling.period, graded_arm(arm)
+    _, undamped = graded_arm(arm)
     notes = [SCALED + RECOMMENDED[arm.has_elastic_link]] if law.gains == default_gains(arm) else []
     notes += [undamped] if undamped else []
-    loops: dict[str, Callable[[], tuple[LoopCard, Callable[[], LoopCard]]]] = {
-        "continuous": lambda: (
-            continuous_card(continuous or margins_of(arm, law), T),
-            lambda: continuous_card(margins_of(damped, law), T),
-        ),
-        "sampled": lambda: (
-            sampled_card(at_samples or _sampled_of(arm, law, chain)),
-            lambda: sampled_card(_sampled_of(damped, law, chain)),
-        ),
-    }
-    cards: dict[str, LoopCard | None] = dict.fromkeys(loops)
-    for name in loops if not law.is_discrete else ("sampled",):
+    cards: dict[str, LoopCard | None] = {"continuous": None, "sampled": None}
+    for name, card in loop_cards(arm, law, chain, continuous=continuous, at_samples=at_samples).items():
         try:
-            own, graded = loops[name]()
-            cards[name] = _with_margins(own, graded()) if damped is not arm and own.stability != "unstable" else own
+            cards[name] = card()
         except ConvergenceError as error:
             notes.append(f"{name} loop not determined: {error}")
-    return ResultCard(**cards, period=T, notes=tuple(notes))
+    return ResultCard(**cards, period=chain.sampling.period, notes=tuple(notes))
+
+
+def loop_cards(
+    arm: Arm, law: AnyLaw, chain: Chain, *, continuous: Margins | None = None, at_samples: Analysis | None = None
+) -> dict[str, Callable[[], LoopCard]]:
+    """The call that returns the card of each loop, or raises ConvergenceError where it is not determined."""
+    law, T, (damped, _) = as_law(law), chain.sampling.period, graded_arm(arm)
+
+    def graded(of: Callable[[Arm, Any], LoopCard], known: Any) -> LoopCard:
+        own = of(arm, known)
+        return own if damped is arm or own.stability == "unstable" else _with_margins(own, of(damped, None))
+
+    of_samples = partial(graded, lambda one, known: sampled_card(known or _sampled_of(one, law, chain)), at_samples)
+    of_time = partial(graded, lambda one, known: continuous_card(known or margins_of(one, law), T), continuous)
+    return {"sampled": of_samples} if law.is_discrete else {"continuous": of_time, "sampled": of_samples}
 
 
 def reference_damping(arm: Arm) -> float:
@@ -224,18 +228,30 @@ def continuous_card(found: Margins, period: float) -> LoopCard:
     by_mode = poles_by_mode(oscillating, {n: s for n, s in own.items() if n})
     is_of_mode = np.isin(oscillating, list(by_mode.values()))
     abscissa = verdict.spectral_abscissa
-    beyond = (
-        ", small gain beyond" if verdict.tail == SMALL_GAIN else ", theorem beyond" if verdict.is_known_beyond else ""
-    )
     delay = None if band is None else (band.delay if found.exact_delay is None else found.exact_delay)
     return LoopCard(
         stability=verdict.verdict,
-        certainty=f"converged to {verdict.band:.4g} rad/s{beyond}",
+        certainty=certainty_of(verdict),
         **_margins(band, None if band is None else band.gain, delay, period),
         least_damping=_least_damped([*by_mode.items(), *((HUB, s) for s in oscillating[~is_of_mode].tolist())]),
         time_constant=-1 / abscissa if abscissa < 0 and math.isfinite(abscissa) else None,
         minimum_damping=None,
     )
+
+
+def certainty_of(verdict: Stability) -> str:
+    """The range of a continuous-time verdict with its word of certainty."""
+    beyond = (
+        ", small gain beyond" if verdict.tail == SMALL_GAIN else ", theorem beyond" if verdict.is_known_beyond else ""
+    )
+    return f"converged to {verdict.band:.4g} rad/s{beyond}"
+
+
+def certainty_of_samples(verdict: Verdict) -> str:
+    """The range of a sampled verdict with its word of certainty."""
+    if verdict.band:
+        return f"certified to {verdict.band.top:.3g} rad/s"
+    return f"{'converged' if verdict.is_converged else 'approximate'}, first {verdict.modes_used} modes"
 
 
 def sampled_card(found: Analysis) -> LoopCard:
@@ -245,12 +261,10 @@ def sampled_card(found: Analysis) -> LoopCard:
     if verdict.is_stable:
         band = sampled_margins(SampledCurve(loop))
     is_small = arm.least_damping < reference_damping(arm)
-    needed, word = found.minimum_damping if is_small else None, "converged" if verdict.is_converged else "approximate"
+    needed = found.minimum_damping if is_small else None
     return LoopCard(
         stability=verdict.word,
-        certainty=f"certified to {verdict.band.top:.3g} rad/s"
-        if verdict.band
-        else f"{word}, first {verdict.modes_used} modes",
+        certainty=certainty_of_samples(verdict),
         **_margins(band, found.gain_factors, found.delay_margin_seconds, T),
         least_damping=_least_damped(unaliased_poles(loop).items()),
         time_constant=verdict.time_constant if verdict.is_stable else None,

@@ -12,6 +12,7 @@ from tfarm.cli.app import (
     Gains,
     Json,
     LawFile,
+    Png,
     TheoryName,
     add_command,
     advance,
@@ -20,6 +21,7 @@ from tfarm.cli.app import (
     load_chain,
     load_law,
     named,
+    print_line,
     refuse,
 )
 from tfarm.errors import require
@@ -45,6 +47,13 @@ Over = Annotated[
 Words = Annotated[str | None, typer.Option("--ask", metavar="QUANTITY,...")]
 
 
+def announce(done: int, total: int, text: str) -> None:
+    """Set the line of progress, and print one without a number of tasks: the cost of Sobol' indices."""
+    advance(done, total, text)
+    if not total:
+        print_line(text)
+
+
 @command(epilog="study sasaki2012-lab --over payload.mass=uniform:0,0.2 --ask card --draws 100 --out study")
 def study(
     arm: ArmName,
@@ -60,7 +69,9 @@ def study(
     workers: Annotated[int | None, typer.Option(min=1)] = None,
     scheduler: str | None = None,
     stop_after: Annotated[float | None, typer.Option(min=0)] = None,
+    report: Annotated[bool, typer.Option("--report")] = False,
     csv: Csv = None,
+    png: Png = None,
     law: LawFile = None,
     chain: Any = load_chain,
     theory: TheoryName = None,
@@ -85,11 +96,13 @@ def study(
     workers: processes; by default one a processor
     scheduler: Dask scheduler, such as tcp://host:8786 (trusted networks only) or tls://host:8786
     stop_after: seconds after which no further part is begun
+    report: write a page, index.html, to that folder
     """
     from tfarm.arm.reading import load_tables
     from tfarm.studies import declared
     from tfarm.studies import study as run
     from tfarm.studies.extras import cluster
+    from tfarm.studies.running import usual_workers
 
     typed: dict[str, Any] = {
         "over": dict(over or []) or None, "ask": ask and ask.split(","), "draws": draws, "seed": seed, "rows": rows,
@@ -105,10 +118,15 @@ def study(
         subject = load_arm(arm, theory)
         controller, defaults = load_law(subject, arm, gains, law)
         arguments = {"arm": subject, "law": controller, "chain": chain(arm), **own}
-    places: dict[str, Any] = {"out": out, "workers": workers, "stop_after": stop_after, "progress": advance}
+    places: dict[str, Any] = {"out": out, "workers": workers, "stop_after": stop_after, "progress": announce}
     if scheduler is None:
         found = run(**arguments, **places)
     else:
         with cluster(scheduler) as client:
             found = run(**arguments, **places, client=client)
-    emit(found, json, defaults, csv=csv)
+    page = None
+    if report:
+        from tfarm.report.writing import write_study
+
+        page = write_study(found, workers or usual_workers())
+    emit(found, json, defaults, csv=csv, png=png, also=(page,))

@@ -14,6 +14,7 @@ from tfarm.plots.loop_function import disc, loop, nichols, nyquist, sensitivity
 from tfarm.plots.motion import modes, sketch, slew, step, tuned_gain
 from tfarm.plots.regions import comparison, gain_map, overlay
 from tfarm.plots.roots import locus
+from tfarm.plots.studies import study, study_band, study_scatter
 from tfarm.plots.style import column
 
 __all__ = [
@@ -34,5 +35,8 @@ __all__ = [
     "sketch",
     "slew",
     "step",
+    "study",
+    "study_band",
+    "study_scatter",
     "tuned_gain",
 ]

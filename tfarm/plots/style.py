@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from contextvars import ContextVar
 from functools import partial, wraps
+from inspect import signature
 from itertools import product
 from pathlib import Path
 from typing import Any, get_args
@@ -139,6 +140,8 @@ def picture(
         make = grid or (lambda figure, *_: figure.subplots(len(rows), sharex=True, height_ratios=rows))
 
         def figure(*found: Any, new: Callable[..., Figure] = Figure, **how: Any) -> Figure:
+            bound = signature(draw).bind_partial(*found, **how)  # what is named counts for size, axes and headline too
+            found, how = bound.args, bound.kwargs
             with style():
                 inches = size(*found) if callable(size) else size
                 fitted = column_size(inches, grid is not None) if _in_column.get() else inches

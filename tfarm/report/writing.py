@@ -15,6 +15,7 @@ from typing import Any
 
 from tfarm.arm import Arm
 from tfarm.case import Comparison
+from tfarm.digits import how_many
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError, TfarmError, must_be_known, require
 from tfarm.files import temporary_folder
@@ -55,10 +56,13 @@ from tfarm.report.page import (
 )
 from tfarm.report.response_sections import bode_section, fit_section, measured_section, modes_section
 from tfarm.report.sampled_section import sampled_section
+from tfarm.report.study_sections import sections_of
 from tfarm.report.trust import TRUST_FOLDER, gather, save_proof, write_trust, written_proofs
 from tfarm.report.tuner_section import tuner_section
 from tfarm.schema import quantities, table
 from tfarm.stopping import undone_if_stopped
+from tfarm.studies.running import FILE
+from tfarm.studies.study import WORST_FILE, Study
 
 ReportProgress = Callable[[int, int, str], object]
 Calls = Mapping[str, Sequence[Callable[[], Any]]]  # by task: what one process does in turn
@@ -407,3 +411,26 @@ def write_comparison(found: Comparison, out: Path) -> Path:
             write_text(made / "index.html", index_page(out, trust=TRUST_PAGE if (out / TRUST_PAGE).is_file() else ""))
             move_into(made, out)
     return out / COMPARISON_PAGE
+
+
+# ------------------------------------------------------------ a study
+
+
+def write_study(found: Study, workers: int = 1) -> Path:
+    """Write index.html with its pictures and tables to the folder of a study: the page.
+
+    Raises ParameterError where it cannot be written.
+    """
+    folder, plan = found.parts.folder, found.parts.plan
+    with _temporary(folder, "--out") as made:
+        sections = [
+            make_section(anchor, anchor, lambda _, make=make: make(), Case(plan.arm, plan.chain), made)
+            for anchor, make in sections_of(found, workers)
+        ]
+        page = render(
+            "study.html", title=f"{found.arm}: study of {how_many(found.rows, 'arm')}", sections=sections,
+            explained=explained, worst_file=WORST_FILE, file=FILE, digest=found.parts.digest,
+        )  # fmt: skip
+        write_text(made / "index.html", page)
+        move_into(made, folder)
+    return folder / "index.html"

@@ -7,19 +7,19 @@ result counts as not stable.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-import scipy  # whose statistics load when they are used: half a second
+import scipy  # whose statistics take half a second to load
 
 from tfarm.arrays import Real
-from tfarm.errors import require
 from tfarm.schema import Percent, Quantity
 
-from .quantities import COLUMNS, LOOPS, asked_columns
+from .quantities import COLUMNS, LOOPS
 
 CONFIDENCE = 0.95
 QUANTILES = {"least": 0.0, "low": 0.05, "median": 0.5, "high": 0.95, "largest": 1.0}
@@ -27,10 +27,6 @@ SIGNIFICANT = 0.05  # of a rank correlation: a larger probability of chance name
 FEWEST_RANKED = 10  # rows of a rank correlation
 CERTAINTIES = ("exact", "certified", "converged", "approximate", "not determined")
 STABLE = "stable"
-LARGER_IS_WORSE = (
-    "peak_sensitivity", "settling_time_s", "overshoot", "time_constant_s", "residual_rms", "cost", "unstable",
-    "minimum_damping_s", "rise_time_s",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,19 +34,31 @@ class StableShare:
     """Stable arms of one loop."""
 
     loop: Annotated[str, Quantity("loop", help="continuous-time or sampled")]
-    stable: Annotated[int, Quantity("stable", help="arms with a stable loop")]
-    other: Annotated[int, Quantity("not stable", help="arms with a marginal or unstable loop")]
-    open: Annotated[int, Quantity("not determined", key="not_determined", help="arms without a result")]
-    certainty: Annotated[str, Quantity("certainty", help="weakest word of certainty among the stable arms")]
-    at_least: Annotated[Percent | None, Quantity("stable share, at least", "", 4,
-            help="with 95 % confidence, one-sided, Clopper and Pearson; independent draws only")]  # fmt: skip
+    stable: Annotated[int, Quantity(help="arms with a stable loop")]
+    other: Annotated[int, Quantity(key="not_stable", help="arms with a marginal or unstable loop")]
+    open: Annotated[int, Quantity(key="not_determined", help="arms without a result")]
+    certainty: Annotated[str, Quantity(help="weakest word of certainty among the stable arms")]
+    at_least: Annotated[Percent | None, Quantity(
+            help="least stable share, 95 % confidence, one-sided, Clopper and Pearson; independent draws")]  # fmt: skip
+
+    @property
+    def finding(self) -> Annotated[str, Quantity("finding", help="stable arms, with their confidence in per cent")]:
+        """Stable arms with certainty and confidence."""
+        count = self.stable + self.other + self.open
+        text = f"{self.certainty if self.stable else ''} stable on {self.stable:,} of {count:,} arms".strip()
+        others = (f"{self.other:,} not stable" * bool(self.other), f"{self.open:,} not determined" * bool(self.open))
+        text += f" ({', '.join(filter(None, others))})" * any(others)
+        if self.at_least is None:
+            return text
+        percent = math.floor(1e4 * self.at_least) / 100  # never more than was shown
+        return f"{text}: at least {percent:g} % of all with {100 * CONFIDENCE:g} % confidence"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Spread:
     """Distribution of a quantity over the arms."""
 
-    name: Annotated[str, Quantity("name", help="column of the table")]
+    name: Annotated[str, Quantity(help="column of the table")]
     label: Annotated[str, Quantity("quantity", key="quantity", help="label of the quantity")]
     unit: Annotated[str, Quantity("unit", help="SI unit")]
     arms: Annotated[int, Quantity("arms", help="arms with a finite value")]
@@ -79,26 +87,20 @@ def least_share(successes: int, count: int, confidence: float = CONFIDENCE) -> f
 
 
 def shares_of(table: Mapping[str, Any], names: Sequence[str], is_independent: bool) -> tuple[StableShare, ...]:
-    """Return the stable shares of the loops whose stability was asked for."""
+    """Return the stable shares of the loops whose stability was computed."""
     found = []
-    for loop in LOOPS:
-        if f"{loop}.stability" not in names:
-            continue
+    for loop in [each for each in LOOPS if f"{each}.stability" in names]:
         words = table[f"{loop}.stability"]
-        is_stable = words == STABLE
-        stable, undetermined = int(is_stable.sum()), int((words == "").sum())
-        texts = table.get(f"{loop}.certainty", np.full(len(words), ""))[is_stable].tolist()
-        certainty = max(({text.split(" ")[0] for text in texts} & {*CERTAINTIES}) or {""}, key=_rank)
+        stable, undetermined, count = int((words == STABLE).sum()), int((words == "").sum()), len(words)
+        texts = table.get(f"{loop}.certainty", np.full(count, ""))[words == STABLE].tolist()
+        known = [text.partition(" ")[0].rstrip(",") for text in texts]
+        at_least = Percent(least_share(stable, count)) if is_independent else None
         found.append(StableShare(
             loop=loop.replace("continuous", "continuous-time"), stable=stable, open=undetermined,
-            other=len(words) - stable - undetermined, certainty=certainty,
-            at_least=Percent(least_share(stable, len(words))) if is_independent and len(words) else None,
+            other=count - stable - undetermined, at_least=at_least,
+            certainty=max(known, key=(*CERTAINTIES, "").index, default=""),
         ))  # fmt: skip
     return tuple(found)
-
-
-def _rank(word: str) -> int:
-    return CERTAINTIES.index(word) if word else -1
 
 
 def spreads_of(table: Mapping[str, Any], names: Sequence[str], keys: Sequence[str]) -> tuple[Spread, ...]:
@@ -120,32 +122,17 @@ def spreads_of(table: Mapping[str, Any], names: Sequence[str], keys: Sequence[st
 
 def _driver(inputs: Mapping[str, Real], values: Real) -> tuple[str | None, float | None]:
     """Return the varied number of the largest significant rank correlation, and that."""
-    found = {}
-    for key, column in inputs.items():
-        if len(values) >= FEWEST_RANKED and np.ptp(column) > 0 and np.ptp(values) > 0:
-            of = scipy.stats.spearmanr(column, values)
-            if of.pvalue < SIGNIFICANT / len(inputs):  # Bonferroni: of several numbers one is often near it by chance
-                found[key] = float(of.statistic)
-    if not found:
-        return None, None
-    key = max(found, key=lambda each: abs(found[each]))
-    return key, found[key]
+    known = {key: scipy.stats.spearmanr(column, values) for key, column in inputs.items()
+             if len(values) >= FEWEST_RANKED and np.ptp(column) > 0 and np.ptp(values) > 0}  # fmt: skip
+    level = SIGNIFICANT / max(1, len(inputs))  # Bonferroni: of several numbers one is often near it by chance
+    found = {key: float(of.statistic) for key, of in known.items() if of.pvalue < level}
+    return max(found.items(), key=lambda each: abs(each[1]), default=(None, None))
 
 
 def failures_of(table: Mapping[str, Any]) -> tuple[Failure, ...]:
     """Return the reasons of missing results with their counts."""
-    first: dict[str, int] = {}
-    count: dict[str, int] = {}
+    rows: dict[str, list[int]] = {}
     for row, text in zip(table["row"].tolist(), table["failed"].tolist(), strict=True):
-        reason = re.sub(r"[-+]?\d[\d.eE+-]*", "N", text)
-        if reason:
-            first.setdefault(reason, int(row))
-            count[reason] = count.get(reason, 0) + 1
-    return tuple(Failure(reason, count[reason], row) for reason, row in first.items())
-
-
-def quantity_named(word: str, key: str) -> str:
-    """Return the one column of numbers of a word.  Raises ParameterError for none or several."""
-    names = [name for name in asked_columns([word]) if not COLUMNS[name].is_text and COLUMNS[name].of.label]
-    require(len(names) == 1 or word in names, key, word, f"names several quantities: {', '.join(names[:6])}")
-    return word if word in names else names[0]
+        if text:
+            rows.setdefault(re.sub(r"[-+]?\d[\d.eE+-]*", "N", text), []).append(int(row))
+    return tuple(Failure(reason, len(own), own[0]) for reason, own in rows.items())

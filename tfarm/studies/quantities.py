@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
@@ -12,9 +12,10 @@ from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 import numpy as np
 
 from tfarm.arm import PLANE
-from tfarm.case.card import LoopCard, result_card
+from tfarm.case.card import LoopCard, certainty_of, certainty_of_samples, loop_cards
 from tfarm.case.step import LoopResponse, step
-from tfarm.errors import ConvergenceError, must_be_known, require
+from tfarm.dsp.verdict import sampled
+from tfarm.errors import ConvergenceError, TfarmError, must_be_known, require
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Interval, windows_of
@@ -26,16 +27,15 @@ from tfarm.tuner.tuning import tuned
 
 from .space import Subject
 
+FAILED = "failed"  # column of the reason of a missing result
 LISTED = 5  # modes and poles of a row
 LOOPS = ("continuous", "sampled")
 SCENARIO = "slew"  # of the time response
 CARD = "card"  # the result card of both loops
+NO_PARENT = Quantity()
 FREQUENCY, RATIO = "modes.natural_frequency_rad_s", "damped_modes.damping_ratio"
 SENSITIVITY, INTERVAL, STABILITY, TRIAL_COST = "sensitivity", "interval", "interval.verdict", "tuner.trial_cost"
 UNSTABLE, REAL, IMAGINARY = "poles.unstable", "poles.re_1_s", "poles.im_rad_s"
-
-
-NO_PARENT = Quantity()
 
 
 class Column(NamedTuple):
@@ -56,10 +56,10 @@ class Columns(dict[str, Column]):
 
 
 class Asked(NamedTuple):
-    """A record of an arm: its columns by dotted name, and the values of those of some names."""
+    """Columns of an arm by dotted name, and the function of their values and of the names that are needed."""
 
     columns: Mapping[str, Column]
-    values: Callable[[Subject, Sequence[str]], Mapping[str, Any]]
+    values: Callable[[Subject, Set[str]], Mapping[str, Any]]
 
 
 def first_of(name: str) -> str:
@@ -67,7 +67,7 @@ def first_of(name: str) -> str:
     return re.sub(r"\.[1-9][0-9]{0,6}$", ".1", name)
 
 
-def _most(names: Sequence[str]) -> int:
+def _most(names: Set[str]) -> int:
     """Return the largest number of numbered columns."""
     return max(int(name.rpartition(".")[2]) for name in names)
 
@@ -105,44 +105,42 @@ def _plain(value: Any) -> Any:
     return float(value) if isinstance(value, Percent | int) else value
 
 
-def _of_loops(kind: Any, under: str, find: Callable[[Subject], Any]) -> Asked:
-    """Return the entries that a record has of the continuous-time and of the sampled loop."""
+def _card_of(loop: str) -> Asked:
+    """Return the entries of the card of a loop, of which stability and its certainty need the verdict alone."""
+    words = f"{loop}.stability", f"{loop}.certainty"
 
-    def entries(record: Any) -> Iterator[tuple[str, Column, Any]]:
-        for loop in LOOPS:
-            yield from entries_of(kind, getattr(record, loop, None), f"{under}{loop}")
+    def values(one: Subject, names: Set[str]) -> dict[str, Any]:
+        card = loop_cards(one.arm, one.law, one.chain).get(loop)
+        if card is None or not names <= {*words}:
+            return {name: value for name, _, value in entries_of(LoopCard, card and card(), loop)}
+        if loop == "sampled":
+            of_samples = sampled(one.arm, one.law, one.chain).verdict
+            return dict(zip(words, (of_samples.word, certainty_of_samples(of_samples)), strict=True))
+        verdict = stability(one.arm, one.law)
+        return dict(zip(words, (verdict.verdict, certainty_of(verdict)), strict=True))
 
-    return Asked(
-        {name: column for name, column, _ in entries(None)},
-        lambda one, _: {name: value for name, _, value in entries(find(one))},
-    )
+    return Asked({name: column for name, column, _ in entries_of(LoopCard, None, loop)}, values)
 
 
-def _modes_of(one: Subject, names: Sequence[str]) -> dict[str, float | None]:
+def _step_of(one: Subject, _: Set[str]) -> dict[str, Any]:
+    found = step(one.arm, one.law, one.chain, SCENARIO)
+    return {name: value for loop in LOOPS
+            for name, _, value in entries_of(LoopResponse, getattr(found, loop), f"step.{loop}")}  # fmt: skip
+
+
+def _modes_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
     count = _most(names)
     return _numbered(FREQUENCY, modes(one.arm, count).natural_frequency[-count:])
 
 
-def _sensitivities_of(one: Subject, names: Sequence[str]) -> dict[str, float | None]:
+def _sensitivities_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
     count, found = _most(names), dict[str, float | None]()
     for parameter, values in modes(one.arm, count).sensitivity.items():
         found |= _numbered(f"{SENSITIVITY}.{parameter}", values[-count:] + 0.0)
     return found
 
 
-def _damped_of(one: Subject, names: Sequence[str]) -> dict[str, float | None]:
-    found = damped_modes(modes(one.arm, _most(names)))
-    s = found.eigenvalues[found.index > 0, 0]
-    return _numbered(RATIO, np.divide(-s.real, abs(s), out=np.full(s.shape, np.nan), where=s != 0))
-
-
-def _poles_of(one: Subject, _: Sequence[str]) -> dict[str, float | None]:
-    found = closed_loop_poles(one.arm, one.law)
-    s = found.values
-    return {UNSTABLE: float(found.unstable), **_numbered(REAL, s.real), **_numbered(IMAGINARY, s.imag)}
-
-
-def _intervals_of(one: Subject, names: Sequence[str]) -> dict[str, Any]:
+def _intervals_of(one: Subject, names: Set[str]) -> dict[str, Any]:
     """Stability and intervals of gains at the hub; undecided, without intervals, where poles cannot be counted."""
     found: dict[str, Any] = {STABILITY: "undecided"}
     with suppress(ConvergenceError):
@@ -155,6 +153,18 @@ def _intervals_of(one: Subject, names: Sequence[str]) -> dict[str, Any]:
     return found
 
 
+def _damped_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
+    found = damped_modes(modes(one.arm, _most(names)))
+    s = found.eigenvalues[found.index > 0, 0]
+    return _numbered(RATIO, -s.real / abs(s))
+
+
+def _poles_of(one: Subject, _: Set[str]) -> dict[str, float | None]:
+    found = closed_loop_poles(one.arm, one.law)
+    s = found.values
+    return {UNSTABLE: float(found.unstable), **_numbered(REAL, s.real), **_numbered(IMAGINARY, s.imag)}
+
+
 def _numbered(name: str, values: Any) -> dict[str, float | None]:
     """Return values under numbered names, None where there are none."""
     return {f"{name}.{n}": each if np.isfinite(each) else None for n, each in enumerate(values.tolist(), start=1)}
@@ -165,7 +175,7 @@ def _columns(name: str, label: str, unit: str, meaning: str) -> dict[str, Column
     return {f"{name}.{n}": Column(Quantity(f"{label} {n}", unit, help=meaning)) for n in range(1, LISTED + 1)}
 
 
-def _tuner_of(one: Subject, _: Sequence[str]) -> dict[str, Any]:
+def _tuner_of(one: Subject, _: Set[str]) -> dict[str, Any]:
     tuning = tuned(one.arm, one.chain, one.plan, **one.tuner)
     training = tuning.training
     return {
@@ -178,81 +188,73 @@ def _tuner_of(one: Subject, _: Sequence[str]) -> dict[str, Any]:
     }
 
 
-ASKED = {
-    CARD: _of_loops(LoopCard, "", lambda one: result_card(one.arm, one.law, one.chain)),
-    "modes": Asked(_columns(FREQUENCY, "natural frequency, mode", "rad/s", "of the undamped arm"), _modes_of),
-    SENSITIVITY: Asked(
-        {
-            name: column
-            for parameter in PARAMETERS
-            for name, column in _columns(
-                f"{SENSITIVITY}.{parameter}",
-                f"sensitivity to {parameter}, mode",
-                "%/%",
-                "d ln(natural frequency)/d ln(number)",
-            ).items()
-        },
-        _sensitivities_of,
-    ),
-    INTERVAL: Asked(
-        {
-            STABILITY: Column(Quantity("stability", help="of the continuous-time loop"), is_text=True),
-            **{
-                f"{INTERVAL}.{gain}.{name}": Column(
-                    replace(of, label=f"stability interval of {gain} {of.label}"), is_text=name.endswith("_is")
-                )
-                for gain in PLANE
-                for name, of in quantities(Interval).items()
-            },
-        },
-        _intervals_of,
-    ),
-    "damped_modes": Asked(_columns(RATIO, "damping ratio, mode", "", "of the arm without controller"), _damped_of),
-    "poles": Asked(
-        {
-            UNSTABLE: Column(Quantity("unstable poles", help="conjugates counted")),
-            **_columns(REAL, "real part, pole", "1/s", "of the continuous-time loop, ascending in frequency"),
-            **_columns(IMAGINARY, "imaginary part, pole", "rad/s", "of the continuous-time loop, ascending"),
-        },
-        _poles_of,
-    ),
-    "step": _of_loops(LoopResponse, "step.", lambda one: step(one.arm, one.law, one.chain, SCENARIO)),
-    "tuner": Asked(
-        {
-            "tuner.cost": Column(Quantity("cost of the tuned slew", "", 4, "none where training diverged")),
-            "tuner.cost_best_constant": Column(Quantity("cost with the best constant gain", "", 4)),
-            "tuner.trials": Column(Quantity("trials", help="slews of the training")),
-            "tuner.is_zero": Column(Quantity("zero gain", help="1 where the moment gain went to zero, else 0")),
-            f"{TRIAL_COST}.1": Column(Quantity("cost of trial 1", "", 4, "none after a divergence")),
-            "tuner.stopped": Column(Quantity("stopped", help="trial and sample of a divergence"), is_text=True),
-        },
-        _tuner_of,
-    ),
-}
-COLUMNS = Columns({name: column for asked in ASKED.values() for name, column in asked.columns.items()})
+ASKED = (
+    *map(_card_of, LOOPS),
+    Asked(_columns(FREQUENCY, "natural frequency, mode", "rad/s", "of the undamped arm"), _modes_of),
+    Asked({name: column for parameter in PARAMETERS for name, column in _columns(
+        f"{SENSITIVITY}.{parameter}", f"sensitivity to {parameter}, mode", "%/%", "d ln(natural frequency)/d ln(number)"
+    ).items()}, _sensitivities_of),
+    Asked({
+        STABILITY: Column(Quantity("stability", help="of the continuous-time loop"), is_text=True),
+        **{f"{INTERVAL}.{gain}.{name}": Column(replace(of, label=f"stability interval of {gain} {of.label}"),
+                                               is_text=name.endswith("_is"))
+           for gain in PLANE for name, of in quantities(Interval).items()},
+    }, _intervals_of),
+    Asked(_columns(RATIO, "damping ratio, mode", "", "of the arm without controller"), _damped_of),
+    Asked({
+        UNSTABLE: Column(Quantity("unstable poles", help="conjugates counted")),
+        **_columns(REAL, "real part, pole", "1/s", "of the continuous-time loop, ascending in frequency"),
+        **_columns(IMAGINARY, "imaginary part, pole", "rad/s", "of the continuous-time loop, ascending"),
+    }, _poles_of),
+    Asked({name: column for loop in LOOPS
+           for name, column, _ in entries_of(LoopResponse, None, f"step.{loop}")}, _step_of),
+    Asked({
+        "tuner.cost": Column(Quantity("cost of the tuned slew", "", 4, "none where training diverged")),
+        "tuner.cost_best_constant": Column(Quantity("cost with the best constant gain", "", 4)),
+        "tuner.trials": Column(Quantity("trials", help="slews of the training")),
+        "tuner.is_zero": Column(Quantity("zero gain", help="1 where the moment gain went to zero, else 0")),
+        f"{TRIAL_COST}.1": Column(Quantity("cost of trial 1", "", 4, "none after a divergence")),
+        "tuner.stopped": Column(Quantity("stopped", help="trial and sample of a divergence"), is_text=True),
+    }, _tuner_of),
+)  # fmt: skip
+COLUMNS = Columns({name: column for asked in ASKED for name, column in asked.columns.items()})
 
 
 def asked_columns(words: Sequence[str]) -> tuple[str, ...]:
     """Return the names of the columns that are asked for: "card", "sampled.delay_margin_ms", "delay_margin_ms".
 
-    A word is a record, or whole parts of dotted names.  Raises ParameterError for a word of no column.
+    A word is whole parts of dotted names, of which those where it is nearest to the front are meant.  Raises
+    ParameterError for a word of no column.
     """
     found: dict[str, None] = {}
     for word in words:
-        own = list(ASKED[word].columns) if word in ASKED else [n for n in COLUMNS if f".{word}." in f".{n}."]
-        own = own or [word] * (first_of(word) in COLUMNS)
-        if not own:
-            parts = {part for name in COLUMNS for part in (name, *name.split(".")) if not part.isdigit()}
-            must_be_known("ask", word, sorted({*ASKED, *parts}))
-        found |= dict.fromkeys(own)
-    require(found, "ask", "", f"name at least one quantity: {', '.join(ASKED)}, or one of theirs")
+        for part in LOOPS if word == CARD else (word,):
+            heads = {name: f".{name}.".partition(f".{part}.") for name in COLUMNS}
+            depth = {name: head.count(".") for name, (head, is_there, _) in heads.items() if is_there}
+            if first_of(word) in COLUMNS:
+                depth = {word: 0}
+            if not depth:
+                parts = {each for name in COLUMNS for each in (name, *name.split(".")) if not each.isdigit()}
+                must_be_known("ask", word, sorted({CARD, *parts}))
+            found |= {name: None for name, place in depth.items() if place == min(depth.values())}
+    require(found, "ask", "", f"name at least one quantity: {CARD}, modes, damped_modes, poles, step, tuner")
     return tuple(found)
 
 
+def column_of(word: str, key: str) -> str:
+    """Return the one column of numbers of a word.  Raises ParameterError for none or several."""
+    names = [name for name in asked_columns([word]) if not COLUMNS[name].is_text and COLUMNS[name].of.label]
+    require(len(names) == 1 or word in names, key, word, f"one quantity of numbers; it names: {', '.join(names[:6])}")
+    return word if word in names else names[0]
+
+
 def values_of(one: Subject, names: Sequence[str]) -> dict[str, Any]:
-    """Return the values of these columns for an arm."""
-    found: dict[str, Any] = {}
-    for asked in ASKED.values():
-        if own := [name for name in names if first_of(name) in asked.columns]:
-            found |= asked.values(one, own)
-    return {name: found.get(name) for name in names}
+    """Return the values of these columns for an arm, and under `FAILED` the reason of missing ones."""
+    found, reasons = dict[str, Any](), []
+    for asked in ASKED:
+        if own := {name for name in names if first_of(name) in asked.columns}:
+            try:
+                found |= asked.values(one, own)
+            except TfarmError as error:
+                reasons.append(f"{min(own).split('.')[0]}: {error}")
+    return {**{name: found.get(name) for name in names}, FAILED: "; ".join(reasons) or None}

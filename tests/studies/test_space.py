@@ -1,0 +1,275 @@
+"""Rows of a study: distributions, grids, lists; independent of chunks, workers and order."""
+
+import csv
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import tfarm
+from tfarm.dsp import Chain
+from tfarm.errors import ParameterError
+from tfarm.studies import space
+from tfarm.studies.declared import files_of
+from tfarm.studies.space import ENDS, Listing, Subjects, space_of
+
+CHANCE = 1e-3  # of a right distribution to be called wrong
+TRUE = {  # by kind: its numbers, and the distribution by another formula than the code's
+    "uniform": ([2.0, 5.0], lambda x: (x - 2) / 3),
+    "loguniform": ([0.1, 10.0], lambda x: np.log(x / 0.1) / np.log(100)),
+    "normal": ([1.0, 0.2], lambda x: stats.norm.cdf((x - 1) / 0.2)),
+    "lognormal": ([3.0, 0.5], lambda x: stats.norm.cdf(np.log(x / 3) / 0.5)),
+}
+GAINS = tfarm.HubFeedback(K1=0.3, K2=0.3)
+
+
+def made(over=None, *, draws=100, seed=1, listed=((), 0), posterior=None):
+    return space_of(over or {}, draws=draws, seed=seed, posterior=posterior, listed=listed)
+
+
+def test_draws_have_their_distributions_and_are_independent():
+    found = made({f"key {kind}": {kind: numbers} for kind, (numbers, _) in TRUE.items()}, draws=3000)
+    columns = found.rows(0, 3000, None).T
+    for column, (kind, (_, cdf)) in zip(columns, TRUE.items(), strict=True):
+        assert stats.kstest(column, cdf).pvalue > CHANCE, kind
+    pairs = [stats.spearmanr(columns[n], columns[k]).pvalue for n in range(4) for k in range(n)]
+    assert min(pairs) > CHANCE / len(pairs)
+    after = [stats.spearmanr(column[1:], column[:-1]).pvalue for column in columns]  # rows one after another
+    assert min(after) > CHANCE / len(after)
+
+
+def test_a_row_depends_on_seed_and_number_alone():
+    over = {"a": {"uniform": [0, 1]}, "b": {"normal": [0, 1]}, "c": {"grid": [0, 1, 3]}, "d": {"values": [5, 7]}}
+    found = made(over, draws=50)
+    whole = found.rows(0, found.count, None)
+    for size in (1, 7, 64):
+        ends = [(first, min(first + size, found.count)) for first in range(0, found.count, size)]
+        parts = {first: found.rows(first, last, None) for first, last in reversed(ends)}
+        assert np.array_equal(np.vstack([parts[first] for first, _ in ends]), whole)
+    assert np.array_equal(made(over, draws=7).rows(0, 42, None), whole[:42])
+    assert not np.any(made(over, draws=50, seed=2).rows(0, 300, None)[:, 0] == whole[:, 0])
+
+
+def test_each_draw_has_every_point_of_the_grid():
+    found = made({"c": {"grid": [0, 1, 3]}, "a": {"uniform": [0, 1]}, "d": {"values": [5, 7]}}, draws=4)
+    assert (found.keys, found.count, found.is_independent) == (("a", "c", "d"), 24, False)
+    rows = found.rows(0, 24, None)
+    for n in range(4):
+        own = rows[6 * n : 6 * n + 6]
+        assert np.ptp(own[:, 0]) == 0
+        assert own[:, 1:].tolist() == [[c, d] for c in (0.0, 0.5, 1.0) for d in (5.0, 7.0)]
+    alone = made({"c": {"grid": [0, 1, 3]}}, draws=1000)
+    assert (alone.count, alone.draws, alone.is_independent) == (3, 1, False)
+
+
+def test_inverses_are_finite_at_both_ends_of_the_uniform_numbers(monkeypatch):
+    for kind, (numbers, _) in TRUE.items():
+        values = made({"a": {kind: numbers}}).values(np.array([ENDS]).T)
+        assert np.isfinite(values).all()
+        assert values[0] < values[1]
+
+    class Zero:
+        def __init__(self, _):
+            self.random = np.zeros
+
+    monkeypatch.setattr(space.np.random, "Generator", Zero)
+    assert made({"a": {"normal": [0, 1]}}).uniform(3).tolist() == [ENDS[0]]
+
+
+BAD_RANGES = [
+    ({"a": {"uniform": [1.0, 1.0]}}, "over.a", "LOW, HIGH"),
+    ({"a": {"uniform": [1.0]}}, "over.a", "LOW, HIGH"),
+    ({"a": {"normal": [1.0]}}, "over.a", "MEAN, DEVIATION"),
+    ({"a": {"normal": []}}, "over.a", "MEAN, DEVIATION"),
+    ({"a": {"normal": [1.0, 0.0]}}, "over.a", "MEAN, DEVIATION"),
+    ({"a": {"normal": [1.0, 0.1, 2.0]}}, "over.a", "MEAN, DEVIATION"),
+    ({"a": {"loguniform": [0.0, 1.0]}}, "over.a", "above 0"),
+    ({"a": {"loguniform": [1.0, 2.0, 3.0]}}, "over.a", "above 0"),
+    ({"a": {"lognormal": [-1.0, 1.0]}}, "over.a", "MEDIAN"),
+    ({"a": {"lognormal": [1.0, 1000.0]}}, "over.a", "MEDIAN"),
+    ({"a": {"uniform": [0.0, math.inf]}}, "over.a", "finite"),
+    ({"a": {"uniform": [-1e308, 1e308]}}, "over.a", "finite"),
+    ({"a": {"uniform": [0.0, math.nan]}}, "over.a", "finite"),
+    ({"a": {"uniform": [True, 2]}}, "over.a", "finite"),
+    ({"a": {"uniform": "01"}}, "over.a", "finite"),
+    ({"a": {"uniform": 0.5}}, "over.a", "finite"),
+    ({"a": {"grid": [0.0, 1.0, 2.5]}}, "over.a", "COUNT"),
+    ({"a": {"grid": [0.0, 1.0, 0]}}, "over.a", "COUNT"),
+    ({"a": {"grid": [0.0, 1.0, 1e12]}}, "over.a", "COUNT"),
+    ({"a": {"values": []}}, "over.a", "at least one number"),
+    ({"a": {"unifrom": [0.0, 1.0]}}, "over.a", 'did you mean "uniform"'),
+    ({"a": {}}, "over.a", "give one of uniform"),
+    ({"a": 0.5}, "over.a", "give one of uniform"),
+    ({}, "over", "nothing is varied"),
+    ({"a": {"grid": [0, 1, 5000]}, "b": {"grid": [0, 1, 5000]}}, "rows", "10,000,000"),
+]
+
+
+@pytest.mark.parametrize(("over", "key", "remedy"), BAD_RANGES)
+def test_a_bad_range_is_refused_in_one_line(over, key, remedy):
+    with pytest.raises(ParameterError, match=remedy) as caught:
+        made(over)
+    assert caught.value.key == key
+    assert "\n" not in str(caught.value)
+
+
+def test_numbers_of_numpy_are_numbers():
+    found = made({"a": {"uniform": np.array([0.0, 1.0])}, "b": {"values": (np.float64(1), np.int64(2))}})
+    assert found.grids == {"b": (1.0, 2.0)}
+
+
+def test_a_key_has_one_place(lab):
+    with pytest.raises(ParameterError, match="varied twice"):
+        made({"a": {"uniform": [0, 1]}}, listed=(("a",), 3))
+    with pytest.raises(ParameterError, match="no grid with it"):
+        made({"b": {"grid": [0, 1, 3]}}, listed=(("a",), 3))
+    law = tfarm.Law({"hub_rate": 0.3, "root_moment": 0.3})
+    for pair in (("law.K1", "law.hub_rate"), ("law.hub_rate", "law.hub_rate.gain")):
+        with pytest.raises(ParameterError, match="two keys are one number"):
+            Subjects(lab, law, Chain(), pair)
+
+
+UNKNOWN_KEYS = [
+    ("payload.mas", "over", 'did you mean "payload.mass"'),
+    ("sampling.perod", "over", 'did you mean "sampling.period"'),
+    ("converters.arithmetic", "over", "converters.rate_filter"),
+    ("law.K9", "law", "known are"),
+    ("law.foo", "law", "known are"),
+    ("tuner.sed", "tuner", 'did you mean "seed"'),
+    ("", "over", "known are"),
+]
+
+
+@pytest.mark.parametrize(("key", "named", "remedy"), UNKNOWN_KEYS)
+def test_an_unknown_key_is_refused_before_any_arm(lab, key, named, remedy):
+    for law in (GAINS, tfarm.Law({"hub_rate": 0.3})):
+        with pytest.raises(ParameterError, match=remedy) as caught:
+            Subjects(lab, law, Chain(), (key,))
+        assert caught.value.key == named
+        assert "\n" not in str(caught.value)
+
+
+def test_values_reach_arm_chain_controller_and_tuner(lab):
+    keys = ("payload.mass", "link.youngs_modulus", "sampling.period", "sampling.delay_samples", "law.K2", "tuner.seed",
+            "actuator.hub_damping")  # fmt: skip
+    one = Subjects(lab, GAINS, Chain(), keys).at((0.1, 7e10, 0.005, 1.5, 0.25, 3.0, 0.01))
+    assert (one.arm.payload.mass, one.arm.link.youngs_modulus) == (0.1, 7e10)
+    assert one.arm.link.shear_modulus == lab.link.shear_modulus * (7e10 / lab.link.youngs_modulus)
+    assert (one.chain.sampling.period, one.chain.sampling.delay_samples) == (0.005, 1.5)
+    assert one.chain.actuator.hub_damping == 0.01
+    assert (one.law, one.tuner) == (tfarm.HubFeedback(K1=0.3, K2=0.25), {"seed": 3.0})
+    by_block = Subjects(lab, tfarm.Law({"hub_rate": ([1.0], [0.1, 1.0])}), Chain(), ("law.hub_rate.den.0",)).at((0.2,))
+    assert by_block.law == tfarm.Law({"hub_rate": ([1.0], [0.2, 1.0])})
+
+
+def test_laws_that_differ_in_the_last_bit_are_other_studies(lab):
+    declared = {"over": {"payload.mass": {"uniform": [0.0, 1.0]}}, "ask": ["modes"], "rows": None, "posterior": None}
+    laws = [tfarm.HubFeedback(K1=K1, K2=0.3) for K1 in (0.3, math.nextafter(0.3, 1))]
+    laws += [
+        tfarm.Law.of_matrices(np.array([[-1.0]]), [[gain]], [[1.0]], [[0.0]], ["hub_rate"])
+        for gain in (1.0, math.nextafter(1, 2))
+    ]
+    files = [files_of(lab, law, Chain(), declared) for law in laws]
+    assert len({(each["arm.toml"], each.get("law.mat")) for each in files}) == 4
+
+
+# ------------------------------------------------------------ lists
+
+
+def listed(folder, text, name="list.csv"):
+    (folder / name).write_bytes(text if isinstance(text, bytes) else text.encode())
+    return Listing(folder / name)
+
+
+def test_a_list_is_read_row_by_row(tmp_path):
+    found = listed(tmp_path, "\ufeffpayload.mass, law.K2\n0.1,0.2\n 3e-1 ,4\n-5,+6.5\n".replace(", ", ","))
+    assert (found.columns, found.size) == (("payload.mass", "law.K2"), 3)
+    assert [block.tolist() for block in found.blocks([(0, 1), (2, 3)])] == [[[0.1, 0.2]], [[-5.0, 6.5]]]
+    own = made(listed=(found.columns, found.size))
+    assert (own.count, own.is_independent) == (3, False)
+    (rows,) = found.blocks([(1, 3)])
+    assert own.rows(1, 3, rows).tolist() == [[0.3, 4.0], [-5.0, 6.5]]
+
+
+BAD_LISTS = [
+    ("a,b\n1,2\n3,\n", "row 1, column b"),
+    ("a,b\n1,2\n3,null\n", "row 1, column b"),
+    ("a,b\nnan,2\n", "row 0, column a"),
+    ("a,b\n1,inf\n", "row 0, column b"),
+    ("a,b\n1,1e999\n", "row 0, column b"),
+    ('a,b\n1,"[1, 2]"\n', "row 0, column b"),
+    ("a,b\n1,one\n", "row 0, column b"),
+    ("a,b\n1,1_0\n", "row 0, column b"),
+    ("a,b\n1,True\n", "row 0, column b"),
+    ("a,b\n1\n", "row 0"),
+    ("a,b\n1,2,3\n", "row 0"),
+    ("a,b\n1,2\n\n3,4\n", "row 1"),
+    ("a,a\n1,2\n", "column"),
+    ("a,\n1,2\n", "column"),
+    ("a,b\n", "list"),
+    ("", "list"),
+    ('a\n"1\n', "list"),
+    (b"a\n\xff\xfe\n", "list"),
+]
+
+
+@pytest.mark.parametrize(("text", "key"), BAD_LISTS)
+def test_a_bad_list_is_refused_with_row_and_column(tmp_path, text, key):
+    with pytest.raises(ParameterError) as caught:
+        _ = listed(tmp_path, text).size
+    assert caught.value.key == key
+    assert "\n" not in str(caught.value)
+    assert "list.csv" in str(caught.value)
+
+
+def test_a_list_that_is_not_there_is_refused(tmp_path):
+    for path in (tmp_path / "none.csv", tmp_path):
+        with pytest.raises(ParameterError, match="cannot be read"):
+            _ = Listing(path).columns
+
+
+PARQUET_CELLS = [
+    ([1.0, None], None), ([1.0, math.nan], None), ([[1.0], [2.0]], None), ([True, False], None), (["1", "x"], None),
+    ([1, 2], [1.0, 2.0]), (["1", "2"], [1.0, 2.0]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("cells", "values"), PARQUET_CELLS)
+def test_a_list_in_parquet_has_the_same_rules(tmp_path, cells, values):
+    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    parquet.write_table(arrow.table({"a": [0.5, 1.5], "b": cells}), tmp_path / "list.parquet")
+    found = Listing(tmp_path / "list.parquet")
+    if values is None:
+        with pytest.raises(ParameterError, match=r"list\.parquet: row [01], column b"):
+            _ = found.size
+    else:
+        assert list(found.rows()) == [[0.5, values[0]], [1.5, values[1]]]
+
+
+def test_a_list_in_parquet_with_doubled_columns_or_of_other_bytes_is_refused(tmp_path):
+    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    table = arrow.table([arrow.array([1.0]), arrow.array([2.0])], names=["a", "a"])
+    parquet.write_table(table, tmp_path / "list.parquet")
+    with pytest.raises(ParameterError, match="each column has a key of its own"):
+        _ = Listing(tmp_path / "list.parquet").columns
+    with pytest.raises(ParameterError, match="cannot be read"):
+        _ = listed(tmp_path, b"PAR1 no table PAR1", "other.parquet").columns
+
+
+@pytest.mark.survey
+def test_a_long_list_takes_no_memory(tmp_path):
+    import tracemalloc
+
+    peaks = []
+    for count in (10_000, 300_000):
+        with (tmp_path / "list.csv").open("w", newline="") as file:
+            csv.writer(file).writerows([("a", "b"), *((n, 0.5) for n in range(count))])
+        tracemalloc.start()
+        found = Listing(tmp_path / "list.csv")
+        assert found.size == count
+        for block in found.blocks([(n, n + 1000) for n in range(0, count, 1000)]):
+            assert len(block) == 1000
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < peaks[0] + 1e5  # bytes
