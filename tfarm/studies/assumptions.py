@@ -188,8 +188,8 @@ def _candidates(arm: Arm, count: int, key: str, own: int, known: Mapping[str, Se
     numbers = {"natural_frequency": FREQUENCY, "sensitivity": f"{SENSITIVITY}.{parameter}"}
     lists = {name: [f"{of}.{n}" for n in range(1, count + 1)] for name, of in numbers.items()}
     words = (STABILITY, LIMIT, LIMIT_IS) if has_hub_inertia(arm) else ()  # no loop of a locked hub or a free pin
-    names = (*chain.from_iterable(lists.values()), *words)
-    table = results(Plan(arm, default_gains(arm), Chain(), space, names), 0, space.count)
+    plan = Plan(arm, default_gains(arm), Chain(), space, (*chain.from_iterable(lists.values()), *words))
+    table = results(plan, 0, space.count)
     columns: dict[str, Sequence[Any]] = {
         **known, **{name: [*map(list, zip(*(table[each] for each in of), strict=True))] for name, of in lists.items()},
     }  # fmt: skip

@@ -72,13 +72,13 @@ class Distribution(NamedTuple):
 
 
 class Subject(NamedTuple):
-    """One arm of a study with its controller, its sampled chain, and plan and numbers of the tuner."""
+    """One arm of a study with its controller, its sampled chain, and numbers and plan of the tuner."""
 
     arm: Arm
     law: AnyLaw
     chain: Chain
-    plan: TunerPlan | None
     tuner: dict[str, float]
+    plan: TunerPlan | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -229,7 +229,7 @@ class Subjects:
             law = law.having(key.removeprefix(LAW), values[key]) if key.startswith(LAW) else law
         own = {key: values[key] for key in self._arms.keys}
         tuner = {key.removeprefix(TUNER): value for key, value in values.items() if key.startswith(TUNER)}
-        return Subject(self._arms.at(own) if own else self._arms.arm, law, chain, self.plan, tuner)
+        return Subject(self._arms.at(own) if own else self._arms.arm, law, chain, tuner, self.plan)
 
 
 # ------------------------------------------------------------------------------------------------------------ lists
