@@ -98,15 +98,20 @@ def test_an_open_direction_needs_a_range(pair):
     assert sizes == pytest.approx([np.trace(pair.posterior.matrix), 1.0], rel=1e-6)
 
 
-@pytest.mark.parametrize("fits", sized(8, 100))
+@pytest.mark.parametrize("fits", sized(16, 100))
 def test_the_posterior_covers_the_truth_at_its_rate(fits):
-    """The truth lies in the region of 80 % of 80 % of the fits; noise of known size on finite elements."""
-    inside = 0
+    """The squared distances of the truth, over the covariance, are those of chi squared: their sum, and 80 % of them.
+
+    Noise of known size on finite elements.
+    """
+    squares = []
     for seed in range(fits):
         found = fit(LAB, measured(pairs=PAIRS[:1], share=0.1, seed=seed), free=[E, "link.damping"], profile=False)
         x = np.log([LAB.link.youngs_modulus / found.arm.link.youngs_modulus, LAB.damping / found.arm.damping])
-        inside += bool(x @ found.posterior.information @ x < stats.chi2.ppf(0.8, df=2))
+        squares.append(x @ found.posterior.information @ x)
+    inside = sum(each < stats.chi2.ppf(0.8, df=2) for each in squares)
     assert stats.binomtest(inside, fits, 0.8).pvalue > 1e-3
+    assert 1e-3 < stats.chi2.cdf(sum(squares), df=2 * fits) < 1 - 1e-3
 
 
 # ------------------------------------------------------------ its file
