@@ -184,12 +184,14 @@ def hub_study(arm: Arm, count: int = STUDIED_MODES) -> Study:
 def _candidates(arm: Arm, count: int, key: str, own: int, known: Mapping[str, Sequence[float]]) -> list[Candidate]:
     """Return the rows of a study of that key, whose values are the last of those known; `own` is the arm's own row."""
     parameter, values = list(known.items())[-1]
-    space = Space(distributions={}, grids={key: tuple(values)})
-    numbers = {"natural_frequency": FREQUENCY, "sensitivity": f"{SENSITIVITY}.{parameter}"}
-    lists = {name: [f"{of}.{n}" for n in range(1, count + 1)] for name, of in numbers.items()}
+    lists = {
+        name: [f"{of}.{n}" for n in range(1, count + 1)]
+        for name, of in (("natural_frequency", FREQUENCY), ("sensitivity", f"{SENSITIVITY}.{parameter}"))
+    }
     words = (STABILITY, LIMIT, LIMIT_IS) if has_hub_inertia(arm) else ()  # no loop of a locked hub or a free pin
-    plan = Plan(arm, default_gains(arm), Chain(), space, (*chain.from_iterable(lists.values()), *words))
-    table = results(plan, 0, space.count)
+    plan = Plan(arm, default_gains(arm), Chain(), Space(distributions={}, grids={key: tuple(values)}),
+                (*chain.from_iterable(lists.values()), *words))  # fmt: skip
+    table = results(plan, 0, len(values))
     columns: dict[str, Sequence[Any]] = {
         **known, **{name: [*map(list, zip(*(table[each] for each in of), strict=True))] for name, of in lists.items()},
     }  # fmt: skip
@@ -197,7 +199,7 @@ def _candidates(arm: Arm, count: int, key: str, own: int, known: Mapping[str, Se
         columns |= {"verdict": table[STABILITY], "K2_below": table[LIMIT],
                     "K2_below_is_edge": [kind == "edge" for kind in table[LIMIT_IS]]}  # fmt: skip
     return [Candidate(is_own=n == own, **{name: column[n] for name, column in columns.items()})
-            for n in range(space.count)]  # fmt: skip
+            for n in range(len(values))]  # fmt: skip
 
 
 def _with_own(candidates: Sequence[float], own: float) -> list[float]:
