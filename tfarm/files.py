@@ -65,12 +65,17 @@ def read_mat(path: str | os.PathLike[str], most: int, *, key: str) -> tuple[dict
 
 
 def write_mat(path: Path, variables: dict[str, Any], *, key: str, oned_as: str = "column") -> None:
-    """Write a MATLAB file (level 5) without SciPy's date in its header: same inputs, same bytes."""
+    """Write a MATLAB file (level 5)."""
+    write_file(path, mat_bytes(variables, oned_as), key=key)
+
+
+def mat_bytes(variables: dict[str, Any], oned_as: str = "column") -> bytes:
+    """Return a MATLAB file (level 5) without SciPy's date in its header: same inputs, same bytes."""
     from scipy.io import savemat
 
     content = io.BytesIO()
     savemat(cast("Any", content), variables, oned_as=cast("Any", oned_as))
-    write_file(path, MAT_HEADER.ljust(HEADER_TEXT) + content.getvalue()[HEADER_TEXT:], key=key)
+    return MAT_HEADER.ljust(HEADER_TEXT) + content.getvalue()[HEADER_TEXT:]
 
 
 def write_file(path: Path, content: bytes, *, key: str) -> None:
@@ -94,6 +99,12 @@ def write_file(path: Path, content: bytes, *, key: str) -> None:
 def is_standard_output(path: Path) -> bool:
     """Return whether a path such as /dev/stdout, or "-", is this process's own standard output."""
     return _descriptor(path) == 1
+
+
+def make_folder(path: Path, *, key: str) -> None:
+    """Make a folder and those above it, unless it is there.  Raises ParameterError, naming `key`."""
+    with _refused(key, path, "cannot be made ({}); choose another"):
+        path.mkdir(parents=True, exist_ok=True)
 
 
 @contextmanager

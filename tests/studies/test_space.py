@@ -12,7 +12,7 @@ from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
 from tfarm.fitting.posterior import Posterior
 from tfarm.studies import space
-from tfarm.studies.running import Plan
+from tfarm.studies.declared import files_of
 from tfarm.studies.space import ENDS, Listing, Subjects, space_of
 
 CHANCE = 1e-3  # of a right distribution to be called wrong
@@ -200,15 +200,14 @@ def test_values_reach_arm_chain_controller_and_tuner(lab):
 
 
 def test_laws_that_differ_in_the_last_bit_are_other_studies(lab):
-    texts = set()
-    for K1 in (0.3, math.nextafter(0.3, 1)):
-        law = tfarm.HubFeedback(K1=K1, K2=0.3)
-        texts.add(Plan(lab, law, Chain(), made({"payload.mass": {"uniform": [0, 1]}}), ()).inputs(None)["law"])
-    A = np.array([[-1.0]])
-    for gain in (1.0, math.nextafter(1, 2)):
-        law = tfarm.Law.of_matrices(A, [[gain]], [[1.0]], [[0.0]], ["hub_rate"])
-        texts.add(Plan(lab, law, Chain(), made({"payload.mass": {"uniform": [0, 1]}}), ()).inputs(None)["law"])
-    assert len(texts) == 4
+    declared = {"over": {"payload.mass": {"uniform": [0.0, 1.0]}}, "ask": ["modes"], "rows": None, "posterior": None}
+    laws = [tfarm.HubFeedback(K1=K1, K2=0.3) for K1 in (0.3, math.nextafter(0.3, 1))]
+    laws += [
+        tfarm.Law.of_matrices(np.array([[-1.0]]), [[gain]], [[1.0]], [[0.0]], ["hub_rate"])
+        for gain in (1.0, math.nextafter(1, 2))
+    ]
+    files = [files_of(lab, law, Chain(), declared) for law in laws]
+    assert len({(each["arm.toml"], each.get("law.mat")) for each in files}) == 4
 
 
 # ------------------------------------------------------------ lists

@@ -28,7 +28,7 @@ def to_toml(arm: Arm) -> str:
 
     The numbers of the paper's arm are always there, others only where they differ from their defaults.
     """
-    return _text(toml_tables(arm_table(arm)))
+    return toml_text(toml_tables(arm_table(arm)))
 
 
 def arm_table(arm: Arm) -> dict[str, Any]:
@@ -71,7 +71,7 @@ def law_toml(law: Law) -> str:
     require(len(set(names)) == len(names), "law", law.name, "two blocks on one signal: add them up first")
     own = {key: getattr(law, key) for key, usual in LAW_DEFAULTS.items() if getattr(law, key) != usual}
     signals = {part.signals[0]: _signal_table(part) for part in law.parts}
-    return _text(toml_tables({"name": law.name, **own, **signals}, "law"))
+    return toml_text(toml_tables({"name": law.name, **own, **signals}, "law"))
 
 
 def save_law(law: Law, path: Path) -> None:
@@ -89,7 +89,7 @@ def _signal_table(part: Part) -> dict[str, Any]:
     return {"gain": block.num[0]} if is_gain else {"num": block.num, "den": block.den}
 
 
-def _text(tables: Iterable[list[str]]) -> str:
+def toml_text(tables: Iterable[list[str]]) -> str:
     """Return the lines of tables, with an empty one between two."""
     return "\n\n".join("\n".join(table) for table in tables) + "\n"
 
@@ -101,7 +101,7 @@ def toml_tables(table: Mapping[str, Any], place: str = "", heading: str = "[{}]"
     head = [heading.format(place)] if place else []
     yield [*head, *(f"{key} = {_value(value)}" for key, value in table.items() if key not in inner)]
     for key, tables in inner.items():
-        where = ".".join(filter(None, (place, json.dumps(key) if "@" in key else key)))
+        where = ".".join(filter(None, (place, json.dumps(key) if {*"@."} & {*key} else key)))
         for each in tables:
             yield from toml_tables(each, where, "[[{}]]" if tables is table[key] else "[{}]")
 

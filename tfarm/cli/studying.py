@@ -48,9 +48,9 @@ Words = Annotated[str | None, typer.Option("--ask", metavar="QUANTITY,...")]
 
 
 def announce(done: int, total: int, text: str) -> None:
-    """Set the line of progress, and print it where nothing of it is done: the cost of Sobol' indices."""
+    """Set the line of progress, and print one without a number of tasks: the cost of Sobol' indices."""
     advance(done, total, text)
-    if not done:
+    if not total:
         print_line(text)
 
 

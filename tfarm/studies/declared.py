@@ -10,19 +10,27 @@ draws = 2000
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from pydantic import Field
 
+from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arm.law_tables import load_law
 from tfarm.arm.reading import arm_in, load_tables, presets
 from tfarm.arm.schema import StrictTable, validated
-from tfarm.dsp.chain import load_chain
-from tfarm.errors import naming
+from tfarm.arm.writing import LAW_DEFAULTS, law_toml, toml_tables, toml_text
+from tfarm.dsp import Chain
+from tfarm.dsp.chain import file_text, load_chain
+from tfarm.errors import ParameterError, naming
+from tfarm.files import mat_bytes, read_file
+from tfarm.fitting.posterior import MOST_BYTES
 
 from .quantities import CARD
+
+STUDY_FILE, ARM_FILE, MATRICES, POSTERIOR = "study.toml", "arm.toml", "law.mat", "posterior.json"
 
 
 class StudyFile(StrictTable):
@@ -53,6 +61,33 @@ def load_study(name_or_path: str) -> dict[str, Any]:
         declared = validated(StudyFile, tables, "")
     arm = declared.arm if declared.arm in presets() else str(folder / declared.arm)
     law = load_law(arm if declared.law is None else folder / declared.law)
+    gains = None if law is None else law.gains
+    same = gains if gains and as_law(gains) == law else law  # as gains, of which one of 0 can be varied
     paths = {name: folder / path for name in ("rows", "posterior") if (path := getattr(declared, name))}
     others = declared.model_dump(include={"over", "ask", "draws", "seed", "worst", "sobol"})
-    return {"arm": arm_in(*load_tables(arm)), "law": law, "chain": load_chain(arm), **others, **paths}
+    return {"arm": arm_in(*load_tables(arm)), "law": same, "chain": load_chain(arm), **others, **paths}
+
+
+def files_of(arm: Arm, law: AnyLaw, chain: Chain, declared: Mapping[str, Any]) -> dict[str, bytes]:
+    """Return the files from which `load_study` has the study again, by their names.
+
+    These are the study, the arm with its chain and its [law], the matrices of a law and the posterior, a copy.  A list
+    keeps its place.
+    """
+    own, files = as_law(law), dict[str, bytes]()
+    try:
+        text = law_toml(own)
+    except ParameterError:  # of a state space: it has no text
+        columns = (*own.signals, *own.wanted)
+        files[MATRICES] = mat_bytes(dict(zip("ABCD", own.matrices(columns), strict=True)))
+        head = {key: getattr(own, key) for key, usual in LAW_DEFAULTS.items() if getattr(own, key) != usual}
+        table = {"name": own.name, **head, "sign": -1, "matrices": MATRICES, "signals": columns}
+        text = toml_text(toml_tables(table, "law"))
+    places = {"rows": declared["rows"] and os.path.abspath(declared["rows"])}
+    if declared["posterior"] is not None:
+        files[POSTERIOR] = read_file(declared["posterior"], MOST_BYTES, key="posterior", what="a posterior's file")
+        places["posterior"] = POSTERIOR
+    over = {key: {kind: tuple(numbers) for kind, numbers in entry.items()} for key, entry in declared["over"].items()}
+    kept = {"arm": ARM_FILE, **declared, **places, "ask": tuple(declared["ask"]), "over": over}
+    study = toml_text(toml_tables({key: value for key, value in kept.items() if value or key == "seed"}))
+    return {**files, ARM_FILE: f"{file_text(arm, chain)}\n{text}".encode(), STUDY_FILE: study.encode()}

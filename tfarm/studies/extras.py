@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import islice
+from logging import getLogger
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,7 +17,7 @@ from tfarm.errors import ConvergenceError, ParameterError, require
 
 Result = TypeVar("Result")
 PATIENCE = 20  # seconds for a scheduler to answer
-RETRIES = 3  # of a chunk whose worker was lost
+SCHEDULER = "--scheduler"
 LEAST_PYARROW = (14, 0, 1)  # older ones unpickle what they read (CVE-2023-47248)
 PACKAGES = ("tfarm", "numpy", "scipy", "numba")  # versions that all workers have in common
 
@@ -75,44 +77,62 @@ def cluster(scheduler: str) -> Iterator[Any]:
 
     Certificates of a tls:// address are those of Dask's own configuration (distributed.comm.tls).
     """
-    distributed = extra("distributed", "cluster", "--scheduler", scheduler)
+    distributed = extra("distributed", "cluster", SCHEDULER, scheduler)
+    getLogger("distributed").setLevel("CRITICAL")  # its errors come as one line of ours
     try:
         client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         remedy = f"does not answer within {PATIENCE} s ({str(error)[:120]}); give tcp://HOST:PORT of a dask scheduler"
-        raise ParameterError(key="--scheduler", value=scheduler, remedy=remedy) from None
+        raise ParameterError(key=SCHEDULER, value=scheduler, remedy=remedy) from None
     with client:
         yield client
+
+
+def cluster_size(client: Any) -> int:
+    """Return the number of workers of a Dask client.  Raises ParameterError for none, and for other versions there."""
+    address = client.scheduler.address
+    try:
+        client.wait_for_workers(1, timeout=PATIENCE)
+    except TimeoutError:
+        remedy = f"has no worker within {PATIENCE} s: start some with `dask worker {address} --nthreads 1`"
+        raise ParameterError(key=SCHEDULER, value=address, remedy=remedy) from None
+    found = client.get_versions(packages=list(PACKAGES))
+    for place, theirs in {"scheduler": found["scheduler"], **found["workers"]}.items():
+        _must_agree(place, {name: theirs["packages"][name] for name in PACKAGES})
+    return len(client.nthreads())
 
 
 def on_cluster(tasks: Iterator[tuple[int, Callable[[], Result]]], client: Any) -> Iterator[tuple[int, Result]]:
     """Yield each task with its result as it comes from the workers of a Dask client, at most one a worker unread.
 
-    Raises ParameterError for workers with other versions than here, ConvergenceError where the scheduler is gone.
+    A task of a lost worker goes to another one.  Raises ParameterError for a worker with other versions than here,
+    ConvergenceError where the scheduler is gone, or the workers of one task again and again.
     """
     distributed = extra("distributed", "cluster", "client", client)
-    running: dict[str, int] = {}
+    queue, running = distributed.as_completed(loop=client.loop), dict[str, int]()
     try:
-        client.wait_for_workers(1, timeout=PATIENCE)
-        for worker, theirs in client.run(versions).items():
-            require(
-                theirs == versions(), f"versions of {worker}", theirs, f"every worker needs those here, {versions()}"
-            )
-        queue = distributed.as_completed()
-
-        def submit(count: int) -> None:
-            for number, call in islice(tasks, count):
-                future = client.submit(call, retries=RETRIES, pure=False)
+        while True:
+            for number, call in islice(tasks, max(1, len(client.nthreads())) - len(running)):
+                future = client.submit(_with_versions, call, pure=False)
                 running[future.key] = number
                 queue.add(future)
+            if not running:
+                return
+            future = next(queue)
+            theirs, result = future.result()
+            _must_agree("worker", theirs)
+            yield running.pop(future.key), result
+    except (OSError, TimeoutError, CancelledError, distributed.KilledWorker) as error:
+        raise ConvergenceError(f"the scheduler or its workers are gone ({type(error).__name__})", None, None) from None
 
-        submit(sum(client.nthreads().values()))
-        for future in queue:
-            yield running.pop(future.key), future.result()
-            submit(1)
-    except (OSError, TimeoutError, distributed.CancelledError, distributed.KilledWorker) as error:
-        words = f"the scheduler or its workers are gone ({type(error).__name__}); run the same command again to go on"
-        raise ConvergenceError(words, None, None) from None
+
+def _with_versions(call: Callable[[], Result]) -> tuple[dict[str, str], Result]:
+    return versions(), call()
+
+
+def _must_agree(place: str, theirs: Mapping[str, str]) -> None:
+    for name, here in versions().items():
+        require(theirs[name] == here, f"{name} of {place}", theirs[name], f"the version here is {here}: install that")
 
 
 def versions() -> dict[str, str]:

@@ -15,7 +15,7 @@ import math
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import islice
 from pathlib import Path
@@ -23,22 +23,25 @@ from typing import Any
 
 import numpy as np
 
-from tfarm.arm import AnyLaw, Arm, as_law
+from tfarm.arm import AnyLaw, Arm
 from tfarm.arrays import Real
 from tfarm.dsp import Chain
-from tfarm.dsp.chain import file_text
-from tfarm.errors import ParameterError, TfarmError, one_line, require
-from tfarm.files import locked, read_file, write_file
+from tfarm.errors import ConvergenceError, ParameterError, TfarmError, one_line
+from tfarm.files import locked, make_folder, read_file, write_file
 from tfarm.processes import shared
+from tfarm.tuner import Plan as TunerPlan
 
+from .declared import STUDY_FILE, files_of
 from .extras import has_parquet, on_cluster, parquet_bytes, parquet_columns, versions
 from .quantities import COLUMNS, FAILED, values_of
 from .space import Listing, Space, Subjects
 
 Progress = Callable[[int, int, str], object]
-Task = tuple[int, Callable[[], dict[str, list[Any]]]]  # number of a part, and the call that returns its table
+Chunk = dict[str, list[Any]]  # columns of a range of rows
+OUT = "--out"  # the key of errors of the folder
+Task = tuple[int, Callable[[], Chunk]]  # number of a part, and the call that returns its table
 ROW = "row"  # column of the number of the row, from 0
-FILE, PREFIX = "study.json", "part-"
+FILE, PREFIX, PARQUET = "study.json", "part-", ".parquet"
 MOST_BYTES = 1 << 20  # of that file
 PILOT = 4  # rows whose cost is measured
 LEAST_SECONDS, MOST_SECONDS = 5.0, 30.0  # of a chunk
@@ -57,6 +60,7 @@ class Plan:
     chain: Chain
     space: Space
     names: tuple[str, ...]
+    tuner: TunerPlan | None = None  # the usual one of each arm by default
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -71,33 +75,17 @@ class Plan:
     @cached_property
     def subjects(self) -> Subjects:
         """The arms and loops of the rows."""
-        return Subjects(self.arm, self.law, self.chain, self.space.keys)
-
-    def inputs(self, listing: Listing | None) -> dict[str, Any]:
-        """Return all that the results depend on, as JSON has it."""
-        space = self.space
-        return {
-            "arm": file_text(self.arm, self.chain),
-            "law": json.dumps(asdict(as_law(self.law)), default=np.ndarray.tolist),
-            "names": list(self.names),
-            "distributions": {key: [each.kind, *each.numbers] for key, each in space.distributions.items()},
-            "grids": {key: list(values) for key, values in space.grids.items()},
-            "posterior": None if space.posterior is None else hashlib.sha256(
-                repr((space.posterior.keys, space.posterior.value.tolist(), space.posterior.size.tolist(),
-                      space.posterior.covariance.tolist())).encode()).hexdigest(),
-            "list": None if listing is None else listing.sha256, "draws": space.draws, "seed": space.seed,
-            "versions": versions(),
-        }  # fmt: skip
+        return Subjects(self.arm, self.law, self.chain, self.space.keys, self.tuner)
 
 
-def chunk(plan: Plan, first: int, last: int, listed: Real | None = None) -> dict[str, list[Any]]:
+def chunk(plan: Plan, first: int, last: int, listed: Real | None = None) -> Chunk:
     """Return the table of rows first to last - 1: column by column, with the reason where a row has no result."""
     return table_of(plan, first, plan.space.rows(first, last, listed))
 
 
-def table_of(plan: Plan, first: int, rows: Real) -> dict[str, list[Any]]:
+def table_of(plan: Plan, first: int, rows: Real) -> Chunk:
     """Return the table of rows of values (rows, keys), numbered from `first`."""
-    table: dict[str, list[Any]] = {name: [] for name in plan.columns}
+    table: Chunk = {name: [] for name in plan.columns}
     for number, row in enumerate(rows.tolist(), start=first):
         found: dict[str, Any] = {ROW: number, **dict(zip(plan.space.keys, row, strict=True))}
         try:
@@ -107,6 +95,14 @@ def table_of(plan: Plan, first: int, rows: Real) -> dict[str, list[Any]]:
         found[FAILED] = found[FAILED] and one_line(found[FAILED], LONGEST_REASON)
         for name, column in table.items():
             column.append(found.get(name))
+    return table
+
+
+def results(plan: Plan, first: int, last: int) -> Chunk:
+    """Return the table of rows first to last - 1.  Raises ConvergenceError for the first row without a result."""
+    table = chunk(plan, first, last)
+    for reason in filter(None, table[FAILED]):
+        raise ConvergenceError(reason, None, None)
     return table
 
 
@@ -139,12 +135,11 @@ def seconds_an_arm(plan: Plan, rows: Real) -> float:
     return float(np.median(times[1:] or times))  # the first one compiles
 
 
-def rows_a_chunk(plan: Plan, workers: int, listing: Listing | None) -> int:
-    """Return the rows of a chunk of 5 to 30 s by the median cost of a few arms."""
-    cost = seconds_an_arm(plan, first_rows(plan, PILOT, listing))
-    whole = cost * plan.space.count / (CHUNKS_A_WORKER * workers)
-    seconds = min(max(whole, LEAST_SECONDS), MOST_SECONDS)
-    return max(1, min(round(seconds / cost), MOST_ROWS, math.ceil(plan.space.count / workers)))
+def rows_a_chunk(cost: float, count: int, workers: int) -> int:
+    """Return the rows of a chunk of 5 to 30 s for arms of that cost [s], so that all workers end together."""
+    whole = cost * count / workers
+    seconds = min(max(whole / CHUNKS_A_WORKER, LEAST_SECONDS), MOST_SECONDS)
+    return min(math.ceil(count / (workers * max(1, round(whole / seconds)))), MOST_ROWS)
 
 
 @dataclass(frozen=True)
@@ -156,6 +151,7 @@ class Parts:
     digest: str
     rows: int  # of a part
     suffix: str
+    cost: float  # seconds an arm, as measured before the first run
 
     @property
     def count(self) -> int:
@@ -176,121 +172,138 @@ class Parts:
         names = {each.name for each in self.folder.glob(f"{PREFIX}*")}
         found = [number for number in range(self.count) if self.path(number).name in names]
         strange = sorted(names - {self.path(number).name for number in found})
-        require(
-            not strange, "out", str(self.folder), f"{strange[:1]} is a part of another study: choose another folder"
-        )
+        if strange:
+            raise _refusal(self.folder, f"{strange[0]} is a part of another study: choose another folder")
         return found
 
     def write(self, number: int, table: Mapping[str, Sequence[Any]]) -> None:
         """Write the table of a part under a temporary name, then rename it."""
-        if self.suffix == ".parquet":
+        if self.suffix == PARQUET:
             content = parquet_bytes(table, self.plan.texts)
         else:
             stream = io.StringIO()
-            writer = csv.writer(stream, lineterminator="\n")
-            writer.writerows([tuple(table), *zip(*table.values(), strict=True)])
+            csv.writer(stream, lineterminator="\n").writerows([tuple(table), *zip(*table.values(), strict=True)])
             content = stream.getvalue().encode()
-        write_file(self.path(number), content, key="--out")
+        write_file(self.path(number), content, key=OUT)
 
     def column(self, *names: str) -> dict[str, Any]:
         """Return columns of all written rows in order: arrays of numbers, NaN where there is none, and of texts."""
-        found: dict[str, list[Any]] = {name: [] for name in names}
+        found: dict[str, list[Any]] = {name: [np.empty(0)] for name in names}
         for number in self.written:
             table = self._read(self.path(number), names)
             for name in names:
-                values = [("" if each is None else each) if name in self.plan.texts else _number(each)
+                is_text = name in self.plan.texts
+                values = [each or "" if is_text else math.nan if each in ("", None) else float(each)
                           for each in table[name]]  # fmt: skip
-                found[name].append(np.array(values, dtype=object if name in self.plan.texts else float))
-        return {name: np.concatenate(arrays or [np.empty(0)]) for name, arrays in found.items()}
+                found[name].append(np.array(values, dtype=object if is_text else float))
+        return {name: np.concatenate(arrays[len(arrays) > 1 :]) for name, arrays in found.items()}
 
     def _read(self, path: Path, names: Sequence[str]) -> Mapping[str, Sequence[Any]]:
-        if self.suffix == ".parquet":
+        if self.suffix == PARQUET:
             return parquet_columns(path, names)
         with path.open(newline="", encoding="utf-8") as file:
             head, *rows = csv.reader(file)
-        columns = dict(zip(head, zip(*rows, strict=True), strict=True))
-        return {name: columns[name] for name in names}
+        return {name: [row[head.index(name)] for row in rows] for name in names}
 
 
-def _number(value: Any) -> float:
-    return math.nan if value in ("", None) else float(value)
-
-
-def opened(folder: Path, plan: Plan, listing: Listing | None, workers: int, size: int | None) -> Parts:
-    """Return the parts of a study in a folder, a new one or that of an interrupted run.
+def opened(
+    folder: Path, plan: Plan, listing: Listing | None, declared: Mapping[str, Any], workers: int, size: int | None
+) -> Parts:
+    """Return the parts of a study in a folder, a new one or that of an interrupted run, with the files that declare it.
 
     Raises ParameterError for a folder that has another study.
     """
-    inputs = plan.inputs(listing)
-    text = json.dumps(inputs, sort_keys=True)
-    digest = hashlib.sha256(text.encode()).hexdigest()
-    file = folder / FILE
+    space, file, files = plan.space, folder / FILE, files_of(plan.arm, plan.law, plan.chain, declared)
+    hashes = {name: _sha256(content) for name, content in files.items() if name != STUDY_FILE}
+    over = [[key, *map(list, entry.items())] for key, entry in declared["over"].items()]
+    inputs = {"over": over, "columns": plan.names, "draws": space.draws, "seed": space.seed,
+              "list": listing and listing.sha256, "versions": versions(), **hashes}  # fmt: skip
+    text = json.dumps(inputs)
+    digest, inputs = _sha256(text.encode()), json.loads(text)
     if file.exists():
         try:
-            known = json.loads(read_file(file, MOST_BYTES, key="out", what=f"a {FILE}"))
-            other = sorted(key for key in inputs if known["inputs"].get(key) != inputs[key])
-            rows, suffix = int(known["rows_a_part"]), str(known["suffix"])
+            known = json.loads(read_file(file, MOST_BYTES, key=OUT, what=f"a {FILE}"))
+            other = sorted(key for key in {*inputs, *known["inputs"]} if known["inputs"].get(key) != inputs.get(key))
+            parts = Parts(folder, plan, digest, int(known["rows_a_part"]), str(known["suffix"]), float(known["cost_s"]))
         except (ValueError, KeyError, TypeError, AttributeError):
-            raise ParameterError(
-                key="out", value=str(file), remedy="is no file of a study: choose another folder"
-            ) from None
-        words = f"has a study with another {', '.join(other)}: choose another folder, or run that study"
-        require(not other, "out", str(folder), words)
-        require(suffix == ".csv" or has_parquet(), "out", str(folder), "has Parquet parts: pip install 'tfarm[study]'")
-        return Parts(folder, plan, digest, rows, suffix)
-    check_rows(plan, listing)
-    rows = size or rows_a_chunk(plan, workers, listing)
-    parts = Parts(folder, plan, digest, rows, ".parquet" if has_parquet() else ".csv")
-    folder.mkdir(parents=True, exist_ok=True)
-    assert parts.written == []
+            raise _refusal(file, "is no file of a study: choose another folder") from None
+        if other:
+            raise _refusal(folder, f"has a study with other {', '.join(other)}: choose another folder")
+        if parts.suffix == PARQUET and not has_parquet():
+            raise _refusal(folder, "has Parquet parts: pip install 'tfarm[study]'")
+        return parts
+    cost = seconds_an_arm(plan, first_rows(plan, PILOT, listing))
+    rows = size or rows_a_chunk(cost, space.count, workers)
+    parts = Parts(folder, plan, digest, rows, PARQUET if has_parquet() else ".csv", cost)
+    if parts.written:
+        raise _refusal(folder, f"has parts, and no {FILE}: choose another folder")
     columns = [{"name": name, "label": of.label, "unit": of.unit, "meaning": of.help}
                for name in plan.names for of in [COLUMNS[name].of]]  # fmt: skip
-    known = {
-        "inputs": inputs,
-        "rows": plan.space.count,
-        "rows_a_part": rows,
-        "suffix": parts.suffix,
-        "columns": columns,
-    }
-    write_file(file, (json.dumps(known, indent=1) + "\n").encode(), key="--out")
+    known = {"inputs": inputs, "rows": space.count, "rows_a_part": rows, "suffix": parts.suffix, "cost_s": cost,
+             "columns": columns}  # fmt: skip
+    for name, content in {**files, FILE: (json.dumps(known, indent=1) + "\n").encode()}.items():
+        write_file(folder / name, content, key=OUT)
     return parts
 
 
+def _refusal(place: Path, remedy: str) -> ParameterError:
+    return ParameterError(key=OUT, value=str(place), remedy=remedy)
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
 def run(
-    parts: Parts,
+    folder: Path,
+    plan: Plan,
     listing: Listing | None,
+    declared: Mapping[str, Any],
     workers: int,
     client: Any,
     stop_after: float | None,
-    progress: Progress | None,
-) -> None:
-    """Write the missing parts; after `stop_after` seconds none is begun any more."""
-    began, done = time.monotonic(), set(parts.written)
-    missing = [number for number in range(parts.count) if number not in done]
-    with locked(parts.folder / FILE, "--out"):
-        tasks = _tasks(parts, listing, missing, began + (math.inf if stop_after is None else stop_after))
-        for ready, (number, table) in enumerate(computed(tasks, workers, client), start=1):
-            parts.write(number, table)
-            if progress is not None:
-                left = (time.monotonic() - began) / ready * (len(missing) - ready)
-                progress(parts.count - len(missing) + ready, parts.count, f"parts of the study, {left:.0f} s left")
+    size: int | None,
+    progress: Progress,
+) -> Parts:
+    """Write the missing parts of a study to its folder; after `stop_after` seconds none is begun any more."""
+    deadline = time.monotonic() + (math.inf if stop_after is None else stop_after)
+    check_rows(plan, listing)
+    make_folder(folder, key=OUT)
+    with locked(folder, OUT):
+        parts = opened(folder, plan, listing, declared, workers, size)
+        done, began = set(parts.written), time.monotonic()
+        missing = [number for number in range(parts.count) if number not in done]
+        tasks = _tasks(parts, listing, missing, deadline)
+
+        def advance(ready: int, left: float) -> None:
+            progress(len(done) + ready, parts.count, f"parts of the study, {left:.0f} s left")
+
+        advance(0, parts.cost * parts.rows * len(missing) / workers)
+        try:
+            for ready, (number, table) in enumerate(computed(tasks, workers, client), start=1):
+                parts.write(number, table)
+                advance(ready, (time.monotonic() - began) / ready * (len(missing) - ready))
+        except ConvergenceError as error:
+            words = f"{error}; the same command again completes the study"
+            raise ConvergenceError(words, None, None) from None
+    return parts
 
 
 def _tasks(parts: Parts, listing: Listing | None, missing: Sequence[int], deadline: float) -> Iterator[Task]:
     """Yield the number of each missing part with the call that returns its table."""
     ends = [parts.ends(number) for number in missing]
-    points = parts.plan.space.points
-    blocks = (listing.blocks([(first // points, (last - 1) // points + 1) for first, last in ends])
-              if listing is not None else (None for _ in ends))  # fmt: skip
+    blocks = [None] * len(ends) if listing is None else listing.blocks(ends)
     for number, (first, last), listed in zip(missing, ends, blocks, strict=True):
         if time.monotonic() >= deadline:
             return
         yield number, partial(chunk, parts.plan, first, last, listed)
 
 
-def computed(tasks: Iterator[Task], workers: int, client: Any) -> Iterator[tuple[int, dict[str, list[Any]]]]:
-    """Yield the number and the table of each task, from processes of this machine or from a client of Dask."""
-    return on_cluster(tasks, client) if client is not None else shared(tasks, workers)
+def computed(
+    tasks: Iterator[tuple[int, Callable[[], Chunk]]], workers: int, client: Any
+) -> Iterator[tuple[int, Chunk]]:
+    """Yield each task with its table as it comes, from processes of this machine or from those of a Dask client."""
+    return shared(tasks, workers) if client is None else on_cluster(tasks, client)
 
 
 def usual_workers() -> int:

@@ -30,6 +30,7 @@ from tfarm.records import record
 from tfarm.schema import Column, Quantity, Table
 from tfarm.spectrum.table import default_gains
 
+from .extras import cluster_size
 from .findings import (
     CONFIDENCE,
     STABLE,
@@ -41,7 +42,7 @@ from .findings import (
     spreads_of,
 )
 from .quantities import CARD, COLUMNS, LOOPS, asked_columns, column_of
-from .running import ROW, Parts, Plan, Progress, computed, opened, run, seconds_an_arm, table_of, usual_workers
+from .running import ROW, Parts, Plan, Progress, computed, run, seconds_an_arm, table_of, usual_workers
 from .space import ENDS, MOST_ROWS, MOST_SEED, Listing, space_of
 
 SHARES = "stable arms (confidence one-sided, Clopper-Pearson)"
@@ -54,6 +55,7 @@ LARGER_IS_WORSE = (
     "minimum_damping_s", "rise_time_s", "re_1_s",
 )  # fmt: skip
 SIGNED = "peak", "steady_state_error"  # of these by their size
+MOST_WORKERS = 1024
 SOBOL_BLOCK = 64  # rows of the sample of Sobol' indices that are computed at a time
 
 
@@ -209,8 +211,8 @@ def study(
     part
         Rows of a part; by default as many as take 5 to 30 s.
     progress
-        Called with parts done, parts of the study, and a text; before the sample of Sobol' indices with 0 done, their
-        number, and a text with the time that they take.
+        Called with parts done, parts of the study, and a text; before the sample of Sobol' indices with 0, 0 and a
+        text that has the time that they take.
 
     Raises
     ------
@@ -219,6 +221,7 @@ def study(
     ConvergenceError
         Where a worker process or the scheduler was killed; another run goes on.
     """
+    progress = progress or (lambda *_: None)
     chain, law = chain_or_usual(chain), default_gains(arm) if law is None else law
     whole("draws", draws, 1, MOST_ROWS, f"a whole number from 1 to {MOST_ROWS:,}")
     whole("seed", seed, 0, MOST_SEED, "a whole number that is not negative")
@@ -234,12 +237,17 @@ def study(
     require(is_power, "sobol", sobol, "a power of 2, such as 256; 0 for no Sobol' indices")
     remedy = "needs two or more independent distributions"
     require(not sobol or (space.is_searchable and len(space.keys) > 1), "sobol", sobol, remedy)
-    workers = usual_workers() if workers is None else whole("workers", workers, 1, 1024, "processes, at least 1")
-    parts = opened(Path(out), plan, listing, workers, part)
-    run(parts, listing, workers, client, stop_after, progress)
+    require(client is None or workers is None, "workers", workers, "those of the client are used: leave it out")
+    if workers is None:
+        workers = usual_workers() if client is None else cluster_size(client)
+    whole("workers", workers, 1, MOST_WORKERS, "processes, at least 1")
+    whole("part", 1 if part is None else part, 1, MOST_ROWS, "rows of a part, at least 1")
+    declared = {"over": over or {}, "ask": ask, "draws": draws, "seed": seed, "rows": rows, "posterior": posterior,
+                "worst": worst, "sobol": sobol}  # fmt: skip
+    parts = run(Path(out), plan, listing, declared, workers, client, stop_after, part, progress)
     found = Study(parts=parts, arm=arm.name, rows=space.count, rows_a_part=parts.rows)
     if found.is_complete:
-        indices = sobol_indices(plan, sobol, workers, client, progress or (lambda *_: None)) if sobol else ()
+        indices = sobol_indices(plan, sobol, workers, client, progress) if sobol else ()
         found = replace(found, sobol=indices, worst=None if order is None else worst_arm(found, order))
     return found
 
@@ -331,7 +339,7 @@ def sobol_indices(plan: Plan, size: int, workers: int, client: Any, progress: Pr
     pages = [np.where(np.arange(len(keys)) == n, B, A) for n in range(len(keys))]  # A with one column of B
     rows = plan.space.values(np.clip(np.vstack([A, B, *pages]), *ENDS))
     seconds = seconds_an_arm(plan, rows) * len(rows) / workers
-    progress(0, len(rows), f"Sobol' indices of {len(rows):,} further arms, about {seconds:.0f} s")
+    progress(0, 0, f"Sobol' indices of {len(rows):,} further arms, about {seconds:.0f} s")
     tasks = ((n, partial(table_of, plan, n, rows[n : n + SOBOL_BLOCK])) for n in range(0, len(rows), SOBOL_BLOCK))
     found = np.empty((len(rows), len(names)))
     for n, table in computed(tasks, workers, client):
