@@ -4,6 +4,7 @@ Types and names are checked here, physics in the records.  The first problem of 
 Label, unit and meaning of every key are in `keys.toml` and read by `file_key`.
 """
 
+import os
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,6 +19,7 @@ from tfarm.arm.materials import assumed, filled, materials
 from tfarm.arm.parts import Attachment, Gauge, Hub, Link, Motor, Payload, RotarySpring, Section
 from tfarm.arm.records import MOST_PARTS, Arm
 from tfarm.errors import MISSING, ParameterError, did_you_mean, must_be_known, require
+from tfarm.files import read_file
 from tfarm.schema import Quantity
 
 _Strict = TypeVar("_Strict", bound="StrictTable")
@@ -75,6 +77,21 @@ def validated(model: type[_Strict], table: Any, place: str) -> _Strict:
         is_missing = problem["type"] == "missing"
         value, remedy = (MISSING, remedy) if is_missing else (value, f"wrong type; {remedy}")
     raise ParameterError(key=".".join(filter(None, (place, *map(str, problem["loc"])))), value=value, remedy=remedy)
+
+
+def validated_file(model: type[_Strict], path: str | os.PathLike[str], most: int, *, key: str, what: str) -> _Strict:
+    """Return the table of a JSON file of at most `most` bytes; `what` names the kind of file ("a tuner's file").
+
+    Raises ParameterError, naming the file, for its first problem; one that cannot be read is named under `key`.
+    """
+    text = read_file(path, most, key=key, what=what)
+    try:
+        return model.model_validate_json(text)
+    except ValidationError as error:
+        problem = error.errors(include_url=False)[0]
+    place = ".".join(map(str, problem["loc"])) or "file"
+    value = {"json_invalid": os.fspath(path), "missing": MISSING}.get(problem["type"], problem["input"])
+    raise ParameterError(key=place, value=value, remedy=f"{problem['msg']}; give {what}", file=os.fspath(path))
 
 
 def of(makes: Callable[..., Any]) -> Callable[[type[_Table]], type[_Table]]:

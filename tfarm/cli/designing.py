@@ -164,6 +164,7 @@ def tune(
     save: write the tuner to this JSON file
     """
     from tfarm import tuner
+    from tfarm.studies.learning import learning_curves
     from tfarm.tuner import trial, tuning
 
     subject, sampling = load_arm(arm, theory), chain(arm)
@@ -176,7 +177,7 @@ def tune(
             "default_gains_in_words": f"{RATE_GAIN} = {rate:.4g} (damping ratio 0.71 of the rigid arm under Kp)",
         }
     tuned = tuner.tune(subject, plan(tuning.usual_plan(subject, sampling), {RATE_GAIN: rate, ANGLE_GAIN: kp}), sampling)
-    drawn = tuner.learning_curves(tuned, curves, advance) if curves else None
+    drawn = learning_curves(subject, tuned.plan, sampling, curves, advance) if curves else None
     compared = tuner.compare_controllers(tuned.trial, tuned.gain(), tuned.training.guard) if compare else None
     if save is not None:
         tuner.save_tuner(tuned.saved(), save)
@@ -304,7 +305,7 @@ def assumptions(
     Options:
     count: flexible modes
     """
-    from tfarm.audit.assumptions import assumptions as find
+    from tfarm.studies.assumptions import assumptions as find
 
     emit(find(load_arm(arm, theory), count), json)
 

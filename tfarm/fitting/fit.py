@@ -1,8 +1,7 @@
 """The fit of an arm to what was measured of it: its numbers, their intervals, and what the data do not determine.
 
-Arms that the data leave possible are drawn from the normal distribution that the residuals have about their least sum,
-and kept where the true sum of squares agrees with it; along what the data do not determine, within a factor of e of the
-start.
+Arms that the data leave possible are drawn from the posterior, along what the data do not determine with a deviation of
+a factor of e, and kept where the true sum of squares agrees with the data.
 
 Of several records of one response there are the numbers by each record, and a bootstrap over them.  The noise within a
 record is not all that differs from one sweep to the next: amplitudes, temperatures, the hand that clamped the link.
@@ -25,22 +24,19 @@ from scipy.special import gammaincinv
 from tfarm.arm import Arm, must_be_arm
 from tfarm.arm.schema import file_key
 from tfarm.arm.writing import to_toml
-from tfarm.arrays import LEAST_SIZE, Real
+from tfarm.arrays import Real
 from tfarm.digits import listed
 from tfarm.errors import ConvergenceError, one_line, require
-from tfarm.files import write_file
-from tfarm.loop.plane import gain_map
+from tfarm.files import is_standard_output, write_file
 from tfarm.records import record
-from tfarm.response import transfer
 from tfarm.schema import Quantity
 
 from .data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of
 from .model import Parameter, Problem, Response, RingMode, parameters
 from .overlay import ResonanceShift, ratio_of, resonance_shifts
-from .posterior import posterior_of, posterior_path, save_posterior
+from .posterior import SUFFIX, Posterior, posterior_of
 from .solve import (
     FIT_SEED,
-    OPEN_DEVIATION,
     BetterError,
     Fitted,
     Progress,
@@ -49,7 +45,6 @@ from .solve import (
     confidence_intervals,
     is_explained,
     nearest_minimum,
-    principal_axes,
     sum_of_squares,
 )
 
@@ -159,6 +154,11 @@ class Fit(Solution):
     ]:
         """Measured peaks that the fitted arm does not have."""
         return [row.measured for row in self.resonances if row.after is None]
+
+    @cached_property
+    def posterior(self) -> Posterior:
+        """The normal distribution of the arm's fitted numbers."""
+        return posterior_of(self, self.parameters, self.not_determined, self.arm.name)
 
     @cached_property
     def records(
@@ -330,45 +330,25 @@ DRAWS = 40  # of records
 WIDER = 1.5  # times the deviation by the noise: a wider scatter is named
 
 
-@dataclass(frozen=True)
-@record
-class Possible:
-    """`arms` that the data leave possible, the best one not among them, and the points (arms, numbers) they are at."""
+def arms_drawn(fit: Fit, count: int) -> tuple[Arm, ...]:
+    """Return arms drawn from the posterior that explain the data as well as the best one does, but for the noise.
 
-    fit: Fit
-    arms: tuple[Arm, ...]
-    points: Real
-
-
-def possible(fit: Fit, count: int) -> Possible:
-    """A number of arms that explain the data as well as the best one does, but for the noise.
-
-    Raises ConvergenceError where the sum of squares is so far from a parabola that draws of one are none of it.
+    Numbers of sensors follow by the linearised residuals.  Raises ConvergenceError where the sum of squares is so far
+    from a parabola that draws of one are none of it.
     """
-    rng = np.random.default_rng(FIT_SEED)
-    sizes, axes = principal_axes(fit.jacobian)
-    spread = np.minimum(1.0 / np.maximum(sizes, LEAST_SIZE), OPEN_DEVIATION)
-    apart = 2.0 * float(gammaincinv(fit.point.size / 2, DRAWS_KEPT))  # the quantile of chi squared
-    most = fit.chi_squared + apart + 2 * int((sizes < 1 / OPEN_DEVIATION).sum())
-    kept: list[Real] = []
-    for _ in range(DRAWS_EACH * count):
-        point = fit.problem.inside(fit.point + axes.T @ (spread * rng.standard_normal(spread.size)))
-        kept += [point] * (sum_of_squares(fit.problem, point) <= most)
+    own, J = fit.problem.of_the_arm, fit.jacobian
+    of_sensors = -np.linalg.pinv(J[:, len(own) :]) @ J[:, : len(own)]
+    normal = np.random.default_rng(FIT_SEED).standard_normal((DRAWS_EACH * count, len(own)))
+    most = fit.chi_squared + 2.0 * float(gammaincinv(len(own) / 2, DRAWS_KEPT))  # the quantile of chi squared
+    kept: list[Arm] = []
+    for values in fit.posterior.with_all_determined.draws({}, normal).tolist():
+        x = np.array([each.coordinate(value) for each, value in zip(own, values, strict=True)]) - fit.point[: len(own)]
+        point = fit.problem.inside(fit.point + np.r_[x, of_sensors @ x])
+        kept += [fit.problem.arm(point)] * (sum_of_squares(fit.problem, point) <= most)
         if len(kept) == count:
-            return Possible(fit, tuple(map(fit.problem.arm, kept)), np.array(kept))
+            return tuple(kept)
     message = f"only {len(kept)} of {DRAWS_EACH * count} arms drawn explain the data: their likelihood is not normal"
     raise ConvergenceError(message, kept, len(kept))
-
-
-def share_stable(those: Possible, across: Real, up: Real) -> Real:
-    """The share of the arms on which both gains are stable (up, across), in continuous time."""
-    return np.asarray(np.mean([gain_map(arm, across, up).unstable == 0 for arm in those.arms], axis=0))
-
-
-def response_band(those: Possible, output: str, omega: Real) -> tuple[Real, Real, Real]:
-    """The lowest and highest magnitude of the possible arms, and the best one's, at frequencies [rad/s]."""
-    sizes = [abs(transfer(arm, output)(1j * omega)) for arm in those.arms]
-    return np.min(sizes, axis=0), np.max(sizes, axis=0), np.asarray(abs(transfer(those.fit.arm, output)(1j * omega)))
 
 
 @dataclass(frozen=True)
@@ -453,5 +433,6 @@ def repeats(fit: Fit, draws: int = DRAWS) -> Repeats | None:
 def save_fit(fit: Fit, path: Path) -> None:
     """Write the fitted arm, and its posterior to a file of the same name; only the arm where that is a stream."""
     write_file(path, to_toml(fit.arm).encode(), key="--save")
-    if path.is_file() and any("." in each.key for each in fit.parameters):
-        save_posterior(posterior_of(fit, fit.parameters, fit.not_determined), fit.arm.name, posterior_path(path))
+    if path.is_file() and not is_standard_output(path) and fit.posterior.numbers:
+        content = f"{fit.posterior.model_dump_json(indent=1)}\n".encode()
+        write_file(path.with_name(f"{path.stem}{SUFFIX}"), content, key="--save")

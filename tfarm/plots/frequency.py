@@ -10,13 +10,15 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import MaxNLocator, NullFormatter
 
-from tfarm.arm import PLANE, HubFeedback
+from tfarm.arm import PLANE, Arm, HubFeedback
 from tfarm.arrays import Complex, Real
 from tfarm.exact.outputs import signal_words, unit_over
 from tfarm.fitting.data import Measured
-from tfarm.fitting.fit import Fit, Possible, response_band, share_stable
+from tfarm.fitting.fit import Fit
 from tfarm.fitting.overlay import Overlay
 from tfarm.loop.curve import decibels
+from tfarm.loop.plane import gain_map
+from tfarm.response import transfer
 from tfarm.response.frequency import Bode
 
 from .style import (
@@ -207,36 +209,37 @@ def fitted(fit: Fit, *, ax: Sequence[Axes]) -> None:
 
 @picture(
     size=(9.0, 4.6),
-    title=lambda those, output: f"{those.fit.before.name}: {signal_words(output)[0]} of the arms "
-                                "that the data leave possible",
+    title=lambda fit, _, output: f"{fit.before.name}: {signal_words(output)[0]} of the arms "
+                                 "that the data leave possible",
 )  # fmt: skip
-def draw_band(those: Possible, output: str, *, ax: Axes) -> None:
-    """Magnitude of a response of the arm that fits best, in the band of all arms that the data leave possible."""
-    ends = [end for each in those.fit.responses for end in each.omega[[0, -1]]]
+def draw_band(fit: Fit, arms: Sequence[Arm], output: str, *, ax: Axes) -> None:
+    """Magnitude of a response of the arm that fits best, in the band of arms that the data leave possible."""
+    ends = [end for each in fit.responses for end in each.omega[[0, -1]]]
     omega = np.geomspace(min(ends), max(ends), 800)  # about one to a pixel
-    least, most, best = response_band(those, output, omega)
+    best, *others = (abs(transfer(each, output)(1j * omega)) for each in (fit.arm, *arms))
     name, unit = signal_words(output)
-    label = f"all of {len(those.arms)} arms that the data leave possible"
-    ax.fill_between(omega / RAD_PER_CYCLE, least, most, color=BLUE, alpha=0.3, lw=0, label=label)
+    label = f"all of {len(arms)} arms that the data leave possible"
+    ax.fill_between(omega / RAD_PER_CYCLE, np.min(others, axis=0), np.max(others, axis=0), color=BLUE, alpha=0.3,
+                    lw=0, label=label)  # fmt: skip
     ax.plot(omega / RAD_PER_CYCLE, best, color=BLUE, lw=1.3, label="the arm that fits best")
     ax.set(xscale="log", yscale="log", xlabel=FREQUENCY_HZ)
-    ax.set_ylabel(f"|{name}| [{unit_over(unit, those.fit.arm.input_unit)}]")
+    ax.set_ylabel(f"|{name}| [{unit_over(unit, fit.arm.input_unit)}]")
     plain_ticks(ax.xaxis, subs=TICKS_A_DECADE)
 
 
 @picture(
     size=(8.0, 5.0),
-    title=lambda those, _: f"{those.fit.before.name}: stabilising gains for the arms that the data leave possible",
+    title=lambda fit, *_: f"{fit.before.name}: stabilising gains for the arms that the data leave possible",
 )  # fmt: skip
-def draw_share(those: Possible, ranges: Sequence[tuple[float, float]], *, ax: Axes) -> None:
+def draw_share(fit: Fit, arms: Sequence[Arm], ranges: Sequence[tuple[float, float]], *, ax: Axes) -> None:
     """The share of the possible arms that each pair of gains stabilises in continuous time; `ranges` of both gains."""
     across, up = (np.linspace(*ends, 60) for ends in ranges)
+    share = np.mean([gain_map(arm, across, up).unstable == 0 for arm in arms], axis=0)
     mesh = ax.pcolormesh(
-        across, up, share_stable(those, across, up), cmap="Blues", vmin=0.0, vmax=1.0, shading="nearest",
-        rasterized=True,
+        across, up, share, cmap="Blues", vmin=0.0, vmax=1.0, shading="nearest", rasterized=True,
     )  # fmt: skip
     ax.figure.colorbar(mesh, ax=ax).set_label("share of the arms with a stable loop [−]")
-    name_axes(PLANE, those.fit.arm, HubFeedback(), ax)
+    name_axes(PLANE, fit.arm, HubFeedback(), ax)
     ax.grid(False)
 
 

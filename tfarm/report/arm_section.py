@@ -8,12 +8,12 @@ from typing import Annotated, Any, Literal, NamedTuple
 import tfarm
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, implausible, input_words, unit_of
 from tfarm.arm.schema import file_key
-from tfarm.audit.assumptions import Study, has_hub_inertia, hub_study, section_study
 from tfarm.digits import plain, significant, unit
 from tfarm.dsp.chain import file_text
 from tfarm.plots.motion import sketch
 from tfarm.report.page import Case, Fact, PageSection, picture, prose, sheet
 from tfarm.schema import Quantity, Table, table
+from tfarm.studies.assumptions import Study, has_hub_inertia, hub_study, section_study
 
 
 def arm_section(case: Case) -> PageSection:

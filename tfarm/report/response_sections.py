@@ -13,7 +13,7 @@ import tfarm
 from tfarm.arm import Arm, Theory
 from tfarm.digits import fixed, kept_digits, lined, listed, plain
 from tfarm.errors import CertificationError, ConvergenceError
-from tfarm.fitting.fit import ARMS, possible
+from tfarm.fitting.fit import ARMS, arms_drawn
 from tfarm.fitting.overlay import overlay
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import ranges_of
@@ -235,23 +235,23 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
         sheet("fit_resonances", table(fit.resonances)),
     ]
     try:
-        those = possible(fit, count)
+        arms = arms_drawn(fit, count)
     except ConvergenceError as error:
         words.append(f"The loops of the arms that agree with the data are not drawn: {error}.")
     else:
-        every = [margins(each, default_gains(fit.arm)) for each in those.arms if has_loop(fit.arm)]
+        every = [margins(each, default_gains(fit.arm)) for each in arms if has_loop(fit.arm)]
         gains, stable = (
             gains_words(default_gains(fit.arm)),
             [each.in_band for each in every if each.in_band is not None],
         )
         if fit.responses:
-            figure = frequency.draw_band.figure(those, "root_moment")
-            blocks.append(picture("fit_band", figure, arms=those.arms))
+            figure = frequency.draw_band.figure(fit, arms, "root_moment")
+            blocks.append(picture("fit_band", figure, arms=arms))
         if every:
             words.append(prose("fit_share", gains=gains, every=every))
             columns = table(stable, ("phase_margin", "delay_margin", "disk_margin"))
             blocks += [
-                picture("fit_map", frequency.draw_share.figure(those, ranges_of(fit.arm))),
+                picture("fit_map", frequency.draw_share.figure(fit, arms, ranges_of(fit.arm))),
                 sheet("fit_margins", columns, gains=gains),
             ]
     answer = prose("fit", verdict=fit.verdict, found=fit.in_words)

@@ -13,7 +13,8 @@ from tfarm.records import record
 from tfarm.report.page import Case, Fact, PageSection, Picture, has_loop, picture, prose, sheet
 from tfarm.report.sampled_section import chain_words, piece_of_bands, response_columns
 from tfarm.schema import Column, Table, table
-from tfarm.tuner import LearningCurves, Tuning, compare_controllers, learning_curves, tried_loops, tune
+from tfarm.studies.learning import learning_curves
+from tfarm.tuner import LearningCurves, Tuning, compare_controllers, tried_loops, tune
 from tfarm.tuner.baselines import Outcomes, quantised_chain
 from tfarm.tuner.tuning import usual_plan
 
@@ -73,7 +74,8 @@ def tuner_numbers(arm: Arm, chain: Chain) -> TunerNumbers:
     Raises ParameterError for an arm without a loop or a slew, CertificationError where no range of gains is proven.
     """
     plan = usual_plan(arm, chain)
-    tuning = tune(arm, plan, results.ideal_chain(chain))
+    own = results.ideal_chain(chain)
+    tuning = tune(arm, plan, own)
     trial, ideal, guard = tuning.trial, tuning.trial.loop.chain, tuning.training.guard
     conditions = QUANTISED_AND_LATE + 1 if trial.n > LONG_TRIAL else None
     listed = tried_loops(arm, ideal, quantised_chain(arm, chain))[:conditions]
@@ -82,7 +84,7 @@ def tuner_numbers(arm: Arm, chain: Chain) -> TunerNumbers:
         tuning=tuning,
         slews=_simulated(tuning, ideal),
         coarse=_simulated(tuning, listed[QUANTISED_AND_LATE].chain),
-        curves=learning_curves(tuning, curve_seeds(plan.trials * trial.n)),
+        curves=learning_curves(arm, plan, own, curve_seeds(plan.trials * trial.n)),
         rows=tuple(compare_controllers(trial, tuning.gain(), guard, listed, tuning.best_constant.gain)),
     )
 

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from tfarm.arm import PLANE
 from tfarm.case.card import LoopCard, certainty_of, certainty_of_samples, loop_cards
 from tfarm.case.step import LoopResponse, step
 from tfarm.dsp.verdict import sampled
-from tfarm.errors import TfarmError, must_be_known, require
+from tfarm.errors import ConvergenceError, TfarmError, must_be_known, require
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
+from tfarm.loop.windows import Interval, windows_of
 from tfarm.schema import Percent, Quantity
 from tfarm.schema.quantities import quantities
 from tfarm.spectrum import damped_modes, modes
+from tfarm.spectrum.shapes import PARAMETERS
 from tfarm.tuner.tuning import tuned
 
 from .space import Subject
@@ -29,6 +34,7 @@ SCENARIO = "slew"  # of the time response
 CARD = "card"  # the result card of both loops
 NO_PARENT = Quantity()
 FREQUENCY, RATIO = "modes.natural_frequency_rad_s", "damped_modes.damping_ratio"
+SENSITIVITY, INTERVAL, STABILITY, TRIAL_COST = "sensitivity", "interval", "interval.verdict", "tuner.trial_cost"
 UNSTABLE, REAL, IMAGINARY = "poles.unstable", "poles.re_1_s", "poles.im_rad_s"
 
 
@@ -39,11 +45,31 @@ class Column(NamedTuple):
     is_text: bool = False
 
 
+class Columns(dict[str, Column]):
+    """Columns by name; of a numbered one, such as modes.natural_frequency_rad_s.1, there are those of any number."""
+
+    def __missing__(self, name: str) -> Column:
+        if (first := first_of(name)) == name:
+            raise KeyError(name)
+        of = self[first].of
+        return Column(replace(of, label=f"{of.label.removesuffix(' 1')} {name.rpartition('.')[2]}"))
+
+
 class Asked(NamedTuple):
     """Columns of an arm by dotted name, and the function of their values and of the names that are needed."""
 
     columns: Mapping[str, Column]
     values: Callable[[Subject, Set[str]], Mapping[str, Any]]
+
+
+def first_of(name: str) -> str:
+    """Return the name of the column number 1 of a numbered one, and any other name itself."""
+    return re.sub(r"\.[1-9][0-9]{0,6}$", ".1", name)
+
+
+def _most(names: Set[str]) -> int:
+    """Return the largest number of numbered columns."""
+    return max(int(name.rpartition(".")[2]) for name in names)
 
 
 def entries_of(kind: Any, value: Any, under: str, parent: Quantity = NO_PARENT) -> Iterator[tuple[str, Column, Any]]:
@@ -102,26 +128,46 @@ def _step_of(one: Subject, _: Set[str]) -> dict[str, Any]:
             for name, _, value in entries_of(LoopResponse, getattr(found, loop), f"step.{loop}")}  # fmt: skip
 
 
-def _modes_of(one: Subject, _: Set[str]) -> dict[str, float | None]:
-    return _numbered(FREQUENCY, modes(one.arm, LISTED).natural_frequency[-LISTED:])
+def _modes_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
+    count = _most(names)
+    return _numbered(FREQUENCY, modes(one.arm, count).natural_frequency[-count:])
 
 
-def _damped_of(one: Subject, _: Set[str]) -> dict[str, float | None]:
-    found = damped_modes(modes(one.arm, LISTED))
+def _sensitivities_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
+    count, found = _most(names), dict[str, float | None]()
+    for parameter, values in modes(one.arm, count).sensitivity.items():
+        found |= _numbered(f"{SENSITIVITY}.{parameter}", values[-count:] + 0.0)
+    return found
+
+
+def _intervals_of(one: Subject, names: Set[str]) -> dict[str, Any]:
+    """Stability and intervals of gains at the hub; undecided, without intervals, where poles cannot be counted."""
+    found: dict[str, Any] = {STABILITY: "undecided"}
+    with suppress(ConvergenceError):
+        verdict = stability(one.arm, one.law)
+        gains = [gain for gain in PLANE if gain in verdict.loop.numbers and any(f".{gain}." in name for name in names)]
+        for gain, of in windows_of(verdict, gains).items():
+            ends = (None,) * 4 if of.interval is None else of.interval
+            found |= {f"{INTERVAL}.{gain}.{name}": end for name, end in zip(Interval._fields, ends, strict=True)}
+        found[STABILITY] = verdict.verdict
+    return found
+
+
+def _damped_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
+    found = damped_modes(modes(one.arm, _most(names)))
     s = found.eigenvalues[found.index > 0, 0]
     return _numbered(RATIO, -s.real / abs(s))
 
 
 def _poles_of(one: Subject, _: Set[str]) -> dict[str, float | None]:
     found = closed_loop_poles(one.arm, one.law)
-    s = found.values[:LISTED]
+    s = found.values
     return {UNSTABLE: float(found.unstable), **_numbered(REAL, s.real), **_numbered(IMAGINARY, s.imag)}
 
 
 def _numbered(name: str, values: Any) -> dict[str, float | None]:
     """Return values under numbered names, None where there are none."""
-    found = [None if np.isnan(each) else each for each in values.tolist()]
-    return {f"{name}.{n}": value for n, value in enumerate([*found, *[None] * (LISTED - len(found))], start=1)}
+    return {f"{name}.{n}": each if np.isfinite(each) else None for n, each in enumerate(values.tolist(), start=1)}
 
 
 def _columns(name: str, label: str, unit: str, meaning: str) -> dict[str, Column]:
@@ -130,12 +176,14 @@ def _columns(name: str, label: str, unit: str, meaning: str) -> dict[str, Column
 
 
 def _tuner_of(one: Subject, _: Set[str]) -> dict[str, Any]:
-    tuning = tuned(one.arm, one.chain, **one.tuner)
+    tuning = tuned(one.arm, one.chain, one.plan, **one.tuner)
     training = tuning.training
     return {
+        **_numbered(TRIAL_COST, training.costs),
         "tuner.cost": training.result.cost if training.stopped is None else None,
         "tuner.cost_best_constant": tuning.best_constant.cost,
         "tuner.trials": float(training.costs.size),
+        "tuner.is_zero": float(training.died),
         "tuner.stopped": training.stopped and str(training.stopped),
     }
 
@@ -143,6 +191,15 @@ def _tuner_of(one: Subject, _: Set[str]) -> dict[str, Any]:
 ASKED = (
     *map(_card_of, LOOPS),
     Asked(_columns(FREQUENCY, "natural frequency, mode", "rad/s", "of the undamped arm"), _modes_of),
+    Asked({name: column for parameter in PARAMETERS for name, column in _columns(
+        f"{SENSITIVITY}.{parameter}", f"sensitivity to {parameter}, mode", "%/%", "d ln(natural frequency)/d ln(number)"
+    ).items()}, _sensitivities_of),
+    Asked({
+        STABILITY: Column(Quantity("stability", help="of the continuous-time loop"), is_text=True),
+        **{f"{INTERVAL}.{gain}.{name}": Column(replace(of, label=f"stability interval of {gain} {of.label}"),
+                                               is_text=name.endswith("_is"))
+           for gain in PLANE for name, of in quantities(Interval).items()},
+    }, _intervals_of),
     Asked(_columns(RATIO, "damping ratio, mode", "", "of the arm without controller"), _damped_of),
     Asked({
         UNSTABLE: Column(Quantity("unstable poles", help="conjugates counted")),
@@ -155,10 +212,12 @@ ASKED = (
         "tuner.cost": Column(Quantity("cost of the tuned slew", "", 4, "none where training diverged")),
         "tuner.cost_best_constant": Column(Quantity("cost with the best constant gain", "", 4)),
         "tuner.trials": Column(Quantity("trials", help="slews of the training")),
+        "tuner.is_zero": Column(Quantity("zero gain", help="1 where the moment gain went to zero, else 0")),
+        f"{TRIAL_COST}.1": Column(Quantity("cost of trial 1", "", 4, "none after a divergence")),
         "tuner.stopped": Column(Quantity("stopped", help="trial and sample of a divergence"), is_text=True),
     }, _tuner_of),
 )  # fmt: skip
-COLUMNS = {name: column for asked in ASKED for name, column in asked.columns.items()}
+COLUMNS = Columns({name: column for asked in ASKED for name, column in asked.columns.items()})
 
 
 def asked_columns(words: Sequence[str]) -> tuple[str, ...]:
@@ -172,6 +231,8 @@ def asked_columns(words: Sequence[str]) -> tuple[str, ...]:
         for part in LOOPS if word == CARD else (word,):
             heads = {name: f".{name}.".partition(f".{part}.") for name in COLUMNS}
             depth = {name: head.count(".") for name, (head, is_there, _) in heads.items() if is_there}
+            if first_of(word) in COLUMNS:
+                depth = {word: 0}
             if not depth:
                 parts = {each for name in COLUMNS for each in (name, *name.split(".")) if not each.isdigit()}
                 must_be_known("ask", word, sorted({CARD, *parts}))
@@ -191,7 +252,7 @@ def values_of(one: Subject, names: Sequence[str]) -> dict[str, Any]:
     """Return the values of these columns for an arm, and under `FAILED` the reason of missing ones."""
     found, reasons = dict[str, Any](), []
     for asked in ASKED:
-        if own := asked.columns.keys() & {*names}:
+        if own := {name for name in names if first_of(name) in asked.columns}:
             try:
                 found |= asked.values(one, own)
             except TfarmError as error:

@@ -29,6 +29,7 @@ from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError, ParameterError, TfarmError, one_line
 from tfarm.files import locked, make_folder, read_file, write_file
 from tfarm.processes import shared
+from tfarm.tuner import Plan as TunerPlan
 
 from .declared import STUDY_FILE, files_of
 from .extras import has_parquet, on_cluster, parquet_bytes, parquet_columns, versions
@@ -59,6 +60,7 @@ class Plan:
     chain: Chain
     space: Space
     names: tuple[str, ...]
+    tuner: TunerPlan | None = None  # the usual one of each arm by default
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -73,7 +75,7 @@ class Plan:
     @cached_property
     def subjects(self) -> Subjects:
         """The arms and loops of the rows."""
-        return Subjects(self.arm, self.law, self.chain, self.space.keys)
+        return Subjects(self.arm, self.law, self.chain, self.space.keys, self.tuner)
 
 
 def chunk(plan: Plan, first: int, last: int, listed: Real | None = None) -> Chunk:
@@ -93,6 +95,14 @@ def table_of(plan: Plan, first: int, rows: Real) -> Chunk:
         found[FAILED] = found[FAILED] and one_line(found[FAILED], LONGEST_REASON)
         for name, column in table.items():
             column.append(found.get(name))
+    return table
+
+
+def results(plan: Plan, first: int, last: int) -> Chunk:
+    """Return the table of rows first to last - 1.  Raises ConvergenceError for the first row without a result."""
+    table = chunk(plan, first, last)
+    for reason in filter(None, table[FAILED]):
+        raise ConvergenceError(reason, None, None)
     return table
 
 

@@ -31,6 +31,7 @@ from tfarm.errors import ParameterError, must_be_known, naming, require
 from tfarm.fitting.posterior import Posterior
 from tfarm.records import record
 from tfarm.tuner.tuning import NUMBERS, NUMBERS_OF_LEARNING
+from tfarm.tuner.tuning import Plan as TunerPlan
 
 from .extras import parquet_rows
 
@@ -71,12 +72,13 @@ class Distribution(NamedTuple):
 
 
 class Subject(NamedTuple):
-    """One arm of a study with its controller, its sampled chain and the numbers of the tuner."""
+    """One arm of a study with its controller, its sampled chain, and numbers and plan of the tuner."""
 
     arm: Arm
     law: AnyLaw
     chain: Chain
     tuner: dict[str, float]
+    plan: TunerPlan | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,8 +200,8 @@ class Subjects:
     controller (`Law.having`), and "tuner.seed" and others of the tuner.  Raises ParameterError for an unknown one.
     """
 
-    def __init__(self, arm: Arm, law: AnyLaw, chain: Chain, keys: Sequence[str]) -> None:
-        self.law, self.chain, self.keys = law, chain, keys
+    def __init__(self, arm: Arm, law: AnyLaw, chain: Chain, keys: Sequence[str], plan: TunerPlan | None = None) -> None:
+        self.law, self.chain, self.keys, self.plan = law, chain, keys, plan
         numbers = {
             f"{table.name}.{each.name}": (table.name, each.name)
             for table in fields(chain) if table.name != "period_from"
@@ -227,7 +229,7 @@ class Subjects:
             law = law.having(key.removeprefix(LAW), values[key]) if key.startswith(LAW) else law
         own = {key: values[key] for key in self._arms.keys}
         tuner = {key.removeprefix(TUNER): value for key, value in values.items() if key.startswith(TUNER)}
-        return Subject(self._arms.at(own) if own else self._arms.arm, law, chain, tuner)
+        return Subject(self._arms.at(own) if own else self._arms.arm, law, chain, tuner, self.plan)
 
 
 # ------------------------------------------------------------------------------------------------------------ lists

@@ -24,7 +24,7 @@ from tfarm.tuner.trial import (
     save_tuner,
     slew_trial,
 )
-from tfarm.tuner.tuning import Plan, Tuning, TuningResult, learning_curves, tune
+from tfarm.tuner.tuning import Plan, Tuning, TuningResult, tune
 
 __all__ = [
     "BestConstant",
@@ -47,7 +47,6 @@ __all__ = [
     "extra_insensitive",
     "find_guard",
     "initial_network",
-    "learning_curves",
     "load_tuner",
     "lq_bound",
     "residual_rms",

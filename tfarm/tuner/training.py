@@ -14,7 +14,6 @@ sample, and `dynamic` is `clipped`.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite, sqrt
 from typing import Annotated, Literal, NamedTuple, get_args
@@ -316,16 +315,6 @@ class LearningCurves:
         """The same of the cost after each trial (trials,)."""
         names = ("lower_quartile", "median", "upper_quartile")
         return dict(zip(names, np.quantile(self.costs, QUARTILES, axis=0, method="nearest"), strict=True))
-
-    @classmethod
-    def of(cls, trainings: Sequence[Training], trials: int) -> LearningCurves:
-        """The curves of trainings of up to `trials` trials."""
-        costs = np.full((len(trainings), trials), np.inf)
-        for row, training in zip(costs, trainings, strict=True):
-            row[: training.costs.size] = training.costs
-        final = [math.inf if each.stopped is not None else each.result.cost for each in trainings]
-        diverged = sum(each.stopped is not None for each in trainings)
-        return cls(costs, np.array(final), diverged, sum(each.died for each in trainings))
 
 
 def train(trial: Trial, network: Network, guard: Guard, learning: Learning, trials: int) -> Training:

@@ -27,18 +27,18 @@ from pathlib import Path
 from typing import Annotated, Literal, get_args
 
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from tfarm.arm import FED_BACK, Arm, HubFeedback, must_not_be_algebraic
 from tfarm.arm.checks import check_fields, not_negative, number, positive
-from tfarm.arm.schema import StrictTable
+from tfarm.arm.schema import StrictTable, validated_file
 from tfarm.arrays import Real
 from tfarm.dsp import Chain, Measurement, Sampled, Scenario, Simulation, Simulator, sampled_loop, scenario
 from tfarm.dsp.chain import Reading, chain_or_usual
 from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
 from tfarm.dsp.simulate import FOLDED_UP
-from tfarm.errors import MISSING, ParameterError, must_be_known, naming, require
-from tfarm.files import read_file, write_file
+from tfarm.errors import must_be_known, naming, require
+from tfarm.files import write_file
 from tfarm.records import record
 from tfarm.spectrum.table import default_gains
 from tfarm.tuner import kernel
@@ -328,16 +328,9 @@ def save_tuner(tuner: SavedTuner, path: Path) -> None:
 
 def load_tuner(path: str | os.PathLike[str]) -> SavedTuner:
     """Read the tuner of a file.  Raises ParameterError, in one line, for the first problem of the file."""
-    text = read_file(path, MOST_TUNER_BYTES, key="controller", what="a tuner's file")
+    what = "a tuner's file of tfarm tune ARM --save FILE.json"
+    found = validated_file(SavedTuner, path, MOST_TUNER_BYTES, key="controller", what=what)
     with naming(path):
-        try:
-            found = SavedTuner.model_validate_json(text)
-        except ValidationError as error:
-            problem = error.errors(include_url=False)[0]
-            key = ".".join(map(str, problem["loc"])) or "file"
-            value = {"json_invalid": os.fspath(path), "missing": MISSING}.get(problem["type"], problem["input"])
-            remedy = f"{problem['msg']}; save it again with tfarm tune ARM --save FILE.json"
-            raise ParameterError(key=key, value=value, remedy=remedy) from None
         found.gain()  # refuses parts that do not match
         Cost(a=found.a, b=found.b)
     return found

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, must_be_arm
-from tfarm.arm.checks import whole
 from tfarm.arrays import Real
 from tfarm.dsp import Chain, Simulator, scenario
 from tfarm.dsp.chain import Reading, chain_or_usual
@@ -39,14 +37,10 @@ from tfarm.tuner.trial import (
     with_signals,
 )
 
-Advance = Callable[[int, int, str], None]
-
-MOST_SEEDS = 10_000  # of learning curves
 NUMBERS: dict[str, Callable[[float], float]] = {  # of a plan, by which studies may vary it
     "trials": int, "seed": int, "K1": float, "Kp": float, "duration": float, "hidden": int, "scale": float,
 }  # fmt: skip
 NUMBERS_OF_LEARNING = ("eta", "alpha", "clip", "enough")
-TRAINING_THREADS = 2  # a report uses no more cores
 SHAPED_NOTE = "no moment feedback; cost of the shaped slew, which arrives later: cost_lq_bound is no bound of it"
 BOUND_NOTES = {
     "vibration": "the least cost of any control signal e on this slew, with full state and preview",
@@ -158,55 +152,37 @@ def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuni
     require(isinstance(plan, Plan | None), "plan", plan, remedy)
     must_be_arm(arm)
     plan = usual_plan(arm, chain) if plan is None else plan
-    network, trial = plan.network(plan.seed), plan.trial(arm, chain)
+    network, own = plan.network(plan.seed), replace(plan, learning=Learning(), trials=1, seed=0)
+    trial, guard, baselines = _baselines(arm, chain, own)
+    training = train(trial, network, guard, plan.learning, plan.trials)
+    return Tuning(trial=trial, plan=plan, training=training, **baselines)
+
+
+@lru_cache(maxsize=1)
+def _baselines(arm: Arm, chain: Chain | None, plan: Plan) -> tuple[Trial, Guard, dict[str, Any]]:
+    """Return trial, guard and baselines of a plan: the same for each learning, seed and number of trials."""
+    trial = plan.trial(arm, chain)
     best = best_constant(trial)
-    guard = find_guard(trial.loop, plan.guard, best.gain)
-    shaped: dict[str, Baseline] = {}
+    guard, shaped = find_guard(trial.loop, plan.guard, best.gain), dict[str, Baseline]()
     for kind in SHAPERS:
         late = shaped_trial(trial, kind)
         delay = late.task.busy_until - trial.task.busy_until
         shaped[kind] = Baseline(f"input shaping, {kind}", late.with_constant(0.0).cost, delay)
-    return Tuning(
-        trial=trial,
-        plan=plan,
-        training=train(trial, network, guard, plan.learning, plan.trials),
-        without=trial.with_constant(0.0),
-        best_constant=best,
-        bound=lq_bound(trial),
-        shaped=shaped,
-    )
+    without = trial.with_constant(0.0)
+    return trial, guard, {"without": without, "best_constant": best, "bound": lq_bound(trial), "shaped": shaped}
 
 
-def tuned(arm: Arm, chain: Chain, **numbers: float) -> Tuning:
-    """Tune with the usual plan and other values of some of its numbers, such as seed, eta and alpha.
+def tuned(arm: Arm, chain: Chain, plan: Plan | None = None, **numbers: float) -> Tuning:
+    """Tune with a plan, the usual one by default, and other values of some of its numbers: seed, eta, alpha ...
 
     Raises ParameterError for a name that is no number of a plan or of its learning.
     """
-    plan = usual_plan(arm, chain)
+    plan = usual_plan(arm, chain) if plan is None else plan
     for name in numbers:
         must_be_known("tuner", name, (*NUMBERS, *NUMBERS_OF_LEARNING))
     learning: dict[str, Any] = {name: value for name, value in numbers.items() if name in NUMBERS_OF_LEARNING}
     own: dict[str, Any] = {name: NUMBERS[name](value) for name, value in numbers.items() if name in NUMBERS}
     return tune(arm, replace(plan, learning=replace(plan.learning, **learning), **own), chain)
-
-
-def learning_curves(tuning: Tuning, seeds: int, advance: Advance | None = None) -> LearningCurves:
-    """Train the tuning's plan from a number of seeds, its own and those that follow (the paper's Figure 5).
-
-    `advance(done, all, text)` is called after each.  Raises ParameterError for a number of seeds out of range.
-    """
-    seeds = whole("seeds", seeds, 1, MOST_SEEDS, f"a whole number of seeds from 1 to {MOST_SEEDS}")
-    plan, done = tuning.plan, [tuning.training]
-
-    def training(seed: int) -> Training:
-        return train(tuning.trial, plan.network(seed), tuning.training.guard, plan.learning, plan.trials)
-
-    with ThreadPoolExecutor(TRAINING_THREADS) as pool:  # compiled loops let other threads run
-        for each in pool.map(training, range(plan.seed + 1, plan.seed + seeds)):
-            done.append(each)
-            if advance is not None:
-                advance(len(done), seeds, "learning curves")
-    return LearningCurves.of(done, plan.trials)
 
 
 class Baseline(NamedTuple):

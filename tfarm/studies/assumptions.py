@@ -5,29 +5,35 @@ at a time, everything else being the arm's own.  Both rest on the exact solution
 (`Modes.sensitivity`); frequencies are those of the undamped arm.
 """
 
+from __future__ import annotations
+
 import math
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Annotated, Any
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback, Section
+from tfarm.arm import MOMENT_GAIN, PLANE, Arm, Section
 from tfarm.arrays import Real
-from tfarm.errors import ConvergenceError, require
-from tfarm.loop.stability import stability
-from tfarm.loop.windows import windows_of
+from tfarm.dsp import Chain
+from tfarm.errors import require
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import default_gains
+
+from .quantities import FREQUENCY, INTERVAL, SENSITIVITY, STABILITY
+from .running import Plan, results
+from .space import Space
 
 STUDIED_MODES = 4  # flexible modes, by default
 AREA = 6.0e-4  # m^2, the paper's
 DEPTHS = (0.002, 0.003, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.030, 0.040, 0.060)  # m, for that area
 INERTIAS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # kg m^2, about the value assumed for the paper's hub
 HELD = "area, shear factor and all else held: I = A depth^2/12, so one per cent of depth counts twice"
+LIMIT, LIMIT_IS = f"{INTERVAL}.{MOMENT_GAIN}.high", f"{INTERVAL}.{MOMENT_GAIN}.high_is"
 OWN_VALUE = 1e-9  # relative: a candidate nearer to the arm's own value is that value
 
 
@@ -142,35 +148,31 @@ def has_hub_inertia(arm: Arm) -> bool:
 
 
 def section_study(arm: Arm, count: int = STUDIED_MODES) -> Study:
-    """The first `count` flexible frequencies over rectangles of the arm's area.
+    """Return the first `count` flexible frequencies over rectangles of the arm's area.
 
     Depths are 2 to 60 mm for the paper's area, scaled with the root of the area to two digits, and that of the
     rectangle with the arm's own second moment.  The shear factor is the arm's own throughout.
     """
-    section, shear_factor, law = arm.link.section, arm.link.shear_factor, default_gains(arm)
-    own = math.sqrt(12.0) * section.radius_of_gyration
-    rows = []
-    for depth in _with_own([float(f"{each * math.sqrt(section.area / AREA):.2g}") for each in DEPTHS], own):
-        second_moment = section.area * depth**2 / 12
-        other = Section.general(area=section.area, second_moment=second_moment, shear_factor=shear_factor)
-        known = {"depth": depth, "width": section.area / depth, "second_moment": second_moment}
-        candidate = replace(arm, link=replace(arm.link, section=other))
-        rows.append(_candidate(candidate, law, count, "second_moment", is_own=depth == own, **known))
-    return Study(arm, HELD, np.empty(0), np.empty(0), section.area, shear_factor, rows)
+    area, own = arm.link.section.area, math.sqrt(12.0) * arm.link.section.radius_of_gyration
+    depths = _with_own([float(f"{each * math.sqrt(area / AREA):.2g}") for each in DEPTHS], own)
+    known = {"depth": depths, "width": [area / depth for depth in depths],
+             "second_moment": [area * depth**2 / 12 for depth in depths]}  # fmt: skip
+    plain = Section.general(area=area, second_moment=area * own**2 / 12, shear_factor=arm.link.shear_factor)
+    general = replace(arm, link=replace(arm.link, section=plain))  # whose file has a second moment
+    rows = _candidates(general, count, "link.section.second_moment", depths.index(own), known)
+    return Study(arm, HELD, np.empty(0), np.empty(0), area, arm.link.shear_factor, rows)
 
 
 def hub_study(arm: Arm, count: int = STUDIED_MODES) -> Study:
-    """The first `count` flexible frequencies over inertias of a hub that has one.
+    """Return the first `count` flexible frequencies over inertias of a hub that has one.
 
     Inertias are 0.01 to 1 kg m^2, moved by whole decades if the arm's own lies outside, and the arm's own.
     """
-    own, law = arm.hub.inertia, default_gains(arm)
+    own = arm.hub.inertia
     decades = min(0, math.floor(math.log10(own / INERTIAS[0]) + OWN_VALUE))
     decades += max(0, math.ceil(math.log10(own / INERTIAS[-1]) - OWN_VALUE))
-    rows = [
-        _candidate(arm.having(hub_inertia=I), law, count, "hub_inertia", is_own=own == I, hub_inertia=I)
-        for I in _with_own([inertia * 10.0**decades for inertia in INERTIAS], own)
-    ]
+    inertias = _with_own([inertia * 10.0**decades for inertia in INERTIAS], own)
+    rows = _candidates(arm, count, "hub.inertia", inertias.index(own), {"hub_inertia": inertias})
     pinned, locked = (
         modes(arm.having(hub_inertia=limit), count).natural_frequency[-count:] for limit in (0.0, math.inf)
     )
@@ -179,23 +181,23 @@ def hub_study(arm: Arm, count: int = STUDIED_MODES) -> Study:
     return Study(arm, "all else held", locked, pinned, arm.link.section.area, arm.link.shear_factor, rows)
 
 
-def _candidate(arm: Arm, law: HubFeedback, count: int, parameter: str, **known: Any) -> Candidate:
-    """A row of a study; the moment has no loop where the hub is locked or a free pin."""
-    table = modes(arm, count)
-    if has_hub_inertia(arm):
-        known["verdict"] = "undecided"
-        with suppress(ConvergenceError):
-            stable = stability(arm, law)
-            windows = windows_of(stable, [MOMENT_GAIN])[MOMENT_GAIN]
-            known["verdict"] = stable.verdict
-            if windows.around is not None:
-                end = windows.around[1]
-                known |= {"K2_below": end, "K2_below_is_edge": windows.end(end) == "edge"}
-    return Candidate(
-        natural_frequency=table.natural_frequency[-count:].tolist(),
-        sensitivity=(table.sensitivity[parameter][-count:] + 0.0).tolist(),
-        **known,
-    )
+def _candidates(arm: Arm, count: int, key: str, own: int, known: Mapping[str, Sequence[float]]) -> list[Candidate]:
+    """Return the rows of a study of that key, whose values are the last of those known; `own` is the arm's own row."""
+    parameter, values = list(known.items())[-1]
+    space = Space(distributions={}, grids={key: tuple(values)})
+    numbers = {"natural_frequency": FREQUENCY, "sensitivity": f"{SENSITIVITY}.{parameter}"}
+    lists = {name: [f"{of}.{n}" for n in range(1, count + 1)] for name, of in numbers.items()}
+    words = (STABILITY, LIMIT, LIMIT_IS) if has_hub_inertia(arm) else ()  # no loop of a locked hub or a free pin
+    plan = Plan(arm, default_gains(arm), Chain(), space, (*chain.from_iterable(lists.values()), *words))
+    table = results(plan, 0, space.count)
+    columns: dict[str, Sequence[Any]] = {
+        **known, **{name: [*map(list, zip(*(table[each] for each in of), strict=True))] for name, of in lists.items()},
+    }  # fmt: skip
+    if words:
+        columns |= {"verdict": table[STABILITY], "K2_below": table[LIMIT],
+                    "K2_below_is_edge": [kind == "edge" for kind in table[LIMIT_IS]]}  # fmt: skip
+    return [Candidate(is_own=n == own, **{name: column[n] for name, column in columns.items()})
+            for n in range(space.count)]  # fmt: skip
 
 
 def _with_own(candidates: Sequence[float], own: float) -> list[float]:

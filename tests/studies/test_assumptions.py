@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm.audit.assumptions import assumptions, hub_study, section_study
 from tfarm.schema import to_dict
 from tfarm.spectrum.table import PAPER_GAINS
+from tfarm.studies.assumptions import assumptions, hub_study, section_study
 
 PAPER = tfarm.load("sasaki2012")
 STOCKY = tfarm.load("stocky-steel")

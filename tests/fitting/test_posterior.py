@@ -1,0 +1,199 @@
+"""The posterior of a fit: its covariance, its draws, also given ranged numbers, its coverage, and its file."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import tfarm
+from tests.fitting.test_fit import LAB, PAIRS, measured
+from tests.shared import sized
+from tests.shell import answer, refused, run
+from tfarm.errors import ParameterError
+from tfarm.fitting.fit import fit, save_fit
+from tfarm.fitting.posterior import Posterior, PosteriorNumber, load_posterior
+from tfarm.studies.declared import load_study
+
+MASS, OFFSET, E, I = "payload.mass", "payload.offset", "link.youngs_modulus", "link.section.second_moment"
+COVARIANCE = [[0.04, -0.018], [-0.018, 0.01]]  # of ln mass, and of offset/0.05: correlation -0.9
+ROWS = 40_000
+TIP = Path("tests/data/sweep/tip.csv").resolve()
+
+
+def normal_posterior(covariance=COVARIANCE, keys=(MASS, OFFSET)):
+    """Two numbers: one by its logarithm, about 0.2, and one by its size of 0.05, about -0.01."""
+    numbers = [PosteriorNumber(key=key, value=value, low=None, high=None, size=size)
+               for key, value, size in zip(keys, (0.2, -0.01), (0.0, 0.05), strict=True)]  # fmt: skip
+    return Posterior(format="tfarm posterior 1", arm="lab", numbers=numbers, covariance=covariance, not_determined=[])
+
+
+def joint(posterior, seed=0):
+    """Coordinates of draws of both numbers (rows, 2)."""
+    p = posterior.draws({}, np.random.default_rng(seed).standard_normal((ROWS, 2)))
+    return np.c_[np.log(p[:, 0] / 0.2), (p[:, 1] + 0.01) / 0.05]
+
+
+def test_moments_of_draws_are_the_best_values_and_the_covariance():
+    x = joint(normal_posterior())
+    deviation = np.sqrt(np.diag(COVARIANCE))
+    assert abs(x.mean(axis=0)).max() < 5 * deviation.max() / math.sqrt(ROWS)
+    assert np.cov(x.T) == pytest.approx(np.array(COVARIANCE), rel=5 * math.sqrt(2 / ROWS))
+
+
+@pytest.mark.parametrize(("ranged", "other", "at"), [(0, 1, 0.25), (1, 0, -0.12)])
+def test_draws_given_one_number_are_those_kept_of_the_joint_ones(ranged, other, at):
+    """Rejection: of joint draws only those within 5 % of a deviation of the given coordinate."""
+    x = joint(normal_posterior(), seed=1)
+    width = 0.05 * math.sqrt(COVARIANCE[ranged][ranged])
+    kept = x[abs(x[:, ranged] - at) < width, other]
+    key, value = ((MASS, 0.2 * math.exp(at)), (OFFSET, -0.01 + 0.05 * at))[ranged]
+    normal = np.random.default_rng(2).standard_normal((ROWS, 1))
+    p = normal_posterior().draws({key: np.full(ROWS, value)}, normal)[:, 0]
+    drawn = (p + 0.01) / 0.05 if other else np.log(p / 0.2)
+    assert len(kept) > 300
+    assert drawn.mean() == pytest.approx(kept.mean(), abs=5 * kept.std() / math.sqrt(len(kept)))
+    assert drawn.std() == pytest.approx(kept.std(), rel=5 / math.sqrt(2 * len(kept)))
+    assert stats.ks_2samp(drawn, kept).pvalue > 1e-4
+
+
+def test_with_every_number_ranged_nothing_is_drawn():
+    ranged = {MASS: np.full(3, 0.1), OFFSET: np.zeros(3)}
+    assert normal_posterior().draws(ranged, np.empty((3, 0))).shape == (3, 0)
+
+
+# ------------------------------------------------------------ of a fit
+
+
+def test_sensors_are_marginalised():
+    """The Schur complement of the information is the block of the whole inverse."""
+    free = [E, "link.damping", "gain", "delay"]
+    found = fit(LAB, measured(pairs=PAIRS[:1]), free=free, profile=False)
+    whole = np.linalg.inv(found.jacobian.T @ found.jacobian)
+    assert found.posterior.keys == (E, "link.damping")
+    assert found.posterior.matrix == pytest.approx(whole[:2, :2], rel=1e-6)
+    alone = np.linalg.inv(found.jacobian[:, :2].T @ found.jacobian[:, :2])
+    assert (np.diag(found.posterior.matrix) > 1.01 * np.diag(alone)).any()
+
+
+@pytest.fixture(scope="module")
+def pair():
+    """A fit of which these data determine the product E I alone."""
+    return fit(LAB, measured(pairs=PAIRS[:1]), free=[E, I], profile=False)
+
+
+def test_an_open_direction_needs_a_range(pair):
+    assert np.linalg.matrix_rank(pair.posterior.matrix, tol=1e-9) == 1
+    with pytest.raises(ParameterError, match=r"^posterior = '(link\.\S+)': .*--over \1=uniform:LOW,HIGH$"):
+        pair.posterior.must_be_determined(("payload.mass",))
+    for key in (E, I):
+        pair.posterior.must_be_determined((key,))
+    ranged = pair.arm.link.youngs_modulus * np.linspace(0.5, 2.0, 9)
+    drawn = pair.posterior.draws({E: ranged}, np.zeros((9, 1)))[:, 0]
+    assert ranged * drawn == pytest.approx(np.full(9, pair.arm.link.EI), rel=1e-3)  # rotary inertia
+    sizes = np.linalg.eigvalsh(pair.posterior.with_all_determined.matrix)
+    assert sizes == pytest.approx([np.trace(pair.posterior.matrix), 1.0], rel=1e-6)
+
+
+@pytest.mark.parametrize("fits", sized(8, 100))
+def test_the_posterior_covers_the_truth_at_its_rate(fits):
+    """The truth lies in the region of 80 % of 80 % of the fits; noise of known size on finite elements."""
+    inside = 0
+    for seed in range(fits):
+        found = fit(LAB, measured(pairs=PAIRS[:1], share=0.1, seed=seed), free=[E, "link.damping"], profile=False)
+        x = np.log([LAB.link.youngs_modulus / found.arm.link.youngs_modulus, LAB.damping / found.arm.damping])
+        inside += bool(x @ found.posterior.information @ x < stats.chi2.ppf(0.8, df=2))
+    assert stats.binomtest(inside, fits, 0.8).pvalue > 1e-3
+
+
+# ------------------------------------------------------------ its file
+
+
+@pytest.fixture(scope="module")
+def saved(pair, tmp_path_factory):
+    """The folder of that fit's files."""
+    folder = tmp_path_factory.mktemp("saved")
+    save_fit(pair, folder / "fitted.toml")
+    return folder
+
+
+def test_the_file_is_the_posterior(pair, saved):
+    assert load_posterior(saved / "fitted.posterior.json") == pair.posterior
+    assert tfarm.load(saved / "fitted.toml") == pair.arm
+    content = json.loads((saved / "fitted.posterior.json").read_text())
+    assert [each["value"] for each in content["numbers"]] == [each.value for each in pair.parameters]
+    assert content["not_determined"] == list(pair.not_determined)
+
+
+def test_intervals_of_the_file_are_the_profiles(capfd, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    data = f"tip_acceleration/hub_torque={TIP}"
+    options = ("fit", "sasaki2012-lab", "--data", data, "--free", E)
+    found = answer(capfd, *options, "--save", "fitted.toml")
+    (number,) = load_posterior("fitted.posterior.json").numbers
+    assert [number.low, number.high] == [found["parameters"][0][key] for key in ("low", "high")]
+    code, out, _ = run(capfd, *options, "--covariance", "--save", "-")
+    assert code == 0
+    assert out.startswith('name = "sasaki2012-lab-fitted"')
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["fitted.posterior.json", "fitted.toml"]
+
+
+def test_a_study_of_a_file_reads_the_posterior_next_to_it(saved, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    (saved / "study.toml").write_text('arm = "fitted.toml"\nposterior = "fitted.posterior.json"\n')
+    assert load_posterior(load_study(str(saved / "study.toml"))["posterior"]).arm == "sasaki2012-lab-fitted"
+
+
+def test_a_study_names_the_number_without_a_range(capsys, saved, tmp_path):
+    options = ("study", str(saved / "fitted.toml"), "--posterior", str(saved / "fitted.posterior.json"), "--draws", "3",
+               "--ask", "modes", "--out", str(tmp_path / "out"))  # fmt: skip
+    assert "--over link." in refused(capsys, *options)
+    code, _, _ = run(capsys, *options, "--over", f"{E}=uniform:6e10,8e10", "--workers", "1")
+    assert code == 0
+
+
+BAD = {
+    "not JSON": (lambda one: "{", "Invalid JSON"),
+    "another format": (lambda one: one | {"format": "tfarm posterior 2"}, "format = 'tfarm posterior 2'"),
+    "no covariance": (lambda one: {key: one[key] for key in one if key != "covariance"}, "covariance"),
+    "an unknown key": (lambda one: one | {"mean": 0.0}, "mean = 0.0"),
+    "a text for a number": (lambda one: one | {"covariance": [["1", 0.0], [0.0, 1.0]]}, "covariance.0.0 = '1'"),
+    "NaN": (lambda one: one | {"covariance": [[math.nan, 0.0], [0.0, 1.0]]}, "covariance.0.0 = nan"),
+    "asymmetric": (lambda one: one | {"covariance": [[1.0, 0.5], [0.4, 1.0]]}, "symmetric"),
+    "negative": (lambda one: one | {"covariance": [[1.0, 2.0], [2.0, 1.0]]}, "non-negative matrix of 2"),
+    "of another size": (lambda one: one | {"covariance": [[1.0]]}, "2 rows and columns"),
+    "ragged": (lambda one: one | {"covariance": [[1.0, 0.0], [1.0]]}, "2 rows and columns"),
+    "no numbers": (lambda one: one | {"numbers": [], "covariance": []}, "covariance = []"),
+    "a negative size": (lambda one: one | {"numbers": [n | {"size": -1.0} for n in one["numbers"]]}, "numbers.0.size"),
+    "a mass of 0": (lambda one: one | {"numbers": [n | {"value": 0.0} for n in one["numbers"]]}, "payload.mass = 0.0"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_another_file_is_refused_in_one_line(tmp_path, case):
+    change, words = BAD[case]
+    changed = change(normal_posterior().model_dump())
+    file = tmp_path / "bad.posterior.json"
+    file.write_text(changed if isinstance(changed, str) else json.dumps(changed))
+    with pytest.raises(ParameterError) as error:
+        load_posterior(file)
+    text = str(error.value)
+    assert str(file) in text
+    assert words in text
+    assert "\n" not in text
+    assert len(text) < 400
+
+
+def test_a_posterior_of_other_numbers_is_refused(capsys, tmp_path):
+    file = tmp_path / "other.posterior.json"
+    file.write_text(normal_posterior(keys=(MASS, "payload.colour")).model_dump_json())
+    options = ("study", "sasaki2012-lab", "--posterior", str(file), "--out", str(tmp_path / "out"))
+    assert "payload.colour" in refused(capsys, *options)
+
+
+def test_a_deviation_below_a_millionth_is_written_as_such(pair):
+    firm = replace(pair, jacobian=pair.jacobian * 1e6)
+    assert np.linalg.eigvalsh(firm.posterior.matrix)[0] == pytest.approx(1e-12, rel=1e-3, abs=0.0)
