@@ -50,7 +50,10 @@ def test_sensitivities_are_the_quotients_of_differences():
     found, step = values(names), 1e-4
     for key, parameter in (("hub.inertia", "hub_inertia"), ("link.length", "length")):
         own = {"hub.inertia": LAB.hub.inertia, "link.length": LAB.length}[key]
-        low, high = (np.array([*values(["modes"], **{key: own * factor}).values()][:5], dtype=float) for factor in (1 - step, 1 + step))
+        low, high = (
+            np.array([*values(["modes"], **{key: own * factor}).values()][:5], dtype=float)
+            for factor in (1 - step, 1 + step)
+        )
         slopes = np.log(high / low) / math.log((1 + step) / (1 - step))
         for n in (1, 3):  # the error is of second order in the step
             assert found[f"sensitivity.{parameter}.{n}"] == pytest.approx(slopes[n - 1], rel=1e-5)

@@ -100,7 +100,7 @@ def test_another_study_and_its_parts_are_refused(tmp_path, monkeypatch):
     (part, *_) = (tmp_path / "a").glob("part-*")
     STUDY(out=tmp_path / "b", draws=5, part=4, workers=1)
     (tmp_path / "b" / part.name).write_bytes(part.read_bytes())
-    refused(f"{part.name} is a part of another study", STUDY, out=tmp_path / "b", draws=5)
+    refused(f"{part.name}'. is a part of another study", STUDY, out=tmp_path / "b", draws=5)
     (tmp_path / "c").mkdir()
     (tmp_path / "c" / part.name).write_bytes(part.read_bytes())
     refused("is a part of another study|has parts, and no study.json", STUDY, out=tmp_path / "c", draws=6)
