@@ -34,6 +34,7 @@ SURVEYS := \
 	dsp.settled \
 	dsp.law_orders \
 	fitting.planted \
+	studies.kills \
 	studies.planted \
 	tuner.bounded \
 	cli.fuzz \

@@ -9,8 +9,10 @@ import json
 import math
 import platform
 import sys
+import tempfile
 import time
 from dataclasses import asdict, dataclass
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -31,6 +33,9 @@ from tfarm.loop.loop import Loop
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import gain_map
 from tfarm.spectrum.proofs import enclosed
+from tfarm.studies.quantities import asked_columns, values_of
+from tfarm.studies.running import Plan, chunk
+from tfarm.studies.space import space_of
 from tfarm.tuner import Guard, Learning, initial_network, slew_trial, train
 
 PACKAGES = ("tfarm", "numpy", "numba", "scipy", "mpmath", "python-flint", "control")
@@ -172,9 +177,30 @@ def tuner():
     )
 
 
+def studies():
+    """An arm of a study, its chunk against a plain loop, and two processes against one, by the time that passes."""
+    over = {"payload.mass": {"uniform": [0.0, 0.2]}, "law.K2": {"uniform": [0.0, 0.6]}}
+    for ask, n in (("modes", 200), ("card", 5)):
+        space = space_of(over, draws=n, seed=0, posterior=None, listed=((), 0))
+        plan = Plan(LAB, LAW, Chain(), space, asked_columns([ask]))
+
+        def plain(plan=plan, n=n):
+            return [values_of(plan.subjects.at(row), plan.names) for row in plan.space.rows(0, n, None).tolist()]
+
+        theirs, ours = timed([plain, partial(chunk, plan, 0, n)], 9, warm=True)
+        yield Row(f"study, an arm of {ask}", n, np.median(ours) / n, np.median(ours / theirs), "a plain loop")
+    taken, n = {}, 20_000
+    for workers in (1, 2):
+        with tempfile.TemporaryDirectory() as folder:
+            began = time.perf_counter()
+            tfarm.study(LAB, over, ["modes"], LAW, out=folder, draws=n, part=n // 20, workers=workers)
+            taken[workers] = time.perf_counter() - began
+    yield Row("study of modes, two processes", n, taken[2] / n, taken[1] / taken[2], "as fast as one")
+
+
 def main(path):
     """Measure, print, keep."""
-    rows = [row for group in (responses, spectra, loops, loci, tuner) for row in group()]
+    rows = [row for group in (responses, spectra, loops, loci, tuner, studies) for row in group()]
     for row in rows:
         ratio = "" if row.ratio is None else f", {row.ratio:.3g} x {row.to}"
         error = "" if row.error is None else f", largest error {row.error:.1e}"

@@ -35,7 +35,7 @@ MADE = {"reference/commands", "reference/json", "reference/arm-file"}  # by docs
 PAGES = {str(path.relative_to(DOCS).with_suffix("")): path for path in sorted(DOCS.rglob("*.md"))}
 PAGES = {name: path for name, path in PAGES.items() if name not in MADE and not name.startswith("_build")}
 DEAR = {  # two to seven seconds each: run by `make survey`
-    "tutorials/design", "howto/compare", "howto/uncertainty", "howto/figures", "howto/measurements",
+    "tutorials/design", "howto/compare", "howto/studies", "howto/figures", "howto/measurements",
     "howto/sensors-motors", "theory/design",
 }  # fmt: skip
 SHOWN = {"{toctree}", "{computed}", "{eval-rst}", "{math}", "{note}", "{tip}", "{seealso}", "{figure}"}

@@ -78,7 +78,8 @@ def cluster(scheduler: str) -> Iterator[Any]:
     Certificates of a tls:// address are those of Dask's own configuration (distributed.comm.tls).
     """
     distributed = extra("distributed", "cluster", SCHEDULER, scheduler)
-    getLogger("distributed").setLevel("CRITICAL")  # its errors come as one line of ours
+    for name in ("distributed", "distributed.client"):  # whose errors come as one line of ours
+        getLogger(name).setLevel("CRITICAL")
     try:
         client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:

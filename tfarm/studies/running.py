@@ -26,7 +26,7 @@ import numpy as np
 from tfarm.arm import AnyLaw, Arm
 from tfarm.arrays import Real
 from tfarm.dsp import Chain
-from tfarm.errors import ConvergenceError, ParameterError, TfarmError, one_line
+from tfarm.errors import ConvergenceError, ParameterError, TfarmError, one_line, require
 from tfarm.files import locked, make_folder, read_file, write_file
 from tfarm.processes import shared
 from tfarm.tuner import Plan as TunerPlan
@@ -172,8 +172,7 @@ class Parts:
         names = {each.name for each in self.folder.glob(f"{PREFIX}*")}
         found = [number for number in range(self.count) if self.path(number).name in names]
         strange = sorted(names - {self.path(number).name for number in found})
-        if strange:
-            raise _refusal(self.folder, f"{strange[0]} is a part of another study: choose another folder")
+        _require(not strange, self.folder, f"{strange[:1]} is a part of another study: choose another folder")
         return found
 
     def write(self, number: int, table: Mapping[str, Sequence[Any]]) -> None:
@@ -226,17 +225,15 @@ def opened(
             other = sorted(key for key in {*inputs, *known["inputs"]} if known["inputs"].get(key) != inputs.get(key))
             parts = Parts(folder, plan, digest, int(known["rows_a_part"]), str(known["suffix"]), float(known["cost_s"]))
         except (ValueError, KeyError, TypeError, AttributeError):
-            raise _refusal(file, "is no file of a study: choose another folder") from None
-        if other:
-            raise _refusal(folder, f"has a study with other {', '.join(other)}: choose another folder")
-        if parts.suffix == PARQUET and not has_parquet():
-            raise _refusal(folder, "has Parquet parts: pip install 'tfarm[study]'")
+            remedy = "is no file of a study: choose another folder"
+            raise ParameterError(key=OUT, value=str(file), remedy=remedy) from None
+        _require(not other, folder, f"has a study with other {', '.join(other)}: choose another folder")
+        _require(parts.suffix != PARQUET or has_parquet(), folder, "has Parquet parts: pip install 'tfarm[study]'")
         return parts
     cost = seconds_an_arm(plan, first_rows(plan, PILOT, listing))
     rows = size or rows_a_chunk(cost, space.count, workers)
     parts = Parts(folder, plan, digest, rows, PARQUET if has_parquet() else ".csv", cost)
-    if parts.written:
-        raise _refusal(folder, f"has parts, and no {FILE}: choose another folder")
+    _require(not parts.written, folder, f"has parts, and no {FILE}: choose another folder")
     columns = [{"name": name, "label": of.label, "unit": of.unit, "meaning": of.help}
                for name in plan.names for of in [COLUMNS[name].of]]  # fmt: skip
     known = {"inputs": inputs, "rows": space.count, "rows_a_part": rows, "suffix": parts.suffix, "cost_s": cost,
@@ -246,8 +243,8 @@ def opened(
     return parts
 
 
-def _refusal(place: Path, remedy: str) -> ParameterError:
-    return ParameterError(key=OUT, value=str(place), remedy=remedy)
+def _require(is_met: object, folder: Path, remedy: str) -> None:
+    require(is_met, OUT, str(folder), remedy)
 
 
 def _sha256(content: bytes) -> str:
