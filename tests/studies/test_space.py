@@ -10,7 +10,7 @@ from scipy import stats
 import tfarm
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
-from tfarm.fitting.posterior import Posterior
+from tfarm.fitting.posterior import Posterior, PosteriorNumber
 from tfarm.studies import space
 from tfarm.studies.declared import files_of
 from tfarm.studies.space import ENDS, Listing, Subjects, space_of
@@ -78,10 +78,11 @@ def test_inverses_are_finite_at_both_ends_of_the_uniform_numbers(monkeypatch):
     assert made({"a": {"normal": [0, 1]}}).uniform(3).tolist() == [ENDS[0]]
 
 
+COVARIANCE = np.array([[0.04, 0.06, 0.0], [0.06, 0.25, 0.1], [0.0, 0.1, 0.09]])
 POSTERIOR = Posterior(
-    keys=("a", "b", "c"), value=np.array([2.0, 5.0, 7.0]), size=np.array([0.0, 2.0, 1.0]),  # a by its logarithm
-    covariance=np.array([[0.04, 0.06, 0.0], [0.06, 0.25, 0.1], [0.0, 0.1, 0.09]]), intervals=((None, None),) * 3,
-    not_determined=(),
+    format="tfarm posterior 1", arm="arm", covariance=COVARIANCE.tolist(), not_determined=[],
+    numbers=[PosteriorNumber(key=key, value=value, size=size, low=None, high=None)
+             for key, value, size in (("a", 2.0, 0.0), ("b", 5.0, 2.0), ("c", 7.0, 1.0))],  # a by its logarithm
 )  # fmt: skip
 
 
@@ -89,10 +90,10 @@ def test_draws_of_a_posterior_have_its_covariance():
     found = made(posterior=POSTERIOR, draws=4000)
     a, b, c = found.rows(0, 4000, None).T
     coordinates = np.array([np.log(a / 2), (b - 5) / 2, c - 7])
-    deviation = np.sqrt(np.diag(POSTERIOR.covariance))
+    deviation = np.sqrt(np.diag(COVARIANCE))
     for own, size in zip(coordinates, deviation, strict=True):
         assert stats.kstest(own / size, "norm").pvalue > CHANCE
-    gap = (np.cov(coordinates) - POSTERIOR.covariance) / np.outer(deviation, deviation)
+    gap = (np.cov(coordinates) - COVARIANCE) / np.outer(deviation, deviation)
     assert abs(gap).max() < 4 * math.sqrt(2 / 4000)  # four deviations of a sample variance
     assert (found.is_independent, found.is_searchable) == (True, False)
     assert np.array_equal(found.rows(17, 19, None), found.rows(0, 4000, None)[17:19])
@@ -104,7 +105,7 @@ def test_a_number_with_a_range_of_its_own_conditions_the_others():
     assert found.keys == ("a", "b", "c")
     a, b, c = found.rows(0, 4000, None).T
     assert stats.kstest(np.log2(a) / 2, "uniform").pvalue > CHANCE
-    C = POSTERIOR.covariance
+    C = COVARIANCE
     slope = C[1:, 0] / C[0, 0]
     rest = np.array([(b - 5) / 2, c - 7]) - np.outer(slope, np.log(a / 2))
     schur = C[1:, 1:] - np.outer(C[1:, 0], C[0, 1:]) / C[0, 0]
