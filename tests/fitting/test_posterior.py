@@ -16,7 +16,7 @@ from tests.shell import answer, refused, run
 from tfarm.errors import ParameterError
 from tfarm.fitting.fit import fit, save_fit
 from tfarm.fitting.posterior import Posterior, PosteriorNumber, load_posterior
-from tfarm.studies.declared import load_study
+from tfarm.studies.study import load_study
 
 MASS, OFFSET, E, I = "payload.mass", "payload.offset", "link.youngs_modulus", "link.section.second_moment"
 COVARIANCE = [[0.04, -0.018], [-0.018, 0.01]]  # of ln mass, and of offset/0.05: correlation -0.9

@@ -26,7 +26,6 @@ from tfarm.loop.nyquist import compressed
 from tfarm.plots.regions import colours, contours
 from tfarm.plots.style import number_label
 from tfarm.spectrum.table import default_gains
-from tfarm.studies.bands import frequency_band
 from tfarm.tuner import Plan
 
 mpl.use("Agg")
@@ -87,7 +86,7 @@ def records(tmp_path_factory):
         "tuned_gain": [tfarm.tune(LAB, Plan(trials=1))],
         "slew": [LAB, tfarm.simulate(LAB, LAW, duration=2.0, count=8, between=4)],
         "study": [study],
-        "study_band": [frequency_band(study)],
+        "study_band": [study],
         "study_scatter": [study],
         "step": [tfarm.step(LAB, LAW, scenario_name="slew")],
         "locus of a law": [tfarm.locus(LAB, LEAD, "gain", 0.0, 2.0, 10, 3)],

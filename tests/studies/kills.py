@@ -110,10 +110,10 @@ def killed(kind, folder, count, served=None):
 
 
 EXPECTED = {  # exit code, and the line on standard error
-    "worker": (3, r"tfarm: a worker process ended .*; the same command again completes the study\n"),
+    "worker": (3, r"tfarm: a worker process ended .*\n"),
     "study": (-signal.SIGKILL, ""),
     "Dask worker": (0, ""),
-    "scheduler": (3, r"tfarm: the scheduler or its workers are gone .*; the same command again completes the study\n"),
+    "scheduler": (3, r"tfarm: the cluster failed .*; run the study again\n"),
 }
 
 

@@ -10,10 +10,10 @@ from tests.shell import answer
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.studies import quantities as room
-from tfarm.studies.learning import learning_curves
+from tfarm.studies.cases import learning_curves, over_values, results
 from tfarm.studies.quantities import asked_columns, values_of
-from tfarm.studies.running import Plan, chunk, results
-from tfarm.studies.space import Space, Subjects
+from tfarm.studies.running import Plan, chunk
+from tfarm.studies.space import Subjects
 from tfarm.tuner import tune
 from tfarm.tuner import tuning as tuning_room
 from tfarm.tuner.tuning import usual_plan
@@ -30,7 +30,7 @@ def values(words, arm=LAB, law=LAW, **numbers):
 
 def grid(key, points, names):
     """The plan of a study over the values of one key."""
-    return Plan(LAB, LAW, Chain(), Space(distributions={}, grids={key: tuple(points)}), tuple(names))
+    return Plan(LAB, LAW, Chain(), over_values(key, points), tuple(names))
 
 
 def test_a_mode_of_any_number_has_a_column():
@@ -38,8 +38,8 @@ def test_a_mode_of_any_number_has_a_column():
     name = "modes.natural_frequency_rad_s.9"
     assert values([name]) == {"failed": None, name: pytest.approx(omega[8], rel=1e-12)}
     assert list(values(["modes"]).values())[:5] == pytest.approx(omega[:5], rel=1e-12)
-    assert room.COLUMNS[name].of.label == "natural frequency, mode 9"
-    assert room.COLUMNS[name].of.unit == "rad/s"
+    assert room.quantity_of(name).label == "natural frequency, mode 9"
+    assert room.quantity_of(name).unit == "rad/s"
     for word in ("modes.natural_frequency_rad_s.0", "poles.unstable.2", "modes.colour.1"):
         with pytest.raises(ParameterError, match=r"^ask = "):
             asked_columns([word])

@@ -12,8 +12,8 @@ from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
 from tfarm.fitting.posterior import Posterior, PosteriorNumber
 from tfarm.studies import space
-from tfarm.studies.declared import files_of
-from tfarm.studies.space import ENDS, Listing, Subjects, space_of
+from tfarm.studies.space import ENDS, Listing, Subjects, lines_of, listing_of, space_of
+from tfarm.studies.study import files_of
 
 CHANCE = 1e-3  # of a right distribution to be called wrong
 TRUE = {  # by kind: its numbers, and the distribution by another formula than the code's
@@ -25,8 +25,8 @@ TRUE = {  # by kind: its numbers, and the distribution by another formula than t
 GAINS = tfarm.HubFeedback(K1=0.3, K2=0.3)
 
 
-def made(over=None, *, draws=100, seed=1, listed=((), 0), posterior=None):
-    return space_of(over or {}, draws=draws, seed=seed, posterior=posterior, listed=listed)
+def made(over=None, *, draws=100, seed=1, listing=None, posterior=None):
+    return space_of(over or {}, draws=draws, seed=seed, posterior=posterior, listing=listing)
 
 
 def test_draws_have_their_distributions_and_are_independent():
@@ -61,7 +61,7 @@ def test_each_draw_has_every_point_of_the_grid():
         assert np.ptp(own[:, 0]) == 0
         assert own[:, 1:].tolist() == [[c, d] for c in (0.0, 0.5, 1.0) for d in (5.0, 7.0)]
     alone = made({"c": {"grid": [0, 1, 3]}}, draws=1000)
-    assert (alone.count, alone.draws, alone.is_independent) == (3, 1, False)
+    assert (alone.count, alone.is_independent) == (3, False)
 
 
 def test_inverses_are_finite_at_both_ends_of_the_uniform_numbers(monkeypatch):
@@ -95,7 +95,7 @@ def test_draws_of_a_posterior_have_its_covariance():
         assert stats.kstest(own / size, "norm").pvalue > CHANCE
     gap = (np.cov(coordinates) - COVARIANCE) / np.outer(deviation, deviation)
     assert abs(gap).max() < 4 * math.sqrt(2 / 4000)  # four deviations of a sample variance
-    assert (found.is_independent, found.is_searchable) == (True, False)
+    assert found.is_independent
     assert np.array_equal(found.rows(17, 19, None), found.rows(0, 4000, None)[17:19])
 
 
@@ -158,9 +158,9 @@ def test_numbers_of_numpy_are_numbers():
 
 def test_a_key_has_one_place(lab):
     with pytest.raises(ParameterError, match="varied twice"):
-        made({"a": {"uniform": [0, 1]}}, listed=(("a",), 3))
+        made({"a": {"uniform": [0, 1]}}, listing=Listing("list.csv", ("a",), 3))
     with pytest.raises(ParameterError, match="no grid with it"):
-        made({"b": {"grid": [0, 1, 3]}}, listed=(("a",), 3))
+        made({"b": {"grid": [0, 1, 3]}}, listing=Listing("list.csv", ("a",), 3))
     law = tfarm.Law({"hub_rate": 0.3, "root_moment": 0.3})
     for pair in (("law.K1", "law.hub_rate"), ("law.hub_rate", "law.hub_rate.gain")):
         with pytest.raises(ParameterError, match="two keys are one number"):
@@ -216,14 +216,15 @@ def test_laws_that_differ_in_the_last_bit_are_other_studies(lab):
 
 def listed(folder, text, name="list.csv"):
     (folder / name).write_bytes(text if isinstance(text, bytes) else text.encode())
-    return Listing(folder / name)
+    return folder / name
 
 
 def test_a_list_is_read_row_by_row(tmp_path):
-    found = listed(tmp_path, "\ufeffpayload.mass, law.K2\n0.1,0.2\n 3e-1 ,4\n-5,+6.5\n".replace(", ", ","))
+    path = listed(tmp_path, "\ufeffpayload.mass, law.K2\n0.1,0.2\n 3e-1 ,4\n-5,+6.5\n".replace(", ", ","))
+    found = listing_of(path)
     assert (found.columns, found.size) == (("payload.mass", "law.K2"), 3)
     assert [block.tolist() for block in found.blocks([(0, 1), (2, 3)])] == [[[0.1, 0.2]], [[-5.0, 6.5]]]
-    own = made(listed=(found.columns, found.size))
+    own = made(listing=found)
     assert (own.count, own.is_independent) == (3, False)
     (rows,) = found.blocks([(1, 3)])
     assert own.rows(1, 3, rows).tolist() == [[0.3, 4.0], [-5.0, 6.5]]
@@ -254,7 +255,7 @@ BAD_LISTS = [
 @pytest.mark.parametrize(("text", "key"), BAD_LISTS)
 def test_a_bad_list_is_refused_with_row_and_column(tmp_path, text, key):
     with pytest.raises(ParameterError) as caught:
-        _ = listed(tmp_path, text).size
+        listing_of(listed(tmp_path, text))
     assert caught.value.key == key
     assert "\n" not in str(caught.value)
     assert "list.csv" in str(caught.value)
@@ -263,7 +264,7 @@ def test_a_bad_list_is_refused_with_row_and_column(tmp_path, text, key):
 def test_a_list_that_is_not_there_is_refused(tmp_path):
     for path in (tmp_path / "none.csv", tmp_path):
         with pytest.raises(ParameterError, match="cannot be read"):
-            _ = Listing(path).columns
+            listing_of(path)
 
 
 PARQUET_CELLS = [
@@ -276,12 +277,11 @@ PARQUET_CELLS = [
 def test_a_list_in_parquet_has_the_same_rules(tmp_path, cells, values):
     arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
     parquet.write_table(arrow.table({"a": [0.5, 1.5], "b": cells}), tmp_path / "list.parquet")
-    found = Listing(tmp_path / "list.parquet")
     if values is None:
         with pytest.raises(ParameterError, match=r"list\.parquet: row [01], column b"):
-            _ = found.size
+            listing_of(tmp_path / "list.parquet")
     else:
-        assert list(found.rows()) == [[0.5, values[0]], [1.5, values[1]]]
+        assert list(lines_of(tmp_path / "list.parquet")) == [("a", "b"), [0.5, values[0]], [1.5, values[1]]]
 
 
 def test_a_list_in_parquet_with_doubled_columns_or_of_other_bytes_is_refused(tmp_path):
@@ -289,9 +289,9 @@ def test_a_list_in_parquet_with_doubled_columns_or_of_other_bytes_is_refused(tmp
     table = arrow.table([arrow.array([1.0]), arrow.array([2.0])], names=["a", "a"])
     parquet.write_table(table, tmp_path / "list.parquet")
     with pytest.raises(ParameterError, match="each column has a key of its own"):
-        _ = Listing(tmp_path / "list.parquet").columns
+        listing_of(tmp_path / "list.parquet")
     with pytest.raises(ParameterError, match="cannot be read"):
-        _ = listed(tmp_path, b"PAR1 no table PAR1", "other.parquet").columns
+        listing_of(listed(tmp_path, b"PAR1 no table PAR1", "other.parquet"))
 
 
 @pytest.mark.survey
@@ -303,7 +303,7 @@ def test_a_long_list_takes_no_memory(tmp_path):
         with (tmp_path / "list.csv").open("w", newline="") as file:
             csv.writer(file).writerows([("a", "b"), *((n, 0.5) for n in range(count))])
         tracemalloc.start()
-        found = Listing(tmp_path / "list.csv")
+        found = listing_of(tmp_path / "list.csv")
         assert found.size == count
         for block in found.blocks([(n, n + 1000) for n in range(0, count, 1000)]):
             assert len(block) == 1000

@@ -109,7 +109,7 @@ def test_a_section_has_the_reason_of_a_missing_response(found, monkeypatch):
     def refused(*_):
         raise tfarm.ParameterError(key="response", value=TEXT, remedy="no arm of the study has it")
 
-    monkeypatch.setattr(writing, "frequency_band", refused)
+    monkeypatch.setattr(writing.studies.study_band, "figure", refused)
     (section,) = (each for each in writing.study_sections(found) if each.title == "Responses")
     assert list(section.blocks) == []
     assert section.words[0].startswith("root_moment: response = ")

@@ -17,17 +17,11 @@ from tfarm.plots.motion import OF_STABILITY
 from tfarm.plots.studies import distributions, study, study_band, study_scatter
 from tfarm.plots.style import GREY, column, save_figure
 from tfarm.response.transfer import transfer
-from tfarm.studies.bands import frequency_band, slew_band
 
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
     return planted_study(tmp_path_factory.mktemp("planted"))
-
-
-@pytest.fixture(scope="module")
-def band(found):
-    return frequency_band(found)
 
 
 def test_the_study_has_every_kind_of_value(found):
@@ -107,58 +101,39 @@ def test_of_many_arms_some_are_drawn(found, monkeypatch):
     assert sum(len(line.get_xdata()) for line in ax.lines) == 10
 
 
-def test_a_band_has_the_curves_of_the_arms(found, band):
+def test_a_band_has_the_curves_of_the_arms(found):
     """By arms made in another way than the study makes them."""
     masses = found.table()["payload.mass"]
-    exact = [abs(tfarm.transfer(LAB.having(payload_mass=m), "root_moment")(1j * band.at)) for m in masses]
-    assert band.curves == pytest.approx(20 * np.log10(exact), abs=1e-9)
-    ax = study_band.figure(band).axes[0]
-    median = next(line for line in ax.lines if line.get_label() == "median, at each point")
-    below, above = 20 * np.log10(np.sort(exact, axis=0)[[DRAWS // 2 - 1, DRAWS // 2]])  # of an even number of arms
-    assert np.all((median.get_ydata() > below - 1e-9) & (median.get_ydata() < above + 1e-9))
-    low, high = np.percentile(band.curves, [5, 95], axis=0)
-    (area,) = area_of(ax)
-    assert {*zip(band.at, low, strict=True), *zip(band.at, high, strict=True)} <= area
+    ax = study_band.figure(found).axes[0]
+    lines = {line.get_label(): line for line in ax.lines}
+    omega, median = lines["median, at each frequency"].get_data()
+    exact = 20 * np.log10([abs(tfarm.transfer(LAB.having(payload_mass=m), "root_moment")(1j * omega)) for m in masses])
+    assert lines["single arms"].get_ydata() == pytest.approx(exact[0], abs=1e-9)
+    below, above = np.sort(exact, axis=0)[[DRAWS // 2 - 1, DRAWS // 2]]  # of an even number of arms
+    assert np.all((median > below - 1e-9) & (median < above + 1e-9))
+    (area,) = (each.get_paths()[0].vertices for each in ax.collections)
+    for end in np.percentile(exact, [5, 95], axis=0):
+        assert all(np.min(abs(area[area[:, 0] == w, 1] - y)) < 1e-9 for w, y in zip(omega, end, strict=True))
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("angular frequency [rad/s]", "root moment [dB re 1 N m/(N m)]")
 
 
-def area_of(ax):
-    return [{(float(x), float(y)) for x, y in each.get_paths()[0].vertices} for each in ax.collections]
-
-
 def test_an_arm_without_a_response_is_left_out_and_none_at_all_is_an_error(found):
-    refused = tfarm.ConvergenceError("no", None, None)
+    refused, place = tfarm.ConvergenceError("no", None, None), "tfarm.plots.studies.transfer"
     ready = transfer(found.parts.plan.arm, "root_moment")
-    with mock.patch(
-        "tfarm.studies.bands.transfer", side_effect=[ready, *[refused] * (DRAWS - 1), lambda s: 0 * s + 10]
-    ):
-        assert frequency_band(found).curves.tolist() == [[20.0] * 1200]
+    with mock.patch(place, side_effect=[ready, *[refused] * (DRAWS - 1), lambda s: 0 * s + 10]):
+        (line, *_) = study_band.figure(found).axes[0].lines
+    assert line.get_ydata().tolist() == [20.0] * 1200
     with (
-        mock.patch("tfarm.studies.bands.transfer", side_effect=[ready, *[refused] * DRAWS]),
-        pytest.raises(tfarm.ParameterError, match="no arm of the study has it"),
+        mock.patch(place, side_effect=[ready, *[refused] * DRAWS]),
+        pytest.raises(tfarm.ParameterError, match="no arm of the study has"),
     ):
-        frequency_band(found)
+        study_band.figure(found)
     with pytest.raises(tfarm.ParameterError, match="output"):
-        frequency_band(found, "root_momentum")
+        study_band.figure(found, "root_momentum")
 
 
-@pytest.mark.survey
-def test_a_band_of_the_slew_has_the_stable_arms(tmp_path):
-    """Of six arms; by the signals of `tfarm.step` at its own times."""
-    found = planted_study(tmp_path, draws=6)
-    band = slew_band(found)
-    rows = [row for row, K2 in enumerate(found.table()["law.K2"]) if K2 < 1]  # C > 0 of this arm allows a little more
-    assert len(rows) <= len(band.curves) <= 6
-    row = rows[0]
-    arm = LAB.having(payload_mass=found.table()["payload.mass"][row])
-    run = tfarm.step(arm, found.parts.plan.law.having("K2", found.table()["law.K2"][row]), None, "slew", band.at[-1])
-    signal = np.interp(band.at, run.t, run.continuous.signals["root_moment"])  # 16 of its points for one of the band
-    assert band.curves[0] == pytest.approx(signal, abs=2e-3 * abs(signal).max())
-    assert study_band.figure(band).axes[0].get_ylabel() == "root moment [N m]"
-
-
-def test_no_words_of_a_picture_overlap_in_any_size(found, band):
-    drawn = [(study, found), (study_scatter, found), (study_band, band)]
+def test_no_words_of_a_picture_overlap_in_any_size(found):
+    drawn = [(study, found), (study_scatter, found), (study_band, found)]
     figures = [picture.figure(record) for picture, record in drawn]
     with column():
         figures += [picture.figure(record) for picture, record in drawn]

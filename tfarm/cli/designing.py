@@ -164,7 +164,7 @@ def tune(
     save: write the tuner to this JSON file
     """
     from tfarm import tuner
-    from tfarm.studies.learning import learning_curves
+    from tfarm.studies.cases import learning_curves
     from tfarm.tuner import trial, tuning
 
     subject, sampling = load_arm(arm, theory), chain(arm)
@@ -305,7 +305,7 @@ def assumptions(
     Options:
     count: flexible modes
     """
-    from tfarm.studies.assumptions import assumptions as find
+    from tfarm.studies.cases import assumptions as find
 
     emit(find(load_arm(arm, theory), count), json)
 

@@ -1,5 +1,6 @@
 """The command for studies of uncertain arms."""
 
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -27,7 +28,6 @@ from tfarm.cli.app import (
 from tfarm.errors import require
 
 command = partial(add_command, "Design")
-USUAL_DRAWS = 1000
 
 
 def varied(text: str) -> dict[str, list[float]]:
@@ -99,9 +99,9 @@ def study(
     report: write a page, index.html, to that folder
     """
     from tfarm.arm.reading import load_tables
-    from tfarm.studies import declared
-    from tfarm.studies import study as run
-    from tfarm.studies.extras import cluster
+    from tfarm.studies.running import cluster
+    from tfarm.studies.study import load_study
+    from tfarm.studies.study import study as run
 
     typed: dict[str, Any] = {
         "over": dict(over or []) or None, "ask": ask and ask.split(","), "draws": draws, "seed": seed, "rows": rows,
@@ -109,23 +109,20 @@ def study(
     }  # fmt: skip
     keys = [key for key, _ in over or []]
     require(len(set(keys)) == len(keys), "--over", keys, "a key is varied twice")
-    own = {key: value for key, value in typed.items() if value is not None}
-    if declared.is_study(load_tables(arm)[0]):
+    if "arm" in load_tables(arm)[0]:  # an arm's file names no arm
         refuse({f"--{key}": value for key, value in typed.items()}, f"the study is that of {arm}; leave this out")
-        arguments, defaults = declared.load_study(arm), None
+        arguments, defaults = load_study(arm), None
     else:
         subject = load_arm(arm, theory)
         controller, defaults = load_law(subject, arm, gains, law)
-        arguments = {"arm": subject, "law": controller, "chain": chain(arm), **own}
-    places: dict[str, Any] = {"out": out, "workers": workers, "stop_after": stop_after, "progress": announce}
-    if scheduler is None:
-        found = run(**arguments, **places)
-    else:
-        with cluster(scheduler) as client:
-            found = run(**arguments, **places, client=client)
+        given = {key: value for key, value in typed.items() if value is not None}
+        arguments = {"arm": subject, "law": controller, "chain": chain(arm), **given}
+    arguments |= {"out": out, "workers": workers, "stop_after": stop_after, "progress": announce}
+    with nullcontext() if scheduler is None else cluster(scheduler) as client:
+        found = run(**arguments, client=client)
     page = None
     if report:
         from tfarm.report.writing import write_study
 
         page = write_study(found)
-    emit(found, json, defaults, csv=csv, png=png, also=(page,))
+    emit(found, json, None if any(key.startswith("law.") for key in keys) else defaults, csv=csv, png=png, also=(page,))

@@ -3,6 +3,7 @@
 import math
 import textwrap
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,13 @@ from matplotlib.ticker import MaxNLocator
 
 from tfarm.arm.schema import file_key, file_keys
 from tfarm.digits import how_many
-from tfarm.errors import require
-from tfarm.studies.bands import ResponseBand
+from tfarm.errors import TfarmError, require
+from tfarm.exact.outputs import signal_words, unit_over
+from tfarm.loop.curve import decibels
+from tfarm.response import transfer
+from tfarm.response.frequency import resonant_band
 from tfarm.studies.findings import QUANTILES, Spread
-from tfarm.studies.quantities import COLUMNS, LOOPS, asked_columns
+from tfarm.studies.quantities import COLUMNS, asked_columns, loop_of, quantity_of, stability_of
 from tfarm.studies.running import Plan
 from tfarm.studies.space import LAW
 from tfarm.studies.study import Study
@@ -25,7 +29,8 @@ from .style import BLUE, GREY, INK, Axes, number_label, picture, plain_ticks, sa
 BINS = 24  # at most, of a histogram
 ACROSS, MOST_QUANTITIES = 4, 12  # axes of distributions side by side, and in all
 MOST_NUMBERS, MOST_ROWS, MOST_MARKS = 4, 3, 1000  # of a scatter picture: axes, and arms
-LINE, SINGLE = 24, 12  # letters of a label of such small axes; single curves in a band
+LINE = 24  # letters of a label of such small axes
+POINTS, CURVES, SINGLE = 1200, 100, 12  # of a band: frequencies, arms at most, and curves drawn of these
 FIRST = ("gain_margin_db", "phase_margin_deg", "delay_margin_ms", "peak_sensitivity")  # where there are too many
 LOOKS: dict[str, dict[str, Any]] = {
     "continuous": {"fill": True, "color": BLUE, "alpha": 0.4, "label": "continuous-time"},
@@ -43,7 +48,7 @@ def distributions(found: Study, quantity: str | None = None, most: int = MOST_QU
     both: dict[str, list[Spread]] = {}
     names = asked_columns([quantity]) if quantity else COLUMNS
     for each in (each for each in found.spreads if each.name in names):
-        both.setdefault(".".join(part for part in each.name.split(".") if part not in LOOPS), []).append(each)
+        both.setdefault(each.name.replace(f"{loop_of(each.name)}.", ""), []).append(each)
     require(both, "quantity", quantity, "the study has no number of it: name it in `ask`")
     return [both[name] for name in sorted(both, key=lambda name: name not in FIRST)][:most]
 
@@ -78,7 +83,7 @@ def study(found: Study, quantity: str | None = None, *, ax: Sequence[Axes]) -> N
             one.plot(
                 [of.low, of.median, of.high], [height] * 3, "|-", ms=7, markevery=[1], color=looks["color"], lw=1.2
             )
-        label = _folded(f"{COLUMNS[each[0].name].of.label} [{each[0].unit or '−'}]")
+        label = _folded(f"{quantity_of(each[0].name).label} [{each[0].unit or '−'}]")
         counted = " and ".join(str(of.arms) for of in each if of.arms < found.done)
         one.set(xlabel=label, ylabel="arms [−]", ylim=(0, 1.27 * np.max(counts)))
         one.set_title(f"{counted} of {found.done} arms" * bool(counted), fontsize=8.0)
@@ -93,11 +98,6 @@ def _ticks(ax: Axes) -> None:
 
 def _folded(label: str) -> str:
     return textwrap.fill(safe(label).replace(" [", "\u00a0["), LINE).replace("\u00a0", " ")
-
-
-def loop_of(name: str) -> str:
-    """Return the loop of a column, empty for one of the arm alone."""
-    return next((loop for loop in LOOPS if loop in name.split(".")), "")
 
 
 def key_label(key: str, plan: Plan) -> str:
@@ -128,19 +128,18 @@ def study_scatter(found: Study, quantity: str | None = None, *, ax: Sequence[Axe
     A mark is an arm, in the colour of the stability of its loop; at the upper edge it has no limit, at the lower edge
     no value.  Of more than a thousand arms as many are drawn, even over the rows.
     """
-    table, (rows, keys) = found.table(), _shown(found, quantity)
-    drawn = np.unique(np.linspace(0, found.done - 1, min(found.done, MOST_MARKS)).round().astype(int))
+    (rows, keys), step = _shown(found, quantity), 1 + (found.done - 1) // MOST_MARKS
+    table = {name: values[::step] for name, values in found.table().items()}
     for of, line in zip(rows, np.reshape(np.array(ax, dtype=object), (len(rows), len(keys))), strict=True):
-        y, (before, loop, _) = table[of.name][drawn], of.name.partition(loop_of(of.name) or "\n")
-        words = table.get(f"{before}{loop}.stability", np.full(found.done, "arm"))[drawn]
+        y = table[of.name]
+        words, edge = table.get(stability_of(of.name), np.full(len(y), "arm")), np.where(np.isnan(y), 0.02, 0.98)
         for key, one in zip(keys, line, strict=True):
             for word, (colour, mark) in MARKS.items():
                 for own, height, transform in (
-                    (np.isfinite(y), y, one.transData), (y == np.inf, 0 * drawn + 0.98, one.get_xaxis_transform()),
-                    (np.isnan(y), 0 * drawn + 0.02, one.get_xaxis_transform()),
+                    (np.isfinite(y), y, one.transData), (~np.isfinite(y), edge, one.get_xaxis_transform()),
                 ):  # fmt: skip
                     if (here := own & (words == word)).any():
-                        one.plot(table[key][drawn][here], height[here], mark, color=colour, ms=3.4, alpha=0.75,
+                        one.plot(table[key][here], height[here], mark, color=colour, ms=3.4, alpha=0.75,
                                  transform=transform, label=word or "not determined")  # fmt: skip
             one.set(xlabel=_folded(key_label(key, found.parts.plan)) * one.xaxis.get_tick_params()["labelbottom"])
             one.set(ylabel=_folded(f"{of.label} [{of.unit or '−'}]") * one.yaxis.get_tick_params()["labelleft"])
@@ -148,16 +147,24 @@ def study_scatter(found: Study, quantity: str | None = None, *, ax: Sequence[Axe
 
 
 @picture(
-    (ResponseBand, "tfarm.studies.bands.frequency_band returns"), size=(9.0, 4.6),
-    title=lambda band: f"{band.arm}: {band.label.partition(' [')[0]} of {how_many(len(band.curves), 'arm')}",
+    (Study, "tfarm.study returns"), size=(9.0, 4.6),
+    title=lambda found, output="root_moment": f"{found.arm}: {signal_words(output)[0]} of the arms of a study",
 )  # fmt: skip
-def study_band(band: ResponseBand, *, ax: Axes) -> None:
-    """Exact responses of the arms of a study, their 5, 50 and 95 % at each point; in the axes, or new ones."""
-    low, median, high = np.quantile(band.curves, [QUANTILES[end] for end in ("low", "median", "high")], axis=0)
-    ax.fill_between(band.at, low, high, color=BLUE, alpha=0.3, lw=0, label="5 to 95 % of the arms, at each point")
-    for n, curve in enumerate(band.curves[:: max(1, len(band.curves) // SINGLE)]):
-        ax.plot(band.at, curve, color=GREY, lw=0.5, alpha=0.6, zorder=1.5, label="single arms" * (not n))
-    ax.plot(band.at, median, color=BLUE, lw=1.4, label="median, at each point")
-    ax.set(xlabel=band.abscissa, ylabel=band.label, xlim=band.at[[0, -1]])
-    if " [dB" in band.label:
-        over_frequency(ax, band.label)
+def study_band(found: Study, output: str = "root_moment", *, ax: Axes) -> None:
+    """Exact responses of up to 100 arms of a study (from `tfarm.study`), their 5, 50 and 95 % at each frequency.
+
+    The arms are even over the rows.  Raises ParameterError for an unknown output, and where no arm has that response.
+    """
+    plan, table, curves = found.parts.plan, found.table(), []
+    omega, row = np.geomspace(*resonant_band(plan.arm), POINTS), transfer(plan.arm, output).rows[0]
+    for n in range(0, found.done, 1 + (found.done - 1) // CURVES):
+        with suppress(TfarmError):  # of an arm that is illegal
+            one = plan.subjects.at([float(table[key][n]) for key in plan.space.keys])
+            curves.append(decibels(transfer(one.arm, output)(1j * omega)))
+    require(curves, "output", output, "no arm of the study has that response")
+    low, median, high = np.quantile(curves, [QUANTILES[end] for end in ("low", "median", "high")], axis=0)
+    ax.fill_between(omega, low, high, color=BLUE, alpha=0.3, lw=0, label="5 to 95 % of the arms, at each frequency")
+    for n, curve in enumerate(curves[:: max(1, len(curves) // SINGLE)]):
+        ax.plot(omega, curve, color=GREY, lw=0.5, alpha=0.6, zorder=1.5, label="single arms" * (not n))
+    ax.plot(omega, median, color=BLUE, lw=1.4, label="median, at each frequency")
+    over_frequency(ax, f"{row.label} [dB re 1 {unit_over(row.unit, plan.arm.input_unit)}]")

@@ -17,7 +17,8 @@ from tfarm.arm import Arm
 from tfarm.case import Comparison
 from tfarm.digits import how_many
 from tfarm.dsp import Chain
-from tfarm.errors import ParameterError, TfarmError, must_be_known, require
+from tfarm.errors import ParameterError, TfarmError, must_be_known, one_line, require
+from tfarm.exact.outputs import signal_words
 from tfarm.files import temporary_folder
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
@@ -63,8 +64,6 @@ from tfarm.report.trust import TRUST_FOLDER, gather, save_proof, write_trust, wr
 from tfarm.report.tuner_section import tuner_section
 from tfarm.schema import Column, quantities, table, text
 from tfarm.stopping import undone_if_stopped
-from tfarm.studies.bands import frequency_band, slew_band
-from tfarm.studies.space import Space
 from tfarm.studies.study import Study
 
 ReportProgress = Callable[[int, int, str], object]
@@ -436,27 +435,22 @@ def write_study(found: Study) -> Path:
 
 def study_sections(found: Study) -> list[PageSection]:
     """Findings, distributions, drivers, responses, worst arm and failures of a study, as far as it has them."""
-    plan, worst, missing = found.parts.plan, found.worst, list[str]()
+    worst, missing, bands = found.worst, list[str](), list[Any]()
     facts = [
         Fact(each.loop, f"{each.stable:,}", f"of {found.done:,} arms stable", each.finding) for each in found.shares
     ]
     facts.append(Fact("arms computed", f"{found.done:,}", note=f"of {found.rows:,}"))
-    pictures = [
-        picture("study_distributions", studies.study.figure(found), found=found),
-        picture("study_scatter", studies.study_scatter.figure(found), found=found),
-    ] if found.spreads else []  # fmt: skip
-    calls = {each: partial(frequency_band, found, each) for each in ("root_moment", "tip_displacement")}
-    calls |= {"slew": partial(slew_band, found)} if any(name.startswith("step.") for name in plan.names) else {}
-    bands = []
-    for name, call in calls.items():
+    pictures = [picture(name, draw.figure(found), found=found) for name, draw in (
+        ("study_distributions", studies.study), ("study_scatter", studies.study_scatter)) if found.spreads]  # fmt: skip
+    for output in ("root_moment", "tip_displacement"):
         try:
-            band, stem = call(), f"study-{name.replace('_', '-')}"
-            bands.append(picture("study_band", studies.study_band.figure(band), stem=stem, band=band))
+            figure, stem = studies.study_band.figure(found, output), f"study-{output.replace('_', '-')}"
+            bands.append(picture("study_band", figure, stem=stem, name=signal_words(output)[0]))
         except TfarmError as error:
-            missing.append(f"{name}: {error}.")
+            missing.append(f"{output}: {error}.")
     sections: tuple[tuple[str, list[str], list[Any]], ...] = (
         ("Findings", [prose("study", found=found)], [sheet("study_ranges", table(found.spreads)),
-         sheet("study_numbers", _numbers(plan.space, {} if worst is None else worst.numbers), found=found)]),
+         sheet("study_numbers", _numbers(found), found=found)]),
         ("Distributions", [], pictures[:1]),
         ("Drivers", [], [*pictures[1:], sheet("study_sobol", table(found.sobol))]),
         ("Responses", missing, bands),
@@ -470,14 +464,12 @@ def study_sections(found: Study) -> list[PageSection]:
     ]  # fmt: skip
 
 
-def _numbers(space: Space, worst: Mapping[str, float]) -> list[Column]:
+def _numbers(found: Study) -> list[Column]:
     """A row a varied number: its distribution or grid, and its value of the worst arm where that was searched."""
-    kinds = {key: f"{each.kind} {', '.join(map(text, each.numbers))}" for key, each in space.distributions.items()}
-    kinds |= {
-        key: f"{len(values)} values, {text(values[0])} to {text(values[-1])}" for key, values in space.grids.items()
-    }
+    space, worst = found.parts.plan.space, [] if found.worst is None else list(found.worst.numbers.values())
+    kinds = {key: one_line(f"{each.kind} {', '.join(map(text, each.numbers))}", 60) for key, each in space.over.items()}
     columns = [
         Column("key", "number", of=space.keys),
         Column("distribution", "distribution", of=[kinds.get(key, "list or posterior") for key in space.keys]),
     ]
-    return columns + [Column("worst", "worst arm", of=list(worst.values()))] * bool(worst)
+    return columns + [Column("worst", "worst arm", of=worst)] * bool(worst)

@@ -19,7 +19,7 @@ import scipy  # whose statistics take half a second to load
 from tfarm.arrays import Real
 from tfarm.schema import Percent, Quantity
 
-from .quantities import COLUMNS, LOOPS
+from .quantities import LOOPS, loop_of, quantity_of
 
 CONFIDENCE = 0.95
 QUANTILES = {"least": 0.0, "low": 0.05, "median": 0.5, "high": 0.95, "largest": 1.0}
@@ -44,10 +44,9 @@ class StableShare:
     @property
     def finding(self) -> Annotated[str, Quantity("finding", help="stable arms, with their confidence in per cent")]:
         """Stable arms with certainty and confidence."""
-        count = self.stable + self.other + self.open
-        text = f"{self.certainty if self.stable else ''} stable on {self.stable:,} of {count:,} arms".strip()
-        others = (f"{self.other:,} not stable" * bool(self.other), f"{self.open:,} not determined" * bool(self.open))
-        text += f" ({', '.join(filter(None, others))})" * any(others)
+        text = f"{self.certainty} stable on {self.stable:,} of {self.stable + self.other + self.open:,} arms".strip()
+        others = [f"{self.other:,} not stable"] * bool(self.other) + [f"{self.open:,} not determined"] * bool(self.open)
+        text += f" ({', '.join(others)})" * bool(others)
         if self.at_least is None:
             return text
         percent = math.floor(1e4 * self.at_least + 1e-6) / 100  # never more than was shown
@@ -91,14 +90,13 @@ def shares_of(table: Mapping[str, Any], names: Sequence[str], is_independent: bo
     found = []
     for loop in [each for each in LOOPS if f"{each}.stability" in names]:
         words = table[f"{loop}.stability"]
-        stable, undetermined, count = int((words == STABLE).sum()), int((words == "").sum()), len(words)
+        stable, open_, count = int((words == STABLE).sum()), int((words == "").sum()), len(words)
         texts = table.get(f"{loop}.certainty", np.full(count, ""))[words == STABLE].tolist()
         known = [text.partition(" ")[0].rstrip(",") for text in texts]
-        at_least = Percent(least_share(stable, count)) if is_independent else None
         found.append(StableShare(
-            loop=loop.replace("continuous", "continuous-time"), stable=stable, open=undetermined,
-            other=count - stable - undetermined, at_least=at_least,
+            loop=loop.replace("continuous", "continuous-time"), stable=stable, open=open_, other=count - stable - open_,
             certainty=max(known, key=(*CERTAINTIES, "").index, default=""),
+            at_least=Percent(least_share(stable, count)) if is_independent else None,
         ))  # fmt: skip
     return tuple(found)
 
@@ -106,17 +104,14 @@ def shares_of(table: Mapping[str, Any], names: Sequence[str], is_independent: bo
 def spreads_of(table: Mapping[str, Any], names: Sequence[str], keys: Sequence[str]) -> tuple[Spread, ...]:
     """Return the distribution of each quantity that has finite values."""
     found = []
-    for name in names:
-        of = COLUMNS[name].of
-        if COLUMNS[name].is_text or not of.label or not np.isfinite(table[name]).any():
-            continue
-        values = table[name]
-        is_known = np.isfinite(values)
-        driver, correlation = _driver({key: table[key][is_known] for key in keys}, values[is_known])
-        prefix = next((f"{loop}, " for loop in LOOPS if loop in name.split(".")), "")
-        ends = dict(zip(QUANTILES, np.quantile(values[is_known], list(QUANTILES.values())).tolist(), strict=True))
-        found.append(Spread(name=name, label=f"{prefix}{of.label}", unit=of.unit, arms=int(is_known.sum()),
-                            driver=driver, correlation=correlation, **ends))  # fmt: skip
+    for name, of in ((name, quantity_of(name)) for name in names):
+        if of.is_number and of.label and (is_known := np.isfinite(table[name])).any():
+            values = table[name][is_known]
+            driver, correlation = _driver({key: table[key][is_known] for key in keys}, values)
+            ends = dict(zip(QUANTILES, np.quantile(values, list(QUANTILES.values())).tolist(), strict=True))
+            label = ", ".join(filter(None, (loop_of(name), of.label)))
+            found.append(Spread(name=name, label=label, unit=of.unit, arms=values.size, driver=driver,
+                                correlation=correlation, **ends))  # fmt: skip
     return tuple(found)
 
 
@@ -132,7 +127,6 @@ def _driver(inputs: Mapping[str, Real], values: Real) -> tuple[str | None, float
 def failures_of(table: Mapping[str, Any]) -> tuple[Failure, ...]:
     """Return the reasons of missing results with their counts."""
     rows: dict[str, list[int]] = {}
-    for row, text in zip(table["row"].tolist(), table["failed"].tolist(), strict=True):
-        if text:
-            rows.setdefault(re.sub(r"[-+]?\d[\d.eE+-]*", "N", text), []).append(int(row))
-    return tuple(Failure(reason, len(own), own[0]) for reason, own in rows.items())
+    for row, text in enumerate(table["failed"]):
+        rows.setdefault(re.sub(r"[-+]?\d[\d.eE+-]*", "N", text), []).append(int(table["row"][row]))
+    return tuple(Failure(reason, len(own), own[0]) for reason, own in rows.items() if reason)

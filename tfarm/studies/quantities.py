@@ -19,7 +19,7 @@ from tfarm.errors import ConvergenceError, TfarmError, must_be_known, require
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Interval, windows_of
-from tfarm.schema import Percent, Quantity
+from tfarm.schema import Quantity
 from tfarm.schema.quantities import quantities
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.shapes import PARAMETERS
@@ -38,27 +38,10 @@ SENSITIVITY, INTERVAL, STABILITY, TRIAL_COST = "sensitivity", "interval", "inter
 UNSTABLE, REAL, IMAGINARY = "poles.unstable", "poles.re_1_s", "poles.im_rad_s"
 
 
-class Column(NamedTuple):
-    """A column of a study: its quantity, and whether its values are texts."""
-
-    of: Quantity
-    is_text: bool = False
-
-
-class Columns(dict[str, Column]):
-    """Columns by name; of a numbered one, such as modes.natural_frequency_rad_s.1, there are those of any number."""
-
-    def __missing__(self, name: str) -> Column:
-        if (first := first_of(name)) == name:
-            raise KeyError(name)
-        of = self[first].of
-        return Column(replace(of, label=f"{of.label.removesuffix(' 1')} {name.rpartition('.')[2]}"))
-
-
 class Asked(NamedTuple):
     """Columns of an arm by dotted name, and the function of their values and of the names that are needed."""
 
-    columns: Mapping[str, Column]
+    columns: Mapping[str, Quantity]
     values: Callable[[Subject, Set[str]], Mapping[str, Any]]
 
 
@@ -67,13 +50,29 @@ def first_of(name: str) -> str:
     return re.sub(r"\.[1-9][0-9]{0,6}$", ".1", name)
 
 
+def quantity_of(name: str) -> Quantity:
+    """Return the quantity of a column; of a numbered one there are columns of any number."""
+    label = f"{COLUMNS[first_of(name)].label.removesuffix(' 1')} {name.rpartition('.')[2]}"
+    return COLUMNS[name] if name in COLUMNS else replace(COLUMNS[first_of(name)], label=label)
+
+
+def loop_of(name: str) -> str:
+    """Return the loop of a column, empty for one of the arm alone."""
+    return next((loop for loop in LOOPS if loop in name.split(".")), "")
+
+
+def stability_of(name: str) -> str:
+    """Return the column of the stability of the loop of a column, empty for one of the arm alone."""
+    return f"{name.partition(loop)[0]}{loop}.stability" if (loop := loop_of(name)) else ""
+
+
 def _most(names: Set[str]) -> int:
     """Return the largest number of numbered columns."""
     return max(int(name.rpartition(".")[2]) for name in names)
 
 
-def entries_of(kind: Any, value: Any, under: str, parent: Quantity = NO_PARENT) -> Iterator[tuple[str, Column, Any]]:
-    """Yield dotted name, column and value of each entry of a record of that class; no value where that is None.
+def entries_of(kind: Any, value: Any, under: str, parent: Quantity = NO_PARENT) -> Iterator[tuple[str, Quantity, Any]]:
+    """Yield dotted name, quantity and value of each entry of a record of that class; no value where that is None.
 
     The first entry without a label (the value of a graded margin) has the name and the quantity of its parent.
     """
@@ -86,7 +85,8 @@ def entries_of(kind: Any, value: Any, under: str, parent: Quantity = NO_PARENT) 
         if inner is not None:
             yield from entries_of(inner, own, place, column)
         else:
-            yield place, Column(column, bool({str, tuple} & {*kinds})), _plain(own)
+            is_text = bool({str, tuple} & {*kinds})
+            yield place, replace(column, is_number=not is_text), "; ".join(own) if isinstance(own, tuple) else own
 
 
 @cache
@@ -96,13 +96,6 @@ def _kinds(kind: Any) -> dict[str, tuple[Any, ...]]:
         name: tuple(each for part in (hint, *get_args(hint)) if isinstance(each := get_origin(part) or part, type))
         for name, hint in get_type_hints(kind).items()
     }
-
-
-def _plain(value: Any) -> Any:
-    """Return a value as a table has it: a float, a text or None."""
-    if isinstance(value, tuple):
-        return "; ".join(map(str, value))
-    return float(value) if isinstance(value, Percent | int) else value
 
 
 def _card_of(loop: str) -> Asked:
@@ -134,10 +127,9 @@ def _modes_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
 
 
 def _sensitivities_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
-    count, found = _most(names), dict[str, float | None]()
-    for parameter, values in modes(one.arm, count).sensitivity.items():
-        found |= _numbered(f"{SENSITIVITY}.{parameter}", values[-count:] + 0.0)
-    return found
+    count = _most(names)
+    return {name: value for parameter, values in modes(one.arm, count).sensitivity.items()
+            for name, value in _numbered(f"{SENSITIVITY}.{parameter}", values[-count:] + 0.0).items()}  # fmt: skip
 
 
 def _intervals_of(one: Subject, names: Set[str]) -> dict[str, Any]:
@@ -147,8 +139,7 @@ def _intervals_of(one: Subject, names: Set[str]) -> dict[str, Any]:
         verdict = stability(one.arm, one.law)
         gains = [gain for gain in PLANE if gain in verdict.loop.numbers and any(f".{gain}." in name for name in names)]
         for gain, of in windows_of(verdict, gains).items():
-            ends = (None,) * 4 if of.interval is None else of.interval
-            found |= {f"{INTERVAL}.{gain}.{name}": end for name, end in zip(Interval._fields, ends, strict=True)}
+            found |= {f"{INTERVAL}.{gain}.{name}": getattr(of.interval, name, None) for name in Interval._fields}
         found[STABILITY] = verdict.verdict
     return found
 
@@ -170,9 +161,13 @@ def _numbered(name: str, values: Any) -> dict[str, float | None]:
     return {f"{name}.{n}": each if np.isfinite(each) else None for n, each in enumerate(values.tolist(), start=1)}
 
 
-def _columns(name: str, label: str, unit: str, meaning: str) -> dict[str, Column]:
+def _columns(name: str, label: str, unit: str, meaning: str) -> dict[str, Quantity]:
     """Return the numbered columns of a quantity of modes or poles."""
-    return {f"{name}.{n}": Column(Quantity(f"{label} {n}", unit, help=meaning)) for n in range(1, LISTED + 1)}
+    return {f"{name}.{n}": _number(f"{label} {n}", meaning, unit) for n in range(1, LISTED + 1)}
+
+
+def _number(label: str, meaning: str, unit: str = "") -> Quantity:
+    return Quantity(label, unit, help=meaning, is_number=True)
 
 
 def _tuner_of(one: Subject, _: Set[str]) -> dict[str, Any]:
@@ -195,29 +190,28 @@ ASKED = (
         f"{SENSITIVITY}.{parameter}", f"sensitivity to {parameter}, mode", "%/%", "d ln(natural frequency)/d ln(number)"
     ).items()}, _sensitivities_of),
     Asked({
-        STABILITY: Column(Quantity("stability", help="of the continuous-time loop"), is_text=True),
-        **{f"{INTERVAL}.{gain}.{name}": Column(replace(of, label=f"stability interval of {gain} {of.label}"),
-                                               is_text=name.endswith("_is"))
+        STABILITY: Quantity("stability", help="of the continuous-time loop"),
+        **{f"{INTERVAL}.{gain}.{name}": replace(of, label=f"stability interval of {gain} {of.label}")
            for gain in PLANE for name, of in quantities(Interval).items()},
     }, _intervals_of),
     Asked(_columns(RATIO, "damping ratio, mode", "", "of the arm without controller"), _damped_of),
     Asked({
-        UNSTABLE: Column(Quantity("unstable poles", help="conjugates counted")),
+        UNSTABLE: _number("unstable poles", "conjugates counted"),
         **_columns(REAL, "real part, pole", "1/s", "of the continuous-time loop, ascending in frequency"),
         **_columns(IMAGINARY, "imaginary part, pole", "rad/s", "of the continuous-time loop, ascending"),
     }, _poles_of),
     Asked({name: column for loop in LOOPS
            for name, column, _ in entries_of(LoopResponse, None, f"step.{loop}")}, _step_of),
     Asked({
-        "tuner.cost": Column(Quantity("cost of the tuned slew", "", 4, "none where training diverged")),
-        "tuner.cost_best_constant": Column(Quantity("cost with the best constant gain", "", 4)),
-        "tuner.trials": Column(Quantity("trials", help="slews of the training")),
-        "tuner.is_zero": Column(Quantity("zero gain", help="1 where the moment gain went to zero, else 0")),
-        f"{TRIAL_COST}.1": Column(Quantity("cost of trial 1", "", 4, "none after a divergence")),
-        "tuner.stopped": Column(Quantity("stopped", help="trial and sample of a divergence"), is_text=True),
+        "tuner.cost": _number("cost of the tuned slew", "none where training diverged"),
+        "tuner.cost_best_constant": _number("cost with the best constant gain", "of the same slew"),
+        "tuner.trials": _number("trials", "slews of the training"),
+        "tuner.is_zero": _number("zero gain", "1 where the moment gain went to zero, else 0"),
+        f"{TRIAL_COST}.1": _number("cost of trial 1", "none after a divergence"),
+        "tuner.stopped": Quantity("stopped", help="trial and sample of a divergence"),
     }, _tuner_of),
 )  # fmt: skip
-COLUMNS = Columns({name: column for asked in ASKED for name, column in asked.columns.items()})
+COLUMNS = {name: column for asked in ASKED for name, column in asked.columns.items()}
 
 
 def asked_columns(words: Sequence[str]) -> tuple[str, ...]:
@@ -243,7 +237,7 @@ def asked_columns(words: Sequence[str]) -> tuple[str, ...]:
 
 def column_of(word: str, key: str) -> str:
     """Return the one column of numbers of a word.  Raises ParameterError for none or several."""
-    names = [name for name in asked_columns([word]) if not COLUMNS[name].is_text and COLUMNS[name].of.label]
+    names = [name for name in asked_columns([word]) if quantity_of(name).is_number and quantity_of(name).label]
     remedy = f"{len(names)} quantities of numbers, not one: {', '.join(names[:6])}"
     require(len(names) == 1 or word in names, key, word, remedy)
     return word if word in names else names[0]

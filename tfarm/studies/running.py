@@ -12,36 +12,37 @@ import hashlib
 import io
 import json
 import math
-import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from importlib import import_module
+from importlib.util import find_spec
 from itertools import islice
+from logging import getLogger
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tfarm.arm import AnyLaw, Arm
+from tfarm.arm.schema import StrictTable, validated_file
 from tfarm.arrays import Real
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError, ParameterError, TfarmError, one_line, require
-from tfarm.files import locked, make_folder, read_file, write_file
-from tfarm.processes import shared
+from tfarm.files import locked, make_folder, write_file
 from tfarm.tuner import Plan as TunerPlan
 
-from .declared import STUDY_FILE, files_of
-from .extras import has_parquet, on_cluster, parquet_bytes, parquet_columns, versions
-from .quantities import COLUMNS, FAILED, values_of
-from .space import Listing, Space, Subjects
+from .quantities import FAILED, quantity_of, values_of
+from .space import Space, Subjects, extra, parquet
 
 Progress = Callable[[int, int, str], object]
 Chunk = dict[str, list[Any]]  # columns of a range of rows
-OUT = "--out"  # the key of errors of the folder
 Task = tuple[int, Callable[[], Chunk]]  # number of a part, and the call that returns its table
+Engine = Callable[[Iterator[Task]], Iterator[tuple[int, Chunk]]]  # yields each task with its table as it comes
+OUT, SCHEDULER = "--out", "--scheduler"  # keys of errors
 ROW = "row"  # column of the number of the row, from 0
-FILE, PREFIX, PARQUET = "study.json", "part-", ".parquet"
+FILE, PREFIX, PARQUET, STUDY_FILE = "study.json", "part-", ".parquet", "study.toml"
 MOST_BYTES = 1 << 20  # of that file
 PILOT = 4  # rows whose cost is measured
 LEAST_SECONDS, MOST_SECONDS = 5.0, 30.0  # of a chunk
@@ -49,6 +50,8 @@ CHUNKS_A_WORKER = 10  # where that leaves them within these
 MOST_ROWS = 50_000  # of a chunk
 CHECKED = 1000  # rows whose arms are built before the first run
 LONGEST_REASON = 200  # characters
+PATIENCE = 20  # seconds for a scheduler to answer, and for its first worker
+PACKAGES = ("tfarm", "numpy", "scipy", "numba")  # versions that all workers have in common
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,7 @@ class Plan:
     @property
     def texts(self) -> set[str]:
         """Names of the columns of texts."""
-        return {FAILED, *(name for name in self.names if COLUMNS[name].is_text)}
+        return {FAILED, *(name for name in self.names if not quantity_of(name).is_number)}
 
     @cached_property
     def subjects(self) -> Subjects:
@@ -98,31 +101,7 @@ def table_of(plan: Plan, first: int, rows: Real) -> Chunk:
     return table
 
 
-def results(plan: Plan, first: int, last: int) -> Chunk:
-    """Return the table of rows first to last - 1.  Raises ConvergenceError for the first row without a result."""
-    table = chunk(plan, first, last)
-    for reason in filter(None, table[FAILED]):
-        raise ConvergenceError(reason, None, None)
-    return table
-
-
-def first_rows(plan: Plan, count: int, listing: Listing | None) -> Real:
-    """Return the values of the first rows (rows, keys), at most that number."""
-    count = min(count, plan.space.count)
-    return plan.space.rows(0, count, None if listing is None else np.array(list(islice(listing.rows(), count))))
-
-
-def check_rows(plan: Plan, listing: Listing | None) -> None:
-    """Raise ParameterError where a number of the first rows is illegal, with their number and the first reason."""
-    rows, errors = first_rows(plan, CHECKED, listing), dict[int, ParameterError]()
-    for number, row in enumerate(rows.tolist()):
-        try:
-            plan.subjects.at(row)
-        except ParameterError as error:
-            errors[number] = error
-    for number, first in errors.items():
-        remedy = f"{len(errors)} of {len(rows)} arms are illegal, the first in row {number}: {first.remedy}"
-        raise ParameterError(key=first.key, value=first.value, remedy=remedy)
+# ------------------------------------------------------------------------------------------------------------ parts
 
 
 def seconds_an_arm(plan: Plan, rows: Real) -> float:
@@ -151,7 +130,6 @@ class Parts:
     digest: str
     rows: int  # of a part
     suffix: str
-    cost: float  # seconds an arm, as measured before the first run
 
     @property
     def count(self) -> int:
@@ -162,23 +140,23 @@ class Parts:
         """Return the file of a part."""
         return self.folder / f"{PREFIX}{self.digest[:8]}-{number:06}{self.suffix}"
 
-    def ends(self, number: int) -> tuple[int, int]:
-        """Return the first row of a part and the one after its last."""
-        return number * self.rows, min((number + 1) * self.rows, self.plan.space.count)
-
-    @property
     def written(self) -> list[int]:
-        """Numbers of the parts that are there.  Raises ParameterError for a part of another study."""
+        """Return the numbers of the parts that are there.  Raises ParameterError for a part of another study."""
         names = {each.name for each in self.folder.glob(f"{PREFIX}*")}
         found = [number for number in range(self.count) if self.path(number).name in names]
         strange = sorted(names - {self.path(number).name for number in found})
-        _require(not strange, self.folder, f"{strange[:1]} is a part of another study: choose another folder")
+        remedy = f"{strange[:1]} is a part of another study: choose another folder"
+        require(not strange, OUT, str(self.folder), remedy)
         return found
 
     def write(self, number: int, table: Mapping[str, Sequence[Any]]) -> None:
         """Write the table of a part under a temporary name, then rename it."""
         if self.suffix == PARQUET:
-            content = parquet_bytes(table, self.plan.texts)
+            module, arrow, binary = parquet("out", "Parquet"), import_module("pyarrow"), io.BytesIO()
+            kinds = {name: arrow.string() if name in self.plan.texts else arrow.float64() for name in table}
+            arrays = {name: arrow.array(values, kinds[name]) for name, values in table.items()}
+            module.write_table(arrow.table(arrays), binary)
+            content = binary.getvalue()
         else:
             stream = io.StringIO()
             csv.writer(stream, lineterminator="\n").writerows([tuple(table), *zip(*table.values(), strict=True)])
@@ -187,122 +165,174 @@ class Parts:
 
     def column(self, *names: str) -> dict[str, Any]:
         """Return columns of all written rows in order: arrays of numbers, NaN where there is none, and of texts."""
-        found: dict[str, list[Any]] = {name: [np.empty(0)] for name in names}
-        for number in self.written:
-            table = self._read(self.path(number), names)
-            for name in names:
-                is_text = name in self.plan.texts
-                values = [each or "" if is_text else math.nan if each in ("", None) else float(each)
-                          for each in table[name]]  # fmt: skip
-                found[name].append(np.array(values, dtype=object if is_text else float))
-        return {name: np.concatenate(arrays[len(arrays) > 1 :]) for name, arrays in found.items()}
+        tables = [self._read(self.path(number), names) for number in self.written()]
+        return {name: np.concatenate([np.empty(0), *(table[name] for table in tables)]) for name in names}
 
-    def _read(self, path: Path, names: Sequence[str]) -> Mapping[str, Sequence[Any]]:
+    def _read(self, path: Path, names: Sequence[str]) -> dict[str, Any]:
         if self.suffix == PARQUET:
-            return parquet_columns(path, names)
-        with path.open(newline="", encoding="utf-8") as file:
-            head, *rows = csv.reader(file)
-        return {name: [row[head.index(name)] for row in rows] for name in names}
+            table = parquet("out", str(path)).read_table(path, columns=list(names)).to_pydict()
+        else:
+            with path.open(newline="", encoding="utf-8") as file:
+                rows = list(csv.DictReader(file))
+            table = {name: [row[name] for row in rows] for name in names}
+        texts = {*names} & self.plan.texts
+        found = {name: np.array([each or "" for each in table[name]], object) for name in texts}
+        return found | {name: np.array([math.nan if each in ("", None) else float(each) for each in table[name]], float)
+                        for name in names if name not in texts}  # fmt: skip
 
 
-def opened(
-    folder: Path, plan: Plan, listing: Listing | None, declared: Mapping[str, Any], workers: int, size: int | None
-) -> Parts:
+class StudyRecord(StrictTable):
+    """The file of a folder: inputs of the study with their hashes and versions, and the rows of a part."""
+
+    inputs: dict[str, Any]
+    rows_a_part: int
+
+
+def opened(folder: Path, plan: Plan, files: Mapping[str, bytes], workers: int, size: int | None, rows: Real) -> Parts:
     """Return the parts of a study in a folder, a new one or that of an interrupted run, with the files that declare it.
 
-    Raises ParameterError for a folder that has another study.
+    `rows` are the values of the first rows.  Raises ParameterError for a folder that has another study.
     """
-    space, file, files = plan.space, folder / FILE, files_of(plan.arm, plan.law, plan.chain, declared)
-    hashes = {name: _sha256(content) for name, content in files.items() if name != STUDY_FILE}
-    over = [[key, *map(list, entry.items())] for key, entry in declared["over"].items()]
-    inputs = {"over": over, "columns": plan.names, "draws": space.draws, "seed": space.seed,
-              "list": listing and listing.sha256, "versions": versions(), **hashes}  # fmt: skip
-    text = json.dumps(inputs)
-    digest, inputs = _sha256(text.encode()), json.loads(text)
+    space, file = plan.space, folder / FILE
+    hashes = {name: hashlib.sha256(content).hexdigest() for name, content in files.items() if name != STUDY_FILE}
+    inputs = json.loads(json.dumps({
+        "over": list(space.over.items()), "columns": plan.names, "draws": space.draws, "seed": space.seed,
+        "list": space.listing and _sha256(space.listing.path), "pyarrow": has_parquet(), "versions": versions(),
+        **hashes,
+    }))  # fmt: skip
     if file.exists():
-        try:
-            known = json.loads(read_file(file, MOST_BYTES, key=OUT, what=f"a {FILE}"))
-            other = sorted(key for key in {*inputs, *known["inputs"]} if known["inputs"].get(key) != inputs.get(key))
-            parts = Parts(folder, plan, digest, int(known["rows_a_part"]), str(known["suffix"]), float(known["cost_s"]))
-        except (ValueError, KeyError, TypeError, AttributeError):
-            remedy = "is no file of a study: choose another folder"
-            raise ParameterError(key=OUT, value=str(file), remedy=remedy) from None
-        _require(not other, folder, f"has a study with other {', '.join(other)}: choose another folder")
-        _require(parts.suffix != PARQUET or has_parquet(), folder, "has Parquet parts: pip install 'tfarm[study]'")
-        return parts
-    cost = seconds_an_arm(plan, first_rows(plan, PILOT, listing))
-    rows = size or rows_a_chunk(cost, space.count, workers)
-    parts = Parts(folder, plan, digest, rows, PARQUET if has_parquet() else ".csv", cost)
-    _require(not parts.written, folder, f"has parts, and no {FILE}: choose another folder")
-    columns = [{"name": name, "label": of.label, "unit": of.unit, "meaning": of.help}
-               for name in plan.names for of in [COLUMNS[name].of]]  # fmt: skip
-    known = {"inputs": inputs, "rows": space.count, "rows_a_part": rows, "suffix": parts.suffix, "cost_s": cost,
-             "columns": columns}  # fmt: skip
-    for name, content in {**files, FILE: (json.dumps(known, indent=1) + "\n").encode()}.items():
+        what = f"a {FILE} of tfarm study; choose another folder"
+        known = validated_file(StudyRecord, file, MOST_BYTES, key=OUT, what=what)
+        other = sorted(key for key in {*inputs, *known.inputs} if known.inputs.get(key) != inputs.get(key))
+        remedy = f"has a study with other {', '.join(other)}: choose another folder"
+        require(not other, OUT, str(folder), remedy)
+        count = known.rows_a_part
+    else:
+        count = size or rows_a_chunk(seconds_an_arm(plan, rows), space.count, workers)
+    digest = hashlib.sha256(json.dumps([inputs, count]).encode()).hexdigest()
+    parts = Parts(folder, plan, digest, count, PARQUET if has_parquet() else ".csv")
+    parts.written()  # is refused before a file is written
+    text = StudyRecord(inputs=inputs, rows_a_part=count).model_dump_json(indent=1)
+    for name, content in {**files, FILE: f"{text}\n".encode()}.items() if not file.exists() else ():
         write_file(folder / name, content, key=OUT)
     return parts
 
 
-def _require(is_met: object, folder: Path, remedy: str) -> None:
-    require(is_met, OUT, str(folder), remedy)
+def has_parquet() -> bool:
+    """Return whether Parquet can be read and written."""
+    return find_spec("pyarrow") is not None
 
 
-def _sha256(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of the packages on which numbers depend."""
+    return {name: import_module(name).__version__ for name in PACKAGES}
+
+
+# ------------------------------------------------------------------------------------------------------------ runs
 
 
 def run(
     folder: Path,
     plan: Plan,
-    listing: Listing | None,
-    declared: Mapping[str, Any],
+    files: Mapping[str, bytes],
+    engine: Engine,
     workers: int,
-    client: Any,
     stop_after: float | None,
     size: int | None,
     progress: Progress,
 ) -> Parts:
     """Write the missing parts of a study to its folder; after `stop_after` seconds none is begun any more."""
     deadline = time.monotonic() + (math.inf if stop_after is None else stop_after)
-    check_rows(plan, listing)
+    count, listing = min(CHECKED, plan.space.count), plan.space.listing
+    rows = plan.space.rows(0, count, None if listing is None else next(listing.blocks([(0, count)])))
+    check_rows(plan, rows)
     make_folder(folder, key=OUT)
     with locked(folder, OUT):
-        parts = opened(folder, plan, listing, declared, workers, size)
-        done, began = set(parts.written), time.monotonic()
+        parts = opened(folder, plan, files, workers, size, rows)
+        done, began = set(parts.written()), time.monotonic()
         missing = [number for number in range(parts.count) if number not in done]
-        tasks = _tasks(parts, listing, missing, deadline)
-
-        def advance(ready: int, left: float) -> None:
+        progress(len(done), parts.count, "parts of the study")
+        for ready, (number, table) in enumerate(engine(_tasks(parts, missing, deadline)), start=1):
+            parts.write(number, table)
+            left = (time.monotonic() - began) / ready * (len(missing) - ready)
             progress(len(done) + ready, parts.count, f"parts of the study, {left:.0f} s left")
-
-        advance(0, parts.cost * parts.rows * len(missing) / workers)
-        try:
-            for ready, (number, table) in enumerate(computed(tasks, workers, client), start=1):
-                parts.write(number, table)
-                advance(ready, (time.monotonic() - began) / ready * (len(missing) - ready))
-        except ConvergenceError as error:
-            words = f"{error}; the same command again completes the study"
-            raise ConvergenceError(words, None, None) from None
     return parts
 
 
-def _tasks(parts: Parts, listing: Listing | None, missing: Sequence[int], deadline: float) -> Iterator[Task]:
+def check_rows(plan: Plan, rows: Real) -> None:
+    """Raise ParameterError where some of the first rows are illegal, with their number and the first reason."""
+    errors = dict[int, ParameterError]()
+    for number, row in enumerate(rows.tolist()):
+        try:
+            plan.subjects.at(row)
+        except ParameterError as error:
+            errors[number] = error
+    for number, first in errors.items():
+        remedy = f"{len(errors)} of {len(rows)} arms are illegal, the first in row {number}: {first.remedy}"
+        raise ParameterError(key=first.key, value=first.value, remedy=remedy)
+
+
+def _tasks(parts: Parts, missing: Sequence[int], deadline: float) -> Iterator[Task]:
     """Yield the number of each missing part with the call that returns its table."""
-    ends = [parts.ends(number) for number in missing]
-    blocks = [None] * len(ends) if listing is None else listing.blocks(ends)
+    space, n = parts.plan.space, parts.rows
+    ends = [(number * n, min((number + 1) * n, space.count)) for number in missing]
+    blocks = [None] * len(ends) if space.listing is None else space.listing.blocks(ends)
     for number, (first, last), listed in zip(missing, ends, blocks, strict=True):
         if time.monotonic() >= deadline:
             return
         yield number, partial(chunk, parts.plan, first, last, listed)
 
 
-def computed(
-    tasks: Iterator[tuple[int, Callable[[], Chunk]]], workers: int, client: Any
-) -> Iterator[tuple[int, Chunk]]:
-    """Yield each task with its table as it comes, from processes of this machine or from those of a Dask client."""
-    return shared(tasks, workers) if client is None else on_cluster(tasks, client)
+# ------------------------------------------------------------------------------------------------------------ cluster
 
 
-def usual_workers() -> int:
-    """Return the number of processors of this machine that may be used."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+def cluster(scheduler: str) -> Any:
+    """Return a client of a Dask scheduler, such as tcp://host:8786.  Raises ParameterError where none answers.
+
+    Certificates of a tls:// address are those of Dask's own configuration (distributed.comm.tls).
+    """
+    distributed = extra("distributed", "cluster", SCHEDULER, scheduler)
+    for name in ("distributed", "distributed.client"):  # whose errors come as one line of ours
+        getLogger(name).setLevel("CRITICAL")
+    try:
+        client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
+        client.wait_for_workers(1, timeout=PATIENCE)
+    except (OSError, ValueError, TypeError) as error:
+        remedy = f"no scheduler with a worker answers within {PATIENCE} s ({str(error)[:120]}); give tcp://HOST:PORT"
+        raise ParameterError(key=SCHEDULER, value=scheduler, remedy=remedy) from None
+    return client
+
+
+def on_cluster(tasks: Iterator[Task], client: Any) -> Iterator[tuple[int, Chunk]]:
+    """Yield each task with its table as it comes from the workers of a Dask client, at most one a worker unread.
+
+    A task of a lost worker goes to another one.  Raises ConvergenceError where the scheduler is gone, or the workers of
+    one task again and again, and for a worker with other versions than here.
+    """
+    queue, running = extra("distributed", "cluster", "client", client).as_completed(loop=client.loop), dict[str, int]()
+    try:
+        while True:
+            for number, call in islice(tasks, max(not running, len(client.nthreads()) - len(running))):
+                future = client.submit(_with_versions, call, pure=False)
+                running[future.key] = number
+                queue.add(future)
+            if not running:
+                return
+            future = next(queue)
+            theirs, table = future.result()
+            require(
+                theirs == versions(), "versions of a worker", theirs, f"install those of this machine: {versions()}"
+            )
+            yield running.pop(future.key), table
+    except Exception as error:  # a chunk itself raises none
+        words = f"the cluster failed ({type(error).__name__}: {one_line(str(error), 200)}); run the study again"
+        raise ConvergenceError(words, None, None) from None
+
+
+def _with_versions(call: Callable[[], Chunk]) -> tuple[dict[str, str], Chunk]:
+    return versions(), call()

@@ -8,12 +8,13 @@ So a row is the same for any number of workers and in any order.
 from __future__ import annotations
 
 import csv
-import hashlib
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
@@ -33,12 +34,11 @@ from tfarm.records import record
 from tfarm.tuner.tuning import NUMBERS, NUMBERS_OF_LEARNING
 from tfarm.tuner.tuning import Plan as TunerPlan
 
-from .extras import parquet_rows
-
 LAW, TUNER = "law.", "tuner."  # prefixes of the numbers of the controller and of the tuner
 MOST_ROWS = 10_000_000  # of one study
 MOST_SEED = 2**63
 ENDS = 2.0**-54, 1 - 2.0**-53  # of uniform numbers: at 0 and 1 the inverse of a normal distribution is infinite
+LEAST_PYARROW = (14, 0, 1)  # older ones unpickle what they read (CVE-2023-47248)
 PLAIN_NUMBER = re.compile(r" *[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)? *", re.ASCII)
 FORMS: dict[str, tuple[str, Callable[..., Any]]] = {  # kind of a distribution: its numbers in words, and SciPy's
     "uniform": ("LOW, HIGH", lambda low, high: low < high and scipy.stats.uniform(low, high - low)),
@@ -79,62 +79,80 @@ class Subject(NamedTuple):
     plan: TunerPlan | None = None
 
 
+class Listing(NamedTuple):
+    """A CSV or Parquet file with a column a key, whose rows are read as they are needed."""
+
+    path: Path
+    columns: tuple[str, ...]
+    size: int
+
+    def blocks(self, ends: Sequence[tuple[int, int]]) -> Iterator[Real]:
+        """Yield the rows of each range (first, last), which ascend."""
+        lines, at = islice(lines_of(self.path), 1, None), 0
+        for first, last in ends:
+            yield np.array(list(islice(lines, first - at, last - at)))
+            at = last
+
+
 @dataclass(frozen=True, kw_only=True)
 @record
 class Space:
     """Numbers that a study varies; `draws` of the distributions, each with every point of the grid.
 
-    `listed` are columns and number of the rows of a list, in whose place no draws are counted.
+    The rows of a list are counted in the place of draws.
     """
 
-    distributions: dict[str, Distribution]
-    grids: dict[str, tuple[float, ...]]
+    over: dict[str, Distribution]
     posterior: Posterior | None = None
-    listed: tuple[tuple[str, ...], int] = ((), 0)
+    listing: Listing | None = None
     draws: int = 1
     seed: int = 0
 
     @property
+    def distributions(self) -> dict[str, Distribution]:
+        """Distributions by key."""
+        return {key: each for key, each in self.over.items() if each.kind in FORMS}
+
+    @property
+    def grids(self) -> dict[str, Sequence[float]]:
+        """Points of the grid by key."""
+        return {key: each.frozen for key, each in self.over.items() if each.kind in GRIDS}
+
+    @property
     def drawn(self) -> tuple[str, ...]:
         """Keys of distributions, then those of the posterior."""
-        own = tuple(self.distributions)
-        return own if self.posterior is None else (*own, *(key for key in self.posterior.keys if key not in own))
+        others = self.posterior.keys if self.posterior else ()
+        return (*self.distributions, *(key for key in others if key not in self.over))
 
     @property
     def keys(self) -> tuple[str, ...]:
         """Keys of the varied numbers, in the order of the columns."""
-        return (*self.listed[0], *self.drawn, *self.grids)
+        return (*(self.listing.columns if self.listing else ()), *self.drawn, *self.grids)
 
-    @property
+    @cached_property
     def points(self) -> int:
         """Number of points of the grid."""
         return math.prod(map(len, self.grids.values()))
 
-    @property
+    @cached_property
     def count(self) -> int:
         """Number of rows."""
-        return (self.listed[1] or self.draws) * self.points
+        return (self.listing.size if self.listing else self.draws if self.drawn else 1) * self.points
 
     @property
     def is_independent(self) -> bool:
         """Whether the rows are independent draws: confidence needs that."""
-        return bool(self.drawn) and not (self.grids or self.listed[0])
-
-    @property
-    def is_searchable(self) -> bool:
-        """Whether every number has a distribution of its own."""
-        return self.is_independent and self.posterior is None
+        return bool(self.drawn) and not (self.grids or self.listing)
 
     def rows(self, first: int, last: int, listed: Real | None) -> Real:
         """Return rows first to last - 1 (rows, keys); `listed` are those of the list behind them."""
         draw, point = np.divmod(np.arange(first, last), self.points)
         uniform = np.array([self.uniform(n) for n in range(draw[0], draw[-1] + 1)])
         own = np.empty((len(uniform), 0)) if listed is None else listed
-        drawn, columns = np.hstack([own, self.values(uniform)])[draw - draw[0]], list[Real]()
-        for values in reversed(self.grids.values()):  # the last one varies fastest
-            point, place = np.divmod(point, len(values))
-            columns.insert(0, np.array(values)[place])
-        return np.column_stack([drawn, *columns])
+        grids = [np.array(values) for values in self.grids.values()]
+        places = np.unravel_index(point, [each.size for each in grids]) if grids else ()
+        columns = [each[place] for each, place in zip(grids, places, strict=True)]
+        return np.column_stack([np.hstack([own, self.values(uniform)])[draw - draw[0]], *columns])
 
     def values(self, uniform: Real) -> Real:
         """Return the drawn values (rows, drawn) of uniform numbers (rows, drawn)."""
@@ -151,42 +169,35 @@ class Space:
 
 
 def space_of(
-    over: Mapping[str, Mapping[str, Any]], *, draws: int, seed: int, posterior: Posterior | None, listed: Any
-) -> Space:
+    over: Mapping[str, Mapping[str, Any]], *, draws: int, seed: int, posterior: Posterior | None = None,
+    listing: Listing | None = None,
+) -> Space:  # fmt: skip
     """Return the space of a declared study.  Raises ParameterError, naming the key."""
-    made = {key: _distribution(f"over.{key}", entry) for key, entry in over.items()}
-    distributions = {key: each for key, each in made.items() if each.kind in FORMS}
-    grids = {key: tuple(each.frozen) for key, each in made.items() if each.kind in GRIDS}
-    found = Space(distributions=distributions, grids=grids, posterior=posterior, listed=listed, draws=draws, seed=seed)
+    known = {key: _distribution(f"over.{key}", entry) for key, entry in over.items()}
+    found = Space(over=known, posterior=posterior, listing=listing, draws=draws, seed=seed)
     remedy = "nothing is varied: give --over KEY=uniform:LOW,HIGH, a list or a posterior"
     require(found.keys, "over", dict(over), remedy)
-    require(not (grids and found.listed[0]), "over", dict(over), "a list has every value itself: no grid with it")
+    require(not (found.grids and listing), "over", dict(over), "a list has every value itself: no grid with it")
     for key in found.keys:
         require(found.keys.count(key) == 1, "over", key, "is varied twice; once is enough")
     if posterior is not None:
-        posterior.must_be_determined(tuple(distributions))
-    found = found if found.drawn else replace(found, draws=1)
+        posterior.must_be_determined(tuple(found.distributions))
     remedy = f"at most {MOST_ROWS:,} rows: fewer draws, or a coarser grid"
-    require(0 < found.count <= MOST_ROWS, "rows", found.count, remedy)
+    require(found.count <= MOST_ROWS, "rows", found.count, remedy)
     return found
 
 
 def _distribution(place: str, entry: Any) -> Distribution:
     """Return the checked distribution or grid of an entry such as {"uniform": [0.0, 1.0]}."""
-    remedy = f'give one of {", ".join([*FORMS, *GRIDS])} with its numbers, such as {{"uniform": [0.0, 1.0]}}'
+    remedy = f'give one of {", ".join(KINDS)} with its numbers, such as {{"uniform": [0.0, 1.0]}}'
     require(isinstance(entry, Mapping) and len(entry) == 1, place, entry, remedy)
     ((kind, numbers),) = entry.items()
-    must_be_known(place, kind, [*FORMS, *GRIDS])
-    words, make = KINDS[kind]
-    remedy = f"{kind} needs finite numbers in order: {words}"
-    require(isinstance(numbers, Sequence | np.ndarray), place, numbers, remedy)
-    found = Distribution(kind, tuple(number(place, each, remedy) for each in numbers))
-    try:
-        with np.errstate(all="ignore"):
-            made = all(map(math.isfinite, found.numbers)) and make(*found.numbers)
-            is_finite = made and np.isfinite(made.ppf(ENDS) if kind in FORMS else made).all()
-    except TypeError:  # another count of numbers
-        is_finite = False
+    must_be_known(place, kind, KINDS)
+    remedy, is_finite = f"{kind} needs finite numbers in order: {KINDS[kind][0]}", False
+    with suppress(TypeError), np.errstate(all="ignore"):  # TypeError: no list, or another count of numbers
+        found = Distribution(kind, tuple(number(place, each, remedy) for each in numbers))
+        made = all(map(math.isfinite, found.numbers)) and found.frozen
+        is_finite = made and np.isfinite(made.ppf(ENDS) if kind in FORMS else made).all()
     require(is_finite, place, numbers, remedy)
     return found
 
@@ -233,64 +244,61 @@ class Subjects:
 # ------------------------------------------------------------------------------------------------------------ lists
 
 
-@dataclass(frozen=True)
-class Listing:
-    """Rows of a CSV or Parquet file, read as they are needed."""
+def listing_of(path: Path) -> Listing:
+    """Return the columns and the number of rows of a list, all of which are checked.  Raises ParameterError."""
+    lines = lines_of(path)
+    found = Listing(path, next(lines), sum(1 for _ in lines))
+    require(found.size, "list", 0, "has no rows", str(path))
+    return found
 
-    path: Path
 
-    @cached_property
-    def columns(self) -> tuple[str, ...]:
-        """Names of the columns.  Raises ParameterError for a doubled one, and for one without a name."""
-        names = tuple(next(iter(self._lines()), ()))
+def lines_of(path: Path) -> Iterator[Any]:
+    """Yield the names of the columns of a list, then its rows of finite numbers.
+
+    Raises ParameterError, naming row and column, for a name that is doubled or missing, and for any other value.
+    """
+    lines = _cells(path, parquet("list", str(path)) if path.suffix == ".parquet" else None)
+    names = tuple(next(lines, ()))
+    with naming(path):
         for name in names:
-            remedy = "each column has a key of its own as its name"
-            require(name and names.count(name) == 1, "column", name, remedy, str(self.path))
-        return names
+            require(name and names.count(name) == 1, "column", name, "each column has a key of its own as its name")
+        yield names
+        for n, row in enumerate(lines):  # from 0, as in the results
+            require(len(row) == len(names), f"row {n}", len(row), f"{len(names)} values, one a column")
+            for name, cell in zip(names, row, strict=True):
+                is_finite = PLAIN_NUMBER.fullmatch(str(cell)) and math.isfinite(float(cell))
+                require(is_finite, f"row {n}, column {name}", cell, "every cell is a finite number")
+            yield list(map(float, row))
 
-    @cached_property
-    def sha256(self) -> str:
-        """SHA-256 of the file."""
-        with self.path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
 
-    @cached_property
-    def size(self) -> int:
-        """Number of rows, each of which was checked.  Raises ParameterError, naming row and column."""
-        found = sum(1 for _ in self.rows())
-        require(found, "list", 0, "has no rows", str(self.path))
-        return found
-
-    def rows(self) -> Iterator[list[float]]:
-        """Yield the rows; a value other than a finite number raises ParameterError."""
-        names = self.columns
-        for n, row in enumerate(islice(self._lines(), 1, None)):  # from 0, as in the results
-            with naming(self.path):
-                require(len(row) == len(names), f"row {n}", len(row), f"{len(names)} values, one a column")
-                yield [_cell(value, n, name) for name, value in zip(names, row, strict=True)]
-
-    def blocks(self, ends: Sequence[tuple[int, int]]) -> Iterator[Real]:
-        """Yield the rows of each range (first, last), which ascend."""
-        lines, at = self.rows(), 0
-        for first, last in ends:
-            yield np.array(list(islice(lines, first - at, last - at)))
-            at = last
-
-    def _lines(self) -> Iterator[Sequence[Any]]:
-        """Yield the names, then the cells of each row."""
-        if self.path.suffix == ".parquet":
-            yield from parquet_rows(self.path)
-            return
-        try:
-            with self.path.open(newline="", encoding="utf-8-sig") as file:
+def _cells(path: Path, module: Any) -> Iterator[Sequence[Any]]:
+    """Yield names and rows of a CSV file, or of a Parquet one by its module, a batch in memory at a time."""
+    try:
+        if module is None:
+            with path.open(newline="", encoding="utf-8-sig") as file:
                 yield from csv.reader(file, strict=True)
-        except (OSError, UnicodeDecodeError, csv.Error) as error:
-            remedy = f"cannot be read ({error}); give a CSV or Parquet file with a column a key"
-            raise ParameterError(key="list", value=str(self.path), remedy=remedy) from None
+        else:
+            with module.ParquetFile(path) as file:
+                yield file.schema_arrow.names
+                for batch in file.iter_batches():
+                    yield from zip(*(column.to_pylist() for column in batch.columns), strict=True)
+    except Exception as error:  # of parsers that are not ours, on data from outside
+        remedy = f"cannot be read ({error}); give a CSV or Parquet file with a column a key"
+        raise ParameterError(key="list", value=str(path), remedy=remedy) from None
 
 
-def _cell(value: Any, row: int, column: str) -> float:
-    """Return a finite number of a cell.  Raises ParameterError, naming row and column."""
-    is_finite = PLAIN_NUMBER.fullmatch(str(value)) and math.isfinite(float(value))
-    require(is_finite, f"row {row}, column {column}", value, "every cell is a finite number")
-    return float(value)
+def parquet(key: str, value: str) -> Any:
+    """Return the module of pyarrow for Parquet.  Raises ParameterError where it is missing or old."""
+    module = extra("pyarrow.parquet", "study", key, value)
+    version = tuple(int(part) for part in import_module("pyarrow").__version__.split(".")[:3])
+    require(version >= LEAST_PYARROW, key, value, "needs pyarrow 14.0.1 or newer: pip install 'tfarm[study]'")
+    return module
+
+
+def extra(package: str, name: str, key: str, value: object) -> Any:
+    """Return an optional package.  Raises ParameterError, naming its extra, where it is missing."""
+    try:
+        return import_module(package)
+    except ImportError:
+        remedy = f"needs {package.partition('.')[0]}: pip install 'tfarm[{name}]'"
+        raise ParameterError(key=key, value=value, remedy=remedy) from None

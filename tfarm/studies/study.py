@@ -1,9 +1,19 @@
-"""A study: many arms and loops, each by the exact solution, and the findings over all of them."""
+"""A study: many arms and loops, each by the exact solution, and the findings over all of them.
+
+It may be declared by a small TOML file, which can be kept and run again:
+
+arm = "sasaki2012-lab"                # preset or file, with its chain and its [law]
+ask = ["card", "modes"]
+draws = 2000
+[over]
+"payload.mass" = { uniform = [0.0, 0.2] }
+"hub.inertia" = { normal = [0.1, 0.005] }
+"""
 
 from __future__ import annotations
 
 import math
-import re
+import os
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -11,45 +21,40 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 import scipy  # whose statistics take half a second to load
+from pydantic import Field
 from scipy.optimize import minimize
 
 from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arm.checks import whole
-from tfarm.arm.writing import law_toml
+from tfarm.arm.law_tables import load_law
+from tfarm.arm.reading import arm_in, load_tables, presets
+from tfarm.arm.schema import StrictTable, validated
+from tfarm.arm.writing import LAW_DEFAULTS, law_toml, toml_tables, toml_text
 from tfarm.arrays import Real
 from tfarm.dsp import Chain
-from tfarm.dsp.chain import chain_or_usual, file_text
-from tfarm.errors import ParameterError, require
-from tfarm.files import write_file
-from tfarm.fitting.posterior import load_posterior
+from tfarm.dsp.chain import chain_or_usual, file_text, load_chain
+from tfarm.errors import ParameterError, naming, require
+from tfarm.files import mat_bytes, read_file, write_file
+from tfarm.fitting.posterior import MOST_BYTES, load_posterior
+from tfarm.processes import shared
 from tfarm.records import record
 from tfarm.schema import Column, Quantity, Table
 from tfarm.spectrum.table import default_gains
 
-from .extras import cluster_size
-from .findings import (
-    CONFIDENCE,
-    STABLE,
-    Failure,
-    Spread,
-    StableShare,
-    failures_of,
-    shares_of,
-    spreads_of,
-)
-from .quantities import CARD, COLUMNS, LOOPS, asked_columns, column_of
-from .running import ROW, Parts, Plan, Progress, computed, run, seconds_an_arm, table_of, usual_workers
-from .space import ENDS, MOST_ROWS, MOST_SEED, Listing, space_of
+from .findings import CONFIDENCE, STABLE, Failure, Spread, StableShare, failures_of, shares_of, spreads_of
+from .quantities import CARD, asked_columns, column_of, quantity_of, stability_of
+from .running import OUT, ROW, STUDY_FILE, Engine, Parts, Plan, Progress, on_cluster, run, seconds_an_arm, table_of
+from .space import ENDS, MOST_ROWS, MOST_SEED, listing_of, space_of
 
 SHARES = "stable arms (confidence one-sided, Clopper-Pearson)"
-WORST_FILE = "worst.toml"
+WORST_FILE, ARM_FILE, MATRICES, POSTERIOR = "worst.toml", "arm.toml", "law.mat", "posterior.json"
 STEPS_A_NUMBER, LEAST_STEPS = 20, 20  # evaluations of the search of the worst arm
 FIRST_STEP = 0.05  # of that search, in the probability of each number
-BEYOND, NOWHERE = 1e9, -math.inf  # in the order of worse arms: above each value of a stable loop; of no value
+BEYOND = 1e9  # in the order of worse arms: above each value of a stable loop
 LARGER_IS_WORSE = (
     "peak", "settling_time_s", "overshoot", "time_constant_s", "residual_rms", "steady_state_error", "cost", "unstable",
     "minimum_damping_s", "rise_time_s", "re_1_s",
@@ -146,7 +151,7 @@ class Study:
     def csv_table(self) -> Table:
         """Every row of the study."""
         return Table(columns=tuple(
-            Column(name, unit=COLUMNS[name].of.unit if name in COLUMNS else "",
+            Column(name, unit=quantity_of(name).unit if name in self.parts.plan.names else "",
                    of=["" if each != each else each for each in values.tolist()])
             for name, values in self._table.items()
         ))  # fmt: skip
@@ -225,116 +230,165 @@ def study(
     chain, law = chain_or_usual(chain), default_gains(arm) if law is None else law
     whole("draws", draws, 1, MOST_ROWS, f"a whole number from 1 to {MOST_ROWS:,}")
     whole("seed", seed, 0, MOST_SEED, "a whole number that is not negative")
-    listing = None if rows is None else Listing(Path(rows))
-    space = space_of(
-        over or {}, draws=draws, seed=seed, posterior=None if posterior is None else load_posterior(posterior),
-        listed=((), 0) if listing is None else (listing.columns, listing.size),
-    )  # fmt: skip
-    order = order_of(worst) if worst else None
-    plan = Plan(arm, law, chain, space, asked_columns([*ask, *(order.names if order else ())]))
-    plan.subjects  # noqa: B018  unknown keys are refused before a folder is made
+    known = None if posterior is None else load_posterior(posterior)
+    listing = None if rows is None else listing_of(Path(rows))
+    space = space_of(over or {}, draws=draws, seed=seed, posterior=known, listing=listing)
+    order = order_of(worst) if worst else ()
+    plan = Plan(arm, law, chain, space, asked_columns([*ask, *order]))
     is_power = sobol >= 0 and sobol & (sobol - 1) == 0
     require(is_power, "sobol", sobol, "a power of 2, such as 256; 0 for no Sobol' indices")
-    remedy = "needs two or more independent distributions"
-    require(not sobol or (space.is_searchable and len(space.keys) > 1), "sobol", sobol, remedy)
-    require(client is None or workers is None, "workers", workers, "those of the client are used: leave it out")
+    is_possible = not sobol or (space.is_independent and posterior is None and len(space.keys) > 1)
+    require(is_possible, "sobol", sobol, "needs two or more independent distributions")
     if workers is None:
-        workers = usual_workers() if client is None else cluster_size(client)
+        processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        workers = processors if client is None else max(1, len(client.nthreads()))
     whole("workers", workers, 1, MOST_WORKERS, "processes, at least 1")
     whole("part", 1 if part is None else part, 1, MOST_ROWS, "rows of a part, at least 1")
-    declared = {"over": over or {}, "ask": ask, "draws": draws, "seed": seed, "rows": rows, "posterior": posterior,
-                "worst": worst, "sobol": sobol}  # fmt: skip
-    parts = run(Path(out), plan, listing, declared, workers, client, stop_after, part, progress)
+    files = files_of(arm, law, chain, {"over": over or {}, "ask": ask, "draws": draws, "seed": seed, "rows": rows,
+                                       "posterior": posterior, "worst": worst, "sobol": sobol})  # fmt: skip
+    engine = partial(shared, count=workers) if client is None else partial(on_cluster, client=client)
+    parts = run(Path(out), plan, files, engine, workers, stop_after, part, progress)
     found = Study(parts=parts, arm=arm.name, rows=space.count, rows_a_part=parts.rows)
     if found.is_complete:
-        indices = sobol_indices(plan, sobol, workers, client, progress) if sobol else ()
-        found = replace(found, sobol=indices, worst=None if order is None else worst_arm(found, order))
+        indices = sobol_indices(plan, sobol, workers, engine, progress) if sobol else ()
+        found = replace(found, sobol=indices, worst=worst_arm(found, order) if order else None)
     return found
+
+
+# ------------------------------------------------------------------------------------------------------------ file
+
+
+class StudyFile(StrictTable):
+    """The keys of a study's file; paths are relative to its folder."""
+
+    arm: str
+    over: dict[str, dict[str, list[float]]] = Field(default_factory=dict)
+    ask: list[str] = Field(default_factory=lambda: [CARD])
+    law: str | None = None
+    draws: int = 1000
+    seed: int = 0
+    rows: str | None = None
+    posterior: str | None = None
+    worst: str = ""
+    sobol: int = 0
+
+
+def load_study(name_or_path: str) -> dict[str, Any]:
+    """Return the arguments of `study` that a file declares.  Raises ParameterError, naming the file."""
+    tables, file = load_tables(name_or_path)
+    folder = Path(file).parent
+    with naming(file):
+        declared = validated(StudyFile, tables, "")
+    arm = declared.arm if declared.arm in presets() else str(folder / declared.arm)
+    law = load_law(arm if declared.law is None else folder / declared.law)
+    gains = None if law is None else law.gains
+    same = gains if gains and as_law(gains) == law else law  # as gains, of which one of 0 can be varied
+    paths = {name: folder / path for name in ("rows", "posterior") if (path := getattr(declared, name))}
+    others = declared.model_dump(include={"over", "ask", "draws", "seed", "worst", "sobol"})
+    return {"arm": arm_in(*load_tables(arm)), "law": same, "chain": load_chain(arm), **others, **paths}
+
+
+def files_of(arm: Arm, law: AnyLaw, chain: Chain, declared: Mapping[str, Any]) -> dict[str, bytes]:
+    """Return the files from which `load_study` has the study again, by their names.
+
+    These are the study, the arm with its chain and its [law], the matrices of a law and the posterior, a copy.  A list
+    keeps its place.
+    """
+    own, files = as_law(law), dict[str, bytes]()
+    try:
+        text = law_toml(own)
+    except ParameterError:  # of a state space: it has no text
+        columns = (*own.signals, *own.wanted)
+        files[MATRICES] = mat_bytes(dict(zip("ABCD", own.matrices(columns), strict=True)))
+        head = {key: getattr(own, key) for key, usual in LAW_DEFAULTS.items() if getattr(own, key) != usual}
+        table = {"name": own.name, **head, "sign": -1, "matrices": MATRICES, "signals": columns}
+        text = toml_text(toml_tables(table, "law"))
+    places = {"rows": declared["rows"] and os.path.abspath(declared["rows"])}
+    if declared["posterior"] is not None:
+        files[POSTERIOR] = read_file(declared["posterior"], MOST_BYTES, key="posterior", what="a posterior's file")
+        places["posterior"] = POSTERIOR
+    over = {key: {kind: tuple(numbers) for kind, numbers in entry.items()} for key, entry in declared["over"].items()}
+    kept = {"arm": ARM_FILE, **declared, **places, "ask": tuple(declared["ask"]), "over": over}
+    study = toml_text(toml_tables({key: value for key, value in kept.items() if value or key == "seed"}))
+    return {**files, ARM_FILE: f"{file_text(arm, chain)}\n{text}".encode(), STUDY_FILE: study.encode()}
 
 
 # ------------------------------------------------------------------------------------------------------------ worst
 
 
-class Order(NamedTuple):
-    """Columns by which arms are in order, worse ones last: an unstable loop is worse than any other, by its damping."""
+def order_of(word: str) -> tuple[str, ...]:
+    """Return the columns of the order by a quantity: that, and the stability of its loop where it has one.
 
-    quantity: str
-    stability: str
-    damping: str
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The columns that there are: a quantity of no loop has no stability."""
-        return tuple(name for name in dict.fromkeys(self) if name in COLUMNS)
-
-    def place(self, values: Mapping[str, Any]) -> float:
-        """Return the place of an arm in the order; `NOWHERE` without a value."""
-        value, word, damping = map(values.get, self)
-        if word not in (None, "", STABLE):
-            return BEYOND - (0.0 if damping is None or math.isnan(damping) else damping)
-        if value is None or math.isnan(value):
-            return NOWHERE
-        size = abs(value) if any(name in self.quantity for name in SIGNED) else value
-        sign = 1.0 if any(name in self.quantity for name in LARGER_IS_WORSE) else -1.0
-        return min(max(sign * size, -BEYOND), BEYOND / 2)
-
-
-def order_of(word: str) -> Order:
-    """Return the order by a quantity.  Raises ParameterError for none or several."""
+    Raises ParameterError for a word of no quantity or of several.
+    """
     quantity = column_of(word, "worst")
-    loop = re.match(rf".*?\b({'|'.join(LOOPS)})\b", quantity)
-    place = loop.group() if loop else ""
-    return Order(quantity, f"{place}.stability", f"{place}.least_damping")
+    return (quantity, *filter(None, [stability_of(quantity)]))
 
 
-def worst_arm(study: Study, order: Order) -> WorstArm:
+def badness(order: Sequence[str], values: Mapping[str, Any]) -> float:
+    """Return the place of an arm in the order, worse ones last: an unstable loop is worse than any stable one.
+
+    An arm without a value is not in the order: -inf.
+    """
+    value, *words = (values[name] for name in order)
+    if any(word not in (None, "", STABLE) for word in words):
+        return BEYOND
+    if value is None or math.isnan(value):
+        return -math.inf
+    size = abs(value) if any(name in order[0] for name in SIGNED) else value
+    return min(max(size if any(name in order[0] for name in LARGER_IS_WORSE) else -size, -BEYOND), BEYOND / 2)
+
+
+def worst_arm(study: Study, order: Sequence[str]) -> WorstArm:
     """Return the worst arm in a quantity, by Nelder and Mead's simplex from the worst drawn, and write its file.
 
     The search stays within the range of a bounded distribution of n draws, else within its quantiles 1/(2 n) and
     1 - 1/(2 n).
     """
     plan, space, table = study.parts.plan, study.parts.plan.space, study.table()
-    own, columns = replace(plan, names=order.names), zip(*(table[name].tolist() for name in order.names), strict=True)
-    ranks = [order.place(dict(zip(order.names, row, strict=True))) for row in columns]
+    own, columns = replace(plan, names=tuple(order)), {name: table[name].tolist() for name in order}
+    ranks = [badness(order, {name: of[n] for name, of in columns.items()}) for n in range(study.done)]
     first = int(np.argmax(ranks))
-    require(ranks[first] > NOWHERE, "worst", order.quantity, "no arm has a value of it")
-    row, count, drawn = [float(table[key][first]) for key in space.keys], 0, float(table[order.quantity][first])
-    found: float | None = drawn
+    require(ranks[first] > -math.inf, "worst", order[0], "no arm has a value of it")
+    worst, count = {name: of[first] for name, of in table.items()}, 0
+    drawn = found = None if math.isnan(worst[order[0]]) else float(worst[order[0]])
 
     def values(uniform: Real) -> dict[str, Any]:
         return {name: of[0] for name, of in table_of(own, 0, space.values(uniform[None])).items()}
 
-    if space.is_searchable:
-        start, edge = space.uniform(first), 0.5 / space.draws
-        bounds = [(0.0, 1.0) if np.isfinite(each.frozen.ppf([0, 1])).all() else (min(edge, u), max(1 - edge, u))
-                  for each, u in zip(space.distributions.values(), start.tolist(), strict=True)]  # fmt: skip
+    if space.is_independent:
+        start = space.uniform(first)
+        with np.errstate(all="ignore"):
+            is_bounded = np.isfinite(space.values(np.array([0 * start, 0 * start + 1]))).all(axis=0)
+        edge = np.minimum(np.where(is_bounded, 0.0, 0.5 / space.draws), np.minimum(start, 1 - start))
         steps = np.diag(np.where(start < 0.5, FIRST_STEP, -FIRST_STEP))
-        searched: Any = minimize(  # type: ignore[call-overload]  # bounds of plain floats
-            lambda u: -order.place(values(u)), start, method="Nelder-Mead", bounds=bounds,
+        searched: Any = minimize(  # type: ignore[call-overload]  # bounds as an array
+            lambda u: -badness(order, values(u)), start, method="Nelder-Mead", bounds=np.array([edge, 1 - edge]).T,
             options={"maxfev": LEAST_STEPS + STEPS_A_NUMBER * len(start), "initial_simplex": [start, *(start + steps)]},
         )  # fmt: skip
-        worst = values(searched.x)
-        found, row, count = worst[order.quantity], [worst[key] for key in space.keys], int(searched.nfev)
-    file, subject = study.parts.folder / WORST_FILE, plan.subjects.at(row)
+        worst, count = values(searched.x), int(searched.nfev)
+        found = worst[order[0]]
+    numbers = {key: float(worst[key]) for key in space.keys}
+    file, subject = study.parts.folder / WORST_FILE, plan.subjects.at([*numbers.values()])
     text = file_text(replace(subject.arm, name=f"{plan.arm.name}-worst"), subject.chain)
     with suppress(ParameterError):  # of a state space, which has no table
         text = f"{text}\n{law_toml(as_law(subject.law))}"
-    write_file(file, text.encode(), key="--out")
+    write_file(file, text.encode(), key=OUT)
     return WorstArm(
-        quantity=order.quantity, row=first, drawn=None if math.isnan(drawn) else drawn, found=found, evaluations=count,
-        numbers=dict(zip(space.keys, row, strict=True)), file=str(file),
+        quantity=order[0], row=first, drawn=drawn, found=found, evaluations=count, numbers=numbers, file=str(file),
     )  # fmt: skip
 
 
 # ------------------------------------------------------------------------------------------------------------ Sobol'
 
 
-def sobol_indices(plan: Plan, size: int, workers: int, client: Any, progress: Progress) -> tuple[SobolIndex, ...]:
+def sobol_indices(plan: Plan, size: int, workers: int, engine: Engine, progress: Progress) -> tuple[SobolIndex, ...]:
     """Return Sobol' indices of every quantity, of a sample of its own of N (numbers + 2) arms.
 
     The first progress has their number and time.  A quantity without a finite value on each arm has no indices.
     """
-    keys, names = plan.space.keys, [name for name in plan.names if COLUMNS[name].of.label and not COLUMNS[name].is_text]
+    keys = plan.space.keys
+    names = [name for name in plan.names if quantity_of(name).is_number and quantity_of(name).label]
     A, B = np.hsplit(scipy.stats.qmc.Sobol(2 * len(keys), rng=np.random.default_rng(plan.space.seed)).random(size), 2)
     pages = [np.where(np.arange(len(keys)) == n, B, A) for n in range(len(keys))]  # A with one column of B
     rows = plan.space.values(np.clip(np.vstack([A, B, *pages]), *ENDS))
@@ -342,33 +396,26 @@ def sobol_indices(plan: Plan, size: int, workers: int, client: Any, progress: Pr
     progress(0, 0, f"Sobol' indices of {len(rows):,} further arms, about {seconds:.0f} s")
     tasks = ((n, partial(table_of, plan, n, rows[n : n + SOBOL_BLOCK])) for n in range(0, len(rows), SOBOL_BLOCK))
     found = np.empty((len(rows), len(names)))
-    for n, table in computed(tasks, workers, client):
+    for n, table in engine(tasks):
         found[n : n + SOBOL_BLOCK] = np.array([table[name] for name in names], dtype=float).T
         progress(min(n + SOBOL_BLOCK, len(rows)), len(rows), "arms of Sobol' indices")
-    missing, varies = np.sum(~np.isfinite(found), axis=0), np.ptp(np.nan_to_num(found), axis=0) > 0
-    known = varies & (missing == 0)
-    return (
-        *_indices([name for name, is_known in zip(names, known, strict=True) if is_known], keys, found[:, known]),
-        *(SobolIndex(quantity=name, note=f"no finite value on {count:,} arms" if count else "no variance")
-          for name, count, is_known in zip(names, missing.tolist(), known, strict=True) if not is_known),
-    )  # fmt: skip
+    return tuple(index for name, values in zip(names, found.T, strict=True) for index in _indices(name, keys, values))
 
 
-def _indices(names: Sequence[str], keys: Sequence[str], values: Real) -> Iterator[SobolIndex]:
-    """Yield the indices of values (A, B and a page a number, each with N arms; quantities)."""
-    if not names:
+def _indices(name: str, keys: Sequence[str], values: Real) -> Iterator[SobolIndex]:
+    """Yield the indices of the values of a quantity: of A, of B and of a page a number, N arms each."""
+    missing = int(np.sum(~np.isfinite(values)))
+    if missing or np.ptp(values) == 0:
+        yield SobolIndex(quantity=name, note=f"no finite value on {missing:,} arms" if missing else "no variance")
         return
-    f_A, f_B, *f_AB = np.moveaxis(values.reshape(len(keys) + 2, -1, len(names)), 2, 1)
-    found: Any = scipy.stats.sobol_indices(func={"f_A": f_A, "f_B": f_B, "f_AB": np.array(f_AB)}, n=f_A.shape[1])
+    f_A, f_B, *f_AB = values.reshape(len(keys) + 2, 1, -1)
+    found: Any = scipy.stats.sobol_indices(func={"f_A": f_A, "f_B": f_B, "f_AB": np.array(f_AB)}, n=f_A.size)
     with warnings.catch_warnings(), np.errstate(all="ignore"):  # an index that does not vary has no interval
         warnings.simplefilter("ignore", scipy.stats.DegenerateDataWarning)
         ends = found.bootstrap(confidence_level=CONFIDENCE)
-    columns = dict[str, Any]()
-    for name in ("first", "total"):
-        interval = getattr(ends, f"{name}_order").confidence_interval
-        columns |= {name: getattr(found, f"{name}_order"), f"{name}_low": interval.low, f"{name}_high": interval.high}
-    for n, name in enumerate(names):
-        for k, key in enumerate(keys):
-            own = {part: float(np.reshape(of, (len(names), -1))[n, k]) for part, of in columns.items()}
-            shown: Any = {part: value for part, value in own.items() if math.isfinite(value)}
-            yield SobolIndex(quantity=name, key=key, **shown)
+    first, total = ends.first_order.confidence_interval, ends.total_order.confidence_interval
+    parts = {"first": found.first_order, "first_low": first.low, "first_high": first.high,
+             "total": found.total_order, "total_low": total.low, "total_high": total.high}  # fmt: skip
+    for key, *row in zip(keys, *map(np.ravel, parts.values()), strict=True):
+        known: Any = {part: float(of) for part, of in zip(parts, row, strict=True) if math.isfinite(of)}
+        yield SobolIndex(quantity=name, key=key, **known)

@@ -16,7 +16,7 @@ from tfarm.dsp.chain import Reading, chain_or_usual
 from tfarm.dsp.results import Run, enough_modes, ideal_chain
 from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, described, torque_unit
 from tfarm.dsp.simulate import RESIDUAL
-from tfarm.errors import must_be_known, require
+from tfarm.errors import require
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import default_gains
@@ -173,13 +173,8 @@ def _baselines(arm: Arm, chain: Chain | None, plan: Plan) -> tuple[Trial, Guard,
 
 
 def tuned(arm: Arm, chain: Chain, plan: Plan | None = None, **numbers: float) -> Tuning:
-    """Tune with a plan, the usual one by default, and other values of some of its numbers: seed, eta, alpha ...
-
-    Raises ParameterError for a name that is no number of a plan or of its learning.
-    """
+    """Tune with a plan, the usual one by default, and other values of some of its numbers: seed, eta, alpha ..."""
     plan = usual_plan(arm, chain) if plan is None else plan
-    for name in numbers:
-        must_be_known("tuner", name, (*NUMBERS, *NUMBERS_OF_LEARNING))
     learning: dict[str, Any] = {name: value for name, value in numbers.items() if name in NUMBERS_OF_LEARNING}
     own: dict[str, Any] = {name: NUMBERS[name](value) for name, value in numbers.items() if name in NUMBERS}
     return tune(arm, replace(plan, learning=replace(plan.learning, **learning), **own), chain)

@@ -1,4 +1,4 @@
-"""Natural frequencies over the sections and hubs that the paper leaves open.
+"""Cases of studies: sections and hubs that the paper leaves open, and the learning curves of the gain tuner.
 
 The paper gives an area, 6e-4 m^2, but neither the second moment I nor the hub inertia I_h.  Two studies vary them one
 at a time, everything else being the arm's own.  Both rest on the exact solution, and the sensitivities are exact too
@@ -9,24 +9,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from itertools import chain
 from typing import Annotated, Any
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, PLANE, Arm, Section
+from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback, Section
+from tfarm.arm.checks import whole
 from tfarm.arrays import Real
 from tfarm.dsp import Chain
-from tfarm.errors import require
+from tfarm.errors import ConvergenceError, require
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import default_gains
+from tfarm.tuner import LearningCurves
+from tfarm.tuner import Plan as TunerPlan
 
-from .quantities import FREQUENCY, INTERVAL, SENSITIVITY, STABILITY
-from .running import Plan, results
-from .space import Space
+from .quantities import FREQUENCY, INTERVAL, SENSITIVITY, STABILITY, TRIAL_COST
+from .running import Chunk, Plan, Progress, chunk
+from .space import Distribution, Space
 
 STUDIED_MODES = 4  # flexible modes, by default
 AREA = 6.0e-4  # m^2, the paper's
@@ -35,6 +38,25 @@ INERTIAS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # kg m^2, about the value ass
 HELD = "area, shear factor and all else held: I = A depth^2/12, so one per cent of depth counts twice"
 LIMIT, LIMIT_IS = f"{INTERVAL}.{MOMENT_GAIN}.high", f"{INTERVAL}.{MOMENT_GAIN}.high_is"
 OWN_VALUE = 1e-9  # relative: a candidate nearer to the arm's own value is that value
+MOST_SEEDS = 10_000
+THREADS = 2  # compiled loops let other threads run; a report uses no more cores
+FINAL, ZERO, STOPPED = "tuner.cost", "tuner.is_zero", "tuner.stopped"
+
+
+def results(plan: Plan, first: int, last: int) -> Chunk:
+    """Return the table of rows first to last - 1.  Raises ConvergenceError for the first row without a result."""
+    table = chunk(plan, first, last)
+    for reason in filter(None, table["failed"]):
+        raise ConvergenceError(reason, None, None)
+    return table
+
+
+def over_values(key: str, values: Sequence[float]) -> Space:
+    """Return the space of the values of one number."""
+    return Space(over={key: Distribution("values", tuple(values))})
+
+
+# ------------------------------------------------------------ sections and hubs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -184,17 +206,13 @@ def hub_study(arm: Arm, count: int = STUDIED_MODES) -> Study:
 def _candidates(arm: Arm, count: int, key: str, own: int, known: Mapping[str, Sequence[float]]) -> list[Candidate]:
     """Return the rows of a study of that key, whose values are the last of those known; `own` is the arm's own row."""
     parameter, values = list(known.items())[-1]
-    lists = {
-        name: [f"{of}.{n}" for n in range(1, count + 1)]
-        for name, of in (("natural_frequency", FREQUENCY), ("sensitivity", f"{SENSITIVITY}.{parameter}"))
-    }
+    names = [f"{of}.{n}" for of in (FREQUENCY, f"{SENSITIVITY}.{parameter}") for n in range(1, count + 1)]
     words = (STABILITY, LIMIT, LIMIT_IS) if has_hub_inertia(arm) else ()  # no loop of a locked hub or a free pin
-    plan = Plan(arm, default_gains(arm), Chain(), Space(distributions={}, grids={key: tuple(values)}),
-                (*chain.from_iterable(lists.values()), *words))  # fmt: skip
+    plan = Plan(arm, default_gains(arm), Chain(), over_values(key, values), (*names, *words))
     table = results(plan, 0, len(values))
-    columns: dict[str, Sequence[Any]] = {
-        **known, **{name: [*map(list, zip(*(table[each] for each in of), strict=True))] for name, of in lists.items()},
-    }  # fmt: skip
+    rows = list(zip(*(table[name] for name in names), strict=True))
+    columns: dict[str, Sequence[Any]] = {**known, "natural_frequency": [[*row[:count]] for row in rows],
+                                         "sensitivity": [[*row[count:]] for row in rows]}  # fmt: skip
     if words:
         columns |= {"verdict": table[STABILITY], "K2_below": table[LIMIT],
                     "K2_below_is_edge": [kind == "edge" for kind in table[LIMIT_IS]]}  # fmt: skip
@@ -205,3 +223,29 @@ def _candidates(arm: Arm, count: int, key: str, own: int, known: Mapping[str, Se
 def _with_own(candidates: Sequence[float], own: float) -> list[float]:
     """The candidates and the arm's own value, ascending; one that equals it, but for rounding, is replaced."""
     return sorted([*(value for value in candidates if abs(value / own - 1) >= OWN_VALUE), own])
+
+
+# ------------------------------------------------------------ learning curves
+
+
+def learning_curves(
+    arm: Arm, plan: TunerPlan, chain: Chain, seeds: int, progress: Progress = lambda *_: None
+) -> LearningCurves:
+    """Return the learning curves of a plan from a number of seeds, its own and those that follow (paper's Figure 5).
+
+    `progress` gets (done, total, text).  Raises ParameterError for a number of seeds out of range.
+    """
+    seeds = whole("seeds", seeds, 1, MOST_SEEDS, f"a whole number of seeds from 1 to {MOST_SEEDS}")
+    costs = [f"{TRIAL_COST}.{n}" for n in range(1, plan.trials + 1)]
+    space = over_values("tuner.seed", range(plan.seed, plan.seed + seeds))
+    own, tables = Plan(arm, HubFeedback(), chain, space, (FINAL, ZERO, STOPPED, *costs), plan), list[dict[str, Any]]()
+    with ThreadPoolExecutor(THREADS) as pool:
+        for table in pool.map(lambda n: results(own, n, n + 1), range(seeds)):
+            tables.append({name: np.inf if value is None else value for name, (value,) in table.items()})
+            progress(len(tables), seeds, "learning curves")
+    return LearningCurves(
+        costs=np.array([[each[name] for name in costs] for each in tables]),
+        final=np.array([each[FINAL] for each in tables]),
+        diverged=sum(each[STOPPED] != np.inf for each in tables),
+        died=sum(bool(each[ZERO]) for each in tables),
+    )
