@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from tfarm.response import bode, transfer
     from tfarm.spectrum import damped_modes, modes
     from tfarm.spectrum.table import default_gains
-    from tfarm.studies import study
+    from tfarm.studies.study import study
     from tfarm.synthesis.design import design
     from tfarm.tuner import tune
 
@@ -129,7 +129,7 @@ _ROOMS = {  # the module of a name; after a colon another name there
     "simulate": "dsp.results",
     "spill": "loop.stability",
     "step": "case.step",
-    "study": "studies",
+    "study": "studies.study",
     "transfer": "response",
     "tune": "tuner",
 }

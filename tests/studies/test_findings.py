@@ -16,10 +16,18 @@ from tfarm.dsp.chain import load_chain
 from tfarm.errors import ParameterError
 from tfarm.spectrum.table import default_gains
 from tfarm.studies import running
-from tfarm.studies.findings import failures_of, least_share, shares_of, spreads_of
-from tfarm.studies.quantities import COLUMNS, asked_columns, values_of
+from tfarm.studies.quantities import (
+    COLUMNS,
+    asked_columns,
+    failures_of,
+    least_share,
+    order_of,
+    shares_of,
+    spreads_of,
+    values_of,
+)
 from tfarm.studies.space import Subject
-from tfarm.studies.study import badness, order_of
+from tfarm.studies.study import badness
 
 GAINS = tfarm.HubFeedback(K1=0.3, K2=0.3)
 FIRST, SECOND = (f"modes.natural_frequency_rad_s.{n}" for n in (1, 2))

@@ -16,8 +16,15 @@ from tfarm.exact.outputs import signal_words, unit_over
 from tfarm.loop.curve import decibels
 from tfarm.response import transfer
 from tfarm.response.frequency import resonant_band
-from tfarm.studies.findings import QUANTILES, Spread
-from tfarm.studies.quantities import COLUMNS, asked_columns, loop_of, quantity_of, stability_of
+from tfarm.studies.quantities import (
+    COLUMNS,
+    QUANTILES,
+    Spread,
+    asked_columns,
+    loop_of,
+    quantity_of,
+    stability_of,
+)
 from tfarm.studies.running import Plan
 from tfarm.studies.space import LAW
 from tfarm.studies.study import Study

@@ -1,5 +1,1 @@
 """Studies of uncertain arms: many arms and loops, each by the exact solution, on one machine or a cluster."""
-
-from .study import Study, study
-
-__all__ = ["Study", "study"]

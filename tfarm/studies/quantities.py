@@ -1,17 +1,28 @@
-"""Quantities that a study asks of each arm: entries of the records of tfarm, by their dotted names in JSON."""
+"""Quantities that a study asks of each arm, and the findings over all arms.
+
+Quantities are entries of the records of tfarm, by their dotted names in JSON.  Findings are the share of stable arms
+with its confidence, the spread of each quantity and its driver, and the reasons of missing results.
+
+With k of n independent draws stable, at least the share p is stable with the confidence 1 - a, where k or more of n
+have the probability a at p: the one-sided interval of Clopper and Pearson (Biometrika 26, 1934).  An arm without a
+result counts as not stable.
+"""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import numpy as np
+import scipy  # whose statistics take half a second to load
 
 from tfarm.arm import PLANE
+from tfarm.arrays import Real
 from tfarm.case.card import LoopCard, certainty_of, certainty_of_samples, loop_cards
 from tfarm.case.step import LoopResponse, step
 from tfarm.dsp.verdict import sampled
@@ -19,7 +30,7 @@ from tfarm.errors import ConvergenceError, TfarmError, must_be_known, require
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Interval, windows_of
-from tfarm.schema import Quantity
+from tfarm.schema import Percent, Quantity
 from tfarm.schema.quantities import quantities
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.shapes import PARAMETERS
@@ -38,11 +49,13 @@ SENSITIVITY, INTERVAL, STABILITY, TRIAL_COST = "sensitivity", "interval", "inter
 UNSTABLE, REAL, IMAGINARY = "poles.unstable", "poles.re_1_s", "poles.im_rad_s"
 
 
-class Asked(NamedTuple):
-    """Columns of an arm by dotted name, and the function of their values and of the names that are needed."""
-
-    columns: Mapping[str, Quantity]
-    values: Callable[[Subject, Set[str]], Mapping[str, Any]]
+CONFIDENCE = 0.95
+QUANTILES = {"least": 0.0, "low": 0.05, "median": 0.5, "high": 0.95, "largest": 1.0}
+SIGNIFICANT = 0.05  # of a rank correlation: a larger probability of chance names no driver
+FEWEST_RANKED = 10  # rows of a rank correlation
+CERTAINTIES = ("exact", "certified", "converged", "approximate", "not determined")
+STABLE = "stable"
+Asked = tuple[Mapping[str, Quantity], Callable[[Subject, Set[str]], Mapping[str, Any]]]  # columns, and their values
 
 
 def first_of(name: str) -> str:
@@ -112,7 +125,7 @@ def _card_of(loop: str) -> Asked:
         verdict = stability(one.arm, one.law)
         return dict(zip(words, (verdict.verdict, certainty_of(verdict)), strict=True))
 
-    return Asked({name: column for name, column, _ in entries_of(LoopCard, None, loop)}, values)
+    return {name: column for name, column, _ in entries_of(LoopCard, None, loop)}, values
 
 
 def _step_of(one: Subject, _: Set[str]) -> dict[str, Any]:
@@ -183,26 +196,26 @@ def _tuner_of(one: Subject, _: Set[str]) -> dict[str, Any]:
     }
 
 
-ASKED = (
+ASKED: tuple[Asked, ...] = (
     *map(_card_of, LOOPS),
-    Asked(_columns(FREQUENCY, "natural frequency, mode", "rad/s", "of the undamped arm"), _modes_of),
-    Asked({name: column for parameter in PARAMETERS for name, column in _columns(
+    (_columns(FREQUENCY, "natural frequency, mode", "rad/s", "of the undamped arm"), _modes_of),
+    ({name: column for parameter in PARAMETERS for name, column in _columns(
         f"{SENSITIVITY}.{parameter}", f"sensitivity to {parameter}, mode", "%/%", "d ln(natural frequency)/d ln(number)"
     ).items()}, _sensitivities_of),
-    Asked({
+    ({
         STABILITY: Quantity("stability", help="of the continuous-time loop"),
         **{f"{INTERVAL}.{gain}.{name}": replace(of, label=f"stability interval of {gain} {of.label}")
            for gain in PLANE for name, of in quantities(Interval).items()},
     }, _intervals_of),
-    Asked(_columns(RATIO, "damping ratio, mode", "", "of the arm without controller"), _damped_of),
-    Asked({
+    (_columns(RATIO, "damping ratio, mode", "", "of the arm without controller"), _damped_of),
+    ({
         UNSTABLE: _number("unstable poles", "conjugates counted"),
         **_columns(REAL, "real part, pole", "1/s", "of the continuous-time loop, ascending in frequency"),
         **_columns(IMAGINARY, "imaginary part, pole", "rad/s", "of the continuous-time loop, ascending"),
     }, _poles_of),
-    Asked({name: column for loop in LOOPS
+    ({name: column for loop in LOOPS
            for name, column, _ in entries_of(LoopResponse, None, f"step.{loop}")}, _step_of),
-    Asked({
+    ({
         "tuner.cost": _number("cost of the tuned slew", "none where training diverged"),
         "tuner.cost_best_constant": _number("cost with the best constant gain", "of the same slew"),
         "tuner.trials": _number("trials", "slews of the training"),
@@ -211,7 +224,7 @@ ASKED = (
         "tuner.stopped": Quantity("stopped", help="trial and sample of a divergence"),
     }, _tuner_of),
 )  # fmt: skip
-COLUMNS = {name: column for asked in ASKED for name, column in asked.columns.items()}
+COLUMNS = {name: column for columns, _ in ASKED for name, column in columns.items()}
 
 
 def asked_columns(words: Sequence[str]) -> tuple[str, ...]:
@@ -235,21 +248,131 @@ def asked_columns(words: Sequence[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def column_of(word: str, key: str) -> str:
-    """Return the one column of numbers of a word.  Raises ParameterError for none or several."""
+def order_of(word: str) -> tuple[str, ...]:
+    """Return the columns of the order by a quantity: that, and the stability of its loop where it has one.
+
+    Raises ParameterError for a word of no number or of several.
+    """
     names = [name for name in asked_columns([word]) if quantity_of(name).is_number and quantity_of(name).label]
     remedy = f"{len(names)} quantities of numbers, not one: {', '.join(names[:6])}"
-    require(len(names) == 1 or word in names, key, word, remedy)
-    return word if word in names else names[0]
+    require(len(names) == 1 or word in names, "worst", word, remedy)
+    quantity = word if word in names else names[0]
+    return (quantity, *filter(None, [stability_of(quantity)]))
 
 
 def values_of(one: Subject, names: Sequence[str]) -> dict[str, Any]:
     """Return the values of these columns for an arm, and under `FAILED` the reason of missing ones."""
     found, reasons = dict[str, Any](), []
-    for asked in ASKED:
-        if own := {name for name in names if first_of(name) in asked.columns}:
+    for columns, values in ASKED:
+        if own := {name for name in names if first_of(name) in columns}:
             try:
-                found |= asked.values(one, own)
+                found |= values(one, own)
             except TfarmError as error:
                 reasons.append(f"{min(own).split('.')[0]}: {error}")
     return {**{name: found.get(name) for name in names}, FAILED: "; ".join(reasons) or None}
+
+
+# ------------------------------------------------------------------------------------------------------------ findings
+
+
+@dataclass(frozen=True, kw_only=True)
+class StableShare:
+    """Stable arms of one loop."""
+
+    loop: Annotated[str, Quantity("loop", help="continuous-time or sampled")]
+    stable: Annotated[int, Quantity(help="arms with a stable loop")]
+    other: Annotated[int, Quantity(key="not_stable", help="arms with a marginal or unstable loop")]
+    open: Annotated[int, Quantity(key="not_determined", help="arms without a result")]
+    certainty: Annotated[str, Quantity(help="weakest word of certainty among the stable arms")]
+    at_least: Annotated[Percent | None, Quantity(
+            help="least share of stable arms, with 95 % confidence; of independent draws only")]  # fmt: skip
+
+    @property
+    def finding(self) -> Annotated[str, Quantity("finding", help="stable arms, with their confidence in per cent")]:
+        """Stable arms with certainty and confidence."""
+        text = f"{self.certainty} stable on {self.stable:,} of {self.stable + self.other + self.open:,} arms".strip()
+        others = [f"{self.other:,} not stable"] * bool(self.other) + [f"{self.open:,} not determined"] * bool(self.open)
+        text += f" ({', '.join(others)})" * bool(others)
+        if self.at_least is None:
+            return text
+        percent = math.floor(1e4 * self.at_least + 1e-6) / 100  # never more than was shown
+        return f"{text}: at least {percent:g} % of all with {100 * CONFIDENCE:g} % confidence"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spread:
+    """Distribution of a quantity over the arms."""
+
+    name: Annotated[str, Quantity(help="column of the table")]
+    label: Annotated[str, Quantity("quantity", key="quantity", help="label of the quantity")]
+    unit: Annotated[str, Quantity("unit", help="SI unit")]
+    arms: Annotated[int, Quantity("arms", help="arms with a finite value")]
+    least: Annotated[float, Quantity("least", "", 4, help="least value")]
+    low: Annotated[float, Quantity("5 %", "", 4, key="quantile_05", help="quantile 0.05")]
+    median: Annotated[float, Quantity("median", "", 4, help="quantile 0.5")]
+    high: Annotated[float, Quantity("95 %", "", 4, key="quantile_95", help="quantile 0.95")]
+    largest: Annotated[float, Quantity("largest", "", 4, help="largest value")]
+    driver: Annotated[str | None, Quantity("driver", help="varied number with the largest rank correlation")]
+    correlation: Annotated[float | None, Quantity("rank correlation", "", 2, help="Spearman's, of that number")]
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A reason of missing results."""
+
+    reason: Annotated[str, Quantity("reason", help="error of the first of these arms, without its numbers")]
+    arms: Annotated[int, Quantity("arms", help="number of arms with that reason")]
+    row: Annotated[int, Quantity("first row", help="number of the first of these rows")]
+
+
+def least_share(successes: int, count: int, confidence: float = CONFIDENCE) -> float:
+    """Return the share that is exceeded with that confidence, one-sided (Clopper and Pearson, 1934)."""
+    interval = scipy.stats.binomtest(successes, count, alternative="greater").proportion_ci(confidence, method="exact")
+    return float(interval.low)
+
+
+def shares_of(table: Mapping[str, Any], names: Sequence[str], is_independent: bool) -> tuple[StableShare, ...]:
+    """Return the stable shares of the loops whose stability was computed."""
+    found = []
+    for loop in [each for each in LOOPS if f"{each}.stability" in names]:
+        words = table[f"{loop}.stability"]
+        stable, open_, count = int((words == STABLE).sum()), int((words == "").sum()), len(words)
+        texts = table.get(f"{loop}.certainty", np.full(count, ""))[words == STABLE].tolist()
+        known = [text.partition(" ")[0].rstrip(",") for text in texts]
+        found.append(StableShare(
+            loop=loop.replace("continuous", "continuous-time"), stable=stable, open=open_, other=count - stable - open_,
+            certainty=max(known, key=(*CERTAINTIES, "").index, default=""),
+            at_least=Percent(least_share(stable, count)) if is_independent else None,
+        ))  # fmt: skip
+    return tuple(found)
+
+
+def spreads_of(table: Mapping[str, Any], names: Sequence[str], keys: Sequence[str]) -> tuple[Spread, ...]:
+    """Return the distribution of each quantity that has finite values."""
+    found = []
+    for name, of in ((name, quantity_of(name)) for name in names):
+        if of.is_number and of.label and (is_known := np.isfinite(table[name])).any():
+            values = table[name][is_known]
+            driver, correlation = _driver({key: table[key][is_known] for key in keys}, values)
+            ends = dict(zip(QUANTILES, np.quantile(values, list(QUANTILES.values())).tolist(), strict=True))
+            label = ", ".join(filter(None, (loop_of(name), of.label)))
+            found.append(Spread(name=name, label=label, unit=of.unit, arms=values.size, driver=driver,
+                                correlation=correlation, **ends))  # fmt: skip
+    return tuple(found)
+
+
+def _driver(inputs: Mapping[str, Real], values: Real) -> tuple[str | None, float | None]:
+    """Return the varied number of the largest significant rank correlation, and that."""
+    known = {key: scipy.stats.spearmanr(column, values) for key, column in inputs.items()
+             if len(values) >= FEWEST_RANKED and np.ptp(column) > 0 and np.ptp(values) > 0}  # fmt: skip
+    level = SIGNIFICANT / max(1, len(inputs))  # Bonferroni: of several numbers one is often near it by chance
+    found = {key: float(of.statistic) for key, of in known.items() if of.pvalue < level}
+    return max(found.items(), key=lambda each: abs(each[1]), default=(None, None))
+
+
+def failures_of(table: Mapping[str, Any]) -> tuple[Failure, ...]:
+    """Return the reasons of missing results with their counts."""
+    rows: dict[str, list[int]] = {}
+    for row, text in enumerate(table["failed"]):
+        rows.setdefault(re.sub(r"[-+]?\d[\d.eE+-]*", "N", text), []).append(int(table["row"][row]))
+    return tuple(Failure(reason, len(own), own[0]) for reason, own in rows.items() if reason)

@@ -44,11 +44,10 @@ OUT, SCHEDULER = "--out", "--scheduler"  # keys of errors
 ROW = "row"  # column of the number of the row, from 0
 FILE, PREFIX, PARQUET, STUDY_FILE = "study.json", "part-", ".parquet", "study.toml"
 MOST_BYTES = 1 << 20  # of that file
-PILOT = 4  # rows whose cost is measured
+PILOT, CHECKED = 4, 1000  # rows whose cost is measured, and whose arms are built, before the first run
 LEAST_SECONDS, MOST_SECONDS = 5.0, 30.0  # of a chunk
 CHUNKS_A_WORKER = 10  # where that leaves them within these
 MOST_ROWS = 50_000  # of a chunk
-CHECKED = 1000  # rows whose arms are built before the first run
 LONGEST_REASON = 200  # characters
 PATIENCE = 20  # seconds for a scheduler to answer, and for its first worker
 PACKAGES = ("tfarm", "numpy", "scipy", "numba")  # versions that all workers have in common
@@ -198,7 +197,7 @@ def opened(folder: Path, plan: Plan, files: Mapping[str, bytes], workers: int, s
     inputs = json.loads(json.dumps({
         "over": list(space.over.items()), "columns": plan.names, "draws": space.draws, "seed": space.seed,
         "list": space.listing and _sha256(space.listing.path), "pyarrow": has_parquet(), "versions": versions(),
-        **hashes,
+        "posterior": space.posterior and space.posterior.model_dump(), **hashes,
     }))  # fmt: skip
     if file.exists():
         what = f"a {FILE} of tfarm study; choose another folder"

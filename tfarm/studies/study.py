@@ -38,20 +38,32 @@ from tfarm.arrays import Real
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual, file_text, load_chain
 from tfarm.errors import ParameterError, naming, require
-from tfarm.files import mat_bytes, read_file, write_file
-from tfarm.fitting.posterior import MOST_BYTES, load_posterior
+from tfarm.files import mat_bytes, write_file
+from tfarm.fitting.posterior import load_posterior
 from tfarm.processes import shared
 from tfarm.records import record
 from tfarm.schema import Column, Quantity, Table
 from tfarm.spectrum.table import default_gains
 
-from .findings import CONFIDENCE, STABLE, Failure, Spread, StableShare, failures_of, shares_of, spreads_of
-from .quantities import CARD, asked_columns, column_of, quantity_of, stability_of
+from .quantities import (
+    CARD,
+    CONFIDENCE,
+    STABLE,
+    Failure,
+    Spread,
+    StableShare,
+    asked_columns,
+    failures_of,
+    order_of,
+    quantity_of,
+    shares_of,
+    spreads_of,
+)
 from .running import OUT, ROW, STUDY_FILE, Engine, Parts, Plan, Progress, on_cluster, run, seconds_an_arm, table_of
 from .space import ENDS, MOST_ROWS, MOST_SEED, listing_of, space_of
 
 SHARES = "stable arms (confidence one-sided, Clopper-Pearson)"
-WORST_FILE, ARM_FILE, MATRICES, POSTERIOR = "worst.toml", "arm.toml", "law.mat", "posterior.json"
+WORST_FILE, ARM_FILE, MATRICES = "worst.toml", "arm.toml", "law.mat"
 STEPS_A_NUMBER, LEAST_STEPS = 20, 20  # evaluations of the search of the worst arm
 FIRST_STEP = 0.05  # of that search, in the probability of each number
 BEYOND = 1e9  # in the order of worse arms: above each value of a stable loop
@@ -60,7 +72,6 @@ LARGER_IS_WORSE = (
     "minimum_damping_s", "rise_time_s", "re_1_s",
 )  # fmt: skip
 SIGNED = "peak", "steady_state_error"  # of these by their size
-MOST_WORKERS = 1024
 SOBOL_BLOCK = 64  # rows of the sample of Sobol' indices that are computed at a time
 
 
@@ -242,7 +253,7 @@ def study(
     if workers is None:
         processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         workers = processors if client is None else max(1, len(client.nthreads()))
-    whole("workers", workers, 1, MOST_WORKERS, "processes, at least 1")
+    whole("workers", workers, 1, math.inf, "processes, at least 1")
     whole("part", 1 if part is None else part, 1, MOST_ROWS, "rows of a part, at least 1")
     files = files_of(arm, law, chain, {"over": over or {}, "ask": ask, "draws": draws, "seed": seed, "rows": rows,
                                        "posterior": posterior, "worst": worst, "sobol": sobol})  # fmt: skip
@@ -291,8 +302,8 @@ def load_study(name_or_path: str) -> dict[str, Any]:
 def files_of(arm: Arm, law: AnyLaw, chain: Chain, declared: Mapping[str, Any]) -> dict[str, bytes]:
     """Return the files from which `load_study` has the study again, by their names.
 
-    These are the study, the arm with its chain and its [law], the matrices of a law and the posterior, a copy.  A list
-    keeps its place.
+    These are the study, the arm with its chain and its [law], and the matrices of a law.  A list and a posterior keep
+    their places.
     """
     own, files = as_law(law), dict[str, bytes]()
     try:
@@ -303,10 +314,7 @@ def files_of(arm: Arm, law: AnyLaw, chain: Chain, declared: Mapping[str, Any]) -
         head = {key: getattr(own, key) for key, usual in LAW_DEFAULTS.items() if getattr(own, key) != usual}
         table = {"name": own.name, **head, "sign": -1, "matrices": MATRICES, "signals": columns}
         text = toml_text(toml_tables(table, "law"))
-    places = {"rows": declared["rows"] and os.path.abspath(declared["rows"])}
-    if declared["posterior"] is not None:
-        files[POSTERIOR] = read_file(declared["posterior"], MOST_BYTES, key="posterior", what="a posterior's file")
-        places["posterior"] = POSTERIOR
+    places = {key: declared[key] and os.path.abspath(declared[key]) for key in ("rows", "posterior")}
     over = {key: {kind: tuple(numbers) for kind, numbers in entry.items()} for key, entry in declared["over"].items()}
     kept = {"arm": ARM_FILE, **declared, **places, "ask": tuple(declared["ask"]), "over": over}
     study = toml_text(toml_tables({key: value for key, value in kept.items() if value or key == "seed"}))
@@ -314,15 +322,6 @@ def files_of(arm: Arm, law: AnyLaw, chain: Chain, declared: Mapping[str, Any]) -
 
 
 # ------------------------------------------------------------------------------------------------------------ worst
-
-
-def order_of(word: str) -> tuple[str, ...]:
-    """Return the columns of the order by a quantity: that, and the stability of its loop where it has one.
-
-    Raises ParameterError for a word of no quantity or of several.
-    """
-    quantity = column_of(word, "worst")
-    return (quantity, *filter(None, [stability_of(quantity)]))
 
 
 def badness(order: Sequence[str], values: Mapping[str, Any]) -> float:
