@@ -318,7 +318,7 @@ def test_indices_of_a_product_are_the_closed_form(lab, tmp_path):
     for each in found.sobol:
         assert each.first == pytest.approx(first[each.key], abs=0.05)  # of a sample of 256, by its own intervals
         assert each.total == pytest.approx(total[each.key], abs=0.05)
-        assert each.first_low <= each.first <= each.first_high
+        assert each.first_interval[0] <= each.first <= each.first_interval[1]
     assert found.done == 20  # rows of the sample are no rows of the study
     (cost, *_) = [each for each in seen if "Sobol'" in each[2]]
     assert cost[:2] == (0, 0)

@@ -22,8 +22,8 @@ WORST = WorstArm(
     numbers={"payload.mass": 0.0125, "law.K2": 0.9875}, file="worst.toml",
 )  # fmt: skip
 SOBOL = SobolIndex(
-    quantity="sampled.phase_margin_deg", key="law.K2", first=0.875, first_low=0.8125, first_high=0.9375,
-    total=0.9275, total_low=0.8525, total_high=1.0125,
+    quantity="sampled.phase_margin_deg", key="law.K2", first=0.875,
+    first_interval=(0.8125, 0.9375), total=0.9275, total_interval=(0.8525, 1.0125),
 )  # fmt: skip
 
 

@@ -16,9 +16,9 @@ Such an arm is graded with 0.1 % of critical damping in its first mode; its stab
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -183,27 +183,26 @@ def result_card(
     notes = [SCALED + RECOMMENDED[arm.has_elastic_link]] if law.gains == default_gains(arm) else []
     notes += [undamped] if undamped else []
     cards: dict[str, LoopCard | None] = {"continuous": None, "sampled": None}
-    for name, card in loop_cards(arm, law, chain, continuous=continuous, at_samples=at_samples).items():
+    for name in cards if not law.is_discrete else ("sampled",):
         try:
-            cards[name] = card()
+            cards[name] = loop_card(name, arm, law, chain, continuous if name == "continuous" else at_samples)
         except ConvergenceError as error:
             notes.append(f"{name} loop not determined: {error}")
     return ResultCard(**cards, period=chain.sampling.period, notes=tuple(notes))
 
 
-def loop_cards(
-    arm: Arm, law: AnyLaw, chain: Chain, *, continuous: Margins | None = None, at_samples: Analysis | None = None
-) -> dict[str, Callable[[], LoopCard]]:
-    """The call that returns the card of each loop, or raises ConvergenceError where it is not determined."""
-    law, T, (damped, _) = as_law(law), chain.sampling.period, graded_arm(arm)
+def loop_card(loop: str, arm: Arm, law: AnyLaw, chain: Chain, known: Any = None) -> LoopCard:
+    """Return the card of the continuous or the sampled loop, of `known` margins or analysis where there are.
 
-    def graded(of: Callable[[Arm, Any], LoopCard], known: Any) -> LoopCard:
-        own = of(arm, known)
-        return own if damped is arm or own.stability == "unstable" else _with_margins(own, of(damped, None))
-
-    of_samples = partial(graded, lambda one, known: sampled_card(known or _sampled_of(one, law, chain)), at_samples)
-    of_time = partial(graded, lambda one, known: continuous_card(known or margins_of(one, law), T), continuous)
-    return {"sampled": of_samples} if law.is_discrete else {"continuous": of_time, "sampled": of_samples}
+    Raises ConvergenceError where the loop is not determined.
+    """
+    if loop == "sampled":
+        own = sampled_card(known or _sampled_of(arm, law, chain))
+    else:
+        own = continuous_card(known or margins_of(arm, law), chain.sampling.period)
+    damped, _ = graded_arm(arm)
+    is_own = damped is arm or own.stability == "unstable"
+    return own if is_own else _with_margins(own, loop_card(loop, damped, law, chain))
 
 
 def reference_damping(arm: Arm) -> float:

@@ -95,12 +95,8 @@ def study(found: Study, quantity: str | None = None, *, ax: Sequence[Axes]) -> N
         one.set(xlabel=label, ylabel="arms [−]", ylim=(0, 1.27 * np.max(counts)))
         one.set_title(f"{counted} of {found.done} arms" * bool(counted), fontsize=8.0)
         one.yaxis.set_major_locator(MaxNLocator(3, integer=True))
-        _ticks(one)
-
-
-def _ticks(ax: Axes) -> None:
-    ax.xaxis.set_major_locator(MaxNLocator(4))
-    plain_ticks(ax.xaxis)
+        one.xaxis.set_major_locator(MaxNLocator(4))
+        plain_ticks(one.xaxis)
 
 
 def _folded(label: str) -> str:
@@ -150,7 +146,8 @@ def study_scatter(found: Study, quantity: str | None = None, *, ax: Sequence[Axe
                                  transform=transform, label=word or "not determined")  # fmt: skip
             one.set(xlabel=_folded(key_label(key, found.parts.plan)) * one.xaxis.get_tick_params()["labelbottom"])
             one.set(ylabel=_folded(f"{of.label} [{of.unit or '−'}]") * one.yaxis.get_tick_params()["labelleft"])
-            _ticks(one)
+            one.xaxis.set_major_locator(MaxNLocator(4))
+            plain_ticks(one.xaxis)
 
 
 @picture(

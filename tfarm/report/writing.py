@@ -437,9 +437,9 @@ def study_sections(found: Study) -> list[PageSection]:
     """Findings, distributions, drivers, responses, worst arm and failures of a study, as far as it has them."""
     worst, missing, bands = found.worst, list[str](), list[Any]()
     facts = [
-        Fact(each.loop, f"{each.stable:,}", f"of {found.done:,} arms stable", each.finding) for each in found.shares
+        *(Fact(each.loop, f"{each.stable:,}", f"of {found.done:,} arms stable", each.finding) for each in found.shares),
+        Fact("arms computed", f"{found.done:,}", note=f"of {found.rows:,}"),
     ]
-    facts.append(Fact("arms computed", f"{found.done:,}", note=f"of {found.rows:,}"))
     pictures = [picture(name, draw.figure(found), found=found) for name, draw in (
         ("study_distributions", studies.study), ("study_scatter", studies.study_scatter)) if found.spreads]  # fmt: skip
     for output in ("root_moment", "tip_displacement"):

@@ -5,8 +5,6 @@ at a time, everything else being the arm's own.  Both rest on the exact solution
 (`Modes.sensitivity`); frequencies are those of the undamped arm.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor

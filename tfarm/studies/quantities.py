@@ -8,22 +8,21 @@ have the probability a at p: the one-sided interval of Clopper and Pearson (Biom
 result counts as not stable.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import chain
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 import scipy  # whose statistics take half a second to load
 
-from tfarm.arm import PLANE
+from tfarm.arm import PLANE, as_law
 from tfarm.arrays import Real
-from tfarm.case.card import LoopCard, certainty_of, certainty_of_samples, loop_cards
+from tfarm.case.card import LoopCard, certainty_of, certainty_of_samples, loop_card
 from tfarm.case.step import LoopResponse, step
 from tfarm.dsp.verdict import sampled
 from tfarm.errors import ConvergenceError, TfarmError, must_be_known, require
@@ -65,8 +64,8 @@ def first_of(name: str) -> str:
 
 def quantity_of(name: str) -> Quantity:
     """Return the quantity of a column; of a numbered one there are columns of any number."""
-    label = f"{COLUMNS[first_of(name)].label.removesuffix(' 1')} {name.rpartition('.')[2]}"
-    return COLUMNS[name] if name in COLUMNS else replace(COLUMNS[first_of(name)], label=label)
+    of = COLUMNS[first_of(name)]
+    return COLUMNS.get(name, replace(of, label=f"{of.label.removesuffix(' 1')} {name.rpartition('.')[2]}"))
 
 
 def loop_of(name: str) -> str:
@@ -116,14 +115,17 @@ def _card_of(loop: str) -> Asked:
     words = f"{loop}.stability", f"{loop}.certainty"
 
     def values(one: Subject, names: Set[str]) -> dict[str, Any]:
-        card = loop_cards(one.arm, one.law, one.chain).get(loop)
-        if card is None or not names <= {*words}:
-            return {name: value for name, _, value in entries_of(LoopCard, card and card(), loop)}
-        if loop == "sampled":
-            of_samples = sampled(one.arm, one.law, one.chain).verdict
-            return dict(zip(words, (of_samples.word, certainty_of_samples(of_samples)), strict=True))
-        verdict = stability(one.arm, one.law)
-        return dict(zip(words, (verdict.verdict, certainty_of(verdict)), strict=True))
+        law = as_law(one.law)
+        if loop == "continuous" and law.is_discrete:
+            return {}
+        if not names <= {*words}:
+            card = loop_card(loop, one.arm, law, one.chain)
+            return {name: value for name, _, value in entries_of(LoopCard, card, loop)}
+        if loop == "continuous":
+            verdict = stability(one.arm, law)
+            return dict(zip(words, (verdict.verdict, certainty_of(verdict)), strict=True))
+        of_samples = sampled(one.arm, law, one.chain).verdict
+        return dict(zip(words, (of_samples.word, certainty_of_samples(of_samples)), strict=True))
 
     return {name: column for name, column, _ in entries_of(LoopCard, None, loop)}, values
 
@@ -176,11 +178,7 @@ def _numbered(name: str, values: Any) -> dict[str, float | None]:
 
 def _columns(name: str, label: str, unit: str, meaning: str) -> dict[str, Quantity]:
     """Return the numbered columns of a quantity of modes or poles."""
-    return {f"{name}.{n}": _number(f"{label} {n}", meaning, unit) for n in range(1, LISTED + 1)}
-
-
-def _number(label: str, meaning: str, unit: str = "") -> Quantity:
-    return Quantity(label, unit, help=meaning, is_number=True)
+    return {f"{name}.{n}": Quantity(f"{label} {n}", unit, help=meaning, is_number=True) for n in range(1, LISTED + 1)}
 
 
 def _tuner_of(one: Subject, _: Set[str]) -> dict[str, Any]:
@@ -209,18 +207,18 @@ ASKED: tuple[Asked, ...] = (
     }, _intervals_of),
     (_columns(RATIO, "damping ratio, mode", "", "of the arm without controller"), _damped_of),
     ({
-        UNSTABLE: _number("unstable poles", "conjugates counted"),
+        UNSTABLE: Quantity("unstable poles", help="conjugates counted", is_number=True),
         **_columns(REAL, "real part, pole", "1/s", "of the continuous-time loop, ascending in frequency"),
         **_columns(IMAGINARY, "imaginary part, pole", "rad/s", "of the continuous-time loop, ascending"),
     }, _poles_of),
     ({name: column for loop in LOOPS
            for name, column, _ in entries_of(LoopResponse, None, f"step.{loop}")}, _step_of),
     ({
-        "tuner.cost": _number("cost of the tuned slew", "none where training diverged"),
-        "tuner.cost_best_constant": _number("cost with the best constant gain", "of the same slew"),
-        "tuner.trials": _number("trials", "slews of the training"),
-        "tuner.is_zero": _number("zero gain", "1 where the moment gain went to zero, else 0"),
-        f"{TRIAL_COST}.1": _number("cost of trial 1", "none after a divergence"),
+        "tuner.cost": Quantity("cost of the tuned slew", help="none where training diverged", is_number=True),
+        "tuner.cost_best_constant": Quantity("cost with the best constant gain", help="same slew", is_number=True),
+        "tuner.trials": Quantity("trials", help="slews of the training", is_number=True),
+        "tuner.is_zero": Quantity("zero gain", help="1 where the moment gain went to zero, else 0", is_number=True),
+        f"{TRIAL_COST}.1": Quantity("cost of trial 1", help="none after a divergence", is_number=True),
         "tuner.stopped": Quantity("stopped", help="trial and sample of a divergence"),
     }, _tuner_of),
 )  # fmt: skip
@@ -230,20 +228,18 @@ COLUMNS = {name: column for columns, _ in ASKED for name, column in columns.item
 def asked_columns(words: Sequence[str]) -> tuple[str, ...]:
     """Return the names of the columns that are asked for: "card", "sampled.delay_margin_ms", "delay_margin_ms".
 
-    A word is whole parts of dotted names, of which those where it is nearest to the front are meant.  Raises
-    ParameterError for a word of no column.
+    A word is a name, or the first parts of one, or those after the first.  Raises ParameterError for a word of no
+    column.
     """
     found: dict[str, None] = {}
-    for word in words:
-        for part in LOOPS if word == CARD else (word,):
-            heads = {name: f".{name}.".partition(f".{part}.") for name in COLUMNS}
-            depth = {name: head.count(".") for name, (head, is_there, _) in heads.items() if is_there}
-            if first_of(word) in COLUMNS:
-                depth = {word: 0}
-            if not depth:
-                parts = {each for name in COLUMNS for each in (name, *name.split(".")) if not each.isdigit()}
-                must_be_known("ask", word, sorted({CARD, *parts}))
-            found |= {name: None for name, place in depth.items() if place == min(depth.values())}
+    for word in chain.from_iterable(LOOPS if each == CARD else (each,) for each in words):
+        begun = [name for name in COLUMNS if f"{name}.".startswith(f"{word}.")]
+        after = [name for name in COLUMNS if f"{name}.".partition(".")[2].startswith(f"{word}.")]
+        own = [word] if first_of(word) in COLUMNS else begun or after
+        if not own:
+            parts = {each for name in COLUMNS for each in (name, *name.split(".")) if not each.isdigit()}
+            must_be_known("ask", word, sorted({CARD, *parts}))
+        found |= dict.fromkeys(own)
     require(found, "ask", "", f"name at least one quantity: {CARD}, modes, damped_modes, poles, step, tuner")
     return tuple(found)
 
@@ -327,8 +323,8 @@ class Failure:
 
 def least_share(successes: int, count: int, confidence: float = CONFIDENCE) -> float:
     """Return the share that is exceeded with that confidence, one-sided (Clopper and Pearson, 1934)."""
-    interval = scipy.stats.binomtest(successes, count, alternative="greater").proportion_ci(confidence, method="exact")
-    return float(interval.low)
+    test = scipy.stats.binomtest(successes, count, alternative="greater")
+    return float(test.proportion_ci(confidence, method="exact").low)
 
 
 def shares_of(table: Mapping[str, Any], names: Sequence[str], is_independent: bool) -> tuple[StableShare, ...]:

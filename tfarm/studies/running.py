@@ -5,8 +5,6 @@ and the parent writes it.  Which rows a chunk has is settled before the first ru
 and kept in `study.json`: an interrupted study goes on with the parts that are missing.
 """
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import io
@@ -44,7 +42,7 @@ OUT, SCHEDULER = "--out", "--scheduler"  # keys of errors
 ROW = "row"  # column of the number of the row, from 0
 FILE, PREFIX, PARQUET, STUDY_FILE = "study.json", "part-", ".parquet", "study.toml"
 MOST_BYTES = 1 << 20  # of that file
-PILOT, CHECKED = 4, 1000  # rows whose cost is measured, and whose arms are built, before the first run
+PILOT, CHECKED = 3, 1000  # rows whose cost is measured, and whose arms are built, before the first run
 LEAST_SECONDS, MOST_SECONDS = 5.0, 30.0  # of a chunk
 CHUNKS_A_WORKER = 10  # where that leaves them within these
 MOST_ROWS = 50_000  # of a chunk
@@ -104,13 +102,11 @@ def table_of(plan: Plan, first: int, rows: Real) -> Chunk:
 
 
 def seconds_an_arm(plan: Plan, rows: Real) -> float:
-    """Return the median time of the first rows of values (rows, keys) [s]."""
-    times = []
-    for row in rows[:PILOT]:
-        began = time.perf_counter()
-        table_of(plan, 0, row[None])
-        times.append(time.perf_counter() - began)
-    return float(np.median(times[1:] or times))  # the first one compiles
+    """Return the mean time of the first rows of values (rows, keys) [s]."""
+    table_of(plan, 0, rows[:1])  # which compiles
+    pilot, began = rows[-PILOT:], time.perf_counter()
+    table_of(plan, 0, pilot)
+    return (time.perf_counter() - began) / len(pilot)
 
 
 def rows_a_chunk(cost: float, count: int, workers: int) -> int:
@@ -192,11 +188,11 @@ def opened(folder: Path, plan: Plan, files: Mapping[str, bytes], workers: int, s
 
     `rows` are the values of the first rows.  Raises ParameterError for a folder that has another study.
     """
-    space, file = plan.space, folder / FILE
+    space, file, suffix = plan.space, folder / FILE, PARQUET if find_spec("pyarrow") else ".csv"
     hashes = {name: hashlib.sha256(content).hexdigest() for name, content in files.items() if name != STUDY_FILE}
     inputs = json.loads(json.dumps({
         "over": list(space.over.items()), "columns": plan.names, "draws": space.draws, "seed": space.seed,
-        "list": space.listing and _sha256(space.listing.path), "pyarrow": has_parquet(), "versions": versions(),
+        "list": space.listing and _sha256(space.listing.path), "parts": suffix, "versions": versions(),
         "posterior": space.posterior and space.posterior.model_dump(), **hashes,
     }))  # fmt: skip
     if file.exists():
@@ -207,19 +203,14 @@ def opened(folder: Path, plan: Plan, files: Mapping[str, bytes], workers: int, s
         require(not other, OUT, str(folder), remedy)
         count = known.rows_a_part
     else:
-        count = size or rows_a_chunk(seconds_an_arm(plan, rows), space.count, workers)
+        count = size or rows_a_chunk(seconds_an_arm(plan, rows[:PILOT]), space.count, workers)
     digest = hashlib.sha256(json.dumps([inputs, count]).encode()).hexdigest()
-    parts = Parts(folder, plan, digest, count, PARQUET if has_parquet() else ".csv")
+    parts = Parts(folder, plan, digest, count, suffix)
     parts.written()  # is refused before a file is written
     text = StudyRecord(inputs=inputs, rows_a_part=count).model_dump_json(indent=1)
     for name, content in {**files, FILE: f"{text}\n".encode()}.items() if not file.exists() else ():
         write_file(folder / name, content, key=OUT)
     return parts
-
-
-def has_parquet() -> bool:
-    """Return whether Parquet can be read and written."""
-    return find_spec("pyarrow") is not None
 
 
 def _sha256(path: Path) -> str:

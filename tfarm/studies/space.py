@@ -5,8 +5,6 @@ al., Parallel random numbers: as easy as 1, 2, 3, 2011) at counter n, and each d
 So a row is the same for any number of workers and in any order.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import re
@@ -30,7 +28,6 @@ from tfarm.arrays import Real
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError, must_be_known, naming, require
 from tfarm.fitting.posterior import Posterior
-from tfarm.records import record
 from tfarm.tuner.tuning import NUMBERS, NUMBERS_OF_LEARNING
 from tfarm.tuner.tuning import Plan as TunerPlan
 
@@ -95,7 +92,6 @@ class Listing(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-@record
 class Space:
     """Numbers that a study varies; `draws` of the distributions, each with every point of the grid.
 
@@ -109,11 +105,6 @@ class Space:
     seed: int = 0
 
     @property
-    def distributions(self) -> dict[str, Distribution]:
-        """Distributions by key."""
-        return {key: each for key, each in self.over.items() if each.kind in FORMS}
-
-    @property
     def grids(self) -> dict[str, Sequence[float]]:
         """Points of the grid by key."""
         return {key: each.frozen for key, each in self.over.items() if each.kind in GRIDS}
@@ -121,8 +112,8 @@ class Space:
     @property
     def drawn(self) -> tuple[str, ...]:
         """Keys of distributions, then those of the posterior."""
-        others = self.posterior.keys if self.posterior else ()
-        return (*self.distributions, *(key for key in others if key not in self.over))
+        own = tuple(key for key, each in self.over.items() if each.kind in FORMS)
+        return (*own, *(key for key in (self.posterior.keys if self.posterior else ()) if key not in own))
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -156,7 +147,7 @@ class Space:
 
     def values(self, uniform: Real) -> Real:
         """Return the drawn values (rows, drawn) of uniform numbers (rows, drawn)."""
-        fixed = {key: each.frozen.ppf(uniform[:, n]) for n, (key, each) in enumerate(self.distributions.items())}
+        fixed = {key: self.over[key].frozen.ppf(uniform[:, n]) for n, key in enumerate(self.drawn) if key in self.over}
         found = np.array([*fixed.values()]).reshape(len(fixed), len(uniform)).T
         if self.posterior is None:
             return found
@@ -181,7 +172,7 @@ def space_of(
     for key in found.keys:
         require(found.keys.count(key) == 1, "over", key, "is varied twice; once is enough")
     if posterior is not None:
-        posterior.must_be_determined(tuple(found.distributions))
+        posterior.must_be_determined(tuple(over))
     remedy = f"at most {MOST_ROWS:,} rows: fewer draws, or a coarser grid"
     require(found.count <= MOST_ROWS, "rows", found.count, remedy)
     return found

@@ -10,8 +10,6 @@ draws = 2000
 "hub.inertia" = { normal = [0.1, 0.005] }
 """
 
-from __future__ import annotations
-
 import math
 import os
 import warnings
@@ -25,19 +23,16 @@ from typing import Annotated, Any
 
 import numpy as np
 import scipy  # whose statistics take half a second to load
-from pydantic import Field
-from scipy.optimize import minimize
 
 from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arm.checks import whole
 from tfarm.arm.law_tables import load_law
 from tfarm.arm.reading import arm_in, load_tables, presets
-from tfarm.arm.schema import StrictTable, validated
 from tfarm.arm.writing import LAW_DEFAULTS, law_toml, toml_tables, toml_text
 from tfarm.arrays import Real
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual, file_text, load_chain
-from tfarm.errors import ParameterError, naming, require
+from tfarm.errors import ParameterError, must_be_known, naming, require
 from tfarm.files import mat_bytes, write_file
 from tfarm.fitting.posterior import load_posterior
 from tfarm.processes import shared
@@ -60,9 +55,13 @@ from .quantities import (
     spreads_of,
 )
 from .running import OUT, ROW, STUDY_FILE, Engine, Parts, Plan, Progress, on_cluster, run, seconds_an_arm, table_of
-from .space import ENDS, MOST_ROWS, MOST_SEED, listing_of, space_of
+from .space import ENDS, MOST_SEED, listing_of, space_of
 
 SHARES = "stable arms (confidence one-sided, Clopper-Pearson)"
+FILE_KEYS = {"arm": str, "law": str, "rows": str, "posterior": str, "over": dict, "ask": list, "draws": int,
+             "seed": int, "worst": str, "sobol": int}  # fmt: skip
+KIND_WORDS = {str: "a text", dict: "a table", list: "a list", int: "a whole number"}
+PATHS = "rows", "posterior"
 WORST_FILE, ARM_FILE, MATRICES = "worst.toml", "arm.toml", "law.mat"
 STEPS_A_NUMBER, LEAST_STEPS = 20, 20  # evaluations of the search of the worst arm
 FIRST_STEP = 0.05  # of that search, in the probability of each number
@@ -72,6 +71,7 @@ LARGER_IS_WORSE = (
     "minimum_damping_s", "rise_time_s", "re_1_s",
 )  # fmt: skip
 SIGNED = "peak", "steady_state_error"  # of these by their size
+BOOTSTRAP = "95 % bootstrap interval; none without any influence"
 SOBOL_BLOCK = 64  # rows of the sample of Sobol' indices that are computed at a time
 
 
@@ -98,12 +98,18 @@ class SobolIndex:
     quantity: Annotated[str, Quantity("quantity", help="column of the table")]
     key: Annotated[str, Quantity("number", help="varied number; none where the indices are not determined")] = ""
     first: Annotated[float | None, Quantity("first order", "", 3, "share by this number alone")] = None
-    first_low: Annotated[float | None, Quantity("from", "", 3, "lower end of the 95 % bootstrap interval")] = None
-    first_high: Annotated[float | None, Quantity("to", "", 3, "upper end; none without any influence")] = None
+    first_interval: Annotated[tuple[float, float] | None, Quantity("interval", "", 3, BOOTSTRAP)] = None
     total: Annotated[float | None, Quantity("total", "", 3, "share by this number and its interactions")] = None
-    total_low: Annotated[float | None, Quantity("total from", "", 3, "lower end of the 95 % bootstrap interval")] = None
-    total_high: Annotated[float | None, Quantity("total to", "", 3, "upper end; none without any influence")] = None
+    total_interval: Annotated[tuple[float, float] | None, Quantity("interval of total", "", 3, BOOTSTRAP)] = None
     note: Annotated[str, Quantity("note", help="reason where the indices are not determined")] = ""
+
+
+class StudyTable(dict[str, Any]):
+    """Columns of a study as arrays by their names."""
+
+    def to_pandas(self) -> Any:
+        """Return a pandas data frame.  Raises ImportError without pandas."""
+        return import_module("pandas").DataFrame(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,14 +174,6 @@ class Study:
         ))  # fmt: skip
 
 
-class StudyTable(dict[str, Any]):
-    """Columns of a study as arrays by their names."""
-
-    def to_pandas(self) -> Any:
-        """Return a pandas data frame.  Raises ImportError without pandas."""
-        return import_module("pandas").DataFrame(self)
-
-
 def study(
     arm: Arm,
     over: Mapping[str, Mapping[str, Any]] | None = None,
@@ -194,7 +192,7 @@ def study(
     client: Any = None,
     stop_after: float | None = None,
     part: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = lambda *_: None,
 ) -> Study:
     """Return the results of many arms and loops, and write them to a folder, from which an interrupted study goes on.
 
@@ -237,24 +235,20 @@ def study(
     ConvergenceError
         Where a worker process or the scheduler was killed; another run goes on.
     """
-    progress = progress or (lambda *_: None)
     chain, law = chain_or_usual(chain), default_gains(arm) if law is None else law
-    whole("draws", draws, 1, MOST_ROWS, f"a whole number from 1 to {MOST_ROWS:,}")
-    whole("seed", seed, 0, MOST_SEED, "a whole number that is not negative")
+    if workers is None:
+        processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        workers = processors if client is None else max(1, len(client.nthreads()))
+    for key, value in {"draws": draws, "seed": seed, "workers": workers, "part": 1 if part is None else part}.items():
+        whole(key, value, int(key != "seed"), MOST_SEED, f"a whole number from {int(key != 'seed')}")
     known = None if posterior is None else load_posterior(posterior)
     listing = None if rows is None else listing_of(Path(rows))
     space = space_of(over or {}, draws=draws, seed=seed, posterior=known, listing=listing)
     order = order_of(worst) if worst else ()
     plan = Plan(arm, law, chain, space, asked_columns([*ask, *order]))
-    is_power = sobol >= 0 and sobol & (sobol - 1) == 0
-    require(is_power, "sobol", sobol, "a power of 2, such as 256; 0 for no Sobol' indices")
+    require(sobol >= 0 and sobol & (sobol - 1) == 0, "sobol", sobol, "a power of 2, such as 256; 0 for no indices")
     is_possible = not sobol or (space.is_independent and posterior is None and len(space.keys) > 1)
     require(is_possible, "sobol", sobol, "needs two or more independent distributions")
-    if workers is None:
-        processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        workers = processors if client is None else max(1, len(client.nthreads()))
-    whole("workers", workers, 1, math.inf, "processes, at least 1")
-    whole("part", 1 if part is None else part, 1, MOST_ROWS, "rows of a part, at least 1")
     files = files_of(arm, law, chain, {"over": over or {}, "ask": ask, "draws": draws, "seed": seed, "rows": rows,
                                        "posterior": posterior, "worst": worst, "sobol": sobol})  # fmt: skip
     engine = partial(shared, count=workers) if client is None else partial(on_cluster, client=client)
@@ -269,34 +263,26 @@ def study(
 # ------------------------------------------------------------------------------------------------------------ file
 
 
-class StudyFile(StrictTable):
-    """The keys of a study's file; paths are relative to its folder."""
-
-    arm: str
-    over: dict[str, dict[str, list[float]]] = Field(default_factory=dict)
-    ask: list[str] = Field(default_factory=lambda: [CARD])
-    law: str | None = None
-    draws: int = 1000
-    seed: int = 0
-    rows: str | None = None
-    posterior: str | None = None
-    worst: str = ""
-    sobol: int = 0
-
-
 def load_study(name_or_path: str) -> dict[str, Any]:
-    """Return the arguments of `study` that a file declares.  Raises ParameterError, naming the file."""
+    """Return the arguments of `study` that a file declares; its paths are relative to its folder.
+
+    Raises ParameterError, naming the file.
+    """
     tables, file = load_tables(name_or_path)
     folder = Path(file).parent
     with naming(file):
-        declared = validated(StudyFile, tables, "")
-    arm = declared.arm if declared.arm in presets() else str(folder / declared.arm)
-    law = load_law(arm if declared.law is None else folder / declared.law)
+        for key, value in tables.items():
+            must_be_known("study", key, FILE_KEYS)
+            kind = FILE_KEYS[key]
+            require(type(value) is kind, key, value, f"give {KIND_WORDS[kind]}")
+        for word in tables.get("ask", []):
+            require(isinstance(word, str), "ask", word, "give names of quantities")
+    arm = tables["arm"] if tables["arm"] in presets() else str(folder / tables["arm"])
+    law = load_law(folder / tables["law"] if "law" in tables else arm)
     gains = None if law is None else law.gains
     same = gains if gains and as_law(gains) == law else law  # as gains, of which one of 0 can be varied
-    paths = {name: folder / path for name in ("rows", "posterior") if (path := getattr(declared, name))}
-    others = declared.model_dump(include={"over", "ask", "draws", "seed", "worst", "sobol"})
-    return {"arm": arm_in(*load_tables(arm)), "law": same, "chain": load_chain(arm), **others, **paths}
+    own = {key: folder / value if key in PATHS else value for key, value in tables.items()}
+    return {**own, "arm": arm_in(*load_tables(arm)), "law": same, "chain": load_chain(arm)}
 
 
 def files_of(arm: Arm, law: AnyLaw, chain: Chain, declared: Mapping[str, Any]) -> dict[str, bytes]:
@@ -314,7 +300,7 @@ def files_of(arm: Arm, law: AnyLaw, chain: Chain, declared: Mapping[str, Any]) -
         head = {key: getattr(own, key) for key, usual in LAW_DEFAULTS.items() if getattr(own, key) != usual}
         table = {"name": own.name, **head, "sign": -1, "matrices": MATRICES, "signals": columns}
         text = toml_text(toml_tables(table, "law"))
-    places = {key: declared[key] and os.path.abspath(declared[key]) for key in ("rows", "posterior")}
+    places = {key: declared[key] and os.path.abspath(declared[key]) for key in PATHS}
     over = {key: {kind: tuple(numbers) for kind, numbers in entry.items()} for key, entry in declared["over"].items()}
     kept = {"arm": ARM_FILE, **declared, **places, "ask": tuple(declared["ask"]), "over": over}
     study = toml_text(toml_tables({key: value for key, value in kept.items() if value or key == "seed"}))
@@ -361,7 +347,7 @@ def worst_arm(study: Study, order: Sequence[str]) -> WorstArm:
             is_bounded = np.isfinite(space.values(np.array([0 * start, 0 * start + 1]))).all(axis=0)
         edge = np.minimum(np.where(is_bounded, 0.0, 0.5 / space.draws), np.minimum(start, 1 - start))
         steps = np.diag(np.where(start < 0.5, FIRST_STEP, -FIRST_STEP))
-        searched: Any = minimize(  # type: ignore[call-overload]  # bounds as an array
+        searched: Any = scipy.optimize.minimize(  # type: ignore[call-overload]  # bounds as an array
             lambda u: -badness(order, values(u)), start, method="Nelder-Mead", bounds=np.array([edge, 1 - edge]).T,
             options={"maxfev": LEAST_STEPS + STEPS_A_NUMBER * len(start), "initial_simplex": [start, *(start + steps)]},
         )  # fmt: skip
@@ -409,12 +395,11 @@ def _indices(name: str, keys: Sequence[str], values: Real) -> Iterator[SobolInde
         return
     f_A, f_B, *f_AB = values.reshape(len(keys) + 2, 1, -1)
     found: Any = scipy.stats.sobol_indices(func={"f_A": f_A, "f_B": f_B, "f_AB": np.array(f_AB)}, n=f_A.size)
-    with warnings.catch_warnings(), np.errstate(all="ignore"):  # an index that does not vary has no interval
-        warnings.simplefilter("ignore", scipy.stats.DegenerateDataWarning)
+    no_interval: Any = scipy.stats.DegenerateDataWarning  # of an index that does not vary
+    with warnings.catch_warnings(action="ignore", category=no_interval), np.errstate(all="ignore"):
         ends = found.bootstrap(confidence_level=CONFIDENCE)
     first, total = ends.first_order.confidence_interval, ends.total_order.confidence_interval
-    parts = {"first": found.first_order, "first_low": first.low, "first_high": first.high,
-             "total": found.total_order, "total_low": total.low, "total_high": total.high}  # fmt: skip
-    for key, *row in zip(keys, *map(np.ravel, parts.values()), strict=True):
-        known: Any = {part: float(of) for part, of in zip(parts, row, strict=True) if math.isfinite(of)}
-        yield SobolIndex(quantity=name, key=key, **known)
+    columns = found.first_order, first.low, first.high, found.total_order, total.low, total.high
+    for key, S, S_low, S_high, T, T_low, T_high in zip(keys, *(np.ravel(of).tolist() for of in columns), strict=True):
+        yield SobolIndex(quantity=name, key=key, first=S, first_interval=(S_low, S_high), total=T,
+                         total_interval=(T_low, T_high))  # fmt: skip
