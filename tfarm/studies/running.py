@@ -199,7 +199,7 @@ def opened(folder: Path, plan: Plan, files: Mapping[str, bytes], workers: int, s
         what = f"a {FILE} of tfarm study; choose another folder"
         known = validated_file(StudyRecord, file, MOST_BYTES, key=OUT, what=what)
         other = sorted(key for key in {*inputs, *known.inputs} if known.inputs.get(key) != inputs.get(key))
-        remedy = f"has a study with other {', '.join(other)}: choose another folder"
+        remedy = f"has a study with other {', '.join(other)}: choose another folder (--worst adds its columns)"
         require(not other, OUT, str(folder), remedy)
         count = known.rows_a_part
     else:
