@@ -13,7 +13,7 @@ from tfarm.dsp.chain import file_text
 from tfarm.plots.motion import sketch
 from tfarm.report.page import Case, Fact, PageSection, picture, prose, sheet
 from tfarm.schema import Quantity, Table, table
-from tfarm.studies.cases import Study, has_hub_inertia, hub_study, section_study
+from tfarm.studies.cases import Candidates, has_hub_inertia, hub_study, section_study
 
 
 def arm_section(case: Case) -> PageSection:
@@ -122,7 +122,7 @@ def derived_table(arm: Arm) -> Table:
 
 def assumptions_section(case: Case) -> PageSection:
     """Frequencies over the sections and the hub inertias that could be chosen, with sensitivities."""
-    arm, found = case.arm, dict[str, Study]()
+    arm, found = case.arm, dict[str, Candidates]()
     if arm.is_uniform:
         found["assumptions_section"] = section_study(arm)
     if arm.is_uniform and has_hub_inertia(arm):

@@ -107,7 +107,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 @record
-class Study:
+class Candidates:
     """Candidates of one assumed parameter, and the limits of every frequency where it is the hub's inertia."""
 
     arm: Arm
@@ -146,8 +146,8 @@ class Assumptions:
     gains: Annotated[
         dict[str, float], Quantity("gains of the loop", help="default gains of the arm, the same for every candidate")
     ]
-    section: Annotated[Study, Quantity("section", help="rectangles of the arm's own area")]
-    hub: Annotated[Study | None, Quantity("hub", help="hub inertias; none where the hub is locked or a free pin")]
+    section: Annotated[Candidates, Quantity("section", help="rectangles of the arm's own area")]
+    hub: Annotated[Candidates | None, Quantity("hub", help="hub inertias; none where the hub is locked or a free pin")]
 
 
 def assumptions(arm: Arm, count: int) -> Assumptions:
@@ -167,7 +167,7 @@ def has_hub_inertia(arm: Arm) -> bool:
     return 0.0 < arm.hub.inertia < math.inf
 
 
-def section_study(arm: Arm, count: int = STUDIED_MODES) -> Study:
+def section_study(arm: Arm, count: int = STUDIED_MODES) -> Candidates:
     """Return the first `count` flexible frequencies over rectangles of the arm's area.
 
     Depths are 2 to 60 mm for the paper's area, scaled with the root of the area to two digits, and that of the
@@ -180,10 +180,10 @@ def section_study(arm: Arm, count: int = STUDIED_MODES) -> Study:
     plain = Section.general(area=area, second_moment=area * own**2 / 12, shear_factor=arm.link.shear_factor)
     general = replace(arm, link=replace(arm.link, section=plain))  # whose file has a second moment
     rows = _candidates(general, count, "link.section.second_moment", depths.index(own), known)
-    return Study(arm, HELD, np.empty(0), np.empty(0), area, arm.link.shear_factor, rows)
+    return Candidates(arm, HELD, np.empty(0), np.empty(0), area, arm.link.shear_factor, rows)
 
 
-def hub_study(arm: Arm, count: int = STUDIED_MODES) -> Study:
+def hub_study(arm: Arm, count: int = STUDIED_MODES) -> Candidates:
     """Return the first `count` flexible frequencies over inertias of a hub that has one.
 
     Inertias are 0.01 to 1 kg m^2, moved by whole decades if the arm's own lies outside, and the arm's own.
@@ -198,7 +198,7 @@ def hub_study(arm: Arm, count: int = STUDIED_MODES) -> Study:
     )
     if not arm.having(hub_inertia=1.0).has_rigid_mode:  # the first falls to 0, a heavy hub on the arm's own stiffness
         locked = np.r_[0.0, locked[:-1]]
-    return Study(arm, "all else held", locked, pinned, arm.link.section.area, arm.link.shear_factor, rows)
+    return Candidates(arm, "all else held", locked, pinned, arm.link.section.area, arm.link.shear_factor, rows)
 
 
 def _candidates(arm: Arm, count: int, key: str, own: int, known: Mapping[str, Sequence[float]]) -> list[Candidate]:
