@@ -101,12 +101,6 @@ def is_standard_output(path: Path) -> bool:
     return _descriptor(path) == 1
 
 
-def make_folder(path: Path, *, key: str) -> None:
-    """Make a folder and those above it, unless it is there.  Raises ParameterError, naming `key`."""
-    with _refused(key, path, "cannot be made ({}); choose another"):
-        path.mkdir(parents=True, exist_ok=True)
-
-
 @contextmanager
 def temporary_folder(place: Path) -> Iterator[Path]:
     """Yield a new folder in `place`, removed afterwards with its content; leftovers of killed runs go first."""
@@ -200,8 +194,10 @@ def _locked(path: Path, *, wait: bool) -> Iterator[None]:
 
 
 @contextmanager
-def locked(path: Path, key: str) -> Iterator[None]:
-    """Hold the lock of a file.  Raises ParameterError where another process has it."""
+def locked_folder(path: Path, *, key: str) -> Iterator[None]:
+    """Make a folder, unless it is there, and hold its lock.  Raises ParameterError where another process has it."""
+    with _refused(key, path, "cannot be made ({}); choose another"):
+        path.mkdir(parents=True, exist_ok=True)
     try:
         with _locked(path, wait=False):
             yield

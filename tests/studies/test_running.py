@@ -14,7 +14,7 @@ import tfarm
 from tests.studies import kills
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.files import locked
+from tfarm.files import locked_folder
 from tfarm.processes import shared
 from tfarm.studies import running
 from tfarm.studies.running import CHUNKS_A_WORKER, LEAST_SECONDS, MOST_SECONDS, rows_a_chunk
@@ -114,7 +114,7 @@ def test_another_study_and_its_parts_are_refused(tmp_path, monkeypatch):
 
 
 def test_a_folder_has_one_run_at_a_time(tmp_path):
-    with locked(tmp_path, "--out"):
+    with locked_folder(tmp_path, key="--out"):
         refused("another run has it", STUDY, out=tmp_path, draws=2)
     (tmp_path / "file").touch()
     refused("cannot be made", STUDY, out=tmp_path / "file" / "x", draws=2)

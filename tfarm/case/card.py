@@ -229,8 +229,7 @@ def continuous_card(found: Margins, period: float) -> LoopCard:
     abscissa = verdict.spectral_abscissa
     delay = None if band is None else (band.delay if found.exact_delay is None else found.exact_delay)
     return LoopCard(
-        stability=verdict.verdict,
-        certainty=certainty_of(verdict),
+        **words_of(verdict),
         **_margins(band, None if band is None else band.gain, delay, period),
         least_damping=_least_damped([*by_mode.items(), *((HUB, s) for s in oscillating[~is_of_mode].tolist())]),
         time_constant=-1 / abscissa if abscissa < 0 and math.isfinite(abscissa) else None,
@@ -238,19 +237,19 @@ def continuous_card(found: Margins, period: float) -> LoopCard:
     )
 
 
-def certainty_of(verdict: Stability) -> str:
-    """The range of a continuous-time verdict with its word of certainty."""
+def words_of(verdict: Stability) -> dict[str, Any]:
+    """Stability and certainty of a continuous-time verdict."""
     beyond = (
         ", small gain beyond" if verdict.tail == SMALL_GAIN else ", theorem beyond" if verdict.is_known_beyond else ""
     )
-    return f"converged to {verdict.band:.4g} rad/s{beyond}"
+    return {"stability": verdict.verdict, "certainty": f"converged to {verdict.band:.4g} rad/s{beyond}"}
 
 
-def certainty_of_samples(verdict: Verdict) -> str:
-    """The range of a sampled verdict with its word of certainty."""
-    if verdict.band:
-        return f"certified to {verdict.band.top:.3g} rad/s"
-    return f"{'converged' if verdict.is_converged else 'approximate'}, first {verdict.modes_used} modes"
+def words_of_samples(verdict: Verdict) -> dict[str, Any]:
+    """Stability and certainty of a sampled verdict."""
+    known = f"{'converged' if verdict.is_converged else 'approximate'}, first {verdict.modes_used} modes"
+    certainty = f"certified to {verdict.band.top:.3g} rad/s" if verdict.band else known
+    return {"stability": verdict.word, "certainty": certainty}
 
 
 def sampled_card(found: Analysis) -> LoopCard:
@@ -262,8 +261,7 @@ def sampled_card(found: Analysis) -> LoopCard:
     is_small = arm.least_damping < reference_damping(arm)
     needed = found.minimum_damping if is_small else None
     return LoopCard(
-        stability=verdict.word,
-        certainty=certainty_of_samples(verdict),
+        **words_of_samples(verdict),
         **_margins(band, found.gain_factors, found.delay_margin_seconds, T),
         least_damping=_least_damped(unaliased_poles(loop).items()),
         time_constant=verdict.time_constant if verdict.is_stable else None,

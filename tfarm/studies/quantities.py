@@ -22,7 +22,7 @@ import scipy  # whose statistics take half a second to load
 
 from tfarm.arm import PLANE, as_law
 from tfarm.arrays import Real
-from tfarm.case.card import LoopCard, certainty_of, certainty_of_samples, loop_card
+from tfarm.case.card import LoopCard, loop_card, words_of, words_of_samples
 from tfarm.case.step import LoopResponse, step
 from tfarm.dsp.verdict import sampled
 from tfarm.errors import ConvergenceError, TfarmError, must_be_known, require
@@ -112,20 +112,19 @@ def _kinds(kind: Any) -> dict[str, tuple[Any, ...]]:
 
 def _card_of(loop: str) -> Asked:
     """Return the entries of the card of a loop, of which stability and its certainty need the verdict alone."""
-    words = f"{loop}.stability", f"{loop}.certainty"
 
     def values(one: Subject, names: Set[str]) -> dict[str, Any]:
         law = as_law(one.law)
         if loop == "continuous" and law.is_discrete:
             return {}
-        if not names <= {*words}:
+        if not names <= {f"{loop}.stability", f"{loop}.certainty"}:
             card = loop_card(loop, one.arm, law, one.chain)
             return {name: value for name, _, value in entries_of(LoopCard, card, loop)}
-        if loop == "continuous":
-            verdict = stability(one.arm, law)
-            return dict(zip(words, (verdict.verdict, certainty_of(verdict)), strict=True))
-        of_samples = sampled(one.arm, law, one.chain).verdict
-        return dict(zip(words, (of_samples.word, certainty_of_samples(of_samples)), strict=True))
+        known = (
+            words_of(stability(one.arm, law)) if loop == "continuous"
+            else words_of_samples(sampled(one.arm, law, one.chain).verdict)
+        )  # fmt: skip
+        return {f"{loop}.{key}": text for key, text in known.items()}
 
     return {name: column for name, column, _ in entries_of(LoopCard, None, loop)}, values
 

@@ -28,7 +28,7 @@ from tfarm.arm.schema import StrictTable, validated_file
 from tfarm.arrays import Real
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError, ParameterError, TfarmError, one_line, require
-from tfarm.files import locked, make_folder, write_file
+from tfarm.files import locked_folder, write_file
 from tfarm.tuner import Plan as TunerPlan
 
 from .quantities import FAILED, quantity_of, values_of
@@ -148,8 +148,8 @@ class Parts:
         """Write the table of a part under a temporary name, then rename it."""
         if self.suffix == PARQUET:
             module, arrow, binary = parquet("out", "Parquet"), import_module("pyarrow"), io.BytesIO()
-            kinds = {name: arrow.string() if name in self.plan.texts else arrow.float64() for name in table}
-            arrays = {name: arrow.array(values, kinds[name]) for name, values in table.items()}
+            texts, kinds = self.plan.texts, (arrow.float64(), arrow.string())
+            arrays = {name: arrow.array(values, kinds[name in texts]) for name, values in table.items()}
             module.write_table(arrow.table(arrays), binary)
             content = binary.getvalue()
         else:
@@ -241,8 +241,7 @@ def run(
     count, listing = min(CHECKED, plan.space.count), plan.space.listing
     rows = plan.space.rows(0, count, None if listing is None else next(listing.blocks([(0, count)])))
     check_rows(plan, rows)
-    make_folder(folder, key=OUT)
-    with locked(folder, OUT):
+    with locked_folder(folder, key=OUT):
         parts = opened(folder, plan, files, workers, size, rows)
         done, began = set(parts.written()), time.monotonic()
         missing = [number for number in range(parts.count) if number not in done]
