@@ -106,10 +106,11 @@ class Word:
         X, is_whole = absolute_sum(A, one, B)
         of_states, of_output = (absolute_sum(A, left, one)[0] for left in (one, C))
         largest = first = X @ E
-        for _ in range(REFINED):  # to the least fixed point, far below the first guess of a word that is long enough
-            w = vA @ largest + vB @ E + absolute[:-1]
-            largest = first + of_states @ w
-        u = of_output @ w + vC @ largest + vD @ E + relative * self.output
+        with np.errstate(over="ignore", invalid="ignore"):  # of a law that grows
+            for _ in range(REFINED):  # to the least fixed point
+                w = vA @ largest + vB @ E + absolute[:-1]
+                largest = first + of_states @ w
+            u = of_output @ w + vC @ largest + vD @ E + relative * self.output
         return largest, is_whole, float(u[0] + absolute[-1])
 
     def limit_cycle(self, loop: Sampled) -> float | None:
