@@ -58,11 +58,10 @@ void {{ name }}_init({{ name }}_state *state)
 
 int {{ name }}_step({{ name }}_state *state, const {{ name }}_input *input, {{ name }}_number *output)
 {
-    int {{ "i, j" if n or delay else "j" }};
+    int {{ "i, j" if n or delay > 1 else "j" }};
     {{ wide }} e[{{ m }}], u{{ ", total" if n }};
 {{ "    %s_number following[%d];\n"|format(name, n) if n -}}
-{{ "    double rate;\n" if hub -}}
-
+{{ "    double rate;\n" if hub }}
 {% if not fixed %}
     *output = state->output;
     if (!({% for field in fields %}is_finite(input->{{ field.identifier }}){{ ")" if loop.last else " && " }}{% endfor %})
@@ -115,8 +114,7 @@ int {{ name }}_step({{ name }}_state *state, const {{ name }}_input *input, {{ n
 {% set final = "clipped(u, %s, %s)"|format(dac[1], dac[2]) if fixed else "converted(u)" if converter else "u" %}
 {% if delay %}
     state->output = state->line[0];
-    for (i = 0; i < {{ delay - 1 }}; i++)
-        state->line[i] = state->line[i + 1];
+{{ "    for (i = 0; i < %d; i++)\n        state->line[i] = state->line[i + 1];\n"|format(delay - 1) if delay > 1 -}}
     state->line[{{ delay - 1 }}] = {{ final }};
 {% else %}
     state->output = {{ final }};
