@@ -1,0 +1,69 @@
+"""The user's words in the languages of targets: identifiers, comments, quoted texts, and templates.
+
+No text of a user reaches a file but through one function here: `comment`, `identifiers`, `python_text`, `matlab_text`;
+XML is written by ElementTree.
+"""
+
+import re
+import unicodedata
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+LONGEST_IDENTIFIER = 31  # characters of an identifier that C99 compares
+LONGEST_COMMENT = 200
+COMMENT_MARKS = (("\\", "|"), ("*/", "* /"), ("/*", "/ *"), ("??/", "? ?/"))  # of C, and the trigraph of a backslash
+
+
+def identifiers(names: Iterable[str], prefix: str, longest: int = LONGEST_IDENTIFIER) -> dict[str, str]:
+    """Return an identifier of C, C++, MATLAB and Python for each name: `prefix`, letters, digits and underscores.
+
+    A prefix that ends in an underscore, such as "y_", begins no keyword.  Equal identifiers are numbered.
+    """
+    found: dict[str, str] = {}
+    taken: set[str] = set()
+    for name in dict.fromkeys(names):
+        plain = f"{prefix}{re.sub(r'[^A-Za-z0-9]+', '_', name).strip('_') or 'unnamed'}"
+        tries = (plain[:longest], *(f"{plain[: longest - 1 - len(str(n))]}_{n}" for n in range(2, len(found) + 3)))
+        found[name] = next(each for each in tries if each.lower() not in taken)
+        taken.add(found[name].lower())
+    return found
+
+
+def comment(text: str) -> str:
+    """Return one line of printable ASCII that ends no comment of C and continues none."""
+    plain = unicodedata.normalize("NFKD", text)
+    line = "".join(c if " " <= c <= "~" else " " if c.isspace() else "?" for c in plain if not unicodedata.combining(c))
+    for mark, instead in COMMENT_MARKS:
+        line = line.replace(mark, instead)
+    return line[:LONGEST_COMMENT].strip()
+
+
+def python_text(text: str) -> str:
+    """Return a literal of Python in ASCII."""
+    return ascii(str(text))
+
+
+def matlab_text(text: str) -> str:
+    """Return a character vector of MATLAB in one line of ASCII, its quotes doubled."""
+    return "'" + comment(text).replace("'", "''") + "'"
+
+
+@cache
+def templates() -> Environment:
+    """The templates of source files, without the escapes of HTML."""
+    folder = Path(__file__).parent / "templates"
+    environment = Environment(
+        loader=FileSystemLoader(folder), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+        keep_trailing_newline=True, autoescape=False,
+    )  # fmt: skip
+    environment.filters["comment"] = comment
+    return environment
+
+
+def render(template: str, **values: Any) -> bytes:
+    """Return a source file from its template."""
+    return templates().get_template(template).render(**values).encode("ascii")
