@@ -5,12 +5,14 @@ XML is written by ElementTree.
 """
 
 import re
+import textwrap
 import unicodedata
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 LONGEST_IDENTIFIER = 31  # characters of an identifier that C99 compares
@@ -52,6 +54,16 @@ def matlab_text(text: str) -> str:
     return "'" + comment(text).replace("'", "''") + "'"
 
 
+def literal(value: Any) -> str:
+    """Return a number of np.float64 or np.float32 in C, in the fewest digits that have its bits."""
+    return f"{value!s}{'F' if isinstance(value, np.float32) else ''}"
+
+
+def literals(values: Iterable[Any]) -> str:
+    """Return the numbers of a row in C, in lines of at most 110 characters."""
+    return textwrap.fill(", ".join(map(literal, values)), 110, subsequent_indent="      ", break_on_hyphens=False)
+
+
 @cache
 def templates() -> Environment:
     """The templates of source files, without the escapes of HTML."""
@@ -60,7 +72,7 @@ def templates() -> Environment:
         loader=FileSystemLoader(folder), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
         keep_trailing_newline=True, autoescape=False,
     )  # fmt: skip
-    environment.filters["comment"] = comment
+    environment.filters |= {"comment": comment, "literal": literal, "literals": literals}
     return environment
 
 
