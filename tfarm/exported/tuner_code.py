@@ -5,9 +5,9 @@
     torque = r + servo - K x,   servo = Kp (angle reference - hub angle) + K1 (rate reference - hub rate)
 
 with r the feedforward torque, counted in u under the reading "total", where no rigid moment is subtracted.  Numbers 1
-and 2 are those of one and two samples before.  Where u, e, x, K or the torque is NaN, infinite or beyond `largest`, a
-step returns 1, holds the torque of the step before and keeps its state.  Below `largest` no sum of the network
-overflows, so that a kept state refuses no later sample.
+and 2 are those of one and two samples before.  Where an input, or u, e, x, K or the torque, is NaN, infinite or beyond
+`largest`, a step returns 1, or 2, holds the torque of the step before and keeps its state.  Below `largest` no sum of
+the network overflows, so that a kept state refuses no later sample.
 """
 
 import hashlib
@@ -33,16 +33,17 @@ from tfarm.tuner.trial import SavedTuner, Trial, load_tuner, slew_trial
 RECORDED_SAMPLES = 1000  # of the self-test
 LONGEST_NAME = 20  # characters of a name, which others are appended to
 REALS = {"double": np.float64, "float": np.float32}
-INPUTS = {  # fields of a `Measurement`, and their meaning; under the reading "total" without the last
-    "hub_angle": "hub angle [rad]",
-    "hub_rate": "hub rate [rad/s]",
-    "root_moment": "root moment [N m]",
-    "feedforward": "feedforward torque [{unit}]",
-    "angle_reference": "reference of the hub angle [rad]",
-    "rate_reference": "reference of the hub rate [rad/s]",
-    "rigid_moment": "root moment of the rigid arm [N m]",
+INPUTS = {  # the field of a `Measurement` of each input, in the order of the C source
+    "y_hub_angle": "hub_angle",
+    "y_hub_rate": "hub_rate",
+    "y_root_moment": "root_moment",
+    "r_hub_angle": "angle_reference",
+    "r_hub_rate": "rate_reference",
+    "r_root_moment": "rigid_moment",
+    "feedforward": "feedforward",
 }
-ANGLE, RATE, MOMENT, FORWARD, ANGLE_WANTED, RATE_WANTED, RIGID = range(7)  # their places
+ANGLE, RATE, MOMENT, WANTED_ANGLE, WANTED_RATE, WANTED_MOMENT, FORWARD = 0, 1, 2, 3, 4, 5, -1
+INPUT_ERROR, OVERFLOW = 1, 2
 U, E, X, K, E_BEFORE, TORQUE = range(6)  # places of the state: the last sample, and e of the one before
 
 
@@ -81,9 +82,12 @@ def network_gain(of: Weights, row: Real) -> float:
 
 @compiled
 def step(of: Weights, state: Real, row: Real, inputs: Real) -> int:
-    """Advance by one sample; return 0, or 1 with the state kept.  `row` is for the inputs of the network."""
-    x = inputs[MOMENT] if of.is_total else inputs[MOMENT] - inputs[RIGID]
-    servo = of.Kp * (inputs[ANGLE_WANTED] - inputs[ANGLE]) + of.K1 * (inputs[RATE_WANTED] - inputs[RATE])
+    """Advance by one sample; return 0, or the kind of an error.  `row` is for the inputs of the network."""
+    for value in inputs:
+        if not -of.largest <= value <= of.largest:
+            return INPUT_ERROR
+    x = inputs[MOMENT] if of.is_total else inputs[MOMENT] - inputs[WANTED_MOMENT]
+    servo = of.Kp * (inputs[WANTED_ANGLE] - inputs[ANGLE]) + of.K1 * (inputs[WANTED_RATE] - inputs[RATE])
     u = servo + inputs[FORWARD] if of.is_total else servo
     row[0], row[1], row[2], row[3], row[4], row[5] = u, state[U], state[E], state[E_BEFORE], x, state[X]
     if row.size > K_BEFORE:
@@ -92,7 +96,7 @@ def step(of: Weights, state: Real, row: Real, inputs: Real) -> int:
     e, torque = u - gain * x, (inputs[FORWARD] + servo) - gain * x
     for value in (u, e, x, gain, torque):
         if not -of.largest <= value <= of.largest:
-            return 1
+            return OVERFLOW
     state[E_BEFORE] = state[E]
     state[U], state[E], state[X], state[K], state[TORQUE] = u, e, x, gain, torque
     return 0
@@ -142,7 +146,7 @@ class ExportedTuner:
         must_be_known("precision", precision, REALS)
         self.real = REALS[precision]
         self.weights = weights_of(saved, self.real)
-        self.inputs = tuple(INPUTS)[: 6 if self.weights.is_total else 7]
+        self.inputs = {name: of for name, of in INPUTS.items() if not (self.weights.is_total and of == "rigid_moment")}
         self.reset()
 
     def reset(self) -> None:
@@ -164,7 +168,7 @@ class ExportedTuner:
 
     def row(self, m: Measurement) -> list[float]:
         """The inputs at a sample."""
-        return [getattr(m, name) for name in self.inputs]
+        return [getattr(m, name) for name in self.inputs.values()]
 
 
 class TunerCode(NamedTuple):

@@ -1,0 +1,383 @@
+"""A trained tuner in C: against Python bit for bit, its functions against mpmath, its network against NumPy's."""
+
+import json
+import math
+import subprocess
+from dataclasses import replace
+from fractions import Fraction
+
+import mpmath
+import numpy as np
+import pytest
+
+import tfarm
+from tests.exported import tuners
+from tests.exported.tuners import COMPILERS, DIFFERENCE, LEVELS, REAL, SECTOR, compiled_program, exported, is_equal
+from tests.hostile import NAME, TEXT
+from tests.shared import sized
+from tests.shell import answer, refused
+from tests.survey import tally
+from tests.tuner.plain import plain_gain
+from tfarm.arm import HubFeedback
+from tfarm.dsp import Chain, Sampling, sampled_loop
+from tfarm.errors import ParameterError
+from tfarm.exported import activation as functions
+from tfarm.exported.tuner_code import ExportedTuner
+from tfarm.tuner import TunedGain, find_guard, slew_trial
+from tfarm.tuner.guard import sector_guard
+from tfarm.tuner.kernel import Limits
+from tfarm.tuner.trial import to_text
+
+LAB = "sasaki2012-lab"
+PRECISIONS = list(REAL.values())
+REALS = list(REAL)
+
+
+def rng_of(seed):
+    return np.random.default_rng(seed)
+
+
+def tuner_of(seed, **changed):
+    """A tuner that is certified on the laboratory arm."""
+    usual = {"guard_kind": "time-varying", "guard": SECTOR, "Kp": 0.0, "signals": "vibration"}
+    return tuners.some_tuner(rng_of(seed), **usual | changed)
+
+
+def needs(compiler):
+    """Skip, naming the compiler, where it is not installed."""
+    if not tuners.has_compiler(compiler):
+        pytest.skip(f"{compiler} is not installed")
+
+
+# ------------------------------------------------------------ exp and log
+
+
+def ulps(found, exact, real):
+    """Error of a number in units in the last place of the exact one."""
+    return abs(mpmath.mpf(float(found)) - exact) / mpmath.mpf(float(np.spacing(real(float(exact)))))
+
+
+@pytest.mark.parametrize("size", sized(2000, 100_000))
+@pytest.mark.parametrize("real", REALS)
+def test_errors_of_exp_and_log(real, size):
+    """Within the stated units in the last place of mpmath, next to both ends, both changes of branch, and tiny ones."""
+    of, rng = functions.activation(real), rng_of(0)
+    ends = np.array([0.5, 1.5, 2.5]) * math.log(2.0)
+    x = -np.r_[rng.uniform(0, -float(of.lowest), size), 10 ** rng.uniform(-30, 0, size), rng.uniform(0, 2, size)]
+    x = np.r_[x, -ends, -ends * (1 + 2.0**-20), np.nextafter(of.lowest, real(0))].astype(real)
+    y = np.r_[rng.uniform(0, 1, size), 10 ** rng.uniform(-30, 0, size), rng.uniform(0.41, 0.45, size), 1.0]
+    y = np.r_[y, of.turn, np.nextafter(of.turn, real(0))].astype(real)
+    with mpmath.workprec(150):
+        exp = max(ulps(functions.exponential(each, of), mpmath.exp(mpmath.mpf(float(each))), real) for each in x)
+        log = max(ulps(functions.logarithm(each, of), mpmath.log1p(mpmath.mpf(float(each))), real) for each in y)
+    print(f"{real.__name__}: exp {float(exp):.3f} ulp, log {float(log):.3f} ulp")
+    assert 0.5 < exp <= functions.ULPS["exp"]
+    assert 0.5 < log <= functions.ULPS["log"]
+
+
+@pytest.mark.parametrize(("real", "digits"), [(np.float64, 53), (np.float32, 24)])
+def test_constants_of_exp_and_log(real, digits):
+    """ln 2 = h + l, k h exact; the terms that the series leave out are below a tenth of half a unit."""
+    of = functions.activation(real)
+    with mpmath.workprec(200):
+        left = abs(mpmath.log(2) - mpmath.mpf(float(of.high)) - mpmath.mpf(float(of.low)))
+        assert left < mpmath.mpf(2) ** (-digits) * abs(mpmath.mpf(float(of.low)))
+    largest = math.ceil(-float(of.lowest) / math.log(2.0))
+    for k in (1, 3, largest - 1, largest):
+        assert Fraction(float(real(k) * of.high)) == k * Fraction(float(of.high))
+    assert float(of.shift) == 1.5 * 2 ** (digits - 1)
+    r, s, terms = math.log(2) / 2, (math.sqrt(2) - 1) / (math.sqrt(2) + 1), of.atanh.size
+    assert r**of.taylor.size / math.factorial(of.taylor.size) / math.exp(-r) < 0.1 * 2.0**-digits
+    # over the least of |f| that the branches reach with that s
+    assert s ** (2 * terms + 2) * 2 / (2 * terms + 3) / (1 - s**2) * s < 0.1 * 2.0**-digits * math.log(math.sqrt(2))
+    np.testing.assert_array_equal(of.taylor, [real(1 / math.factorial(n)) for n in range(of.taylor.size)])
+    np.testing.assert_array_equal(of.atanh, [real(2 / (2 * j + 3)) for j in range(terms)])
+
+
+@pytest.mark.parametrize("real", REALS)
+def test_ends_of_exp_and_sigmoid(real):
+    of = functions.activation(real)
+    assert functions.exponential(real(0), of) == 1
+    assert functions.logarithm(real(0), of) == 0
+    assert [functions.exponential(real(x), of) for x in (of.lowest, -math.inf)] == [0, 0]
+    assert math.isnan(functions.exponential(real(math.nan), of))
+    assert [functions.sigmoid(real(x), of) for x in (-math.inf, 0, math.inf)] == [0, 0.5, 1]
+    assert [functions.softplus(real(x), of) for x in (-math.inf, 50, math.inf)] == [0, 50, math.inf]
+    assert math.isnan(functions.softplus(real(math.nan), of))
+
+
+# ------------------------------------------------------------ the step
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_gains_are_those_of_the_network_in_numpy(seed):
+    """lo + (hi - lo)(1 - 1/(1 + e^z)) and ln(1 + e^z) by NumPy; the difference is some roundings of sums of that size."""
+    saved, rng = tuners.some_tuner(rng_of(seed)), rng_of(100 + seed)
+    tuner, gain = ExportedTuner(saved), saved.gain()
+    inputs = rng.normal(size=(50, len(tuner.inputs)))
+    past = [np.zeros(4), np.zeros(4)]  # u, e, x, K
+    for row in inputs:
+        m = dict(zip(tuner.inputs, row, strict=True))
+        x = m["y_root_moment"] - m.get("r_root_moment", 0.0)
+        servo = saved.Kp * (m["r_hub_angle"] - m["y_hub_angle"]) + saved.K1 * (m["r_hub_rate"] - m["y_hub_rate"])
+        u = servo + (m["feedforward"] if saved.signals == "total" else 0.0)
+        (u1, e1, x1, K1), (_, e2, _, _) = past
+        full = np.array([u, u1, e1, e2, x, x1, K1])
+        K = plain_gain(full, gain.network.weights, len(saved.w2), gain.network.scales, gain.guard)
+        past = [np.array([u, u - K * x, x, K]), past[0]]
+        status, torque = tuner.run(row[None])
+        sums = abs(np.array(saved.W1)) @ abs(full[: len(saved.scales)] / saved.scales)
+        error = 1e-15 * (1 + 40 * abs(np.array(saved.w2)) @ (1 + sums)) * (1 + abs(x))
+        assert status[0] == 0
+        assert torque[0] == pytest.approx(m["feedforward"] + servo - K * x, rel=1e-14, abs=error)
+        past[0] = tuner.state[[0, 1, 2, 3]]
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+@pytest.mark.parametrize("signals", ["vibration", "total"])
+def test_a_sample_that_is_not_finite_is_refused(precision, signals):
+    """An error status, the torque before, the state kept: what follows is as without that sample."""
+    tuner, rng = ExportedTuner(tuner_of(1, signals=signals), precision), rng_of(0)
+    rows = rng.normal(size=(40, len(tuner.inputs)))
+    _, expected = tuner.run(rows)
+    for place in range(rows.shape[1]):
+        for value in (math.nan, math.inf, -math.inf, 1.1 * float(tuner.weights.largest)):
+            odd = np.insert(rows, 20, rows[20], axis=0)
+            odd[20, place] = value
+            tuner.reset()
+            status, torque = tuner.run(odd)
+            assert status.nonzero()[0].tolist() == [20]
+            assert status[20] == 1
+            assert torque[20] == torque[19]
+            np.testing.assert_array_equal(np.delete(torque, 20), expected)
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_no_kept_state_refuses_a_later_sample(precision):
+    """The largest inputs, weights and the smallest scales: a refused result is one of that sample alone."""
+    for seed in range(20):
+        rng = rng_of(seed)
+        saved = tuners.some_tuner(rng)
+        tuner = ExportedTuner(saved.model_copy(update={"W1": (1e6 * np.array(saved.W1)).tolist()}), precision)
+        largest = float(tuner.weights.largest)
+        rows = rng.choice([-1.0, -1e-3, 1.0, 1e-3], (200, len(tuner.inputs))) * largest
+        rows[1::2] = rng.normal(size=(100, len(tuner.inputs)))
+        status, torque = tuner.run(rows)
+        assert np.isfinite(torque).all()
+        assert not status[1::2].any()
+        assert set(status[::2].tolist()) <= {0, 2}
+
+
+def test_a_result_beyond_the_largest_number_is_refused():
+    """A finite input times a gain of ten."""
+    saved = tuner_of(0, guard=(5.0, 10.0))
+    tuner = ExportedTuner(saved)
+    row = np.zeros((1, 7))
+    row[0, 2] = 0.9 * float(tuner.weights.largest)
+    status, torque = tuner.run(row)
+    assert (status[0], torque[0], tuner.state.tolist()) == (2, 0.0, [0.0] * 6)
+
+
+@pytest.mark.parametrize(("changed", "key"), [({"K1": 1e39}, "K1"), ({"scales": [1e-50] * 6}, "scales")])
+def test_numbers_beyond_float_are_refused_by_name(changed, key):
+    W1 = {"W1": np.ones((2, 6)).tolist(), "w2": [1.0, 1.0], "scales": [1.0] * 6}
+    saved = tuner_of(0, **W1 | changed)
+    ExportedTuner(saved)
+    with pytest.raises(ParameterError, match="export it in double") as caught:
+        ExportedTuner(saved, "float")
+    assert caught.value.key == key
+
+
+@pytest.mark.parametrize("guard", [(0.31, 0.63), (0.1, 0.3), (1 / 3, 0.7)])
+def test_the_guard_is_rounded_inwards(guard):
+    for seed in range(10):
+        tuner = ExportedTuner(tuner_of(seed, guard=guard, w2=[1e3]*6, W1=rng_of(seed).normal(size=(6, 6)).tolist(), scales=[1.0] * 6), "float")
+        tuner.run(rng_of(seed).normal(0, 10, (50, 7)))
+        assert guard[0] <= float(tuner.weights.lo) < float(tuner.weights.hi) <= guard[1]
+        assert guard[0] <= float(tuner.state[3]) <= guard[1]
+    with pytest.raises(ParameterError, match="guard"):
+        ExportedTuner(tuner_of(0, guard=(0.3, math.nextafter(0.3, 1))), "float")
+
+
+# ------------------------------------------------------------ the simulated slew
+
+
+@pytest.mark.parametrize("signals", ["vibration", "total"])
+@pytest.mark.parametrize("Kp", [0.0, 2.0])
+def test_a_slew_is_that_of_the_tuner(lab, signals, Kp):
+    """The difference from tfarm's own simulation is within the stated bound.
+
+    And within what roundings of every signal do to tfarm's own: as much as planted relative errors, to scale.
+    """
+    saved = tuner_of(5, signals=signals, Kp=Kp)
+    trial = slew_trial(lab, K1=saved.K1, Kp=Kp, signals=signals)
+    found = tuners.differences(trial, saved)
+    planted, rng, gain = 1e-6, rng_of(0), saved.gain()
+    own = gain.run(trial.simulator())
+
+    def shaken(value):
+        return float(value * (1 + planted * rng.uniform(-1, 1)))
+
+    def controller(m):
+        m = m._replace(**{name: shaken(getattr(m, name)) for name in ExportedTuner(saved).inputs.values()})
+        m = m._replace(vibration=shaken(m.root_moment - m.rigid_moment))
+        return shaken(m.feedforward + m.servo(gain.servo) - shaken(gain(m)) * m.vibration)
+
+    size = abs(trial.simulator().controller(controller).torque - own.torque).max() / abs(own.torque).max()
+    for precision, digits in (("double", 53), ("float", 24)):
+        assert found[precision] <= DIFFERENCE[precision]
+        assert found[precision] <= 10 * size / planted * 2.0**-digits
+    assert found["float"] > 1e-9  # the arithmetic is that of float
+
+
+# ------------------------------------------------------------ C
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_c_is_python_to_the_last_bit(tmp_path, compiler, level, precision):
+    """20,000 samples in all, of every kind of tuner, with refused ones among them."""
+    needs(compiler)
+    rng = rng_of(7)
+    for n, changed in enumerate(({}, {"guard": None, "guard_kind": "none"}, {"signals": "total"}, {"signals": "vibration"})):
+        saved = tuners.some_tuner(rng_of(n), **changed)
+        tuner = exported(tmp_path, saved, precision, anyway=True)
+        rows = tuners.some_inputs(rng, 5000, len(tuner.inputs))
+        assert is_equal(tmp_path, tuner, rows, compiler, level)[0], (n, saved)
+        assert {0, 1} <= set(tuner.run(rows)[0].tolist())
+
+
+def test_the_comparison_is_of_every_bit(tmp_path):
+    """One coefficient in its last place, and the comparison fails."""
+    needs("gcc")
+    tuner, rng = exported(tmp_path, tuner_of(2)), rng_of(0)
+    rows = tuners.some_inputs(rng, 2000, len(tuner.inputs))
+    assert is_equal(tmp_path, tuner, rows, "gcc")[0]
+    source = (tmp_path / "tuner.c").read_text()
+    number = functions.activation(np.float64).taylor[4]
+    before, after = (tuner_literal(each) for each in (number, np.nextafter(number, 1.0)))
+    assert source.count(before) == 1
+    (tmp_path / "tuner.c").write_text(source.replace(before, after))
+    assert not is_equal(tmp_path, tuner, rows, "gcc")[0]
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_the_self_test_runs(tmp_path, compiler, precision):
+    needs(compiler)
+    exported(tmp_path, tuner_of(3), precision)
+    done = subprocess.run([compiled_program(tmp_path, compiler)], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (0, "0 of 1000 samples differ\n")
+    source = (tmp_path / "tuner.c").read_text()
+    (tmp_path / "tuner.c").write_text(source.replace("z += w2[j]", "z -= w2[j]"))
+    done = subprocess.run([compiled_program(tmp_path, compiler)], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 1
+
+
+def test_no_library_is_called(tmp_path):
+    """Neither libm nor malloc: the object file at -O0 has no undefined symbol but copies of memory."""
+    needs("gcc")
+    needs("nm")
+    exported(tmp_path, tuner_of(4, guard=None, guard_kind="none"), anyway=True)
+    subprocess.run(["gcc", "-std=c99", "-O0", "-c", "tuner.c"], cwd=tmp_path, check=True, timeout=60)
+    found = subprocess.run(["nm", "-u", "tuner.o"], cwd=tmp_path, capture_output=True, text=True, check=True, timeout=60)
+    assert {line.split()[-1] for line in found.stdout.splitlines()} <= {"memcpy", "memset"}
+
+
+def test_sanitizers_find_nothing(tmp_path):
+    needs("gcc")
+    for precision in PRECISIONS:
+        tuner = exported(tmp_path, tuner_of(6, guard=None, guard_kind="none"), precision, anyway=True)
+        rows = tuners.some_inputs(rng_of(0), 2000, len(tuner.inputs))
+        checked = ("-fsanitize=undefined,address", "-fno-sanitize-recover=all")
+        assert is_equal(tmp_path, tuner, rows, "gcc", *checked)[0]
+
+
+def test_cppcheck_finds_nothing(tmp_path):
+    needs("cppcheck")
+    exported(tmp_path, tuner_of(6))
+    command = ["cppcheck", "--std=c99", "--enable=warning,performance,portability", "--error-exitcode=1", "tuner.c"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+# ------------------------------------------------------------ the certificate, texts and refusals
+
+
+def test_the_guard_is_certified_anew(lab, tmp_path):
+    """A sector of the default rule again; beyond its radius there is none; at C = 0 it is not settled."""
+    loop = sampled_loop(lab, HubFeedback(K1=0.3, K2=1.0), count=6)
+    guard = find_guard(loop, "time-varying", 0.336)
+    again = sector_guard(loop, guard.lo, guard.hi)
+    assert (again.is_proven, again.sentence) == (guard.is_proven, guard.sentence) == (True, again.sentence)
+    assert sector_guard(loop, guard.lo, 1.2 * guard.hi) is None
+    assert not sector_guard(sampled_loop(tfarm.load("sasaki2012"), HubFeedback(K1=0.3, K2=1.0), count=6), *SECTOR).is_proven
+
+
+@pytest.mark.parametrize(
+    ("changed", "arm"), [({"guard": None, "guard_kind": "none"}, LAB), ({"guard": (0.0, 1.1)}, LAB), ({}, "sasaki2012")]
+)
+def test_a_gain_without_a_certificate_needs_anyway(tmp_path, changed, arm):
+    saved = tuner_of(0, **changed)
+    with pytest.raises(ParameterError, match="--anyway exports it"):
+        exported(tmp_path, saved, arm=arm)
+    assert not (tmp_path / "tuner.c").exists()
+    exported(tmp_path, saved, arm=arm, anyway=True)
+    assert "NOT CERTIFIED STABLE; exported by --anyway" in (tmp_path / "tuner.h").read_text()
+
+
+def test_what_is_refused(tmp_path, lab):
+    (tmp_path / "tuned.json").write_text(to_text(tuner_of(0)))
+    how = {"what": "tuner", "form": "c", "folder": tmp_path / "out"}
+    file = tmp_path / "tuned.json"
+    for changed, key in (
+        ({}, "tuned"),
+        ({"tuned": file, "chain": Chain(sampling=Sampling(period=0.005))}, "sampling.period"),
+        ({"tuned": file, "precision": "q31"}, "precision"),
+        ({"tuned": tmp_path / "none.json"}, "controller"),
+    ):
+        with pytest.raises(ParameterError) as caught:
+            tfarm.export(lab, **how | changed)
+        assert caught.value.key == key
+        assert "\n" not in str(caught.value)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", [NAME, TEXT[:80], "*/ int x; /*", "a\\\nb??/", "x" * 80])
+def test_hostile_names_of_arms(tmp_path, lab, name):
+    """Names of the arm and of the arm of the training, in comments."""
+    needs("gcc")
+    exported(tmp_path, tuner_of(0, arm=name), arm=lab.having(damping=lab.damping) if name == TEXT[:80] else replace(lab, name=name))
+    for file in ("tuner.h", "tuner.c"):
+        text = (tmp_path / file).read_bytes()
+        assert text.isascii()
+        assert text.count(b"/*") == text.count(b"*/")
+    assert subprocess.run([compiled_program(tmp_path, "gcc")], timeout=60, check=False).returncode == 0
+
+
+@pytest.mark.parametrize("name", ["int", "while", "9lives", "_Bool", "a b; c", "../x", "y" * 99, "שלום", "printf", "main"])
+def test_hostile_names_in_c(tmp_path, name):
+    needs("gcc")
+    exported(tmp_path, tuner_of(0), name=name)
+    assert subprocess.run([compiled_program(tmp_path, "gcc")], timeout=60, check=False).returncode == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["program", "self_test.c", "tuned.json", "tuner.c", "tuner.h"]
+
+
+def test_the_command(tmp_path, capsys):
+    file, out = tmp_path / "tuned.json", tmp_path / "out"
+    file.write_text(to_text(tuner_of(0)))
+    arguments = ("export", LAB, "--what", "tuner", "--as", "c", "--tuned", str(file), "--out", str(out))
+    found = answer(capsys, *arguments, "--name", "gain")
+    assert found["files"] == ["tuner.h", "tuner.c", "self_test.c"]
+    assert "certified for any K(t)" in found["verdict"]
+    assert "int gain_step(" in (out / "tuner.h").read_text()
+    line = refused(capsys, *arguments, "--period", "0.02")
+    assert "sampling.period = 0.02: the tuner was trained every 0.01 s" in line
+
+
+def test_a_small_survey():
+    for survey in (tuners.slews,):
+        outcomes, _, wrong = tally(survey, 5, 3)
+        assert not wrong
+        assert sum(outcomes.values()) == 1
