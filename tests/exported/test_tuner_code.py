@@ -1,6 +1,5 @@
 """A trained tuner in C: against Python bit for bit, its functions against mpmath, its network against NumPy's."""
 
-import json
 import math
 import subprocess
 from dataclasses import replace
@@ -21,14 +20,16 @@ from tests.tuner.plain import plain_gain
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.errors import ParameterError
-from tfarm.exported import activation as functions
+from tfarm.exported import tuner_twin as functions
+from tfarm.exported.texts import literal
 from tfarm.exported.tuner_code import ExportedTuner
-from tfarm.tuner import TunedGain, find_guard, slew_trial
+from tfarm.tuner import find_guard, slew_trial
 from tfarm.tuner.guard import sector_guard
-from tfarm.tuner.kernel import Limits
 from tfarm.tuner.trial import to_text
 
 LAB = "sasaki2012-lab"
+GUARDED = {"guard": SECTOR, "guard_kind": "time-varying"}  # certified on the laboratory arm
+FREE = {"guard": None, "guard_kind": "none"}  # without a guard: no certificate is sought
 PRECISIONS = list(REAL.values())
 REALS = list(REAL)
 
@@ -39,8 +40,7 @@ def rng_of(seed):
 
 def tuner_of(seed, **changed):
     """A tuner that is certified on the laboratory arm."""
-    usual = {"guard_kind": "time-varying", "guard": SECTOR, "Kp": 0.0, "signals": "vibration"}
-    return tuners.some_tuner(rng_of(seed), **usual | changed)
+    return tuners.some_tuner(rng_of(seed), **GUARDED | {"Kp": 0.0, "signals": "vibration"} | changed)
 
 
 def needs(compiler):
@@ -86,12 +86,12 @@ def test_constants_of_exp_and_log(real, digits):
     for k in (1, 3, largest - 1, largest):
         assert Fraction(float(real(k) * of.high)) == k * Fraction(float(of.high))
     assert float(of.shift) == 1.5 * 2 ** (digits - 1)
-    r, s, terms = math.log(2) / 2, (math.sqrt(2) - 1) / (math.sqrt(2) + 1), of.atanh.size
+    r, s, terms = math.log(2) / 2, (math.sqrt(2) - 1) / (math.sqrt(2) + 1), of.artanh.size
     assert r**of.taylor.size / math.factorial(of.taylor.size) / math.exp(-r) < 0.1 * 2.0**-digits
     # over the least of |f| that the branches reach with that s
     assert s ** (2 * terms + 2) * 2 / (2 * terms + 3) / (1 - s**2) * s < 0.1 * 2.0**-digits * math.log(math.sqrt(2))
     np.testing.assert_array_equal(of.taylor, [real(1 / math.factorial(n)) for n in range(of.taylor.size)])
-    np.testing.assert_array_equal(of.atanh, [real(2 / (2 * j + 3)) for j in range(terms)])
+    np.testing.assert_array_equal(of.artanh, [real(2 / (2 * j + 3)) for j in range(terms)])
 
 
 @pytest.mark.parametrize("real", REALS)
@@ -111,8 +111,13 @@ def test_ends_of_exp_and_sigmoid(real):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_gains_are_those_of_the_network_in_numpy(seed):
-    """lo + (hi - lo)(1 - 1/(1 + e^z)) and ln(1 + e^z) by NumPy; the difference is some roundings of sums of that size."""
-    saved, rng = tuners.some_tuner(rng_of(seed)), rng_of(100 + seed)
+    """The gain by NumPy's exp and log; the difference is some roundings of sums of the network's size."""
+    rng = rng_of(seed)
+    saved = tuners.some_tuner(rng)
+    small = {
+        name: (np.array(value) / np.abs(value).max()).tolist() for name, value in (("W1", saved.W1), ("w2", saved.w2))
+    }
+    saved = saved.model_copy(update=small)
     tuner, gain = ExportedTuner(saved), saved.gain()
     inputs = rng.normal(size=(50, len(tuner.inputs)))
     past = [np.zeros(4), np.zeros(4)]  # u, e, x, K
@@ -125,7 +130,7 @@ def test_gains_are_those_of_the_network_in_numpy(seed):
         full = np.array([u, u1, e1, e2, x, x1, K1])
         K = plain_gain(full, gain.network.weights, len(saved.w2), gain.network.scales, gain.guard)
         past = [np.array([u, u - K * x, x, K]), past[0]]
-        status, torque = tuner.run(row[None])
+        torque, status = tuner.run(row[None])
         sums = abs(np.array(saved.W1)) @ abs(full[: len(saved.scales)] / saved.scales)
         error = 1e-15 * (1 + 40 * abs(np.array(saved.w2)) @ (1 + sums)) * (1 + abs(x))
         assert status[0] == 0
@@ -139,13 +144,13 @@ def test_a_sample_that_is_not_finite_is_refused(precision, signals):
     """An error status, the torque before, the state kept: what follows is as without that sample."""
     tuner, rng = ExportedTuner(tuner_of(1, signals=signals), precision), rng_of(0)
     rows = rng.normal(size=(40, len(tuner.inputs)))
-    _, expected = tuner.run(rows)
+    expected, _ = tuner.run(rows)
     for place in range(rows.shape[1]):
         for value in (math.nan, math.inf, -math.inf, 1.1 * float(tuner.weights.largest)):
             odd = np.insert(rows, 20, rows[20], axis=0)
             odd[20, place] = value
             tuner.reset()
-            status, torque = tuner.run(odd)
+            torque, status = tuner.run(odd)
             assert status.nonzero()[0].tolist() == [20]
             assert status[20] == 1
             assert torque[20] == torque[19]
@@ -162,7 +167,7 @@ def test_no_kept_state_refuses_a_later_sample(precision):
         largest = float(tuner.weights.largest)
         rows = rng.choice([-1.0, -1e-3, 1.0, 1e-3], (200, len(tuner.inputs))) * largest
         rows[1::2] = rng.normal(size=(100, len(tuner.inputs)))
-        status, torque = tuner.run(rows)
+        torque, status = tuner.run(rows)
         assert np.isfinite(torque).all()
         assert not status[1::2].any()
         assert set(status[::2].tolist()) <= {0, 2}
@@ -174,7 +179,7 @@ def test_a_result_beyond_the_largest_number_is_refused():
     tuner = ExportedTuner(saved)
     row = np.zeros((1, 7))
     row[0, 2] = 0.9 * float(tuner.weights.largest)
-    status, torque = tuner.run(row)
+    torque, status = tuner.run(row)
     assert (status[0], torque[0], tuner.state.tolist()) == (2, 0.0, [0.0] * 6)
 
 
@@ -191,7 +196,8 @@ def test_numbers_beyond_float_are_refused_by_name(changed, key):
 @pytest.mark.parametrize("guard", [(0.31, 0.63), (0.1, 0.3), (1 / 3, 0.7)])
 def test_the_guard_is_rounded_inwards(guard):
     for seed in range(10):
-        tuner = ExportedTuner(tuner_of(seed, guard=guard, w2=[1e3]*6, W1=rng_of(seed).normal(size=(6, 6)).tolist(), scales=[1.0] * 6), "float")
+        W1, w2 = rng_of(seed).normal(size=(6, 6)).tolist(), [1e3] * 6
+        tuner = ExportedTuner(tuner_of(seed, guard=guard, W1=W1, w2=w2, scales=[1.0] * 6), "float")
         tuner.run(rng_of(seed).normal(0, 10, (50, 7)))
         assert guard[0] <= float(tuner.weights.lo) < float(tuner.weights.hi) <= guard[1]
         assert guard[0] <= float(tuner.state[3]) <= guard[1]
@@ -219,7 +225,7 @@ def test_a_slew_is_that_of_the_tuner(lab, signals, Kp):
         return float(value * (1 + planted * rng.uniform(-1, 1)))
 
     def controller(m):
-        m = m._replace(**{name: shaken(getattr(m, name)) for name in ExportedTuner(saved).inputs.values()})
+        m = m._replace(**{name: shaken(getattr(m, name)) for name, _, _ in ExportedTuner(saved).inputs.values()})
         m = m._replace(vibration=shaken(m.root_moment - m.rigid_moment))
         return shaken(m.feedforward + m.servo(gain.servo) - shaken(gain(m)) * m.vibration)
 
@@ -233,30 +239,38 @@ def test_a_slew_is_that_of_the_tuner(lab, signals, Kp):
 # ------------------------------------------------------------ C
 
 
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    """Files of a tuner of every kind in each precision, its twin in Python, and inputs with refused ones among them."""
+    found = {precision: [] for precision in PRECISIONS}
+    for precision, kinds in found.items():
+        for n, changed in enumerate((FREE, FREE | {"signals": "total"}, GUARDED, GUARDED | {"signals": "vibration"})):
+            folder = tmp_path_factory.mktemp("tuner")
+            tuner = exported(folder, tuners.some_tuner(rng_of(n), **changed), precision, anyway=True)
+            rows = tuners.some_inputs(rng_of(10 + n), 5000, len(tuner.inputs))
+            assert {0, 1} <= set(tuner.run(rows)[1].tolist())
+            kinds.append((folder, tuner, rows))
+    return found
+
+
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("precision", PRECISIONS)
-def test_c_is_python_to_the_last_bit(tmp_path, compiler, level, precision):
-    """20,000 samples in all, of every kind of tuner, with refused ones among them."""
+def test_c_is_python_to_the_last_bit(folders, compiler, level, precision):
+    """20,000 samples in all."""
     needs(compiler)
-    rng = rng_of(7)
-    for n, changed in enumerate(({}, {"guard": None, "guard_kind": "none"}, {"signals": "total"}, {"signals": "vibration"})):
-        saved = tuners.some_tuner(rng_of(n), **changed)
-        tuner = exported(tmp_path, saved, precision, anyway=True)
-        rows = tuners.some_inputs(rng, 5000, len(tuner.inputs))
-        assert is_equal(tmp_path, tuner, rows, compiler, level)[0], (n, saved)
-        assert {0, 1} <= set(tuner.run(rows)[0].tolist())
+    for folder, tuner, rows in folders[precision]:
+        assert is_equal(folder, tuner, rows, compiler, level)[0], folder
 
 
 def test_the_comparison_is_of_every_bit(tmp_path):
-    """One coefficient in its last place, and the comparison fails."""
+    """The lower end of the guard in its last place, and the comparison fails."""
     needs("gcc")
-    tuner, rng = exported(tmp_path, tuner_of(2)), rng_of(0)
-    rows = tuners.some_inputs(rng, 2000, len(tuner.inputs))
+    tuner, rows = exported(tmp_path, tuner_of(2)), rng_of(0).normal(size=(2000, 7))
     assert is_equal(tmp_path, tuner, rows, "gcc")[0]
     source = (tmp_path / "tuner.c").read_text()
-    number = functions.activation(np.float64).taylor[4]
-    before, after = (tuner_literal(each) for each in (number, np.nextafter(number, 1.0)))
+    number = tuner.weights.lo
+    before, after = (literal(each) for each in (number, np.nextafter(number, 1.0)))
     assert source.count(before) == 1
     (tmp_path / "tuner.c").write_text(source.replace(before, after))
     assert not is_equal(tmp_path, tuner, rows, "gcc")[0]
@@ -279,16 +293,18 @@ def test_no_library_is_called(tmp_path):
     """Neither libm nor malloc: the object file at -O0 has no undefined symbol but copies of memory."""
     needs("gcc")
     needs("nm")
-    exported(tmp_path, tuner_of(4, guard=None, guard_kind="none"), anyway=True)
+    exported(tmp_path, tuner_of(4, **FREE), anyway=True)
     subprocess.run(["gcc", "-std=c99", "-O0", "-c", "tuner.c"], cwd=tmp_path, check=True, timeout=60)
-    found = subprocess.run(["nm", "-u", "tuner.o"], cwd=tmp_path, capture_output=True, text=True, check=True, timeout=60)
+    found = subprocess.run(
+        ["nm", "-u", "tuner.o"], cwd=tmp_path, capture_output=True, text=True, check=True, timeout=60
+    )
     assert {line.split()[-1] for line in found.stdout.splitlines()} <= {"memcpy", "memset"}
 
 
 def test_sanitizers_find_nothing(tmp_path):
     needs("gcc")
     for precision in PRECISIONS:
-        tuner = exported(tmp_path, tuner_of(6, guard=None, guard_kind="none"), precision, anyway=True)
+        tuner = exported(tmp_path, tuner_of(6, **FREE), precision, anyway=True)
         rows = tuners.some_inputs(rng_of(0), 2000, len(tuner.inputs))
         checked = ("-fsanitize=undefined,address", "-fno-sanitize-recover=all")
         assert is_equal(tmp_path, tuner, rows, "gcc", *checked)[0]
@@ -312,12 +328,10 @@ def test_the_guard_is_certified_anew(lab, tmp_path):
     again = sector_guard(loop, guard.lo, guard.hi)
     assert (again.is_proven, again.sentence) == (guard.is_proven, guard.sentence) == (True, again.sentence)
     assert sector_guard(loop, guard.lo, 1.2 * guard.hi) is None
-    assert not sector_guard(sampled_loop(tfarm.load("sasaki2012"), HubFeedback(K1=0.3, K2=1.0), count=6), *SECTOR).is_proven
+    assert sector_guard(sampled_loop(lab.having(damping=0.0), HubFeedback(K1=0.3, K2=1.0), count=6), *SECTOR) is None
 
 
-@pytest.mark.parametrize(
-    ("changed", "arm"), [({"guard": None, "guard_kind": "none"}, LAB), ({"guard": (0.0, 1.1)}, LAB), ({}, "sasaki2012")]
-)
+@pytest.mark.parametrize(("changed", "arm"), [(FREE, LAB), ({"guard": (0.0, 1.1)}, LAB), ({}, "sasaki2012")])
 def test_a_gain_without_a_certificate_needs_anyway(tmp_path, changed, arm):
     saved = tuner_of(0, **changed)
     with pytest.raises(ParameterError, match="--anyway exports it"):
@@ -346,9 +360,9 @@ def test_what_is_refused(tmp_path, lab):
 
 @pytest.mark.parametrize("name", [NAME, TEXT[:80], "*/ int x; /*", "a\\\nb??/", "x" * 80])
 def test_hostile_names_of_arms(tmp_path, lab, name):
-    """Names of the arm and of the arm of the training, in comments."""
+    """Names of the arm, and of the arm of the training, in comments."""
     needs("gcc")
-    exported(tmp_path, tuner_of(0, arm=name), arm=lab.having(damping=lab.damping) if name == TEXT[:80] else replace(lab, name=name))
+    exported(tmp_path, tuner_of(0, arm=name, **FREE), arm=replace(lab, name=NAME), anyway=True)
     for file in ("tuner.h", "tuner.c"):
         text = (tmp_path / file).read_bytes()
         assert text.isascii()
@@ -356,12 +370,20 @@ def test_hostile_names_of_arms(tmp_path, lab, name):
     assert subprocess.run([compiled_program(tmp_path, "gcc")], timeout=60, check=False).returncode == 0
 
 
-@pytest.mark.parametrize("name", ["int", "while", "9lives", "_Bool", "a b; c", "../x", "y" * 99, "שלום", "printf", "main"])
+@pytest.mark.parametrize(
+    "name", ["int", "while", "9lives", "_Bool", "a b; c", "../x", "y" * 99, "שלום", "printf", "main"]
+)
 def test_hostile_names_in_c(tmp_path, name):
     needs("gcc")
-    exported(tmp_path, tuner_of(0), name=name)
+    exported(tmp_path, tuner_of(0, **FREE), name=name, anyway=True)
     assert subprocess.run([compiled_program(tmp_path, "gcc")], timeout=60, check=False).returncode == 0
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["program", "self_test.c", "tuned.json", "tuner.c", "tuner.h"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "program",
+        "self_test.c",
+        "tuned.json",
+        "tuner.c",
+        "tuner.h",
+    ]
 
 
 def test_the_command(tmp_path, capsys):
@@ -377,7 +399,5 @@ def test_the_command(tmp_path, capsys):
 
 
 def test_a_small_survey():
-    for survey in (tuners.slews,):
-        outcomes, _, wrong = tally(survey, 5, 3)
-        assert not wrong
-        assert sum(outcomes.values()) == 1
+    outcomes, _, wrong = tally(tuners.slews, 5, 3)
+    assert (wrong, sum(outcomes.values())) == (0, 1)

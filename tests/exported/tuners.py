@@ -42,7 +42,7 @@ int main(void)
     static REAL rows[MOST][N], torques[MOST];
     static unsigned char statuses[MOST];
     tuner_state state;
-    tuner_inputs in;
+    tuner_input in;
     REAL *const fields[] = { FIELDS };
     size_t count = fread(rows, sizeof rows[0], MOST, stdin), k;
     int i;
@@ -86,7 +86,8 @@ def run_in_c(folder, tuner, rows, compiler, *options):
     program = compiled_program(
         folder, compiler, *options, *(f"-D{name}={text}" for name, text in macros.items()), main="driver.c"
     )
-    given = np.ascontiguousarray(rows, dtype=tuner.real).tobytes()
+    with np.errstate(over="ignore"):
+        given = np.ascontiguousarray(rows, dtype=tuner.real).tobytes()
     done = subprocess.run([program], input=given, capture_output=True, timeout=RUN_TIME, check=True)
     torques = np.frombuffer(done.stdout, tuner.real, len(rows))
     return np.frombuffer(done.stdout[torques.nbytes :], np.uint8), torques, 1e9 * float(done.stderr) / len(rows)
@@ -119,7 +120,7 @@ def some_inputs(rng, samples, width):
 def is_equal(folder, tuner, rows, compiler, *options):
     """Whether C and Python are equal to the last bit, and the time of a step [ns]."""
     tuner.reset()
-    statuses, torques = tuner.run(rows)
+    torques, statuses = tuner.run(rows)
     in_c, torques_in_c, time = run_in_c(folder, tuner, rows, compiler, *options)
     return bool((in_c == statuses).all() and torques_in_c.tobytes() == torques.tobytes()), time
 
@@ -151,7 +152,11 @@ def bits(size, seed):
     rng = np.random.default_rng(seed)
     samples = SAMPLES // (2 * size)
     for n in range(size):
-        saved = some_tuner(rng, W1=rng.normal(size=(6, 6)).tolist(), w2=[0.3] * 6, scales=[1.0] * 6) if n == 0 else some_tuner(rng)
+        saved = (
+            some_tuner(rng, W1=rng.normal(size=(6, 6)).tolist(), w2=[0.3] * 6, scales=[1.0] * 6)
+            if n == 0
+            else some_tuner(rng)
+        )
         for precision in REAL.values():
             with tempfile.TemporaryDirectory() as place:
                 tuner = exported(Path(place), saved, precision, anyway=True)

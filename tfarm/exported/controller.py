@@ -7,7 +7,7 @@ the delay of the law as the simulation has them.  The loop is judged with the co
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple
@@ -29,12 +29,12 @@ from tfarm.exact.outputs import OUTPUTS
 from tfarm.exported import twin
 from tfarm.exported.realisation import NoiseGain, around, as_one, least_noise, with_matrices
 from tfarm.exported.result import Export, ExportTask, is_certified, names_of
-from tfarm.exported.texts import facts_of, identifiers, render
+from tfarm.exported.texts import facts_of, identifiers, literal, name_in_c, render
 from tfarm.exported.word_length import FIXED, FLOATS, MOST_SUMMED, OUTPUT, Word, matrices_of, word_of
 from tfarm.records import record
 from tfarm.schema import Quantity
 
-NAME, LONGEST_NAME = "controller", 16  # of identifiers in C, before "_step" and the like
+NAME = "controller"  # of identifiers in C
 RECORDED, REFUSED, SEED = 1000, 500, 1  # samples of the self-test, the one with a NaN, its first random number
 WHOLE_SAMPLE = 1e-9  # of a sample: rounding of a delay
 RATE, ANGLE = "hub_rate", "hub_angle"
@@ -217,31 +217,27 @@ def written(
 ) -> tuple[dict[str, bytes], list[Any]]:
     """The files by name, and the identifiers of names."""
     word, is_fixed = controller.word, task.precision == FIXED
-    wanted = task.name or NAME
-    prefix = "" if wanted[:1].isascii() and wanted[:1].isalpha() else "n_"
-    name = identifiers([wanted], prefix, LONGEST_NAME)
+    name = name_in_c(task.name or NAME)
     known = identifiers(controller.signals, "y_"), identifiers(controller.references, "r_")
     fields = fields_of(task, controller, *known)
     real = {"double": "double", "float": "float", FIXED: "int32_t"}[task.precision]
     e = [_error(row, fields, real) for row in controller.plan.tolist()]
-    outputs, status = _recorded(controller, fields)
     suffix = "f" if task.precision == "float" else ""
-    A, B, C, D = ([[_number(x, suffix) for x in row] for row in table.tolist()] for table in word.tables)
+    A, B, C, D = ([[literal(x, suffix) for x in row] for row in table.tolist()] for table in word.tables)
     dac = controller.whole_dac if is_fixed else controller.dac
     is_converter = bool(np.isfinite(dac).all())
     unit = task.arm.input_unit
     values: dict[str, Any] = {
-        "name": name[wanted], "facts": [*facts.items(), *facts_of(details)], "fixed": is_fixed, "real": real,
-        "fields": fields, "sizes": [_number(each.size, suffix) for each in fields], "n": word.law.order,
-        "m": len(e), "errors": e, "A": A, "B": B, "C": C, "D": D, "shifts": word.shifts,
+        "name": next(iter(name.values())), "facts": [*facts.items(), *facts_of(details)], "fixed": is_fixed,
+        "real": real, "fields": fields, "header": "controller.h", "n": word.law.order, "m": len(e),
+         "errors": e, "A": A, "B": B, "C": C, "D": D, "shifts": word.shifts,
         "wide": "int64_t" if is_fixed else real, "cast": "(int64_t)" if is_fixed else "",
         "largest": "FLT_MAX" if suffix else "DBL_MAX", "converter": is_converter, "delay": controller.delay,
-        "dac": [_number(each, "") if each else 0 for each in dac.tolist()] if is_converter else [0, 0, 0],
+        "dac": [literal(each, "") if each else 0 for each in dac.tolist()] if is_converter else [0, 0, 0],
         "hub": controller.hub and (known[0][ANGLE], *(each.hex() for each in controller.hub)),
         "output": f"{task.arm.input} over {word.output!r} {unit}" if is_fixed else f"{task.arm.input} [{unit}]",
-        "recorded": [_number(each, suffix) for each in outputs.tolist()], "status": status.tolist(),
-        "refused": REFUSED, "seed": SEED, "zero": f"0.0{suffix}", "half": f"8388608.0{suffix}", "one": f"1.0{suffix}",
         "period": repr(task.chain.sampling.period),
+        **recorded(controller.run, [each.size for each in fields], task.precision),
     }  # fmt: skip
     files = ("controller.h", "controller.c", "self_test.c", "example.c")
     return {file: render(file, **values) for file in files}, names_of(name, *known)
@@ -273,21 +269,25 @@ def _error(row: list[int], fields: list[Field], real: str) -> str:
     return f"{'0' if reference < 0 else wide + of[reference]} - {value}"
 
 
-def _recorded(controller: Controller, fields: Sequence[Field]) -> tuple[NDArray[Any], Whole]:
-    """Outputs and status of the self-test, whose inputs are those of a linear congruential generator."""
+def recorded(
+    run: Callable[[NDArray[Any]], tuple[NDArray[Any], Whole]], sizes: Sequence[float], precision: str
+) -> dict[str, Any]:
+    """Values of the template of a self-test, whose inputs are those of a linear congruential generator."""
     numbers, seed = [], SEED
-    for _ in range(RECORDED * len(fields)):
+    for _ in range(RECORDED * len(sizes)):
         seed = (1664525 * seed + 1013904223) % 2**32
         numbers.append(seed)
-    words = np.array(numbers, dtype=np.int64).reshape(RECORDED, -1)
-    if controller.word.precision == FIXED:
-        return controller.run(words - 2**31)
-    kind = FLOATS[controller.word.precision][0]
-    inputs = (np.array([each.size for each in fields], kind) * ((words >> 8) / 2.0**23 - 1).astype(kind)).astype(float)
-    inputs[REFUSED, 0] = np.nan
-    return controller.run(inputs)
-
-
-def _number(value: float, suffix: str) -> str:
-    """A literal of C: whole, or hexadecimal with all its bits."""
-    return f"{value:d}" if isinstance(value, int) else f"{float(value).hex()}{suffix}"
+    words: NDArray[Any] = np.array(numbers, dtype=np.int64).reshape(RECORDED, -1)
+    if precision == FIXED:
+        inputs = words - 2**31
+    else:
+        kind = FLOATS[precision][0]
+        inputs = (np.array(sizes, kind) * ((words >> 8) / 2.0**23 - 1).astype(kind)).astype(float)
+        inputs[REFUSED, 0] = np.nan
+    outputs, status = run(inputs)
+    suffix = "f" if precision == "float" else ""
+    return {
+        "sizes": [literal(each, suffix) for each in sizes], "status": status.tolist(), "refused": REFUSED, "seed": SEED,
+        "recorded": [literal(each, suffix) for each in outputs.tolist()], "zero": f"0.0{suffix}",
+        "half": f"8388608.0{suffix}", "one": f"1.0{suffix}",
+    }  # fmt: skip

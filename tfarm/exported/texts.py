@@ -5,19 +5,18 @@ XML is written by ElementTree.
 """
 
 import re
-import textwrap
 import unicodedata
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from tfarm.schema import entries, text
 
 LONGEST_IDENTIFIER = 31  # characters of an identifier that C99 compares
+LONGEST_NAME = 16  # of identifiers in C, before "_step" and the like
 LONGEST_COMMENT = 200
 COMMENT_MARKS = (("\\", "|"), ("*/", "* /"), ("/*", "/ *"), ("??/", "? ?/"))  # of C, and the trigraph of a backslash
 
@@ -56,14 +55,15 @@ def matlab_text(words: str) -> str:
     return "'" + comment(words).replace("'", "''") + "'"
 
 
-def literal(value: Any) -> str:
-    """Return a number of np.float64 or np.float32 in C, in the fewest digits that have its bits."""
-    return f"{value!s}{'F' if isinstance(value, np.float32) else ''}"
+def name_in_c(wanted: str) -> dict[str, str]:
+    """Return the name that the identifiers of a file in C begin with, by the wanted one."""
+    prefix = "" if wanted[:1].isascii() and wanted[:1].isalpha() else "n_"
+    return identifiers([wanted], prefix, LONGEST_NAME)
 
 
-def literals(values: Iterable[Any]) -> str:
-    """Return the numbers of a row in C, in lines of at most 110 characters."""
-    return textwrap.fill(", ".join(map(literal, values)), 110, subsequent_indent="      ", break_on_hyphens=False)
+def literal(value: float, suffix: str = "") -> str:
+    """Return a number in C: whole, or hexadecimal with all its bits."""
+    return f"{value:d}" if isinstance(value, int) else f"{float(value).hex()}{suffix}"
 
 
 @cache
@@ -74,7 +74,7 @@ def templates() -> Environment:
         loader=FileSystemLoader(folder), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
         keep_trailing_newline=True, autoescape=False,
     )  # fmt: skip
-    environment.filters |= {"comment": comment, "literal": literal, "literals": literals}
+    environment.filters["comment"] = comment
     return environment
 
 

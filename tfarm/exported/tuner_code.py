@@ -1,14 +1,4 @@
-"""A trained tuner in C99, and the same arithmetic in Python, operation by operation.
-
-    u = servo (+ r),   x = moment (- rigid moment),   K = network(u, u1, e1, e2, x, x1 (, K1)),   e = u - K x
-
-    torque = r + servo - K x,   servo = Kp (angle reference - hub angle) + K1 (rate reference - hub rate)
-
-with r the feedforward torque, counted in u under the reading "total", where no rigid moment is subtracted.  Numbers 1
-and 2 are those of one and two samples before.  Where an input, or u, e, x, K or the torque, is NaN, infinite or beyond
-`largest`, a step returns 1, or 2, holds the torque of the step before and keeps its state.  Below `largest` no sum of
-the network overflows, so that a kept state refuses no later sample.
-"""
+"""A trained tuner as C99: header, source and self-test, and the same tuner as a controller of simulations."""
 
 import hashlib
 import math
@@ -16,98 +6,29 @@ from importlib.metadata import version
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tfarm.arrays import Real
-from tfarm.dsp import Measurement
+from tfarm.arm import HubFeedback
+from tfarm.arrays import Real, Whole
+from tfarm.dsp import Measurement, sampled_loop
 from tfarm.errors import MISSING, ParameterError, must_be_known, require
-from tfarm.exact.compiled import compiled
-from tfarm.exported.activation import ULPS, Activation, activation, sigmoid, softplus
-from tfarm.exported.result import ANYWAY, Export, ExportTask, names_of
-from tfarm.exported.texts import identifiers, render
+from tfarm.exported.controller import FEEDFORWARD, Field, recorded
+from tfarm.exported.result import ANYWAY, Export, ExportTask, Name, names_of
+from tfarm.exported.texts import facts_of, literal, name_in_c, render
+from tfarm.exported.tuner_twin import ULPS, Weights, activation, run
+from tfarm.exported.word_length import FLOATS
 from tfarm.schema import Quantity
 from tfarm.tuner.guard import sector_guard
-from tfarm.tuner.kernel import K_BEFORE
-from tfarm.tuner.trial import SavedTuner, Trial, load_tuner, slew_trial
+from tfarm.tuner.trial import TRIAL_MODES, SavedTuner, load_tuner
 
-RECORDED_SAMPLES = 1000  # of the self-test
-LONGEST_NAME = 20  # characters of a name, which others are appended to
-REALS = {"double": np.float64, "float": np.float32}
-INPUTS = {  # the field of a `Measurement` of each input, in the order of the C source
-    "y_hub_angle": "hub_angle",
-    "y_hub_rate": "hub_rate",
-    "y_root_moment": "root_moment",
-    "r_hub_angle": "angle_reference",
-    "r_hub_rate": "rate_reference",
-    "r_root_moment": "rigid_moment",
-    "feedforward": "feedforward",
+INPUTS = {  # by identifier in C: the field of a `Measurement`, the meaning, and the unit ("": that of the arm's input)
+    "y_hub_angle": ("hub_angle", "hub angle", "rad"),
+    "y_hub_rate": ("hub_rate", "hub rate", "rad/s"),
+    "y_root_moment": ("root_moment", "root moment", "N m"),
+    "r_hub_angle": ("angle_reference", "reference of the hub angle", "rad"),
+    "r_hub_rate": ("rate_reference", "reference of the hub rate", "rad/s"),
+    "r_root_moment": ("rigid_moment", "root moment of the rigid arm", "N m"),
+    FEEDFORWARD: ("feedforward", "feedforward", ""),
 }
-ANGLE, RATE, MOMENT, WANTED_ANGLE, WANTED_RATE, WANTED_MOMENT, FORWARD = 0, 1, 2, 3, 4, 5, -1
-INPUT_ERROR, OVERFLOW = 1, 2
-U, E, X, K, E_BEFORE, TORQUE = range(6)  # places of the state: the last sample, and e of the one before
-
-
-class Weights(NamedTuple):
-    """Numbers of a tuner in one precision: network, servo and guard, as in `tfarm.tuner.kernel`."""
-
-    activation: Activation
-    W1: Real
-    w2: Real
-    scales: Real
-    K1: float
-    Kp: float
-    lo: float
-    hi: float
-    span: float
-    largest: float
-    is_total: bool
-    is_free: bool
-
-
-@compiled
-def network_gain(of: Weights, row: Real) -> float:
-    """K of a row of inputs."""
-    z = of.activation.zero
-    for j in range(of.w2.size):
-        net = of.activation.zero
-        for i in range(row.size):
-            net += of.W1[j, i] * (row[i] / of.scales[i])
-        z += of.w2[j] * sigmoid(net, of.activation)
-    if of.is_free:
-        return softplus(z, of.activation)
-    gain = of.lo + of.span * sigmoid(z, of.activation)
-    gain = of.lo if gain < of.lo else gain
-    return of.hi if gain > of.hi else gain
-
-
-@compiled
-def step(of: Weights, state: Real, row: Real, inputs: Real) -> int:
-    """Advance by one sample; return 0, or the kind of an error.  `row` is for the inputs of the network."""
-    for value in inputs:
-        if not -of.largest <= value <= of.largest:
-            return INPUT_ERROR
-    x = inputs[MOMENT] if of.is_total else inputs[MOMENT] - inputs[WANTED_MOMENT]
-    servo = of.Kp * (inputs[WANTED_ANGLE] - inputs[ANGLE]) + of.K1 * (inputs[WANTED_RATE] - inputs[RATE])
-    u = servo + inputs[FORWARD] if of.is_total else servo
-    row[0], row[1], row[2], row[3], row[4], row[5] = u, state[U], state[E], state[E_BEFORE], x, state[X]
-    if row.size > K_BEFORE:
-        row[K_BEFORE] = state[K]
-    gain = network_gain(of, row)
-    e, torque = u - gain * x, (inputs[FORWARD] + servo) - gain * x
-    for value in (u, e, x, gain, torque):
-        if not -of.largest <= value <= of.largest:
-            return OVERFLOW
-    state[E_BEFORE] = state[E]
-    state[U], state[E], state[X], state[K], state[TORQUE] = u, e, x, gain, torque
-    return 0
-
-
-@compiled
-def run(of: Weights, state: Real, row: Real, inputs: Real, status: Any, torque: Real) -> None:
-    """Step over rows of inputs."""
-    for k in range(status.size):
-        status[k] = step(of, state, row, inputs[k])
-        torque[k] = state[TORQUE]
 
 
 def weights_of(saved: SavedTuner, real: Any) -> Weights:
@@ -143,47 +64,50 @@ class ExportedTuner:
     """
 
     def __init__(self, saved: SavedTuner, precision: str = "double") -> None:
-        must_be_known("precision", precision, REALS)
-        self.real = REALS[precision]
+        must_be_known("precision", precision, FLOATS)
+        self.real = FLOATS[precision][0]
         self.weights = weights_of(saved, self.real)
-        self.inputs = {name: of for name, of in INPUTS.items() if not (self.weights.is_total and of == "rigid_moment")}
+        self.scale = saved.scales[0]
+        self.inputs = {key: of for key, of in INPUTS.items() if not (self.weights.is_total and key == "r_root_moment")}
         self.reset()
 
     def reset(self) -> None:
         """Return to the state before the first sample."""
         self.state, self._row = np.zeros(6, self.real), np.zeros(self.weights.scales.size, self.real)
 
-    def run(self, inputs: Real) -> tuple[NDArray[np.int32], Real]:
-        """Advance over rows of `inputs` (n, inputs); return statuses (n,) and torques (n,)."""
-        status, torque = np.zeros(len(inputs), np.int32), np.zeros(len(inputs), self.real)
+    def run(self, inputs: Real) -> tuple[Real, Whole]:
+        """Advance over rows of `inputs` (n, inputs); return torques and status (n,), as the C code has them."""
+        torque, status = np.zeros(len(inputs), self.real), np.zeros(len(inputs), np.int64)
         with np.errstate(over="ignore"):
-            run(self.weights, self.state, self._row, np.ascontiguousarray(inputs, dtype=self.real), status, torque)
-        return status, torque
+            rows = np.ascontiguousarray(inputs, dtype=self.real)
+        run(self.weights, self.state, self._row, rows, torque, status)
+        return torque, status
 
     def __call__(self, m: Measurement) -> float:
         """The torque of a sample; that of the sample before where a number is NaN, infinite or too large."""
         if m.k == 0:
             self.reset()
-        return float(self.run(np.array([self.row(m)]))[1][0])
+        return float(self.run(np.array([self.row(m)]))[0][0])
 
     def row(self, m: Measurement) -> list[float]:
-        """The inputs at a sample."""
-        return [getattr(m, name) for name in self.inputs.values()]
+        """Inputs of a sample."""
+        return [getattr(m, name) for name, _, _ in self.inputs.values()]
 
 
 class TunerCode(NamedTuple):
     """Properties of a tuner in C."""
 
     network: Annotated[str, Quantity("network", help="inputs, hidden neurons and outputs")]
-    precision: Annotated[str, Quantity("precision", help="double or float")]
-    samples: Annotated[int, Quantity("samples of the self-test", help="samples of a simulated slew")]
+    precision: Annotated[str, Quantity("arithmetic", help="double or float")]
+    exp_error: Annotated[float, Quantity("bound on the error of exp", "ulp", 2, "units in the last place")]
+    log_error: Annotated[float, Quantity("bound on the error of log", "ulp", 2, "units in the last place")]
 
 
 def c_tuner(task: ExportTask) -> Export:
-    """A trained tuner in C: source, header and self-test.
+    """The files of a trained tuner in C99.
 
     Raises ParameterError without a tuner, for one of another sampling period, and, unless `anyway`, for one whose gain
-    may not vary in its guard on this arm.
+    is not certified to vary in its guard on this arm.
     """
     if task.tuned is None:
         raise ParameterError(key="tuned", value=MISSING, remedy="give the file of tfarm tune ARM --save FILE.json")
@@ -191,47 +115,47 @@ def c_tuner(task: ExportTask) -> Export:
     remedy = f"the tuner was trained every {saved.period!r} s: sample so, or train one at this period"
     require(saved.period == period, "sampling.period", period, remedy)
     tuner = ExportedTuner(saved, task.precision)
-    of, unit = tuner.weights, task.arm.input_unit
-    duration = max(RECORDED_SAMPLES * period, task.chain.slew.rise_time)
-    trial = slew_trial(
-        task.arm, task.chain, K1=float(of.K1), Kp=float(of.Kp), signals=saved.signals, duration=duration
-    )
-    guard = None if of.is_free else sector_guard(trial.loop, float(of.lo), float(of.hi))
+    of = tuner.weights
+    servo = HubFeedback(K1=float(of.K1), K2=1.0, Kp=float(of.Kp))
+    loop = sampled_loop(task.arm, servo, task.chain, count=TRIAL_MODES)
+    guard = None if of.is_free else sector_guard(loop, float(of.lo), float(of.hi))
     certainty = "not certified for a gain that varies" if guard is None else guard.sentence
     is_proven = guard is not None and guard.is_proven
     remedy = f"on this arm the gain is {certainty}; --anyway exports it"
     require(is_proven or task.anyway, "tuned", str(task.tuned), remedy)
-    names = identifiers([task.name or "tuner"], "", LONGEST_NAME)
-    (name,) = names.values()
-    network = f"{of.scales.size}-{of.w2.size}-1"
+    details = TunerCode(f"{of.scales.size}-{of.w2.size}-1", task.precision, *ULPS.values())
     facts = {
-        "arm": task.arm.name, "tuner": f"{network}, trained on {saved.arm}", "sampling period": f"{period!r} s",
-        "moment gain": certainty, **({} if is_proven else {"warning": ANYWAY}),
+        "arm": task.arm.name, "tuner": f"trained on {saved.arm}", **({} if is_proven else {"warning": ANYWAY}),
+        "sampling period": f"{period!r} s", "moment gain": certainty,
         "SHA-256 of the tuner": hashlib.sha256(task.tuned.read_bytes()).hexdigest(),
         "SHA-256 of the inputs": task.sha256, "tfarm": version("tfarm"),
     }  # fmt: skip
-    rows = recorded(tuner, trial)
-    texts = {
-        "name": name, "facts": facts, "of": of, "real": task.precision, "ulps": ULPS, "rows": rows,
-        "inputs": {each: INPUTS[each].format(unit=unit) for each in tuner.inputs},
-    }  # fmt: skip
-    contents = {
-        target: render(template, **texts)
-        for target, template in (("tuner.h", "tuner.h"), ("tuner.c", "tuner.c"), ("self_test.c", "tuner_test.c"))
-    }
+    contents, names = written(task, tuner, [*facts.items(), *facts_of(details)])
     return Export(
-        what=task.what, form=task.form, contents=contents, names=names_of(names), verdict=certainty,
-        details=TunerCode(network, task.precision, len(rows)), sha256=task.sha256,
+        what=task.what, form=task.form, contents=contents, names=names, verdict=certainty, details=details,
+        sha256=task.sha256,
     )  # fmt: skip
 
 
-def recorded(tuner: ExportedTuner, trial: Trial) -> Real:
-    """Inputs and torque (samples, inputs + 1) of the first samples of a simulated slew."""
-    rows: list[list[float]] = []
-
-    def controller(m: Measurement) -> float:
-        rows.append([*tuner.row(m), tuner(m)])
-        return rows[-1][-1]
-
-    trial.simulator().controller(controller)
-    return np.array(rows[:RECORDED_SAMPLES], dtype=tuner.real)
+def written(
+    task: ExportTask, tuner: ExportedTuner, facts: list[tuple[str, str]]
+) -> tuple[dict[str, bytes], list[Name]]:
+    """The files by name, and the identifiers of names."""
+    weights, name = tuner.weights, name_in_c(task.name or "tuner")
+    suffix = "f" if task.precision == "float" else ""
+    numbers = {**weights.activation._asdict(), **weights._asdict()}
+    unused = {"lo", "hi", "span"} if weights.is_free else {"two", "turn", "artanh"}
+    tables = {key: np.ravel(each).tolist() for key, each in numbers.items() if isinstance(each, np.ndarray)}
+    scalars = {key: float(each) for key, each in numbers.items() if isinstance(each, np.floating)}
+    fields = [
+        Field(of, key, f"{meaning} [{unit or task.arm.input_unit}]", 1.0 if "rad" in unit else tuner.scale)
+        for key, (of, meaning, unit) in tuner.inputs.items()
+    ]
+    values = {
+        "name": next(iter(name.values())), "facts": facts, "fixed": False, "real": task.precision, "header": "tuner.h",
+        "fields": fields, "output": f"{task.arm.input} [{task.arm.input_unit}]", "of": weights, "ulps": ULPS,
+        "scalars": {key: literal(each, suffix) for key, each in scalars.items() if key not in unused},
+        "tables": {key: [literal(x, suffix) for x in each] for key, each in tables.items() if key not in unused},
+        **recorded(tuner.run, [each.size for each in fields], task.precision),
+    }  # fmt: skip
+    return {file: render(file, **values) for file in ("tuner.h", "tuner.c", "self_test.c")}, names_of(name)

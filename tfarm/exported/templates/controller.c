@@ -1,14 +1,6 @@
 /* {{ facts[0][1]|comment }}: see controller.h */
 #include "controller.h"
 
-#include <float.h>
-
-{% if not fixed %}
-#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
-#error "numbers are rounded to their type: compile for SSE2 or set -mfpmath=sse"
-#endif
-
-{% endif %}
 {% macro matrix(key, rows) %}
 static const {{ real }} {{ key }}[{{ rows|length }}][{{ rows[0]|length }}] = {
 {% for row in rows %}

@@ -17,7 +17,14 @@
 #ifndef {{ name }}_CONTROLLER_H
 #define {{ name }}_CONTROLLER_H
 
+#include <float.h>
 #include <stdint.h>
+
+{% if not fixed %}
+#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
+#error "numbers are rounded to their type: compile for SSE2 or set -mfpmath=sse"
+#endif
+{% endif %}
 
 #define {{ name }}_INPUT_ERROR 1
 #define {{ name }}_OVERFLOW 2
@@ -31,6 +38,7 @@ typedef struct {
 } {{ name }}_input;
 
 typedef struct {
+{% block state %}
 {% if n %}
     {{ name }}_number x[{{ n }}];
 {% endif %}
@@ -41,6 +49,7 @@ typedef struct {
     double angle, rate; /* estimate of the hub rate */
     int begun;
 {% endif %}
+{% endblock %}
     {{ name }}_number output;
 } {{ name }}_state;
 

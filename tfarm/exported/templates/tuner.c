@@ -1,43 +1,38 @@
-/*
-{% for label, value in facts.items() %}
- * {{ (label ~ ": " ~ value) | comment }}
-{% endfor %}
- *
- * Equal to tfarm bit for bit without fused multiply-add (-ffp-contract=off) and where FLT_EVAL_METHOD is 0.
- */
+/* {{ facts[0][1]|comment }}: see tuner.h */
 #include "tuner.h"
 
-{% set a = of.activation %}
-static const {{ real }} W1[{{ of.W1 | length }}][{{ of.scales | length }}] = {
-{% for row in of.W1 %}
-    { {{ row | literals }} },
+{% for key, number in scalars.items() %}
+static const {{ real }} {{ key }} = {{ number }};
+{% endfor %}
+{% for key, numbers in tables.items() %}
+static const {{ real }} {{ key }}[{{ numbers|length }}] = {
+{% for row in numbers|batch(4) %}
+    {{ row|join(", ") }},
 {% endfor %}
 };
-{% for array, values in {"w2": of.w2, "scales": of.scales, "taylor": a.taylor, "atanh_terms": a.atanh}.items() %}
-{% if array != "atanh_terms" or of.is_free %}
-static const {{ real }} {{ array }}[{{ values | length }}] = { {{ values | literals }} };
-{% endif %}
 {% endfor %}
 
-static {{ real }} polynomial({{ real }} x, const {{ real }} *coefficients, int number)
+static {{ real }} polynomial({{ real }} x, const {{ real }} *coefficients, int size)
 {
-    {{ real }} total = coefficients[number - 1];
+    {{ real }} total = coefficients[size - 1];
     int n;
-    for (n = number - 2; n >= 0; --n) total = total * x + coefficients[n];
+    for (n = size - 2; n >= 0; n--)
+        total = total * x + coefficients[n];
     return total;
 }
 
-/* e^x for x <= 0, within {{ ulps.exp }} units in the last place; 0 up to {{ a.lowest | literal }}.
- * x = k ln 2 + r (Cody and Waite), e^r by Taylor's polynomial, coefficients 1/n!. */
+/* e^x for x <= 0, within {{ ulps.exp }} units in the last place: 2^k e^r, x = k ln 2 + r (Cody and Waite), Taylor */
 static {{ real }} exponential({{ real }} x)
 {
-    {{ real }} k, result, power = {{ a.half | literal }};
+    {{ real }} k, result, power = half;
     int n;
-    if (!(x > {{ a.lowest | literal }})) return x == x ? {{ a.zero | literal }} : x;
-    k = (x * {{ a.inverse | literal }} + {{ a.shift | literal }}) - {{ a.shift | literal }};
-    result = polynomial((x - k * {{ a.high | literal }}) - k * {{ a.low | literal }}, taylor, {{ a.taylor | length }});
+    if (!(x > lowest))
+        return x == x ? zero : x;
+    k = (x * inverse + shift) - shift;
+    result = polynomial((x - k * high) - k * low, taylor, {{ tables.taylor|length }});
     for (n = (int)-k; n > 0; n /= 2) { /* at most ten times */
-        if (n % 2 == 1) result *= power;
+        if (n % 2 == 1)
+            result *= power;
         power *= power;
     }
     return result;
@@ -45,68 +40,63 @@ static {{ real }} exponential({{ real }} x)
 
 static {{ real }} sigmoid({{ real }} z)
 {
-    const {{ real }} small = exponential(z > {{ a.zero | literal }} ? -z : z);
-    return (z > {{ a.zero | literal }} ? {{ a.one | literal }} : small) / ({{ a.one | literal }} + small);
+    const {{ real }} small = exponential(z > zero ? -z : z);
+    return (z > zero ? one : small) / (one + small);
 }
 {% if of.is_free %}
 
-/* ln(1 + y) for 0 <= y <= 1, within {{ ulps.log }} units in the last place: f - s (f - R), s = f/(2 + f), R the terms
- * of 2 atanh(s) from s^3 on over s, coefficients 2/(2 j + 1). */
+/* ln(1 + y) for 0 <= y <= 1, within {{ ulps.log }} units in the last place: f - s (f - R), s = f/(2 + f), series of artanh */
 static {{ real }} logarithm({{ real }} y)
 {
-    const {{ real }} f = y < {{ a.turn | literal }} ? y : {{ a.half | literal }} * (y - {{ a.one | literal }});
-    const {{ real }} s = f / ({{ a.two | literal }} + f), square = s * s;
-    const {{ real }} below = s * (f - square * polynomial(square, atanh_terms, {{ a.atanh | length }}));
-    return y < {{ a.turn | literal }} ? f - below : {{ a.high | literal }} + (f - (below - {{ a.low | literal }}));
+    const {{ real }} f = y < turn ? y : half * (y - one), s = f / (two + f), square = s * s;
+    const {{ real }} below = s * (f - square * polynomial(square, artanh, {{ tables.artanh|length }}));
+    return y < turn ? f - below : high + (f - (below - low));
 }
 {% endif %}
 
-static {{ real }} gain_of(const {{ real }} *row)
+static {{ real }} network(const {{ real }} *row)
 {
-    {{ real }} z = {{ a.zero | literal }}, net, gain;
+    {{ real }} z = zero, net, gain;
     int i, j;
-    for (j = 0; j < {{ of.w2 | length }}; ++j) {
-        net = {{ a.zero | literal }};
-        for (i = 0; i < {{ of.scales | length }}; ++i) net += W1[j][i] * (row[i] / scales[i]);
+    for (j = 0; j < {{ of.w2|length }}; j++) {
+        net = zero;
+        for (i = 0; i < {{ of.scales|length }}; i++)
+            net += W1[{{ of.scales|length }} * j + i] * (row[i] / scales[i]);
         z += w2[j] * sigmoid(net);
     }
 {% if of.is_free %}
-    gain = logarithm(exponential(z > {{ a.zero | literal }} ? -z : z));
-    return z > {{ a.zero | literal }} ? z + gain : gain;
+    gain = logarithm(exponential(z > zero ? -z : z));
+    return z > zero ? z + gain : gain;
 {% else %}
-    gain = {{ of.lo | literal }} + {{ of.span | literal }} * sigmoid(z);
-    gain = gain < {{ of.lo | literal }} ? {{ of.lo | literal }} : gain;
-    return gain > {{ of.hi | literal }} ? {{ of.hi | literal }} : gain;
+    gain = lo + span * sigmoid(z);
+    return gain < lo ? lo : gain > hi ? hi : gain;
 {% endif %}
 }
 
-static int is_inside({{ real }} value)
+static int is_small({{ real }} value) /* not NaN, and so small that no sum overflows */
 {
-    return -{{ of.largest | literal }} <= value && value <= {{ of.largest | literal }};
+    return -largest <= value && value <= largest;
 }
 
 void {{ name }}_init({{ name }}_state *state)
 {
-    state->u = state->e = state->x = state->K = state->e_before = state->torque = {{ a.zero | literal }};
+    *state = ({{ name }}_state){ zero, zero, zero, zero, zero, zero };
 }
 
-int {{ name }}_step({{ name }}_state *state, const {{ name }}_inputs *in, {{ real }} *torque)
+int {{ name }}_step({{ name }}_state *state, const {{ name }}_input *input, {{ name }}_number *output)
 {
-    const {{ real }} x = in->root_moment{% if not of.is_total %} - in->rigid_moment{% endif %};
-    const {{ real }} servo = {{ of.Kp | literal }} * (in->angle_reference - in->hub_angle)
-        + {{ of.K1 | literal }} * (in->rate_reference - in->hub_rate);
-    const {{ real }} u = servo{% if of.is_total %} + in->feedforward{% endif %};
-    const {{ real }} row[] = { u, state->u, state->e, state->e_before, x, state->x{{ ", state->K" if of.scales | length == 7 }} };
-    const {{ real }} gain = gain_of(row), e = u - gain * x, wanted = (in->feedforward + servo) - gain * x;
-    const int is_fine = is_inside(u) && is_inside(e) && is_inside(x) && is_inside(gain) && is_inside(wanted);
-    if (is_fine) {
-        state->e_before = state->e;
-        state->u = u;
-        state->e = e;
-        state->x = x;
-        state->K = gain;
-        state->torque = wanted;
-    }
-    *torque = state->torque;
-    return !is_fine;
+    const {{ real }} x = input->y_root_moment{{ "" if of.is_total else " - input->r_root_moment" }};
+    const {{ real }} servo = Kp * (input->r_hub_angle - input->y_hub_angle) + K1 * (input->r_hub_rate - input->y_hub_rate);
+    const {{ real }} u = servo{{ " + input->feedforward" if of.is_total }};
+    const {{ real }} row[] = { u, state->u, state->e, state->e_before, x, state->x{{ ", state->gain" if of.scales|length == 7 }} };
+    const {{ real }} gain = network(row), e = u - gain * x, torque = (input->feedforward + servo) - gain * x;
+
+    *output = state->output;
+    if (!({% for field in fields %}is_small(input->{{ field.identifier }}){{ "" if loop.last else " && " }}{% endfor %}))
+        return {{ name }}_INPUT_ERROR;
+    if (!(is_small(u) && is_small(e) && is_small(x) && is_small(gain) && is_small(torque)))
+        return {{ name }}_OVERFLOW;
+    *state = ({{ name }}_state){ u, e, x, gain, state->e, torque };
+    *output = torque;
+    return 0;
 }
