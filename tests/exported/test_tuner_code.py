@@ -43,6 +43,11 @@ def tuner_of(seed, **changed):
     return tuners.some_tuner(rng_of(seed), **GUARDED | {"Kp": 0.0, "signals": "vibration"} | changed)
 
 
+def numbers_of(real):
+    """Constants of exp and log in a precision."""
+    return functions.numbers_of(tuner_of(0), real)
+
+
 def needs(compiler):
     """Skip, naming the compiler, where it is not installed."""
     if not tuners.has_compiler(compiler):
@@ -61,7 +66,7 @@ def ulps(found, exact, real):
 @pytest.mark.parametrize("real", REALS)
 def test_errors_of_exp_and_log(real, size):
     """Within the stated units in the last place of mpmath, next to both ends, both changes of branch, and tiny ones."""
-    of, rng = functions.activation(real), rng_of(0)
+    of, rng = numbers_of(real), rng_of(0)
     ends = np.array([0.5, 1.5, 2.5]) * math.log(2.0)
     x = -np.r_[rng.uniform(0, -float(of.lowest), size), 10 ** rng.uniform(-30, 0, size), rng.uniform(0, 2, size)]
     x = np.r_[x, -ends, -ends * (1 + 2.0**-20), np.nextafter(of.lowest, real(0))].astype(real)
@@ -78,7 +83,7 @@ def test_errors_of_exp_and_log(real, size):
 @pytest.mark.parametrize(("real", "digits"), [(np.float64, 53), (np.float32, 24)])
 def test_constants_of_exp_and_log(real, digits):
     """ln 2 = h + l, k h exact; the terms that the series leave out are below a tenth of half a unit."""
-    of = functions.activation(real)
+    of = numbers_of(real)
     with mpmath.workprec(200):
         left = abs(mpmath.log(2) - mpmath.mpf(float(of.high)) - mpmath.mpf(float(of.low)))
         assert left < mpmath.mpf(2) ** (-digits) * abs(mpmath.mpf(float(of.low)))
@@ -96,7 +101,7 @@ def test_constants_of_exp_and_log(real, digits):
 
 @pytest.mark.parametrize("real", REALS)
 def test_ends_of_exp_and_sigmoid(real):
-    of = functions.activation(real)
+    of = numbers_of(real)
     assert functions.exponential(real(0), of) == 1
     assert functions.logarithm(real(0), of) == 0
     assert [functions.exponential(real(x), of) for x in (of.lowest, -math.inf)] == [0, 0]
@@ -146,7 +151,7 @@ def test_a_sample_that_is_not_finite_is_refused(precision, signals):
     rows = rng.normal(size=(40, len(tuner.inputs)))
     expected, _ = tuner.run(rows)
     for place in range(rows.shape[1]):
-        for value in (math.nan, math.inf, -math.inf, 1.1 * float(tuner.weights.largest)):
+        for value in (math.nan, math.inf, -math.inf, 1.1 * float(tuner.numbers.largest)):
             odd = np.insert(rows, 20, rows[20], axis=0)
             odd[20, place] = value
             tuner.reset()
@@ -164,7 +169,7 @@ def test_no_kept_state_refuses_a_later_sample(precision):
         rng = rng_of(seed)
         saved = tuners.some_tuner(rng)
         tuner = ExportedTuner(saved.model_copy(update={"W1": (1e6 * np.array(saved.W1)).tolist()}), precision)
-        largest = float(tuner.weights.largest)
+        largest = float(tuner.numbers.largest)
         rows = rng.choice([-1.0, -1e-3, 1.0, 1e-3], (200, len(tuner.inputs))) * largest
         rows[1::2] = rng.normal(size=(100, len(tuner.inputs)))
         torque, status = tuner.run(rows)
@@ -178,7 +183,7 @@ def test_a_result_beyond_the_largest_number_is_refused():
     saved = tuner_of(0, guard=(5.0, 10.0))
     tuner = ExportedTuner(saved)
     row = np.zeros((1, 7))
-    row[0, 2] = 0.9 * float(tuner.weights.largest)
+    row[0, 2] = 0.9 * float(tuner.numbers.largest)
     torque, status = tuner.run(row)
     assert (status[0], torque[0], tuner.state.tolist()) == (2, 0.0, [0.0] * 6)
 
@@ -199,7 +204,7 @@ def test_the_guard_is_rounded_inwards(guard):
         W1, w2 = rng_of(seed).normal(size=(6, 6)).tolist(), [1e3] * 6
         tuner = ExportedTuner(tuner_of(seed, guard=guard, W1=W1, w2=w2, scales=[1.0] * 6), "float")
         tuner.run(rng_of(seed).normal(0, 10, (50, 7)))
-        assert guard[0] <= float(tuner.weights.lo) < float(tuner.weights.hi) <= guard[1]
+        assert guard[0] <= float(tuner.numbers.lo) < float(tuner.numbers.hi) <= guard[1]
         assert guard[0] <= float(tuner.state[3]) <= guard[1]
     with pytest.raises(ParameterError, match="guard"):
         ExportedTuner(tuner_of(0, guard=(0.3, math.nextafter(0.3, 1))), "float")
@@ -269,7 +274,7 @@ def test_the_comparison_is_of_every_bit(tmp_path):
     tuner, rows = exported(tmp_path, tuner_of(2)), rng_of(0).normal(size=(2000, 7))
     assert is_equal(tmp_path, tuner, rows, "gcc")[0]
     source = (tmp_path / "tuner.c").read_text()
-    number = tuner.weights.lo
+    number = tuner.numbers.lo
     before, after = (literal(each) for each in (number, np.nextafter(number, 1.0)))
     assert source.count(before) == 1
     (tmp_path / "tuner.c").write_text(source.replace(before, after))

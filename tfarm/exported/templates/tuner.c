@@ -68,7 +68,7 @@ static {{ real }} network(const {{ real }} *row)
     gain = logarithm(exponential(z > zero ? -z : z));
     return z > zero ? z + gain : gain;
 {% else %}
-    gain = lo + span * sigmoid(z);
+    gain = lo + (hi - lo) * sigmoid(z);
     return gain < lo ? lo : gain > hi ? hi : gain;
 {% endif %}
 }
@@ -88,7 +88,7 @@ int {{ name }}_step({{ name }}_state *state, const {{ name }}_input *input, {{ n
     const {{ real }} x = input->y_root_moment{{ "" if of.is_total else " - input->r_root_moment" }};
     const {{ real }} servo = Kp * (input->r_hub_angle - input->y_hub_angle) + K1 * (input->r_hub_rate - input->y_hub_rate);
     const {{ real }} u = servo{{ " + input->feedforward" if of.is_total }};
-    const {{ real }} row[] = { u, state->u, state->e, state->e_before, x, state->x{{ ", state->gain" if of.scales|length == 7 }} };
+    const {{ real }} row[] = { u, state->u, state->e, state->e_before, x, state->x, state->gain };
     const {{ real }} gain = network(row), e = u - gain * x, torque = (input->feedforward + servo) - gain * x;
 
     *output = state->output;
