@@ -189,14 +189,14 @@ def test_an_integral_can_overflow_and_a_servo_cannot():
     found = c_controller(task_of((LAB, SERVO, IDEAL), "q31")).details
     assert found.overflow.startswith("excluded")
     assert found.samples is None
-    assert all(each.bound < 1 for each in found.states)
+    assert max(found.largest_states) < 1
 
 
 @pytest.mark.parametrize(
     ("task", "error"),
     [
-        (task_of((LAB, GAINS, IDEAL), "q31", ranges={"root_moment": -1.0}), "range.root_moment = -1.0: a positive"),
-        (task_of("gains", ranges={"tip": 1.0}), r"range = 'tip': no signal of this controller: hub_rate, output"),
+        (task_of((LAB, GAINS, IDEAL), "q31", ranges={"root_moment": -1.0}), "range.root_moment = -1.0: the largest"),
+        (task_of("gains", ranges={"tip": 1.0}), "range = 'tip': known are: hub_rate, root_moment, output"),
         (replace(task_of("gains"), precision="q31", ranges={"hub_rate": 1.0}), "range = 'root_moment': q31 needs"),
         (replace(task_of("gains", "q31"), ranges={"hub_rate": 1.0, "root_moment": 1.0}), "range = 'output': q31 needs"),
         (task_of((LAB, GAINS, REAL), "q31"), 'converters.hub_rate = \'difference\': with q31 the hub rate is an input'),
@@ -224,7 +224,7 @@ def test_a_coefficient_whose_rounding_destabilises_the_loop_is_named():
     law = tfarm.HubFeedback(K1=K1, K2=K2)
     assert tfarm.sampled(LAB, law, IDEAL).verdict.is_stable
     with pytest.raises(
-        ParameterError, match=r"coefficient D\[0, 1\] = 'float': rounded to float the loop is not certified"
+        ParameterError, match=r"coefficient D\[0, 1\] = 1.\d+: rounded to float the loop is not certified"
     ):
         c_controller(task_of((LAB, law, IDEAL), "float"))
 

@@ -10,7 +10,7 @@ from tfarm.arm import HubFeedback
 from tfarm.arrays import Real, Whole
 from tfarm.dsp import Measurement, sampled_loop
 from tfarm.errors import MISSING, ParameterError, must_be_known, require
-from tfarm.exported.controller import FEEDFORWARD, Field, recorded
+from tfarm.exported.controller import FEEDFORWARD, REAL, Port, recorded
 from tfarm.exported.result import ANYWAY, Export, ExportTask, names_of
 from tfarm.exported.texts import literal, name_in_c, render
 from tfarm.exported.tuner_twin import ULPS, numbers_of, run
@@ -96,21 +96,21 @@ def c_tuner(task: ExportTask) -> Export:
 
 def written(task: ExportTask, tuner: ExportedTuner, name: str, facts: dict[str, str]) -> dict[str, bytes]:
     """The files by name; constants have the names that they have in `tuner_twin`."""
-    of, suffix = tuner.numbers, "f" if task.precision == "float" else ""
+    of, (real, suffix, _) = tuner.numbers, REAL[task.precision]
     unused = {"lo", "hi"} if of.is_free else {"two", "turn", "artanh"}
     kept: dict[str, Any] = {key: each for key, each in of._asdict().items() if key not in unused}
-    fields = [
-        Field(of_sample, key, f"{meaning} [{unit or task.arm.input_unit}]", 1.0 if "rad" in unit else tuner.scale)
+    ports = [
+        Port(of_sample, key, f"{meaning} [{unit or task.arm.input_unit}]", 1.0 if "rad" in unit else tuner.scale)
         for key, (of_sample, meaning, unit) in tuner.inputs.items()
     ]
     values = {
-        "name": name, "facts": list(facts.items()), "fixed": False, "real": task.precision, "header": "tuner.h",
-        "fields": fields, "output": f"{task.arm.input} [{task.arm.input_unit}]", "of": of, "ulps": ULPS,
+        "name": name, "facts": list(facts.items()), "fixed": False, "real": real, "suffix": suffix, "header": "tuner.h",
+        "fields": ports, "output": f"{task.arm.input} [{task.arm.input_unit}]", "of": of, "ulps": ULPS,
         "scalars": {key: literal(float(x), suffix) for key, x in kept.items() if isinstance(x, np.floating)},
         "tables": {
             key: [literal(x, suffix) for x in each.ravel().tolist()]
             for key, each in kept.items() if isinstance(each, np.ndarray)
         },
-        **recorded(tuner.run, [each.size for each in fields], task.precision),
+        **recorded(tuner.run, ports, task.precision),
     }  # fmt: skip
     return {file: render(file, **values) for file in ("tuner.h", "tuner.c", "self_test.c")}
