@@ -1,7 +1,6 @@
 """A trained tuner in C: against Python bit for bit, its functions against mpmath, its network against NumPy's."""
 
 import math
-import subprocess
 from dataclasses import replace
 from fractions import Fraction
 
@@ -11,8 +10,9 @@ import pytest
 
 import tfarm
 from tests.exported import tuners
-from tests.exported.tuners import COMPILERS, DIFFERENCE, LEVELS, REAL, SECTOR, compiled_program, exported, is_equal
-from tests.hostile import NAME, TEXT
+from tests.exported.compilers import COMPILERS, KINDS, STRICT, build, needed, run
+from tests.exported.tuners import DIFFERENCE, LEVELS, PRECISIONS, SECTOR, exported, is_equal
+from tests.hostile import C_TEXTS, NAME
 from tests.shared import sized
 from tests.shell import answer, refused
 from tests.survey import tally
@@ -27,11 +27,11 @@ from tfarm.tuner import find_guard, slew_trial
 from tfarm.tuner.guard import sector_guard
 from tfarm.tuner.trial import to_text
 
+SOURCES = ("tuner.c", "self_test.c")
 LAB = "sasaki2012-lab"
 GUARDED = {"guard": SECTOR, "guard_kind": "time-varying"}  # certified on the laboratory arm
 FREE = {"guard": None, "guard_kind": "none"}  # without a guard: no certificate is sought
-PRECISIONS = list(REAL.values())
-REALS = list(REAL)
+REALS = [KINDS[each] for each in PRECISIONS]
 
 
 def rng_of(seed):
@@ -46,12 +46,6 @@ def tuner_of(seed, **changed):
 def numbers_of(real):
     """Constants of exp and log in a precision."""
     return functions.numbers_of(tuner_of(0), real)
-
-
-def needs(compiler):
-    """Skip, naming the compiler, where it is not installed."""
-    if not tuners.has_compiler(compiler):
-        pytest.skip(f"{compiler} is not installed")
 
 
 # ------------------------------------------------------------ exp and log
@@ -263,64 +257,58 @@ def folders(tmp_path_factory):
 @pytest.mark.parametrize("precision", PRECISIONS)
 def test_c_is_python_to_the_last_bit(folders, compiler, level, precision):
     """20,000 samples in all."""
-    needs(compiler)
+    needed(compiler)
     for folder, tuner, rows in folders[precision]:
-        assert is_equal(folder, tuner, rows, compiler, level)[0], folder
+        assert is_equal(folder, tuner, rows, compiler, level), folder
 
 
 def test_the_comparison_is_of_every_bit(tmp_path):
     """The lower end of the guard in its last place, and the comparison fails."""
-    needs("gcc")
+    needed("gcc")
     tuner, rows = exported(tmp_path, tuner_of(2)), rng_of(0).normal(size=(2000, 7))
-    assert is_equal(tmp_path, tuner, rows, "gcc")[0]
+    assert is_equal(tmp_path, tuner, rows, "gcc")
     source = (tmp_path / "tuner.c").read_text()
     number = tuner.numbers.lo
     before, after = (literal(each) for each in (number, np.nextafter(number, 1.0)))
     assert source.count(before) == 1
     (tmp_path / "tuner.c").write_text(source.replace(before, after))
-    assert not is_equal(tmp_path, tuner, rows, "gcc")[0]
+    assert not is_equal(tmp_path, tuner, rows, "gcc")
 
 
 @pytest.mark.parametrize("precision", PRECISIONS)
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_the_self_test_runs(tmp_path, compiler, precision):
-    needs(compiler)
+    """And fails where the sign of the output neuron is the other one."""
+    needed(compiler)
     exported(tmp_path, tuner_of(3), precision)
-    done = subprocess.run([compiled_program(tmp_path, compiler)], capture_output=True, text=True, timeout=60)
-    assert (done.returncode, done.stdout) == (0, "0 of 1000 samples differ\n")
+    assert run(build(tmp_path, compiler, sources=SOURCES)) == b"0 of 1000 samples differ\n"
     source = (tmp_path / "tuner.c").read_text()
     (tmp_path / "tuner.c").write_text(source.replace("z += w2[j]", "z -= w2[j]"))
-    done = subprocess.run([compiled_program(tmp_path, compiler)], capture_output=True, text=True, timeout=60)
-    assert done.returncode == 1
+    with pytest.raises(AssertionError, match="of 1000 samples differ"):
+        run(build(tmp_path, compiler, sources=SOURCES))
 
 
 def test_no_library_is_called(tmp_path):
     """Neither libm nor malloc: the object file at -O0 has no undefined symbol but copies of memory."""
-    needs("gcc")
-    needs("nm")
+    needed("nm")
     exported(tmp_path, tuner_of(4, **FREE), anyway=True)
-    subprocess.run(["gcc", "-std=c99", "-O0", "-c", "tuner.c"], cwd=tmp_path, check=True, timeout=60)
-    found = subprocess.run(
-        ["nm", "-u", "tuner.o"], cwd=tmp_path, capture_output=True, text=True, check=True, timeout=60
-    )
-    assert {line.split()[-1] for line in found.stdout.splitlines()} <= {"memcpy", "memset"}
+    run(needed("gcc"), *STRICT, "-O0", "-c", tmp_path / "tuner.c", "-o", tmp_path / "tuner.o")
+    found = run("nm", "-u", tmp_path / "tuner.o").decode().splitlines()
+    assert {line.split()[-1] for line in found} <= {"memcpy", "memset"}
 
 
 def test_sanitizers_find_nothing(tmp_path):
-    needs("gcc")
+    needed("gcc")
     for precision in PRECISIONS:
         tuner = exported(tmp_path, tuner_of(6, **FREE), precision, anyway=True)
         rows = tuners.some_inputs(rng_of(0), 2000, len(tuner.inputs))
-        checked = ("-fsanitize=undefined,address", "-fno-sanitize-recover=all")
-        assert is_equal(tmp_path, tuner, rows, "gcc", *checked)[0]
+        assert is_equal(tmp_path, tuner, rows, "gcc", "-fsanitize=undefined,address", "-fno-sanitize-recover=all")
 
 
 def test_cppcheck_finds_nothing(tmp_path):
-    needs("cppcheck")
     exported(tmp_path, tuner_of(6))
-    command = ["cppcheck", "--std=c99", "--enable=warning,performance,portability", "--error-exitcode=1", "tuner.c"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
-    assert (done.returncode, done.stderr) == (0, "")
+    checks = ("--std=c99", "--enable=warning,performance,portability", "--error-exitcode=1", "--quiet")
+    assert run(needed("cppcheck"), *checks, tmp_path / "tuner.c", tmp_path / "self_test.c") == b""
 
 
 # ------------------------------------------------------------ the certificate, texts and refusals
@@ -354,7 +342,7 @@ def test_what_is_refused(tmp_path, lab):
         ({}, "tuned"),
         ({"tuned": file, "chain": Chain(sampling=Sampling(period=0.005))}, "sampling.period"),
         ({"tuned": file, "precision": "q31"}, "precision"),
-        ({"tuned": tmp_path / "none.json"}, "controller"),
+        ({"tuned": tmp_path / "none.json"}, "tuned"),
     ):
         with pytest.raises(ParameterError) as caught:
             tfarm.export(lab, **how | changed)
@@ -363,32 +351,17 @@ def test_what_is_refused(tmp_path, lab):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("name", [NAME, TEXT[:80], "*/ int x; /*", "a\\\nb??/", "x" * 80])
-def test_hostile_names_of_arms(tmp_path, lab, name):
-    """Names of the arm, and of the arm of the training, in comments."""
-    needs("gcc")
-    exported(tmp_path, tuner_of(0, arm=name, **FREE), arm=replace(lab, name=NAME), anyway=True)
-    for file in ("tuner.h", "tuner.c"):
-        text = (tmp_path / file).read_bytes()
-        assert text.isascii()
-        assert text.count(b"/*") == text.count(b"*/")
-    assert subprocess.run([compiled_program(tmp_path, "gcc")], timeout=60, check=False).returncode == 0
-
-
-@pytest.mark.parametrize(
-    "name", ["int", "while", "9lives", "_Bool", "a b; c", "../x", "y" * 99, "שלום", "printf", "main"]
-)
-def test_hostile_names_in_c(tmp_path, name):
-    needs("gcc")
-    exported(tmp_path, tuner_of(0, **FREE), name=name, anyway=True)
-    assert subprocess.run([compiled_program(tmp_path, "gcc")], timeout=60, check=False).returncode == 0
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "program",
-        "self_test.c",
-        "tuned.json",
-        "tuner.c",
-        "tuner.h",
-    ]
+@pytest.mark.parametrize("words", [each[:80] for each in C_TEXTS])
+def test_hostile_names(tmp_path, lab, words):
+    """Of the arm, of the arm of the training, and of the identifiers."""
+    saved = tuner_of(0, arm=words, **FREE)
+    exported(tmp_path, saved, arm=replace(lab, name=NAME), name=words, anyway=True)
+    files = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert set(files) == {"tuner.h", "tuner.c", "self_test.c", "tuned.json"}
+    for name in ("tuner.h", "tuner.c"):
+        assert files[name].isascii()
+        assert files[name].count(b"/*") == files[name].count(b"*/")
+    assert run(build(tmp_path, "gcc", "-trigraphs", sources=SOURCES)) == b"0 of 1000 samples differ\n"
 
 
 def test_the_command(tmp_path, capsys):

@@ -69,7 +69,7 @@ def c_tuner(task: ExportTask) -> Export:
     """
     if task.tuned is None:
         raise ParameterError(key="tuned", value=MISSING, remedy="give the file of tfarm tune ARM --save FILE.json")
-    saved, period = load_tuner(task.tuned), task.chain.sampling.period
+    saved, period = load_tuner(task.tuned, "tuned"), task.chain.sampling.period
     remedy = f"the tuner was trained every {saved.period!r} s: sample so, or train one at this period"
     require(saved.period == period, "sampling.period", period, remedy)
     tuner = ExportedTuner(saved, task.precision)
