@@ -1,14 +1,6 @@
 /* {{ facts[0][1]|comment }}: see controller.h */
 #include "controller.h"
 
-{% if not fixed %}
-#include <float.h>
-
-#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
-#error "numbers are rounded to their type: compile for SSE2 or set -mfpmath=sse"
-#endif
-
-{% endif %}
 {% for key, rows in (("A", A), ("B", B), ("C", C), ("D", D)) if rows and rows[0] %}
 static const {{ real }} {{ key }}[{{ rows|length }}][{{ rows[0]|length }}] = {
 {% for row in rows %}

@@ -20,7 +20,14 @@
 #ifndef {{ name }}_CONTROLLER_H
 #define {{ name }}_CONTROLLER_H
 
+#include <float.h>
 #include <stdint.h>
+
+{% if not fixed %}
+#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
+#error "numbers are rounded to their type: compile for SSE2 or set -mfpmath=sse"
+#endif
+{% endif %}
 
 #define {{ name }}_INPUT_ERROR 1
 #define {{ name }}_OVERFLOW 2
@@ -33,8 +40,12 @@ typedef struct {
 } {{ name }}_input;
 
 typedef struct {
-    {{ name }}_number {{ "x[%d], "|format(n) if n }}{{ "line[%d], "|format(delay) if delay }}output; /* states, delay */
+{% block state %}
+{{ "    %s_number x[%d];\n"|format(name, n) if n -}}
+{{ "    %s_number line[%d]; /* delay of the controller */\n"|format(name, delay) if delay -}}
 {{ "    double angle, rate; /* estimate of the hub rate */\n    int begun;\n" if hub -}}
+{% endblock %}
+    {{ name }}_number output;
 } {{ name }}_state;
 
 void {{ name }}_init({{ name }}_state *state);

@@ -1,5 +1,5 @@
 /* Self-test: {{ recorded|length }} samples with the recorded outputs of tfarm's arithmetic, equal bit for bit. */
-#include "controller.h"
+#include "{{ header }}"
 
 #include <stdio.h>
 #include <string.h>
