@@ -148,8 +148,7 @@ def c_controller(task: ExportTask) -> Export:
         overflow="excluded for inputs within their ranges" if is_safe else "not excluded",
         error=error, samples=None if is_whole else MOST_SUMMED, limit_cycle=word.limit_cycle(found.verdict.loop),
     )  # fmt: skip
-    facts = task.facts(word.rounded, found)
-    contents, names = written(task, controller, facts, details)
+    contents, names = written(task, controller, task.facts(word.rounded, found) | dict(facts_of(details)))
     return Export(
         what=task.what, form=task.form, contents=contents, names=names, verdict=found.verdict.sentence,
         details=details, sha256=task.sha256,
@@ -212,9 +211,7 @@ def judged(task: ExportTask, word: Word, loop: Sampled) -> Any:
 # ------------------------------------------------------------ files
 
 
-def written(
-    task: ExportTask, controller: Controller, facts: dict[str, str], details: WordLength
-) -> tuple[dict[str, bytes], list[Any]]:
+def written(task: ExportTask, controller: Controller, facts: dict[str, str]) -> tuple[dict[str, bytes], list[Any]]:
     """The files by name, and the identifiers of names."""
     word, is_fixed = controller.word, task.precision == FIXED
     wanted = task.name or NAME
@@ -231,7 +228,7 @@ def written(
     is_converter = bool(np.isfinite(dac).all())
     unit = task.arm.input_unit
     values: dict[str, Any] = {
-        "name": name[wanted], "facts": [*facts.items(), *facts_of(details)], "fixed": is_fixed, "real": real,
+        "name": name[wanted], "facts": [*facts.items()], "fixed": is_fixed, "real": real,
         "fields": fields, "sizes": [_number(each.size, suffix) for each in fields], "n": word.law.order,
         "m": len(e), "errors": e, "A": A, "B": B, "C": C, "D": D, "shifts": word.shifts,
         "wide": "int64_t" if is_fixed else real, "cast": "(int64_t)" if is_fixed else "",

@@ -15,7 +15,7 @@ import zipfile
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
@@ -24,7 +24,7 @@ from xml.etree import ElementTree as XML
 
 import numpy as np
 
-from tfarm.arm import tracked
+from tfarm.arm import Law, tracked
 from tfarm.arm.law import REFERENCE
 from tfarm.arrays import Complex, Real
 from tfarm.dsp import Simulator, scenario
@@ -32,10 +32,12 @@ from tfarm.dsp.plant import MODES_USED, RECORDED
 from tfarm.dsp.results import simulated
 from tfarm.dsp.scenarios import TRIAL_DURATION
 from tfarm.dsp.simulate import first_mode
-from tfarm.errors import ParameterError, one_line
+from tfarm.errors import ParameterError, one_line, require
 from tfarm.exact.outputs import signal_words
-from tfarm.exported.result import Export, ExportTask, What
+from tfarm.exported.controller import FEEDFORWARD, controller_of, in_z, written
+from tfarm.exported.result import ANYWAY, Export, ExportTask, What, is_certified
 from tfarm.exported.texts import identifiers, render
+from tfarm.exported.word_length import FIXED
 from tfarm.files import temporary_folder
 from tfarm.records import record
 from tfarm.schema import Quantity
@@ -46,7 +48,7 @@ LONGEST_COMPILATION = 60.0  # s
 PLATFORMS = {"linux": ("linux64", ".so"), "darwin": ("darwin64", ".dylib"), "win32": ("win64", ".dll")}
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # of every file: same inputs, same bytes
 LARGEST = sys.float_info.max  # of a range without limit
-LONGEST_NAME = 200  # characters of a text
+LONGEST_TEXT = 400  # characters
 MEASURED, TIP_OFFSET = "measured:", "tip_offset"
 AT, STATE, SELF = ("const fmi2ValueReference *", "size_t"), "fmi2FMUstate", "((model *)c)"
 ABSENT = "report(c, fmi2Error, __func__)"
@@ -101,45 +103,87 @@ class Unit:
 
 
 class LawCode(NamedTuple):
-    """Lines of C that have and run a controller, and its files; empty without one."""
+    """Lines of C that declare, start and run a controller, its files, and the stability of its loop; empty without."""
 
     include: str = ""
     state: str = ""
     init: str = ""
     step: str = ""
     files: Mapping[str, bytes] = MappingProxyType({})
+    verdict: str = ""
+
+
+class Header(NamedTuple):
+    """The facts of a unit in its description and its source."""
+
+    has_plant: bool
+    variables: Sequence[Variable]
+    identifier: str
+    period: str
+    about: str
+    guid: str
 
 
 def fmu(task: ExportTask) -> Export:
     """Return the functional mock-up unit of a task, one file.
 
-    Raises ParameterError for a loop that is not certified stable, and as `Simulator` does.
+    Raises ParameterError for a loop that is not certified stable, a controller in fixed point, and as `Simulator` does.
     """
-    prepared, has_plant = prepared_simulator(task), task.what != "controller"
-    variables = variables_of(task.what, prepared)
-    count, modes = Counter(each.causality for each in variables), prepared.plant.count if has_plant else None
-    law = LawCode()
-    facts = {"arm": task.arm.name, "sampling period": f"{task.chain.sampling.period!r} s", "tfarm": version("tfarm")}
-    guid = hashlib.sha256(repr((task.sha256, variables, modes, facts)).encode()).hexdigest()[:32]
-    source = render(
-        "fmu.c", what=f"{task.what} of an arm", facts=facts, law=law, plant=has_plant, guid=guid, functions=FUNCTIONS,
-        period=repr(float(task.chain.sampling.period)), inputs=count["input"], parameters=count["parameter"],
-        outputs=count["output"], **plant_code(prepared),
-    )  # fmt: skip
+    prepared, has_plant, name = prepared_simulator(task), task.what != "controller", task.name or task.what
+    variables, modes = variables_of(task.what, prepared), prepared.plant.count if has_plant else None
+    law = LawCode() if task.what == "plant" else law_code(task, prepared.law, variables)
+    about = "; ".join(filter(None, (f"{task.what} of {task.arm.name}", law.verdict, f"SHA-256 of the inputs {task.sha256}")))
+    guid = hashlib.sha256(repr((about, name, modes, variables, version("tfarm"))).encode()).hexdigest()[:32]
+    header = Header(has_plant, variables, identifiers([name], "fmu_")[name], repr(float(task.chain.sampling.period)),
+                    one_line(about, LONGEST_TEXT), guid)  # fmt: skip
+    numbers, count = plant_code(prepared), Counter(each.causality for each in variables)
+    source = render("fmu.c", law=law, functions=FUNCTIONS, count=count, **header._asdict(), **numbers)
     sources = {"fmi2.h": render("fmi2.h"), "fmu.c": source, **law.files}
-    identifier = identifiers([task.name or task.what], "fmu_")[task.name or task.what]
-    binary, words = compiled(sources, identifier)
+    binary, words = compiled(sources, header.identifier)
     files = {f"sources/{name}": content for name, content in sources.items()} | binary
-    files["modelDescription.xml"] = model_description(task, variables, guid, identifier, [*sources])
+    files["modelDescription.xml"] = model_description(header, sources)
     return Export(
-        what=task.what, form=task.form, contents={f"{task.what}.fmu": zipped(files)}, names=[],
+        what=task.what, form=task.form, contents={f"{task.what}.fmu": zipped(files)}, names=[], verdict=law.verdict,
         details=Unit(variables, modes, words), sha256=task.sha256,
     )  # fmt: skip
 
 
+def law_code(task: ExportTask, law: Law, variables: Sequence[Variable]) -> LawCode:
+    """The controller as simulated: its law as given, its readings and its output those of the converters of a plant.
+
+    In a closed loop its delay is that of the plant.
+    """
+    remedy = "a functional mock-up unit has a controller in double or float; take c for fixed point"
+    require(task.precision != FIXED, "precision", task.precision, remedy)
+    is_loop, is_single = task.what == "loop", task.chain.converters.arithmetic == "float32"
+    task = replace(task, precision="float" if is_single else task.precision)
+    made = controller_of(in_z(replace(law, delay=0.0) if is_loop else law, task.chain), task)
+    made = replace(made, hub=None, signals=law.signals, dac=np.array([0.0, -np.inf, np.inf]))
+    found = task.analysis(replace(made.word.rounded, delay=task.law.delay))
+    files, (name, *_) = written(task, made, task.facts(made.word.rounded, found))
+    inputs, outputs = ([each.name for each in variables if each.causality == of] for of in ("input", "output"))
+    place = {name: f"m->at.out[{n}]" for n, name in enumerate(outputs)}
+    place |= {name: f"m->at.in[{n}]" for n, name in enumerate(inputs)}
+    own, fields = name.identifier, [f"{MEASURED}{each}" for each in made.signals]
+    fields += [*(f"{REFERENCE}{each}" for each in made.references), FEEDFORWARD]
+    read = ", ".join(f"({own}_number){place[each]}" for each in fields)
+    return LawCode(
+        include='#include "controller.h"',
+        state=f"{own}_state law;",
+        init=f"{own}_init(&m->law);",
+        step=f"const {own}_input input = {{ {read} }};\n    {own}_number output;\n"
+        f"    if ({own}_step(&m->law, &input, &output))\n        return 0;\n    u = output;",
+        files={each: files[each] for each in ("controller.h", "controller.c")},
+        verdict=found.verdict.sentence if is_certified(found) else f"{ANYWAY}: {found.verdict.sentence}",
+    )
+
+
 def prepared_simulator(task: ExportTask) -> Simulator:
-    """The simulator of the loop, with the modes that the simulation of a slew has; of a step where there is no slew."""
-    arm, law = tracked(task.arm, task.law)
+    """The simulator of the loop, with the modes that the simulation of a slew has; of a step where there is no slew.
+
+    A plant alone has no delay of the law.
+    """
+    arm, law = tracked(task.arm, task.law if task.what == "loop" else replace(task.law, delay=0.0))
     try:
         run = scenario("slew", arm, task.chain, TRIAL_DURATION)
     except ParameterError:  # an arm that cannot turn
@@ -160,7 +204,7 @@ def variables_of(what: What, of: Simulator) -> list[Variable]:
     sensors = [variable(name, side, MEASURED, "reading of the ") for name in names]
     wanted = dict.fromkeys((*law.references, *(name.removeprefix(REFERENCE) for name in law.wanted)))
     references = [variable(name, "input", REFERENCE, "reference of the ") for name in wanted]
-    references.append(Variable("feedforward", "input", unit, "part of the output of the controller"))
+    references.append(Variable(FEEDFORWARD, "input", unit, "part of the output of the controller"))
     if what == "controller":
         return [*sensors, *references, variable(drive, "output")]
     return [
@@ -211,45 +255,41 @@ def braces(values: Any) -> str:
 # ------------------------------------------------------------ the file
 
 
-def model_description(
-    task: ExportTask, variables: Sequence[Variable], guid: str, identifier: str, sources: Iterable[str]
-) -> bytes:
+def model_description(of: Header, sources: Iterable[str]) -> bytes:
     """The file modelDescription.xml: outputs of a plant are known at the start, that of a controller is 0 there."""
-    has_plant, period = task.what != "controller", repr(float(task.chain.sampling.period))
-    place = {each.name: str(n) for n, each in enumerate(variables, 1)}
-    outputs = [each.name for each in variables if each.causality == "output"]
+    place = {each.name: str(n) for n, each in enumerate(of.variables, 1)}
+    outputs = [place[each.name] for each in of.variables if each.causality == "output"]
+    start = {"start": "0"}
     kinds = {
-        "input": ({"variability": "discrete"}, {"start": "0"}),
-        "parameter": ({"variability": "fixed"}, {"start": "0"}),
-        "output": ({"variability": "discrete", "initial": "calculated"}, {}) if has_plant else
-                  ({"variability": "discrete", "initial": "exact"}, {"start": "0"}),
+        "input": ({"variability": "discrete"}, start),
+        "parameter": ({"variability": "fixed"}, start),
+        "output": ({"variability": "discrete", "initial": "calculated" if of.has_plant else "exact"},
+                   {} if of.has_plant else start),
     }  # fmt: skip
-    slave = element(
-        "CoSimulation",
-        element("SourceFiles", *(element("File", name=name) for name in sources if name.endswith(".c"))),
-        modelIdentifier=identifier, canHandleVariableCommunicationStepSize="true",
-        canNotUseMemoryManagementFunctions="true",
-    )  # fmt: skip
     listed = [
         element(
             "ScalarVariable", element("Real", unit=each.unit, **kinds[each.causality][1]), name=each.name,
             valueReference=str(n), description=each.description, causality=each.causality, **kinds[each.causality][0],
         )
-        for n, each in enumerate(variables)
+        for n, each in enumerate(of.variables)
     ]  # fmt: skip
-    structure = [element("Outputs", *(element("Unknown", index=place[name], dependencies="") for name in outputs))]
-    if has_plant:
-        known = {"dependencies": place[TIP_OFFSET]}
-        structure.append(
-            element("InitialUnknowns", *(element("Unknown", index=place[name], **known) for name in outputs))
-        )
+    structure = [element("Outputs", *(element("Unknown", index=n, **{"dependencies": ""} if of.has_plant else {}) for n in outputs))]
+    if of.has_plant:
+        known = [element("Unknown", index=n, dependencies=place[TIP_OFFSET]) for n in outputs]
+        structure.append(element("InitialUnknowns", *known))
     root = element(
-        "fmiModelDescription", slave,
-        element("UnitDefinitions", *(element("Unit", name=unit) for unit in sorted({of.unit for of in variables}))),
+        "fmiModelDescription",
+        element(
+            "CoSimulation",
+            element("SourceFiles", *(element("File", name=name) for name in sources if name.endswith(".c"))),
+            modelIdentifier=of.identifier, canHandleVariableCommunicationStepSize="true",
+            canNotUseMemoryManagementFunctions="true",
+        ),
+        element("UnitDefinitions", *(element("Unit", name=unit) for unit in sorted({each.unit for each in of.variables}))),
         element("LogCategories", element("Category", name="logStatusError")),
-        element("DefaultExperiment", startTime="0", stopTime=repr(TRIAL_DURATION), stepSize=period),
+        element("DefaultExperiment", startTime="0", stopTime=repr(TRIAL_DURATION), stepSize=of.period),
         element("ModelVariables", *listed), element("ModelStructure", *structure),
-        fmiVersion="2.0", modelName=one_line(f"{task.arm.name}: {task.what}", LONGEST_NAME), guid=guid,
+        fmiVersion="2.0", modelName=of.identifier, guid=of.guid, description=of.about,
         generationTool=f"tfarm {version('tfarm')}", variableNamingConvention="flat", numberOfEventIndicators="0",
     )  # fmt: skip
     XML.indent(root)
@@ -280,7 +320,7 @@ def compiled(sources: Mapping[str, bytes], identifier: str) -> tuple[dict[str, b
             )  # fmt: skip
             binary = (folder / f"unit{suffix}").read_bytes()
         except (OSError, subprocess.SubprocessError) as error:
-            return {}, f"none: {one_line(f'{compiler}: {error}', LONGEST_NAME)}"
+            return {}, f"none: {one_line(f'{compiler}: {error}', LONGEST_TEXT)}"
     return {f"binaries/{platform}/{identifier}{suffix}": binary}, f"{platform}, by {Path(compiler).name}"
 
 

@@ -8,7 +8,7 @@
 #define MOST_SAMPLES 4e15 /* of a simulation */
 #define SLACK 1e-4 /* of a period, in the times of a master */
 #define WHOLE 4503599627370496.0 /* 2^52: a larger number has no fraction */
-enum { INPUTS = {{ inputs }}, GIVEN = {{ inputs + parameters }}, OUTPUTS = {{ outputs }} }; /* GIVEN: with parameters */
+enum { INPUTS = {{ count.input }}, GIVEN = {{ count.input + count.parameter }}, OUTPUTS = {{ count.output }} }; /* GIVEN: with parameters */
 enum { POLES = {{ poles }}, PIECES = {{ pieces }}, RING = {{ ring }} }; /* pieces of a sample; a ring of torques */
 
 typedef struct {
@@ -26,7 +26,7 @@ typedef struct {
     {{ law.state }}
 } model;
 
-{% if plant %}
+{% if has_plant %}
 {% for name, rows in tables.items() %}
 static const double {{ name }} = {{ rows }};
 {% endfor %}
@@ -62,7 +62,7 @@ static int measure(model *m) { /* 0 where the root moment is beyond its bound */
 static int advance(model *m) { /* by one sample; 0 where it cannot */
     double u = m->at.in[0];
     {{ law.step }}
-{% if plant %}
+{% if has_plant %}
     const double old = m->at.held[(m->at.sample + 1) % RING], impulse = m->at.sample ? 0.0 : m->given[INPUTS];
     m->at.held[m->at.sample % RING] = u = on_steps(u, converters[2]);
     m->at.integral[1] += impulse;
@@ -82,14 +82,14 @@ static int advance(model *m) { /* by one sample; 0 where it cannot */
 {% endif %}
     m->at.sample++;
     m->at.out[OUTPUTS - 1] = u;
-    return {{ "measure(m)" if plant else "1" }};
+    return {{ "measure(m)" if has_plant else "1" }};
 }
 
 static fmi2Status begin(model *m, double start) {
     memset(&m->at, 0, sizeof m->at);
     m->at.time = m->start = start;
     {{ law.init }}
-{% if plant %}
+{% if has_plant %}
     for (int i = 0; i < POLES; i++) {
         m->at.re[i] = released[i][0] * m->given[INPUTS + 1];
         m->at.im[i] = released[i][1] * m->given[INPUTS + 1];
@@ -151,7 +151,7 @@ FMI2 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Bo
     while (end - (double)m->at.sample > SLACK) {
         if (!m->at.is_held)
             memcpy(m->at.in, m->given, sizeof m->at.in);
-        m->at.is_held = end - (double)m->at.sample < {{ "1.0 - SLACK" if plant else "SLACK" }}; /* it ends later */
+        m->at.is_held = end - (double)m->at.sample < {{ "1.0 - SLACK" if has_plant else "SLACK" }}; /* it ends later */
         if (m->at.is_held)
             break;
         m->at.time = m->start + (double)m->at.sample * PERIOD;
