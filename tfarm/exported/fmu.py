@@ -20,7 +20,7 @@ from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, NamedTuple
-from xml.etree import ElementTree as XML
+from xml.etree.ElementTree import Element, indent, tostring
 
 import numpy as np
 
@@ -43,15 +43,16 @@ from tfarm.records import record
 from tfarm.schema import Quantity
 
 COMPILERS = ("cc", "gcc", "clang")
-OPTIONS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")  # no fused operation: the simulation's digits
+OPTIONS = ("-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")  # no fused operation
 LONGEST_COMPILATION = 60.0  # s
 PLATFORMS = {"linux": ("linux64", ".so"), "darwin": ("darwin64", ".dylib"), "win32": ("win64", ".dll")}
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # of every file: same inputs, same bytes
 LARGEST = sys.float_info.max  # of a range without limit
-LONGEST_TEXT = 400  # characters
+LONGEST_TEXT, LONGEST_GUID = 400, 32  # characters
+ERRORS = "logStatusError"  # category of messages
 MEASURED, TIP_OFFSET = "measured:", "tip_offset"
-AT, STATE, SELF = ("const fmi2ValueReference *", "size_t"), "fmi2FMUstate", "((model *)c)"
-ABSENT = "report(c, fmi2Error, __func__)"
+AT, STATE, KIND, SELF = ("const fmi2ValueReference *", "size_t"), "fmi2FMUstate", "fmi2StatusKind", "((model *)c)"
+ABSENT, ELSE_DISCARD = "report(c, fmi2Error, __func__)", "? fmi2OK : fmi2Discard"
 FUNCTIONS: tuple[tuple[str, tuple[str, ...], str], ...] = (  # of FMI in one statement: name, types of arguments, status
     ("SetDebugLogging", ("fmi2Boolean", "size_t", "const fmi2String *"), "fmi2OK"),
     ("SetupExperiment", ("fmi2Boolean", "fmi2Real", "fmi2Real", "fmi2Boolean", "fmi2Real"), "begin(c, a3)"),
@@ -72,14 +73,9 @@ FUNCTIONS: tuple[tuple[str, tuple[str, ...], str], ...] = (  # of FMI in one sta
     ("SetRealInputDerivatives", (*AT, "const fmi2Integer *", "const fmi2Real *"), ABSENT),
     ("GetRealOutputDerivatives", (*AT, "const fmi2Integer *", "fmi2Real *"), ABSENT),
     ("CancelStep", (), ABSENT),
-    *(
-        (f"Get{kind}Status", ("fmi2StatusKind", f"fmi2{kind or 'Status'} *"), "fmi2Discard")
-        for kind in ("", "Integer", "String")
-    ),
-    *(
-        (f"Get{kind}Status", ("fmi2StatusKind", f"fmi2{kind} *"), f"*a2 = {SELF}->at.{of}, a1 == {wanted} ? fmi2OK : fmi2Discard")
-        for kind, of, wanted in (("Real", "time", "fmi2LastSuccessfulTime"), ("Boolean", "is_stopped", "fmi2Terminated"))
-    ),
+    *((f"Get{of}Status", (KIND, f"fmi2{of or 'Status'} *"), "fmi2Discard") for of in ("", "Integer", "String")),
+    ("GetRealStatus", (KIND, "fmi2Real *"), f"*a2 = {SELF}->at.time, a1 == fmi2LastSuccessfulTime {ELSE_DISCARD}"),
+    ("GetBooleanStatus", (KIND, "fmi2Boolean *"), f"*a2 = {SELF}->at.is_stopped, a1 == fmi2Terminated {ELSE_DISCARD}"),
 )
 
 
@@ -121,6 +117,7 @@ class Header(NamedTuple):
     identifier: str
     period: str
     about: str
+    sha256: str
     guid: str
 
 
@@ -130,21 +127,22 @@ def fmu(task: ExportTask) -> Export:
     Raises ParameterError for a loop that is not certified stable, a controller in fixed point, and as `Simulator` does.
     """
     prepared, has_plant, name = prepared_simulator(task), task.what != "controller", task.name or task.what
-    variables, modes = variables_of(task.what, prepared), prepared.plant.count if has_plant else None
+    variables = variables_of(task.what, prepared)
     law = LawCode() if task.what == "plant" else law_code(task, prepared.law, variables)
-    about = "; ".join(filter(None, (f"{task.what} of {task.arm.name}", law.verdict, f"SHA-256 of the inputs {task.sha256}")))
-    guid = hashlib.sha256(repr((about, name, modes, variables, version("tfarm"))).encode()).hexdigest()[:32]
-    header = Header(has_plant, variables, identifiers([name], "fmu_")[name], repr(float(task.chain.sampling.period)),
-                    one_line(about, LONGEST_TEXT), guid)  # fmt: skip
+    period, modes = repr(float(task.chain.sampling.period)), prepared.plant.count if has_plant else None
+    about = f"{task.what} of {task.arm.name}, sampled every {period} s{law.verdict and f': {law.verdict}'}"
+    guid = hashlib.sha256(repr((task.sha256, name, about, modes, variables, version("tfarm"))).encode()).hexdigest()
+    identifier = identifiers([name], "fmu_")[name]
+    header = Header(has_plant, variables, identifier, period, about, task.sha256, guid[:LONGEST_GUID])
     numbers, count = plant_code(prepared), Counter(each.causality for each in variables)
-    source = render("fmu.c", law=law, functions=FUNCTIONS, count=count, **header._asdict(), **numbers)
+    source = render("fmu.c", law=law, functions=FUNCTIONS, errors=ERRORS, count=count, **header._asdict(), **numbers)
     sources = {"fmi2.h": render("fmi2.h"), "fmu.c": source, **law.files}
-    binary, words = compiled(sources, header.identifier)
+    binary, compiler = compiled(sources, identifier)
     files = {f"sources/{name}": content for name, content in sources.items()} | binary
     files["modelDescription.xml"] = model_description(header, sources)
     return Export(
         what=task.what, form=task.form, contents={f"{task.what}.fmu": zipped(files)}, names=[], verdict=law.verdict,
-        details=Unit(variables, modes, words), sha256=task.sha256,
+        details=Unit(variables, modes, compiler), sha256=task.sha256,
     )  # fmt: skip
 
 
@@ -168,7 +166,7 @@ def law_code(task: ExportTask, law: Law, variables: Sequence[Variable]) -> LawCo
     fields += [*(f"{REFERENCE}{each}" for each in made.references), FEEDFORWARD]
     read = ", ".join(f"({own}_number){place[each]}" for each in fields)
     return LawCode(
-        include='#include "controller.h"',
+        include='\n#include "controller.h"',
         state=f"{own}_state law;",
         init=f"{own}_init(&m->law);",
         step=f"const {own}_input input = {{ {read} }};\n    {own}_number output;\n"
@@ -259,46 +257,45 @@ def model_description(of: Header, sources: Iterable[str]) -> bytes:
     """The file modelDescription.xml: outputs of a plant are known at the start, that of a controller is 0 there."""
     place = {each.name: str(n) for n, each in enumerate(of.variables, 1)}
     outputs = [place[each.name] for each in of.variables if each.causality == "output"]
-    start = {"start": "0"}
-    kinds = {
-        "input": ({"variability": "discrete"}, start),
-        "parameter": ({"variability": "fixed"}, start),
-        "output": ({"variability": "discrete", "initial": "calculated" if of.has_plant else "exact"},
-                   {} if of.has_plant else start),
-    }  # fmt: skip
-    listed = [
-        element(
-            "ScalarVariable", element("Real", unit=each.unit, **kinds[each.causality][1]), name=each.name,
-            valueReference=str(n), description=each.description, causality=each.causality, **kinds[each.causality][0],
-        )
-        for n, each in enumerate(of.variables)
-    ]  # fmt: skip
-    structure = [element("Outputs", *(element("Unknown", index=n, **{"dependencies": ""} if of.has_plant else {}) for n in outputs))]
+    delayed = {"dependencies": ""} if of.has_plant else {}  # at a communication point, of the inputs there
+    structure = [element("Outputs", *(element("Unknown", index=n, **delayed) for n in outputs))]
     if of.has_plant:
-        known = [element("Unknown", index=n, dependencies=place[TIP_OFFSET]) for n in outputs]
-        structure.append(element("InitialUnknowns", *known))
+        released = [element("Unknown", index=n, dependencies=place[TIP_OFFSET]) for n in outputs]
+        structure.append(element("InitialUnknowns", *released))
+    files = [element("File", name=name) for name in sources if name.endswith(".c")]
+    units = [element("Unit", name=unit) for unit in sorted({each.unit for each in of.variables})]
     root = element(
         "fmiModelDescription",
         element(
-            "CoSimulation",
-            element("SourceFiles", *(element("File", name=name) for name in sources if name.endswith(".c"))),
-            modelIdentifier=of.identifier, canHandleVariableCommunicationStepSize="true",
-            canNotUseMemoryManagementFunctions="true",
+            "CoSimulation", element("SourceFiles", *files), modelIdentifier=of.identifier,
+            canHandleVariableCommunicationStepSize="true", canNotUseMemoryManagementFunctions="true",
         ),
-        element("UnitDefinitions", *(element("Unit", name=unit) for unit in sorted({each.unit for each in of.variables}))),
-        element("LogCategories", element("Category", name="logStatusError")),
+        element("UnitDefinitions", *units),
+        element("LogCategories", element("Category", name=ERRORS)),
         element("DefaultExperiment", startTime="0", stopTime=repr(TRIAL_DURATION), stepSize=of.period),
-        element("ModelVariables", *listed), element("ModelStructure", *structure),
-        fmiVersion="2.0", modelName=of.identifier, guid=of.guid, description=of.about,
+        element("ModelVariables", *(declared(n, each, of.has_plant) for n, each in enumerate(of.variables))),
+        element("ModelStructure", *structure),
+        fmiVersion="2.0", modelName=of.identifier, guid=of.guid, description=one_line(of.about, LONGEST_TEXT),
         generationTool=f"tfarm {version('tfarm')}", variableNamingConvention="flat", numberOfEventIndicators="0",
     )  # fmt: skip
-    XML.indent(root)
-    return XML.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+    indent(root)
+    return tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
 
 
-def element(tag: str, *children: XML.Element, **attributes: str) -> XML.Element:
+def declared(reference: int, of: Variable, has_plant: bool) -> Element:
+    """A variable in the description; those of a sampled system change at the samples."""
+    is_computed = of.causality == "output" and has_plant
+    initial = {"initial": "calculated" if has_plant else "exact"} if of.causality == "output" else {}
+    return element(
+        "ScalarVariable", element("Real", unit=of.unit, **({} if is_computed else {"start": "0"})),
+        name=of.name, valueReference=str(reference), description=of.description, causality=of.causality,
+        variability="fixed" if of.causality == "parameter" else "discrete", **initial,
+    )  # fmt: skip
+
+
+def element(tag: str, *children: Element, **attributes: str) -> Element:
     """An element of XML with its children."""
-    made = XML.Element(tag, attributes)
+    made = Element(tag, attributes)
     made.extend(children)
     return made
 

@@ -1,7 +1,9 @@
 /* Types of the Functional Mock-up Interface 2.0 for co-simulation, after its specification (fmi-standard.org). */
 #include <stddef.h>
-#ifdef _WIN32
+#if defined _WIN32
 #define FMI2 __declspec(dllexport)
+#elif defined __GNUC__
+#define FMI2 __attribute__((visibility("default")))
 #else
 #define FMI2
 #endif
@@ -17,6 +19,7 @@ typedef enum { fmi2DoStepStatus, fmi2PendingStatus, fmi2LastSuccessfulTime, fmi2
 typedef void (*fmi2Logger)(fmi2ComponentEnvironment, fmi2String name, fmi2Status, fmi2String kind, fmi2String text, ...);
 typedef struct {
     fmi2Logger logger;
-    void *(*allocateMemory)(size_t, size_t), (*freeMemory)(void *), (*stepFinished)(fmi2ComponentEnvironment, fmi2Status);
+    void *(*allocateMemory)(size_t, size_t), (*freeMemory)(void *);
+    void (*stepFinished)(fmi2ComponentEnvironment, fmi2Status);
     fmi2ComponentEnvironment environment;
 } fmi2CallbackFunctions;

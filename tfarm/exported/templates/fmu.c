@@ -1,25 +1,22 @@
-/* FMI 2.0 co-simulation: {{ about | comment }}. It needs neither libm nor Python. */
+/* FMI 2.0 co-simulation: {{ about | comment }}
+   SHA-256 of the inputs: {{ sha256 }}.  It needs neither the mathematical library nor Python. */
 #include <stdlib.h>
 #include <string.h>
-#include "fmi2.h"
-{{ law.include }}
-#define GUID "{{ guid }}"
+#include "fmi2.h"{{ law.include }}
 #define PERIOD {{ period }} /* s */
-#define MOST_SAMPLES 4e15 /* of a simulation */
 #define SLACK 1e-4 /* of a period, in the times of a master */
 #define WHOLE 4503599627370496.0 /* 2^52: a larger number has no fraction */
-enum { INPUTS = {{ count.input }}, GIVEN = {{ count.input + count.parameter }}, OUTPUTS = {{ count.output }} }; /* GIVEN: with parameters */
+enum { INPUTS = {{ count.input }}, GIVEN = INPUTS + {{ count.parameter }}, OUTPUTS = {{ count.output }} }; /* GIVEN: both */
 enum { POLES = {{ poles }}, PIECES = {{ pieces }}, RING = {{ ring }} }; /* pieces of a sample; a ring of torques */
 
 typedef struct {
-    fmi2Logger logger;
-    fmi2ComponentEnvironment environment;
+    fmi2CallbackFunctions callbacks;
     char name[64];
     double start, given[GIVEN]; /* s; inputs and parameters */
     struct {
         double time, in[INPUTS], out[OUTPUTS]; /* s; inputs at the last sample */
-        double re[POLES], im[POLES], integral[2]; /* amplitudes of the poles, two integrals of the torque */
-        double held[RING], acting, angle, rate; /* outputs of the DAC, torque on the hub, last readings of the encoder */
+        double a[POLES][2], integral[2]; /* amplitudes of the poles, the torque integrated twice and once */
+        double held[RING], acting, angle, rate; /* outputs of the DAC, torque on the hub, readings of the encoder */
         long long sample;
         int is_running, is_held, is_stopped;
     } at;
@@ -44,7 +41,7 @@ static int measure(model *m) { /* 0 where the root moment is beyond its bound */
     for (int o = 0; o < OUTPUTS - 1; o++) {
         seen[o] = rates[o][0] * m->at.integral[0] + rates[o][1] * m->at.integral[1];
         for (int i = 0; i < POLES; i++)
-            seen[o] += weights[o][i][0] * m->at.re[i] - weights[o][i][1] * m->at.im[i];
+            seen[o] += weights[o][i][0] * m->at.a[i][0] - weights[o][i][1] * m->at.a[i][1];
         seen[o] += through[o] * m->at.acting;
     }
     if (!(seen[2] <= {{ bound }} && seen[2] >= -{{ bound }}))
@@ -53,28 +50,27 @@ static int measure(model *m) { /* 0 where the root moment is beyond its bound */
     seen[2] = on_steps(seen[2], converters[1]);
     m->at.rate = {{ lag }} * m->at.rate + (1.0 - {{ lag }}) * (m->at.sample ? seen[0] - m->at.angle : 0.0) / PERIOD;
     m->at.angle = seen[0];
-    seen[1] = {{ "m->at.rate" if is_differenced else "seen[1]" }};
+    {{ "seen[1] = m->at.rate;" if is_differenced }}
     memcpy(m->at.out, seen, sizeof seen);
     return 1;
 }
 
 {% endif %}
 static int advance(model *m) { /* by one sample; 0 where it cannot */
-    double u = m->at.in[0];
+    double u{{ "" if law.step else " = m->at.in[0]" }};
     {{ law.step }}
 {% if has_plant %}
-    const double old = m->at.held[(m->at.sample + 1) % RING], impulse = m->at.sample ? 0.0 : m->given[INPUTS];
+    const double old = m->at.held[(m->at.sample + 1) % RING];
+    double impulse = m->at.sample ? 0.0 : m->given[INPUTS];
     m->at.held[m->at.sample % RING] = u = on_steps(u, converters[2]);
     m->at.integral[1] += impulse;
-    for (int i = 0; i < POLES; i++)
-        m->at.re[i] += impulse;
-    for (int s = 0; s < PIECES; s++) {
+    for (int s = 0; s < PIECES; s++, impulse = 0.0) {
         const double dt = piece[s][0];
         m->at.acting = (piece[s][1] > 0.5 ? m->at.held[(m->at.sample + 2) % RING] : old) + m->at.in[INPUTS - 1];
         for (int i = 0; i < POLES; i++) {
-            const double re = m->at.re[i], im = m->at.im[i];
-            m->at.re[i] = turn[s][i][0] * re - turn[s][i][1] * im + push[s][i][0] * m->at.acting;
-            m->at.im[i] = turn[s][i][0] * im + turn[s][i][1] * re + push[s][i][1] * m->at.acting;
+            const double re = m->at.a[i][0] + impulse, im = m->at.a[i][1];
+            m->at.a[i][0] = turn[s][i][0] * re - turn[s][i][1] * im + push[s][i][0] * m->at.acting;
+            m->at.a[i][1] = turn[s][i][0] * im + turn[s][i][1] * re + push[s][i][1] * m->at.acting;
         }
         m->at.integral[0] += dt * m->at.integral[1] + 0.5 * dt * dt * m->at.acting;
         m->at.integral[1] += dt * m->at.acting;
@@ -90,18 +86,17 @@ static fmi2Status begin(model *m, double start) {
     m->at.time = m->start = start;
     {{ law.init }}
 {% if has_plant %}
-    for (int i = 0; i < POLES; i++) {
-        m->at.re[i] = released[i][0] * m->given[INPUTS + 1];
-        m->at.im[i] = released[i][1] * m->given[INPUTS + 1];
-    }
+    for (int i = 0; i < POLES; i++)
+        for (int j = 0; j < 2; j++)
+            m->at.a[i][j] = released[i][j] * m->given[INPUTS + 1];
     m->at.is_stopped = !measure(m);
 {% endif %}
     return fmi2OK;
 }
 
 static fmi2Status report(model *m, fmi2Status status, fmi2String text) {
-    if (m->logger)
-        m->logger(m->environment, m->name, status, "logStatusError", text);
+    if (m->callbacks.logger)
+        m->callbacks.logger(m->callbacks.environment, m->name, status, "{{ errors }}", text);
     return status;
 }
 
@@ -111,14 +106,13 @@ FMI2 void fmi2FreeInstance(fmi2Component c) { free(c); }
 
 FMI2 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
     const fmi2CallbackFunctions *functions, fmi2Boolean is_visible, fmi2Boolean is_logging) {
-    model *m = type == fmi2CoSimulation && strcmp(guid, GUID) == 0 ? calloc(1, sizeof *m) : NULL;
+    model *m = type == fmi2CoSimulation && strcmp(guid, "{{ guid }}") == 0 ? calloc(1, sizeof *m) : NULL;
     (void)resources, (void)is_visible, (void)is_logging;
-    if (m) {
-        m->logger = functions->logger;
-        m->environment = functions->environment;
-        strncpy(m->name, name, sizeof m->name - 1);
-        begin(m, 0.0);
-    }
+    if (!m)
+        return NULL;
+    m->callbacks = *functions;
+    strncpy(m->name, name, sizeof m->name - 1);
+    begin(m, 0.0);
     return m;
 }
 
@@ -142,11 +136,11 @@ FMI2 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference *at, size_
     return m->at.is_running ? fmi2OK : begin(m, m->start);
 }
 
-FMI2 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean is_final) {
+FMI2 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean is_settled) {
     model *m = c;
     const double off = (time - m->at.time) / PERIOD, end = (time + step - m->start) / PERIOD; /* in samples */
-    (void)is_final;
-    if (!m->at.is_running || m->at.is_stopped || !(step > 0.0 && end < MOST_SAMPLES && off < SLACK && off > -SLACK))
+    (void)is_settled;
+    if (!m->at.is_running || m->at.is_stopped || !(step > 0.0 && end < 1e15 && off < SLACK && off > -SLACK))
         return report(m, fmi2Error, "fmi2DoStep: not started, stopped, or no step on from the last one");
     while (end - (double)m->at.sample > SLACK) {
         if (!m->at.is_held)
