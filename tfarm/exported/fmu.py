@@ -186,7 +186,8 @@ def prepared_simulator(task: ExportTask) -> Simulator:
         run = scenario("slew", arm, task.chain, TRIAL_DURATION)
     except ParameterError:  # an arm that cannot turn
         run = scenario("step", arm, task.chain, TRIAL_DURATION)
-    return Simulator(arm, task.chain, run, law, count=simulated(arm, law, task.chain, run)[1].modes)
+    _, used = simulated(arm, law, task.chain, run, task.modes, outputs=task.outputs)
+    return Simulator(arm, task.chain, run, law, count=used.modes, outputs=task.outputs)
 
 
 def variables_of(what: What, of: Simulator) -> list[Variable]:
