@@ -2,12 +2,14 @@
 
 import ctypes
 import zipfile
+from copy import copy
 from ctypes import CFUNCTYPE, Structure, byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
 from xml.etree import ElementTree
 
 LOGGER = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 OK, WARNING, DISCARD, ERROR = range(4)
+MODEL_EXCHANGE, CO_SIMULATION = range(2)
 LAST_SUCCESSFUL_TIME, TERMINATED = 2, 3
 
 
@@ -18,23 +20,33 @@ class Callbacks(Structure):
 
 
 class Unit:
-    """An instance of a unit, unpacked into a folder; every status other than 0 raises, with what was logged."""
+    """An instance of a unit, unpacked into a folder; `call` and what uses it assert the status, with what was logged."""
 
-    def __init__(self, file, folder, *, guid=None):
+    def __init__(self, file, folder):
+        self.folder = Path(folder)
         with zipfile.ZipFile(file) as archive:
             archive.extractall(folder)
-        self.xml = ElementTree.parse(Path(folder) / "modelDescription.xml").getroot()
-        slave = self.xml.find("CoSimulation")
-        (binary,) = Path(folder).glob(f"binaries/*/{slave.get('modelIdentifier')}.*")
-        self.library = ctypes.CDLL(str(binary))
-        self.at = {each.get("name"): int(each.get("valueReference")) for each in self.xml.iter("ScalarVariable")}
+        self.xml = ElementTree.parse(self.folder / "modelDescription.xml").getroot()
+        (self.binary,) = self.folder.glob(f"binaries/*/{self.xml.find('CoSimulation').get('modelIdentifier')}.*")
+        variables = list(self.xml.iter("ScalarVariable"))
+        self.at = {each.get("name"): int(each.get("valueReference")) for each in variables}
+        self.causality = {each.get("name"): each.get("causality") for each in variables}
         self.period = float(self.xml.find("DefaultExperiment").get("stepSize"))
-        self.logged = []
+        self.library = ctypes.CDLL(str(self.binary))
+        self.library.fmi2Instantiate.restype = c_void_p
+        self.c = self._instance(self.xml.get("guid"), CO_SIMULATION)
+
+    def _instance(self, guid, kind):
+        self.logged, self.time = [], 0.0
         self._logger = LOGGER(lambda *arguments: self.logged.append(arguments[-1].decode()))
         self._callbacks = Callbacks(ctypes.cast(self._logger, c_void_p))
-        self.library.fmi2Instantiate.restype = c_void_p
-        guid = self.xml.get("guid") if guid is None else guid
-        self.c = c_void_p(self.library.fmi2Instantiate(b"unit", 1, guid.encode(), b"", byref(self._callbacks), 0, 0))
+        return c_void_p(self.library.fmi2Instantiate(b"unit", kind, guid.encode(), b"", byref(self._callbacks), 0, 0))
+
+    def another(self, guid=None, kind=CO_SIMULATION):
+        """Another instance in the same process; None where there is none."""
+        other = copy(self)
+        other.c = other._instance(guid or self.xml.get("guid"), kind)
+        return other if other.c.value else None
 
     def status(self, name, *arguments):
         """The status of a function."""
@@ -46,22 +58,30 @@ class Unit:
         assert status == OK, (name, status, self.logged)
 
     def start(self, start=0.0, **parameters):
-        """Through the initialisation."""
+        """The calls of an initialisation."""
         self.call("SetupExperiment", 0, c_double(0.0), c_double(start), 0, c_double(0.0))
         self.call("EnterInitializationMode")
         self.set(parameters)
         self.call("ExitInitializationMode")
         self.time = start
 
+    def real(self, act, references, values):
+        """The status of fmi2GetReal or fmi2SetReal."""
+        n = len(references)
+        return self.status(f"{act}Real", (c_uint * n)(*references), c_size_t(n), values)
+
+    def set_status(self, values):
+        """The status of setting variables by name."""
+        return self.real("Set", list(map(self.at.get, values)), (c_double * len(values))(*values.values()))
+
     def set(self, values):
         """Set variables by name."""
-        n = len(values)
-        self.call("SetReal", (c_uint * n)(*map(self.at.get, values)), c_size_t(n), (c_double * n)(*values.values()))
+        assert self.set_status(values) == OK, self.logged
 
     def get(self, names):
         """The values of variables by name."""
-        n, found = len(names), (c_double * len(names))()
-        self.call("GetReal", (c_uint * n)(*map(self.at.get, names)), c_size_t(n), found)
+        found = (c_double * len(names))()
+        assert self.real("Get", list(map(self.at.get, names)), found) == OK, self.logged
         return list(found)
 
     def step_status(self, step):
@@ -72,10 +92,10 @@ class Unit:
 
     def step(self, step=None):
         """A step that has to succeed, by default of a sampling period."""
-        status = self.step_status(self.period if step is None else step)
-        assert status == OK, self.logged
+        assert self.step_status(self.period if step is None else step) == OK, self.logged
 
-    def close(self):
-        """Free the instance."""
-        self.library.fmi2FreeInstance.restype = None
-        self.library.fmi2FreeInstance(self.c)
+    def status_of(self, kind, which):
+        """The value of fmi2GetRealStatus or fmi2GetBooleanStatus."""
+        value = {"Real": c_double, "Boolean": c_int}[kind]()
+        self.call(f"Get{kind}Status", which, byref(value))
+        return value.value

@@ -181,7 +181,7 @@ def prepared_simulator(task: ExportTask) -> Simulator:
 
     A plant alone has no delay of the law.
     """
-    arm, law = tracked(task.arm, task.law if task.what == "loop" else replace(task.law, delay=0.0))
+    arm, law = tracked(task.arm, replace(task.law, delay=0.0) if task.what == "plant" else task.law)
     try:
         run = scenario("slew", arm, task.chain, TRIAL_DURATION)
     except ParameterError:  # an arm that cannot turn
