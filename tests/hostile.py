@@ -51,6 +51,6 @@ def check_drawing(svg):
 
 
 C_TEXTS = (  # for comments and identifiers of exported code
-    TEXT, NAME, LONG, "a */ int x; /* b", "*/*/", "/*/", "ends ??/", "ends \\", "two\nlines\r\n#error", "int", "\\*/ ??/\n*/",
-    "*\\/ /\\* ?\\?/", "%{ x %} ' '' \"", "`rm -rf`; $(x)", "\u2028\x00\x1b[31m", "é*\u0301/",
+    TEXT, NAME, LONG, "a */ int x; /* b", "*/*/", "/*/", "ends ??/", "ends \\", "two\nlines\r\n#error", "int",
+    "\\*/ ??/\n*/", "*\\/ /\\* ?\\?/", "%{ x %} ' '' \"", "`rm -rf`; $(x)", "\u2028\x00\x1b[31m", "é*\u0301/",
 )  # fmt: skip

@@ -34,7 +34,7 @@ def test_the_command_writes_what_the_function_does(capsys, tmp_path):
     ("options", "error"),
     [
         (("--K2", "30"), "law = 'gains at the hub': the sampled loop is not certified stable: unstable ("),
-        (("--precision", "q15"), "precision = 'q15': known are: double, float, q31"),
+        (("--precision", "q15"), "precision = 'q15': did you mean \"q31\"? known are: double, float, q31"),
         (("--precision", "q31"), "range = 'hub_rate': q31 needs the largest absolute value"),
         (("--range", "hub_rate=x"), "write SIGNAL=VALUE"),
     ],

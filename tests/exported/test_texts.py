@@ -31,7 +31,8 @@ def test_identifiers_are_distinct_short_and_no_keywords():
 @pytest.mark.parametrize("words", C_TEXTS)
 def test_a_comment_is_one_line_that_ends_nothing(words):
     line = comment(words)
-    assert line.isascii() and line.isprintable()
+    assert line.isascii()
+    assert line.isprintable()
     assert not re.search(r"\*/|/\*|\?\?/|\\|\n|\r", line)
     assert comment(line) == line
 
@@ -40,7 +41,8 @@ def test_a_comment_is_one_line_that_ends_nothing(words):
 def test_literals_are_read_back(words):
     assert ast.literal_eval(python_text(words)) == words
     quoted = matlab_text(words)
-    assert quoted[0] == quoted[-1] == "'" and "\n" not in quoted
+    assert quoted[0] == quoted[-1] == "'"
+    assert "\n" not in quoted
     assert "'" not in quoted[1:-1].replace("''", "")
 
 

@@ -1,6 +1,5 @@
-"""Realisations, and bounds of finite word length, against sums, Lyapunov equations and integer arithmetic of their own."""
+"""Realisations and bounds of finite word length, against sums, Lyapunov equations, fractions and whole numbers."""
 
-import math
 from dataclasses import replace
 from fractions import Fraction
 
@@ -10,7 +9,6 @@ from scipy.linalg import solve_discrete_lyapunov
 
 import tfarm
 from tests.exported.cases import GAINS, IDEAL, LAB, NOTCH, PI, REAL, hinf, realised, task_of
-from tfarm.dsp import Chain, Sampling
 from tfarm.errors import ParameterError
 from tfarm.exported.controller import c_controller, in_z
 from tfarm.exported.realisation import BALANCED, SECTIONS, around, candidates, gramians
@@ -21,6 +19,7 @@ SERVO = tfarm.Law(
 )
 
 LAG = tfarm.Law({"hub_rate": ([0.3], [0.02, 1.0]), "root_moment": ([0.1], [0.01, 1.0])}, references=("hub_rate",))
+UNSTABLE = tfarm.HubFeedback(K1=0.3, K2=30.0)
 
 
 def exact_loop(law, chain=IDEAL, arm=LAB):
@@ -94,7 +93,7 @@ def test_errors_and_states_stay_within_their_bounds_under_the_worst_inputs(law, 
     word = controller.word
     bounds, is_whole, error = word.bounds
     assert is_whole
-    A, B, C, D = word.law.parts[0].block.matrices()
+    A, B, C, _ = word.law.parts[0].block.matrices()
     n, steps = len(A), 300
     response = [np.vstack([C, np.eye(n)]) @ np.linalg.matrix_power(A, k) @ B for k in range(steps)]
     reached = np.zeros(n)
@@ -190,19 +189,19 @@ def test_an_integral_can_overflow_and_a_servo_cannot():
     found = c_controller(task_of((LAB, SERVO, IDEAL), "q31")).details
     assert found.overflow.startswith("excluded")
     assert found.samples is None
-    assert all(each.bound < 1 for each in found.states)
+    assert max(found.largest_states) < 1
 
 
 @pytest.mark.parametrize(
     ("task", "error"),
     [
-        (task_of((LAB, GAINS, IDEAL), "q31", ranges={"root_moment": -1.0}), "range.root_moment = -1.0: a positive"),
-        (task_of("gains", ranges={"tip": 1.0}), r"range = 'tip': no signal of this controller: hub_rate, output"),
+        (task_of((LAB, GAINS, IDEAL), "q31", ranges={"root_moment": -1.0}), "range.root_moment = -1.0: the largest"),
+        (task_of("gains", ranges={"tip": 1.0}), "range = 'tip': known are: hub_rate, root_moment, output"),
         (replace(task_of("gains"), precision="q31", ranges={"hub_rate": 1.0}), "range = 'root_moment': q31 needs"),
         (replace(task_of("gains", "q31"), ranges={"hub_rate": 1.0, "root_moment": 1.0}), "range = 'output': q31 needs"),
         (task_of((LAB, GAINS, REAL), "q31"), 'converters.hub_rate = \'difference\': with q31 the hub rate is an input'),
         (task_of((LAB, replace(PI, delay=0.015), IDEAL)), "law.delay = 0.015: is 1.5 samples: C code has a delay"),
-        (task_of((LAB, tfarm.HubFeedback(K1=0.3, K2=30.0), IDEAL)), "law = 'gains at the hub': the sampled loop is not"),
+        (task_of((LAB, UNSTABLE, IDEAL)), "law = 'gains at the hub': the sampled loop is not certified stable"),
         (task_of((LAB, tfarm.Law({"hub_rate": 0.3, "root_moment": 1e-50}), IDEAL), "float"),
          r"D\[0, 1\] = 1e-50: this coefficient is beyond the numbers of float32"),
     ],
@@ -215,40 +214,30 @@ def test_what_cannot_be_exported_is_refused_in_one_line(task, error):
 
 def test_a_coefficient_whose_rounding_destabilises_the_loop_is_named():
     """A gain next to the end of its interval, which rounding to float32 moves beyond it."""
-    end = tfarm.sampled(LAB, GAINS, IDEAL).interval("K2")[1]
-    up = np.nextafter(np.float32(end), np.float32(np.inf))
     K2 = None
     for rate in np.linspace(0.3, 0.31, 40):
         end = tfarm.sampled(LAB, tfarm.HubFeedback(K1=float(rate), K2=0.3), IDEAL).interval("K2")[1]
         if float(np.float32(end * (1 - 1e-9))) > end * (1 + 2e-9):
             K2, K1 = end * (1 - 1e-9), float(rate)
             break
-    assert K2 is not None and up > 0
+    assert K2 is not None
     law = tfarm.HubFeedback(K1=K1, K2=K2)
     assert tfarm.sampled(LAB, law, IDEAL).verdict.is_stable
     with pytest.raises(
-        ParameterError, match=r"coefficient D\[0, 1\] = 'float': rounded to float the loop is not certified"
+        ParameterError, match=r"coefficient D\[0, 1\] = 1.\d+: rounded to float the loop is not certified"
     ):
         c_controller(task_of((LAB, law, IDEAL), "float"))
 
 
 def test_a_loop_that_is_not_certified_is_exported_anyway_and_the_header_warns():
-    found = c_controller(task_of((LAB, tfarm.HubFeedback(K1=0.3, K2=30.0), IDEAL), anyway=True))
+    found = c_controller(task_of((LAB, UNSTABLE, IDEAL), anyway=True))
     assert b"warning: NOT CERTIFIED STABLE; exported by --anyway" in found.contents["controller.h"]
     assert found.verdict.startswith("unstable")
 
 
-def test_a_controller_of_a_rig_runs_in_every_arithmetic():
+@pytest.mark.survey
+def test_a_controller_of_a_rig_is_balanced():
     """Order 7 from three columns, one a reference alone; its loop at C = 0 is not certified."""
-    for precision in ("double", "float", "q31"):
-        task = task_of(hinf(), precision, anyway=True, ranges={"hub_angle": 1.0})
-        found = c_controller(task)
-        assert found.details.realisation == BALANCED
-        assert found.details.noise_gains[-1].gain < found.details.noise_gains[0].gain / 100
-
-
-def test_a_bound_that_is_too_small_would_be_noticed(monkeypatch):
-    controller, _ = realised(task_of((LAB, SERVO, IDEAL), "float"))
-    assert math.isfinite(controller.word.bounds[2])
-    assert controller.word.bounds[2] > realised(task_of((LAB, SERVO, IDEAL)))[0].word.bounds[2] * 1e8
-    assert Chain(sampling=Sampling()) == IDEAL
+    found = c_controller(task_of(hinf(), "q31", anyway=True, ranges={"hub_angle": 1.0}))
+    assert found.details.realisation == BALANCED
+    assert found.details.noise_gains[-1].gain < found.details.noise_gains[0].gain / 100

@@ -158,7 +158,7 @@ def law_code(task: ExportTask, law: Law, variables: Sequence[Variable]) -> LawCo
     made = controller_of(in_z(replace(law, delay=0.0) if is_loop else law, task.chain), task)
     made = replace(made, hub=None, signals=law.signals, dac=np.array([0.0, -np.inf, np.inf]))
     found = task.analysis(replace(made.word.rounded, delay=task.law.delay))
-    files, (name, *_) = written(task, made, task.facts(made.word.rounded, found))
+    files, (name, *_) = written(task, made, [*task.facts(made.word.rounded, found).items()])
     inputs, outputs = ([each.name for each in variables if each.causality == of] for of in ("input", "output"))
     place = {name: f"m->at.out[{n}]" for n, name in enumerate(outputs)}
     place |= {name: f"m->at.in[{n}]" for n, name in enumerate(inputs)}

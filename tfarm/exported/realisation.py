@@ -9,12 +9,11 @@ of squares of the responses of u to a rounding of each state, both in the closed
 
 which no scaling of the states changes: where every state has unit variance, the variance of u by roundings, over that
 of one of them and over that of u under the noise (Mullis and Roberts, IEEE Trans. Circuits and Systems 23, 1976).  It
-is compared for the law as given, for second-order
-sections, each balanced, and for the balanced realisation, K = W = diag(sigma).
+is compared for the law as given, for second-order sections, each balanced, and for the balanced realisation,
+K = W = diag(sigma).
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -43,8 +42,7 @@ class NoiseGain(NamedTuple):
             help="variance of the output by roundings, for states of unit variance, in the closed loop")]  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Around:
+class Around(NamedTuple):
     """The closed loop around a law of one state space: matrix, input of each signal and of each rounding, output u.
 
     `of_signals` (n, signals), `of_rounding` (n, states + 1) (the last is a rounding of u), `output` (n,), `reads`
@@ -59,15 +57,14 @@ class Around:
     states: slice
 
 
-def as_one(law: Law) -> Law:
-    """The law in z with one state space of all columns, signals first, with the sign of v = -sum."""
-    columns = (*law.signals, *law.wanted)
-    return with_matrices(law, law.matrices(columns))
-
-
 def with_matrices(law: Law, matrices: Matrices) -> Law:
-    """The law with another state space of all its columns; sign of v = -sum."""
+    """The law with another state space of all its columns, signals first, and the sign of v = -sum."""
     return replace(law, parts=(Part((*law.signals, *law.wanted), StateSpace(*matrices)),), sign=-1)
+
+
+def matrices_of(law: Law) -> Matrices:
+    """A, B, C, D of a law of all columns: u = r + C x + D e."""
+    return law.matrices((*law.signals, *law.wanted))
 
 
 def around(law: Law, loop: Sampled) -> Around:
@@ -75,13 +72,11 @@ def around(law: Law, loop: Sampled) -> Around:
     A, B, C = loop.pulse.matrices()
     own, Bk, Ck, Dk = with_estimate(law, loop.chain).matrices(loop.in_z.signals)
     n, m, order = len(A), len(own), law.order
-    output = -np.hstack([Dk @ C, Ck])[0]
-    push = np.r_[B, np.zeros(m)]
-    of_states = np.eye(n + m)[:, n : n + order]
+    output, push = -np.hstack([Dk @ C, Ck])[0], np.r_[B, np.zeros(m)]
     return Around(
         matrix=np.block([[A, np.zeros((n, m))], [Bk @ C, own]]) + np.outer(push, output),
         of_signals=np.vstack([np.outer(B, -Dk[0]), Bk]),
-        of_rounding=np.c_[of_states, push],
+        of_rounding=np.c_[np.eye(n + m)[:, n : n + order], push],
         output=output,
         reads=np.hstack([C, np.zeros((len(C), m))]),
         states=slice(n, n + order),
@@ -96,8 +91,8 @@ def gramians(of: Around) -> tuple[Real, Real] | None:
         for _ in range(MOST_DOUBLINGS):
             more, seen = M @ K @ M.T, M.T @ W @ M
             K, W, M = K + more, W + seen, M @ M
-            left = [(a[rows, rows], b[rows, rows]) for a, b in ((more, K), (seen, W))]
-            if all(np.abs(a).max() <= SUMMED * np.abs(b).max() < np.inf for a, b in left):
+            left = [(abs(a[rows, rows]).max(), abs(b[rows, rows]).max()) for a, b in ((more, K), (seen, W))]
+            if all(last <= SUMMED * whole < np.inf for last, whole in left):
                 return K[rows, rows] / (of.output @ K @ of.output), W[rows, rows]
     return None
 
@@ -105,13 +100,10 @@ def gramians(of: Around) -> tuple[Real, Real] | None:
 def balancing(K: Real, W: Real) -> Real | None:
     """T with T^-1 K T^-T = T^T W T = diag(sigma); None where a state is not controllable or not observable."""
     size, vectors = np.linalg.eigh(K)
-    if size[-1] <= 0 or size[0] <= LEAST_SHARE * size[-1]:
-        return None
-    root = vectors * np.sqrt(size)
+    root = vectors * np.sqrt(np.maximum(size, 0.0))
     square, turned = np.linalg.eigh(root.T @ W @ root)
-    if square[-1] <= 0 or square[0] <= LEAST_SHARE**2 * square[-1]:
-        return None
-    return root @ turned / square**0.25
+    is_minimal = size[0] > LEAST_SHARE * size[-1] and square[0] > LEAST_SHARE**2 * square[-1]
+    return root @ turned / square**0.25 if is_minimal else None
 
 
 def sections(A: Real, K: Real, W: Real) -> Real | None:
@@ -122,46 +114,30 @@ def sections(A: Real, K: Real, W: Real) -> Real | None:
     modal = np.hstack(blocks)
     if modal.shape != A.shape or np.linalg.cond(modal / np.linalg.norm(modal, axis=0)) > WORST_CONDITION:
         return None
-    inverse, first, own = np.linalg.inv(modal), 0, []
-    K, W = inverse @ K @ inverse.T, modal.T @ W @ modal
-    for block in blocks:
-        part = slice(first, first := first + block.shape[1])
-        own.append(balancing(K[part, part], W[part, part]))
+    duals = np.split(np.linalg.inv(modal), np.cumsum([block.shape[1] for block in blocks])[:-1])
+    own = [balancing(dual @ K @ dual.T, block.T @ W @ block) for block, dual in zip(blocks, duals, strict=True)]
     known = [each for each in own if each is not None]
     return modal @ block_diag(*known) if len(known) == len(own) else None
 
 
-def transformed(matrices: Matrices, T: Real) -> Matrices:
-    """The same system with states T^-1 x."""
-    A, B, C, D = matrices
-    return np.asarray(np.linalg.solve(T, A @ T)), np.asarray(np.linalg.solve(T, B)), C @ T, D
-
-
-def candidates(law: Law, loop: Sampled) -> Iterator[tuple[NoiseGain, Matrices]]:
-    """The realisations of a law in z of one state space, each with its noise gain."""
-    matrices = law.parts[0].block.matrices()
-    if not law.order:
-        yield NoiseGain(GIVEN, 0.0), matrices
-        return
-    found = gramians(around(law, loop))
+def candidates(law: Law, loop: Sampled) -> list[tuple[NoiseGain, Matrices]]:
+    """The realisations of a law in z of one state space, each with its noise gain; the law as given comes first."""
+    A, B, C, D = matrices_of(law)
+    found = gramians(around(law, loop)) if law.order else None
     if found is None:
-        yield NoiseGain(GIVEN, None), matrices
-        return
+        return [(NoiseGain(GIVEN, None if law.order else 0.0), (A, B, C, D))]
     K, W = found
-    for name, T in ((GIVEN, np.eye(law.order)), (SECTIONS, sections(matrices[0], K, W)), (BALANCED, balancing(K, W))):
-        if T is not None:
-            variances = np.diag(np.linalg.solve(T, np.linalg.solve(T, K).T))
-            yield NoiseGain(name, float(variances @ np.diag(T.T @ W @ T))), transformed(matrices, T)
+    changes = {GIVEN: np.eye(law.order), SECTIONS: sections(A, K, W), BALANCED: balancing(K, W)}
+    known = [(name, T, np.linalg.inv(T)) for name, T in changes.items() if T is not None]
+    gains = [float(np.diag(inverse @ K @ inverse.T) @ np.diag(T.T @ W @ T)) for _, T, inverse in known]
+    return [
+        (NoiseGain(name, gain), (inverse @ A @ T, inverse @ B, C @ T, D))
+        for gain, (name, T, inverse) in zip(gains, known, strict=True)
+    ]
 
 
 def least_noise(law: Law, loop: Sampled) -> tuple[Law, str, list[NoiseGain]]:
-    """The law in the realisation with the least noise gain, its name, and the gains of all.
-
-    Where no noise gain is determined the law is as given.
-    """
-    found = list(candidates(law, loop))
-    _, name, matrices = min(
-        ((np.inf if gain.gain is None else gain.gain, gain.realisation, each) for gain, each in found),
-        key=lambda each: each[0],
-    )
-    return with_matrices(law, matrices), name, [gain for gain, _ in found]
+    """The law in the realisation with the least noise gain, its name, and the gains of all."""
+    found = candidates(law, loop)
+    best, matrices = min(found, key=lambda each: each[0].gain or 0.0)
+    return with_matrices(law, matrices), best.realisation, [gain for gain, _ in found]

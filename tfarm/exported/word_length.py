@@ -18,17 +18,17 @@ from typing import Any
 import numpy as np
 
 from tfarm.arm import Law
-from tfarm.arm.blocks import Matrices
 from tfarm.arm.law import REFERENCE
 from tfarm.arrays import Real
 from tfarm.dsp.sampled import Sampled
 from tfarm.errors import ParameterError, require
-from tfarm.exported.realisation import around, with_matrices
+from tfarm.exported.realisation import around, matrices_of, with_matrices
 
 MOST_SUMMED, BLOCK = 20_000, 32  # samples of a sum without a bound on all others, and of one step
 DECAYED = 1e-3  # row sum of |M^n| from which all later samples are bounded
 ON_CIRCLE, UNSEEN = 1e-9, 1e-8  # of 1: modulus of a pole on the unit circle; share of one that no output shows
 FRACTION_BITS, MOST_SHIFT = 31, 62  # of a number in fixed point, and of a sum of products
+HALF_STEP = 2.0 ** -(FRACTION_BITS + 1)  # of the range of a number: its largest rounding
 HEADROOM, LEAST_SCALE = 1 + 2.0**-10, 2.0**-100  # of the range of a state: for roundings, and the least of all
 OF_OUTPUT = 4.0  # ranges of u that a state without a bound reaches before it saturates
 REFINED = 8  # steps to the bound of the errors
@@ -41,18 +41,15 @@ def absolute_sum(M: Real, left: Real, right: Real) -> tuple[Real, bool]:
 
     With G = sum_{k<n} |left M^k|, sum_k |left M^k| <= G (I - |M^n|)^-1 once the row sums of |M^n| are below 1.
     """
-    power, rows = np.linalg.matrix_power(M, BLOCK), [left]
-    for _ in range(BLOCK - 1):
-        rows.append(rows[-1] @ M)
-    block, G, S, n = np.array(rows), np.zeros(left.shape), np.zeros((len(left), right.shape[1])), 0
-    with np.errstate(over="ignore", invalid="ignore"):
-        while n < MOST_SUMMED:
-            G, S, n = G + abs(block).sum(axis=0), S + abs(block @ right).sum(axis=0), n + BLOCK
-            block = block @ power
-            last = np.linalg.matrix_power(power, n // BLOCK) if (n // BLOCK) & (n // BLOCK - 1) == 0 else None
-            if last is not None and abs(last).sum(axis=1).max(initial=0.0) <= DECAYED:
-                whole = np.linalg.solve(np.eye(len(M)) - abs(last).T, G.T).T
-                return S + whole @ abs(last @ right), True
+    block = np.array([left @ np.linalg.matrix_power(M, k) for k in range(BLOCK)])
+    step = last = np.linalg.matrix_power(M, BLOCK)
+    G, S = np.zeros(left.shape), np.zeros((len(left), right.shape[1]))
+    with np.errstate(over="ignore", invalid="ignore"):  # of a matrix that grows
+        for _ in range(MOST_SUMMED // BLOCK):
+            G, S = G + abs(block).sum(axis=0), S + abs(block @ right).sum(axis=0)
+            if abs(last).sum(axis=1).max(initial=0.0) <= DECAYED:
+                return S + np.linalg.solve(np.eye(len(M)) - abs(last).T, G.T).T @ abs(last @ right), True
+            block, last = block @ step, last @ step
     return np.nan_to_num(S, nan=np.inf), False
 
 
@@ -70,8 +67,8 @@ class Word:
     sizes: Real
     ranges: Real
     output: float
-    tables: tuple[Any, Any, Any, Any]
-    shifts: Any
+    tables: tuple[Any, ...]
+    shifts: Any = None
 
     @cached_property
     def rounded(self) -> Law:
@@ -85,12 +82,10 @@ class Word:
     @cached_property
     def errors(self) -> tuple[float, Real]:
         """Relative and absolute rounding error of a sum: of each state, and of u last."""
-        n, m = self.law.order, self.sizes.size
+        n, terms = self.law.order, self.law.order + self.sizes.size + 3
         if self.precision == FIXED:
-            half = 2.0 ** -(FRACTION_BITS + 1)
-            return 0.0, np.r_[np.full(n, half), half * self.output]
+            return 0.0, HALF_STEP * np.r_[np.ones(n), self.output]
         kind, unit = FLOATS[self.precision]
-        terms = n + m + 3
         return terms * unit / (1 - terms * unit), np.full(n + 1, terms * float(np.finfo(kind).smallest_subnormal))
 
     @cached_property
@@ -99,17 +94,18 @@ class Word:
 
         The error d of the states obeys d' = A d + w, w = |dA| X + |dB| E + roundings; X includes d.
         """
-        (A, B, C, D), E, one = self.law.parts[0].block.matrices(), self.sizes, np.eye(self.law.order)
-        rounded = self.rounded.parts[0].block.matrices()
+        (A, B, C, D), E, one = matrices_of(self.law), self.sizes, np.eye(self.law.order)
         relative, absolute = self.errors
-        vA, vB, vC, vD = (abs(r - e) + relative * abs(r) for r, e in zip(rounded, (A, B, C, D), strict=True))
+        pairs = zip(matrices_of(self.rounded), (A, B, C, D), strict=True)
+        vA, vB, vC, vD = (abs(r - e) + relative * abs(r) for r, e in pairs)
         X, is_whole = absolute_sum(A, one, B)
         of_states, of_output = (absolute_sum(A, left, one)[0] for left in (one, C))
         largest = first = X @ E
-        for _ in range(REFINED):  # to the least fixed point, far below the first guess of a word that is long enough
-            w = vA @ largest + vB @ E + absolute[:-1]
-            largest = first + of_states @ w
-        u = of_output @ w + vC @ largest + vD @ E + relative * self.output
+        with np.errstate(over="ignore", invalid="ignore"):  # of a law that grows
+            for _ in range(REFINED):  # to the least fixed point
+                w = vA @ largest + vB @ E + absolute[:-1]
+                largest = first + of_states @ w
+            u = of_output @ w + vC @ largest + vD @ E + relative * self.output
         return largest, is_whole, float(u[0] + absolute[-1])
 
     def limit_cycle(self, loop: Sampled) -> float | None:
@@ -119,26 +115,21 @@ class Word:
         error of a signal, the relative and absolute errors g and a of a sum, b of a signal in fixed point, and
         Q = |A B; C D|.  Where all eigenvalues of g S Q are below 1 that bounds z.
         """
-        A, B, C, D = (abs(each) for each in self.rounded.parts[0].block.matrices())
-        n, signals, read = len(A), self.law.signals, loop.in_z.signals
+        n, signals, read = self.law.order, self.law.signals, loop.in_z.signals
         if not set(signals) <= set(read):  # an estimated rate
             return None
         of, at = around(self.rounded, loop), [read.index(name) for name in signals]
         left = np.vstack([np.eye(len(of.matrix))[of.states], of.reads[at], of.output])
-        right = np.c_[of.of_rounding, of.of_signals[:, at]]
-        S, is_whole = absolute_sum(observed(of.matrix, left), left, right)
-        if not is_whole:
+        S, is_whole = absolute_sum(observed(of.matrix, left), left, np.c_[of.of_rounding, of.of_signals[:, at]])
+        A, B, C, D = (abs(each) for each in matrices_of(self.rounded))
+        Q = np.block([[A, B[:, : len(at)]], [C, D[:, : len(at)]]])  # references are at rest
+        S[-1, n:] += np.r_[1.0, D[0, : len(at)]]  # u itself
+        relative, absolute = self.errors
+        loops = relative * S[:, : n + 1] @ Q if is_whole else np.ones((1 + n + len(at), n + len(at)))
+        if max(abs(np.linalg.eigvals(loops[:-1])), default=0.0) >= 1:
             return None
-        B, D = B[:, : len(at)], D[:, : len(at)]  # references are at rest
-        S[-1, n:] += np.r_[1.0, D[0]]  # u itself
-        (relative, absolute), Q = self.errors, np.block([[A, B], [C, D]])
-        reading = 2.0 ** -(FRACTION_BITS + 1) * self.ranges[: len(at)] * (self.precision == FIXED)
-        loops = relative * S[:-1, : n + 1] @ Q
-        if max(abs(np.linalg.eigvals(loops)), default=0.0) >= 1:
-            return None
-        rest = S @ np.r_[absolute, reading]
-        z = np.linalg.solve(np.eye(len(loops)) - loops, rest[:-1])
-        return float(rest[-1] + relative * S[-1, : n + 1] @ Q @ z)
+        rest = S @ np.r_[absolute, HALF_STEP * self.ranges[: len(at)] * (self.precision == FIXED)]
+        return float(rest[-1] + loops[-1] @ np.linalg.solve(np.eye(n + len(at)) - loops[:-1], rest[:-1]))
 
 
 def observed(M: Real, left: Real) -> Real:
@@ -155,66 +146,44 @@ def word_of(law: Law, precision: str, ranges: Mapping[str, float], output: float
     Raises ParameterError, in fixed point for a signal or an output without a range, and for a coefficient that is
     beyond the numbers of the target.
     """
-    columns = (*law.signals, *law.wanted)
-    sizes, factors = [], []
-    for name in columns:
-        plain = name.removeprefix(REFERENCE)
-        remedy = f"q31 needs the largest absolute value of this signal: --range {plain}=VALUE, in SI units"
-        require(plain in ranges or precision != FIXED, "range", plain, remedy)
-        sizes.append(ranges.get(plain, 1.0))
-        factors.append(2.0 if name in law.references else 1.0)
-    R, E = np.array(sizes), np.array(sizes) * factors
-    if precision != FIXED:
-        kind = FLOATS[precision][0]
-        A, B, C, D = (_rounded(key, each, kind) for key, each in zip("ABCD", matrices_of(law), strict=True))
-        return Word(law, precision, E, R, output or 1.0, (A, B, C, D), None)
-    remedy = (
-        "q31 needs the range of the output: a torque limit or a range of the DAC in the chain, or --range output=VALUE"
-    )
-    require(output is not None, "range", OUTPUT, remedy)
-    U = float(output or 1.0)
-    return _fixed(law, E, R, U)
-
-
-def matrices_of(law: Law) -> Matrices:
-    """A, B, C, D of a law of one state space: u = r + C x + D e."""
-    return law.parts[0].block.matrices()
-
-
-def _rounded(key: str, table: Real, kind: Any) -> Any:
-    """A table in floating point.  Raises ParameterError for a coefficient that overflows, or underflows to 0."""
+    names = [name.removeprefix(REFERENCE) for name in (*law.signals, *law.wanted)]
+    for name in (*names, OUTPUT):
+        is_known = name in ranges or (name == OUTPUT and output) or precision != FIXED
+        require(is_known, "range", name, f"q31 needs the largest absolute value: --range {name}=VALUE, in SI units")
+    R = np.array([ranges.get(name, 1.0) for name in names])
+    E = R * np.array([2.0 if name in law.references else 1.0 for name in (*law.signals, *law.wanted)])
+    if precision == FIXED:
+        return _fixed(law, E, R, float(output or 1.0))
+    kind, tables = FLOATS[precision][0], matrices_of(law)
     with np.errstate(over="ignore"):
-        found = table.astype(kind)
-    for place in np.argwhere(~np.isfinite(found) | ((found == 0) & (table != 0))).tolist():
-        _refuse(key, place, float(table[tuple(place)]), f"is beyond the numbers of {np.dtype(kind).name}")
-    return found
+        found = tuple(each.astype(kind) for each in tables)
+    for key, table, own in zip("ABCD", tables, found, strict=True):
+        is_beyond = ~np.isfinite(own) | ((own == 0) & (table != 0))
+        _check(key, table, is_beyond, f"beyond the numbers of {np.dtype(kind).name}")
+    return Word(law, precision, E, R, output or 1.0, found)
 
 
-def _refuse(key: str, place: Any, value: float, problem: str) -> None:
-    """Raise ParameterError for one coefficient."""
-    raise ParameterError(key=f"{key}[{', '.join(map(str, place))}]", value=value, remedy=f"this coefficient {problem}")
+def _check(key: str, table: Real, is_beyond: Any, problem: str) -> None:
+    """Raise ParameterError for the first coefficient of a table that the target does not have."""
+    for place in np.argwhere(is_beyond).tolist():
+        name = f"{key}[{', '.join(map(str, place))}]"
+        raise ParameterError(key=name, value=float(table[tuple(place)]), remedy=f"this coefficient is {problem}")
 
 
 def _fixed(law: Law, E: Real, R: Real, U: float) -> Word:
     """A law in fixed point: the states scaled by powers of 2 beyond their bounds, or where there is none by u."""
-    A, B, C, D = matrices_of(law)
-    X, is_whole = absolute_sum(A, np.eye(len(A)), B)
-    size = HEADROOM * (X @ E)
-    if not is_whole:
-        size = np.minimum(size, np.divide(OF_OUTPUT * U, abs(C[0]), out=np.full(len(A), np.inf), where=C[0] != 0))
-    scale = np.exp2(np.ceil(np.log2(np.maximum(size, LEAST_SCALE))))
+    (A, B, C, D), n = matrices_of(law), law.order
+    X, is_whole = absolute_sum(A, np.eye(n), B)
+    of_output = np.divide(OF_OUTPUT * U, abs(C[0]), out=np.full(n, np.inf), where=C[0] != 0)
+    size = np.maximum(X @ E if is_whole else np.minimum(X @ E, of_output), LEAST_SCALE)
+    scale = np.exp2(np.ceil(np.log2(HEADROOM * size)))
     scaled = with_matrices(law, (A * scale / scale[:, None], B / scale[:, None], C * scale, D))
     A, B, C, D = matrices_of(scaled)
     table = np.block([[A, B * R], [C / U, D * R / U]])
-    sums = abs(table) @ np.r_[np.ones(len(A)), E / R] + np.r_[np.zeros(len(A)), 1.0]  # of u with the feedforward
-    shifts = np.floor(np.log2((2.0**FRACTION_BITS - len(table) - 2) / np.maximum(sums, LEAST_SCALE))).astype(int)
-    shifts = np.minimum(shifts, MOST_SHIFT)
-    for row in np.flatnonzero(shifts < 1).tolist():
-        column = int(np.argmax(abs(table[row])))
-        name = ("A" if column < len(A) else "B") if row < len(A) else ("C" if column < len(A) else "D")
-        at = [row % len(A) if row < len(A) else 0, column % max(1, len(A)) if column < len(A) else column - len(A)]
-        _refuse(name, at, float(table[row, column]), "is beyond the numbers of q31 at these ranges")
+    sums = abs(table) @ np.r_[np.ones(n), E / R] + np.r_[np.zeros(n), 1.0]  # of u with the feedforward
+    most = 2.0**FRACTION_BITS - len(table) - R.size
+    shifts = np.minimum(np.floor(np.log2(most / np.maximum(sums, LEAST_SCALE))).astype(int), MOST_SHIFT)
+    is_largest = abs(table) == abs(table).max(axis=1)[:, None]
+    _check("[A B; C D]", table, is_largest & (shifts < 1)[:, None], "beyond the numbers of q31 at these ranges")
     whole = np.rint(np.ldexp(table, shifts[:, None])).astype(np.int64)
-    n = len(A)
-    tables = whole[:n, :n], whole[:n, n:], whole[n:, :n], whole[n:, n:]
-    return Word(scaled, FIXED, E, R, U, tables, shifts)
+    return Word(scaled, FIXED, E, R, U, (whole[:n, :n], whole[:n, n:], whole[n:, :n], whole[n:, n:]), shifts)

@@ -9,24 +9,19 @@
 #endif
 
 {% endif %}
-{% macro matrix(key, rows) %}
+{% for key, rows in (("A", A), ("B", B), ("C", C), ("D", D)) if rows and rows[0] %}
 static const {{ real }} {{ key }}[{{ rows|length }}][{{ rows[0]|length }}] = {
 {% for row in rows %}
     { {{- row|join(", ") -}} },
 {% endfor %}
 };
-{% endmacro %}
-{% if n %}
-{{ matrix("A", A) }}
-{{- matrix("B", B) }}
-{{- matrix("C", C) }}
-{%- endif %}
-{{ matrix("D", D) }}
+{% endfor %}
+
 {% if fixed %}
 {% if n %}
 static const int shifts[{{ n }}] = { {{- shifts[:-1]|join(", ") -}} };
-{% endif %}
 
+{% endif %}
 static int64_t shifted(int64_t value, int shift) /* value/2^shift to the nearest, halves upwards */
 {
     const uint64_t top = UINT64_C(1) << 63, half = UINT64_C(1) << (shift - 1);
@@ -46,11 +41,11 @@ static int is_finite({{ real }} value)
 
 static {{ real }} converted(double u) /* on the steps of the DAC and within its limits */
 {
-{% if dac[0] %}
+{% if step %}
     const double whole = 6755399441055744.0, exact = 2251799813685248.0; /* 1.5 2^52, 2^51 */
     double n = u / {{ dac[0] }};
     if (n > -exact && n < exact)
-        n = (n + whole) - whole;
+        n = n > 0 ? (n + whole) - whole : n < 0 ? -((whole - n) - whole) : n;
     u = n * {{ dac[0] }};
 {% endif %}
     return ({{ real }})(u < {{ dac[1] }} ? {{ dac[1] }} : u > {{ dac[2] }} ? {{ dac[2] }} : u);
@@ -66,10 +61,7 @@ void {{ name }}_init({{ name }}_state *state)
 
 int {{ name }}_step({{ name }}_state *state, const {{ name }}_input *input, {{ name }}_number *output)
 {
-{% if n or delay %}
-    int i;
-{% endif %}
-    int j;
+    int {{ "i, j" if n or delay else "j" }};
     {{ wide }} e[{{ m }}], u;
 {% if n %}
     {{ wide }} total;
@@ -85,13 +77,13 @@ int {{ name }}_step({{ name }}_state *state, const {{ name }}_input *input, {{ n
         return {{ name }}_INPUT_ERROR;
 {% endif %}
 {% if hub %}
-    rate = {{ hub[1] }} * state->rate
-        + (1.0 - {{ hub[1] }}) * ((double)input->{{ hub[0] }} - (state->begun ? state->angle : (double)input->{{ hub[0] }})) / {{ hub[2] }};
+    rate = state->begun ? (double)input->{{ hub[0] }} - state->angle : 0.0;
+    rate = {{ hub[1] }} * state->rate + (1.0 - {{ hub[1] }}) * rate / {{ hub[2] }};
 {% endif %}
 {% for each in errors %}
     e[{{ loop.index0 }}] = {{ each }};
 {% endfor %}
-    u = {{ "input->feedforward * (INT64_C(1) << %d)"|format(shifts[-1]) if fixed else "input->feedforward" }};
+    u = input->feedforward{{ " * (INT64_C(1) << %d)"|format(shifts[-1]) if fixed }};
 {% if n %}
     for (i = 0; i < {{ n }}; i++)
         u += {{ cast }}C[0][i] * state->x[i];
@@ -108,15 +100,15 @@ int {{ name }}_step({{ name }}_state *state, const {{ name }}_input *input, {{ n
 {% if fixed %}
         following[i] = clipped(shifted(total, shifts[i]), INT32_MIN, INT32_MAX);
 {% else %}
-        following[i] = total;
         if (!is_finite(total))
             return {{ name }}_OVERFLOW;
+        following[i] = total;
 {% endif %}
     }
 {% endif %}
 {% if fixed %}
     u = shifted(u, {{ shifts[-1] }});
-{% if dac[0] %}
+{% if step %}
     u = shifted(u, {{ dac[0] }}) * (INT64_C(1) << {{ dac[0] }});
 {% endif %}
 {% else %}

@@ -22,7 +22,7 @@ static {{ real }} next({{ "void" if fixed else real + " size" }}) /* of a linear
 {% if fixed %}
     return (int32_t)((int64_t)seed - INT64_C(2147483648));
 {% else %}
-    return size * (({{ real }})(seed >> 8) / {{ half }} - {{ one }});
+    return size * (({{ real }})(seed >> 8) / 8388608.0{{ suffix }} - 1.0{{ suffix }});
 {% endif %}
 }
 
@@ -40,7 +40,7 @@ int main(void)
 {% endfor %}
 {% if not fixed %}
         if (k == {{ refused }})
-            input.{{ fields[0].identifier }} = {{ zero }} / (input.feedforward - input.feedforward); /* NaN */
+            input.{{ fields[0].identifier }} = 0.0{{ suffix }} / (input.feedforward - input.feedforward); /* NaN */
 {% endif %}
         status = {{ name }}_step(&state, &input, &output);
         wrong += status != expected[k] || memcmp(&output, &recorded[k], sizeof output) != 0;
