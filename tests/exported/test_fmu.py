@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.exported.cases import CASES, GAINS, IDEAL, LAB, REAL
+from tests.exported.cases import CASES, GAINS, IDEAL, LAB, REAL, hinf
 from tests.exported.compilers import COMPILERS, STRICT, needed, run
 from tests.exported.units import DISCARD, DRIVER, ERROR, LAST_SUCCESSFUL_TIME, TERMINATED, Unit
 from tests.hostile import C_TEXTS, NAME
@@ -39,6 +39,7 @@ BAR = odd_arms()["heavy-hub"]
 LOOPS = {
     **{name: (*case, "slew") for name, case in CASES.items()},
     "late": (LAB, GAINS, LATE, "slew"),
+    "rig": (*hinf(), "slew"),
     "single": (LAB, STATES, SINGLE, "slew"),
     "states": (LAB, STATES, replace(LATE, converters=IDEAL.converters), "slew"),
     "reference": (LAB, SERVO, IDEAL, "slew"),

@@ -137,11 +137,11 @@ def fmu(task: ExportTask) -> Export:
     numbers, count = plant_code(prepared), Counter(each.causality for each in variables)
     source = render("fmu.c", law=law, functions=FUNCTIONS, errors=ERRORS, count=count, **header._asdict(), **numbers)
     sources = {"fmi2.h": render("fmi2.h"), "fmu.c": source, **law.files}
-    binary, compiler = compiled(sources, identifier)
+    binary, compiler = binary_of(sources, identifier)
     files = {f"sources/{name}": content for name, content in sources.items()} | binary
     files["modelDescription.xml"] = model_description(header, sources)
     return Export(
-        what=task.what, form=task.form, contents={f"{task.what}.fmu": zipped(files)}, names=[], verdict=law.verdict,
+        what=task.what, form=task.form, contents={f"{task.what}.fmu": archive_of(files)}, names=[], verdict=law.verdict,
         details=Unit(variables, modes, compiler), sha256=task.sha256,
     )  # fmt: skip
 
@@ -155,15 +155,16 @@ def law_code(task: ExportTask, law: Law, variables: Sequence[Variable]) -> LawCo
     require(task.precision != FIXED, "precision", task.precision, remedy)
     is_loop, is_single = task.what == "loop", task.chain.converters.arithmetic == "float32"
     task = replace(task, precision="float" if is_single else task.precision)
-    made = controller_of(in_z(replace(law, delay=0.0) if is_loop else law, task.chain), task)
-    made = replace(made, hub=None, signals=law.signals, dac=np.array([0.0, -np.inf, np.inf]))
-    found = task.analysis(replace(made.word.rounded, delay=task.law.delay))
-    files, (name, *_) = written(task, made, [*task.facts(made.word.rounded, found).items()])
+    controller = controller_of(in_z(replace(law, delay=0.0) if is_loop else law, task.chain), task)
+    controller = replace(controller, hub=None, signals=law.signals, dac=np.array([0.0, -np.inf, np.inf]))
+    rounded = replace(controller.word.rounded, delay=task.law.delay)
+    found = task.analysis(rounded)
+    files, (first, *_) = written(task, controller, [*task.facts(rounded, found).items()])
     inputs, outputs = ([each.name for each in variables if each.causality == of] for of in ("input", "output"))
     place = {name: f"m->at.out[{n}]" for n, name in enumerate(outputs)}
     place |= {name: f"m->at.in[{n}]" for n, name in enumerate(inputs)}
-    own, fields = name.identifier, [f"{MEASURED}{each}" for each in made.signals]
-    fields += [*(f"{REFERENCE}{each}" for each in made.references), FEEDFORWARD]
+    own, fields = first.identifier, [f"{MEASURED}{each}" for each in controller.signals]
+    fields += [*(f"{REFERENCE}{each}" for each in controller.references), FEEDFORWARD]
     read = ", ".join(f"({own}_number){place[each]}" for each in fields)
     return LawCode(
         include='\n#include "controller.h"',
@@ -186,8 +187,10 @@ def prepared_simulator(task: ExportTask) -> Simulator:
         run = scenario("slew", arm, task.chain, TRIAL_DURATION)
     except ParameterError:  # an arm that cannot turn
         run = scenario("step", arm, task.chain, TRIAL_DURATION)
-    _, used = simulated(arm, law, task.chain, run, task.modes, outputs=task.outputs)
-    return Simulator(arm, task.chain, run, law, count=used.modes, outputs=task.outputs)
+    modes = 1 if task.what == "controller" else task.modes
+    if modes is None:
+        modes = simulated(arm, law, task.chain, run, outputs=task.outputs)[1].modes
+    return Simulator(arm, task.chain, run, law, count=modes, outputs=task.outputs)
 
 
 def variables_of(what: What, of: Simulator) -> list[Variable]:
@@ -274,7 +277,7 @@ def model_description(of: Header, sources: Iterable[str]) -> bytes:
         element("UnitDefinitions", *units),
         element("LogCategories", element("Category", name=ERRORS)),
         element("DefaultExperiment", startTime="0", stopTime=repr(TRIAL_DURATION), stepSize=of.period),
-        element("ModelVariables", *(declared(n, each, of.has_plant) for n, each in enumerate(of.variables))),
+        element("ModelVariables", *(variable_element(n, each, of.has_plant) for n, each in enumerate(of.variables))),
         element("ModelStructure", *structure),
         fmiVersion="2.0", modelName=of.identifier, guid=of.guid, description=one_line(of.about, LONGEST_TEXT),
         generationTool=f"tfarm {version('tfarm')}", variableNamingConvention="flat", numberOfEventIndicators="0",
@@ -283,7 +286,7 @@ def model_description(of: Header, sources: Iterable[str]) -> bytes:
     return tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
 
 
-def declared(reference: int, of: Variable, has_plant: bool) -> Element:
+def variable_element(reference: int, of: Variable, has_plant: bool) -> Element:
     """A variable in the description; those of a sampled system change at the samples."""
     is_computed = of.causality == "output" and has_plant
     initial = {"initial": "calculated" if has_plant else "exact"} if of.causality == "output" else {}
@@ -296,12 +299,12 @@ def declared(reference: int, of: Variable, has_plant: bool) -> Element:
 
 def element(tag: str, *children: Element, **attributes: str) -> Element:
     """An element of XML with its children."""
-    made = Element(tag, attributes)
-    made.extend(children)
-    return made
+    parent = Element(tag, attributes)
+    parent.extend(children)
+    return parent
 
 
-def compiled(sources: Mapping[str, bytes], identifier: str) -> tuple[dict[str, bytes], str]:
+def binary_of(sources: Mapping[str, bytes], identifier: str) -> tuple[dict[str, bytes], str]:
     """The binary for this machine by its path in a unit, none without a compiler; and platform and compiler."""
     compiler = next(filter(None, map(shutil.which, COMPILERS)), None)
     if compiler is None or sys.platform not in PLATFORMS:
@@ -322,7 +325,7 @@ def compiled(sources: Mapping[str, bytes], identifier: str) -> tuple[dict[str, b
     return {f"binaries/{platform}/{identifier}{suffix}": binary}, f"{platform}, by {Path(compiler).name}"
 
 
-def zipped(files: Mapping[str, bytes]) -> bytes:
+def archive_of(files: Mapping[str, bytes]) -> bytes:
     """An archive of files, the same for the same content."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
