@@ -17,12 +17,14 @@ from tests.exported.compilers import COMPILERS, STRICT, needed, run
 from tests.exported.units import DISCARD, DRIVER, ERROR, LAST_SUCCESSFUL_TIME, TERMINATED, Unit
 from tests.hostile import C_TEXTS, NAME
 from tests.odd_arms import odd_arms
+from tests.shared import thinned
 from tfarm import Law, ParameterError
 from tfarm.arm.law import REFERENCE
 from tfarm.dsp import Simulator, scenario
 from tfarm.dsp.results import simulated_run
 from tfarm.exported import fmu as module
 
+QUICK = ("integral", "late", "states", "decay", "impulse", "pulse")
 MODES = 4
 EQUAL = 1e-12  # of the largest value of a signal: roundings in another order
 LATE = replace(REAL, sampling=replace(REAL.sampling, delay_samples=1.3, antialias_corner=400.0))
@@ -50,6 +52,7 @@ LOOPS = {
 }
 
 
+OTHERS = [name for name in LOOPS if name not in (*QUICK, "unstable")]
 FOLDER = TemporaryDirectory(prefix="units-")
 EXPORTED = {}
 
@@ -88,7 +91,7 @@ def assert_equal(found, truth, name=""):
     np.testing.assert_allclose(found, truth, rtol=0, atol=EQUAL * abs(truth).max(), err_msg=name)
 
 
-@pytest.mark.parametrize("case", [case for case in LOOPS if case != "unstable"])
+@pytest.mark.parametrize("case", [*QUICK, *(pytest.param(case, marks=pytest.mark.survey) for case in OTHERS)])
 def test_a_loop_is_that_of_the_simulation(case):
     arm, law, chain, name = LOOPS[case]
     outputs = ("strain@0.05", "tip_rotation") if arm is BAR else ()
@@ -125,7 +128,7 @@ def test_a_plant_is_that_of_the_simulation_under_any_torque(case):
     assert_equal(found["torque"][1:], truth.torque)
 
 
-@pytest.mark.parametrize("case", ["integral", "late", "single", "reference"])
+@pytest.mark.parametrize("case", thinned(["integral", "late", "single", "reference"], 2))
 def test_plant_and_controller_in_turn_are_the_loop(case):
     """First the controller, then the plant, in each step; the delay of the law is the controller's here."""
     plant, control, loop = (made(what, case)[0] for what in ("plant", "controller", "loop"))
@@ -285,7 +288,7 @@ def test_the_check_of_c_finds_nothing():
     run(needed("cppcheck"), *checks, made("loop", "single")[0].folder / "sources")
 
 
-@pytest.mark.parametrize("what", ["plant", "controller", "loop"])
+@pytest.mark.parametrize("what", thinned(["loop", "plant", "controller"], 3))
 def test_sanitizers_find_nothing_in_random_calls(tmp_path, what):
     """Values of any size, unknown references, steps of any length and order, and resets."""
     unit, _ = made(what, "single")
@@ -364,7 +367,7 @@ def test_equal_inputs_have_equal_bytes(tmp_path):
     assert "generationDateAndTime" not in one.read("modelDescription.xml").decode()
 
 
-@pytest.mark.parametrize("text", C_TEXTS)
+@pytest.mark.parametrize("text", thinned(C_TEXTS, 3))
 def test_names_of_a_user_reach_c_and_xml_as_text(tmp_path, text, monkeypatch):
     """The name of the arm where it is a legal one, and that of the identifiers."""
     monkeypatch.setattr(module, "COMPILERS", ())
