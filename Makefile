@@ -36,6 +36,7 @@ SURVEYS := \
 	fitting.planted \
 	tuner.bounded \
 	exported.laws \
+	exported.unit_loops \
 	cli.fuzz \
 	cli.stops \
 	report.plausible \
