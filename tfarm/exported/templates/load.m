@@ -1,0 +1,26 @@
+% written by tfarm: the systems of a .mat file in this folder, for MATLAB (Control System Toolbox) and Octave (control)
+{% for line in of.head %}
+% {{ line | comment }}
+{% endfor %}
+here = fileparts(mfilename('fullpath'));
+{{ loads }}
+value = @(d) d.C * ((d.checked_at * eye(size(d.A, 1)) - d.A) \ d.B) + d.D;
+is_kept = @(d) max(max(abs(value(d) - d.checked_value))) <= 1e-9 * max(max(abs(d.checked_value)));
+if ~exist('ss') && exist('OCTAVE_VERSION', 'builtin')
+    try, pkg('load', 'control'); catch, end
+end
+if ~exist('ss'), disp('No control package: matrices are checked, no ss and frd are built.'); end
+{% for name, each in of.systems.items() %}
+% {{ name }}: {{ each.title | comment }}
+d = {{ "data" if loop.first else "data." + name }};
+assert(is_kept(d), '{{ name }}: the matrices differ from their transfer functions in the file');
+if exist('ss')
+    {{ name }} = ss(d.A, d.B, d.C, d.D, d.period, 'InputName', d.input_name, 'OutputName', d.output_names, ...
+        'StateName', d.state_names, 'Name', d.name);
+end
+{% endfor %}
+{% if of.response %}
+% exact: the exact frequency response of the arm
+if exist('ss'), exact = frd(data.response, data.omega, 'InputName', data.exact_input, 'OutputName', data.exact_outputs); end
+{% endif %}
+clear here d value is_kept
