@@ -19,6 +19,7 @@ from matplotlib import pyplot
 
 import tfarm
 from tests.bench import Row
+from tests.octave import ABSENT, OCTAVE, left_by_octave
 from tests.shared import docs_module
 from tests.shell import heard
 from tfarm.arm.law_tables import load_law
@@ -93,6 +94,8 @@ class Run:
         elif kind == "sh" or (kind == "ipython3" and text.startswith("%%bash\n")):
             for line in text.removeprefix("%%bash\n").replace("\\\n", "").splitlines():
                 self.command(line)
+        elif kind == "matlab":
+            self.printed += left_by_octave(Path.cwd(), text)[1] if OCTAVE else ABSENT
         elif kind in ("python", "ipython3"):
             self.python(text)
         elif kind == "toml":

@@ -4,7 +4,6 @@ import io
 import os
 import re
 import shutil
-import subprocess
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +12,7 @@ import scipy.io
 
 import tfarm
 from tests import hostile
+from tests.octave import left_by_octave
 from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.arm.law_tables import law_of_table
@@ -25,7 +25,6 @@ from tfarm.response.signals import Signals
 
 LAB = tfarm.load("sasaki2012-lab")
 LAW = HubFeedback(K1=0.3, K2=0.3)
-SECONDS = 60  # for a start of Octave of a second, on a machine under load
 STUBS = {  # of the control package, which a machine may have or not
     "ss": "function s = ss(A, B, C, D, T, varargin)\n  s = struct('A', A, 'B', B, 'C', C, 'D', D, 'T', T);\n"
     "  s.names = {varargin{2:2:end}};\nend\n",
@@ -36,18 +35,6 @@ STUBS = {  # of the control package, which a machine may have or not
 @pytest.fixture(scope="module")
 def reduced():
     return reduce(tfarm.load("sasaki2012"), ["root_moment", "hub_rate"], order=10)
-
-
-def octave(folder, code):
-    """The variables that a line of Octave leaves, run in a folder."""
-    program = shutil.which("octave-cli") or shutil.which("octave")
-    if program is None:
-        pytest.skip("octave is not installed: the script is not run")
-    line = f"cd '{folder}'; try, {code}; save('-v7', 'left.mat'); catch error, disp(error.message); end"
-    call = [program, "--no-gui", "--norc", "--no-history", "--quiet", "--eval", line]
-    done = subprocess.run(call, capture_output=True, text=True, timeout=SECONDS, check=False)
-    assert (folder / "left.mat").exists(), done.stdout + done.stderr
-    return scipy.io.loadmat(folder / "left.mat", squeeze_me=True), done.stdout
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +104,7 @@ def test_octave_without_control_checks_the_matrices(folder):
         "for w = data.omega(1:50:end), G = [G, r.C * ((1i * w * eye(size(r.A, 1)) - r.A) \\ r.B) + r.D]; end; "
         "clear data r"
     )
-    left, printed = octave(folder, code)
+    left, printed = left_by_octave(folder, code)
     torque = Simulator(LAB, Chain(), task, LAW).run().torque
     assert left["y"][-1] == pytest.approx(torque, rel=0, abs=1e-10 * abs(torque).max())  # 50 samples, 23 states
     data = scipy.io.loadmat(folder / "loop.mat", squeeze_me=True)
@@ -134,7 +121,7 @@ def test_octave_builds_each_system_with_its_names(folder, tmp_path):
         shutil.copy(file, tmp_path)
     for name, text in STUBS.items():
         (tmp_path / f"{name}.m").write_text(text)
-    left, printed = octave(tmp_path, "load_loop; load_my_arm")
+    left, printed = left_by_octave(tmp_path, "load_loop; load_my_arm")
     assert {"loop", "controller", "plant", "reduced", "sys", "exact"} <= set(left)
     assert not {"here", "d", "value", "is_kept"} & set(left)
     assert "checked" not in printed
@@ -148,7 +135,7 @@ def test_octave_refuses_matrices_that_were_changed(folder, tmp_path):
     data["plant"]["A"][0, 0][0, 0] *= 1 + 1e-6
     scipy.io.savemat(tmp_path / "loop.mat", data)
     shutil.copy(folder / "load_loop.m", tmp_path)
-    left, _ = octave(tmp_path, "found = ''; try, load_loop; catch found, found = found.message; end")
+    left, _ = left_by_octave(tmp_path, "found = ''; try, load_loop; catch found, found = found.message; end")
     assert left["found"] == "plant: the matrices differ from their transfer functions in the file"
 
 
@@ -162,7 +149,7 @@ def test_hostile_names_stay_text(tmp_path):
         assert not [line for line in text.splitlines() if "exit" in line and not line.startswith("% ")]
     for name, stub in STUBS.items():
         (tmp_path / f"{name}.m").write_text(stub)
-    left, _ = octave(tmp_path, "load_plant; load_controller; load_loop; went = 1")
+    left, _ = left_by_octave(tmp_path, "load_plant; load_controller; load_loop; went = 1")
     assert left["went"] == 1
     assert str(left["controller"]["names"].item()[-1]).startswith("<script>alert(1)</script>")
 

@@ -22,6 +22,7 @@ from tfarm.arrays import Complex
 from tfarm.dsp import Chain
 from tfarm.dsp.discretise import acting_law, with_all_gains, with_estimate
 from tfarm.dsp.plant import USUAL_MODES, PulseTransfer, damped_at_hub, sensed_plant
+from tfarm.errors import require
 from tfarm.exported.result import ExportTask
 from tfarm.records import record
 from tfarm.reduced import BAND, ReducedModel, modal_model, reduce
@@ -47,6 +48,12 @@ class NamedSystem:
     states: tuple[str, ...]
     period: float = 0.0
     facts: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        is_finite = all(np.isfinite(each).all() for each in self.matrices)
+        require(
+            is_finite, "export", self.name, "a matrix has entries that are not finite; change the arm or the period"
+        )
 
     @property
     def title(self) -> str:
