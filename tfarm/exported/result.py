@@ -15,9 +15,10 @@ from tfarm.dsp import Chain
 from tfarm.dsp.chain import file_text
 from tfarm.dsp.verdict import Analysis, sampled
 from tfarm.errors import ParameterError
+from tfarm.exported.texts import facts_of
 from tfarm.files import move_into, place_in
 from tfarm.records import record
-from tfarm.schema import Quantity, entries, with_unit
+from tfarm.schema import Quantity
 from tfarm.spectrum.table import default_gains
 
 What = Literal["controller", "tuner", "plant", "loop"]
@@ -80,7 +81,7 @@ class ExportTask:
     def facts(self, law: AnyLaw, found: Analysis) -> dict[str, str]:
         """The facts that a file begins with, by label: arm, law, stability and margins of the sampled loop, version."""
         card = result_card(self.arm, law, self.chain, at_samples=found).sampled
-        shown = {} if card is None else {label: with_unit(value, of) for label, of, value in entries(card)}
+        shown = {} if card is None else dict(facts_of(card))
         warning = {} if is_certified(found) else {"warning": ANYWAY}
         head = {"arm": self.arm.name, "controller": self.law.name, **warning}
         period = {"sampling period": f"{self.chain.sampling.period!r} s"}

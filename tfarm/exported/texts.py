@@ -13,6 +13,8 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from tfarm.schema import entries, text
+
 LONGEST_IDENTIFIER = 31  # characters of an identifier that C99 compares
 LONGEST_COMMENT = 200
 COMMENT_MARKS = (("\\", "|"), ("*/", "* /"), ("/*", "/ *"), ("??/", "? ?/"))  # of C, and the trigraph of a backslash
@@ -33,23 +35,23 @@ def identifiers(names: Iterable[str], prefix: str, longest: int = LONGEST_IDENTI
     return found
 
 
-def comment(text: str) -> str:
+def comment(words: str) -> str:
     """Return one line of printable ASCII that ends no comment of C and continues none."""
-    plain = unicodedata.normalize("NFKD", text)
+    plain = unicodedata.normalize("NFKD", words)
     line = "".join(c if " " <= c <= "~" else " " if c.isspace() else "?" for c in plain if not unicodedata.combining(c))
     for mark, instead in COMMENT_MARKS:
         line = line.replace(mark, instead)
     return line[:LONGEST_COMMENT].strip()
 
 
-def python_text(text: str) -> str:
+def python_text(words: str) -> str:
     """Return a literal of Python in ASCII."""
-    return ascii(str(text))
+    return ascii(words)
 
 
-def matlab_text(text: str) -> str:
+def matlab_text(words: str) -> str:
     """Return a character vector of MATLAB in one line of ASCII, its quotes doubled."""
-    return "'" + comment(text).replace("'", "''") + "'"
+    return "'" + comment(words).replace("'", "''") + "'"
 
 
 @cache
@@ -67,3 +69,11 @@ def templates() -> Environment:
 def render(template: str, **values: Any) -> bytes:
     """Return a source file from its template."""
     return templates().get_template(template).render(**values).encode("ascii")
+
+
+def facts_of(record: Any) -> list[tuple[str, str]]:
+    """The entries of a record that have one value, by label with unit, for a comment."""
+    rows = (
+        (f"{label} [{of.unit}]" if of.unit else label, text(value, of.digits)) for label, of, value in entries(record)
+    )
+    return [(label, shown) for label, shown in rows if shown]
