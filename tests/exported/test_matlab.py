@@ -110,7 +110,8 @@ def test_octave_without_control_checks_the_matrices(folder):
     drive = np.array([task.feedforward, *task.references.values()])
     scipy.io.savemat(folder / "drive.mat", {"drive": drive})
     code = (
-        "load_it_s; load_my_arm; load_plant; load_controller; load_loop; load drive.mat; x = zeros(size(data.A, 1), 1); y = []; "
+        "load_it_s; load_my_arm; load_plant; load_controller; load_loop; load drive.mat; "
+        "x = zeros(size(data.A, 1), 1); y = []; "
         "for u = drive, y = [y, data.C * x + data.D * u]; x = data.A * x + data.B * u; end; r = data.reduced; G = []; "
         "for w = data.omega(1:50:end), G = [G, r.C * ((1i * w * eye(size(r.A, 1)) - r.A) \\ r.B) + r.D]; end; "
         "clear data r"
