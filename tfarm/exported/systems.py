@@ -10,6 +10,7 @@ estimate of a hub rate is one of the controller.  Quantisation and saturation ar
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from importlib.metadata import version
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -180,7 +181,7 @@ def linear(task: ExportTask) -> Linear:
     """Return the systems of a task.  Raises ParameterError for a loop that is not certified stable."""
     law, chain, what = task.law, task.chain, task.what
     arm, _ = arm_and_law(task.arm, law)
-    facts, verdict = {"arm": arm.name, "SHA-256 of the inputs": task.sha256}, ""
+    facts, verdict = {"arm": arm.name, "SHA-256 of the inputs": task.sha256, "tfarm": version("tfarm")}, ""
     if what != "plant":
         judged = task.analysis(law)
         facts, verdict = task.facts(law, judged), judged.verdict.sentence
