@@ -155,14 +155,14 @@ def test_hostile_names_stay_text(tmp_path):
     """In comments, in character vectors, and in the variables of the file."""
     arm = replace(LAB, name=hostile.NAME + "'; exit(7); %{ ... x")
     law = Law({"hub_rate": 0.3, "moment@1e-1": 0.1}, name=hostile.TEXT + "'); exit(7) % \n exit(7)\n%}\n")
-    for what in ("plant", "controller", "loop"):
+    for what in ("controller", "loop"):
         tfarm.export(arm, law, what=what, form="mat", folder=tmp_path)
         text = (tmp_path / f"load_{what}.m").read_text("ascii")
         assert str(scipy.io.loadmat(tmp_path / f"{what}.mat", squeeze_me=True)["name"]).isascii()
         assert not [line for line in text.splitlines() if "exit" in line and not line.startswith("% ")]
     for name, stub in STUBS.items():
         (tmp_path / f"{name}.m").write_text(stub)
-    left, _ = left_by_octave(tmp_path, "load_plant; load_controller; load_loop; went = 1")
+    left, _ = left_by_octave(tmp_path, "load_controller; load_loop; went = 1")
     assert left["went"] == 1
     assert str(left["controller"]["names"].item()[-1]).startswith("<script>alert(1)</script>")
 

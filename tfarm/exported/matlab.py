@@ -41,7 +41,7 @@ def mat_file(of: Linear) -> bytes:
 
 def script(file: str, of: Linear) -> bytes:
     """Return the script that builds the systems of a file of that name."""
-    return render("load.m", loads=_loads(file), of=of)
+    return render("load.m", file=matlab_text(file), of=of)
 
 
 def entries_of(system: NamedSystem) -> dict[str, Any]:
@@ -82,14 +82,9 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
     text = ""
     with suppress(OSError):  # a file that cannot be read is not ours
         text = other.read_text("utf-8", errors="replace") if other.is_file() else ""
-    is_ours = not os.path.exists(other) or (WRITTEN_BY in text and _loads(path.name) in text)
+    is_ours = not os.path.exists(other) or (WRITTEN_BY in text and matlab_text(path.name) in text)
     remedy = f"{other.name} in that folder is not its script and would be replaced; choose another name"
     require(is_ours, key, str(path), remedy)
     write_file(other, script(path.name, of), key=key)
     write_file(path, mat_file(of), key=key)
     return path, other
-
-
-def _loads(file: str) -> str:
-    """Return the line of a script that loads its file."""
-    return f"data = load(fullfile(here, {matlab_text(file)}));"

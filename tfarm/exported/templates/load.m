@@ -3,7 +3,7 @@
 % {{ line | comment }}
 {% endfor %}
 here = fileparts(mfilename('fullpath'));
-{{ loads }}
+data = load(fullfile(here, {{ file }}));
 value = @(d) d.C * ((d.checked_at * eye(size(d.A, 1)) - d.A) \ d.B) + d.D;
 is_kept = @(d) max(max(abs(value(d) - d.checked_value))) <= 1e-9 * max(max(abs(d.checked_value)));
 if ~exist('ss') && exist('OCTAVE_VERSION', 'builtin')
