@@ -35,6 +35,7 @@ SURVEYS := \
 	dsp.law_orders \
 	fitting.planted \
 	tuner.bounded \
+	exported.laws \
 	cli.fuzz \
 	cli.stops \
 	report.plausible \

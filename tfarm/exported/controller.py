@@ -59,7 +59,7 @@ class WordLength:
     noise_gains: Annotated[list[NoiseGain], Quantity("noise gains", help="of each realisation")]
     states: Annotated[list[StateBound], Quantity("states", help="bounds on the states")]
     overflow: Annotated[str, Quantity("overflow", help="whether a state can overflow, for inputs within their ranges")]
-    error: Annotated[float, Quantity("bound on the error of the output", "", 4,
+    error: Annotated[float | None, Quantity("bound on the error of the output", "", 4,
             help="for inputs within their ranges, 1 SI unit by default, against exact arithmetic")]  # fmt: skip
     samples: Annotated[int | None, Quantity("samples of that bound", help="null where it holds for all samples")]
     limit_cycle: Annotated[float | None, Quantity("bound on a limit cycle of the output by round-off", "", 4,
@@ -141,12 +141,13 @@ def c_controller(task: ExportTask) -> Export:
     word = controller.word
     found = task.analysis(word.rounded) if task.anyway else judged(task, word, exact.verdict.loop)
     bounds, is_whole, error = word.bounds
-    is_safe = is_whole and (word.precision != FIXED or bool((bounds < 1).all()))
+    is_bounded = math.isfinite(error) and (word.precision != FIXED or bool((bounds < 1).all()))
     details = WordLength(
         precision=task.precision, realisation=name, noise_gains=gains,
         states=[StateBound(n, each) for n, each in enumerate(bounds.tolist())],
-        overflow="excluded for inputs within their ranges" if is_safe else "not excluded",
-        error=error, samples=None if is_whole else MOST_SUMMED, limit_cycle=word.limit_cycle(found.verdict.loop),
+        overflow="excluded for inputs within their ranges" if is_whole and is_bounded else "not excluded",
+        error=error if is_bounded else None, samples=None if is_whole else MOST_SUMMED,
+        limit_cycle=word.limit_cycle(found.verdict.loop),
     )  # fmt: skip
     facts = task.facts(word.rounded, found)
     contents, names = written(task, controller, facts, details)

@@ -25,8 +25,8 @@ from tfarm.dsp.sampled import Sampled
 from tfarm.errors import ParameterError, require
 from tfarm.exported.realisation import around, with_matrices
 
-MOST_SUMMED = 20_000  # samples of a sum without a bound on all others
-LEAST_SUMMED, DECAYED = 16, 1e-3  # samples, and the row sum of |M^n| from which all later ones are bounded
+MOST_SUMMED, BLOCK = 20_000, 32  # samples of a sum without a bound on all others, and of one step
+DECAYED = 1e-3  # row sum of |M^n| from which all later samples are bounded
 ON_CIRCLE, UNSEEN = 1e-9, 1e-8  # of 1: modulus of a pole on the unit circle; share of one that no output shows
 FRACTION_BITS, MOST_SHIFT = 31, 62  # of a number in fixed point, and of a sum of products
 HEADROOM, LEAST_SCALE = 1 + 2.0**-10, 2.0**-100  # of the range of a state: for roundings, and the least of all
@@ -41,16 +41,18 @@ def absolute_sum(M: Real, left: Real, right: Real) -> tuple[Real, bool]:
 
     With G = sum_{k<n} |left M^k|, sum_k |left M^k| <= G (I - |M^n|)^-1 once the row sums of |M^n| are below 1.
     """
-    G, S, row, power = np.zeros(left.shape), np.zeros((len(left), right.shape[1])), left, M
+    power, rows = np.linalg.matrix_power(M, BLOCK), [left]
+    for _ in range(BLOCK - 1):
+        rows.append(rows[-1] @ M)
+    block, G, S, n = np.array(rows), np.zeros(left.shape), np.zeros((len(left), right.shape[1])), 0
     with np.errstate(over="ignore", invalid="ignore"):
-        for n in range(1, MOST_SUMMED + 1):
-            G, S, row = G + abs(row), S + abs(row @ right), row @ M
-            if n & (n - 1):
-                continue
-            if n >= LEAST_SUMMED and abs(power).sum(axis=1).max(initial=0.0) <= DECAYED:
-                whole = np.linalg.solve(np.eye(len(M)) - abs(power).T, G.T).T
-                return S + whole @ abs(power @ right), True
-            power = power @ power
+        while n < MOST_SUMMED:
+            G, S, n = G + abs(block).sum(axis=0), S + abs(block @ right).sum(axis=0), n + BLOCK
+            block = block @ power
+            last = np.linalg.matrix_power(power, n // BLOCK) if (n // BLOCK) & (n // BLOCK - 1) == 0 else None
+            if last is not None and abs(last).sum(axis=1).max(initial=0.0) <= DECAYED:
+                whole = np.linalg.solve(np.eye(len(M)) - abs(last).T, G.T).T
+                return S + whole @ abs(last @ right), True
     return np.nan_to_num(S, nan=np.inf), False
 
 
@@ -104,33 +106,40 @@ class Word:
         X, is_whole = absolute_sum(A, one, B)
         of_states, of_output = (absolute_sum(A, left, one)[0] for left in (one, C))
         largest = first = X @ E
-        for _ in range(REFINED):  # to the least fixed point, far below the first guess of a word that is long enough
-            w = vA @ largest + vB @ E + absolute[:-1]
-            largest = first + of_states @ w
-        u = of_output @ w + vC @ largest + vD @ E + relative * self.output
+        with np.errstate(over="ignore", invalid="ignore"):  # of a law that grows
+            for _ in range(REFINED):  # to the least fixed point
+                w = vA @ largest + vB @ E + absolute[:-1]
+                largest = first + of_states @ w
+            u = of_output @ w + vC @ largest + vD @ E + relative * self.output
         return largest, is_whole, float(u[0] + absolute[-1])
 
     def limit_cycle(self, loop: Sampled) -> float | None:
         """Bound on u in a limit cycle that roundings sustain in a loop at rest; None where none was found.
 
-        A state and a signal z <= S (g Q z + a), with the responses S of the closed loop to a rounding, the relative and
-        absolute errors g and a, and Q = |A B; C D|: below 1/g S Q has no other solution than that of a.
+        A state and a signal z <= S (g Q z + a) + s b, with the responses S of the closed loop to a rounding and s to an
+        error of a signal, the relative and absolute errors g and a of a sum, b of a signal in fixed point, and
+        Q = |A B; C D|.  Where all eigenvalues of g S Q are below 1 that bounds z.
         """
         A, B, C, D = (abs(each) for each in self.rounded.parts[0].block.matrices())
-        columns, read = (*self.law.signals, *self.law.wanted), loop.in_z.signals
-        if not set(self.law.signals) <= set(read):  # an estimated rate
+        n, signals, read = len(A), self.law.signals, loop.in_z.signals
+        if not set(signals) <= set(read):  # an estimated rate
             return None
-        of = around(self.rounded, loop)
-        left = np.vstack([np.eye(len(of.matrix))[of.states], of.reads, of.output])
-        S, is_whole = absolute_sum(observed(of.matrix, left), left, of.of_rounding)
-        of_signal = np.array([[float(name == each) for each in read] for name in columns])
-        Q = np.vstack([np.hstack([A, B @ of_signal]), np.hstack([C, D @ of_signal])])
-        (relative, absolute), (of_z, of_u) = self.errors, (S[:-1], S[-1])
-        loops = relative * of_z @ Q
-        if not is_whole or max(abs(np.linalg.eigvals(loops)), default=0.0) >= 1:
+        of, at = around(self.rounded, loop), [read.index(name) for name in signals]
+        left = np.vstack([np.eye(len(of.matrix))[of.states], of.reads[at], of.output])
+        right = np.c_[of.of_rounding, of.of_signals[:, at]]
+        S, is_whole = absolute_sum(observed(of.matrix, left), left, right)
+        if not is_whole:
             return None
-        z = np.linalg.solve(np.eye(len(loops)) - loops, of_z @ absolute)
-        return float((of_u + np.eye(len(of_u))[-1]) @ (relative * Q @ z + absolute))
+        B, D = B[:, : len(at)], D[:, : len(at)]  # references are at rest
+        S[-1, n:] += np.r_[1.0, D[0]]  # u itself
+        (relative, absolute), Q = self.errors, np.block([[A, B], [C, D]])
+        reading = 2.0 ** -(FRACTION_BITS + 1) * self.ranges[: len(at)] * (self.precision == FIXED)
+        loops = relative * S[:-1, : n + 1] @ Q
+        if max(abs(np.linalg.eigvals(loops)), default=0.0) >= 1:
+            return None
+        rest = S @ np.r_[absolute, reading]
+        z = np.linalg.solve(np.eye(len(loops)) - loops, rest[:-1])
+        return float(rest[-1] + relative * S[-1, : n + 1] @ Q @ z)
 
 
 def observed(M: Real, left: Real) -> Real:
