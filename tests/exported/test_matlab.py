@@ -57,7 +57,7 @@ def test_mat_file_and_its_script(reduced, folder):
     w = data["omega"]
     np.testing.assert_array_equal(data["response"], tfarm.transfer(reduced.arm, reduced.outputs)(1j * w))
     assert "data = load(fullfile(here, 'my-arm.mat'));" in text
-    used = set(re.findall(r"\bd(?:ata)?\.(\w+)", text))
+    used = set(re.findall(r"\b(?:data|this_system)\.(\w+)", text))
     assert used <= set(data)
     assert {"A", "B", "C", "D", "omega", "response"} <= used
 
@@ -135,7 +135,7 @@ def test_octave_builds_each_system_with_its_names(folder, tmp_path):
         (tmp_path / f"{name}.m").write_text(text)
     left, printed = left_by_octave(tmp_path, "load_loop; load_my_arm")
     assert {"loop", "controller", "plant", "reduced", "sys", "exact"} <= set(left)
-    assert not {"here", "d", "value", "is_kept"} & set(left)
+    assert not {"here", "this_system", "value_of_system", "is_as_written"} & set(left)
     assert "checked" not in printed
     inputs, outputs, states, name = left["plant"]["names"].item()
     assert (inputs, outputs[0], states[0], name) == ("hub_torque", "hub_angle", "plant1", "sasaki2012-lab, sampled")
