@@ -36,6 +36,7 @@ SURVEYS := \
 	fitting.planted \
 	tuner.bounded \
 	exported.laws \
+	exported.tuners \
 	cli.fuzz \
 	cli.stops \
 	report.plausible \
