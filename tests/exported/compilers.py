@@ -11,7 +11,7 @@ COMPILERS = ("gcc", "clang")
 SECONDS = 60
 KINDS = {"double": np.float64, "float": np.float32, "q31": np.int32}
 PUMP = """
-#include "controller.h"
+#include "CODE.h"
 #include <stdio.h>
 int main(void)
 {
@@ -54,17 +54,23 @@ def build(folder, compiler, *options, sources=("controller.c", "self_test.c"), o
 
 
 def stepped(folder, controller, inputs, compiler, *options):
-    """Outputs and status of exported code in `folder`, of inputs (n, k) in the kind of its arithmetic."""
-    kind = KINDS[controller.word.precision]
-    header = (folder / "controller.h").read_text(encoding="ascii")
+    """Outputs and status of an exported controller in `folder`, of inputs (n, k) in the kind of its arithmetic."""
+    return pumped(folder, "controller", KINDS[controller.word.precision], inputs, compiler, *options)
+
+
+def pumped(folder, code, kind, inputs, compiler, *options):
+    """Outputs and status of exported code, of inputs (n, k) of a kind."""
+    header = (folder / f"{code}.h").read_text(encoding="ascii")
     name = header.partition("#ifndef ")[2].partition("_CONTROLLER_H")[0]
     body = header.partition("typedef struct {\n")[2].partition("}")[0]
-    fields = [line.split()[-1].rstrip(";") for line in body.splitlines() if line.strip()]
-    assert len(fields) == controller.inputs == inputs.shape[1]
+    fields = [each.split()[-1] for each in body.partition(";")[0].split(",")]
+    assert len(fields) == inputs.shape[1]
     assign = "\n".join(f"        input.{each} = row[{n}];" for n, each in enumerate(fields))
-    text = PUMP.replace("ASSIGN", assign).replace("FIELDS", str(len(fields))).replace("NAME", name)
+    text = (
+        PUMP.replace("ASSIGN", assign).replace("FIELDS", str(len(fields))).replace("NAME", name).replace("CODE", code)
+    )
     (folder / "pump.c").write_text(text, encoding="ascii")
-    program = build(folder, compiler, *options, sources=("controller.c", "pump.c"), out="pump")
+    program = build(folder, compiler, *options, sources=(f"{code}.c", "pump.c"), out="pump")
     raw = run(program, input=np.ascontiguousarray(inputs, dtype=kind).tobytes())
     rows = np.frombuffer(raw, dtype=np.dtype([("out", kind), ("status", np.int32)]))
     return rows["out"], rows["status"]

@@ -7,7 +7,7 @@ the delay of the law as the simulation has them.  The loop is judged with the co
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple
@@ -30,12 +30,12 @@ from tfarm.exact.outputs import OUTPUTS
 from tfarm.exported import twin
 from tfarm.exported.realisation import NoiseGain, around, least_noise, matrices_of, with_matrices
 from tfarm.exported.result import Export, ExportTask, Name, is_certified, names_of
-from tfarm.exported.texts import facts_of, identifiers, render
+from tfarm.exported.texts import facts_of, identifiers, literal, name_in_c, render
 from tfarm.exported.word_length import FIXED, FLOATS, MOST_SUMMED, OUTPUT, Word, word_of
 from tfarm.records import record
 from tfarm.schema import Quantity
 
-NAME, LONGEST_NAME = "controller", 16  # of identifiers in C, before "_step" and the like
+NAME = "controller"  # of identifiers in C
 FILES = ("controller.h", "controller.c", "self_test.c", "example.c")
 RECORDED, REFUSED, SEED = 1000, 500, 1  # samples of the self-test, the one with a NaN, its first random number
 WHOLE_SAMPLE = 1e-9  # of a sample: rounding of a delay
@@ -128,32 +128,28 @@ def c_controller(task: ExportTask) -> Export:
     word = controller.word
     found = judged(task, word, exact.verdict.loop)
     bounds, is_whole, error = word.bounds
-    is_bounded = math.isfinite(error) and (word.precision != FIXED or bool((bounds < 1).all()))
     details = WordLength(
         precision=task.precision, realisation=name, noise_gains=gains, largest_states=tuple(bounds.tolist()),
-        overflow="excluded for inputs within their ranges" if is_whole and is_bounded else "not excluded",
-        error=error if is_bounded else None, samples=None if is_whole else MOST_SUMMED,
+        overflow="excluded for inputs within their ranges" if is_whole and error < math.inf else "not excluded",
+        error=error if error < math.inf else None, samples=None if is_whole else MOST_SUMMED,
         limit_cycle=word.limit_cycle(found.verdict.loop),
     )  # fmt: skip
-    contents, names = written(task, controller, [*task.facts(word.rounded, found).items(), *facts_of(details)])
+    contents, names = source_files(task, controller, [*task.facts(word.rounded, found).items(), *facts_of(details)])
     return Export(
         what=task.what, form=task.form, contents=contents, names=names, verdict=found.verdict.sentence,
         details=details, sha256=task.sha256,
     )  # fmt: skip
 
 
-def written(
+def source_files(
     task: ExportTask, controller: Controller, facts: Sequence[tuple[str, str]]
 ) -> tuple[dict[str, bytes], list[Name]]:
     """The files that begin with these facts, by name, and the identifiers in them, that of the controller first."""
-    wanted = task.name or NAME
-    prefix = "" if wanted[:1].isascii() and wanted[:1].isalpha() else "n_"
-    known = (
-        identifiers([wanted], prefix, LONGEST_NAME),
-        *(identifiers(names, mark) for names, mark in ((controller.signals, "y_"), (controller.references, "r_"))),
-    )
-    values = values_of(task, controller, ports_of(task, controller, *known[1:])) | {"name": known[0][wanted]}
-    return {file: render(file, facts=facts, **values) for file in FILES}, names_of(*known)
+    name, signals = name_in_c(task.name or NAME), identifiers(controller.signals, "y_")
+    references = identifiers(controller.references, "r_")
+    values = values_of(task, controller, ports_of(task, controller, signals, references))
+    contents = {file: render(file, name=next(iter(name.values())), facts=facts, **values) for file in FILES}
+    return contents, names_of(name, signals, references)
 
 
 def in_z(law: Law, chain: Chain) -> Law:
@@ -217,20 +213,18 @@ def values_of(task: ExportTask, controller: Controller, ports: Sequence[Port]) -
     """The values of the templates, but for name and facts."""
     word, is_fixed, (real, suffix, largest) = controller.word, task.precision == FIXED, REAL[task.precision]
     dac, unit = controller.whole_dac if is_fixed else controller.dac, task.arm.input_unit
-    outputs, status = _recorded(controller, ports)
-    A, B, C, D = ([[_number(x, suffix) for x in row] for row in table.tolist()] for table in word.tables)
+    A, B, C, D = ([[literal(x, suffix) for x in row] for row in table.tolist()] for table in word.tables)
     return {
         "fixed": is_fixed, "real": real, "wide": "int64_t" if is_fixed else real, "largest": largest, "suffix": suffix,
         "cast": "(int64_t)" if is_fixed else "", "fields": ports,
-        "sizes": [_number(each.size, suffix) for each in ports],
+        **recorded(controller.run, ports, task.precision), "header": FILES[0],
         "n": word.law.order, "m": len(controller.plan), "A": A, "B": B, "C": C, "D": D, "shifts": word.shifts,
         "errors": [_error(source, reference, ports, real) for source, reference, _ in controller.plan.tolist()],
         "converter": bool(np.isfinite(dac).all()), "delay": controller.delay, "step": bool(dac[0]),
-        "dac": [_number(each, "") for each in dac.tolist()],
+        "dac": [literal(each, "") for each in dac.tolist()],
         "hub": controller.hub and (ports[controller.signals.index(ANGLE)].identifier, *map(float.hex, controller.hub)),
         "output": f"{task.arm.input} over {word.output!r} {unit}" if is_fixed else f"{task.arm.input} [{unit}]",
-        "recorded": [_number(each, suffix) for each in outputs.tolist()], "status": status.tolist(),
-        "refused": REFUSED, "seed": SEED, "period": repr(task.chain.sampling.period),
+        "period": repr(task.chain.sampling.period),
     }  # fmt: skip
 
 
@@ -257,20 +251,23 @@ def _error(source: int, reference: int, ports: Sequence[Port], real: str) -> str
     return f"{'0' if reference < 0 else of[reference]} - {f'({real})rate' if source == twin.ESTIMATE else of[source]}"
 
 
-def _recorded(controller: Controller, ports: Sequence[Port]) -> tuple[NDArray[Any], Whole]:
-    """Outputs and status of the self-test, whose inputs are those of a linear congruential generator."""
-    numbers = [SEED]
+def recorded(
+    run: Callable[[NDArray[Any]], tuple[NDArray[Any], Whole]], ports: Sequence[Port], precision: str
+) -> dict[str, Any]:
+    """Values of the template of a self-test, whose inputs are those of a linear congruential generator."""
+    numbers, suffix = [SEED], REAL[precision][1]
     for _ in range(RECORDED * len(ports)):
         numbers.append((1664525 * numbers[-1] + 1013904223) % 2**32)
-    words = np.array(numbers[1:], dtype=np.int64).reshape(RECORDED, -1)
-    if controller.word.precision == FIXED:
-        return controller.run(words - 2**31)
-    kind = FLOATS[controller.word.precision][0]
-    inputs = (np.array([each.size for each in ports], kind) * ((words >> 8) / 2.0**23 - 1).astype(kind)).astype(float)
-    inputs[REFUSED, 0] = np.nan
-    return controller.run(inputs)
-
-
-def _number(value: float, suffix: str) -> str:
-    """A literal of C: whole, or hexadecimal with all its bits."""
-    return f"{value:d}" if isinstance(value, int) else f"{value.hex()}{suffix}"
+    inputs: NDArray[Any] = np.array(numbers[1:], dtype=np.int64).reshape(RECORDED, -1)
+    if precision == FIXED:
+        inputs = inputs - 2**31
+    else:
+        kind = FLOATS[precision][0]
+        sizes = np.array([each.size for each in ports], kind)
+        inputs = (sizes * ((inputs >> 8) / 2.0**23 - 1).astype(kind)).astype(float)
+        inputs[REFUSED, 0] = np.nan
+    outputs, status = run(inputs)
+    return {
+        "sizes": [literal(each.size, suffix) for each in ports], "refused": REFUSED, "seed": SEED,
+        "recorded": [literal(each, suffix) for each in outputs.tolist()], "status": status.tolist(),
+    }  # fmt: skip

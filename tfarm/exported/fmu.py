@@ -34,9 +34,9 @@ from tfarm.dsp.scenarios import TRIAL_DURATION
 from tfarm.dsp.simulate import first_mode
 from tfarm.errors import ParameterError, one_line, require
 from tfarm.exact.outputs import signal_words
-from tfarm.exported.controller import FEEDFORWARD, controller_of, in_z, written
+from tfarm.exported.controller import FEEDFORWARD, controller_of, in_z, source_files
 from tfarm.exported.result import ANYWAY, Export, ExportTask, What, is_certified
-from tfarm.exported.texts import identifiers, render
+from tfarm.exported.texts import identifiers, literal, render
 from tfarm.exported.word_length import FIXED
 from tfarm.files import temporary_folder
 from tfarm.records import record
@@ -159,7 +159,7 @@ def law_code(task: ExportTask, law: Law, variables: Sequence[Variable]) -> LawCo
     controller = replace(controller, hub=None, signals=law.signals, dac=np.array([0.0, -np.inf, np.inf]))
     rounded = replace(controller.word.rounded, delay=task.law.delay)
     found = task.analysis(rounded)
-    files, (first, *_) = written(task, controller, [*task.facts(rounded, found).items()])
+    files, (first, *_) = source_files(task, controller, [*task.facts(rounded, found).items()])
     inputs, outputs = ([each.name for each in variables if each.causality == of] for of in ("input", "output"))
     place = {name: f"m->at.out[{n}]" for n, name in enumerate(outputs)}
     place |= {name: f"m->at.in[{n}]" for n, name in enumerate(inputs)}
@@ -239,8 +239,8 @@ def plant_code(of: Simulator) -> dict[str, Any]:
     }
     return {
         "tables": {name: braces(values) for name, values in tables.items()},
-        "poles": of.kept.size, "pieces": len(model.piece), "ring": chain.delay + 2, "bound": repr(chain.bound),
-        "lag": repr(chain.pole), "is_differenced": chain.is_differenced,
+        "poles": of.kept.size, "pieces": len(model.piece), "ring": chain.delay + 2, "bound": literal(chain.bound),
+        "lag": literal(chain.pole), "is_differenced": chain.is_differenced,
     }  # fmt: skip
 
 
@@ -251,7 +251,7 @@ def parts(values: Complex) -> Real:
 
 def braces(values: Any) -> str:
     """An array of C, every number with all of its digits."""
-    return f"{{{', '.join(map(braces, values))}}}" if np.ndim(values) else repr(float(values))
+    return f"{{{', '.join(map(braces, values))}}}" if np.ndim(values) else literal(values)
 
 
 # ------------------------------------------------------------ the file

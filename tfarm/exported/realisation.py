@@ -31,6 +31,7 @@ MOST_DOUBLINGS = 40  # of the samples that a sum has: 1e12 of them
 SUMMED = 1e-9  # of a sum of squares: its last terms
 LEAST_SHARE = 1e-12  # of the largest singular value: below it a state is not controllable or not observable
 WORST_CONDITION = 1e8  # of the eigenvectors: beyond it poles are not separated
+NEXT_TO = 1.01  # times the least noise gain: for less a law keeps its states, and an integral its pole z = 1
 GIVEN, SECTIONS, BALANCED = "law as given", "second-order sections", "balanced state space"
 
 
@@ -137,7 +138,8 @@ def candidates(law: Law, loop: Sampled) -> list[tuple[NoiseGain, Matrices]]:
 
 
 def least_noise(law: Law, loop: Sampled) -> tuple[Law, str, list[NoiseGain]]:
-    """The law in the realisation with the least noise gain, its name, and the gains of all."""
+    """The law in the realisation with the least noise gain, the first of those next to it, its name, and all gains."""
     found = candidates(law, loop)
-    best, matrices = min(found, key=lambda each: each[0].gain or 0.0)
+    least = min(gain.gain or 0.0 for gain, _ in found)
+    best, matrices = next(each for each in found if (each[0].gain or 0.0) <= NEXT_TO * least)
     return with_matrices(law, matrices), best.realisation, [gain for gain, _ in found]

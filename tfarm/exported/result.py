@@ -87,8 +87,12 @@ class ExportTask:
         shown = {} if card is None else dict(facts_of(card))
         warning = {} if is_certified(found) else {"warning": ANYWAY}
         head = {"arm": self.arm.name, "controller": self.law.name, **warning}
-        period = {"sampling period": f"{self.chain.sampling.period!r} s"}
-        return head | period | shown | {"SHA-256 of the inputs": self.sha256, "tfarm": version("tfarm")}
+        sampling = self.chain.sampling
+        times = {
+            "sampling period [s]": repr(sampling.period),
+            "delay beyond this code [samples]": repr(sampling.delay_samples),
+        }
+        return head | times | shown | {"SHA-256 of the inputs": self.sha256, "tfarm": version("tfarm")}
 
 
 def is_certified(found: Analysis) -> bool:

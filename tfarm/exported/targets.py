@@ -5,7 +5,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import get_args
 
-from tfarm.arm import AnyLaw, Arm, must_be_arm
+from tfarm.arm import AnyLaw, Arm, arm_and_law, must_be_arm
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual
 from tfarm.errors import ParameterError, must_be_known, require
@@ -90,9 +90,9 @@ def export(
     remedy = "only a plant or a loop as fmu has outputs and modes of its own; leave them out"
     require(is_simulated or not (outputs or modes), "outputs" if outputs else "modes", outputs or modes, remedy)
     task = ExportTask(
-        arm=arm, given=law, chain=chain_or_usual(chain), what=what, form=form,
-        tuned=None if tuned is None else Path(tuned), precision=precision, ranges=dict(ranges or {}), name=name,
-        anyway=anyway, outputs=tuple(outputs), modes=modes,
+        arm=arm if law is None else arm_and_law(arm, law)[0], given=law, chain=chain_or_usual(chain),
+        what=what, form=form, tuned=None if tuned is None else Path(tuned), precision=precision,
+        ranges=dict(ranges or {}), name=name, anyway=anyway, outputs=tuple(outputs), modes=modes,
     )  # fmt: skip
     module, _, function = WRITERS[what, form].partition(":")
     found: Export = getattr(import_module(f"tfarm.exported.{module}"), function)(task)

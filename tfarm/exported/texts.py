@@ -16,6 +16,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from tfarm.schema import entries, text
 
 LONGEST_IDENTIFIER = 31  # characters of an identifier that C99 compares
+LONGEST_NAME = 16  # of identifiers in C, before "_step" and the like
 LONGEST_COMMENT = 200
 COMMENT_MARKS = (("\\", "|"), ("*/", "* /"), ("/*", "/ *"), ("??/", "? ?/"))  # of C, and the trigraph of a backslash
 
@@ -52,6 +53,17 @@ def python_text(words: str) -> str:
 def matlab_text(words: str) -> str:
     """Return a character vector of MATLAB in one line of ASCII, its quotes doubled."""
     return "'" + comment(words).replace("'", "''") + "'"
+
+
+def name_in_c(wanted: str) -> dict[str, str]:
+    """Return the name that the identifiers of a file in C begin with, by the wanted one."""
+    prefix = "" if wanted[:1].isascii() and wanted[:1].isalpha() else "n_"
+    return identifiers([wanted], prefix, LONGEST_NAME)
+
+
+def literal(value: float, suffix: str = "") -> str:
+    """Return a number in C: whole, or hexadecimal with all its bits."""
+    return f"{value:d}" if isinstance(value, int) else f"{float(value).hex()}{suffix}"
 
 
 @cache
