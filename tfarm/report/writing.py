@@ -64,6 +64,8 @@ WORTH_A_PROCESS = 8  # pieces for which a second process, which takes a second o
 EVIDENCE, SCRIPTS = "method and proofs", "scripts of the live pages"  # tasks of no arm
 LOOP_TASK, SAMPLED_TASK = "continuous loop", "sampled loop"  # each of sections that share a design or damped modes
 LONGEST = (SAMPLED_TASK, LOOP_TASK, EVIDENCE)  # tasks of five seconds and more, which are begun first
+EXPORTS = "export"  # folder in that of an arm, to whose files its pages lead
+EXPORTED = [f"{of}{end}" for of in ("controller", "tuner", "plant", "loop") for end in (".h", ".fmu", ".mat", ".py")]
 TRUST_PAGE, COMPARISON_PAGE = f"{TRUST_FOLDER}/index.html", "compare.html"
 RESERVED_NAMES = {  # of folders that no arm may have
     "index.html", "readme.md", "pictures", "bench.json", TRUST_FOLDER, "data", COMPARISON_PAGE, "compare.json", ASSETS,
@@ -311,6 +313,8 @@ def navigation(arm: Arm, own: Sequence[tuple[str, str]], trust: str, folder: Pat
     """(file, title) of all that a page of an arm leads to."""
     compared = kept_comparison(folder.parent)
     more = [(f"../{COMPARISON_PAGE}", compared["title"])] if arm.name in compared["arms"] else []
+    files = [f"{EXPORTS}/{name}" for name in EXPORTED if (folder / EXPORTS / name).is_file()]
+    more += [(file, f"Exported: {Path(file).name}") for file in files]
     return [("../index.html", "All arms"), *own, *more, *([(f"../{trust}", "Method and proofs")] if trust else [])]
 
 
