@@ -239,7 +239,7 @@ def plant_code(of: Simulator) -> dict[str, Any]:
     }
     return {
         "tables": {name: braces(values) for name, values in tables.items()},
-        "poles": of.kept.size, "pieces": len(model.piece), "ring": chain.delay + 2, "bound": literal(chain.bound),
+        "poles": of.kept.size, "pieces": len(model.piece), "ring": chain.delay + 2, "bound": repr(chain.bound),
         "lag": literal(chain.pole), "is_differenced": chain.is_differenced,
     }  # fmt: skip
 
