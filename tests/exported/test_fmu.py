@@ -18,6 +18,7 @@ from tests.exported.units import DISCARD, DRIVER, ERROR, LAST_SUCCESSFUL_TIME, T
 from tests.hostile import C_TEXTS, NAME
 from tests.odd_arms import odd_arms
 from tests.shared import thinned
+from tests.shell import refused
 from tfarm import Law, ParameterError
 from tfarm.arm.law import REFERENCE
 from tfarm.dsp import Simulator, scenario
@@ -28,7 +29,7 @@ QUICK = ("integral", "late", "single", "decay", "impulse", "pulse")
 MODES = 4
 EQUAL = 1e-12  # of the largest value of a signal: roundings in another order
 LATE = replace(REAL, sampling=replace(REAL.sampling, delay_samples=1.3, antialias_corner=400.0))
-SINGLE = replace(LATE, converters=replace(LATE.converters, arithmetic="float32"))
+SINGLE = replace(LATE, converters=replace(LATE.converters, arithmetic="float32", torque_bits=None))
 STATES = Law(
     {"hub_angle": ([4.0, -3.6], [1.0, -0.5]), "deflection@0.3": 5.0, "hub_rate": 0.5},
     period=0.01, references=("hub_angle",), name=NAME,
@@ -393,6 +394,22 @@ def test_names_of_a_user_reach_c_and_xml_as_text(tmp_path, text, monkeypatch):
     assert head[1].endswith("nor Python. */")
     assert head[2] == "#include <stdlib.h>"
     run(needed("cc"), "-std=c99", "-fsyntax-only", "-Wall", "-Werror", tmp_path / "sources" / "fmu.c")
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        (("--what", "controller", "--modes", "5"), "modes = 5: only a plant or a loop as fmu has outputs and modes"),
+        (("--what", "loop", "--precision", "q31"), "precision = 'q31': a functional mock-up unit has a controller in"),
+        (("--what", "loop", "--K1", "-3"), "the sampled loop is not certified stable: unstable ("),
+        (("--what", "plant", "--output", "no_such"), "output = 'no_such': "),
+        (("--what", "tuner"), "as = 'fmu': a tuner is exported as: c"),
+    ],
+)  # fmt: skip
+def test_a_refused_export_leaves_nothing_behind(capsys, tmp_path, options, error):
+    words = ("export", "sasaki2012-lab", "--as", "fmu", "--out", str(tmp_path / "new"))
+    assert error in refused(capsys, *words, *options)
+    assert not (tmp_path / "new").exists()
 
 
 def test_without_a_compiler_there_is_the_source(tmp_path, monkeypatch):
