@@ -37,6 +37,7 @@ SURVEYS := \
 	tuner.bounded \
 	exported.laws \
 	exported.unit_loops \
+	exported.tuners \
 	cli.fuzz \
 	cli.stops \
 	report.plausible \

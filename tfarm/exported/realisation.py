@@ -130,7 +130,7 @@ def candidates(law: Law, loop: Sampled) -> list[tuple[NoiseGain, Matrices]]:
     K, W = found
     changes = {GIVEN: np.eye(law.order), SECTIONS: sections(A, K, W), BALANCED: balancing(K, W)}
     known = [(name, T, np.linalg.inv(T)) for name, T in changes.items() if T is not None]
-    gains = [float(np.diag(inverse @ K @ inverse.T) @ np.diag(T.T @ W @ T)) for _, T, inverse in known]
+    gains = [abs(float(np.diag(inverse @ K @ inverse.T) @ np.diag(T.T @ W @ T))) for _, T, inverse in known]
     return [
         (NoiseGain(name, gain), (inverse @ A @ T, inverse @ B, C @ T, D))
         for gain, (name, T, inverse) in zip(gains, known, strict=True)
@@ -138,8 +138,9 @@ def candidates(law: Law, loop: Sampled) -> list[tuple[NoiseGain, Matrices]]:
 
 
 def least_noise(law: Law, loop: Sampled) -> tuple[Law, str, list[NoiseGain]]:
-    """The law in the realisation with the least noise gain, the first of those next to it, its name, and all gains."""
-    found = candidates(law, loop)
-    least = min(gain.gain or 0.0 for gain, _ in found)
-    best, matrices = next(each for each in found if (each[0].gain or 0.0) <= NEXT_TO * least)
+    """The law in the realisation of least noise, as given if that has hardly more; its name, and all noise gains."""
+    (given, own), *_ = found = candidates(law, loop)
+    best, matrices = min(found, key=lambda each: each[0].gain or 0.0)
+    if not NEXT_TO * (best.gain or 0.0) < (given.gain or 0.0):
+        best, matrices = given, own
     return with_matrices(law, matrices), best.realisation, [gain for gain, _ in found]

@@ -113,9 +113,9 @@ def polynomial(x: float, coefficients: Real) -> float:
 
 @compiled
 def exponential(x: float, of: Numbers) -> float:
-    """e^x for x <= 0; NaN stays NaN."""
+    """e^x for x <= 0; 0 of NaN, which u, e or x then is too: the step is refused."""
     if not x > of.lowest:
-        return of.zero if x == x else x
+        return of.zero
     k = (x * of.inverse + of.shift) - of.shift
     result = polynomial((x - k * of.high) - k * of.low, of.taylor)
     power, n = of.half, int(-k)
@@ -164,8 +164,8 @@ def network_gain(of: Numbers, row: Real) -> float:
         z += of.w2[j] * sigmoid(net, of)
     if of.is_free:
         return softplus(z, of)
-    gain = of.lo + (of.hi - of.lo) * sigmoid(z, of)
-    return of.lo if gain < of.lo else of.hi if gain > of.hi else gain
+    gain = of.lo + (of.hi - of.lo) * sigmoid(z, of)  # not below lo; above hi by rounding
+    return of.hi if gain > of.hi else gain
 
 
 @compiled

@@ -27,7 +27,7 @@ static {{ real }} exponential({{ real }} x)
     {{ real }} k, result, power = half;
     int n;
     if (!(x > lowest))
-        return x == x ? zero : x;
+        return zero;
     k = (x * inverse + shift) - shift;
     result = polynomial((x - k * high) - k * low, taylor, {{ tables.taylor|length }});
     for (n = (int)-k; n > 0; n /= 2) { /* at most ten times */
@@ -69,7 +69,7 @@ static {{ real }} network(const {{ real }} *row)
     return z > zero ? z + gain : gain;
 {% else %}
     gain = lo + (hi - lo) * sigmoid(z);
-    return gain < lo ? lo : gain > hi ? hi : gain;
+    return gain > hi ? hi : gain;
 {% endif %}
 }
 
