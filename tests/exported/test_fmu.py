@@ -376,12 +376,14 @@ def test_names_of_a_user_reach_c_and_xml_as_text(tmp_path, text, monkeypatch):
         arm = replace(LAB, name=text)
     except ParameterError:
         arm = LAB
-    tfarm.export(arm, GAINS, what="plant", form="fmu", folder=tmp_path, name=text, modes=1)
+    found = tfarm.export(arm, GAINS, what="plant", form="fmu", folder=tmp_path, name=text, modes=1)
     with zipfile.ZipFile(tmp_path / "plant.fmu") as archive:
         assert archive.namelist() == ["modelDescription.xml", "sources/fmi2.h", "sources/fmu.c"]
         source, xml = archive.read("sources/fmu.c"), ElementTree.fromstring(archive.read("modelDescription.xml"))
         archive.extractall(tmp_path)
-    assert re.fullmatch(r"fmu_[A-Za-z0-9_]{1,27}", xml.find("CoSimulation").get("modelIdentifier"))
+    ((name, identifier),) = found.names
+    assert (name, identifier) == (text, xml.find("CoSimulation").get("modelIdentifier"))
+    assert re.fullmatch(r"fmu_[A-Za-z0-9_]{1,27}", identifier)
     assert xml.get("description").startswith(f"plant of {arm.name[:150]}")
     assert {each.tag for each in xml.iter()} == {
         "fmiModelDescription", "CoSimulation", "SourceFiles", "File", "UnitDefinitions", "Unit", "LogCategories",
