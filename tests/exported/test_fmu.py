@@ -18,17 +18,18 @@ from tests.exported.units import DISCARD, DRIVER, ERROR, LAST_SUCCESSFUL_TIME, T
 from tests.hostile import C_TEXTS, NAME
 from tests.odd_arms import odd_arms
 from tests.shared import thinned
+from tests.shell import refused
 from tfarm import Law, ParameterError
 from tfarm.arm.law import REFERENCE
 from tfarm.dsp import Simulator, scenario
 from tfarm.dsp.results import simulated_run
 from tfarm.exported import fmu as module
 
-QUICK = ("integral", "late", "states", "decay", "impulse", "pulse")
+QUICK = ("integral", "late", "single", "decay", "impulse", "pulse")
 MODES = 4
 EQUAL = 1e-12  # of the largest value of a signal: roundings in another order
 LATE = replace(REAL, sampling=replace(REAL.sampling, delay_samples=1.3, antialias_corner=400.0))
-SINGLE = replace(LATE, converters=replace(LATE.converters, arithmetic="float32"))
+SINGLE = replace(LATE, converters=replace(LATE.converters, arithmetic="float32", torque_bits=None))
 STATES = Law(
     {"hub_angle": ([4.0, -3.6], [1.0, -0.5]), "deflection@0.3": 5.0, "hub_rate": 0.5},
     period=0.01, references=("hub_angle",), name=NAME,
@@ -375,12 +376,14 @@ def test_names_of_a_user_reach_c_and_xml_as_text(tmp_path, text, monkeypatch):
         arm = replace(LAB, name=text)
     except ParameterError:
         arm = LAB
-    tfarm.export(arm, GAINS, what="plant", form="fmu", folder=tmp_path, name=text, modes=1)
+    found = tfarm.export(arm, GAINS, what="plant", form="fmu", folder=tmp_path, name=text, modes=1)
     with zipfile.ZipFile(tmp_path / "plant.fmu") as archive:
         assert archive.namelist() == ["modelDescription.xml", "sources/fmi2.h", "sources/fmu.c"]
         source, xml = archive.read("sources/fmu.c"), ElementTree.fromstring(archive.read("modelDescription.xml"))
         archive.extractall(tmp_path)
-    assert re.fullmatch(r"fmu_[A-Za-z0-9_]{1,27}", xml.find("CoSimulation").get("modelIdentifier"))
+    ((name, identifier),) = found.names
+    assert (name, identifier) == (text, xml.find("CoSimulation").get("modelIdentifier"))
+    assert re.fullmatch(r"fmu_[A-Za-z0-9_]{1,27}", identifier)
     assert xml.get("description").startswith(f"plant of {arm.name[:150]}")
     assert {each.tag for each in xml.iter()} == {
         "fmiModelDescription", "CoSimulation", "SourceFiles", "File", "UnitDefinitions", "Unit", "LogCategories",
@@ -393,6 +396,22 @@ def test_names_of_a_user_reach_c_and_xml_as_text(tmp_path, text, monkeypatch):
     assert head[1].endswith("nor Python. */")
     assert head[2] == "#include <stdlib.h>"
     run(needed("cc"), "-std=c99", "-fsyntax-only", "-Wall", "-Werror", tmp_path / "sources" / "fmu.c")
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        (("--what", "controller", "--modes", "5"), "modes = 5: only a plant or a loop as fmu has outputs and modes"),
+        (("--what", "loop", "--precision", "q31"), "precision = 'q31': a functional mock-up unit has a controller in"),
+        (("--what", "loop", "--K1", "-3"), "the sampled loop is not certified stable: unstable ("),
+        (("--what", "plant", "--output", "no_such"), "output = 'no_such': "),
+        (("--what", "tuner"), "as = 'fmu': a tuner is exported as: c"),
+    ],
+)  # fmt: skip
+def test_a_refused_export_leaves_nothing_behind(capsys, tmp_path, options, error):
+    words = ("export", "sasaki2012-lab", "--as", "fmu", "--out", str(tmp_path / "new"))
+    assert error in refused(capsys, *words, *options)
+    assert not (tmp_path / "new").exists()
 
 
 def test_without_a_compiler_there_is_the_source(tmp_path, monkeypatch):

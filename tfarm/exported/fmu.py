@@ -35,7 +35,7 @@ from tfarm.dsp.simulate import first_mode
 from tfarm.errors import ParameterError, one_line, require
 from tfarm.exact.outputs import signal_words
 from tfarm.exported.controller import FEEDFORWARD, controller_of, in_z, source_files
-from tfarm.exported.result import ANYWAY, Export, ExportTask, What, is_certified
+from tfarm.exported.result import ANYWAY, Export, ExportTask, What, is_certified, names_of
 from tfarm.exported.texts import identifiers, literal, render
 from tfarm.exported.word_length import FIXED
 from tfarm.files import temporary_folder
@@ -132,17 +132,17 @@ def fmu(task: ExportTask) -> Export:
     period, modes = repr(float(task.chain.sampling.period)), prepared.plant.count if has_plant else None
     about = f"{task.what} of {task.arm.name}, sampled every {period} s{law.verdict and f': {law.verdict}'}"
     guid = hashlib.sha256(repr((task.sha256, name, about, modes, variables, version("tfarm"))).encode()).hexdigest()
-    identifier = identifiers([name], "fmu_")[name]
-    header = Header(has_plant, variables, identifier, period, about, task.sha256, guid[:LONGEST_GUID])
+    own = identifiers([name], "fmu_")
+    header = Header(has_plant, variables, own[name], period, about, task.sha256, guid[:LONGEST_GUID])
     numbers, count = plant_code(prepared), Counter(each.causality for each in variables)
     source = render("fmu.c", law=law, functions=FUNCTIONS, errors=ERRORS, count=count, **header._asdict(), **numbers)
     sources = {"fmi2.h": render("fmi2.h"), "fmu.c": source, **law.files}
-    binary, compiler = binary_of(sources, identifier)
+    binary, compiler = binary_of(sources, own[name])
     files = {f"sources/{name}": content for name, content in sources.items()} | binary
     files["modelDescription.xml"] = model_description(header, sources)
     return Export(
-        what=task.what, form=task.form, contents={f"{task.what}.fmu": archive_of(files)}, names=[], verdict=law.verdict,
-        details=Unit(variables, modes, compiler), sha256=task.sha256,
+        what=task.what, form=task.form, contents={f"{task.what}.fmu": archive_of(files)}, names=names_of(own),
+        verdict=law.verdict, details=Unit(variables, modes, compiler), sha256=task.sha256,
     )  # fmt: skip
 
 
@@ -239,7 +239,7 @@ def plant_code(of: Simulator) -> dict[str, Any]:
     }
     return {
         "tables": {name: braces(values) for name, values in tables.items()},
-        "poles": of.kept.size, "pieces": len(model.piece), "ring": chain.delay + 2, "bound": literal(chain.bound),
+        "poles": of.kept.size, "pieces": len(model.piece), "ring": chain.delay + 2, "bound": repr(chain.bound),
         "lag": literal(chain.pole), "is_differenced": chain.is_differenced,
     }  # fmt: skip
 
