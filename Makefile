@@ -37,6 +37,7 @@ SURVEYS := \
 	tuner.bounded \
 	exported.laws \
 	exported.tuners \
+	exported.unit_loops \
 	cli.fuzz \
 	cli.stops \
 	report.plausible \

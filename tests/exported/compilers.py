@@ -64,7 +64,7 @@ def pumped(folder, code, kind, inputs, compiler, *options):
     header = (folder / f"{code}.h").read_text(encoding="ascii")
     name = header.partition("#ifndef ")[2].partition("_CONTROLLER_H")[0]
     body = header.partition("typedef struct {\n")[2].partition("}")[0]
-    fields = [line.split()[-1].rstrip(";") for line in body.splitlines() if line.strip()]
+    fields = [each.split()[-1] for each in body.partition(";")[0].split(",")]
     assert len(fields) == inputs.shape[1]
     assign = "\n".join(f"        input.{each} = row[{n}];" for n, each in enumerate(fields))
     text = (

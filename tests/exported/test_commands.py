@@ -3,7 +3,7 @@
 import pytest
 
 import tfarm
-from tests.exported.cases import GAINS, IDEAL, LAB
+from tests.exported.cases import GAINS, IDEAL, LAB, RIG, hinf, task_of
 from tests.exported.compilers import build, run
 from tests.shell import answer, refused
 
@@ -23,7 +23,7 @@ def test_the_command_writes_what_the_function_does(capsys, tmp_path):
     for file in FILES:
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
     header = (tmp_path / "a" / "controller.h").read_text(encoding="ascii")
-    for line in ("arm: sasaki2012-lab", "sampling period: 0.01 s", "certainty: certified to 9.27e+05 rad/s",
+    for line in ("arm: sasaki2012-lab", "sampling period [s]: 0.01", "certainty: certified to 9.27e+05 rad/s",
                  "phase margin [deg]: 26.15 at 63.4 rad/s, poor", f"SHA-256 of the inputs: {own.sha256}"):  # fmt: skip
         assert f" * {line}\n" in header
     assert "warning" not in header
@@ -49,10 +49,23 @@ def test_what_has_no_such_form_names_those_it_has(capsys, tmp_path):
     assert "as = 'c': a plant is exported as: fmu, mat, py" in error
 
 
-def test_the_hash_is_that_of_arm_law_and_chain(tmp_path):
+def test_the_hash_is_that_of_arm_law_and_chain():
     def sha(arm=LAB, law=GAINS, chain=IDEAL):
-        return tfarm.export(arm, law, what="controller", form="c", folder=tmp_path, chain=chain).sha256
+        return task_of((arm, law, chain)).sha256
 
+    faster = tfarm.dsp.Chain(sampling=tfarm.dsp.Sampling(period=0.005))
+    others = sha(law=tfarm.HubFeedback(K1=0.3, K2=0.31)), sha(arm=LAB.having(payload_mass=0.2)), sha(chain=faster)
     assert sha() == sha()
-    assert len({sha(), sha(law=tfarm.HubFeedback(K1=0.3, K2=0.31)), sha(arm=LAB.having(payload_mass=0.2)),
-                sha(chain=tfarm.dsp.Chain(sampling=tfarm.dsp.Sampling(period=0.005)))}) == 4  # fmt: skip
+    assert len({sha(), *others}) == 4
+
+
+def test_a_law_of_another_input_is_in_its_unit(tmp_path):
+    """A controller of the motor's current, on the file of its arm."""
+    arm, law, chain = hinf()
+    wanted = {"what": "controller", "form": "c", "folder": tmp_path, "chain": chain, "anyway": True}
+    found = tfarm.export(tfarm.load(RIG / "rig.toml"), law, **wanted)
+    assert arm.input == "motor_current"
+    assert b" * Output: motor_current [A]\n" in found.contents["controller.h"]
+    assert found.details.realisation == "balanced state space"
+    gains = {each.realisation: each.gain for each in found.details.noise_gains}
+    assert gains["balanced state space"] < gains["law as given"] / 100

@@ -29,7 +29,7 @@ from tfarm.errors import ParameterError, must_be_known, require
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.exported import twin
 from tfarm.exported.realisation import NoiseGain, around, least_noise, matrices_of, with_matrices
-from tfarm.exported.result import Export, ExportTask, is_certified, names_of
+from tfarm.exported.result import Export, ExportTask, Name, is_certified, names_of
 from tfarm.exported.texts import facts_of, identifiers, literal, name_in_c, render
 from tfarm.exported.word_length import FIXED, FLOATS, MOST_SUMMED, OUTPUT, Word, word_of
 from tfarm.records import record
@@ -128,25 +128,28 @@ def c_controller(task: ExportTask) -> Export:
     word = controller.word
     found = judged(task, word, exact.verdict.loop)
     bounds, is_whole, error = word.bounds
-    is_bounded = math.isfinite(error) and (word.precision != FIXED or bool((bounds < 1).all()))
     details = WordLength(
         precision=task.precision, realisation=name, noise_gains=gains, largest_states=tuple(bounds.tolist()),
-        overflow="excluded for inputs within their ranges" if is_whole and is_bounded else "not excluded",
-        error=error if is_bounded else None, samples=None if is_whole else MOST_SUMMED,
+        overflow="excluded for inputs within their ranges" if is_whole and error < math.inf else "not excluded",
+        error=error if error < math.inf else None, samples=None if is_whole else MOST_SUMMED,
         limit_cycle=word.limit_cycle(found.verdict.loop),
     )  # fmt: skip
-    facts = [*task.facts(word.rounded, found).items(), *facts_of(details)]
-    known = (
-        name_in_c(task.name or NAME),
-        *(identifiers(names, mark) for names, mark in ((controller.signals, "y_"), (controller.references, "r_"))),
-    )
-    values = values_of(task, controller, ports_of(task, controller, *known[1:])) | {
-        "name": next(iter(known[0].values()))
-    }
+    contents, names = source_files(task, controller, [*task.facts(word.rounded, found).items(), *facts_of(details)])
     return Export(
-        what=task.what, form=task.form, contents={file: render(file, facts=facts, **values) for file in FILES},
-        names=names_of(*known), verdict=found.verdict.sentence, details=details, sha256=task.sha256,
+        what=task.what, form=task.form, contents=contents, names=names, verdict=found.verdict.sentence,
+        details=details, sha256=task.sha256,
     )  # fmt: skip
+
+
+def source_files(
+    task: ExportTask, controller: Controller, facts: Sequence[tuple[str, str]]
+) -> tuple[dict[str, bytes], list[Name]]:
+    """The files that begin with these facts, by name, and the identifiers in them, that of the controller first."""
+    name, signals = name_in_c(task.name or NAME), identifiers(controller.signals, "y_")
+    references = identifiers(controller.references, "r_")
+    values = values_of(task, controller, ports_of(task, controller, signals, references))
+    contents = {file: render(file, name=next(iter(name.values())), facts=facts, **values) for file in FILES}
+    return contents, names_of(name, signals, references)
 
 
 def in_z(law: Law, chain: Chain) -> Law:

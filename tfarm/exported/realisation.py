@@ -31,6 +31,7 @@ MOST_DOUBLINGS = 40  # of the samples that a sum has: 1e12 of them
 SUMMED = 1e-9  # of a sum of squares: its last terms
 LEAST_SHARE = 1e-12  # of the largest singular value: below it a state is not controllable or not observable
 WORST_CONDITION = 1e8  # of the eigenvectors: beyond it poles are not separated
+NEXT_TO = 1.01  # times the least noise gain: for less a law keeps its states, and an integral its pole z = 1
 GIVEN, SECTIONS, BALANCED = "law as given", "second-order sections", "balanced state space"
 
 
@@ -129,7 +130,7 @@ def candidates(law: Law, loop: Sampled) -> list[tuple[NoiseGain, Matrices]]:
     K, W = found
     changes = {GIVEN: np.eye(law.order), SECTIONS: sections(A, K, W), BALANCED: balancing(K, W)}
     known = [(name, T, np.linalg.inv(T)) for name, T in changes.items() if T is not None]
-    gains = [float(np.diag(inverse @ K @ inverse.T) @ np.diag(T.T @ W @ T)) for _, T, inverse in known]
+    gains = [abs(float(np.diag(inverse @ K @ inverse.T) @ np.diag(T.T @ W @ T))) for _, T, inverse in known]
     return [
         (NoiseGain(name, gain), (inverse @ A @ T, inverse @ B, C @ T, D))
         for gain, (name, T, inverse) in zip(gains, known, strict=True)
@@ -137,7 +138,9 @@ def candidates(law: Law, loop: Sampled) -> list[tuple[NoiseGain, Matrices]]:
 
 
 def least_noise(law: Law, loop: Sampled) -> tuple[Law, str, list[NoiseGain]]:
-    """The law in the realisation with the least noise gain, its name, and the gains of all."""
-    found = candidates(law, loop)
+    """The law in the realisation with the least noise gain, as given if that has hardly more; its name, and all gains."""
+    (given, own), *_ = found = candidates(law, loop)
     best, matrices = min(found, key=lambda each: each[0].gain or 0.0)
+    if not NEXT_TO * (best.gain or 0.0) < (given.gain or 0.0):
+        best, matrices = given, own
     return with_matrices(law, matrices), best.realisation, [gain for gain, _ in found]

@@ -40,7 +40,8 @@ class ExportTask:
     """What to export, and how: an arm, a law (by default the default gains), and the chain of its sampled loop.
 
     `ranges` are the largest absolute values of signals by name, in SI units, for fixed point.  `tuned` is the file of a
-    trained tuner.  `anyway`: also a loop that is not certified stable.
+    trained tuner.  `anyway`: also a loop that is not certified stable.  `outputs` and `modes` are the further outputs
+    and the flexible modes of a plant in a functional mock-up unit, by default those of the simulation of a slew.
     """
 
     arm: Arm
@@ -53,6 +54,8 @@ class ExportTask:
     ranges: Mapping[str, float] = field(default_factory=dict)
     name: str = ""
     anyway: bool = False
+    outputs: tuple[str, ...] = ()
+    modes: int | None = None
 
     @cached_property
     def law(self) -> Law:
@@ -84,8 +87,12 @@ class ExportTask:
         shown = {} if card is None else dict(facts_of(card))
         warning = {} if is_certified(found) else {"warning": ANYWAY}
         head = {"arm": self.arm.name, "controller": self.law.name, **warning}
-        period = {"sampling period": f"{self.chain.sampling.period!r} s"}
-        return head | period | shown | {"SHA-256 of the inputs": self.sha256, "tfarm": version("tfarm")}
+        sampling = self.chain.sampling
+        times = {
+            "sampling period [s]": repr(sampling.period),
+            "delay beyond this code [samples]": repr(sampling.delay_samples),
+        }
+        return head | times | shown | {"SHA-256 of the inputs": self.sha256, "tfarm": version("tfarm")}
 
 
 def is_certified(found: Analysis) -> bool:

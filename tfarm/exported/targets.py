@@ -1,14 +1,14 @@
 """The export of a controller, a tuner, the plant or the closed loop to another program."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import get_args
 
-from tfarm.arm import AnyLaw, Arm, must_be_arm
+from tfarm.arm import AnyLaw, Arm, arm_and_law, must_be_arm
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual
-from tfarm.errors import ParameterError, must_be_known
+from tfarm.errors import ParameterError, must_be_known, require
 from tfarm.exported.result import Export, ExportTask, Form, Precision, What, write_into
 
 WRITERS = {  # module and function of `tfarm.exported` that make an `Export` of a task
@@ -39,6 +39,8 @@ def export(
     ranges: Mapping[str, float] | None = None,
     name: str = "",
     anyway: bool = False,
+    outputs: Sequence[str] = (),
+    modes: int | None = None,
 ) -> Export:
     """Write a controller, a tuner, the plant or the closed loop as files for another program.
 
@@ -64,6 +66,9 @@ def export(
         Beginning of the identifiers of a file in C.
     anyway
         Export a loop that is not certified stable.
+    outputs, modes
+        Of a functional mock-up unit with a plant: outputs beyond those of a simulation, as "strain@0.05", and the
+        number of flexible modes, by default that of the simulation of a slew.
 
     Returns
     -------
@@ -81,10 +86,13 @@ def export(
     if (what, form) not in WRITERS:
         forms = ", ".join(each for of, each in WRITERS if of == what)
         raise ParameterError(key="as", value=form, remedy=f"a {what} is exported as: {forms}")
+    is_simulated = form == "fmu" and what != "controller"
+    remedy = "only a plant or a loop as fmu has outputs and modes of its own; leave them out"
+    require(is_simulated or not (outputs or modes), "outputs" if outputs else "modes", outputs or modes, remedy)
     task = ExportTask(
-        arm=arm, given=law, chain=chain_or_usual(chain), what=what, form=form,
-        tuned=None if tuned is None else Path(tuned), precision=precision, ranges=dict(ranges or {}), name=name,
-        anyway=anyway,
+        arm=arm if law is None else arm_and_law(arm, law)[0], given=law, chain=chain_or_usual(chain),
+        what=what, form=form, tuned=None if tuned is None else Path(tuned), precision=precision,
+        ranges=dict(ranges or {}), name=name, anyway=anyway, outputs=tuple(outputs), modes=modes,
     )  # fmt: skip
     module, _, function = WRITERS[what, form].partition(":")
     found: Export = getattr(import_module(f"tfarm.exported.{module}"), function)(task)

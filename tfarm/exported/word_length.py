@@ -92,7 +92,8 @@ class Word:
     def bounds(self) -> tuple[Real, bool, float]:
         """Bound on each state as exported, whether it is over all samples, and bound on the error of u.
 
-        The error d of the states obeys d' = A d + w, w = |dA| X + |dB| E + roundings; X includes d.
+        The error d of the states obeys d' = A d + w, w = |dA| X + |dB| E + roundings; X includes d.  Where a state may
+        saturate, in fixed point, the error has no bound.
         """
         (A, B, C, D), E, one = matrices_of(self.law), self.sizes, np.eye(self.law.order)
         relative, absolute = self.errors
@@ -106,7 +107,8 @@ class Word:
                 w = vA @ largest + vB @ E + absolute[:-1]
                 largest = first + of_states @ w
             u = of_output @ w + vC @ largest + vD @ E + relative * self.output
-        return largest, is_whole, float(u[0] + absolute[-1])
+        may_saturate = self.precision == FIXED and max(largest, default=0.0) >= 1
+        return largest, is_whole, math.inf if may_saturate else float(u[0] + absolute[-1])
 
     def limit_cycle(self, loop: Sampled) -> float | None:
         """Bound on u in a limit cycle that roundings sustain in a loop at rest; None where none was found.

@@ -10,10 +10,7 @@ static const {{ real }} {{ key }}[{{ rows|length }}][{{ rows[0]|length }}] = {
 {% endfor %}
 
 {% if fixed %}
-{% if n %}
-static const int shifts[{{ n }}] = { {{- shifts[:-1]|join(", ") -}} };
-
-{% endif %}
+{{ "static const int shifts[%d] = {%s};\n\n"|format(n, shifts[:-1]|join(", ")) if n -}}
 static int64_t shifted(int64_t value, int shift) /* value/2^shift to the nearest, halves upwards */
 {
     const uint64_t top = UINT64_C(1) << 63, half = UINT64_C(1) << (shift - 1);
@@ -53,16 +50,10 @@ void {{ name }}_init({{ name }}_state *state)
 
 int {{ name }}_step({{ name }}_state *state, const {{ name }}_input *input, {{ name }}_number *output)
 {
-    int {{ "i, j" if n or delay else "j" }};
-    {{ wide }} e[{{ m }}], u;
-{% if n %}
-    {{ wide }} total;
-    {{ name }}_number following[{{ n }}];
-{% endif %}
-{% if hub %}
-    double rate;
-{% endif %}
-
+    int {{ "i, j" if n or delay > 1 else "j" }};
+    {{ wide }} e[{{ m }}], u{{ ", total" if n }};
+{{ "    %s_number following[%d];\n"|format(name, n) if n -}}
+{{ "    double rate;\n" if hub }}
 {% if not fixed %}
     *output = state->output;
     if (!({% for field in fields %}is_finite(input->{{ field.identifier }}){{ ")" if loop.last else " && " }}{% endfor %})
@@ -76,19 +67,17 @@ int {{ name }}_step({{ name }}_state *state, const {{ name }}_input *input, {{ n
     e[{{ loop.index0 }}] = {{ each }};
 {% endfor %}
     u = input->feedforward{{ " * (INT64_C(1) << %d)"|format(shifts[-1]) if fixed }};
-{% if n %}
-    for (i = 0; i < {{ n }}; i++)
-        u += {{ cast }}C[0][i] * state->x[i];
-{% endif %}
-    for (j = 0; j < {{ m }}; j++)
-        u += {{ cast }}D[0][j] * e[j];
+{% for key, vector, size in (("C", "state->x", n), ("D", "e", m)) if size %}
+    for (j = 0; j < {{ size }}; j++)
+        u += {{ cast }}{{ key }}[0][j] * {{ vector }}[j];
+{% endfor %}
 {% if n %}
     for (i = 0; i < {{ n }}; i++) {
         total = 0;
-        for (j = 0; j < {{ n }}; j++)
-            total += {{ cast }}A[i][j] * state->x[j];
-        for (j = 0; j < {{ m }}; j++)
-            total += {{ cast }}B[i][j] * e[j];
+{% for key, vector, size in (("A", "state->x", n), ("B", "e", m)) %}
+        for (j = 0; j < {{ size }}; j++)
+            total += {{ cast }}{{ key }}[i][j] * {{ vector }}[j];
+{% endfor %}
 {% if fixed %}
         following[i] = clipped(shifted(total, shifts[i]), INT32_MIN, INT32_MAX);
 {% else %}
@@ -100,9 +89,7 @@ int {{ name }}_step({{ name }}_state *state, const {{ name }}_input *input, {{ n
 {% endif %}
 {% if fixed %}
     u = shifted(u, {{ shifts[-1] }});
-{% if step %}
-    u = shifted(u, {{ dac[0] }}) * (INT64_C(1) << {{ dac[0] }});
-{% endif %}
+{{ "    u = shifted(u, %s) * (INT64_C(1) << %s);\n"|format(dac[0], dac[0]) if step -}}
 {% else %}
     if (!is_finite(u))
         return {{ name }}_OVERFLOW;
@@ -119,8 +106,7 @@ int {{ name }}_step({{ name }}_state *state, const {{ name }}_input *input, {{ n
 {% set final = "clipped(u, %s, %s)"|format(dac[1], dac[2]) if fixed else "converted(u)" if converter else "u" %}
 {% if delay %}
     state->output = state->line[0];
-    for (i = 0; i < {{ delay - 1 }}; i++)
-        state->line[i] = state->line[i + 1];
+{{ "    for (i = 0; i < %d; i++)\n        state->line[i] = state->line[i + 1];\n"|format(delay - 1) if delay > 1 -}}
     state->line[{{ delay - 1 }}] = {{ final }};
 {% else %}
     state->output = {{ final }};

@@ -9,10 +9,13 @@
 {% endfor %}
  * Output: {{ output|comment }}
  *
- * Call {{ name }}_init once and {{ name }}_step at each sample.  {{ name }}_step returns 0, or
- * {{ name }}_INPUT_ERROR for an input that is not finite and {{ name }}_OVERFLOW for a result
- * that is not: it then holds the output and keeps the state.
- * Compile with -ffp-contract=off and without -ffast-math.
+ * Call {{ name }}_init once and {{ name }}_step at each sample.
+{% if fixed %}
+ * {{ name }}_step returns 0.
+{% else %}
+ * {{ name }}_step returns 0, {{ name }}_INPUT_ERROR for an input that is not finite, or {{ name }}_OVERFLOW for such a
+ * result: it then holds the output and keeps the state.  Compile with -ffp-contract=off, without -ffast-math.
+{% endif %}
  */
 #ifndef {{ name }}_CONTROLLER_H
 #define {{ name }}_CONTROLLER_H
@@ -32,23 +35,15 @@
 typedef {{ real }} {{ name }}_number;
 
 typedef struct {
-{% for field in fields %}
-    {{ name }}_number {{ field.identifier }};
-{% endfor %}
+    {{ name }}_number {% for field in fields %}{{ field.identifier }}{{ ";" if loop.last else ", " }}{% endfor %}
+
 } {{ name }}_input;
 
 typedef struct {
 {% block state %}
-{% if n %}
-    {{ name }}_number x[{{ n }}];
-{% endif %}
-{% if delay %}
-    {{ name }}_number line[{{ delay }}]; /* delay of the controller */
-{% endif %}
-{% if hub %}
-    double angle, rate; /* estimate of the hub rate */
-    int begun;
-{% endif %}
+{{ "    %s_number x[%d];\n"|format(name, n) if n -}}
+{{ "    %s_number line[%d]; /* delay of the controller */\n"|format(name, delay) if delay -}}
+{{ "    double angle, rate; /* estimate of the hub rate */\n    int begun;\n" if hub -}}
 {% endblock %}
     {{ name }}_number output;
 } {{ name }}_state;

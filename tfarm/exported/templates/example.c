@@ -1,5 +1,5 @@
 /*
- * Main loop of a microcontroller: replace the four functions by those of its timer, ADC, encoder and DAC.
+ * Main loop of a microcontroller: replace the three functions by those of its timer, ADC, encoder and DAC.
  * As they are, they end after ten samples, and the file compiles and runs on a host:
  *     cc -std=c99 -ffp-contract=off example.c controller.c && ./a.out
  */
@@ -7,10 +7,9 @@
 
 #include <stdio.h>
 
-static int samples_left = 10;
-
 static int wait_for_sample(void) /* until the timer of {{ period }} s; 0 ends the loop */
 {
+    static int samples_left = 10;
     return samples_left-- > 0;
 }
 
@@ -21,14 +20,9 @@ static void read_inputs({{ name }}_input *input)
 {% endfor %}
 }
 
-static void write_output({{ name }}_number output) /* {{ output|comment }} */
+static void write_output({{ name }}_number output, int status) /* {{ output|comment }} */
 {
-    printf("%.9g\n", (double)output);
-}
-
-static void stop(int status) /* a sensor has failed: brake, warn, or hold the output as here */
-{
-    fprintf(stderr, "error %d, output held\n", status);
+    printf("%.9g%s\n", (double)output, status ? " held: a sensor has failed" : "");
 }
 
 int main(void)
@@ -42,9 +36,7 @@ int main(void)
     while (wait_for_sample()) {
         read_inputs(&input);
         status = {{ name }}_step(&state, &input, &output);
-        if (status)
-            stop(status);
-        write_output(output);
+        write_output(output, status);
     }
     return 0;
 }

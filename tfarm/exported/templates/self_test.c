@@ -4,26 +4,20 @@
 #include <stdio.h>
 #include <string.h>
 
-static const {{ real }} recorded[{{ recorded|length }}] = {
-{% for row in recorded|batch(4) %}
+{% for kind, key, values, width in ((real, "recorded", recorded, 4), ("int", "expected", status, 40)) %}
+static const {{ kind }} {{ key }}[{{ values|length }}] = {
+{% for row in values|batch(width) %}
     {{ row|join(", ") }},
 {% endfor %}
 };
-static const int expected[{{ recorded|length }}] = {
-{% for row in status|batch(40) %}
-    {{ row|join(", ") }},
 {% endfor %}
-};
 static uint32_t seed = {{ seed }}u;
 
 static {{ real }} next({{ "void" if fixed else real + " size" }}) /* of a linear congruential generator */
 {
+{% set share = "((%s)(seed >> 8) / 8388608.0%s - 1.0%s)"|format(real, suffix, suffix) %}
     seed = 1664525u * seed + 1013904223u;
-{% if fixed %}
-    return (int32_t)((int64_t)seed - INT64_C(2147483648));
-{% else %}
-    return size * (({{ real }})(seed >> 8) / 8388608.0{{ suffix }} - 1.0{{ suffix }});
-{% endif %}
+    return {{ "(int32_t)((int64_t)seed - INT64_C(2147483648))" if fixed else "size * " + share }};
 }
 
 int main(void)
@@ -36,7 +30,7 @@ int main(void)
     {{ name }}_init(&state);
     for (k = 0; k < {{ recorded|length }}; k++) {
 {% for field in fields %}
-        input.{{ field.identifier }} = next({{ sizes[loop.index0] if not fixed else "" }});
+        input.{{ field.identifier }} = next({{ sizes[loop.index0] if not fixed }});
 {% endfor %}
 {% if not fixed %}
         if (k == {{ refused }})
