@@ -30,7 +30,9 @@ from tfarm.tuner.trial import to_text
 SOURCES = ("tuner.c", "self_test.c")
 LAB = "sasaki2012-lab"
 GUARDED = {"guard": SECTOR, "guard_kind": "time-varying"}  # certified on the laboratory arm
-EXCEEDED = {"guard": (0.16, 0.43), "guard_kind": "frozen"}  # 0.16 + (0.43 - 0.16) is above 0.43 in either precision
+EXCEEDED = {  # 0.16 + (0.43 - 0.16) is above 0.43 in either precision, and the sum of the network in most samples
+    "guard": (0.16, 0.43), "guard_kind": "frozen", "W1": [[0.1] * 6] * 2, "w2": [200.0] * 2, "scales": [1.0] * 6,
+}  # fmt: skip
 FREE = {"guard": None, "guard_kind": "none"}  # without a guard: no certificate is sought
 REALS = [KINDS[each] for each in PRECISIONS]
 
@@ -186,7 +188,7 @@ def test_no_sum_of_the_network_overflows(precision):
 @pytest.mark.parametrize("precision", PRECISIONS)
 def test_no_gain_is_above_the_guard(precision):
     """Where the sum of its lower end and its width is, by rounding."""
-    tuner = ExportedTuner(tuner_of(0, **EXCEEDED, W1=[[0.0] * 6], w2=[200.0], scales=[1.0] * 6), precision)
+    tuner = ExportedTuner(tuner_of(0, **EXCEEDED), precision)
     tuner.run(np.zeros((1, 7)))
     assert tuner.numbers.lo + (tuner.numbers.hi - tuner.numbers.lo) > tuner.numbers.hi
     assert tuner.state[3] == tuner.numbers.hi
