@@ -21,6 +21,7 @@ from matplotlib import pyplot
 
 import tfarm
 from tests.bench import Row
+from tests.octave import ABSENT, OCTAVE, left_by_octave
 from tests.shared import docs_module
 from tests.shell import heard
 from tfarm.arm.law_tables import load_law
@@ -95,6 +96,8 @@ class Run:
         elif kind == "sh" or (kind == "ipython3" and text.startswith("%%bash\n")):
             for line in text.removeprefix("%%bash\n").replace("\\\n", "").splitlines():
                 self.command(line)
+        elif kind == "matlab":
+            self.printed += left_by_octave(Path.cwd(), text)[1] if OCTAVE else ABSENT
         elif kind in ("python", "ipython3"):
             if text.startswith("import fmpy") and importlib.util.find_spec("fmpy") is None:
                 pytest.skip("FMPy is not installed: the last blocks of howto/export-fmu")

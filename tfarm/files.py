@@ -12,11 +12,11 @@ import secrets
 import shutil
 import stat
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 from tfarm.errors import ParameterError, require
 from tfarm.stopping import undone_if_stopped
@@ -64,13 +64,13 @@ def read_mat(path: str | os.PathLike[str], most: int, *, key: str) -> tuple[dict
     return {name: value for name, value in found.items() if not name.startswith("__")}, data
 
 
-def write_mat(path: Path, variables: dict[str, Any], *, key: str, oned_as: str = "column") -> None:
-    """Write a MATLAB file (level 5) without SciPy's date in its header: same inputs, same bytes."""
+def mat_content(variables: Mapping[str, Any], oned_as: Literal["row", "column"]) -> bytes:
+    """Return a MATLAB file (level 5) without SciPy's date in its header: same inputs, same bytes."""
     from scipy.io import savemat
 
     content = io.BytesIO()
-    savemat(cast("Any", content), variables, oned_as=cast("Any", oned_as))
-    write_file(path, MAT_HEADER.ljust(HEADER_TEXT) + content.getvalue()[HEADER_TEXT:], key=key)
+    savemat(cast("Any", content), dict(variables), oned_as=oned_as)
+    return MAT_HEADER.ljust(HEADER_TEXT) + content.getvalue()[HEADER_TEXT:]
 
 
 def write_file(path: Path, content: bytes, *, key: str) -> None:

@@ -36,7 +36,7 @@ from tfarm.errors import ParameterError, one_line, require
 from tfarm.exact.outputs import signal_words
 from tfarm.exported.controller import FEEDFORWARD, controller_of, in_z, source_files
 from tfarm.exported.result import ANYWAY, Export, ExportTask, What, is_certified
-from tfarm.exported.texts import identifiers, render
+from tfarm.exported.texts import identifiers, literal, render
 from tfarm.exported.word_length import FIXED
 from tfarm.files import temporary_folder
 from tfarm.records import record
@@ -239,8 +239,8 @@ def plant_code(of: Simulator) -> dict[str, Any]:
     }
     return {
         "tables": {name: braces(values) for name, values in tables.items()},
-        "poles": of.kept.size, "pieces": len(model.piece), "ring": chain.delay + 2, "bound": repr(chain.bound),
-        "lag": repr(chain.pole), "is_differenced": chain.is_differenced,
+        "poles": of.kept.size, "pieces": len(model.piece), "ring": chain.delay + 2, "bound": literal(chain.bound),
+        "lag": literal(chain.pole), "is_differenced": chain.is_differenced,
     }  # fmt: skip
 
 
@@ -251,7 +251,7 @@ def parts(values: Complex) -> Real:
 
 def braces(values: Any) -> str:
     """An array of C, every number with all of its digits."""
-    return f"{{{', '.join(map(braces, values))}}}" if np.ndim(values) else repr(float(values))
+    return f"{{{', '.join(map(braces, values))}}}" if np.ndim(values) else literal(values)
 
 
 # ------------------------------------------------------------ the file

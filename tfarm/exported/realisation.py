@@ -138,7 +138,7 @@ def candidates(law: Law, loop: Sampled) -> list[tuple[NoiseGain, Matrices]]:
 
 
 def least_noise(law: Law, loop: Sampled) -> tuple[Law, str, list[NoiseGain]]:
-    """The law in the realisation with the least noise gain, as given if that has hardly more; its name, and all gains."""
+    """The law in the realisation of least noise, as given if that has hardly more; its name, and all noise gains."""
     (given, own), *_ = found = candidates(law, loop)
     best, matrices = min(found, key=lambda each: each[0].gain or 0.0)
     if not NEXT_TO * (best.gain or 0.0) < (given.gain or 0.0):
