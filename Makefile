@@ -36,8 +36,8 @@ SURVEYS := \
 	fitting.planted \
 	tuner.bounded \
 	exported.laws \
-	exported.unit_loops \
 	exported.tuners \
+	exported.unit_loops \
 	cli.fuzz \
 	cli.stops \
 	report.plausible \

@@ -30,6 +30,9 @@ from tfarm.tuner.trial import to_text
 SOURCES = ("tuner.c", "self_test.c")
 LAB = "sasaki2012-lab"
 GUARDED = {"guard": SECTOR, "guard_kind": "time-varying"}  # certified on the laboratory arm
+EXCEEDED = {  # 0.16 + (0.43 - 0.16) is above 0.43 in either precision, and the sum of the network in most samples
+    "guard": (0.16, 0.43), "guard_kind": "frozen", "W1": [[0.1] * 6] * 2, "w2": [200.0] * 2, "scales": [1.0] * 6,
+}  # fmt: skip
 FREE = {"guard": None, "guard_kind": "none"}  # without a guard: no certificate is sought
 REALS = [KINDS[each] for each in PRECISIONS]
 
@@ -170,6 +173,27 @@ def test_no_kept_state_refuses_a_later_sample(precision):
         assert set(status[::2].tolist()) <= {0, 2}
 
 
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_no_sum_of_the_network_overflows(precision):
+    """u(t) and u(t-1) of the size of the largest number and with opposite weights: their sum is 0, not inf - inf."""
+    saved = tuner_of(0, W1=[[1e6, -1e6, 0.0, 0.0, 0.0, 0.0]], w2=[1.0], scales=[1.0] * 6)
+    tuner = ExportedTuner(saved, precision)
+    row = np.zeros(7)
+    row[[1, 4]] = np.array([-1.0, 1.0]) * float(tuner.numbers.largest)
+    _, status = tuner.run(np.array([row, row]))
+    assert not status.any()
+    assert tuner.state[3] == pytest.approx(SECTOR[0] + (SECTOR[1] - SECTOR[0]) / (1 + math.exp(-0.5)), rel=1e-6)
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_no_gain_is_above_the_guard(precision):
+    """Where the sum of its lower end and its width is, by rounding."""
+    tuner = ExportedTuner(tuner_of(0, **EXCEEDED), precision)
+    tuner.run(np.zeros((1, 7)))
+    assert tuner.numbers.lo + (tuner.numbers.hi - tuner.numbers.lo) > tuner.numbers.hi
+    assert tuner.state[3] == tuner.numbers.hi
+
+
 def test_a_result_beyond_the_largest_number_is_refused():
     """A finite input times a gain of ten."""
     saved = tuner_of(0, guard=(5.0, 10.0))
@@ -241,11 +265,11 @@ def folders(tmp_path_factory):
     """Files of a tuner of every kind in each precision, its twin in Python, and inputs with refused ones among them."""
     found = {precision: [] for precision in PRECISIONS}
     for precision, kinds in found.items():
-        for n, changed in enumerate((FREE, FREE | {"signals": "total"}, GUARDED, GUARDED | {"signals": "vibration"})):
+        for n, changed in enumerate((FREE, FREE | {"signals": "total"}, EXCEEDED, GUARDED | {"signals": "vibration"})):
             folder = tmp_path_factory.mktemp("tuner")
             tuner = exported(folder, tuners.some_tuner(rng_of(n), **changed), precision, anyway=True)
-            rows = tuners.some_inputs(rng_of(10 + n), 5000, len(tuner.inputs))
-            assert {0, 1} <= set(tuner.run(rows)[1].tolist())
+            rows = tuners.some_inputs(rng_of(10 + n), 5000, tuner)
+            assert {0, 1, 2} == set(tuner.run(rows)[1].tolist())
             kinds.append((folder, tuner, rows))
     return found
 
@@ -299,7 +323,7 @@ def test_sanitizers_find_nothing(tmp_path):
     needed("gcc")
     for precision in PRECISIONS:
         tuner = exported(tmp_path, tuner_of(6, **FREE), precision, anyway=True)
-        rows = tuners.some_inputs(rng_of(0), 2000, len(tuner.inputs))
+        rows = tuners.some_inputs(rng_of(0), 2000, tuner)
         assert is_equal(tmp_path, tuner, rows, "gcc", "-fsanitize=undefined,address", "-fno-sanitize-recover=all")
 
 

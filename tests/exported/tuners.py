@@ -83,14 +83,17 @@ def some_tuner(rng, **changed):
     ).model_copy(update=changed)  # fmt: skip
 
 
-def some_inputs(rng, samples, width):
+def some_inputs(rng, samples, tuner):
     """Inputs of all sizes: quantised and clipped as by converters, zeros, and one in 200 that has to be refused."""
+    width = len(tuner.inputs)
     rows = rng.normal(size=(samples, width)) * 10 ** rng.uniform(-8, 3, (samples, 1))
     coarse = rng.random(samples) < 0.3
     rows[coarse] = np.clip(np.round(rows[coarse] * 64) / 64, -8.0, 8.0)
     rows[rng.random(rows.shape) < 0.05] = 0.0
     odd = rng.random(rows.shape) < 0.005 / width
     rows[odd] = rng.choice([np.nan, np.inf, -np.inf, 1e308, -1e308, 3e38, 5e-324], odd.sum())
+    odd = rng.random(samples) < 0.002
+    rows[odd] = rng.choice([-0.9, 0.9], (odd.sum(), width)) * float(tuner.numbers.largest)
     return rows
 
 
@@ -136,7 +139,7 @@ def bits(size, seed):
             with tempfile.TemporaryDirectory() as place:
                 folder = Path(place)
                 tuner = exported(folder, saved, precision, anyway=True)
-                rows = some_inputs(rng, SAMPLES // (2 * size), len(tuner.inputs))
+                rows = some_inputs(rng, SAMPLES // (2 * size), tuner)
                 for compiler in filter(has_program, COMPILERS):
                     for level in LEVELS:
                         equal = is_equal(folder, tuner, rows, compiler, level)

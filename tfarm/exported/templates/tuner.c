@@ -15,8 +15,7 @@ static const {{ real }} {{ key }}[{{ numbers|length }}] = {
 static {{ real }} polynomial({{ real }} x, const {{ real }} *coefficients, int size)
 {
     {{ real }} total = coefficients[size - 1];
-    int n;
-    for (n = size - 2; n >= 0; n--)
+    for (int n = size - 2; n >= 0; n--)
         total = total * x + coefficients[n];
     return total;
 }
@@ -25,12 +24,11 @@ static {{ real }} polynomial({{ real }} x, const {{ real }} *coefficients, int s
 static {{ real }} exponential({{ real }} x)
 {
     {{ real }} k, result, power = half;
-    int n;
     if (!(x > lowest))
         return zero;
     k = (x * inverse + shift) - shift;
     result = polynomial((x - k * high) - k * low, taylor, {{ tables.taylor|length }});
-    for (n = (int)-k; n > 0; n /= 2) { /* at most ten times */
+    for (int n = (int)-k; n > 0; n /= 2) { /* at most ten times */
         if (n % 2 == 1)
             result *= power;
         power *= power;
@@ -57,10 +55,9 @@ static {{ real }} logarithm({{ real }} y)
 static {{ real }} network(const {{ real }} *row)
 {
     {{ real }} z = zero, net, gain;
-    int i, j;
-    for (j = 0; j < {{ of.w2|length }}; j++) {
+    for (int j = 0; j < {{ of.w2|length }}; j++) {
         net = zero;
-        for (i = 0; i < {{ of.scales|length }}; i++)
+        for (int i = 0; i < {{ of.scales|length }}; i++)
             net += W1[{{ of.scales|length }} * j + i] * (row[i] / scales[i]);
         z += w2[j] * sigmoid(net);
     }
