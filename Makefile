@@ -35,6 +35,9 @@ SURVEYS := \
 	dsp.law_orders \
 	fitting.planted \
 	tuner.bounded \
+	exported.laws \
+	exported.tuners \
+	exported.unit_loops \
 	cli.fuzz \
 	cli.stops \
 	report.plausible \

@@ -326,9 +326,9 @@ def save_tuner(tuner: SavedTuner, path: Path) -> None:
     write_file(path, to_text(tuner).encode(), key="--save")
 
 
-def load_tuner(path: str | os.PathLike[str]) -> SavedTuner:
+def load_tuner(path: str | os.PathLike[str], key: str = "controller") -> SavedTuner:
     """Read the tuner of a file.  Raises ParameterError, in one line, for the first problem of the file."""
-    text = read_file(path, MOST_TUNER_BYTES, key="controller", what="a tuner's file")
+    text = read_file(path, MOST_TUNER_BYTES, key=key, what="a tuner's file")
     with naming(path):
         try:
             found = SavedTuner.model_validate_json(text)
