@@ -9,8 +9,8 @@ from tfarm.arm.law import arm_and_law
 from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, load_chain
 from tfarm.exported.controller import controller_of, in_z
-from tfarm.exported.realisation import least_noise
 from tfarm.exported.result import ExportTask
+from tfarm.exported.word_length import least_noise
 
 LAB = tfarm.load("sasaki2012-lab")
 RIG = Path(__file__).parents[1] / "data" / "quanser-2dsfl"

@@ -22,8 +22,8 @@ from tests.exported.compilers import COMPILERS, build, random_inputs, run, stepp
 from tests.survey import Finding
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exported.controller import c_controller, controller_of, in_z, source_files
-from tfarm.exported.realisation import least_noise
 from tfarm.exported.result import write_into
+from tfarm.exported.word_length import least_noise
 
 SIGNALS = ("hub_angle", "hub_rate", "root_moment")
 SAMPLES, MILLION, STEPS = 5_000, 1_000_000, 5_000_000

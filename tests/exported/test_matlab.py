@@ -19,7 +19,7 @@ from tfarm.arm.law_tables import law_of_table
 from tfarm.dsp import Actuator, Chain
 from tfarm.dsp.scenarios import scenario
 from tfarm.dsp.simulate import Simulator
-from tfarm.exported.matlab import save_mat
+from tfarm.exported.systems import save_mat
 from tfarm.reduced import reduce
 from tfarm.response.signals import Signals
 

@@ -20,7 +20,7 @@ from tests.tuner.plain import plain_gain
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.errors import ParameterError
-from tfarm.exported import tuner_twin as functions
+from tfarm.exported import tuner_code as functions
 from tfarm.exported.texts import literal
 from tfarm.exported.tuner_code import ExportedTuner
 from tfarm.tuner import find_guard, slew_trial

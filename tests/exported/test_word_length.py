@@ -11,8 +11,7 @@ import tfarm
 from tests.exported.cases import GAINS, IDEAL, LAB, NOTCH, PI, REAL, realised, task_of
 from tfarm.errors import ParameterError
 from tfarm.exported.controller import c_controller, in_z
-from tfarm.exported.realisation import BALANCED, SECTIONS, around, candidates, gramians
-from tfarm.exported.word_length import absolute_sum, observed
+from tfarm.exported.word_length import BALANCED, SECTIONS, absolute_sum, around, candidates, gramians, observed
 
 SERVO = tfarm.Law(
     {"hub_angle": ([6.0, 8.0], [0.02, 1.0]), "root_moment": ([0.1], [0.01, 1.0])}, references=("hub_angle",)

@@ -3,6 +3,6 @@
 `export` writes the files of a task; a module here makes those of each form.
 """
 
-from tfarm.exported.targets import export
+from tfarm.exported.result import export
 
 __all__ = ["export"]

@@ -28,10 +28,21 @@ from tfarm.dsp.verdict import Analysis, sampled
 from tfarm.errors import ParameterError, must_be_known, require
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.exported import twin
-from tfarm.exported.realisation import NoiseGain, around, least_noise, matrices_of, with_matrices
 from tfarm.exported.result import Export, ExportTask, Name, is_certified, names_of
 from tfarm.exported.texts import facts_of, identifiers, literal, name_in_c, render
-from tfarm.exported.word_length import FIXED, FLOATS, MOST_SUMMED, OUTPUT, Word, word_of
+from tfarm.exported.word_length import (
+    FIXED,
+    FLOATS,
+    MOST_SUMMED,
+    OUTPUT,
+    NoiseGain,
+    Word,
+    around,
+    least_noise,
+    matrices_of,
+    with_matrices,
+    word_of,
+)
 from tfarm.records import record
 from tfarm.schema import Quantity
 
