@@ -11,7 +11,16 @@ import tfarm
 from tests.exported.cases import GAINS, IDEAL, LAB, NOTCH, PI, REAL, realised, task_of
 from tfarm.errors import ParameterError
 from tfarm.exported.controller import c_controller, in_z
-from tfarm.exported.word_length import BALANCED, SECTIONS, absolute_sum, around, candidates, gramians, observed
+from tfarm.exported.word_length import (
+    BALANCED,
+    SECTIONS,
+    absolute_sum,
+    around,
+    candidates,
+    gramians,
+    observed,
+    with_system_matrix,
+)
 
 SERVO = tfarm.Law(
     {"hub_angle": ([6.0, 8.0], [0.02, 1.0]), "root_moment": ([0.1], [0.01, 1.0])}, references=("hub_angle",)
@@ -30,7 +39,9 @@ def test_every_realisation_has_the_transfer_functions_of_the_law(law):
     given, loop = exact_loop(law)
     z = np.exp(1j * np.linspace(0.05, 3.1, 40))
     names = []
-    for gain, (A, B, C, D) in candidates(given, loop):
+    for gain, S in candidates(given, loop):
+        n = given.order
+        A, B, C, D = S[:n, :n], S[:n, n:], S[n:, :n], S[n:, n:]
         names.append(gain.realisation)
         own = np.stack([C @ np.linalg.solve(each * np.eye(len(A)) - A, B) + D for each in z])[:, 0]
         assert abs(own.T - given.values(z)).max() <= 1e-11 * abs(own).max()
@@ -40,8 +51,8 @@ def test_every_realisation_has_the_transfer_functions_of_the_law(law):
 def test_noise_gains_are_those_of_lyapunov_equations():
     """Of a stable loop without a free hub angle; the balanced realisation has the same variances on both sides."""
     given, loop = exact_loop(SERVO)
-    for gain, matrices in candidates(given, loop):
-        law = replace(given, parts=(replace(given.parts[0], block=type(given.parts[0].block)(*matrices)),))
+    for gain, S in candidates(given, loop):
+        law = with_system_matrix(given, S)
         of = around(law, loop)
         K = solve_discrete_lyapunov(of.matrix, of.of_signals @ of.of_signals.T)
         W = solve_discrete_lyapunov(of.matrix.T, np.outer(of.output, of.output))
@@ -99,10 +110,10 @@ def test_errors_and_states_stay_within_their_bounds_under_the_worst_inputs(law, 
     for row in range(n + 1):
         e = np.array([np.sign(response[steps - 1 - k][row]) for k in range(steps)]) * word.sizes
         inputs = np.zeros((steps + 1, controller.inputs))
-        for j, (source, reference, _) in enumerate(controller.plan.tolist()):
-            shares = (-1.0, 0.0) if reference < 0 else (-0.5, 0.5)
+        for j, (reference, source) in enumerate(controller.plan.tolist()):
+            shares = (-0.5, 0.5) if reference < controller.inputs else (-1.0, 0.0)
             inputs[:-1, source] = shares[0] * e[:, j]
-            if reference >= 0:
+            if reference < controller.inputs:
                 inputs[:-1, reference] = shares[1] * e[:, j]
         scale = np.ones(controller.inputs)
         if precision == "q31":
@@ -133,10 +144,7 @@ def in_fractions(word, controller, inputs, scale):
     x, out, largest = [Fraction(0)] * len(A), [], np.zeros(len(A))
     for row in inputs.tolist():
         row = [Fraction(each) * Fraction(of) for each, of in zip(row, scale.tolist(), strict=True)]
-        e = [
-            (0 if reference < 0 else sign * row[reference]) - row[source]
-            for source, reference, sign in controller.plan.tolist()
-        ]
+        e = [[*row, None, 0][minuend] - row[subtrahend] for minuend, subtrahend in controller.plan.tolist()]
         out.append(row[-1] + sum(map(Fraction.__mul__, C[0], x)) + sum(map(Fraction.__mul__, D[0], map(Fraction, e))))
         x = [
             sum(map(Fraction.__mul__, A[i], x)) + sum(map(Fraction.__mul__, B[i], map(Fraction, e)))
@@ -154,7 +162,8 @@ def test_a_limit_cycle_in_fixed_point_stays_within_its_bound(law):
     word = controller.word
     bound = word.limit_cycle(loop)
     A, B, C = loop.pulse.matrices()
-    a, b, c, d = (each.tolist() for each in word.tables)
+    n, table = word.law.order, word.table
+    a, b, c, d = (each.tolist() for each in (table[:n, :n], table[:n, n:], table[n:, :n], table[n:, n:]))
     shift, R, U = word.shifts.tolist(), word.ranges, word.output
     reads = [loop.in_z.signals.index(name) for name in word.law.signals]
     plant, x, seen = np.random.default_rng(1).normal(size=len(A)) * 1e-6, [0] * len(a), []
@@ -202,7 +211,7 @@ def test_an_integral_can_overflow_and_a_servo_cannot():
         (task_of((LAB, replace(PI, delay=0.015), IDEAL)), "law.delay = 0.015: is 1.5 samples: C code has a delay"),
         (task_of((LAB, UNSTABLE, IDEAL)), "law = 'gains at the hub': the sampled loop is not certified stable"),
         (task_of((LAB, tfarm.Law({"hub_rate": 0.3, "root_moment": 1e-50}), IDEAL), "float"),
-         r"D\[0, 1\] = 1e-50: this coefficient is beyond the numbers of float32"),
+         r"ABCD\[0\]\[1\] = 1e-50: this coefficient is beyond the numbers of float32"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_exported_is_refused_in_one_line(task, error):
@@ -222,9 +231,7 @@ def test_a_coefficient_whose_rounding_destabilises_the_loop_is_named():
     assert K2 is not None
     law = tfarm.HubFeedback(K1=K1, K2=K2)
     assert tfarm.sampled(LAB, law, IDEAL).verdict.is_stable
-    with pytest.raises(
-        ParameterError, match=r"coefficient D\[0, 1\] = 1.\d+: rounded to float the loop is not certified"
-    ):
+    with pytest.raises(ParameterError, match=r"ABCD\[0\]\[1\] = 1.\d+: rounded to float the loop is not certified"):
         c_controller(task_of((LAB, law, IDEAL), "float"))
 
 

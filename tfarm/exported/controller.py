@@ -38,9 +38,10 @@ from tfarm.exported.word_length import (
     NoiseGain,
     Word,
     around,
+    coefficient,
     least_noise,
-    matrices_of,
-    with_matrices,
+    system_matrix,
+    with_system_matrix,
     word_of,
 )
 from tfarm.records import record
@@ -98,11 +99,12 @@ class Controller:
 
     @cached_property
     def plan(self) -> Whole:
-        """Index of signal and reference of each column, and the sign of the reference, as `twin` has them."""
-        law, at = self.word.law, {name: len(self.signals) + n for n, name in enumerate(self.references)}
-        sources = {name: n for n, name in enumerate(self.signals)} | ({RATE: twin.ESTIMATE} if self.hub else {})
-        rows = [(sources[name], at[name] if name in law.references else -1, 1) for name in law.signals]
-        return np.array([*rows, *((twin.NO_SIGNAL, at[name.removeprefix(REFERENCE)], -1) for name in law.wanted)])
+        """The two inputs whose difference is e of each column, as `twin` has them: references less signals."""
+        law, rate, zero = self.word.law, self.inputs, self.inputs + 1
+        signals = {name: n for n, name in enumerate(self.signals)} | ({RATE: rate} if self.hub else {})
+        wanted = {name: len(self.signals) + n for n, name in enumerate(self.references)}
+        rows = [(wanted[name] if name in law.references else zero, signals[name]) for name in law.signals]
+        return np.array([*rows, *((zero, wanted[name.removeprefix(REFERENCE)]) for name in law.wanted)])
 
     @property
     def inputs(self) -> int:
@@ -119,15 +121,14 @@ class Controller:
     def run(self, inputs: NDArray[Any]) -> tuple[NDArray[Any], Whole]:
         """Outputs and status (n,) of inputs (n, k), those of the C code bit for bit; whole numbers in fixed point."""
         word, kind = self.word, np.int64 if self.word.precision == FIXED else np.float64
-        tables = tuple(np.ascontiguousarray(each, dtype=kind) for each in word.tables)
         outputs, status, line = np.zeros(len(inputs), kind), np.zeros(len(inputs), int), np.zeros(self.delay, kind)
-        inputs = np.ascontiguousarray(inputs, dtype=kind)
+        table, inputs = (np.ascontiguousarray(each, dtype=kind) for each in (word.table, inputs))
         if word.precision == FIXED:
-            twin.run_fixed(tables, word.shifts, self.plan, inputs, self.whole_dac, line, outputs)
+            twin.run_fixed(table, word.shifts, self.plan, inputs, self.whole_dac, line, outputs)
         else:
             hub = np.array([self.signals.index(ANGLE), *self.hub] if self.hub else [-1.0, 0.0, 1.0])
             is_single = word.precision == "float"
-            twin.run_real(tables, self.plan, inputs, self.dac, hub, line, is_single, outputs, status)
+            twin.run_real(table, self.plan, inputs, self.dac, hub, line, is_single, outputs, status)
         return outputs, status
 
 
@@ -172,7 +173,7 @@ def in_z(law: Law, chain: Chain) -> Law:
     remedy = f"is {samples:.6g} samples: C code has a delay of whole samples; write another one into the law's states"
     require(abs(samples - round(samples)) <= WHOLE_SAMPLE, "law.delay", law.delay, remedy)
     law = discretised(law, chain.sampling.period)
-    return with_matrices(law, matrices_of(law))
+    return with_system_matrix(law, system_matrix(law))
 
 
 def controller_of(law: Law, task: ExportTask) -> Controller:
@@ -204,17 +205,15 @@ def judged(task: ExportTask, word: Word, loop: Sampled) -> Analysis:
     found = sampled(task.arm, word.rounded, task.chain)
     if task.anyway or is_certified(found):
         return found
-    exact, rounded, radius = matrices_of(word.law), matrices_of(word.rounded), {}
-    for n, place in ((n, place) for n, table in enumerate(exact) for place in np.ndindex(table.shape)):
-        tables = [each.copy() for each in exact]
-        tables[n][place] = rounded[n][place]
-        matrix = around(with_matrices(word.law, (tables[0], tables[1], tables[2], tables[3])), loop).matrix
-        radius["ABCD"[n], place] = float(abs(np.linalg.eigvals(matrix)).max())
-    key, place = max(radius, key=lambda each: radius[each])
+    exact, rounded, radius = system_matrix(word.law), system_matrix(word.rounded), {}
+    for place in np.ndindex(exact.shape):
+        table = exact.copy()
+        table[place] = rounded[place]
+        matrix = around(with_system_matrix(word.law, table), loop).matrix
+        radius[place] = float(abs(np.linalg.eigvals(matrix)).max())
+    worst = max(radius, key=radius.__getitem__)
     remedy = f"rounded to {task.precision} the loop is not certified stable: {found.verdict.sentence}; take more digits"
-    raise ParameterError(
-        key=f"coefficient {key}{list(place)}", value=float(exact["ABCD".index(key)][place]), remedy=remedy
-    )
+    raise ParameterError(key=coefficient(worst), value=float(exact[worst]), remedy=remedy)
 
 
 # ------------------------------------------------------------ values of the templates
@@ -224,13 +223,15 @@ def values_of(task: ExportTask, controller: Controller, ports: Sequence[Port]) -
     """The values of the templates, but for name and facts."""
     word, is_fixed, (real, suffix, largest) = controller.word, task.precision == FIXED, REAL[task.precision]
     dac, unit = controller.whole_dac if is_fixed else controller.dac, task.arm.input_unit
-    A, B, C, D = ([[literal(x, suffix) for x in row] for row in table.tolist()] for table in word.tables)
+    cast = "(int64_t)" if is_fixed else ""
+    known = [*(f"{cast}input->{each.identifier}" for each in ports), f"({real})rate", "0"]
     return {
         "fixed": is_fixed, "real": real, "wide": "int64_t" if is_fixed else real, "largest": largest, "suffix": suffix,
-        "cast": "(int64_t)" if is_fixed else "", "fields": ports,
+        "cast": cast, "fields": ports,
         **recorded(controller.run, ports, task.precision), "header": FILES[0],
-        "n": word.law.order, "m": len(controller.plan), "A": A, "B": B, "C": C, "D": D, "shifts": word.shifts,
-        "errors": [_error(source, reference, ports, real) for source, reference, _ in controller.plan.tolist()],
+        "n": word.law.order, "m": len(controller.plan), "shifts": word.shifts,
+        "table": [[literal(x, suffix) for x in row] for row in word.table.tolist()],
+        "errors": [f"{known[minuend]} - {known[subtrahend]}" for minuend, subtrahend in controller.plan.tolist()],
         "converter": bool(np.isfinite(dac).all()), "delay": controller.delay, "step": bool(dac[0]),
         "dac": [literal(each, "") for each in dac.tolist()],
         "hub": controller.hub and (ports[controller.signals.index(ANGLE)].identifier, *map(float.hex, controller.hub)),
@@ -252,14 +253,6 @@ def ports_of(task: ExportTask, controller: Controller, *known: dict[str, str]) -
     rows.append((FEEDFORWARD, FEEDFORWARD, f"{FEEDFORWARD} [{task.arm.input_unit}]", word.output))
     is_fixed = word.precision == FIXED
     return [Port(name, own, f"{text}, over {size!r}" if is_fixed else text, size) for name, own, text, size in rows]
-
-
-def _error(source: int, reference: int, ports: Sequence[Port], real: str) -> str:
-    """The C expression of e of one column of a plan."""
-    of = [f"{'(int64_t)' if real == REAL[FIXED][0] else ''}input->{each.identifier}" for each in ports]
-    if source == twin.NO_SIGNAL:
-        return f"-{of[reference]}"
-    return f"{'0' if reference < 0 else of[reference]} - {f'({real})rate' if source == twin.ESTIMATE else of[source]}"
 
 
 def recorded(

@@ -12,8 +12,7 @@ from tfarm.dsp.kernel import DAC, estimate, product, quantise, rounded
 from tfarm.exact.compiled import compiled, inlined
 
 INPUT_ERROR, OVERFLOW = 1, 2  # what a step returns, 0 for a sample without an error
-NO_SIGNAL, ESTIMATE = -1, -2  # sources of a column
-SOURCE, REFERENCE, SIGN = 0, 1, 2  # columns of a plan
+MINUEND, SUBTRAHEND = 0, 1  # columns of a plan
 LARGEST = 2147483647  # of 32 bits
 
 
@@ -30,33 +29,31 @@ def pushed(line: Any, u: Any) -> Any:
 
 @compiled
 def run_real(
-    tables: Any, plan: Any, inputs: Any, dac: Any, hub: Any, line: Any, single: bool, outputs: Any, status: Any
+    table: Any, plan: Any, inputs: Any, dac: Any, hub: Any, line: Any, single: bool, outputs: Any, status: Any
 ) -> None:
     """Fill outputs and status (n,) of inputs (n, k), the last of which is the feedforward.
 
-    `plan` (columns, 3): index of signal and reference of each column, and the sign of the reference; `dac` a row of the
-    quantisers; `hub` index of the hub angle (-1: no estimate), pole and period of the estimated rate.
+    `table` is [A B; C D]; `plan` (columns, 2) has the two numbers whose difference is e of a column, by their places
+    among the inputs, an estimated hub rate and 0; `dac` is a row of the quantisers; `hub` index of the hub angle (-1:
+    no estimate), pole and period of the estimated rate.
     """
-    A, B, C, D = tables
-    x, following, e, held = np.zeros(A.shape[0]), np.zeros(A.shape[0]), np.zeros(B.shape[1]), 0.0
-    memory, clipped, rate = np.zeros(3), np.zeros(3, np.bool_), 0.0
+    n, forward = table.shape[0] - 1, inputs.shape[1] - 1
+    known, z, following, held = np.zeros(forward + 3), np.zeros(table.shape[1]), np.zeros(n + 1), 0.0
+    memory, clipped = np.zeros(3), np.zeros(3, np.bool_)
     for k in range(inputs.shape[0]):
-        row, before = inputs[k], memory.copy()
+        known[: forward + 1], before = inputs[k], memory.copy()
         status[k] = INPUT_ERROR
-        if np.isfinite(row).all():
+        if np.isfinite(inputs[k]).all():
             if hub[0] >= 0.0:
-                rate = estimate(row[int(hub[0])], 0.0, memory, True, hub[1], hub[2])
-            for j in range(e.size):
-                source, reference = plan[j, SOURCE], plan[j, REFERENCE]
-                value = 0.0 if source == NO_SIGNAL else rounded(rate, single) if source == ESTIMATE else row[source]
-                e[j] = rounded((0.0 if reference < 0 else plan[j, SIGN] * row[reference]) - value, single)
-            u = product(D[0], e, product(C[0], x, row[-1], single), single)
-            for i in range(x.size):
-                following[i] = product(B[i], e, product(A[i], x, 0.0, single), single)
-            status[k] = 0 if np.isfinite(u) and np.isfinite(following).all() else OVERFLOW
+                known[-2] = rounded(estimate(known[int(hub[0])], 0.0, memory, True, hub[1], hub[2]), single)
+            for j in range(plan.shape[0]):
+                z[n + j] = rounded(known[plan[j, MINUEND]] - known[plan[j, SUBTRAHEND]], single)
+            for i in range(n + 1):
+                following[i] = product(table[i], z, known[forward] if i == n else 0.0, single)
+            status[k] = 0 if np.isfinite(following).all() else OVERFLOW
             if status[k] == 0:
-                x[:] = following
-                held = pushed(line, rounded(quantise(u, dac, clipped, DAC), single))
+                z[:n] = following[:n]
+                held = pushed(line, rounded(quantise(following[n], dac, clipped, DAC), single))
             else:
                 memory[:] = before
         outputs[k] = held
@@ -68,29 +65,22 @@ def shifted(value: int, shift: int) -> int:
     return (value + (1 << (shift - 1))) >> shift
 
 
-@inlined
-def whole_product(row: Any, values: Any, start: int) -> int:
-    """start + row . values, exactly."""
-    for j in range(values.size):
-        start += row[j] * values[j]
-    return start
-
-
 @compiled
-def run_fixed(tables: Any, shifts: Any, plan: Any, inputs: Any, dac: Any, line: Any, outputs: Any) -> None:
+def run_fixed(table: Any, shifts: Any, plan: Any, inputs: Any, dac: Any, line: Any, outputs: Any) -> None:
     """The same in fixed point; `dac` is the shift of the step of the DAC, 0 for none, lowest and highest output."""
-    A, B, C, D = tables
-    n = A.shape[0]
-    x, following, e = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(B.shape[1], np.int64)
+    n, forward = table.shape[0] - 1, inputs.shape[1] - 1
+    known, z = np.zeros(forward + 3, np.int64), np.zeros(table.shape[1], np.int64)
+    following = np.zeros(n + 1, np.int64)
     for k in range(inputs.shape[0]):
-        row = inputs[k]
-        for j in range(e.size):
-            source, reference = plan[j, SOURCE], plan[j, REFERENCE]
-            e[j] = (0 if reference < 0 else plan[j, SIGN] * row[reference]) - (0 if source < 0 else row[source])
-        u = shifted(whole_product(D[0], e, whole_product(C[0], x, row[-1] << shifts[n])), shifts[n])
+        known[: forward + 1] = inputs[k]
+        for j in range(plan.shape[0]):
+            z[n + j] = known[plan[j, MINUEND]] - known[plan[j, SUBTRAHEND]]
+        for i in range(n + 1):
+            total = known[forward] << shifts[n] if i == n else 0
+            for j in range(z.size):
+                total += table[i, j] * z[j]
+            following[i] = shifted(total, shifts[i])
         for i in range(n):
-            total = shifted(whole_product(B[i], e, whole_product(A[i], x, 0)), shifts[i])
-            following[i] = min(max(total, -LARGEST - 1), LARGEST)
-        x[:] = following
-        u = shifted(u, dac[0]) << dac[0] if dac[0] > 0 else u
+            z[i] = min(max(following[i], -LARGEST - 1), LARGEST)
+        u = shifted(following[n], dac[0]) << dac[0] if dac[0] > 0 else following[n]
         outputs[k] = pushed(line, min(max(u, dac[1]), dac[2]))

@@ -1,4 +1,16 @@
-"""A realised law in the word length of a target: rounded coefficients, bounds on states, errors and limit cycles.
+"""A sampled law in the word length of a target: the realisation of least noise, its coefficients, and bounds.
+
+    [x_{k+1}; u_k - r_k] = [A B; C D] [x_k; e_k],      e = reference - signal of each column
+
+States T^-1 x have A T^-1 ... T.  With K the covariance of the states under white noise at the signals, and W the sum
+of squares of the responses of u to a rounding of each state, both in the closed loop, the noise gain is
+
+    g = sum_i K_ii W_ii / variance of u,
+
+which no scaling of the states changes: where every state has unit variance, the variance of u by roundings, over that
+of one of them and over that of u under the noise (Mullis and Roberts, IEEE Trans. Circuits and Systems 23, 1976).  It
+is compared for the law as given, for second-order sections, each balanced, and for the balanced realisation,
+K = W = diag(sigma).
 
 In fixed point (Q31) a signal of range R is a whole number of steps R/2^31, a state one of its bound; each row of
 coefficients has one shift f, so that the sum of all products is below 2^63 and is rounded once:
@@ -10,7 +22,7 @@ Uncertain Systems, 1995).  Where the law itself is not stable, as with an integr
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple
@@ -19,7 +31,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from tfarm.arm import Law
-from tfarm.arm.blocks import Matrices, StateSpace
+from tfarm.arm.blocks import StateSpace
 from tfarm.arm.law import REFERENCE, Part
 from tfarm.arrays import Real
 from tfarm.dsp.discretise import with_estimate
@@ -27,12 +39,21 @@ from tfarm.dsp.sampled import Sampled
 from tfarm.errors import ParameterError, require
 from tfarm.schema import Quantity
 
-MOST_DOUBLINGS = 40  # of the samples that a sum has: 1e12 of them
-SUMMED = 1e-9  # of a sum of squares: its last terms
+DOUBLINGS = 40  # of the samples that a sum of squares has: 1e12 of them
 LEAST_SHARE = 1e-12  # of the largest singular value: below it a state is not controllable or not observable
 WORST_CONDITION = 1e8  # of the eigenvectors: beyond it poles are not separated
 NEXT_TO = 1.01  # times the least noise gain: for less a law keeps its states, and an integral its pole z = 1
 GIVEN, SECTIONS, BALANCED = "law as given", "second-order sections", "balanced state space"
+MOST_SUMMED, BLOCK = 20_000, 32  # samples of a sum without a bound on all others, and of one step
+DECAYED = 1e-3  # row sum of |M^n| from which all later samples are bounded
+ON_CIRCLE, UNSEEN = 1e-9, 1e-8  # of 1: modulus of a pole on the unit circle; share of one that no output shows
+FRACTION_BITS, MOST_SHIFT = 31, 62  # of a number in fixed point, and of a sum of products
+HALF_STEP = 2.0 ** -(FRACTION_BITS + 1)  # of the range of a number: its largest rounding
+HEADROOM, LEAST_SCALE = 1 + 2.0**-10, 2.0**-100  # of the range of a state: for roundings, and the least of all
+OF_OUTPUT = 4.0  # ranges of u that a state without a bound reaches before it saturates
+REFINED = 8  # steps to the bound of the errors
+FIXED, OUTPUT = "q31", "output"  # fixed point; the name of the controller's output among ranges
+FLOATS: dict[str, tuple[Any, float]] = {"double": (np.float64, 2.0**-53), "float": (np.float32, 2.0**-24)}  # roundoff
 
 
 class NoiseGain(NamedTuple):
@@ -58,14 +79,18 @@ class Around(NamedTuple):
     states: slice
 
 
-def with_matrices(law: Law, matrices: Matrices) -> Law:
-    """The law with another state space of all its columns, signals first, and the sign of v = -sum."""
-    return replace(law, parts=(Part((*law.signals, *law.wanted), StateSpace(*matrices)),), sign=-1)
+def system_matrix(law: Law) -> Real:
+    """[A B; C D] of a law of all its columns, signals first."""
+    A, B, C, D = law.matrices((*law.signals, *law.wanted))
+    return np.block([[A, B], [C, D]])
 
 
-def matrices_of(law: Law) -> Matrices:
-    """A, B, C, D of a law of all columns: u = r + C x + D e."""
-    return law.matrices((*law.signals, *law.wanted))
+def with_system_matrix(law: Law, S: Real) -> Law:
+    """The law with another state space of all its columns, and the sign of v = -sum."""
+    columns = (*law.signals, *law.wanted)
+    n = S.shape[1] - len(columns)
+    block = StateSpace(S[:n, :n], S[:n, n:], S[n:, :n], S[n:, n:])
+    return replace(law, parts=(Part(columns, block),), sign=-1)
 
 
 def around(law: Law, loop: Sampled) -> Around:
@@ -86,16 +111,13 @@ def around(law: Law, loop: Sampled) -> Around:
 
 def gramians(of: Around) -> tuple[Real, Real] | None:
     """K over the variance of u, and W, of the states of the law; None where their sums do not converge."""
-    M, K, W = of.matrix, of.of_signals @ of.of_signals.T, np.outer(of.output, of.output)
-    rows = of.states
-    with np.errstate(over="ignore", invalid="ignore"):
-        for _ in range(MOST_DOUBLINGS):
-            more, seen = M @ K @ M.T, M.T @ W @ M
-            K, W, M = K + more, W + seen, M @ M
-            left = [(abs(a[rows, rows]).max(), abs(b[rows, rows]).max()) for a, b in ((more, K), (seen, W))]
-            if all(last <= SUMMED * whole < np.inf for last, whole in left):
-                return K[rows, rows] / (of.output @ K @ of.output), W[rows, rows]
-    return None
+    M, own = observed(of.matrix, np.vstack([np.eye(len(of.matrix))[of.states], of.output])), of.states
+    K, W = of.of_signals @ of.of_signals.T, np.outer(of.output, of.output)
+    if abs(np.linalg.eigvals(M)).max() >= 1:
+        return None
+    for _ in range(DOUBLINGS):
+        K, W, M = K + M @ K @ M.T, W + M.T @ W @ M, M @ M
+    return K[own, own] / (of.output @ K @ of.output), W[own, own]
 
 
 def balancing(K: Real, W: Real) -> Real | None:
@@ -121,41 +143,27 @@ def sections(A: Real, K: Real, W: Real) -> Real | None:
     return modal @ block_diag(*known) if len(known) == len(own) else None
 
 
-def candidates(law: Law, loop: Sampled) -> list[tuple[NoiseGain, Matrices]]:
-    """The realisations of a law in z of one state space, each with its noise gain; the law as given comes first."""
-    A, B, C, D = matrices_of(law)
-    found = gramians(around(law, loop)) if law.order else None
+def candidates(law: Law, loop: Sampled) -> list[tuple[NoiseGain, Real]]:
+    """The realisations [A B; C D] of a law in z of one state space, that of the law as given first."""
+    S, n = system_matrix(law), law.order
+    found = gramians(around(law, loop)) if n else None
     if found is None:
-        return [(NoiseGain(GIVEN, None if law.order else 0.0), (A, B, C, D))]
+        return [(NoiseGain(GIVEN, None if n else 0.0), S)]
     K, W = found
-    changes = {GIVEN: np.eye(law.order), SECTIONS: sections(A, K, W), BALANCED: balancing(K, W)}
+    changes = {GIVEN: np.eye(n), SECTIONS: sections(S[:n, :n], K, W), BALANCED: balancing(K, W)}
     known = [(name, T, np.linalg.inv(T)) for name, T in changes.items() if T is not None]
     gains = [abs(float(np.diag(inverse @ K @ inverse.T) @ np.diag(T.T @ W @ T))) for _, T, inverse in known]
     return [
-        (NoiseGain(name, gain), (inverse @ A @ T, inverse @ B, C @ T, D))
+        (NoiseGain(name, gain), block_diag(inverse, np.eye(1)) @ S @ block_diag(T, np.eye(S.shape[1] - n)))
         for gain, (name, T, inverse) in zip(gains, known, strict=True)
     ]
 
 
 def least_noise(law: Law, loop: Sampled) -> tuple[Law, str, list[NoiseGain]]:
     """The law in the realisation of least noise, as given if that has hardly more; its name, and all noise gains."""
-    (given, own), *_ = found = candidates(law, loop)
-    best, matrices = min(found, key=lambda each: each[0].gain or 0.0)
-    if not NEXT_TO * (best.gain or 0.0) < (given.gain or 0.0):
-        best, matrices = given, own
-    return with_matrices(law, matrices), best.realisation, [gain for gain, _ in found]
-
-
-MOST_SUMMED, BLOCK = 20_000, 32  # samples of a sum without a bound on all others, and of one step
-DECAYED = 1e-3  # row sum of |M^n| from which all later samples are bounded
-ON_CIRCLE, UNSEEN = 1e-9, 1e-8  # of 1: modulus of a pole on the unit circle; share of one that no output shows
-FRACTION_BITS, MOST_SHIFT = 31, 62  # of a number in fixed point, and of a sum of products
-HALF_STEP = 2.0 ** -(FRACTION_BITS + 1)  # of the range of a number: its largest rounding
-HEADROOM, LEAST_SCALE = 1 + 2.0**-10, 2.0**-100  # of the range of a state: for roundings, and the least of all
-OF_OUTPUT = 4.0  # ranges of u that a state without a bound reaches before it saturates
-REFINED = 8  # steps to the bound of the errors
-FIXED, OUTPUT = "q31", "output"  # fixed point; the name of the controller's output among ranges
-FLOATS: dict[str, tuple[Any, float]] = {"double": (np.float64, 2.0**-53), "float": (np.float32, 2.0**-24)}  # roundoff
+    found = candidates(law, loop)
+    best, S = min(found, key=lambda each: (each[0].gain or 0.0) * (NEXT_TO if each[0].realisation != GIVEN else 1.0))
+    return with_system_matrix(law, S), best.realisation, [gain for gain, _ in found]
 
 
 def absolute_sum(M: Real, left: Real, right: Real) -> tuple[Real, bool]:
@@ -180,8 +188,7 @@ class Word:
     """A realised law in z of one state space, in the numbers of a target.
 
     `sizes` bounds e of each column; in fixed point `ranges` are the scales of e, that of each state is 1, and `output`
-    is that of u.  `tables` are A, B, C, D as exported, whole numbers in fixed point, and `shifts` those of each state
-    and of u.
+    is that of u.  `table` is [A B; C D] as exported, whole numbers in fixed point, and `shifts` those of its rows.
     """
 
     law: Law
@@ -189,17 +196,16 @@ class Word:
     sizes: Real
     ranges: Real
     output: float
-    tables: tuple[Any, ...]
+    table: Any
     shifts: Any = None
 
     @cached_property
     def rounded(self) -> Law:
         """The law with the coefficients as exported, in SI units."""
-        A, B, C, D = (np.asarray(each, dtype=float) for each in self.tables)
+        S, one = np.asarray(self.table, dtype=float), np.ones(self.law.order)
         if self.precision == FIXED:
-            up, last = np.ldexp(1.0, -self.shifts[:-1])[:, None], math.ldexp(self.output, -int(self.shifts[-1]))
-            A, B, C, D = A * up, B * up / self.ranges, C * last, D * last / self.ranges
-        return with_matrices(self.law, (A, B, C, D))
+            S = np.ldexp(S, -self.shifts[:, None]) * np.r_[one, self.output][:, None] / np.r_[one, self.ranges]
+        return with_system_matrix(self.law, S)
 
     @cached_property
     def errors(self) -> tuple[float, Real]:
@@ -214,23 +220,23 @@ class Word:
     def bounds(self) -> tuple[Real, bool, float]:
         """Bound on each state as exported, whether it is over all samples, and bound on the error of u.
 
-        The error d of the states obeys d' = A d + w, w = |dA| X + |dB| E + roundings; X includes d.  Where a state may
+        The error d of the states obeys d' = A d + w, w = |dS| [X; E] + roundings; X includes d.  Where a state may
         saturate, in fixed point, the error has no bound.
         """
-        (A, B, C, D), E, one = matrices_of(self.law), self.sizes, np.eye(self.law.order)
+        exact, rounded, n = system_matrix(self.law), system_matrix(self.rounded), self.law.order
         relative, absolute = self.errors
-        pairs = zip(matrices_of(self.rounded), (A, B, C, D), strict=True)
-        vA, vB, vC, vD = (abs(r - e) + relative * abs(r) for r, e in pairs)
-        X, is_whole = absolute_sum(A, one, B)
-        of_states, of_output = (absolute_sum(A, left, one)[0] for left in (one, C))
-        largest = first = X @ E
+        V, A = abs(rounded - exact) + relative * abs(rounded), exact[:n, :n]
+        X, is_whole = absolute_sum(A, np.eye(n), exact[:n, n:])
+        responses, _ = absolute_sum(A, np.vstack([np.eye(n), exact[n, :n]]), np.eye(n))
+        largest = first = X @ self.sizes
         with np.errstate(over="ignore", invalid="ignore"):  # of a law that grows
             for _ in range(REFINED):  # to the least fixed point
-                w = vA @ largest + vB @ E + absolute[:-1]
-                largest = first + of_states @ w
-            u = of_output @ w + vC @ largest + vD @ E + relative * self.output
+                w = V @ np.r_[largest, self.sizes] + absolute
+                of_roundings = responses @ w[:n]
+                largest = first + of_roundings[:n]
+            error = float(of_roundings[n] + w[n] + relative * self.output)
         may_saturate = self.precision == FIXED and max(largest, default=0.0) >= 1
-        return largest, is_whole, math.inf if may_saturate else float(u[0] + absolute[-1])
+        return largest, is_whole, math.inf if may_saturate else error
 
     def limit_cycle(self, loop: Sampled) -> float | None:
         """Bound on u in a limit cycle that roundings sustain in a loop at rest; None where none was found.
@@ -245,11 +251,10 @@ class Word:
         of, at = around(self.rounded, loop), [read.index(name) for name in signals]
         left = np.vstack([np.eye(len(of.matrix))[of.states], of.reads[at], of.output])
         S, is_whole = absolute_sum(observed(of.matrix, left), left, np.c_[of.of_rounding, of.of_signals[:, at]])
-        A, B, C, D = (abs(each) for each in matrices_of(self.rounded))
-        Q = np.block([[A, B[:, : len(at)]], [C, D[:, : len(at)]]])  # references are at rest
-        S[-1, n:] += np.r_[1.0, D[0, : len(at)]]  # u itself
+        Q = abs(system_matrix(self.rounded))[:, : n + len(at)]  # references are at rest
+        S[-1, n:] += np.r_[1.0, Q[n, n:]]  # u itself
         relative, absolute = self.errors
-        loops = relative * S[:, : n + 1] @ Q if is_whole else np.ones((1 + n + len(at), n + len(at)))
+        loops = relative * S[:, : n + 1] @ Q if is_whole else np.ones((len(left), n + len(at)))
         if max(abs(np.linalg.eigvals(loops[:-1])), default=0.0) >= 1:
             return None
         rest = S @ np.r_[absolute, HALF_STEP * self.ranges[: len(at)] * (self.precision == FIXED)]
@@ -278,36 +283,37 @@ def word_of(law: Law, precision: str, ranges: Mapping[str, float], output: float
     E = R * np.array([2.0 if name in law.references else 1.0 for name in (*law.signals, *law.wanted)])
     if precision == FIXED:
         return _fixed(law, E, R, float(output or 1.0))
-    kind, tables = FLOATS[precision][0], matrices_of(law)
+    kind, S = FLOATS[precision][0], system_matrix(law)
     with np.errstate(over="ignore"):
-        found = tuple(each.astype(kind) for each in tables)
-    for key, table, own in zip("ABCD", tables, found, strict=True):
-        is_beyond = ~np.isfinite(own) | ((own == 0) & (table != 0))
-        _check(key, table, is_beyond, f"beyond the numbers of {np.dtype(kind).name}")
-    return Word(law, precision, E, R, output or 1.0, found)
+        own = S.astype(kind)
+    _check(S, ~np.isfinite(own) | ((own == 0) & (S != 0)), np.dtype(kind).name)
+    return Word(law, precision, E, R, output or 1.0, own)
 
 
-def _check(key: str, table: Real, is_beyond: Any, problem: str) -> None:
-    """Raise ParameterError for the first coefficient of a table that the target does not have."""
+def _check(S: Real, is_beyond: Any, kind: str) -> None:
+    """Raise ParameterError for the first coefficient that the target does not have."""
     for place in np.argwhere(is_beyond).tolist():
-        name = f"{key}[{', '.join(map(str, place))}]"
-        raise ParameterError(key=name, value=float(table[tuple(place)]), remedy=f"this coefficient is {problem}")
+        remedy = f"this coefficient is beyond the numbers of {kind}"
+        raise ParameterError(key=coefficient(place), value=float(S[tuple(place)]), remedy=remedy)
+
+
+def coefficient(place: Sequence[int]) -> str:
+    """The name of a coefficient, in its table in the source in C."""
+    return f"ABCD[{place[0]}][{place[1]}]"
 
 
 def _fixed(law: Law, E: Real, R: Real, U: float) -> Word:
     """A law in fixed point: the states scaled by powers of 2 beyond their bounds, or where there is none by u."""
-    (A, B, C, D), n = matrices_of(law), law.order
-    X, is_whole = absolute_sum(A, np.eye(n), B)
-    of_output = np.divide(OF_OUTPUT * U, abs(C[0]), out=np.full(n, np.inf), where=C[0] != 0)
+    S, n, one = system_matrix(law), law.order, np.ones(law.order)
+    X, is_whole = absolute_sum(S[:n, :n], np.eye(n), S[:n, n:])
+    of_output = np.divide(OF_OUTPUT * U, abs(S[n, :n]), out=np.full(n, np.inf), where=S[n, :n] != 0)
     size = np.maximum(X @ E if is_whole else np.minimum(X @ E, of_output), LEAST_SCALE)
     scale = np.exp2(np.ceil(np.log2(HEADROOM * size)))
-    scaled = with_matrices(law, (A * scale / scale[:, None], B / scale[:, None], C * scale, D))
-    A, B, C, D = matrices_of(scaled)
-    table = np.block([[A, B * R], [C / U, D * R / U]])
-    sums = abs(table) @ np.r_[np.ones(n), E / R] + np.r_[np.zeros(n), 1.0]  # of u with the feedforward
+    scaled = with_system_matrix(law, S * np.r_[scale, np.ones(R.size)] / np.r_[scale, 1.0][:, None])
+    table = system_matrix(scaled) * np.r_[one, R] / np.r_[one, U][:, None]
+    sums = abs(table) @ np.r_[one, E / R] + np.r_[np.zeros(n), 1.0]  # of u with the feedforward
     most = 2.0**FRACTION_BITS - len(table) - R.size
     shifts = np.minimum(np.floor(np.log2(most / np.maximum(sums, LEAST_SCALE))).astype(int), MOST_SHIFT)
     is_largest = abs(table) == abs(table).max(axis=1)[:, None]
-    _check("[A B; C D]", table, is_largest & (shifts < 1)[:, None], "beyond the numbers of q31 at these ranges")
-    whole = np.rint(np.ldexp(table, shifts[:, None])).astype(np.int64)
-    return Word(scaled, FIXED, E, R, U, (whole[:n, :n], whole[:n, n:], whole[n:, :n], whole[n:, n:]), shifts)
+    _check(table, is_largest & (shifts < 1)[:, None], "q31 at these ranges")
+    return Word(scaled, FIXED, E, R, U, np.rint(np.ldexp(table, shifts[:, None])).astype(np.int64), shifts)

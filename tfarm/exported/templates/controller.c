@@ -1,16 +1,15 @@
 /* {{ facts[0][1]|comment }}: see controller.h */
 #include "controller.h"
 
-{% for key, rows in (("A", A), ("B", B), ("C", C), ("D", D)) if rows and rows[0] %}
-static const {{ real }} {{ key }}[{{ rows|length }}][{{ rows[0]|length }}] = {
-{% for row in rows %}
+static const {{ real }} ABCD[{{ n + 1 }}][{{ n + m }}] = { /* of [x; e], to the next x, and to the output */
+{% for row in table %}
     { {{- row|join(", ") -}} },
 {% endfor %}
 };
-{% endfor %}
 
 {% if fixed %}
-{{ "static const int shifts[%d] = {%s};\n\n"|format(n, shifts[:-1]|join(", ")) if n -}}
+static const int shifts[{{ n + 1 }}] = { {{- shifts|join(", ") -}} };
+
 static int64_t shifted(int64_t value, int shift) /* value/2^shift to the nearest, halves upwards */
 {
     const uint64_t top = UINT64_C(1) << 63, half = UINT64_C(1) << (shift - 1);
@@ -50,9 +49,8 @@ void {{ name }}_init({{ name }}_state *state)
 
 int {{ name }}_step({{ name }}_state *state, const {{ name }}_input *input, {{ name }}_number *output)
 {
-    int {{ "i, j" if n or delay > 1 else "j" }};
-    {{ wide }} e[{{ m }}], u{{ ", total" if n }};
-{{ "    %s_number following[%d];\n"|format(name, n) if n -}}
+    int i, j;
+    {{ wide }} z[{{ n + m }}], next[{{ n + 1 }}], total, u;
 {{ "    double rate;\n" if hub }}
 {% if not fixed %}
     *output = state->output;
@@ -63,40 +61,27 @@ int {{ name }}_step({{ name }}_state *state, const {{ name }}_input *input, {{ n
     rate = state->begun ? (double)input->{{ hub[0] }} - state->angle : 0.0;
     rate = {{ hub[1] }} * state->rate + (1.0 - {{ hub[1] }}) * rate / {{ hub[2] }};
 {% endif %}
+{{ "    for (j = 0; j < %d; j++)\n        z[j] = state->x[j];\n"|format(n) if n -}}
 {% for each in errors %}
-    e[{{ loop.index0 }}] = {{ each }};
+    z[{{ n + loop.index0 }}] = {{ each }};
 {% endfor %}
-    u = input->feedforward{{ " * (INT64_C(1) << %d)"|format(shifts[-1]) if fixed }};
-{% for key, vector, size in (("C", "state->x", n), ("D", "e", m)) if size %}
-    for (j = 0; j < {{ size }}; j++)
-        u += {{ cast }}{{ key }}[0][j] * {{ vector }}[j];
-{% endfor %}
-{% if n %}
-    for (i = 0; i < {{ n }}; i++) {
-        total = 0;
-{% for key, vector, size in (("A", "state->x", n), ("B", "e", m)) %}
-        for (j = 0; j < {{ size }}; j++)
-            total += {{ cast }}{{ key }}[i][j] * {{ vector }}[j];
-{% endfor %}
+    for (i = 0; i < {{ n + 1 }}; i++) {
+        total = i < {{ n }} ? 0 : input->feedforward{{ " * (INT64_C(1) << %d)"|format(shifts[-1]) if fixed }};
+        for (j = 0; j < {{ n + m }}; j++)
+            total += {{ cast }}ABCD[i][j] * z[j];
 {% if fixed %}
-        following[i] = clipped(shifted(total, shifts[i]), INT32_MIN, INT32_MAX);
+        next[i] = shifted(total, shifts[i]);
 {% else %}
         if (!is_finite(total))
             return {{ name }}_OVERFLOW;
-        following[i] = total;
+        next[i] = total;
 {% endif %}
     }
-{% endif %}
-{% if fixed %}
-    u = shifted(u, {{ shifts[-1] }});
-{{ "    u = shifted(u, %s) * (INT64_C(1) << %s);\n"|format(dac[0], dac[0]) if step -}}
-{% else %}
-    if (!is_finite(u))
-        return {{ name }}_OVERFLOW;
-{% endif %}
+    u = next[{{ n }}];
+{{ "    u = shifted(u, %s) * (INT64_C(1) << %s);\n"|format(dac[0], dac[0]) if fixed and step -}}
 {% if n %}
     for (i = 0; i < {{ n }}; i++)
-        state->x[i] = following[i];
+        state->x[i] = {{ "clipped(next[i], INT32_MIN, INT32_MAX)" if fixed else "next[i]" }};
 {% endif %}
 {% if hub %}
     state->angle = (double)input->{{ hub[0] }};
