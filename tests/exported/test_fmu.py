@@ -14,7 +14,7 @@ import pytest
 import tfarm
 from tests.exported.cases import CASES, GAINS, IDEAL, LAB, REAL, hinf
 from tests.exported.compilers import COMPILERS, STRICT, needed, run
-from tests.exported.units import DISCARD, DRIVER, ERROR, LAST_SUCCESSFUL_TIME, TERMINATED, Unit
+from tests.exported.units import DISCARD, DRIVER, ERROR, LAST_SUCCESSFUL_TIME, TERMINATED, Unit, modes_of_units
 from tests.hostile import C_TEXTS, NAME
 from tests.odd_arms import odd_arms
 from tests.shared import thinned
@@ -25,7 +25,7 @@ from tfarm.dsp import Simulator, scenario
 from tfarm.dsp.results import simulated_run
 from tfarm.exported import fmu as module
 
-QUICK = ("integral", "late", "single", "decay", "impulse", "pulse")
+QUICK = ("integral", "late", "single", "impulse", "pulse")
 MODES = 4
 EQUAL = 1e-12  # of the largest value of a signal: roundings in another order
 LATE = replace(REAL, sampling=replace(REAL.sampling, delay_samples=1.3, antialias_corner=400.0))
@@ -48,7 +48,6 @@ LOOPS = {
     "reference": (LAB, SERVO, IDEAL, "slew"),
     "unstable": (LAB, tfarm.HubFeedback(K1=-3.0), IDEAL, "slew"),
     "pulse": (BAR, tfarm.HubFeedback(K1=1.0), IDEAL, "pulse"),
-    "decay": (LAB, GAINS, LATE, "decay"),
     "impulse": (LAB, STATES, LATE, "impulse"),
 }
 
@@ -63,10 +62,10 @@ def made(what, case="gains", **how):
     needed("cc")
     key = repr((what, case, how))
     if key not in EXPORTED:
-        arm, law, chain, _ = LOOPS[case]
-        folder, modes = Path(FOLDER.name) / f"unit{len(EXPORTED)}", {} if what == "controller" else {"modes": MODES}
-        options = modes | {"anyway": True} | how
-        EXPORTED[key] = folder, tfarm.export(arm, law, what=what, form="fmu", folder=folder, chain=chain, **options)
+        (arm, law, chain, _), folder = LOOPS[case], Path(FOLDER.name) / f"unit{len(EXPORTED)}"
+        options = {"anyway": True} | how
+        with modes_of_units(MODES):
+            EXPORTED[key] = folder, tfarm.export(arm, law, what=what, form="fmu", folder=folder, chain=chain, **options)
     folder, found = EXPORTED[key]
     return Unit(folder / f"{what}.fmu", folder / "unpacked"), found
 
@@ -95,12 +94,11 @@ def assert_equal(found, truth, name=""):
 @pytest.mark.parametrize("case", [*QUICK, *(pytest.param(case, marks=pytest.mark.survey) for case in OTHERS)])
 def test_a_loop_is_that_of_the_simulation(case):
     arm, law, chain, name = LOOPS[case]
-    outputs = ("strain@0.05", "tip_rotation") if arm is BAR else ()
-    unit, exported = made("loop", case, **{"outputs": outputs} if outputs else {})
-    truth = simulated_run(arm, law, chain, name, 1.5, count=MODES, outputs=outputs).simulation
+    unit, exported = made("loop", case)
+    truth = simulated_run(arm, law, chain, name, 1.5, count=MODES).simulation
     task, n = truth.scenario, truth.t.size
     assert truth.stopped is None
-    unit.start(impulse=task.impulse, tip_offset=task.tip_offset)
+    unit.start(impulse=task.impulse)
     found = driven(unit, inputs_of(task), n)
     for signal in truth.at_samples.names:
         assert_equal(found[signal][:n], truth.at_samples.signal(signal), signal)
@@ -201,7 +199,7 @@ def test_two_instances_and_a_reset_do_not_share_a_state():
     inputs = {"feedforward": np.ones(30)}
     one.start()
     truth = driven(one, inputs, 30)
-    two.start(tip_offset=0.1)
+    two.start(impulse=0.1)
     driven(two, inputs, 30)
     for unit in (one, two):
         unit.call("Terminate")
@@ -341,25 +339,25 @@ def test_the_description_is_consistent(what):
 
 
 def test_declared_dependencies_are_true():
-    """At the start outputs change with the tip offset alone, and at a communication point with no input."""
+    """At the start, and at a communication point, outputs change with no input and no parameter."""
     unit, _ = made("loop", "states")
-    (offset,) = {each.get("dependencies") for each in unit.xml.iterfind("ModelStructure/InitialUnknowns/Unknown")}
-    assert list(unit.at)[int(offset) - 1] == "tip_offset"
+    assert {each.get("dependencies") for each in unit.xml.iterfind("ModelStructure/*/Unknown")} == {""}
     outputs = [name for name, of in unit.causality.items() if of == "output"]
-    others = {name: 0.3 for name, of in unit.causality.items() if of != "output" and name != "tip_offset"}
-    unit.set(others)
+    given = {name: 0.3 for name, of in unit.causality.items() if of != "output"}
+    unit.set(given)
     assert unit.get(outputs) == [0.0] * len(outputs)
-    unit.set({"tip_offset": 0.01})
-    at_start = dict(zip(outputs, unit.get(outputs), strict=True))
-    assert at_start["tip_displacement"] == pytest.approx(0.01, rel=1e-9)
-    unit.start(tip_offset=0.01)
-    unit.set(others | {"feedforward": 9.0} if "impulse" not in others else {"feedforward": 9.0})
-    assert dict(zip(outputs, unit.get(outputs), strict=True)) == at_start
+    unit.start(impulse=0.3)
+    unit.step()
+    seen = unit.get(outputs)
+    unit.set({name: 0.7 for name in given if name != "impulse"})
+    assert unit.get(outputs) == seen
+    assert any(seen)
 
 
 def test_equal_inputs_have_equal_bytes(tmp_path):
     for folder in ("one", "two"):
-        tfarm.export(LAB, GAINS, what="loop", form="fmu", folder=tmp_path / folder, modes=MODES)
+        with modes_of_units(MODES):
+            tfarm.export(LAB, GAINS, what="loop", form="fmu", folder=tmp_path / folder)
     one, two = (zipfile.ZipFile(tmp_path / folder / "loop.fmu") for folder in ("one", "two"))
     assert [(each.filename, each.date_time) for each in one.infolist()] == [
         (each.filename, (1980, 1, 1, 0, 0, 0)) for each in two.infolist()
@@ -376,7 +374,8 @@ def test_names_of_a_user_reach_c_and_xml_as_text(tmp_path, text, monkeypatch):
         arm = replace(LAB, name=text)
     except ParameterError:
         arm = LAB
-    found = tfarm.export(arm, GAINS, what="plant", form="fmu", folder=tmp_path, name=text, modes=1)
+    with modes_of_units(1):
+        found = tfarm.export(arm, GAINS, what="plant", form="fmu", folder=tmp_path, name=text)
     with zipfile.ZipFile(tmp_path / "plant.fmu") as archive:
         assert archive.namelist() == ["modelDescription.xml", "sources/fmi2.h", "sources/fmu.c"]
         source, xml = archive.read("sources/fmu.c"), ElementTree.fromstring(archive.read("modelDescription.xml"))
@@ -401,10 +400,8 @@ def test_names_of_a_user_reach_c_and_xml_as_text(tmp_path, text, monkeypatch):
 @pytest.mark.parametrize(
     ("options", "error"),
     [
-        (("--what", "controller", "--modes", "5"), "modes = 5: only a plant or a loop as fmu has outputs and modes"),
         (("--what", "loop", "--precision", "q31"), "precision = 'q31': a functional mock-up unit has a controller in"),
         (("--what", "loop", "--K1", "-3"), "the sampled loop is not certified stable: unstable ("),
-        (("--what", "plant", "--output", "no_such"), "output = 'no_such': "),
         (("--what", "tuner"), "as = 'fmu': a tuner is exported as: c"),
     ],
 )  # fmt: skip
@@ -416,7 +413,8 @@ def test_a_refused_export_leaves_nothing_behind(capsys, tmp_path, options, error
 
 def test_without_a_compiler_there_is_the_source(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "COMPILERS", ("no-such-compiler",))
-    found = tfarm.export(LAB, GAINS, what="plant", form="fmu", folder=tmp_path, modes=1)
+    with modes_of_units(1):
+        found = tfarm.export(LAB, GAINS, what="plant", form="fmu", folder=tmp_path)
     assert found.details.binary == "none: no compiler found (no-such-compiler)"
     assert sorted(zipfile.ZipFile(tmp_path / "plant.fmu").namelist()) == [
         "modelDescription.xml", "sources/fmi2.h", "sources/fmu.c",
@@ -429,10 +427,12 @@ def test_a_compiler_that_fails_or_hangs_is_named(tmp_path, monkeypatch):
     broken.chmod(0o755)
     monkeypatch.setattr(module, "COMPILERS", (str(broken),))
     monkeypatch.setattr(module, "LONGEST_COMPILATION", 0.2)
-    found = tfarm.export(LAB, GAINS, what="plant", form="fmu", folder=tmp_path, modes=1)
+    with modes_of_units(1):
+        found = tfarm.export(LAB, GAINS, what="plant", form="fmu", folder=tmp_path)
     assert re.fullmatch(r"none: .*timed out after 0\.2 seconds", found.details.binary)
     broken.write_text("#!/bin/sh\nexit 3\n", encoding="ascii")
-    found = tfarm.export(LAB, GAINS, what="plant", form="fmu", folder=tmp_path, modes=1)
+    with modes_of_units(1):
+        found = tfarm.export(LAB, GAINS, what="plant", form="fmu", folder=tmp_path)
     assert re.fullmatch(r"none: .*exit status 3\.", found.details.binary)
 
 

@@ -104,7 +104,7 @@ def test_a_controller_is_read_again_as_a_law(folder):
     assert inner == law
 
 
-def test_octave_without_control_checks_the_matrices(folder):
+def test_octave_has_the_loop_of_the_simulation(folder):
     """A slew of the loop by its matrices in Octave is the simulated one; the reduced model is within its error."""
     task = scenario("slew", LAB, Chain(), 0.5)
     drive = np.array([task.feedforward, *task.references.values()])
@@ -125,7 +125,7 @@ def test_octave_without_control_checks_the_matrices(folder):
     error = abs(left["G"] - exact) / (abs(exact) + slope)
     assert error.max() < float(data["reduced"]["worst_error"]) + 1e-10  # rounding of the solution of order 42
     assert w.size == 20
-    assert printed.count("matrices are checked") in (0, 5)  # 0 where the package is installed
+    assert printed.count("no ss and frd are built") in (0, 5)  # 0 where the package is installed
 
 
 def test_octave_builds_each_system_with_its_names(folder, tmp_path):
@@ -135,20 +135,11 @@ def test_octave_builds_each_system_with_its_names(folder, tmp_path):
         (tmp_path / f"{name}.m").write_text(text)
     left, printed = left_by_octave(tmp_path, "load_loop; load_my_arm")
     assert {"loop", "controller", "plant", "reduced", "sys", "exact"} <= set(left)
-    assert not {"here", "this_system", "value_of_system", "is_as_written"} & set(left)
-    assert "checked" not in printed
+    assert not {"here", "this_system"} & set(left)
+    assert "no ss" not in printed
     inputs, outputs, states, name = left["plant"]["names"].item()
     assert (inputs, outputs[0], states[0], name) == ("hub_torque", "hub_angle", "plant1", "sasaki2012-lab, sampled")
     assert float(left["plant"]["T"]) == 0.01
-
-
-def test_octave_refuses_matrices_that_were_changed(folder, tmp_path):
-    data = {name: value for name, value in scipy.io.loadmat(folder / "loop.mat").items() if not name.startswith("__")}
-    data["plant"]["A"][0, 0][0, 0] *= 1 + 1e-6
-    scipy.io.savemat(tmp_path / "loop.mat", data)
-    shutil.copy(folder / "load_loop.m", tmp_path)
-    left, _ = left_by_octave(tmp_path, "found = ''; try, load_loop; catch found, found = found.message; end")
-    assert left["found"] == "plant: the matrices differ from their transfer functions in the file"
 
 
 def test_hostile_names_stay_text(tmp_path):

@@ -52,6 +52,12 @@ def built(system):
     return control.StateSpace(*system.matrices, system.period, inputs=inputs, outputs=outputs, states=states)
 
 
+def value(system, z):
+    """The transfer functions of a system at z."""
+    A, B, C, D = system.matrices
+    return C @ np.linalg.solve(z * np.eye(len(A)) - A, B.astype(complex)) + D
+
+
 @EVERY
 def test_the_loop_has_the_matrix_of_the_analysis(law, chain):
     loop, mine = sampled_loop(LAB, law, chain), systems(law, chain)[2].matrices[0]
@@ -69,7 +75,7 @@ def test_the_loop_is_the_interconnection_of_plant_and_controller(law, chain):
         inputs=[each.replace(".", "_") for each in loop.inputs], outputs=[*P.output_labels, plant.inputs[0]],
     )  # fmt: skip
     for z in np.exp(1j * np.array([0.03, 0.4, 2.0])) * 1.01:
-        mine = loop(z)
+        mine = value(loop, z)
         assert whole(z) == pytest.approx(mine, rel=1e-8, abs=1e-9 * abs(mine).max())  # poles 0.01 away
 
 
@@ -102,7 +108,7 @@ def test_the_controller_has_the_values_of_the_law(law):
     assert set(controller.inputs) == set(expected)
     for n, at in enumerate(z):
         theirs = [expected[name][n] for name in controller.inputs]
-        assert controller(at)[0] == pytest.approx(np.array(theirs), rel=1e-10)
+        assert value(controller, at)[0] == pytest.approx(np.array(theirs), rel=1e-10)
 
 
 @pytest.mark.parametrize("delay", [0.0, 1.25])
@@ -113,7 +119,7 @@ def test_the_plant_has_the_aliased_exact_response(delay):
     rows = [plant.outputs.index(name) for name in ("hub_angle", "tip_displacement")]
     for z in np.exp(1j * np.array([0.1, 0.5, 1.5])):
         theirs = aliased(exact, z, T, delay, 2000)
-        assert plant(z)[rows, 0] == pytest.approx(theirs, rel=1e-5)
+        assert value(plant, z)[rows, 0] == pytest.approx(theirs, rel=1e-5)
 
 
 def test_the_sampled_plant_has_the_poles_of_the_reduced_models():

@@ -16,7 +16,7 @@ import numpy as np
 import tfarm
 from tests import survey
 from tests.exported.laws import some_law
-from tests.exported.units import OK, Unit
+from tests.exported.units import OK, Unit, modes_of_units
 from tests.strategies import some_arm
 from tests.survey import Finding, each_of
 from tfarm.arm import tracked
@@ -54,8 +54,8 @@ def loops(rng):
     try:
         arm = some_arm(rng)
         law, chain = replace(some_law(rng), delay=0.0), some_chain(rng, arm)
-        with tempfile.TemporaryDirectory() as place:
-            tfarm.export(arm, law, what="loop", form="fmu", folder=place, chain=chain, modes=3, anyway=True)
+        with tempfile.TemporaryDirectory() as place, modes_of_units(3):
+            tfarm.export(arm, law, what="loop", form="fmu", folder=place, chain=chain, anyway=True)
             unit = Unit(Path(place) / "loop.fmu", Path(place) / "unpacked")
         task = scenario("slew", arm, chain, SAMPLES * chain.sampling.period)
         task = replace(task, disturbance=0.1 * abs(task.feedforward).max() * rng.normal(size=task.t.size))

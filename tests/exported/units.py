@@ -2,10 +2,15 @@
 
 import ctypes
 import zipfile
+from contextlib import contextmanager
 from copy import copy
 from ctypes import CFUNCTYPE, Structure, byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
+from types import SimpleNamespace
+from unittest import mock
 from xml.etree import ElementTree
+
+from tfarm.exported import fmu
 
 LOGGER = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 OK, WARNING, DISCARD, ERROR = range(4)
@@ -61,6 +66,13 @@ int main(void) {
     return 0;
 }
 """
+
+
+@contextmanager
+def modes_of_units(count):
+    """Units of so many flexible modes, instead of those that the simulation of a slew takes seconds to choose."""
+    with mock.patch.object(fmu, "simulated", return_value=(None, SimpleNamespace(modes=count))):
+        yield
 
 
 class Callbacks(Structure):

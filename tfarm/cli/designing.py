@@ -101,8 +101,6 @@ def export(
     ] = None,
     name: str = "",
     anyway: Annotated[bool, typer.Option("--anyway")] = False,
-    output: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
-    modes: Annotated[int | None, typer.Option("--modes", min=1, max=30)] = None,
     theory: TheoryName = None,
     json: Json = False,
     *,
@@ -118,15 +116,13 @@ def export(
     ranges: largest absolute value of an input in fixed point, in SI units; may be repeated
     name: beginning of the identifiers in C
     anyway: also where the loop is not certified stable
-    output: further output of the plant in a functional mock-up unit, as strain@0.05; may be repeated
-    modes: flexible modes of that plant
     """
     subject = load_arm(arm, theory)
     controller, defaults = load_law(subject, arm, gains, law)
     found = tfarm.export(
         subject, controller, what=cast("Any", what), form=cast("Any", form), folder=out, chain=chain(arm), tuned=tuned,
         precision=cast("Any", precision), ranges={signal: size for signal, (size,) in ranges or []}, name=name,
-        anyway=anyway, outputs=output or (), modes=modes,
+        anyway=anyway,
     )  # fmt: skip
     emit(found, json, defaults, also=[out / each for each in found.files])
 

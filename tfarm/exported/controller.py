@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -121,15 +122,16 @@ class Controller:
     def run(self, inputs: NDArray[Any]) -> tuple[NDArray[Any], Whole]:
         """Outputs and status (n,) of inputs (n, k), those of the C code bit for bit; whole numbers in fixed point."""
         word, kind = self.word, np.int64 if self.word.precision == FIXED else np.float64
-        outputs, status, line = np.zeros(len(inputs), kind), np.zeros(len(inputs), int), np.zeros(self.delay, kind)
+        outputs, status = np.zeros(len(inputs), kind), np.zeros(len(inputs), int)
         table, inputs = (np.ascontiguousarray(each, dtype=kind) for each in (word.table, inputs))
         if word.precision == FIXED:
-            twin.run_fixed(table, word.shifts, self.plan, inputs, self.whole_dac, line, outputs)
+            twin.run_fixed(table, word.shifts, self.plan, inputs, self.whole_dac, outputs)
         else:
             hub = np.array([self.signals.index(ANGLE), *self.hub] if self.hub else [-1.0, 0.0, 1.0])
             is_single = word.precision == "float"
-            twin.run_real(table, self.plan, inputs, self.dac, hub, line, is_single, outputs, status)
-        return outputs, status
+            twin.run_real(table, self.plan, inputs, self.dac, hub, is_single, outputs, status)
+        is_good = status == 0  # a refused sample moves no delay line: the output is held
+        return np.r_[np.zeros(1 + self.delay, kind), outputs[is_good]][np.cumsum(is_good)], status
 
 
 def c_controller(task: ExportTask) -> Export:
@@ -259,10 +261,9 @@ def recorded(
     run: Callable[[NDArray[Any]], tuple[NDArray[Any], Whole]], ports: Sequence[Port], precision: str
 ) -> dict[str, Any]:
     """Values of the template of a self-test, whose inputs are those of a linear congruential generator."""
-    numbers, suffix = [SEED], REAL[precision][1]
-    for _ in range(RECORDED * len(ports)):
-        numbers.append((1664525 * numbers[-1] + 1013904223) % 2**32)
-    inputs: NDArray[Any] = np.array(numbers[1:], dtype=np.int64).reshape(RECORDED, -1)
+    suffix, places = REAL[precision][1], range(RECORDED * len(ports))
+    _, *numbers = accumulate(places, lambda last, _: (1664525 * last + 1013904223) % 2**32, initial=SEED)
+    inputs: NDArray[Any] = np.array(numbers, dtype=np.int64).reshape(RECORDED, -1)
     if precision == FIXED:
         inputs = inputs - 2**31
     else:

@@ -12,13 +12,10 @@ import subprocess
 import sys
 import tempfile
 import zipfile
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated, Any, NamedTuple
 from xml.etree.ElementTree import Element, indent, tostring
 
@@ -31,7 +28,6 @@ from tfarm.dsp import Simulator, scenario
 from tfarm.dsp.plant import MODES_USED, RECORDED
 from tfarm.dsp.results import simulated
 from tfarm.dsp.scenarios import TRIAL_DURATION
-from tfarm.dsp.simulate import first_mode
 from tfarm.errors import ParameterError, one_line, require
 from tfarm.exact.outputs import signal_words
 from tfarm.exported.controller import FEEDFORWARD, controller_of, in_z, source_files
@@ -50,7 +46,7 @@ ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # of every file: same inputs, same bytes
 LARGEST = sys.float_info.max  # of a range without limit
 LONGEST_TEXT, LONGEST_GUID = 400, 32  # characters
 ERRORS = "logStatusError"  # category of messages
-MEASURED, TIP_OFFSET = "measured:", "tip_offset"
+MEASURED = "measured:"
 AT, STATE, KIND, SELF = ("const fmi2ValueReference *", "size_t"), "fmi2FMUstate", "fmi2StatusKind", "((model *)c)"
 ABSENT, ELSE_DISCARD = "report(c, fmi2Error, __func__)", "? fmi2OK : fmi2Discard"
 FUNCTIONS: tuple[tuple[str, tuple[str, ...], str], ...] = (  # of FMI in one statement: name, types of arguments, status
@@ -99,26 +95,12 @@ class Unit:
 
 
 class LawCode(NamedTuple):
-    """Lines of C that declare, start and run a controller, its files, and the stability of its loop; empty without."""
+    """The controller of a unit: its identifier and inputs in C, its files, and the stability of its loop."""
 
-    include: str = ""
-    state: str = ""
-    init: str = ""
-    step: str = ""
-    files: Mapping[str, bytes] = MappingProxyType({})
-    verdict: str = ""
-
-
-class Header(NamedTuple):
-    """The facts of a unit in its description and its source."""
-
-    has_plant: bool
-    variables: Sequence[Variable]
     identifier: str
-    period: str
-    about: str
-    sha256: str
-    guid: str
+    inputs: Sequence[str]
+    files: Mapping[str, bytes]
+    verdict: str
 
 
 def fmu(task: ExportTask) -> Export:
@@ -127,22 +109,22 @@ def fmu(task: ExportTask) -> Export:
     Raises ParameterError for a loop that is not certified stable, a controller in fixed point, and as `Simulator` does.
     """
     prepared, has_plant, name = prepared_simulator(task), task.what != "controller", task.name or task.what
-    variables = variables_of(task.what, prepared)
-    law = LawCode() if task.what == "plant" else law_code(task, prepared.law, variables)
-    period, modes = repr(float(task.chain.sampling.period)), prepared.plant.count if has_plant else None
-    about = f"{task.what} of {task.arm.name}, sampled every {period} s{law.verdict and f': {law.verdict}'}"
+    variables, own = variables_of(task.what, prepared), identifiers([name], "fmu_")
+    law = None if task.what == "plant" else law_code(task, prepared.law, variables)
+    verdict, period = law.verdict if law else "", repr(float(task.chain.sampling.period))
+    about = f"{task.what} of {task.arm.name}, sampled every {period} s{verdict and f': {verdict}'}"
+    modes = prepared.plant.count if has_plant else None
     guid = hashlib.sha256(repr((task.sha256, name, about, modes, variables, version("tfarm"))).encode()).hexdigest()
-    own = identifiers([name], "fmu_")
-    header = Header(has_plant, variables, own[name], period, about, task.sha256, guid[:LONGEST_GUID])
-    numbers, count = plant_code(prepared), Counter(each.causality for each in variables)
-    source = render("fmu.c", law=law, functions=FUNCTIONS, errors=ERRORS, count=count, **header._asdict(), **numbers)
-    sources = {"fmi2.h": render("fmi2.h"), "fmu.c": source, **law.files}
+    head: dict[str, Any] = {"variables": variables, "has_plant": has_plant, "period": period, "about": about}
+    head["guid"], numbers = guid[:LONGEST_GUID], plant_code(prepared)
+    source = render("fmu.c", law=law, functions=FUNCTIONS, errors=ERRORS, sha256=task.sha256, **head, **numbers)
+    sources = {"fmi2.h": render("fmi2.h"), "fmu.c": source, **(law.files if law else {})}
     binary, compiler = binary_of(sources, own[name])
     files = {f"sources/{name}": content for name, content in sources.items()} | binary
-    files["modelDescription.xml"] = model_description(header, sources)
+    files["modelDescription.xml"] = model_description(sources, own[name], **head)
     return Export(
         what=task.what, form=task.form, contents={f"{task.what}.fmu": archive_of(files)}, names=names_of(own),
-        verdict=law.verdict, details=Unit(variables, modes, compiler), sha256=task.sha256,
+        verdict=verdict, details=Unit(variables, modes, compiler), sha256=task.sha256,
     )  # fmt: skip
 
 
@@ -161,20 +143,14 @@ def law_code(task: ExportTask, law: Law, variables: Sequence[Variable]) -> LawCo
     found = task.analysis(rounded)
     files, (first, *_) = source_files(task, controller, [*task.facts(rounded, found).items()])
     inputs, outputs = ([each.name for each in variables if each.causality == of] for of in ("input", "output"))
-    place = {name: f"m->at.out[{n}]" for n, name in enumerate(outputs)}
-    place |= {name: f"m->at.in[{n}]" for n, name in enumerate(inputs)}
-    own, fields = first.identifier, [f"{MEASURED}{each}" for each in controller.signals]
-    fields += [*(f"{REFERENCE}{each}" for each in controller.references), FEEDFORWARD]
-    read = ", ".join(f"({own}_number){place[each]}" for each in fields)
+    place = {name: f"out[{n}]" for n, name in enumerate(outputs)} | {name: f"in[{n}]" for n, name in enumerate(inputs)}
+    signals, wanted = controller.signals, controller.references
+    fields = [*(f"{MEASURED}{each}" for each in signals), *(f"{REFERENCE}{each}" for each in wanted), FEEDFORWARD]
     return LawCode(
-        include='\n#include "controller.h"',
-        state=f"{own}_state law;",
-        init=f"{own}_init(&m->law);",
-        step=f"const {own}_input input = {{ {read} }};\n    {own}_number output;\n"
-        f"    if ({own}_step(&m->law, &input, &output))\n        return 0;\n    u = output;",
-        files={each: files[each] for each in ("controller.h", "controller.c")},
-        verdict=found.verdict.sentence if is_certified(found) else f"{ANYWAY}: {found.verdict.sentence}",
-    )
+        first.identifier, [place[each] for each in fields],
+        {each: files[each] for each in ("controller.h", "controller.c")},
+        found.verdict.sentence if is_certified(found) else f"{ANYWAY}: {found.verdict.sentence}",
+    )  # fmt: skip
 
 
 def prepared_simulator(task: ExportTask) -> Simulator:
@@ -187,10 +163,8 @@ def prepared_simulator(task: ExportTask) -> Simulator:
         run = scenario("slew", arm, task.chain, TRIAL_DURATION)
     except ParameterError:  # an arm that cannot turn
         run = scenario("step", arm, task.chain, TRIAL_DURATION)
-    modes = 1 if task.what == "controller" else task.modes
-    if modes is None:
-        modes = simulated(arm, law, task.chain, run, outputs=task.outputs)[1].modes
-    return Simulator(arm, task.chain, run, law, count=modes, outputs=task.outputs)
+    modes = 1 if task.what == "controller" else simulated(arm, law, task.chain, run)[1].modes
+    return Simulator(arm, task.chain, run, law, count=modes)
 
 
 def variables_of(what: What, of: Simulator) -> list[Variable]:
@@ -213,20 +187,15 @@ def variables_of(what: What, of: Simulator) -> list[Variable]:
         *([variable(drive, "input")] if what == "plant" else references),
         Variable("disturbance", "input", unit, "added to the output of the DAC, without delay"),
         Variable("impulse", "parameter", f"{unit} s", "on the hub, just after the first sample"),
-        Variable(TIP_OFFSET, "parameter", "m", "tip displacement at the start, of the first mode at rest"),
         *sensors,
-        *(variable(name, "output") for name in (*RECORDED, *of.others)),
+        *(variable(name, "output") for name in RECORDED),
         Variable("torque", "output", unit, "output of the DAC at the last sample"),
     ]
 
 
 def plant_code(of: Simulator) -> dict[str, Any]:
     """The numbers of the plant in its template."""
-    chain, model, p = of.electronics, of.model, of.plant.poles
-    released = np.zeros(p.size, complex)
-    with suppress(ParameterError):  # a pinned tip, or an overdamped first mode: there is no free decay
-        place, amplitude = first_mode(of.plant, 1.0)
-        released[place] = amplitude
+    chain, model = of.electronics, of.model
     tables = {
         "turn[PIECES][POLES][2]": parts(model.turn),
         "push[PIECES][POLES][2]": parts(model.push),
@@ -235,7 +204,6 @@ def plant_code(of: Simulator) -> dict[str, Any]:
         "rates[OUTPUTS - 1][2]": model.rates,
         "through[OUTPUTS - 1]": model.static,
         "converters[3][3]": np.clip(chain.quantisers, -LARGEST, LARGEST),
-        "released[POLES][2]": parts(released[of.kept]),
     }
     return {
         "tables": {name: braces(values) for name, values in tables.items()},
@@ -257,29 +225,31 @@ def braces(values: Any) -> str:
 # ------------------------------------------------------------ the file
 
 
-def model_description(of: Header, sources: Iterable[str]) -> bytes:
-    """The file modelDescription.xml: outputs of a plant are known at the start, that of a controller is 0 there."""
-    place = {each.name: str(n) for n, each in enumerate(of.variables, 1)}
-    outputs = [place[each.name] for each in of.variables if each.causality == "output"]
-    delayed = {"dependencies": ""} if of.has_plant else {}  # at a communication point, of the inputs there
-    structure = [element("Outputs", *(element("Unknown", index=n, **delayed) for n in outputs))]
-    if of.has_plant:
-        released = [element("Unknown", index=n, dependencies=place[TIP_OFFSET]) for n in outputs]
-        structure.append(element("InitialUnknowns", *released))
+def model_description(
+    sources: Iterable[str], identifier: str, *, variables: Sequence[Variable], has_plant: bool, period: str, about: str,
+    guid: str,
+) -> bytes:  # fmt: skip
+    """The file modelDescription.xml: at a communication point outputs of a plant depend on no input there."""
+    outputs = [str(n) for n, each in enumerate(variables, 1) if each.causality == "output"]
+    known = {"dependencies": ""} if has_plant else {}
+    structure = [
+        element(tag, *(element("Unknown", index=n, **known) for n in outputs))
+        for tag in ("Outputs", "InitialUnknowns")[: 1 + has_plant]
+    ]
     files = [element("File", name=name) for name in sources if name.endswith(".c")]
-    units = [element("Unit", name=unit) for unit in sorted({each.unit for each in of.variables})]
+    units = [element("Unit", name=unit) for unit in sorted({each.unit for each in variables})]
     root = element(
         "fmiModelDescription",
         element(
-            "CoSimulation", element("SourceFiles", *files), modelIdentifier=of.identifier,
+            "CoSimulation", element("SourceFiles", *files), modelIdentifier=identifier,
             canHandleVariableCommunicationStepSize="true", canNotUseMemoryManagementFunctions="true",
         ),
         element("UnitDefinitions", *units),
         element("LogCategories", element("Category", name=ERRORS)),
-        element("DefaultExperiment", startTime="0", stopTime=repr(TRIAL_DURATION), stepSize=of.period),
-        element("ModelVariables", *(variable_element(n, each, of.has_plant) for n, each in enumerate(of.variables))),
+        element("DefaultExperiment", startTime="0", stopTime=repr(TRIAL_DURATION), stepSize=period),
+        element("ModelVariables", *(variable_element(n, each, has_plant) for n, each in enumerate(variables))),
         element("ModelStructure", *structure),
-        fmiVersion="2.0", modelName=of.identifier, guid=of.guid, description=one_line(of.about, LONGEST_TEXT),
+        fmiVersion="2.0", modelName=identifier, guid=guid, description=one_line(about, LONGEST_TEXT),
         generationTool=f"tfarm {version('tfarm')}", variableNamingConvention="flat", numberOfEventIndicators="0",
     )  # fmt: skip
     indent(root)

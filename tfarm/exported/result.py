@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from importlib import import_module
@@ -15,7 +15,7 @@ from tfarm.case import result_card
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual, file_text
 from tfarm.dsp.verdict import Analysis, sampled
-from tfarm.errors import ParameterError, must_be_known, require
+from tfarm.errors import ParameterError, must_be_known
 from tfarm.exported.texts import facts_of
 from tfarm.files import move_into, place_in
 from tfarm.records import record
@@ -41,8 +41,7 @@ class ExportTask:
     """What to export, and how: an arm, a law (by default the default gains), and the chain of its sampled loop.
 
     `ranges` are the largest absolute values of signals by name, in SI units, for fixed point.  `tuned` is the file of a
-    trained tuner.  `anyway`: also a loop that is not certified stable.  `outputs` and `modes` are the further outputs
-    and the flexible modes of a plant in a functional mock-up unit, by default those of the simulation of a slew.
+    trained tuner.  `anyway`: also a loop that is not certified stable.
     """
 
     arm: Arm
@@ -55,8 +54,6 @@ class ExportTask:
     ranges: Mapping[str, float] = field(default_factory=dict)
     name: str = ""
     anyway: bool = False
-    outputs: tuple[str, ...] = ()
-    modes: int | None = None
 
     @cached_property
     def law(self) -> Law:
@@ -168,8 +165,6 @@ def export(
     ranges: Mapping[str, float] | None = None,
     name: str = "",
     anyway: bool = False,
-    outputs: Sequence[str] = (),
-    modes: int | None = None,
 ) -> Export:
     """Write a controller, a tuner, the plant or the closed loop as files for another program.
 
@@ -195,9 +190,6 @@ def export(
         Beginning of the identifiers of a file in C.
     anyway
         Export a loop that is not certified stable.
-    outputs, modes
-        Of a functional mock-up unit with a plant: outputs beyond those of a simulation, as "strain@0.05", and the
-        number of flexible modes, by default that of the simulation of a slew.
 
     Returns
     -------
@@ -215,13 +207,10 @@ def export(
     if (what, form) not in WRITERS:
         forms = ", ".join(each for of, each in WRITERS if of == what)
         raise ParameterError(key="as", value=form, remedy=f"a {what} is exported as: {forms}")
-    is_simulated = form == "fmu" and what != "controller"
-    remedy = "only a plant or a loop as fmu has outputs and modes of its own; leave them out"
-    require(is_simulated or not (outputs or modes), "outputs" if outputs else "modes", outputs or modes, remedy)
     task = ExportTask(
         arm=arm if law is None else arm_and_law(arm, law)[0], given=law, chain=chain_or_usual(chain),
         what=what, form=form, tuned=None if tuned is None else Path(tuned), precision=precision,
-        ranges=dict(ranges or {}), name=name, anyway=anyway, outputs=tuple(outputs), modes=modes,
+        ranges=dict(ranges or {}), name=name, anyway=anyway,
     )  # fmt: skip
     module, _, function = WRITERS[what, form].partition(":")
     found: Export = getattr(import_module(f"tfarm.exported.{module}"), function)(task)

@@ -70,11 +70,6 @@ class NamedSystem:
         error = f"; worst {NORM} " + "{worst_error:.3g} from {band[0]:g} to {band[1]:g} rad/s"
         return f"{self.name}, {kind}, {len(self.states)} states{error.format(**self.facts) if self.facts else ''}"
 
-    def __call__(self, s: complex) -> Complex:
-        """Return the matrix (outputs, inputs) of its transfer functions at s [1/s], or z."""
-        A, B, C, D = self.matrices
-        return np.asarray(C @ np.linalg.solve(s * np.eye(len(A)) - A, B.astype(complex)) + D)
-
 
 # ------------------------------------------------------------ controller and sampled loop
 
@@ -204,32 +199,27 @@ def linear(task: ExportTask) -> Linear:
 
 
 WRITTEN_BY = "written by tfarm"  # in the first line of every script, load.m
-CHECKED_AT = {True: 1.2j, False: 10.0 + 10.0j}  # z, and s [1/s], at which a script compares values: no pole is there
 
 
 def mat(task: ExportTask) -> Export:
     """Return the MATLAB file of a task and its script."""
-    found, file = linear(task), f"{task.what}.mat"
-    contents = {file: mat_file(found), f"load_{task.what}.m": script(file, found)}
+    found = linear(task)
     return Export(
-        what=task.what, form=task.form, contents=contents, names=[], verdict=found.verdict, sha256=task.sha256
-    )
+        what=task.what, form=task.form, contents=mat_files(f"{task.what}.mat", found), names=[],
+        verdict=found.verdict, sha256=task.sha256,
+    )  # fmt: skip
 
 
-def mat_file(of: Linear) -> bytes:
-    """Return the bytes of a MATLAB file."""
+def mat_files(name: str, of: Linear) -> dict[str, bytes]:
+    """Return a MATLAB file of that name, and the script that builds its systems, by their names."""
+    script = f"load_{re.sub(r'[^A-Za-z0-9_]', '_', Path(name).stem)}.m"
     first, *others = ((name, entries_of(system)) for name, system in of.systems.items())
-    return mat_content({**first[1], **dict(others), **of.response}, "row")
-
-
-def script(file: str, of: Linear) -> bytes:
-    """Return the script that builds the systems of a file of that name."""
-    return render("load.m", file=matlab_text(file), of=of)
+    content = mat_content({**first[1], **dict(others), **of.response}, "row")
+    return {name: content, script: render("load.m", file=matlab_text(name), of=of)}
 
 
 def entries_of(system: NamedSystem) -> dict[str, Any]:
-    """Return the variables of one system, with its transfer functions at `CHECKED_AT`."""
-    at = CHECKED_AT[system.period > 0]
+    """Return the variables of one system, with its names and facts."""
     return {
         **dict(zip("ABCD", system.matrices, strict=True)),
         "period": system.period,
@@ -237,8 +227,6 @@ def entries_of(system: NamedSystem) -> dict[str, Any]:
         "output_names": np.array(system.outputs, dtype=object),
         "state_names": np.array(system.states, dtype=object),
         "name": comment(system.name),
-        "checked_at": at,
-        "checked_value": system(at),
         **system.facts,
     }
 
@@ -255,22 +243,23 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
     exact = response_data(model.arm, reduced.input, reduced.outputs, reduced.band, G)
     of = Linear({"sys": reduced_system(reduced, reduced.outputs)}, [], exact)
     if is_standard_output(path):
-        write_file(path, mat_file(of), key=key)
+        write_file(path, mat_files(path.name, of)[path.name], key=key)
         return (path,)
     is_file = os.path.isfile(path) or not os.path.exists(path)
     require(is_file, key, str(path), "is no regular file, and its script needs a folder")
     path = path if path.suffix == ".mat" else path.with_name(path.name + ".mat")
     require(comment(path.name) == path.name, key, path.name, "a name of printable ASCII, as its script contains it")
-    other = path.with_name(f"load_{re.sub(r'[^A-Za-z0-9_]', '_', path.stem)}.m")
+    contents = {path.with_name(name): content for name, content in mat_files(path.name, of).items()}
+    other = next(reversed(contents))
     text = ""
     with suppress(OSError):  # a file that cannot be read is not ours
         text = other.read_text("utf-8", errors="replace") if other.is_file() else ""
     is_ours = not os.path.exists(other) or (WRITTEN_BY in text and matlab_text(path.name) in text)
     remedy = f"{other.name} in that folder is not its script and would be replaced; choose another name"
     require(is_ours, key, str(path), remedy)
-    write_file(other, script(path.name, of), key=key)
-    write_file(path, mat_file(of), key=key)
-    return path, other
+    for place in reversed(contents):
+        write_file(place, contents[place], key=key)
+    return tuple(contents)
 
 
 def py(task: ExportTask) -> Export:

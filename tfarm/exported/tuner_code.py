@@ -28,6 +28,9 @@ ANGLE, RATE, MOMENT, WANTED_ANGLE, WANTED_RATE, WANTED_MOMENT, FORWARD = 0, 1, 2
 U, E, X, K, E_BEFORE, TORQUE = range(6)  # places of the state: the last sample, and e of the one before
 
 
+ZERO, HALF, ONE, TWO = np.array([0.0, 0.5, 1.0, 2.0], np.float32)  # exact, and of either precision with another number
+
+
 class Numbers(NamedTuple):
     """Numbers of a tuner in one precision.
 
@@ -35,10 +38,6 @@ class Numbers(NamedTuple):
     + `low`; series in ascending order.  Then network, servo and guard, as in `tfarm.tuner.kernel`.
     """
 
-    zero: float
-    half: float
-    one: float
-    two: float
     lowest: float
     shift: float
     inverse: float
@@ -67,7 +66,7 @@ def numbers_of(saved: SavedTuner, real: Any) -> Numbers:
     bits, lowest, terms, odd = (42, -708.0, 14, 10) if real is np.float64 else (16, -87.0, 9, 4)
     high = Fraction(round(LN_2 * 2**bits), 2**bits)
     shift = 1.5 * 2 ** np.finfo(real).nmant
-    scalars = 0.0, 0.5, 1.0, 2.0, lowest, shift, 1 / math.log(2.0), high, LN_2 - high, math.sqrt(2.0) - 1
+    scalars = lowest, shift, 1 / math.log(2.0), high, LN_2 - high, math.sqrt(2.0) - 1
     series = [1 / math.factorial(n) for n in range(terms)], [2 / (2 * j + 1) for j in range(1, odd + 1)]
     limits, names = saved.gain().guard, ("W1", "w2", "scales", "K1", "Kp")
     with np.errstate(over="ignore", under="ignore"):
@@ -99,10 +98,10 @@ def polynomial(x: float, coefficients: Real) -> float:
 def exponential(x: float, of: Numbers) -> float:
     """e^x for x <= 0; 0 of NaN, which u, e or x then is too: the step is refused."""
     if not x > of.lowest:
-        return of.zero
+        return ZERO
     k = (x * of.inverse + of.shift) - of.shift
     result = polynomial((x - k * of.high) - k * of.low, of.taylor)
-    power, n = of.half, int(-k)
+    power, n = HALF, int(-k)
     while n > 0:  # at most ten times
         if n % 2 == 1:
             result *= power
@@ -115,8 +114,8 @@ def exponential(x: float, of: Numbers) -> float:
 def logarithm(y: float, of: Numbers) -> float:
     """ln(1 + y) for 0 <= y <= 1."""
     is_small = y < of.turn
-    f = y if is_small else of.half * (y - of.one)
-    s = f / (of.two + f)
+    f = y if is_small else HALF * (y - ONE)
+    s = f / (TWO + f)
     square = s * s
     below = s * (f - square * polynomial(square, of.artanh))
     return f - below if is_small else of.high + (f - (below - of.low))
@@ -125,14 +124,14 @@ def logarithm(y: float, of: Numbers) -> float:
 @compiled
 def sigmoid(z: float, of: Numbers) -> float:
     """1/(1 + e^-z)."""
-    small = exponential(-z if z > of.zero else z, of)
-    return (of.one if z > of.zero else small) / (of.one + small)
+    small = exponential(-z if z > ZERO else z, of)
+    return (ONE if z > ZERO else small) / (ONE + small)
 
 
 @compiled
 def softplus(z: float, of: Numbers) -> float:
     """ln(1 + e^z)."""
-    is_positive = z > of.zero
+    is_positive = z > ZERO
     tail = logarithm(exponential(-z if is_positive else z, of), of)
     return z + tail if is_positive else tail
 
@@ -140,9 +139,9 @@ def softplus(z: float, of: Numbers) -> float:
 @compiled
 def network_gain(of: Numbers, row: Real) -> float:
     """K of a row of inputs."""
-    z = of.zero
+    z = ZERO
     for j in range(of.w2.size):
-        net = of.zero
+        net = ZERO
         for i in range(of.scales.size):
             net += of.W1[j, i] * (row[i] / of.scales[i])
         z += of.w2[j] * sigmoid(net, of)
@@ -258,7 +257,7 @@ def c_tuner(task: ExportTask) -> Export:
 def written(task: ExportTask, tuner: ExportedTuner, name: str, facts: dict[str, str]) -> dict[str, bytes]:
     """The files by name; constants have the names that they have in `tuner_twin`."""
     of, (real, suffix, _) = tuner.numbers, REAL[task.precision]
-    unused = {"lo", "hi"} if of.is_free else {"two", "turn", "artanh"}
+    unused = {"lo", "hi"} if of.is_free else {"turn", "artanh"}
     kept: dict[str, Any] = {key: each for key, each in of._asdict().items() if key not in unused}
     ports = [
         Port(of_sample, key, f"{meaning} [{unit or task.arm.input_unit}]", 1.0 if "rad" in unit else tuner.scale)

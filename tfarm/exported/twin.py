@@ -16,29 +16,16 @@ MINUEND, SUBTRAHEND = 0, 1  # columns of a plan
 LARGEST = 2147483647  # of 32 bits
 
 
-@inlined
-def pushed(line: Any, u: Any) -> Any:
-    """The output of a delay line, a sample for each entry; the line is moved by one."""
-    if line.size == 0:
-        return u
-    out = line[0]
-    line[:-1] = line[1:]
-    line[-1] = u
-    return out
-
-
 @compiled
-def run_real(
-    table: Any, plan: Any, inputs: Any, dac: Any, hub: Any, line: Any, single: bool, outputs: Any, status: Any
-) -> None:
-    """Fill outputs and status (n,) of inputs (n, k), the last of which is the feedforward.
+def run_real(table: Any, plan: Any, inputs: Any, dac: Any, hub: Any, single: bool, outputs: Any, status: Any) -> None:
+    """Fill outputs and status (n,) of inputs (n, k), the last of which is the feedforward; refused ones are left as 0.
 
     `table` is [A B; C D]; `plan` (columns, 2) has the two numbers whose difference is e of a column, by their places
     among the inputs, an estimated hub rate and 0; `dac` is a row of the quantisers; `hub` index of the hub angle (-1:
     no estimate), pole and period of the estimated rate.
     """
     n, forward = table.shape[0] - 1, inputs.shape[1] - 1
-    known, z, following, held = np.zeros(forward + 3), np.zeros(table.shape[1]), np.zeros(n + 1), 0.0
+    known, z, following = np.zeros(forward + 3), np.zeros(table.shape[1]), np.zeros(n + 1)
     memory, clipped = np.zeros(3), np.zeros(3, np.bool_)
     for k in range(inputs.shape[0]):
         known[: forward + 1], before = inputs[k], memory.copy()
@@ -53,10 +40,9 @@ def run_real(
             status[k] = 0 if np.isfinite(following).all() else OVERFLOW
             if status[k] == 0:
                 z[:n] = following[:n]
-                held = pushed(line, rounded(quantise(following[n], dac, clipped, DAC), single))
+                outputs[k] = rounded(quantise(following[n], dac, clipped, DAC), single)
             else:
                 memory[:] = before
-        outputs[k] = held
 
 
 @inlined
@@ -66,7 +52,7 @@ def shifted(value: int, shift: int) -> int:
 
 
 @compiled
-def run_fixed(table: Any, shifts: Any, plan: Any, inputs: Any, dac: Any, line: Any, outputs: Any) -> None:
+def run_fixed(table: Any, shifts: Any, plan: Any, inputs: Any, dac: Any, outputs: Any) -> None:
     """The same in fixed point; `dac` is the shift of the step of the DAC, 0 for none, lowest and highest output."""
     n, forward = table.shape[0] - 1, inputs.shape[1] - 1
     known, z = np.zeros(forward + 3, np.int64), np.zeros(table.shape[1], np.int64)
@@ -83,4 +69,4 @@ def run_fixed(table: Any, shifts: Any, plan: Any, inputs: Any, dac: Any, line: A
         for i in range(n):
             z[i] = min(max(following[i], -LARGEST - 1), LARGEST)
         u = shifted(following[n], dac[0]) << dac[0] if dac[0] > 0 else following[n]
-        outputs[k] = pushed(line, min(max(u, dac[1]), dac[2]))
+        outputs[k] = min(max(u, dac[1]), dac[2])

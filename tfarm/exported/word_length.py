@@ -28,7 +28,7 @@ from functools import cached_property
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, cdf2rdf
 
 from tfarm.arm import Law
 from tfarm.arm.blocks import StateSpace
@@ -51,7 +51,6 @@ FRACTION_BITS, MOST_SHIFT = 31, 62  # of a number in fixed point, and of a sum o
 HALF_STEP = 2.0 ** -(FRACTION_BITS + 1)  # of the range of a number: its largest rounding
 HEADROOM, LEAST_SCALE = 1 + 2.0**-10, 2.0**-100  # of the range of a state: for roundings, and the least of all
 OF_OUTPUT = 4.0  # ranges of u that a state without a bound reaches before it saturates
-REFINED = 8  # steps to the bound of the errors
 FIXED, OUTPUT = "q31", "output"  # fixed point; the name of the controller's output among ranges
 FLOATS: dict[str, tuple[Any, float]] = {"double": (np.float64, 2.0**-53), "float": (np.float32, 2.0**-24)}  # roundoff
 
@@ -132,12 +131,11 @@ def balancing(K: Real, W: Real) -> Real | None:
 def sections(A: Real, K: Real, W: Real) -> Real | None:
     """T of second-order sections, a pair of poles each, and first-order ones, each balanced; None of multiple poles."""
     poles, vectors = np.linalg.eig(A)
-    upper = np.flatnonzero(poles.imag >= 0)
-    blocks = [np.c_[vectors[:, n].real, vectors[:, n].imag][:, : 1 + (poles[n].imag > 0)] for n in upper]
-    modal = np.hstack(blocks)
-    if modal.shape != A.shape or np.linalg.cond(modal / np.linalg.norm(modal, axis=0)) > WORST_CONDITION:
+    _, modal = cdf2rdf(poles, vectors)
+    if np.linalg.cond(modal / np.linalg.norm(modal, axis=0)) > WORST_CONDITION:
         return None
-    duals = np.split(np.linalg.inv(modal), np.cumsum([block.shape[1] for block in blocks])[:-1])
+    begins = np.flatnonzero(poles.imag >= 0)[1:]  # of a section, after the first
+    blocks, duals = np.split(modal, begins, axis=1), np.split(np.linalg.inv(modal), begins)
     own = [balancing(dual @ K @ dual.T, block.T @ W @ block) for block, dual in zip(blocks, duals, strict=True)]
     known = [each for each in own if each is not None]
     return modal @ block_diag(*known) if len(known) == len(own) else None
@@ -227,16 +225,13 @@ class Word:
         relative, absolute = self.errors
         V, A = abs(rounded - exact) + relative * abs(rounded), exact[:n, :n]
         X, is_whole = absolute_sum(A, np.eye(n), exact[:n, n:])
-        responses, _ = absolute_sum(A, np.vstack([np.eye(n), exact[n, :n]]), np.eye(n))
-        largest = first = X @ self.sizes
-        with np.errstate(over="ignore", invalid="ignore"):  # of a law that grows
-            for _ in range(REFINED):  # to the least fixed point
-                w = V @ np.r_[largest, self.sizes] + absolute
-                of_roundings = responses @ w[:n]
-                largest = first + of_roundings[:n]
-            error = float(of_roundings[n] + w[n] + relative * self.output)
-        may_saturate = self.precision == FIXED and max(largest, default=0.0) >= 1
-        return largest, is_whole, math.inf if may_saturate else error
+        S, _ = absolute_sum(A, np.vstack([np.eye(n), exact[n, :n]]), np.eye(n))
+        rest, error = V[:, n:] @ self.sizes + absolute, math.inf
+        largest = least_solution(S[:n] @ V[:n, :n], X @ self.sizes + S[:n] @ rest[:n])
+        if self.precision != FIXED or max(largest, default=0.0) < 1:
+            w = V[:, :n] @ largest + rest
+            error = float(S[n] @ w[:n] + w[n] + relative * self.output)
+        return largest, is_whole, error
 
     def limit_cycle(self, loop: Sampled) -> float | None:
         """Bound on u in a limit cycle that roundings sustain in a loop at rest; None where none was found.
@@ -255,10 +250,16 @@ class Word:
         S[-1, n:] += np.r_[1.0, Q[n, n:]]  # u itself
         relative, absolute = self.errors
         loops = relative * S[:, : n + 1] @ Q if is_whole else np.ones((len(left), n + len(at)))
-        if max(abs(np.linalg.eigvals(loops[:-1])), default=0.0) >= 1:
-            return None
         rest = S @ np.r_[absolute, HALF_STEP * self.ranges[: len(at)] * (self.precision == FIXED)]
-        return float(rest[-1] + loops[-1] @ np.linalg.solve(np.eye(n + len(at)) - loops[:-1], rest[:-1]))
+        bound = float(rest[-1] + loops[-1] @ least_solution(loops[:-1], rest[:-1]))
+        return bound if bound < math.inf else None
+
+
+def least_solution(P: Real, q: Real) -> Real:
+    """The least z = P z + q of entries that are not negative; infinite where an eigenvalue of P is not below 1."""
+    if np.isfinite(P).all() and max(abs(np.linalg.eigvals(P)), default=0.0) < 1:
+        return np.asarray(np.linalg.solve(np.eye(q.size) - P, q))
+    return np.full(q.size, np.inf)
 
 
 def observed(M: Real, left: Real) -> Real:

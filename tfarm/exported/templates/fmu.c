@@ -2,17 +2,19 @@
    SHA-256 of the inputs: {{ sha256 }}.  It needs neither the mathematical library nor Python. */
 #include <stdlib.h>
 #include <string.h>
-#include "fmi2.h"{{ law.include }}
+#include "fmi2.h"
+{{ '#include "controller.h"\n' if law }}
 #define PERIOD {{ period }} /* s */
 #define SLACK 1e-4 /* of a period, in the times of a master */
 #define WHOLE 4503599627370496.0 /* 2^52: a larger number has no fraction */
-enum { INPUTS = {{ count.input }}, GIVEN = INPUTS + {{ count.parameter }}, OUTPUTS = {{ count.output }} }; /* GIVEN: both */
+{% set names = variables|map(attribute="causality")|list %}
+enum { INPUTS = {{ names.count("input") }}, GIVEN = INPUTS + {{ names.count("parameter") }}, OUTPUTS = {{ names.count("output") }} };
 enum { POLES = {{ poles }}, PIECES = {{ pieces }}, RING = {{ ring }} }; /* pieces of a sample; a ring of torques */
 
 typedef struct {
     fmi2CallbackFunctions callbacks;
     char name[64];
-    double start, given[GIVEN]; /* s; inputs and parameters */
+    double start, given[GIVEN]; /* s; inputs, then parameters */
     struct {
         double time, in[INPUTS], out[OUTPUTS]; /* s; inputs at the last sample */
         double a[POLES][2], integral[2]; /* amplitudes of the poles, the torque integrated twice and once */
@@ -20,8 +22,7 @@ typedef struct {
         long long sample;
         int is_running, is_held, is_stopped;
     } at;
-    {{ law.state }}
-} model;
+{{ "    %s_state law;\n"|format(law.identifier) if law }}} model;
 
 {% if has_plant %}
 {% for name, rows in tables.items() %}
@@ -57,8 +58,13 @@ static int measure(model *m) { /* 0 where the root moment is beyond its bound */
 
 {% endif %}
 static int advance(model *m) { /* by one sample; 0 where it cannot */
-    double u{{ "" if law.step else " = m->at.in[0]" }};
-    {{ law.step }}
+{% if law %}
+    const {{ law.identifier }}_input input = { {% for each in law.inputs %}({{ law.identifier }}_number)m->at.{{ each }}{{ ", " if not loop.last }}{% endfor %} };
+    {{ law.identifier }}_number output;
+    if ({{ law.identifier }}_step(&m->law, &input, &output))
+        return 0;
+{% endif %}
+    double u = {{ "output" if law else "m->at.in[0]" }};
 {% if has_plant %}
     const double old = m->at.held[(m->at.sample + 1) % RING];
     double impulse = m->at.sample ? 0.0 : m->given[INPUTS];
@@ -84,11 +90,7 @@ static int advance(model *m) { /* by one sample; 0 where it cannot */
 static fmi2Status begin(model *m, double start) {
     memset(&m->at, 0, sizeof m->at);
     m->at.time = m->start = start;
-    {{ law.init }}
-{% if has_plant %}
-    for (int i = 0; i < POLES; i++)
-        for (int j = 0; j < 2; j++)
-            m->at.a[i][j] = released[i][j] * m->given[INPUTS + 1];
+{{ "    %s_init(&m->law);\n"|format(law.identifier) if law }}{% if has_plant %}
     m->at.is_stopped = !measure(m);
 {% endif %}
     return fmi2OK;

@@ -23,9 +23,9 @@ static {{ real }} polynomial({{ real }} x, const {{ real }} *coefficients, int s
 /* e^x for x <= 0, within {{ ulps.exp }} units in the last place: 2^k e^r, x = k ln 2 + r (Cody and Waite), Taylor */
 static {{ real }} exponential({{ real }} x)
 {
-    {{ real }} k, result, power = half;
+    {{ real }} k, result, power = 0.5{{ suffix }};
     if (!(x > lowest))
-        return zero;
+        return 0;
     k = (x * inverse + shift) - shift;
     result = polynomial((x - k * high) - k * low, taylor, {{ tables.taylor|length }});
     for (int n = (int)-k; n > 0; n /= 2) { /* at most ten times */
@@ -38,15 +38,15 @@ static {{ real }} exponential({{ real }} x)
 
 static {{ real }} sigmoid({{ real }} z)
 {
-    const {{ real }} small = exponential(z > zero ? -z : z);
-    return (z > zero ? one : small) / (one + small);
+    const {{ real }} small = exponential(z > 0 ? -z : z);
+    return (z > 0 ? 1 : small) / (1 + small);
 }
 {% if of.is_free %}
 
 /* ln(1 + y) for 0 <= y <= 1, within {{ ulps.log }} units in the last place: f - s (f - R), s = f/(2 + f), series of artanh */
 static {{ real }} logarithm({{ real }} y)
 {
-    const {{ real }} f = y < turn ? y : half * (y - one), s = f / (two + f), square = s * s;
+    const {{ real }} f = y < turn ? y : 0.5{{ suffix }} * (y - 1), s = f / (2 + f), square = s * s;
     const {{ real }} below = s * (f - square * polynomial(square, artanh, {{ tables.artanh|length }}));
     return y < turn ? f - below : high + (f - (below - low));
 }
@@ -54,16 +54,16 @@ static {{ real }} logarithm({{ real }} y)
 
 static {{ real }} network(const {{ real }} *row)
 {
-    {{ real }} z = zero, net, gain;
+    {{ real }} z = 0, net, gain;
     for (int j = 0; j < {{ of.w2|length }}; j++) {
-        net = zero;
+        net = 0;
         for (int i = 0; i < {{ of.scales|length }}; i++)
             net += W1[{{ of.scales|length }} * j + i] * (row[i] / scales[i]);
         z += w2[j] * sigmoid(net);
     }
 {% if of.is_free %}
-    gain = logarithm(exponential(z > zero ? -z : z));
-    return z > zero ? z + gain : gain;
+    gain = logarithm(exponential(z > 0 ? -z : z));
+    return z > 0 ? z + gain : gain;
 {% else %}
     gain = lo + (hi - lo) * sigmoid(z);
     return gain > hi ? hi : gain;
@@ -77,7 +77,7 @@ static int is_small({{ real }} value) /* not NaN, and so small that no sum overf
 
 void {{ name }}_init({{ name }}_state *state)
 {
-    *state = ({{ name }}_state){ zero, zero, zero, zero, zero, zero };
+    *state = ({{ name }}_state){ 0 };
 }
 
 int {{ name }}_step({{ name }}_state *state, const {{ name }}_input *input, {{ name }}_number *output)
