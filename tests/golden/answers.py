@@ -10,6 +10,7 @@ import io
 import json
 import math
 import re
+import tempfile
 from pathlib import Path
 
 from tests.golden.renamed import renamed
@@ -55,11 +56,11 @@ def words_of(line):
 
 
 def answer_of(line):
-    """What the command prints with --json, long lists thinned.  AssertionError where it fails."""
+    """What the command prints with --json, long lists thinned; FOLDER is a new one.  AssertionError where it fails."""
     out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), tempfile.TemporaryDirectory() as folder:
         try:
-            main([*words_of(line), "--json"])
+            main([*(folder if word == "FOLDER" else word for word in words_of(line)), "--json"])
         except SystemExit as stop:
             if stop.code:
                 raise AssertionError(f"{line}: exit code {stop.code}, {err.getvalue()}") from stop
