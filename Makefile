@@ -37,6 +37,9 @@ SURVEYS := \
 	studies.kills \
 	studies.planted \
 	tuner.bounded \
+	exported.laws \
+	exported.tuners \
+	exported.unit_loops \
 	cli.fuzz \
 	cli.stops \
 	report.plausible \

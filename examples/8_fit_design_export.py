@@ -29,7 +29,5 @@ assert law is not None  # None of a file without [law]
 print(f"damping {100 * chosen.value:.4g} %;", tfarm.sampled(arm, law).verdict.sentence)
 print("on the rig itself:", tfarm.sampled(bench, law).verdict.word)
 
-model = tfarm.reduce(arm, ["root_moment", "hub_angle"], order=10)  # for a simulator of one's own
-matrices = model.state_space()  # of python-control
-np.savez("model.npz", A=matrices.A, B=matrices.B, C=matrices.C, D=matrices.D)
-print(f"order {model.order}, off by at most {model.worst_error:.1e}")
+made = tfarm.export(arm, law, what="loop", form="mat", folder="matlab")  # load_loop.m is for MATLAB and Octave
+print(f"written: {', '.join(made.files)}; the loop is {made.verdict}")

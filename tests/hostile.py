@@ -48,3 +48,9 @@ def check_drawing(svg):
     """A drawing has no tag but those of drawings."""
     tags = {element.tag.partition("}")[2] for element in ElementTree.fromstring(svg).iter()}
     assert tags.isdisjoint({"script", "evil", "foreignObject", "a"})
+
+
+C_TEXTS = (  # for comments and identifiers of exported code
+    TEXT, NAME, LONG, "a */ int x; /* b", "*/*/", "/*/", "ends ??/", "ends \\", "two\nlines\r\n#error", "int",
+    "\\*/ ??/\n*/", "*\\/ /\\* ?\\?/", "%{ x %} ' '' \"", "`rm -rf`; $(x)", "\u2028\x00\x1b[31m", "é*\u0301/",
+)  # fmt: skip

@@ -8,6 +8,8 @@ import io
 import json
 import re
 import shlex
+import shutil
+import subprocess
 import sys
 import tomllib
 from dataclasses import asdict, dataclass
@@ -19,6 +21,7 @@ from matplotlib import pyplot
 
 import tfarm
 from tests.bench import Row
+from tests.octave import ABSENT, OCTAVE, left_by_octave
 from tests.shared import docs_module
 from tests.shell import heard
 from tfarm.arm.law_tables import load_law
@@ -93,7 +96,11 @@ class Run:
         elif kind == "sh" or (kind == "ipython3" and text.startswith("%%bash\n")):
             for line in text.removeprefix("%%bash\n").replace("\\\n", "").splitlines():
                 self.command(line)
+        elif kind == "matlab":
+            self.printed += left_by_octave(Path.cwd(), text)[1] if OCTAVE else ABSENT
         elif kind in ("python", "ipython3"):
+            if text.startswith("import fmpy") and importlib.util.find_spec("fmpy") is None:
+                pytest.skip("FMPy is not installed: the last blocks of howto/export-fmu")
             self.python(text)
         elif kind == "toml":
             self.file(block.options["caption"], text)
@@ -134,6 +141,10 @@ class Run:
                 assert all("=" in verb or f"\n{verb}:" in makefile for verb in verbs), line
             case ["python", "-m", module, *_] if module != "pip":
                 assert importlib.util.find_spec(module), line
+            case ["cc" | "./self_test", *_] if shutil.which("cc"):
+                self.printed += subprocess.run(words, capture_output=True, text=True, timeout=60, check=True).stdout
+            case ["cc" | "./self_test", *_]:
+                pytest.skip("cc is not installed on this machine")
             case ["pip" | "git" | "cd" | "python", *_]:
                 return
             case _:

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from tfarm.dsp.verdict import sampled
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
     from tfarm.exact.outputs import Output
+    from tfarm.exported import export
     from tfarm.fitting.data import Measured, read_measured
     from tfarm.fitting.fit import fit
     from tfarm.fitting.overlay import overlay
@@ -80,6 +81,7 @@ __all__ = [
     "default_gains",
     "design",
     "explore",
+    "export",
     "fit",
     "load",
     "locus",
@@ -116,6 +118,7 @@ _ROOMS = {  # the module of a name; after a colon another name there
     "map": "loop.plane:gain_map",
     "margins": "loop.margins",
     "explore": "report.live",
+    "export": "exported",
     "Measured": "fitting.data",
     "fit": "fitting.fit",
     "modes": "spectrum",

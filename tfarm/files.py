@@ -12,11 +12,11 @@ import secrets
 import shutil
 import stat
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 from tfarm.errors import ParameterError, require
 from tfarm.stopping import undone_if_stopped
@@ -64,17 +64,12 @@ def read_mat(path: str | os.PathLike[str], most: int, *, key: str) -> tuple[dict
     return {name: value for name, value in found.items() if not name.startswith("__")}, data
 
 
-def write_mat(path: Path, variables: dict[str, Any], *, key: str, oned_as: str = "column") -> None:
-    """Write a MATLAB file (level 5)."""
-    write_file(path, mat_bytes(variables, oned_as), key=key)
-
-
-def mat_bytes(variables: dict[str, Any], oned_as: str = "column") -> bytes:
+def mat_content(variables: Mapping[str, Any], oned_as: Literal["row", "column"]) -> bytes:
     """Return a MATLAB file (level 5) without SciPy's date in its header: same inputs, same bytes."""
     from scipy.io import savemat
 
     content = io.BytesIO()
-    savemat(cast("Any", content), variables, oned_as=cast("Any", oned_as))
+    savemat(cast("Any", content), dict(variables), oned_as=oned_as)
     return MAT_HEADER.ljust(HEADER_TEXT) + content.getvalue()[HEADER_TEXT:]
 
 
@@ -107,6 +102,43 @@ def temporary_folder(place: Path) -> Iterator[Path]:
     _remove_leftovers(place, re.escape(FOLDER) + SUFFIX)
     with _temporary(place, FOLDER, "", partial(Path.mkdir, mode=0o700)) as folder:
         yield folder
+
+
+@contextmanager
+def place_in(out: Path, key: str, names: Sequence[str] = ()) -> Iterator[Path]:
+    """A temporary folder in `out`, gone afterwards; what was made for it goes too if the work fails.
+
+    Raises ParameterError, naming `key`, before any work where `out` or a folder of these names in it cannot be written.
+    """
+    folders = [out, *(out / name for name in names)]
+    missing = [part for folder in folders for part in (*reversed(folder.parents), folder) if not part.exists()]
+
+    def remove_empty() -> None:
+        for folder in reversed(missing):
+            with suppress(OSError):
+                folder.rmdir()
+
+    try:
+        with undone_if_stopped(remove_empty):
+            for folder in folders:
+                folder.mkdir(parents=True, exist_ok=True)
+                with temporary_folder(folder):  # which fails where it cannot be written to
+                    pass
+            with temporary_folder(out) as place:
+                yield place
+    except OSError as error:
+        remedy = f"cannot be written to ({error.strerror or error}); give a folder that can"
+        raise ParameterError(key=key, value=str(out), remedy=remedy) from None
+    finally:
+        remove_empty()
+
+
+def move_into(made: Path, folder: Path) -> None:
+    """Every file replaced in one step each, pages last, so that a page never names a file that is not there."""
+    files = [file.relative_to(made) for file in made.rglob("*") if file.is_file()]
+    for file in sorted(files, key=lambda file: (file.suffix == ".html", file.as_posix())):
+        (folder / file).parent.mkdir(parents=True, exist_ok=True)
+        os.replace(made / file, folder / file)
 
 
 @contextmanager

@@ -107,7 +107,6 @@ def test_a_dash_is_standard_output(verb, option, capfdbinary, tmp_path, monkeypa
         ("map sasaki2012-lab --csv=- --json", "one thing at a time"),
         ("report sasaki2012-lab --out -", "only --csv, --figure, --png, --mat, --save may go there"),
         ("sampled sasaki2012-lab --dsp -", "only --csv, --figure, --png, --mat, --save may go there"),
-        ("reduce sasaki2012 --order 4 --mat -", "is no regular file"),
     ],
 )
 def test_a_dash_that_cannot_be_standard_output_is_one_line(words, why, capsys, tmp_path, monkeypatch):

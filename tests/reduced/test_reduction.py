@@ -95,6 +95,14 @@ def test_outputs_without_a_model(arm):
         reduce(arm, ["root_moment", "root_moment"], order=4)
 
 
+def test_state_space(arm):
+    reduced, points = reduce(arm, ["root_moment", "hub_rate"], order=10), np.array([3j, 60j, 0.5 + 200j])
+    system = reduced.state_space()
+    np.testing.assert_allclose(system(points)[:, 0], reduced(points), rtol=1e-9)
+    assert system.output_labels == ["root_moment", "hub_rate"]
+    assert system.name == "sasaki2012, aaa, order 10"
+
+
 def test_by_error_with_a_band_and_a_file(capsys, tmp_path):
     given = ("--error", "1e-6", "--band", "1,500", "--method", "modal", "--mat", str(tmp_path / "arm.mat"), "--json")
     code, out, _ = run(capsys, "reduce", "sasaki2012", "--outputs", "tip_displacement", *given)

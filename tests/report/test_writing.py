@@ -39,7 +39,7 @@ from tfarm.report.arm_section import arm_section
 from tfarm.report.overview import Card, results, save_card
 from tfarm.report.page import TEMPLATES, Case, GivenLaw, best, explained, prose, sheet, templates
 from tfarm.report.trust import write_trust, written_proofs
-from tfarm.report.writing import PIECES, QUESTIONS, index_page, kept, pieces_of
+from tfarm.report.writing import PIECES, QUESTIONS, index_page, kept, navigation, pieces_of
 from tfarm.schema import Column, quantities, to_dict
 from tfarm.spectrum.table import default_gains
 
@@ -213,6 +213,17 @@ def test_every_page_marks_itself_in_the_same_navigation(pages):
     (bar,) = bars
     leads = re.findall(r'href="([^"]*)"', bar)
     assert {"../index.html", "live.html", "../trust/index.html", *(page.name for page in own)} == set(leads)
+
+
+def test_pages_lead_to_exported_files(tmp_path):
+    """To those of the export alone, whatever else is in its folder."""
+    arm, folder = tfarm.load("sasaki2012-lab"), tmp_path / "sasaki2012-lab"
+    plain = navigation(arm, [], "", folder)
+    (folder / "export").mkdir(parents=True)
+    for name in ("controller.h", "controller.c", "loop.fmu", "<evil>.h"):
+        (folder / "export" / name).write_bytes(b"")
+    found = [each for each in navigation(arm, [], "", folder) if each not in plain]
+    assert found == [("export/controller.h", "Exported: controller.h"), ("export/loop.fmu", "Exported: loop.fmu")]
 
 
 def test_no_paragraph_is_on_two_pages_and_words_are_explained_in_one_place(pages):

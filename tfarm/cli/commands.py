@@ -291,7 +291,7 @@ def reduce(
     method: modal or aaa; by default that of the smaller error
     mat: write a MATLAB file, and a script of that name
     """
-    from tfarm.reduced import save_mat
+    from tfarm.exported.systems import save_mat
 
     reduced = tfarm.reduce(
         load_arm(arm, theory), outputs_on([name.strip() for name in outputs.split(",")], side),

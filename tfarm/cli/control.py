@@ -32,7 +32,7 @@ from tfarm.cli.app import (
     refuse,
 )
 from tfarm.errors import require
-from tfarm.files import write_mat
+from tfarm.files import mat_content, write_file
 
 command = partial(add_command, "Loop")
 sampled_command = partial(add_command, "Sampled loop")
@@ -334,7 +334,7 @@ def simulate(
             load_arm(arm, theory), load_tuner(controller), chain(arm), scenario, duration, **how
         )
     if mat is not None:
-        write_mat(mat, matlab_signals(found), key="--mat")
+        write_file(mat, mat_content(matlab_signals(found), "column"), key="--mat")
     if animate is not None:
         tfarm.plots.animate(found.arm, found.simulation).save(animate)
     if found.stopped_at is not None:

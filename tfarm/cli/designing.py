@@ -89,6 +89,47 @@ def design(
     emit(found, json, also=(save,))
 
 
+@command(epilog="export sasaki2012-lab --what controller --as c --out firmware")
+def export(
+    arm: ArmName,
+    what: Annotated[str, typer.Option("--what", help="controller, tuner, plant or loop")],
+    form: Annotated[str, typer.Option("--as", help="c (C99), fmu, mat (MATLAB, Octave) or py (python-control)")],
+    out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="folder of the files")],
+    law: LawFile = None,
+    chain: Any = load_chain,
+    tuned: Annotated[Path | None, typer.Option("--tuned", metavar="FILE", exists=True)] = None,
+    precision: str = "double",
+    ranges: Annotated[
+        list[Any] | None, typer.Option("--range", parser=named(numbers("SIGNAL=VALUE", 1)), metavar="SIGNAL=VALUE")
+    ] = None,
+    name: str = "",
+    anyway: Annotated[bool, typer.Option("--anyway")] = False,
+    theory: TheoryName = None,
+    json: Json = False,
+    *,
+    gains: Gains,
+) -> None:
+    """Files for another program: C code, a functional mock-up unit, MATLAB, python-control.
+
+    The loop is judged with the numbers as they are rounded in the files.
+
+    Options:
+    tuned: trained tuner, written by tune --save
+    precision: double, float or q31 (fixed point), of a controller in C
+    ranges: largest absolute value of an input in fixed point, in SI units; may be repeated
+    name: beginning of the identifiers in C
+    anyway: also where the loop is not certified stable
+    """
+    subject = load_arm(arm, theory)
+    controller, defaults = load_law(subject, arm, gains, law)
+    found = tfarm.export(
+        subject, controller, what=cast("Any", what), form=cast("Any", form), folder=out, chain=chain(arm), tuned=tuned,
+        precision=cast("Any", precision), ranges={signal: size for signal, (size,) in ranges or []}, name=name,
+        anyway=anyway,
+    )  # fmt: skip
+    emit(found, json, defaults, also=[out / each for each in found.files])
+
+
 LearningWord = Annotated[str, typer.Option(rich_help_panel="Learning")]
 LearningNumber = Annotated[float, typer.Option(rich_help_panel="Learning")]
 CostWeight = Annotated[float, typer.Option(rich_help_panel="Cost")]

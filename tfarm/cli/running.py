@@ -25,7 +25,7 @@ STREAMED = (
 )  # of files that may go to standard output instead, called "-"
 ONLY_STREAMED = f"- is standard output, and only {', '.join(STREAMED)} may go there: give a name"
 WRITTEN = (*STREAMED, "--animate")
-PATHS = (*WRITTEN, "--out", "--dsp", "--law", "--controller", "--list", "--posterior")  # such as 1_0
+PATHS = (*WRITTEN, "--out", "--tuned", "--dsp", "--law", "--controller", "--list", "--posterior")  # such as 1_0
 ODD_NUMBER = re.compile(r"(?=.*(_|[^\x00-\x7f]))[-+.\d_eEij]*\d[-+.\d_eEij]*")  # to Python alone: 5_0, or other digits
 
 

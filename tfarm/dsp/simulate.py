@@ -238,10 +238,10 @@ class Simulator:
         self.plant = sensed_plant(arm, chain, self.measured, count).together
         for names in filter(None, (RECORDED, self.others)):
             self.plant = self.plant.joined(sensed_plant(arm, chain, names, count).unfiltered)
-        self._kept = np.nonzero(self.plant.poles.imag >= 0)[0]
+        self.kept = np.nonzero(self.plant.poles.imag >= 0)[0]
         self._forcing = kernel.Forcing(scenario.feedforward, scenario.disturbance, float(scenario.impulse))
         c, sampling = self.chain.converters, self.chain.sampling
-        self._electronics = kernel.Electronics(
+        self.electronics = kernel.Electronics(
             quantisers=quantisers(self.chain),
             is_differenced=c.hub_rate == "difference",
             pole=math.exp(-c.rate_filter * sampling.period),
@@ -275,11 +275,11 @@ class Simulator:
             D = np.repeat(D, gain.size, axis=0)
             D[:, columns.index("root_moment")] = gain
         matrices = tuple(np.ascontiguousarray(each) for each in (A, B, C, D))
-        if self._electronics.is_single:
+        if self.electronics.is_single:
             matrices = tuple(each.astype(np.float32).astype(float) for each in matrices)
         sources = np.array([self.measured.index(name) if name in self.measured else -1 for name in columns])
         references, state = references_of(law, self.scenario), self._start()
-        done = kernel.run(self._model, state, self._forcing, self._electronics, matrices, sources, references)
+        done = kernel.run(self.model, state, self._forcing, self.electronics, matrices, sources, references)
         return self._result(state, int(done), gain)
 
     def controller(self, controller: Controller) -> Simulation:
@@ -300,12 +300,12 @@ class Simulator:
         """The same with `between` records in each sample."""
         other = copy(self)
         other.between = between
-        vars(other).pop("_model", None)
+        vars(other).pop("model", None)
         return other
 
     def modal(self) -> tuple[Complex, Complex]:
         """Poles (m,) [1/s] with Im p >= 0, and their weights in hub angle, rate, moment and tip (4, m)."""
-        return self.plant.poles[self._kept], self._model.weights[len(self.measured) :][: len(RECORDED)]
+        return self.plant.poles[self.kept], self.model.weights[len(self.measured) :][: len(RECORDED)]
 
     def first_amplitudes(self) -> Complex:
         """The modal amplitudes (m,) after the sample at t = 0 and the impulse."""
@@ -314,14 +314,14 @@ class Simulator:
     # ------------------------------------------------------------ inside
 
     @cached_property
-    def _model(self) -> kernel.Model:
+    def model(self) -> kernel.Model:
         """The plant for the compiled loop, with the records between two samples."""
         row = self.plant.outputs.index("hub_angle", len(self.measured))
-        return kernel.model_of(self.plant, self._kept, self.chain.sampling, self.between, row)
+        return kernel.model_of(self.plant, self.kept, self.chain.sampling, self.between, row)
 
     def _stepped(self, rule: Callable[[Measurement], tuple[float, float]], gain: Real | None) -> Simulation:
         """The loop of `kernel.run` in Python."""
-        model, state, memory, of, forcing = self._model, self._start(), np.zeros(3), self._electronics, self._forcing
+        model, state, memory, of, forcing = self.model, self._start(), np.zeros(3), self.electronics, self._forcing
         task = self.scenario
         references = np.c_[task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference].tolist()
 
@@ -355,24 +355,24 @@ class Simulator:
 
     def _at_first(self) -> Complex:
         """The modal amplitudes (m,) at t = 0: 0, or of the first mode at rest with the tip displaced."""
-        amplitude: Complex = np.zeros(self._kept.size, complex)
+        amplitude: Complex = np.zeros(self.kept.size, complex)
         if offset := self.scenario.tip_offset:
             first, released = first_mode(self.plant, offset)
-            amplitude[self._kept == first] = released
+            amplitude[self.kept == first] = released
         return amplitude
 
     def _energy(self, amplitude: Complex, rate: float) -> float:
         """Energy of an undamped arm [J]: b^2 |a|^2/2 a mode, b^2 twice the residue of the hub rate, and rigid."""
         row = self.plant.outputs.index("hub_rate", len(self.measured))
         rigid = self.plant.rigid[row, 1] * rate**2 / 2
-        return float(self.plant.residues[row, self._kept].real @ abs(amplitude) ** 2 + rigid)
+        return float(self.plant.residues[row, self.kept].real @ abs(amplitude) ** 2 + rigid)
 
     def _result(self, state: kernel.State, done: int, gain: Real | None) -> Simulation:
         """The record of `done` samples."""
         stopped, error = None, None
         if done < state.torque.size:
-            of_root = np.nan_to_num(abs(self.plant.residues[kernel.MOMENT, self._kept] * state.amplitude), nan=np.inf)
-            stopped = Stop(done * self.scenario.period, int(self.plant.mode[self._kept][int(np.argmax(of_root))]))
+            of_root = np.nan_to_num(abs(self.plant.residues[kernel.MOMENT, self.kept] * state.amplitude), nan=np.inf)
+            stopped = Stop(done * self.scenario.period, int(self.plant.mode[self.kept][int(np.argmax(of_root))]))
         elif self.plant.arm.is_undamped and not self.chain.actuator.hub_damping > 0:
             before = self._energy(self.first_amplitudes(), self.scenario.impulse)
             after, (work, moved) = self._energy(state.amplitude, state.rigid[kernel.ONCE]), state.work

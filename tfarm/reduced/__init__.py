@@ -3,7 +3,7 @@
 from tfarm.reduced.modal import ModalModel, modal_model, relaxed_model, slow_model
 from tfarm.reduced.partial_fractions import PartialFractions
 from tfarm.reduced.rational import rational_model
-from tfarm.reduced.reduction import BAND, ReducedModel, reduce, save_mat
+from tfarm.reduced.reduction import BAND, ReducedModel, reduce
 
 __all__ = [
     "BAND",
@@ -14,6 +14,5 @@ __all__ = [
     "rational_model",
     "reduce",
     "relaxed_model",
-    "save_mat",
     "slow_model",
 ]

@@ -1,18 +1,14 @@
 """Reduced models of an order or within an error, each with its frequency range, worst error and first missing mode.
 
-The norm of an error is |dG| / (|G| + |w G'|).  A model is written as a MATLAB file.
+The norm of an error is |dG| / (|G| + |w G'|).
 """
 
 from __future__ import annotations
 
-import os
-import re
 from collections.abc import Callable, Iterable
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +19,6 @@ from tfarm.arm.checks import positive, whole
 from tfarm.arrays import Complex, Real
 from tfarm.errors import MISSING, ConvergenceError, require
 from tfarm.exact.outputs import Output
-from tfarm.files import is_standard_output, write_file, write_mat
 from tfarm.records import record
 from tfarm.response import Wanted, transfer
 from tfarm.response.frequency import known_band
@@ -32,12 +27,9 @@ from tfarm.spectrum import modes
 
 from .modal import SLOW_PAIRS, SLOW_POLES_FROM, modal_model, relaxed_model, slow_model
 from .partial_fractions import (
-    CLEAR_OF_POLES,
     EXACT_ROUNDING,
     PartialFractions,
     Ruler,
-    distance,
-    frequencies_around,
 )
 from .rational import has_rational, modes_in, rational_model
 
@@ -316,73 +308,3 @@ def first_mode_lacking(model: PartialFractions) -> tuple[int, float]:
     has = (abs(model.natural_frequency[:, None] - omega) <= POLE_IS_MODE * omega).any(axis=0)
     first = int(np.argmin(has))
     return first + 1, float(omega[first])
-
-
-WRITTEN_BY = ": written by tfarm."  # in the first line of every script
-MAT_POINTS = 1000  # of the exact response in the file, even in ln w
-
-
-def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[Path, Path]:
-    """Write a MATLAB file and in its folder a script that builds `sys` (ss) and `exact` (frd); return both paths.
-
-    The file has A, B, C, D, all names, the exact response over the frequency range, and the worst error.
-    Raises ParameterError, naming `key`, where they cannot be written, or a script of that name is another file's.
-    """
-    path = Path(path)
-    is_file = not is_standard_output(path) and (os.path.isfile(path) or not os.path.exists(path))
-    require(is_file, key, str(path), "is no regular file, and its script needs a folder")
-    path = path if path.suffix == ".mat" else path.with_name(path.name + ".mat")
-    script = path.with_name(f"load_{re.sub(r'[^A-Za-z0-9_]', '_', path.stem)}.m")
-    text = ""
-    with suppress(OSError):  # a file that cannot be read is not ours
-        text = script.read_text("utf-8", errors="replace") if script.is_file() else ""
-    is_ours = not os.path.exists(script) or (WRITTEN_BY in text and _loads(path) in text)
-    remedy = f"{script.name} in that folder is not its script and would be replaced; choose another name"
-    require(is_ours, key, str(path), remedy)
-    write_file(script, _script(reduced, path).encode(), key=key)
-    write_mat(path, _contents(reduced), key=key, oned_as="row")
-    return path, script
-
-
-def _loads(path: Path) -> str:
-    """Return the line of the script that loads its file."""
-    file = path.name.replace("'", "''")
-    return f"data = load(fullfile(here, '{file}'));"
-
-
-def _contents(reduced: ReducedModel) -> dict[str, Any]:
-    """Return the variables of the MATLAB file."""
-    model = reduced.model
-    omega = np.geomspace(*reduced.band, MAT_POINTS)
-    omega = omega[distance(omega, frequencies_around(model.arm, reduced.band[1])) > CLEAR_OF_POLES * omega]
-    response = transfer(model.arm, model.rows, x=model.x)(1j * omega)
-    return {
-        **reduced.named_matrices,
-        "omega": omega,
-        "response": response[:, None, :],
-        "input_name": np.array([model.input], dtype=object),
-        "output_names": np.array(model.outputs, dtype=object),
-        "state_names": np.array(model.states, dtype=object),
-        "name": reduced.name,
-        "worst_error": reduced.worst_error,
-        "band": np.array(reduced.band),
-    }
-
-
-def _script(reduced: ReducedModel, path: Path) -> str:
-    """Return the MATLAB script."""
-    name = reduced.name.replace("'", "''")
-    low, high = reduced.band
-    return f"""% {reduced.name}{WRITTEN_BY}
-% sys:   the reduced model (ss), worst |dG| / (|G| + |w dG/dw|) {reduced.worst_error:.3g} over {low:g} to {high:g} rad/s
-% exact: the exact frequency response (frd) over that band
-here = fileparts(mfilename('fullpath'));
-{_loads(path)}
-sys = ss(data.A, data.B, data.C, data.D, ...
-    'InputName', data.input_name, 'OutputName', data.output_names, 'StateName', data.state_names);
-exact = frd(data.response, data.omega, ...
-    'InputName', data.input_name, 'OutputName', data.output_names);
-sys.Name = '{name}';
-exact.Name = '{name}, exact';
-clear here data
-"""

@@ -4,10 +4,8 @@ The sections of an arm's page in their order, its page by templates, the index, 
 """
 
 import hashlib
-import os
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -17,9 +15,9 @@ from tfarm.arm import Arm
 from tfarm.case import Comparison
 from tfarm.digits import how_many
 from tfarm.dsp import Chain
-from tfarm.errors import ParameterError, TfarmError, must_be_known, one_line, require
+from tfarm.errors import TfarmError, must_be_known, one_line, require
 from tfarm.exact.outputs import signal_words
-from tfarm.files import temporary_folder
+from tfarm.files import move_into, place_in
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.plots import studies
@@ -63,7 +61,6 @@ from tfarm.report.sampled_section import sampled_section
 from tfarm.report.trust import TRUST_FOLDER, gather, save_proof, write_trust, written_proofs
 from tfarm.report.tuner_section import tuner_section
 from tfarm.schema import Column, quantities, table, text
-from tfarm.stopping import undone_if_stopped
 from tfarm.studies.study import Study
 
 ReportProgress = Callable[[int, int, str], object]
@@ -73,6 +70,8 @@ WORTH_A_PROCESS = 8  # pieces for which a second process, which takes a second o
 EVIDENCE, SCRIPTS = "method and proofs", "scripts of the live pages"  # tasks of no arm
 LOOP_TASK, SAMPLED_TASK = "continuous loop", "sampled loop"  # each of sections that share a design or damped modes
 LONGEST = (SAMPLED_TASK, LOOP_TASK, EVIDENCE)  # tasks of five seconds and more, which are begun first
+EXPORTS = "export"  # folder in that of an arm, to whose files its pages lead
+EXPORTED = [f"{of}{end}" for of in ("controller", "tuner", "plant", "loop") for end in (".h", ".fmu", ".mat", ".py")]
 TRUST_PAGE, COMPARISON_PAGE = f"{TRUST_FOLDER}/index.html", "compare.html"
 RESERVED_NAMES = {  # of folders that no arm may have
     "index.html", "readme.md", "pictures", "bench.json", TRUST_FOLDER, "data", COMPARISON_PAGE, "compare.json", ASSETS,
@@ -192,7 +191,7 @@ def write(
     cases = [Case(arm, chain, tuple(own), fit, tuple(measured), paper) for arm, chain, own, fit in each]
     for case in cases:
         check_laws(case)
-    with _temporary(out, "out", names + [TRUST_FOLDER, ASSETS] * (not only)) as place:
+    with place_in(out, "out", names + [TRUST_FOLDER, ASSETS] * (not only)) as place:
         sections = _written(cases, out, place, only, progress)
     for name, section in sections:
         if section.failure and notice is not None:
@@ -209,35 +208,6 @@ def _check(names: Sequence[str], only: tuple[str, ...]) -> None:
     for name in names:
         require(name.casefold() not in taken, "name", name, taken.get(name.casefold(), ""))
         taken[name.casefold()] = "two arms of this name would share one folder; give one of them another name"
-
-
-@contextmanager
-def _temporary(out: Path, key: str, names: Sequence[str] = ()) -> Iterator[Path]:
-    """A temporary folder in `out`, gone afterwards; what was made for it goes too if the work fails.
-
-    Raises ParameterError, naming `key`, before any work where `out` or a folder of these names in it cannot be written.
-    """
-    folders = [out, *(out / name for name in names)]
-    missing = [part for folder in folders for part in (*reversed(folder.parents), folder) if not part.exists()]
-
-    def remove_empty() -> None:
-        for folder in reversed(missing):
-            with suppress(OSError):
-                folder.rmdir()
-
-    try:
-        with undone_if_stopped(remove_empty):
-            for folder in folders:
-                folder.mkdir(parents=True, exist_ok=True)
-                with temporary_folder(folder):  # which fails where it cannot be written to
-                    pass
-            with temporary_folder(out) as place:
-                yield place
-    except OSError as error:
-        remedy = f"cannot be written to ({error.strerror or error}); give a folder that can"
-        raise ParameterError(key=key, value=str(out), remedy=remedy) from None
-    finally:
-        remove_empty()
 
 
 def _written(
@@ -306,14 +276,6 @@ def _in_turn(calls: Sequence[Callable[[], Any]]) -> list[Any]:
     return [call() for call in calls]
 
 
-def move_into(made: Path, folder: Path) -> None:
-    """Every file replaced in one step each, pages last, so that a page never names a file that is not there."""
-    files = [file.relative_to(made) for file in made.rglob("*") if file.is_file()]
-    for file in sorted(files, key=lambda file: (file.suffix == ".html", file.as_posix())):
-        (folder / file).parent.mkdir(parents=True, exist_ok=True)
-        os.replace(made / file, folder / file)
-
-
 # ------------------------------------------------------------ an arm's page
 
 
@@ -357,6 +319,8 @@ def navigation(arm: Arm, own: Sequence[tuple[str, str]], trust: str, folder: Pat
     """(file, title) of all that a page of an arm leads to."""
     compared = kept_comparison(folder.parent)
     more = [(f"../{COMPARISON_PAGE}", compared["title"])] if arm.name in compared["arms"] else []
+    files = [f"{EXPORTS}/{name}" for name in EXPORTED if (folder / EXPORTS / name).is_file()]
+    more += [(file, f"Exported: {Path(file).name}") for file in files]
     return [("../index.html", "All arms"), *own, *more, *([(f"../{trust}", "Method and proofs")] if trust else [])]
 
 
@@ -400,7 +364,7 @@ def write_comparison(found: Comparison, out: Path) -> Path:
         (of, getattr(found, name)) for name, of in quantities(Comparison).items() if of.label and name != "is_sampled"
     )
     first, *tables = (sheet("compared", table(each), stem=f"compare-{of.key}", of=of) for of, each in rows)
-    with _temporary(out, "--out") as made:
+    with place_in(out, "--out") as made:
         saved = save_section(
             PageSection(words=[prose("comparison", found=found)], blocks=[first, drawn, *tables]), made
         )
@@ -424,7 +388,7 @@ def write_study(found: Study) -> Path:
     Raises ParameterError where it cannot be written.
     """
     folder = found.parts.folder
-    with _temporary(folder, "--out") as made:
+    with place_in(folder, "--out") as made:
         sections = [save_section(each, made) for each in study_sections(found)]
         title = f"{found.arm}: study of {how_many(found.rows, 'arm')}"
         page = render("study.html", title=title, sections=sections, explained=explained, found=found)

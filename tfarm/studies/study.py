@@ -33,7 +33,7 @@ from tfarm.arrays import Real
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual, file_text, load_chain
 from tfarm.errors import ParameterError, must_be_known, naming, require
-from tfarm.files import mat_bytes, write_file
+from tfarm.files import mat_content, write_file
 from tfarm.fitting.posterior import load_posterior
 from tfarm.processes import shared
 from tfarm.records import record
@@ -296,7 +296,7 @@ def files_of(arm: Arm, law: AnyLaw, chain: Chain, declared: Mapping[str, Any]) -
         text = law_toml(own)
     except ParameterError:  # of a state space: it has no text
         columns = (*own.signals, *own.wanted)
-        files[MATRICES] = mat_bytes(dict(zip("ABCD", own.matrices(columns), strict=True)))
+        files[MATRICES] = mat_content(dict(zip("ABCD", own.matrices(columns), strict=True)), "column")
         head = {key: getattr(own, key) for key, usual in LAW_DEFAULTS.items() if getattr(own, key) != usual}
         table = {"name": own.name, **head, "sign": -1, "matrices": MATRICES, "signals": columns}
         text = toml_text(toml_tables(table, "law"))

@@ -306,13 +306,25 @@ def _moving(loops: list[Sampled], best_constant: float) -> Guard | None:
         return None
     radii = np.array([model.radius(m) for model in models])
     half = RADIUS_SHARE * float(radii.min())
-    lo, hi = max(0.0, m - half), m + half
-    proofs = [model.proof(lo, hi) for model in models if half >= NARROWEST_SECTOR]
-    proven = tuple(filter(None, proofs))
+    return _certified(models, max(0.0, m - half), m + half, m) if half >= NARROWEST_SECTOR else None
+
+
+def sector_guard(loop: Sampled, lo: float, hi: float) -> Guard | None:
+    """Return the guard of a given sector [lo, hi] of time-varying gains, such as that of a saved tuner.
+
+    None where it is not certified in every model of the loop.
+    """
+    return _certified([MovingGain(each) for each in _larger(loop)], lo, hi, (lo + hi) / 2)
+
+
+def _certified(models: list[MovingGain], lo: float, hi: float, middle: float) -> Guard | None:
+    """The sector [lo, hi] with its proof in every model; settled where the widest around `middle` is."""
+    proven = tuple(filter(None, (model.proof(lo, hi) for model in models)))
     if len(proven) < len(models):
         return None
-    is_settled = _settled(loops, np.c_[m - radii, m + radii].tolist())
-    return Guard("time-varying", lo, hi, loops[-1].plant.count, is_settled, proven)
+    widest = [(middle - radius, middle + radius) for radius in (model.radius(middle) for model in models)]
+    loops = [model.loop for model in models]
+    return Guard("time-varying", lo, hi, loops[-1].plant.count, _settled(loops, widest), proven)
 
 
 def _middle(model: MovingGain, best_constant: float) -> float | None:

@@ -326,10 +326,10 @@ def save_tuner(tuner: SavedTuner, path: Path) -> None:
     write_file(path, to_text(tuner).encode(), key="--save")
 
 
-def load_tuner(path: str | os.PathLike[str]) -> SavedTuner:
+def load_tuner(path: str | os.PathLike[str], key: str = "controller") -> SavedTuner:
     """Read the tuner of a file.  Raises ParameterError, in one line, for the first problem of the file."""
     what = "a tuner's file of tfarm tune ARM --save FILE.json"
-    found = validated_file(SavedTuner, path, MOST_TUNER_BYTES, key="controller", what=what)
+    found = validated_file(SavedTuner, path, MOST_TUNER_BYTES, key=key, what=what)
     with naming(path):
         found.gain()  # refuses parts that do not match
         Cost(a=found.a, b=found.b)

@@ -1,0 +1,62 @@
+"""Laws and chains of exported controllers, and the parts of an export that tests compare."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import tfarm
+from tfarm.arm.law import arm_and_law
+from tfarm.arm.law_tables import load_law
+from tfarm.dsp import Actuator, Chain, Converters, Sampling, load_chain
+from tfarm.exported.controller import controller_of, in_z
+from tfarm.exported.result import ExportTask
+from tfarm.exported.word_length import least_noise
+
+LAB = tfarm.load("sasaki2012-lab")
+RIG = Path(__file__).parents[1] / "data" / "quanser-2dsfl"
+GAINS = tfarm.HubFeedback(K1=0.3, K2=0.3)
+PI = tfarm.Law(  # an integral of the hub angle, a filtered moment, whole samples of delay
+    {"hub_angle": ([0.3, 1.0, 0.2], [0.02, 1.0, 0.0]), "hub_rate": 0.3, "root_moment": ([0.2], [0.01, 1.0])},
+    references=("hub_angle", "hub_rate"), delay=0.02, name="PI */ \\ of the hub",
+)  # fmt: skip
+NOTCH = tfarm.Law(
+    {"hub_rate": ([0.2 * 1, 0.2 * 2, 0.2 * 5000], [1.0, 80.0, 5000.0]), "root_moment": 0.2}, references=("hub_rate",)
+)
+IDEAL = Chain(sampling=Sampling(period=0.01))
+REAL = Chain(
+    sampling=Sampling(period=0.01), actuator=Actuator(torque_limit=1.5),
+    converters=Converters(encoder_counts=8192, hub_rate="difference", rate_filter=200.0, moment_bits=12,
+                          moment_range=2.0, torque_bits=12, torque_range=2.0),
+)  # fmt: skip
+RANGES = {"hub_angle": 3.0, "hub_rate": 10.0, "root_moment": 2.0, "output": 2.0}
+CASES = {  # arm, law, chain
+    "gains": (LAB, GAINS, IDEAL),
+    "integral": (LAB, PI, IDEAL),
+    "notch": (LAB, NOTCH, replace(REAL, converters=replace(REAL.converters, hub_rate="ideal"))),
+    "estimate": (LAB, GAINS, REAL),
+}
+
+
+def task_of(case, precision="double", **others):
+    """The task of a case of `CASES`, or of an arm, a law and a chain."""
+    arm, law, chain = CASES[case] if isinstance(case, str) else case
+    ranges = {name: size for name, size in RANGES.items() if precision == "q31"} | others.pop("ranges", {})
+    if precision == "q31":
+        names = {*tfarm.arm.as_law(law).signals, "output"}
+        ranges = {name: size for name, size in ranges.items() if name in names}
+    return ExportTask(
+        arm=arm, given=law, chain=chain, what="controller", form="c", precision=precision, ranges=ranges, **others
+    )
+
+
+@cache
+def hinf():
+    """The H-infinity controller of the rig, its arm with the controller's input, and its chain."""
+    arm, law = tfarm.load(RIG / "rig.toml"), load_law(RIG / "hinf.toml")
+    return arm_and_law(arm, law)[0], law, load_chain(RIG / "chain.toml")
+
+
+def realised(task):
+    """The realised controller of a task, and its exact sampled loop."""
+    loop = tfarm.sampled(task.arm, task.law, task.chain).verdict.loop
+    return controller_of(least_noise(in_z(task.law, task.chain), loop)[0], task), loop

@@ -1,0 +1,211 @@
+"""The MATLAB file and its script: variables, names, a run under Octave, hostile names, the road of `reduce --mat`."""
+
+import io
+import os
+import re
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.io
+
+import tfarm
+from tests import hostile
+from tests.octave import left_by_octave
+from tests.shell import run
+from tfarm import HubFeedback, Law, ParameterError
+from tfarm.arm.law_tables import law_of_table
+from tfarm.dsp import Actuator, Chain
+from tfarm.dsp.scenarios import scenario
+from tfarm.dsp.simulate import Simulator
+from tfarm.exported.systems import save_mat
+from tfarm.reduced import reduce
+from tfarm.response.signals import Signals
+
+LAB = tfarm.load("sasaki2012-lab")
+LAW = HubFeedback(K1=0.3, K2=0.3)
+STUBS = {  # of the control package, which a machine may have or not
+    "ss": "function s = ss(A, B, C, D, T, varargin)\n  s = struct('A', A, 'B', B, 'C', C, 'D', D, 'T', T);\n"
+    "  s.names = {varargin{2:2:end}};\nend\n",
+    "frd": "function s = frd(H, w, varargin)\n  s = struct('H', H, 'w', w);\nend\n",
+}
+
+
+@pytest.fixture(scope="module")
+def reduced():
+    return reduce(tfarm.load("sasaki2012"), ["root_moment", "hub_rate"], order=10)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, reduced):
+    """Each export of one loop, and the file of a reduced model."""
+    folder = tmp_path_factory.mktemp("mat")
+    for what in ("plant", "controller", "loop"):
+        tfarm.export(LAB, LAW, what=what, form="mat", folder=folder)
+    save_mat(reduced, folder / "my-arm.mat")
+    save_mat(reduced, folder / "it's.mat")
+    return folder
+
+
+def test_mat_file_and_its_script(reduced, folder):
+    data, text = scipy.io.loadmat(folder / "my-arm.mat", squeeze_me=True), (folder / "load_my_arm.m").read_text()
+    for name, matrix in zip("ABCD", reduced.matrices(), strict=True):
+        np.testing.assert_array_equal(data[name], matrix.squeeze())
+    assert list(data["output_names"]) == ["root_moment", "hub_rate"]
+    assert len(data["state_names"]) == 10
+    w = data["omega"]
+    np.testing.assert_array_equal(data["response"], tfarm.transfer(reduced.arm, reduced.outputs)(1j * w))
+    assert "data = load(fullfile(here, 'my-arm.mat'));" in text
+    used = set(re.findall(r"\b(?:data|this_system)\.(\w+)", text))
+    assert used <= set(data)
+    assert {"A", "B", "C", "D", "omega", "response"} <= used
+
+
+def test_the_file_of_a_loop_has_every_system_and_the_exact_response(folder):
+    data = scipy.io.loadmat(folder / "loop.mat", squeeze_me=True)
+    names = [name for name, value in data.items() if getattr(value, "dtype", np.dtype(float)).names]
+    assert names == ["controller", "plant", "reduced"]
+    exact = Signals(LAB, tuple(data["exact_outputs"])).values(1j * data["omega"])
+    np.testing.assert_array_equal(data["response"], exact)
+    assert list(data["exact_outputs"]) == list(data["plant"]["output_names"].item())
+    assert float(data["reduced"]["worst_error"]) < 1e-10
+    assert (float(data["period"]), float(data["reduced"]["period"])) == (0.01, 0.0)
+
+
+def test_the_exact_arm_of_a_file_has_the_analog_damping_of_the_actuator(tmp_path):
+    """It is friction of the hub."""
+    chain, braked = Chain(actuator=Actuator(hub_damping=0.02)), replace(LAB, hub=replace(LAB.hub, friction=0.02))
+    tfarm.export(LAB, LAW, what="plant", form="mat", folder=tmp_path, chain=chain)
+    data = scipy.io.loadmat(tmp_path / "plant.mat", squeeze_me=True)
+    exact = Signals(braked, tuple(data["exact_outputs"])).values(1j * data["omega"])
+    np.testing.assert_array_equal(data["response"], exact)
+    assert "single1" in list(data["reduced"]["state_names"].item())  # the rate that friction brings to rest
+
+
+@pytest.mark.parametrize("what", ["plant", "controller", "loop"])
+def test_same_inputs_same_bytes(what, folder, tmp_path):
+    made = tfarm.export(LAB, LAW, what=what, form="mat", folder=tmp_path)
+    assert made.files == (f"{what}.mat", f"load_{what}.m")
+    for name in made.files:
+        assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
+
+
+def test_a_controller_is_read_again_as_a_law(folder):
+    """By `matrices = ` of a law's file; the sign is that of the input."""
+    columns = ["hub_angle", "hub_rate", "root_moment"]
+    table = {"matrices": "controller.mat", "period": 0.01, "sign": 1}
+    law = law_of_table(table | {"signals": columns + [f"reference:{name}" for name in columns]}, folder)
+    first, second = (tfarm.sampled(LAB, each) for each in (law, LAW))
+    assert first.verdict.log_radius == pytest.approx(second.verdict.log_radius, rel=1e-9)
+    inner = law_of_table(
+        table | {"matrices": "loop.mat", "system": "controller", "signals": list(law.parts[0].signals)}, folder
+    )
+    assert inner == law
+
+
+def test_octave_has_the_loop_of_the_simulation(folder):
+    """A slew of the loop by its matrices in Octave is the simulated one; the reduced model is within its error."""
+    task = scenario("slew", LAB, Chain(), 0.5)
+    drive = np.array([task.feedforward, *task.references.values()])
+    scipy.io.savemat(folder / "drive.mat", {"drive": drive})
+    code = (
+        "load_it_s; load_my_arm; load_plant; load_controller; load_loop; load drive.mat; "
+        "x = zeros(size(data.A, 1), 1); y = []; "
+        "for u = drive, y = [y, data.C * x + data.D * u]; x = data.A * x + data.B * u; end; r = data.reduced; G = []; "
+        "for w = data.omega(1:50:end), G = [G, r.C * ((1i * w * eye(size(r.A, 1)) - r.A) \\ r.B) + r.D]; end; "
+        "clear data r"
+    )
+    left, printed = left_by_octave(folder, code)
+    torque = Simulator(LAB, Chain(), task, LAW).run().torque
+    assert left["y"][-1] == pytest.approx(torque, rel=0, abs=1e-10 * abs(torque).max())  # 50 samples, 23 states
+    data = scipy.io.loadmat(folder / "loop.mat", squeeze_me=True)
+    exact, w = data["response"][:, ::50], data["omega"][::50]
+    slope = abs(np.gradient(data["response"], np.log(data["omega"]), axis=1)[:, ::50])
+    error = abs(left["G"] - exact) / (abs(exact) + slope)
+    assert error.max() < float(data["reduced"]["worst_error"]) + 1e-10  # rounding of the solution of order 42
+    assert w.size == 20
+    assert printed.count("no ss and frd are built") in (0, 5)  # 0 where the package is installed
+
+
+def test_octave_builds_each_system_with_its_names(folder, tmp_path):
+    for file in folder.iterdir():
+        shutil.copy(file, tmp_path)
+    for name, text in STUBS.items():
+        (tmp_path / f"{name}.m").write_text(text)
+    left, printed = left_by_octave(tmp_path, "load_loop; load_my_arm")
+    assert {"loop", "controller", "plant", "reduced", "sys", "exact"} <= set(left)
+    assert not {"here", "this_system"} & set(left)
+    assert "no ss" not in printed
+    inputs, outputs, states, name = left["plant"]["names"].item()
+    assert (inputs, outputs[0], states[0], name) == ("hub_torque", "hub_angle", "plant1", "sasaki2012-lab, sampled")
+    assert float(left["plant"]["T"]) == 0.01
+
+
+def test_hostile_names_stay_text(tmp_path):
+    """In comments, in character vectors, and in the variables of the file."""
+    arm = replace(LAB, name=hostile.NAME + "'; exit(7); %{ ... x")
+    law = Law({"hub_rate": 0.3, "moment@1e-1": 0.1}, name=hostile.TEXT + "'); exit(7) % \n exit(7)\n%}\n")
+    for what in ("controller", "loop"):
+        tfarm.export(arm, law, what=what, form="mat", folder=tmp_path)
+        text = (tmp_path / f"load_{what}.m").read_text("ascii")
+        assert str(scipy.io.loadmat(tmp_path / f"{what}.mat", squeeze_me=True)["name"]).isascii()
+        assert not [line for line in text.splitlines() if "exit" in line and not line.startswith("% ")]
+    for name, stub in STUBS.items():
+        (tmp_path / f"{name}.m").write_text(stub)
+    left, _ = left_by_octave(tmp_path, "load_controller; load_loop; went = 1")
+    assert left["went"] == 1
+    assert str(left["controller"]["names"].item()[-1]).startswith("<script>alert(1)</script>")
+
+
+def test_reduce_writes_the_same_file_to_a_name_and_to_standard_output(capfdbinary, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = ("reduce", "sasaki2012-lab", "--order", "6", "--mat")
+    with pytest.raises(SystemExit):
+        tfarm.cli.main([*words, "-"])
+    out, _ = capfdbinary.readouterr()
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(SystemExit):
+        tfarm.cli.main([*words, "arm"])
+    assert (tmp_path / "arm.mat").read_bytes() == out
+    assert scipy.io.loadmat(io.BytesIO(out))["A"].shape == (6, 6)
+    assert (tmp_path / "load_arm.m").exists()
+
+
+@pytest.mark.parametrize("name", ["none/a.mat", "a" * 300, "b" * 252])
+def test_a_folder_that_is_not_there_and_a_name_that_is_too_long(reduced, tmp_path, name):
+    with pytest.raises(ParameterError, match=r"cannot be written|printable ASCII"):
+        save_mat(reduced, tmp_path / name)
+
+
+@pytest.mark.parametrize("name", ["Prüfstand.mat", "a\nexit(7).mat", "a\\b.mat"])
+def test_a_name_that_a_script_cannot_contain(reduced, tmp_path, name):
+    with pytest.raises(ParameterError, match="printable ASCII"):
+        save_mat(reduced, tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_script_that_is_another_files_is_left_alone(reduced, tmp_path):
+    """load_a_b.m is the script of a-b.mat and would be that of a_b.mat; one written by hand belongs to no file."""
+    save_mat(reduced, tmp_path / "a-b.mat")
+    save_mat(reduced, tmp_path / "a-b.mat")
+    (tmp_path / "load_c.m").write_text("x = 1;\n")
+    before = {file: file.read_bytes() for file in tmp_path.iterdir()}
+    for name in ("a_b.mat", "c.mat"):
+        with pytest.raises(ParameterError, match="is not its script"):
+            save_mat(reduced, tmp_path / name)
+    assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+
+def test_a_matlab_file_goes_to_no_pipe(reduced, tmp_path):
+    os.mkfifo(tmp_path / "pipe.mat")
+    with pytest.raises(ParameterError, match="no regular file"):
+        save_mat(reduced, tmp_path / "pipe.mat")
+    assert [file.name for file in tmp_path.iterdir()] == ["pipe.mat"]
+
+
+def test_the_command_writes_both_files_and_names_the_loop(capsys, tmp_path):
+    words = ("export", "sasaki2012-lab", "--what", "loop", "--as", "mat", "--out", str(tmp_path))
+    code, out, err = run(capsys, *words)
+    assert (code, err.count("written: ")) == (0, 2)
+    assert "stable (certified" in out

@@ -1,0 +1,241 @@
+"""Realisations and bounds of finite word length, against sums, Lyapunov equations, fractions and whole numbers."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_discrete_lyapunov
+
+import tfarm
+from tests.exported.cases import GAINS, IDEAL, LAB, NOTCH, PI, REAL, realised, task_of
+from tfarm.errors import ParameterError
+from tfarm.exported.controller import c_controller, in_z
+from tfarm.exported.word_length import (
+    BALANCED,
+    SECTIONS,
+    absolute_sum,
+    around,
+    candidates,
+    gramians,
+    observed,
+    with_system_matrix,
+)
+
+SERVO = tfarm.Law(
+    {"hub_angle": ([6.0, 8.0], [0.02, 1.0]), "root_moment": ([0.1], [0.01, 1.0])}, references=("hub_angle",)
+)
+
+LAG = tfarm.Law({"hub_rate": ([0.3], [0.02, 1.0]), "root_moment": ([0.1], [0.01, 1.0])}, references=("hub_rate",))
+UNSTABLE = tfarm.HubFeedback(K1=0.3, K2=30.0)
+
+
+def exact_loop(law, chain=IDEAL, arm=LAB):
+    return in_z(tfarm.arm.as_law(law), chain), tfarm.sampled(arm, law, chain).verdict.loop
+
+
+@pytest.mark.parametrize("law", [SERVO, PI, NOTCH])
+def test_every_realisation_has_the_transfer_functions_of_the_law(law):
+    given, loop = exact_loop(law)
+    z = np.exp(1j * np.linspace(0.05, 3.1, 40))
+    names = []
+    for gain, S in candidates(given, loop):
+        n = given.order
+        A, B, C, D = S[:n, :n], S[:n, n:], S[n:, :n], S[n:, n:]
+        names.append(gain.realisation)
+        own = np.stack([C @ np.linalg.solve(each * np.eye(len(A)) - A, B) + D for each in z])[:, 0]
+        assert abs(own.T - given.values(z)).max() <= 1e-11 * abs(own).max()
+    assert {SECTIONS, BALANCED} < set(names)
+
+
+def test_noise_gains_are_those_of_lyapunov_equations():
+    """Of a stable loop without a free hub angle; the balanced realisation has the same variances on both sides."""
+    given, loop = exact_loop(SERVO)
+    for gain, S in candidates(given, loop):
+        law = with_system_matrix(given, S)
+        of = around(law, loop)
+        K = solve_discrete_lyapunov(of.matrix, of.of_signals @ of.of_signals.T)
+        W = solve_discrete_lyapunov(of.matrix.T, np.outer(of.output, of.output))
+        k, w, variance = np.diag(K)[of.states], np.diag(W)[of.states], of.output @ K @ of.output
+        assert gain.gain == pytest.approx(k @ w / variance, rel=1e-6)
+        if gain.realisation == BALANCED:
+            assert k / variance == pytest.approx(w, rel=1e-6)
+            K, W = gramians(of)
+            assert abs(K - np.diag(np.diag(K))).max() <= 1e-9 * abs(K).max()
+
+
+def test_the_variance_of_roundings_is_that_of_a_simulated_loop():
+    """White noise added to each state of the realised law, of the size of its standard deviation under the signals."""
+    given, loop = exact_loop(SERVO)
+    of = around(given, loop)
+    K, _ = gramians(of)
+    rng, steps = np.random.default_rng(5), 200_000
+    x, u = np.zeros(len(of.matrix)), np.empty(steps)
+    push = of.of_rounding[:, :-1] * np.sqrt(np.diag(K))
+    noise = rng.normal(size=(steps, push.shape[1])) @ push.T
+    for k in range(steps):
+        u[k] = of.output @ x
+        x = of.matrix @ x + noise[k]
+    ((gain, _), *_) = candidates(given, loop)
+    assert u.var() == pytest.approx(gain.gain, rel=0.1)  # 200,000 samples of a time constant of some 60
+
+
+def test_the_bound_of_a_sum_holds_and_is_near():
+    """Complex pairs near the circle, where single terms are small by chance; an integrator has none for all samples."""
+    rng = np.random.default_rng(2)
+    for radius in (0.5, 0.9, 0.99):
+        q = rng.normal(size=(4, 4))
+        M = radius * np.linalg.solve(q, np.diag([1, 0.3, -0.7, 0.99]) @ q)
+        left, right = rng.normal(size=(2, 4)), rng.normal(size=(4, 3))
+        bound, is_whole = absolute_sum(M, left, right)
+        long = sum(abs(left @ np.linalg.matrix_power(M, k) @ right) for k in range(4000))
+        assert is_whole
+        assert (bound >= long * (1 - 1e-12)).all()
+        assert bound == pytest.approx(long, rel=0.01)
+    assert not absolute_sum(np.eye(1), np.eye(1), np.eye(1))[1]
+
+
+@pytest.mark.parametrize("precision", ["double", "float", "q31"])
+@pytest.mark.parametrize("law", [NOTCH, LAG])
+def test_errors_and_states_stay_within_their_bounds_under_the_worst_inputs(law, precision):
+    """Inputs at the ends of their ranges with the signs of the response; exact arithmetic in fractions."""
+    controller, _ = realised(task_of((LAB, law, IDEAL), precision, ranges={"root_moment": 2.0}))
+    word = controller.word
+    bounds, is_whole, error = word.bounds
+    assert is_whole
+    A, B, C, _ = word.law.parts[0].block.matrices()
+    n, steps = len(A), 300
+    response = [np.vstack([C, np.eye(n)]) @ np.linalg.matrix_power(A, k) @ B for k in range(steps)]
+    reached = np.zeros(n)
+    for row in range(n + 1):
+        e = np.array([np.sign(response[steps - 1 - k][row]) for k in range(steps)]) * word.sizes
+        inputs = np.zeros((steps + 1, controller.inputs))
+        for j, (reference, source) in enumerate(controller.plan.tolist()):
+            shares = (-0.5, 0.5) if reference < controller.inputs else (-1.0, 0.0)
+            inputs[:-1, source] = shares[0] * e[:, j]
+            if reference < controller.inputs:
+                inputs[:-1, reference] = shares[1] * e[:, j]
+        scale = np.ones(controller.inputs)
+        if precision == "q31":
+            scale[:] = [
+                *(word.ranges[list(word.law.signals).index(s)] for s in (*controller.signals, *controller.references)),
+                word.output,
+            ]
+            inputs = np.clip(np.rint(inputs / scale * 2.0**31), -(2**31), 2**31 - 1)
+            scale *= 2.0**-31
+        elif precision == "float":
+            inputs = inputs.astype(np.float32).astype(float)
+        outputs, _ = controller.run(inputs)
+        exact, largest = in_fractions(word, controller, inputs, scale)
+        unit = Fraction(word.output) / 2**31 if precision == "q31" else 1
+        if precision == "q31":
+            exact = [min(max(each, -unit * 2**31), unit * (2**31 - 1)) for each in exact]
+        differences = [abs(Fraction(own) * unit - truth) for own, truth in zip(outputs.tolist(), exact, strict=True)]
+        assert max(differences) <= error
+        if row:
+            reached[row - 1] = largest[row - 1]
+    assert (reached <= bounds * (1 + 1e-9)).all()
+    assert (reached >= 0.95 * bounds).all()
+
+
+def in_fractions(word, controller, inputs, scale):
+    """u of the law before rounding, and the largest size of each state, with 60 digits less than exact."""
+    A, B, C, D = ([[Fraction(x) for x in row] for row in each.tolist()] for each in word.law.parts[0].block.matrices())
+    x, out, largest = [Fraction(0)] * len(A), [], np.zeros(len(A))
+    for row in inputs.tolist():
+        row = [Fraction(each) * Fraction(of) for each, of in zip(row, scale.tolist(), strict=True)]
+        e = [[*row, None, 0][minuend] - row[subtrahend] for minuend, subtrahend in controller.plan.tolist()]
+        out.append(row[-1] + sum(map(Fraction.__mul__, C[0], x)) + sum(map(Fraction.__mul__, D[0], map(Fraction, e))))
+        x = [
+            sum(map(Fraction.__mul__, A[i], x)) + sum(map(Fraction.__mul__, B[i], map(Fraction, e)))
+            for i in range(len(A))
+        ]
+        x = [Fraction(round(each * 2**200), 2**200) for each in x]
+        largest = np.maximum(largest, [abs(float(each)) for each in x])
+    return out, largest
+
+
+@pytest.mark.parametrize("law", [SERVO, NOTCH, GAINS])
+def test_a_limit_cycle_in_fixed_point_stays_within_its_bound(law):
+    """The closed loop with whole numbers in the controller, from a start off its rest, once it has decayed."""
+    controller, loop = realised(task_of((LAB, law, IDEAL), "q31"))
+    word = controller.word
+    bound = word.limit_cycle(loop)
+    A, B, C = loop.pulse.matrices()
+    n, table = word.law.order, word.table
+    a, b, c, d = (each.tolist() for each in (table[:n, :n], table[:n, n:], table[n:, :n], table[n:, n:]))
+    shift, R, U = word.shifts.tolist(), word.ranges, word.output
+    reads = [loop.in_z.signals.index(name) for name in word.law.signals]
+    plant, x, seen = np.random.default_rng(1).normal(size=len(A)) * 1e-6, [0] * len(a), []
+    plant[loop.pulse.integrals_at] = 0.0
+    for _ in range(6000):
+        e = [-round(each) for each in (C[reads] @ plant) / R * 2.0**31]
+        sums = [sum(map(int.__mul__, a[i], x)) + sum(map(int.__mul__, b[i], e)) for i in range(len(a))]
+        u = (sum(map(int.__mul__, c[0], x)) + sum(map(int.__mul__, d[0], e)) + (1 << (shift[-1] - 1))) >> shift[-1]
+        x = [(each + (1 << (s - 1))) >> s for each, s in zip(sums, shift, strict=False)]
+        plant = A @ plant + B * (u * U / 2.0**31)
+        seen.append(u * U / 2.0**31)
+    assert bound is not None
+    assert max(map(abs, seen[-1000:])) <= bound
+    assert max(map(abs, seen[:10])) > bound
+    assert law is not SERVO or max(map(abs, seen[-1000:])) >= bound / 1000
+
+
+def test_a_pole_that_no_output_shows_is_left_out():
+    M, left = np.array([[1.0, 0.3], [0.0, 0.5]]), np.array([[0.0, 1.0]])
+    kept = observed(M, left)
+    assert max(abs(np.linalg.eigvals(kept))) == pytest.approx(0.5)
+    for k in range(6):
+        assert left @ np.linalg.matrix_power(kept, k + 1) == pytest.approx(left @ np.linalg.matrix_power(M, k + 1))
+    assert (observed(M, np.eye(2)) == M).all()
+
+
+def test_an_integral_can_overflow_and_a_servo_cannot():
+    found = c_controller(task_of("integral", "q31")).details
+    assert found.overflow == "not excluded"
+    assert found.samples == 20_000
+    found = c_controller(task_of((LAB, SERVO, IDEAL), "q31")).details
+    assert found.overflow.startswith("excluded")
+    assert found.samples is None
+    assert max(found.largest_states) < 1
+
+
+@pytest.mark.parametrize(
+    ("task", "error"),
+    [
+        (task_of((LAB, GAINS, IDEAL), "q31", ranges={"root_moment": -1.0}), "range.root_moment = -1.0: the largest"),
+        (task_of("gains", ranges={"tip": 1.0}), "range = 'tip': known are: hub_rate, root_moment, output"),
+        (replace(task_of("gains"), precision="q31", ranges={"hub_rate": 1.0}), "range = 'root_moment': q31 needs"),
+        (replace(task_of("gains", "q31"), ranges={"hub_rate": 1.0, "root_moment": 1.0}), "range = 'output': q31 needs"),
+        (task_of((LAB, GAINS, REAL), "q31"), 'converters.hub_rate = \'difference\': with q31 the hub rate is an input'),
+        (task_of((LAB, replace(PI, delay=0.015), IDEAL)), "law.delay = 0.015: is 1.5 samples: C code has a delay"),
+        (task_of((LAB, UNSTABLE, IDEAL)), "law = 'gains at the hub': the sampled loop is not certified stable"),
+        (task_of((LAB, tfarm.Law({"hub_rate": 0.3, "root_moment": 1e-50}), IDEAL), "float"),
+         r"ABCD\[0\]\[1\] = 1e-50: this coefficient is beyond the numbers of float32"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_exported_is_refused_in_one_line(task, error):
+    with pytest.raises(ParameterError, match=error) as caught:
+        c_controller(task)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_coefficient_whose_rounding_destabilises_the_loop_is_named():
+    """A gain next to the end of its interval, which rounding to float32 moves beyond it."""
+    K2 = None
+    for rate in np.linspace(0.3, 0.31, 40):
+        end = tfarm.sampled(LAB, tfarm.HubFeedback(K1=float(rate), K2=0.3), IDEAL).interval("K2")[1]
+        if float(np.float32(end * (1 - 1e-9))) > end * (1 + 2e-9):
+            K2, K1 = end * (1 - 1e-9), float(rate)
+            break
+    assert K2 is not None
+    law = tfarm.HubFeedback(K1=K1, K2=K2)
+    assert tfarm.sampled(LAB, law, IDEAL).verdict.is_stable
+    with pytest.raises(ParameterError, match=r"ABCD\[0\]\[1\] = 1.\d+: rounded to float the loop is not certified"):
+        c_controller(task_of((LAB, law, IDEAL), "float"))
+
+
+def test_a_loop_that_is_not_certified_is_exported_anyway_and_the_header_warns():
+    found = c_controller(task_of((LAB, UNSTABLE, IDEAL), anyway=True))
+    assert b"warning: NOT CERTIFIED STABLE; exported by --anyway" in found.contents["controller.h"]
+    assert found.verdict.startswith("unstable")

@@ -1,0 +1,174 @@
+"""Exported tuners: C against Python bit for bit, the simulated slew against tfarm's own tuner, and the time of a step.
+
+    python -m tests.exported.tuners SIZE SEED
+
+SIZE random tuners in double and in float, 1e6 samples of C and Python in all; a compiler that is not installed is named
+in a printed line.  A fifth as many slews of random arms, under a guard of their own.
+"""
+
+import shutil
+import tempfile
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+import tfarm
+from tests import survey
+from tests.exported.compilers import COMPILERS, build, pumped, run
+from tests.survey import Finding
+from tests.tuner.bounded import some_trial
+from tfarm.errors import CertificationError, ConvergenceError
+from tfarm.exported.tuner_code import ExportedTuner
+from tfarm.tuner import best_constant, find_guard
+from tfarm.tuner.trial import FORMAT, SavedTuner, to_text
+
+LEVELS = ("-O0", "-O2")
+PRECISIONS = ("double", "float")
+SAMPLES = 1_000_000  # of a survey
+SECTOR = (0.31, 0.63)  # proven on the laboratory arm with K1 = 0.3
+DIFFERENCE = {"double": 1e-13, "float": 1e-4}  # of a slew's torque, over its largest: the stated bound
+STEP_TIME = 500.0  # ns, for a network of 6-6-1
+CLOCK = """
+#include "tuner.h"
+#include <stdio.h>
+#include <time.h>
+
+int main(void)
+{
+    tuner_state state;
+    tuner_input input = { 0 };
+    tuner_number output, sum = 0;
+    clock_t begun = clock();
+    int k;
+    tuner_init(&state);
+    for (k = 0; k < 1000000; ++k) {
+        input.y_root_moment = (tuner_number)(k % 17 - 8);
+        input.r_hub_rate = (tuner_number)(k % 13 - 6);
+        tuner_step(&state, &input, &output);
+        sum += output;
+    }
+    printf("%g %g", 1e3 * (double)(clock() - begun) / CLOCKS_PER_SEC, (double)sum);
+    return 0;
+}
+"""
+
+
+@cache
+def has_program(name):
+    """Whether a program is installed; a missing one is named once."""
+    found = shutil.which(name) is not None
+    if not found:
+        print(f"{name} is not installed: its comparisons are left out")
+    return found
+
+
+def step_time(folder, compiler):
+    """Time of a step of an exported tuner at -O2 [ns], the least of five runs of 1e6 steps."""
+    (folder / "clock.c").write_text(CLOCK, encoding="ascii")
+    program = build(folder, compiler, "-O2", sources=("tuner.c", "clock.c"), out="clock")
+    return min(float(run(program).split()[0]) for _ in range(5))
+
+
+def some_tuner(rng, **changed):
+    """A random tuner: 6 or 7 inputs, 1 to 12 neurons, both readings, with a guard or without."""
+    inputs, hidden, is_free = int(rng.choice([6, 7])), int(rng.integers(1, 13)), bool(rng.random() < 0.3)
+    size = float(rng.choice([0.5, 5.0, 50.0]))
+    return SavedTuner(
+        format=FORMAT, arm="sasaki2012-lab", period=0.01, K1=0.3, Kp=float(rng.choice([0.0, 2.0])),
+        signals=str(rng.choice(["vibration", "total"])), a=1.0, b=2.6,
+        guard_kind="none" if is_free else "time-varying", guard=None if is_free else SECTOR,
+        scales=(10 ** rng.uniform(-2, 2, inputs)).tolist(),
+        W1=rng.normal(0, size, (hidden, inputs)).tolist(), w2=rng.normal(0, size, hidden).tolist(),
+    ).model_copy(update=changed)  # fmt: skip
+
+
+def some_inputs(rng, samples, tuner):
+    """Inputs of all sizes: quantised and clipped as by converters, zeros, and one in 200 that has to be refused."""
+    width = len(tuner.inputs)
+    rows = rng.normal(size=(samples, width)) * 10 ** rng.uniform(-8, 3, (samples, 1))
+    coarse = rng.random(samples) < 0.3
+    rows[coarse] = np.clip(np.round(rows[coarse] * 64) / 64, -8.0, 8.0)
+    rows[rng.random(rows.shape) < 0.05] = 0.0
+    odd = rng.random(rows.shape) < 0.005 / width
+    rows[odd] = rng.choice([np.nan, np.inf, -np.inf, 1e308, -1e308, 3e38, 5e-324], odd.sum())
+    odd = rng.random(samples) < 0.002
+    rows[odd] = rng.choice([-0.9, 0.9], (odd.sum(), width)) * float(tuner.numbers.largest)
+    return rows
+
+
+def is_equal(folder, tuner, rows, compiler, *options):
+    """Whether C and Python are equal to the last bit."""
+    tuner.reset()
+    torques, statuses = tuner.run(rows)
+    with np.errstate(over="ignore"):
+        rows = rows.astype(tuner.real)
+    torques_in_c, in_c = pumped(folder, "tuner", tuner.real, rows, compiler, *options)
+    return bool((in_c == statuses).all() and torques_in_c.tobytes() == torques.tobytes())
+
+
+def exported(folder, saved, precision="double", arm="sasaki2012-lab", **how):
+    """The files of a tuner in a folder, and its twin in Python."""
+    file = Path(folder) / "tuned.json"
+    file.write_text(to_text(saved), encoding="utf-8")
+    tfarm.export(
+        tfarm.load(arm) if isinstance(arm, str) else arm, what="tuner", form="c", folder=folder, tuned=file,
+        precision=precision, **how,
+    )  # fmt: skip
+    return ExportedTuner(saved, precision)
+
+
+def differences(trial, saved):
+    """Largest difference of the slew's torque under the exported tuner from tfarm's own, over its largest."""
+    simulator = trial.simulator()
+    own = saved.gain().run(simulator)
+    found = {}
+    for precision in PRECISIONS:
+        other = simulator.controller(ExportedTuner(saved, precision))
+        found[precision] = float(abs(other.torque - own.torque).max() / abs(own.torque).max())
+    return found
+
+
+def bits(size, seed):
+    """C against Python; `ns` is the time of a step of 6-6-1 at -O2."""
+    rng = np.random.default_rng(seed)
+    of_paper = {"W1": rng.normal(size=(6, 6)).tolist(), "w2": [0.3] * 6, "scales": [1.0] * 6}
+    for n in range(size):
+        saved = some_tuner(rng, **of_paper if n == 0 else {})
+        for precision in PRECISIONS:
+            with tempfile.TemporaryDirectory() as place:
+                folder = Path(place)
+                tuner = exported(folder, saved, precision, anyway=True)
+                rows = some_inputs(rng, SAMPLES // (2 * size), tuner)
+                for compiler in filter(has_program, COMPILERS):
+                    for level in LEVELS:
+                        equal = is_equal(folder, tuner, rows, compiler, level)
+                        words = "" if equal else f"{compiler} {level} {precision} {saved}"
+                        yield Finding("equal" if equal else "differs", words, not equal)
+                    if n == 0:
+                        time = step_time(folder, compiler)
+                        yield Finding("step", "", time > STEP_TIME, {f"ns, {precision}": time})
+
+
+def slews(size, seed):
+    """The simulated slew of random arms: exported tuner against tfarm's own."""
+    rng, made = np.random.default_rng(seed), 0
+    while made < max(1, size // 5):
+        trial = some_trial(rng)
+        try:
+            guard = find_guard(trial.loop, "time-varying", best_constant(trial).gain)
+        except (CertificationError, ConvergenceError):
+            continue
+        made += 1
+        servo = trial.loop.gains
+        saved = some_tuner(
+            rng, K1=servo.K1, Kp=servo.Kp, signals="vibration", period=trial.task.period,
+            guard_kind="time-varying", guard=(guard.lo, guard.hi),
+        )  # fmt: skip
+        found = differences(trial, saved)
+        wrong = [f"{name} {each:.2g}" for name, each in found.items() if not each <= DIFFERENCE[name]]
+        yield Finding("slew", f"{wrong} {trial.arm}" if wrong else "", bool(wrong), found)
+
+
+if __name__ == "__main__":
+    survey.main(bits, slews, size=20, seed=0)

@@ -1,0 +1,278 @@
+"""A sampled controller as C99: header, source, self-test and an example of a main loop.
+
+    e = reference - signal,  u = feedforward + C x + D e,  x = A x + B e
+
+in double, float or Q31, in the realisation with the least round-off noise, with the DAC, the limit of the actuator and
+the delay of the law as the simulation has them.  The loop is judged with the coefficients as they are exported.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Law
+from tfarm.arm.checks import positive
+from tfarm.arm.law import REFERENCE
+from tfarm.arrays import Real, Whole
+from tfarm.dsp.chain import Chain
+from tfarm.dsp.discretise import discretised
+from tfarm.dsp.kernel import DAC
+from tfarm.dsp.sampled import Sampled
+from tfarm.dsp.simulate import quantisers
+from tfarm.dsp.verdict import Analysis, sampled
+from tfarm.errors import ParameterError, must_be_known, require
+from tfarm.exact.outputs import OUTPUTS
+from tfarm.exported import twin
+from tfarm.exported.result import Export, ExportTask, Name, is_certified, names_of
+from tfarm.exported.texts import facts_of, identifiers, literal, name_in_c, render
+from tfarm.exported.word_length import (
+    FIXED,
+    FLOATS,
+    MOST_SUMMED,
+    OUTPUT,
+    NoiseGain,
+    Word,
+    around,
+    coefficient,
+    least_noise,
+    system_matrix,
+    with_system_matrix,
+    word_of,
+)
+from tfarm.records import record
+from tfarm.schema import Quantity
+
+NAME = "controller"  # of identifiers in C
+FILES = ("controller.h", "controller.c", "self_test.c", "example.c")
+RECORDED, REFUSED, SEED = 1000, 500, 1  # samples of the self-test, the one with a NaN, its first random number
+WHOLE_SAMPLE = 1e-9  # of a sample: rounding of a delay
+RATE, ANGLE, FEEDFORWARD = "hub_rate", "hub_angle", "feedforward"
+REAL = {"double": ("double", "", "DBL_MAX"), "float": ("float", "f", "FLT_MAX"), FIXED: ("int32_t", "", "")}  # in C
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class WordLength:
+    """Arithmetic of an exported controller: realisation, noise gains, bounds on states, errors and limit cycles."""
+
+    precision: Annotated[str, Quantity("arithmetic", help="double, float or q31 (fixed point of 32 bits)")]
+    realisation: Annotated[str, Quantity("realisation", help="structure of the states, of least round-off noise")]
+    noise_gains: Annotated[list[NoiseGain], Quantity("noise gains", help="of each realisation")]
+    largest_states: Annotated[tuple[float, ...], Quantity("largest values of the states", "", 3,
+            help="bounds for inputs within their ranges; in fixed point over the range of each state")]  # fmt: skip
+    overflow: Annotated[str, Quantity("overflow", help="whether a state can overflow, for inputs within their ranges")]
+    error: Annotated[float | None, Quantity("bound on the error of the output", "", 4,
+            help="for inputs within their ranges, 1 SI unit by default, against exact arithmetic")]  # fmt: skip
+    samples: Annotated[int | None, Quantity("samples of these bounds", help="null where they hold for all samples")]
+    limit_cycle: Annotated[float | None, Quantity("bound on a limit cycle of the output by round-off", "", 4,
+            help="output that roundings sustain in the closed loop at rest; null where not determined")]  # fmt: skip
+
+
+class Port(NamedTuple):
+    """One input of the C function: its name, identifier, text of a comment, and size in the self-test."""
+
+    name: str
+    identifier: str
+    text: str
+    size: float
+
+
+@dataclass(frozen=True)
+class Controller:
+    """A realised law in the numbers of a target, its inputs, and what acts on its output.
+
+    `signals` and `references` are the names of its inputs, before the feedforward; `dac` is the step (0: none), the
+    lowest and the highest output; `hub` is the pole and the period [s] of an estimated hub rate.
+    """
+
+    word: Word
+    signals: tuple[str, ...]
+    references: tuple[str, ...]
+    dac: Real
+    delay: int
+    hub: tuple[float, float] | None
+
+    @cached_property
+    def plan(self) -> Whole:
+        """The two inputs whose difference is e of each column, as `twin` has them: references less signals."""
+        law, rate, zero = self.word.law, self.inputs, self.inputs + 1
+        signals = {name: n for n, name in enumerate(self.signals)} | ({RATE: rate} if self.hub else {})
+        wanted = {name: len(self.signals) + n for n, name in enumerate(self.references)}
+        rows = [(wanted[name] if name in law.references else zero, signals[name]) for name in law.signals]
+        return np.array([*rows, *((zero, wanted[name.removeprefix(REFERENCE)]) for name in law.wanted)])
+
+    @property
+    def inputs(self) -> int:
+        """The number of inputs, the last of which is the feedforward."""
+        return len(self.signals) + len(self.references) + 1
+
+    @property
+    def whole_dac(self) -> Whole:
+        """The converter in fixed point: shift of its step, 0 for none, lowest and highest output."""
+        step, low, high = self.dac / self.word.output * 2.0**31
+        limits = np.clip([np.ceil(low), np.floor(high)], -twin.LARGEST - 1, twin.LARGEST)
+        return np.array([round(math.log2(step)) if step > 1 else 0, *limits], dtype=np.int64)
+
+    def run(self, inputs: NDArray[Any]) -> tuple[NDArray[Any], Whole]:
+        """Outputs and status (n,) of inputs (n, k), those of the C code bit for bit; whole numbers in fixed point."""
+        word, kind = self.word, np.int64 if self.word.precision == FIXED else np.float64
+        outputs, status = np.zeros(len(inputs), kind), np.zeros(len(inputs), int)
+        table, inputs = (np.ascontiguousarray(each, dtype=kind) for each in (word.table, inputs))
+        if word.precision == FIXED:
+            twin.run_fixed(table, word.shifts, self.plan, inputs, self.whole_dac, outputs)
+        else:
+            hub = np.array([self.signals.index(ANGLE), *self.hub] if self.hub else [-1.0, 0.0, 1.0])
+            is_single = word.precision == "float"
+            twin.run_real(table, self.plan, inputs, self.dac, hub, is_single, outputs, status)
+        is_good = status == 0  # a refused sample moves no delay line: the output is held
+        return np.r_[np.zeros(1 + self.delay, kind), outputs[is_good]][np.cumsum(is_good)], status
+
+
+def c_controller(task: ExportTask) -> Export:
+    """The files of a controller in C99, and its finite word length."""
+    exact = task.analysis(task.law)
+    law, name, gains = least_noise(in_z(task.law, task.chain), exact.verdict.loop)
+    controller = controller_of(law, task)
+    word = controller.word
+    found = judged(task, word, exact.verdict.loop)
+    bounds, is_whole, error = word.bounds
+    details = WordLength(
+        precision=task.precision, realisation=name, noise_gains=gains, largest_states=tuple(bounds.tolist()),
+        overflow="excluded for inputs within their ranges" if is_whole and error < math.inf else "not excluded",
+        error=error if error < math.inf else None, samples=None if is_whole else MOST_SUMMED,
+        limit_cycle=word.limit_cycle(found.verdict.loop),
+    )  # fmt: skip
+    contents, names = source_files(task, controller, [*task.facts(word.rounded, found).items(), *facts_of(details)])
+    return Export(
+        what=task.what, form=task.form, contents=contents, names=names, verdict=found.verdict.sentence,
+        details=details, sha256=task.sha256,
+    )  # fmt: skip
+
+
+def source_files(
+    task: ExportTask, controller: Controller, facts: Sequence[tuple[str, str]]
+) -> tuple[dict[str, bytes], list[Name]]:
+    """The files that begin with these facts, by name, and the identifiers in them, that of the controller first."""
+    name, signals = name_in_c(task.name or NAME), identifiers(controller.signals, "y_")
+    references = identifiers(controller.references, "r_")
+    values = values_of(task, controller, ports_of(task, controller, signals, references))
+    contents = {file: render(file, name=next(iter(name.values())), facts=facts, **values) for file in FILES}
+    return contents, names_of(name, signals, references)
+
+
+def in_z(law: Law, chain: Chain) -> Law:
+    """The law in z of one state space.
+
+    Raises ParameterError for a delay of its own that is no whole number of samples.
+    """
+    samples = law.delay / chain.sampling.period
+    remedy = f"is {samples:.6g} samples: C code has a delay of whole samples; write another one into the law's states"
+    require(abs(samples - round(samples)) <= WHOLE_SAMPLE, "law.delay", law.delay, remedy)
+    law = discretised(law, chain.sampling.period)
+    return with_system_matrix(law, system_matrix(law))
+
+
+def controller_of(law: Law, task: ExportTask) -> Controller:
+    """A realised law in the numbers of a task.  Raises ParameterError as `word_of` does."""
+    of, T, dac = task.chain.converters, task.chain.sampling.period, quantisers(task.chain)[DAC]
+    is_estimated = of.hub_rate == "difference" and RATE in law.signals
+    remedy = 'with q31 the hub rate is an input, or the law reads hub_angle: set converters.hub_rate = "ideal"'
+    require(not (is_estimated and task.precision == FIXED), "converters.hub_rate", of.hub_rate, remedy)
+    signals = tuple(dict.fromkeys(ANGLE if is_estimated and name == RATE else name for name in law.signals))
+    references = tuple(dict.fromkeys((*law.references, *(name.removeprefix(REFERENCE) for name in law.wanted))))
+    known = (*dict.fromkeys((*law.signals, *references)), OUTPUT)
+    for name, value in task.ranges.items():
+        must_be_known("range", name, known)
+        positive(f"range.{name}", value, "the largest absolute value of a signal is a positive, finite number")
+    limit = float(max(abs(dac[1:]))) if of.torque_range is None else of.torque_range
+    output = task.ranges.get(OUTPUT, limit if math.isfinite(limit) else None)
+    ranges = {"root_moment": of.moment_range, **task.ranges} if of.moment_range else task.ranges
+    hub = (math.exp(-of.rate_filter * T), T) if is_estimated else None
+    word = word_of(law, task.precision, ranges, output)
+    return Controller(word, signals, references, dac, round(law.delay / T), hub)
+
+
+def judged(task: ExportTask, word: Word, loop: Sampled) -> Analysis:
+    """The sampled loop with the coefficients as exported.
+
+    Raises ParameterError where it is not certified stable, unless it is exported anyway, naming the coefficient whose
+    rounding moves the poles most.
+    """
+    found = sampled(task.arm, word.rounded, task.chain)
+    if task.anyway or is_certified(found):
+        return found
+    exact, rounded, radius = system_matrix(word.law), system_matrix(word.rounded), {}
+    for place in np.ndindex(exact.shape):
+        table = exact.copy()
+        table[place] = rounded[place]
+        matrix = around(with_system_matrix(word.law, table), loop).matrix
+        radius[place] = float(abs(np.linalg.eigvals(matrix)).max())
+    worst = max(radius, key=radius.__getitem__)
+    remedy = f"rounded to {task.precision} the loop is not certified stable: {found.verdict.sentence}; take more digits"
+    raise ParameterError(key=coefficient(worst), value=float(exact[worst]), remedy=remedy)
+
+
+# ------------------------------------------------------------ values of the templates
+
+
+def values_of(task: ExportTask, controller: Controller, ports: Sequence[Port]) -> dict[str, Any]:
+    """The values of the templates, but for name and facts."""
+    word, is_fixed, (real, suffix, largest) = controller.word, task.precision == FIXED, REAL[task.precision]
+    dac, unit = controller.whole_dac if is_fixed else controller.dac, task.arm.input_unit
+    cast = "(int64_t)" if is_fixed else ""
+    known = [*(f"{cast}input->{each.identifier}" for each in ports), f"({real})rate", "0"]
+    return {
+        "fixed": is_fixed, "real": real, "wide": "int64_t" if is_fixed else real, "largest": largest, "suffix": suffix,
+        "cast": cast, "fields": ports,
+        **recorded(controller.run, ports, task.precision), "header": FILES[0],
+        "n": word.law.order, "m": len(controller.plan), "shifts": word.shifts,
+        "table": [[literal(x, suffix) for x in row] for row in word.table.tolist()],
+        "errors": [f"{known[minuend]} - {known[subtrahend]}" for minuend, subtrahend in controller.plan.tolist()],
+        "converter": bool(np.isfinite(dac).all()), "delay": controller.delay, "step": bool(dac[0]),
+        "dac": [literal(each, "") for each in dac.tolist()],
+        "hub": controller.hub and (ports[controller.signals.index(ANGLE)].identifier, *map(float.hex, controller.hub)),
+        "output": f"{task.arm.input} over {word.output!r} {unit}" if is_fixed else f"{task.arm.input} [{unit}]",
+        "period": repr(task.chain.sampling.period),
+    }  # fmt: skip
+
+
+def ports_of(task: ExportTask, controller: Controller, *known: dict[str, str]) -> list[Port]:
+    """The inputs of the C function: signals, references, and the feedforward."""
+    word, law = controller.word, controller.word.law
+    names = (name.removeprefix(REFERENCE) for name in (*law.signals, *law.wanted))
+    sizes = dict(zip(names, word.ranges.tolist(), strict=True))
+    rows = [
+        (name, own, f"{title}{name} [{OUTPUTS[name.partition('@')[0]].unit}]", sizes.get(name, 1.0))
+        for title, found in zip(("", "reference of "), known, strict=True)
+        for name, own in found.items()
+    ]
+    rows.append((FEEDFORWARD, FEEDFORWARD, f"{FEEDFORWARD} [{task.arm.input_unit}]", word.output))
+    is_fixed = word.precision == FIXED
+    return [Port(name, own, f"{text}, over {size!r}" if is_fixed else text, size) for name, own, text, size in rows]
+
+
+def recorded(
+    run: Callable[[NDArray[Any]], tuple[NDArray[Any], Whole]], ports: Sequence[Port], precision: str
+) -> dict[str, Any]:
+    """Values of the template of a self-test, whose inputs are those of a linear congruential generator."""
+    suffix, places = REAL[precision][1], range(RECORDED * len(ports))
+    _, *numbers = accumulate(places, lambda last, _: (1664525 * last + 1013904223) % 2**32, initial=SEED)
+    inputs: NDArray[Any] = np.array(numbers, dtype=np.int64).reshape(RECORDED, -1)
+    if precision == FIXED:
+        inputs = inputs - 2**31
+    else:
+        kind = FLOATS[precision][0]
+        sizes = np.array([each.size for each in ports], kind)
+        inputs = (sizes * ((inputs >> 8) / 2.0**23 - 1).astype(kind)).astype(float)
+        inputs[REFUSED, 0] = np.nan
+    outputs, status = run(inputs)
+    return {
+        "sizes": [literal(each.size, suffix) for each in ports], "refused": REFUSED, "seed": SEED,
+        "recorded": [literal(each, suffix) for each in outputs.tolist()], "status": status.tolist(),
+    }  # fmt: skip

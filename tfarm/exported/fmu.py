@@ -1,0 +1,304 @@
+"""Functional mock-up units (FMI 2.0, co-simulation) of plant, controller and closed loop: C, and its binary.
+
+The plant is that of the simulation: exact between the samples, the torque through DAC, delay and hold, the sensors
+through filters and converters.  At a communication point its outputs are those just before the sample, which uses the
+inputs that the next step begins with.  A unit needs neither Python nor the mathematical library.
+"""
+
+import hashlib
+import io
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+from xml.etree.ElementTree import Element, indent, tostring
+
+import numpy as np
+
+from tfarm.arm import Law, tracked
+from tfarm.arm.law import REFERENCE
+from tfarm.arrays import Complex, Real
+from tfarm.dsp import Simulator, scenario
+from tfarm.dsp.plant import MODES_USED, RECORDED
+from tfarm.dsp.results import simulated
+from tfarm.dsp.scenarios import TRIAL_DURATION
+from tfarm.errors import ParameterError, one_line, require
+from tfarm.exact.outputs import signal_words
+from tfarm.exported.controller import FEEDFORWARD, controller_of, in_z, source_files
+from tfarm.exported.result import ANYWAY, Export, ExportTask, What, is_certified, names_of
+from tfarm.exported.texts import identifiers, literal, render
+from tfarm.exported.word_length import FIXED
+from tfarm.files import temporary_folder
+from tfarm.records import record
+from tfarm.schema import Quantity
+
+COMPILERS = ("cc", "gcc", "clang")
+OPTIONS = ("-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")  # no fused operation
+LONGEST_COMPILATION = 60.0  # s
+PLATFORMS = {"linux": ("linux64", ".so"), "darwin": ("darwin64", ".dylib"), "win32": ("win64", ".dll")}
+ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # of every file: same inputs, same bytes
+LARGEST = sys.float_info.max  # of a range without limit
+LONGEST_TEXT, LONGEST_GUID = 400, 32  # characters
+ERRORS = "logStatusError"  # category of messages
+MEASURED = "measured:"
+AT, STATE, KIND, SELF = ("const fmi2ValueReference *", "size_t"), "fmi2FMUstate", "fmi2StatusKind", "((model *)c)"
+ABSENT, ELSE_DISCARD = "report(c, fmi2Error, __func__)", "? fmi2OK : fmi2Discard"
+FUNCTIONS: tuple[tuple[str, tuple[str, ...], str], ...] = (  # of FMI in one statement: name, types of arguments, status
+    ("SetDebugLogging", ("fmi2Boolean", "size_t", "const fmi2String *"), "fmi2OK"),
+    ("SetupExperiment", ("fmi2Boolean", "fmi2Real", "fmi2Real", "fmi2Boolean", "fmi2Real"), "begin(c, a3)"),
+    ("EnterInitializationMode", (), "fmi2OK"),
+    ("ExitInitializationMode", (), f"{SELF}->at.is_running = 1, fmi2OK"),
+    ("Terminate", (), "fmi2OK"),
+    ("Reset", (), f"memset({SELF}->given, 0, sizeof {SELF}->given), begin(c, 0.0)"),
+    *(
+        (f"{act}{kind}", (*AT, f"{const}fmi2{kind} *"), f"a2 ? {ABSENT} : fmi2OK")
+        for kind in ("Integer", "Boolean", "String")
+        for act, const in (("Get", ""), ("Set", "const "))
+    ),
+    *((f"{act}FMUstate", (f"{STATE}{star}",), ABSENT) for act, star in (("Get", " *"), ("Set", ""), ("Free", " *"))),
+    ("SerializedFMUstateSize", (STATE, "size_t *"), ABSENT),
+    ("SerializeFMUstate", (STATE, "fmi2Byte *", "size_t"), ABSENT),
+    ("DeSerializeFMUstate", ("const fmi2Byte *", "size_t", f"{STATE} *"), ABSENT),
+    ("GetDirectionalDerivative", (*AT, *AT, "const fmi2Real *", "fmi2Real *"), ABSENT),
+    ("SetRealInputDerivatives", (*AT, "const fmi2Integer *", "const fmi2Real *"), ABSENT),
+    ("GetRealOutputDerivatives", (*AT, "const fmi2Integer *", "fmi2Real *"), ABSENT),
+    ("CancelStep", (), ABSENT),
+    *((f"Get{of}Status", (KIND, f"fmi2{of or 'Status'} *"), "fmi2Discard") for of in ("", "Integer", "String")),
+    ("GetRealStatus", (KIND, "fmi2Real *"), f"*a2 = {SELF}->at.time, a1 == fmi2LastSuccessfulTime {ELSE_DISCARD}"),
+    ("GetBooleanStatus", (KIND, "fmi2Boolean *"), f"*a2 = {SELF}->at.is_stopped, a1 == fmi2Terminated {ELSE_DISCARD}"),
+)
+
+
+class Variable(NamedTuple):
+    """A real variable of a unit."""
+
+    name: Annotated[str, Quantity("variable", help="name of a variable of the functional mock-up unit")]
+    causality: Annotated[str, Quantity("causality", help="input, parameter or output")]
+    unit: Annotated[str, Quantity("unit", help="SI unit")]
+    description: Annotated[str, Quantity("description", help="meaning of the variable")]
+
+
+@dataclass(frozen=True)
+@record
+class Unit:
+    """A functional mock-up unit: its variables in the order of their references, flexible modes, and binary."""
+
+    variables: Annotated[list[Variable], Quantity("variables", help="variables of the functional mock-up unit")]
+    modes: Annotated[int | None, MODES_USED]
+    binary: Annotated[str, Quantity("binary", help="platform and compiler of the binary, or the reason for none")]
+
+
+class LawCode(NamedTuple):
+    """The controller of a unit: its identifier and inputs in C, its files, and the stability of its loop."""
+
+    identifier: str
+    inputs: Sequence[str]
+    files: Mapping[str, bytes]
+    verdict: str
+
+
+def fmu(task: ExportTask) -> Export:
+    """Return the functional mock-up unit of a task, one file.
+
+    Raises ParameterError for a loop that is not certified stable, a controller in fixed point, and as `Simulator` does.
+    """
+    prepared, has_plant, name = prepared_simulator(task), task.what != "controller", task.name or task.what
+    variables, own = variables_of(task.what, prepared), identifiers([name], "fmu_")
+    law = None if task.what == "plant" else law_code(task, prepared.law, variables)
+    verdict, period = law.verdict if law else "", repr(float(task.chain.sampling.period))
+    about = f"{task.what} of {task.arm.name}, sampled every {period} s{verdict and f': {verdict}'}"
+    modes = prepared.plant.count if has_plant else None
+    guid = hashlib.sha256(repr((task.sha256, name, about, modes, variables, version("tfarm"))).encode()).hexdigest()
+    head: dict[str, Any] = {"variables": variables, "has_plant": has_plant, "period": period, "about": about}
+    head["guid"], numbers = guid[:LONGEST_GUID], plant_code(prepared)
+    source = render("fmu.c", law=law, functions=FUNCTIONS, errors=ERRORS, sha256=task.sha256, **head, **numbers)
+    sources = {"fmi2.h": render("fmi2.h"), "fmu.c": source, **(law.files if law else {})}
+    binary, compiler = binary_of(sources, own[name])
+    files = {f"sources/{name}": content for name, content in sources.items()} | binary
+    files["modelDescription.xml"] = model_description(sources, own[name], **head)
+    return Export(
+        what=task.what, form=task.form, contents={f"{task.what}.fmu": archive_of(files)}, names=names_of(own),
+        verdict=verdict, details=Unit(variables, modes, compiler), sha256=task.sha256,
+    )  # fmt: skip
+
+
+def law_code(task: ExportTask, law: Law, variables: Sequence[Variable]) -> LawCode:
+    """The controller as simulated: its law as given, its readings and its output those of the converters of a plant.
+
+    In a closed loop its delay is that of the plant.
+    """
+    remedy = "a functional mock-up unit has a controller in double or float; take c for fixed point"
+    require(task.precision != FIXED, "precision", task.precision, remedy)
+    is_loop, is_single = task.what == "loop", task.chain.converters.arithmetic == "float32"
+    task = replace(task, precision="float" if is_single else task.precision)
+    controller = controller_of(in_z(replace(law, delay=0.0) if is_loop else law, task.chain), task)
+    controller = replace(controller, hub=None, signals=law.signals, dac=np.array([0.0, -np.inf, np.inf]))
+    rounded = replace(controller.word.rounded, delay=task.law.delay)
+    found = task.analysis(rounded)
+    files, (first, *_) = source_files(task, controller, [*task.facts(rounded, found).items()])
+    inputs, outputs = ([each.name for each in variables if each.causality == of] for of in ("input", "output"))
+    place = {name: f"out[{n}]" for n, name in enumerate(outputs)} | {name: f"in[{n}]" for n, name in enumerate(inputs)}
+    signals, wanted = controller.signals, controller.references
+    fields = [*(f"{MEASURED}{each}" for each in signals), *(f"{REFERENCE}{each}" for each in wanted), FEEDFORWARD]
+    return LawCode(
+        first.identifier, [place[each] for each in fields],
+        {each: files[each] for each in ("controller.h", "controller.c")},
+        found.verdict.sentence if is_certified(found) else f"{ANYWAY}: {found.verdict.sentence}",
+    )  # fmt: skip
+
+
+def prepared_simulator(task: ExportTask) -> Simulator:
+    """The simulator of the loop, with the modes that the simulation of a slew has; of a step where there is no slew.
+
+    A plant alone has no delay of the law.
+    """
+    arm, law = tracked(task.arm, replace(task.law, delay=0.0) if task.what == "plant" else task.law)
+    try:
+        run = scenario("slew", arm, task.chain, TRIAL_DURATION)
+    except ParameterError:  # an arm that cannot turn
+        run = scenario("step", arm, task.chain, TRIAL_DURATION)
+    modes = 1 if task.what == "controller" else simulated(arm, law, task.chain, run)[1].modes
+    return Simulator(arm, task.chain, run, law, count=modes)
+
+
+def variables_of(what: What, of: Simulator) -> list[Variable]:
+    """The variables of a unit: inputs, parameters, outputs."""
+    drive, law = of.plant.arm.input, of.law
+
+    def variable(name: str, causality: str, prefix: str = "", words: str = "") -> Variable:
+        label, unit = signal_words(name)
+        return Variable(f"{prefix}{name}", causality, unit, f"{words}{label}")
+
+    unit, side = signal_words(drive)[1], "input" if what == "controller" else "output"
+    names = law.signals if what == "controller" else of.measured
+    sensors = [variable(name, side, MEASURED, "reading of the ") for name in names]
+    wanted = dict.fromkeys((*law.references, *(name.removeprefix(REFERENCE) for name in law.wanted)))
+    references = [variable(name, "input", REFERENCE, "reference of the ") for name in wanted]
+    references.append(Variable(FEEDFORWARD, "input", unit, "part of the output of the controller"))
+    if what == "controller":
+        return [*sensors, *references, variable(drive, "output")]
+    return [
+        *([variable(drive, "input")] if what == "plant" else references),
+        Variable("disturbance", "input", unit, "added to the output of the DAC, without delay"),
+        Variable("impulse", "parameter", f"{unit} s", "on the hub, just after the first sample"),
+        *sensors,
+        *(variable(name, "output") for name in RECORDED),
+        Variable("torque", "output", unit, "output of the DAC at the last sample"),
+    ]
+
+
+def plant_code(of: Simulator) -> dict[str, Any]:
+    """The numbers of the plant in its template."""
+    chain, model = of.electronics, of.model
+    tables = {
+        "turn[PIECES][POLES][2]": parts(model.turn),
+        "push[PIECES][POLES][2]": parts(model.push),
+        "piece[PIECES][2]": model.piece[:, :2],
+        "weights[OUTPUTS - 1][POLES][2]": parts(model.weights),
+        "rates[OUTPUTS - 1][2]": model.rates,
+        "through[OUTPUTS - 1]": model.static,
+        "converters[3][3]": np.clip(chain.quantisers, -LARGEST, LARGEST),
+    }
+    return {
+        "tables": {name: braces(values) for name, values in tables.items()},
+        "poles": of.kept.size, "pieces": len(model.piece), "ring": chain.delay + 2, "bound": repr(chain.bound),
+        "lag": literal(chain.pole), "is_differenced": chain.is_differenced,
+    }  # fmt: skip
+
+
+def parts(values: Complex) -> Real:
+    """Real and imaginary parts, in a further axis."""
+    return np.stack([values.real, values.imag], axis=-1)
+
+
+def braces(values: Any) -> str:
+    """An array of C, every number with all of its digits."""
+    return f"{{{', '.join(map(braces, values))}}}" if np.ndim(values) else literal(values)
+
+
+# ------------------------------------------------------------ the file
+
+
+def model_description(
+    sources: Iterable[str], identifier: str, *, variables: Sequence[Variable], has_plant: bool, period: str, about: str,
+    guid: str,
+) -> bytes:  # fmt: skip
+    """The file modelDescription.xml: at a communication point outputs of a plant depend on no input there."""
+    outputs = [str(n) for n, each in enumerate(variables, 1) if each.causality == "output"]
+    known = {"dependencies": ""} if has_plant else {}
+    structure = [
+        element(tag, *(element("Unknown", index=n, **known) for n in outputs))
+        for tag in ("Outputs", "InitialUnknowns")[: 1 + has_plant]
+    ]
+    files = [element("File", name=name) for name in sources if name.endswith(".c")]
+    units = [element("Unit", name=unit) for unit in sorted({each.unit for each in variables})]
+    root = element(
+        "fmiModelDescription",
+        element(
+            "CoSimulation", element("SourceFiles", *files), modelIdentifier=identifier,
+            canHandleVariableCommunicationStepSize="true", canNotUseMemoryManagementFunctions="true",
+        ),
+        element("UnitDefinitions", *units),
+        element("LogCategories", element("Category", name=ERRORS)),
+        element("DefaultExperiment", startTime="0", stopTime=repr(TRIAL_DURATION), stepSize=period),
+        element("ModelVariables", *(variable_element(n, each, has_plant) for n, each in enumerate(variables))),
+        element("ModelStructure", *structure),
+        fmiVersion="2.0", modelName=identifier, guid=guid, description=one_line(about, LONGEST_TEXT),
+        generationTool=f"tfarm {version('tfarm')}", variableNamingConvention="flat", numberOfEventIndicators="0",
+    )  # fmt: skip
+    indent(root)
+    return tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+
+
+def variable_element(reference: int, of: Variable, has_plant: bool) -> Element:
+    """A variable in the description; those of a sampled system change at the samples."""
+    is_computed = of.causality == "output" and has_plant
+    initial = {"initial": "calculated" if has_plant else "exact"} if of.causality == "output" else {}
+    return element(
+        "ScalarVariable", element("Real", unit=of.unit, **({} if is_computed else {"start": "0"})),
+        name=of.name, valueReference=str(reference), description=of.description, causality=of.causality,
+        variability="fixed" if of.causality == "parameter" else "discrete", **initial,
+    )  # fmt: skip
+
+
+def element(tag: str, *children: Element, **attributes: str) -> Element:
+    """An element of XML with its children."""
+    parent = Element(tag, attributes)
+    parent.extend(children)
+    return parent
+
+
+def binary_of(sources: Mapping[str, bytes], identifier: str) -> tuple[dict[str, bytes], str]:
+    """The binary for this machine by its path in a unit, none without a compiler; and platform and compiler."""
+    compiler = next(filter(None, map(shutil.which, COMPILERS)), None)
+    if compiler is None or sys.platform not in PLATFORMS:
+        return {}, f"none: no compiler found ({', '.join(COMPILERS)})"
+    platform, suffix = PLATFORMS[sys.platform]
+    with temporary_folder(Path(tempfile.gettempdir())) as folder:
+        for name, content in sources.items():
+            (folder / name).write_bytes(content)
+        command = [compiler, *OPTIONS, "-o", f"unit{suffix}", *(name for name in sources if name.endswith(".c"))]
+        try:
+            subprocess.run(
+                command, cwd=folder, check=True, timeout=LONGEST_COMPILATION, capture_output=True,
+                stdin=subprocess.DEVNULL,
+            )  # fmt: skip
+            binary = (folder / f"unit{suffix}").read_bytes()
+        except (OSError, subprocess.SubprocessError) as error:
+            return {}, f"none: {one_line(f'{compiler}: {error}', LONGEST_TEXT)}"
+    return {f"binaries/{platform}/{identifier}{suffix}": binary}, f"{platform}, by {Path(compiler).name}"
+
+
+def archive_of(files: Mapping[str, bytes]) -> bytes:
+    """An archive of files, the same for the same content."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in sorted(files):
+            archive.writestr(zipfile.ZipInfo(name, ZIP_DATE), files[name], zipfile.ZIP_DEFLATED)
+    return content.getvalue()

@@ -1,0 +1,218 @@
+"""The task of an export, the facts that its files begin with, and the record of the files."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple, get_args
+
+from tfarm.arm import AnyLaw, Arm, Law, arm_and_law, as_law, must_be_arm
+from tfarm.case import result_card
+from tfarm.dsp import Chain
+from tfarm.dsp.chain import chain_or_usual, file_text
+from tfarm.dsp.verdict import Analysis, sampled
+from tfarm.errors import ParameterError, must_be_known
+from tfarm.exported.texts import facts_of
+from tfarm.files import move_into, place_in
+from tfarm.records import record
+from tfarm.schema import Quantity
+from tfarm.spectrum.table import default_gains
+
+What = Literal["controller", "tuner", "plant", "loop"]
+Form = Literal["c", "fmu", "mat", "py"]
+Precision = Literal["double", "float", "q31"]
+ANYWAY = "NOT CERTIFIED STABLE; exported by --anyway"
+
+
+class Name(NamedTuple):
+    """A name of the user, and the identifier that it has in the files."""
+
+    name: Annotated[str, Quantity("name", help="signal, reference or name of the user")]
+    identifier: Annotated[str, Quantity("identifier", help="its identifier in the exported files")]
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class ExportTask:
+    """What to export, and how: an arm, a law (by default the default gains), and the chain of its sampled loop.
+
+    `ranges` are the largest absolute values of signals by name, in SI units, for fixed point.  `tuned` is the file of a
+    trained tuner.  `anyway`: also a loop that is not certified stable.
+    """
+
+    arm: Arm
+    given: AnyLaw | None
+    chain: Chain
+    what: What
+    form: Form
+    tuned: Path | None = None
+    precision: Precision = "double"
+    ranges: Mapping[str, float] = field(default_factory=dict)
+    name: str = ""
+    anyway: bool = False
+
+    @cached_property
+    def law(self) -> Law:
+        """The law as given; the default gains without one."""
+        return as_law(default_gains(self.arm) if self.given is None else self.given)
+
+    @cached_property
+    def sha256(self) -> str:
+        """SHA-256 of arm, chain, law and tuner."""
+        law = None if self.given is None else asdict(self.law)
+        tuned = "" if self.tuned is None else self.tuned.read_text(encoding="utf-8")
+        text = json.dumps([file_text(self.arm, self.chain), law, tuned], sort_keys=True, default=lambda a: a.tolist())
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def analysis(self, law: AnyLaw) -> Analysis:
+        """The sampled loop of a law, in most cases the given one as its numbers are rounded in the files.
+
+        Raises ParameterError for a loop that is not certified stable, unless `anyway`.
+        """
+        found = sampled(self.arm, law, self.chain)
+        if not (self.anyway or is_certified(found)):
+            remedy = f"the sampled loop is not certified stable: {found.verdict.sentence}; --anyway exports it"
+            raise ParameterError(key="law", value=self.law.name, remedy=remedy)
+        return found
+
+    def facts(self, law: AnyLaw, found: Analysis) -> dict[str, str]:
+        """The facts that a file begins with, by label: arm, law, stability and margins of the sampled loop, version."""
+        card = result_card(self.arm, law, self.chain, at_samples=found).sampled
+        shown = {} if card is None else dict(facts_of(card))
+        warning = {} if is_certified(found) else {"warning": ANYWAY}
+        head = {"arm": self.arm.name, "controller": self.law.name, **warning}
+        sampling = self.chain.sampling
+        times = {
+            "sampling period [s]": repr(sampling.period),
+            "delay beyond this code [samples]": repr(sampling.delay_samples),
+        }
+        return head | times | shown | {"SHA-256 of the inputs": self.sha256, "tfarm": version("tfarm")}
+
+
+def is_certified(found: Analysis) -> bool:
+    """Whether a sampled loop is certified stable."""
+    return found.verdict.is_settled and found.verdict.is_stable
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class Export:
+    """Exported files, with the verdict on the loop as its numbers are rounded there.
+
+    `contents` are the bytes of each file by its name; `details` is the record of a target.
+    """
+
+    what: Annotated[str, Quantity("exported", help="controller, tuner, plant or loop")]
+    form: Annotated[str, Quantity("form", help="c, fmu, mat or py")]
+    contents: Mapping[str, bytes] = field(repr=False)
+    names: Annotated[list[Name], Quantity("names", help="identifiers of names in the exported files")]
+    verdict: Annotated[str, Quantity("stability", help="stability of the loop as exported, with its certainty")] = ""
+    details: Annotated[Any, Quantity(flat=True, help="numbers of the form of the export")] = None
+    sha256: Annotated[str, Quantity("SHA-256 of the inputs", help="hash of arm, chain, law and tuner")] = ""
+
+    @property
+    def files(self) -> Annotated[tuple[str, ...], Quantity("files", help="names of the written files")]:
+        """The names of the files."""
+        return tuple(self.contents)
+
+
+def names_of(*mappings: Mapping[str, str]) -> list[Name]:
+    """The names of `identifiers` as rows."""
+    return [Name(name, identifier) for mapping in mappings for name, identifier in mapping.items()]
+
+
+def write_into(folder: Path, contents: Mapping[str, bytes]) -> None:
+    """Write all files into a folder, none of them before all are complete.
+
+    Raises ParameterError where the folder cannot be written to.
+    """
+    with place_in(folder, "--out") as place:
+        for name, content in contents.items():
+            (place / name).parent.mkdir(parents=True, exist_ok=True)
+            (place / name).write_bytes(content)
+        move_into(place, folder)
+
+
+WRITERS = {  # module and function of `tfarm.exported` that make an `Export` of a task
+    ("controller", "c"): "controller:c_controller",
+    ("tuner", "c"): "tuner_code:c_tuner",
+    ("plant", "fmu"): "fmu:fmu",
+    ("controller", "fmu"): "fmu:fmu",
+    ("loop", "fmu"): "fmu:fmu",
+    ("plant", "mat"): "systems:mat",
+    ("controller", "mat"): "systems:mat",
+    ("loop", "mat"): "systems:mat",
+    ("plant", "py"): "systems:py",
+    ("controller", "py"): "systems:py",
+    ("loop", "py"): "systems:py",
+}
+
+
+def export(
+    arm: Arm,
+    law: AnyLaw | None = None,
+    *,
+    what: What,
+    form: Form,
+    folder: str | Path,
+    chain: Chain | None = None,
+    tuned: str | Path | None = None,
+    precision: Precision = "double",
+    ranges: Mapping[str, float] | None = None,
+    name: str = "",
+    anyway: bool = False,
+) -> Export:
+    """Write a controller, a tuner, the plant or the closed loop as files for another program.
+
+    Parameters
+    ----------
+    arm, law
+        The arm and its controller, by default the default gains.
+    what
+        "controller", "tuner", "plant" or "loop".
+    form
+        "c" (C99), "fmu" (FMI co-simulation), "mat" (MATLAB, Octave) or "py" (python-control).
+    folder
+        Folder of the files.
+    chain
+        Sampling, converters and delay, every 10 ms and ideal by default.
+    tuned
+        File of a trained tuner.
+    precision
+        Arithmetic of a controller in C: "double", "float" or "q31" (fixed point).
+    ranges
+        Largest absolute value of each input in fixed point, in SI units.
+    name
+        Beginning of the identifiers of a file in C.
+    anyway
+        Export a loop that is not certified stable.
+
+    Returns
+    -------
+    Export
+        Names of the files, identifiers, and the stability of the loop with the numbers as exported.
+
+    Raises
+    ------
+    ParameterError
+        For a loop that is not certified stable (unless `anyway`), and where the target does not have what it needs.
+    """
+    must_be_arm(arm)
+    for key, value, known in (("what", what, What), ("as", form, Form), ("precision", precision, Precision)):
+        must_be_known(key, value, get_args(known))
+    if (what, form) not in WRITERS:
+        forms = ", ".join(each for of, each in WRITERS if of == what)
+        raise ParameterError(key="as", value=form, remedy=f"a {what} is exported as: {forms}")
+    task = ExportTask(
+        arm=arm if law is None else arm_and_law(arm, law)[0], given=law, chain=chain_or_usual(chain),
+        what=what, form=form, tuned=None if tuned is None else Path(tuned), precision=precision,
+        ranges=dict(ranges or {}), name=name, anyway=anyway,
+    )  # fmt: skip
+    module, _, function = WRITERS[what, form].partition(":")
+    found: Export = getattr(import_module(f"tfarm.exported.{module}"), function)(task)
+    write_into(Path(folder), found.contents)
+    return found

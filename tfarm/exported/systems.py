@@ -1,0 +1,284 @@
+"""State spaces of a task with the names of their signals: controller, plant, closed loop, reduced model.
+
+With the references w and a feedforward r the sampled loop of the plant x and the controller k is
+
+    u = r + c k + d [y; w],   k_next = a k + b [y; w],   x_next = A x + B u,   y = C x
+
+A quantity of the loop acts as in `tfarm.dsp.sampled`: delay, hold and analog filters are states of the plant, the
+estimate of a hub rate is one of the controller.  Quantisation and saturation are not linear and not in it.
+"""
+
+import os
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from tfarm.arm import Arm, Law, arm_and_law
+from tfarm.arm.blocks import Matrices, StateSpace
+from tfarm.arm.law import REFERENCE, Part
+from tfarm.arrays import Complex
+from tfarm.dsp import Chain
+from tfarm.dsp.discretise import acting_law, with_all_gains, with_estimate
+from tfarm.dsp.plant import USUAL_MODES, PulseTransfer, damped_at_hub, sensed_plant
+from tfarm.errors import require
+from tfarm.exported.result import Export, ExportTask, names_of
+from tfarm.exported.texts import comment, matlab_text, python_text, render
+from tfarm.files import is_standard_output, mat_content, write_file
+from tfarm.records import record
+from tfarm.reduced import BAND, ReducedModel, modal_model, reduce
+from tfarm.reduced.partial_fractions import CLEAR_OF_POLES, distance, frequencies_around
+from tfarm.reduced.reduction import NORM
+from tfarm.response import transfer
+from tfarm.response.signals import Signals
+
+RESPONSE_POINTS = 1000  # of the exact response in a file, even in ln w
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class NamedSystem:
+    """x' = A x + B u, y = C x + D u with named signals; x' is the next x where the period [s] is not 0.
+
+    `facts` are further entries of it in a file, such as its worst error.
+    """
+
+    name: str
+    matrices: Matrices
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    states: tuple[str, ...]
+    period: float = 0.0
+    facts: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        is_finite = all(np.isfinite(each).all() for each in self.matrices)
+        require(
+            is_finite, "export", self.name, "a matrix has entries that are not finite; change the arm or the period"
+        )
+
+    @property
+    def title(self) -> str:
+        """Name, kind and order of the system, with its worst error, if it is an approximation."""
+        kind = f"sampled every {self.period:g} s" if self.period else "continuous-time"
+        error = f"; worst {NORM} " + "{worst_error:.3g} from {band[0]:g} to {band[1]:g} rad/s"
+        return f"{self.name}, {kind}, {len(self.states)} states{error.format(**self.facts) if self.facts else ''}"
+
+
+# ------------------------------------------------------------ controller and sampled loop
+
+
+def controller_system(arm: Arm, law: Law, chain: Chain) -> NamedSystem:
+    """Return the controller in z, from its signals and then their references to its share of the input."""
+    acting, _ = acting_law(arm, with_all_gains(arm, law), chain)
+    parts = tuple(_with_references(part, acting.references) for part in acting.parts)
+    acting = with_estimate(replace(acting, parts=parts, references=()), chain)
+    columns = (*acting.signals, *acting.wanted)
+    a, b, c, d = acting.matrices(columns)
+    return NamedSystem(
+        name=law.name, matrices=(a, b, 0.0 - c, 0.0 - d), inputs=columns, outputs=(arm.input,),
+        states=tuple(f"controller{n + 1}" for n in range(len(a))), period=chain.sampling.period,
+    )  # fmt: skip
+
+
+def _with_references(part: Part, references: tuple[str, ...]) -> Part:
+    """Return a part of a law with the references of its signals as columns of their own."""
+    at = [n for n, name in enumerate(part.signals) if name in references]
+    A, B, C, D = part.block.matrices()
+    names = tuple(REFERENCE + part.signals[n] for n in at)
+    return Part((*part.signals, *names), StateSpace(A, np.c_[B, -B[:, at]], C, np.c_[D, -D[:, at]]))
+
+
+def plant_system(arm: Arm, law: Law, chain: Chain) -> NamedSystem:
+    """Return the sampled plant from its input to the signals of the law and the tip, exact for its modal model."""
+    acting, late = acting_law(arm, with_all_gains(arm, law), chain)
+    signals = with_estimate(acting, chain).signals
+    sensed = sensed_plant(arm, late, list(dict.fromkeys((*signals, "tip_displacement"))), USUAL_MODES)
+    A, B, C = PulseTransfer(sensed.together, late.sampling).folded().matrices()
+    return NamedSystem(
+        name=f"{arm.name}, sampled", matrices=(A, B[:, None], C, np.zeros((len(C), 1))), inputs=(arm.input,),
+        outputs=sensed.read.names, states=tuple(f"plant{n + 1}" for n in range(len(A))), period=chain.sampling.period,
+    )  # fmt: skip
+
+
+def loop_system(plant: NamedSystem, controller: NamedSystem) -> NamedSystem:
+    """Return the closed loop from feedforward and references to the outputs of the plant and its input.
+
+    The first outputs of the plant are the first inputs of the controller.
+    """
+    (A, B, C, _), (a, b, c, d) = plant.matrices, controller.matrices
+    n = len(controller.inputs) - sum(name.startswith(REFERENCE) for name in controller.inputs)
+    y, u = np.pad(C, ((0, 0), (0, len(a)))), np.c_[d[:, :n] @ C[:n], c]  # of the states of both
+    through = np.c_[np.ones((1, 1)), d[:, n:]]
+    return NamedSystem(
+        name=f"{plant.name}, {controller.name}",
+        matrices=(
+            block_diag(A, a) + np.r_[B @ u, b[:, :n] @ y[:n]], np.r_[B @ through, np.pad(b[:, n:], ((0, 0), (1, 0)))],
+            np.r_[y, u], np.pad(through, ((len(C), 0), (0, 0))),
+        ),
+        inputs=("feedforward", *controller.inputs[n:]), outputs=(*plant.outputs, *controller.outputs),
+        states=(*plant.states, *controller.states), period=plant.period,
+    )  # fmt: skip
+
+
+# ------------------------------------------------------------ the arm itself
+
+
+def reduced_system(reduced: ReducedModel, outputs: tuple[str, ...]) -> NamedSystem:
+    """Return the continuous-time reduced model under these names of its outputs, with its worst error."""
+    return NamedSystem(
+        name=reduced.name, matrices=reduced.matrices(), inputs=(reduced.input,), outputs=outputs, states=reduced.states,
+        facts={"worst_error": reduced.worst_error, "band": np.array(reduced.band)},
+    )  # fmt: skip
+
+
+def reduced_systems(arm: Arm, names: tuple[str, ...]) -> dict[str, NamedSystem]:
+    """Return modal models with the modes of the sampled plant, one for each place along the arm."""
+    read, found = Signals(arm, names), {}
+    along = [place for each, place in zip(read.outputs, read.places, strict=True) if each.place == "x"]
+    for n, share in enumerate(dict.fromkeys(along or [0.0])):
+        rows = [
+            row for row, each in enumerate(read.outputs)
+            if (read.places[row] == share if each.place == "x" else n == 0)
+        ]  # fmt: skip
+        outputs, x = [read.outputs[row] for row in rows], share * arm.length if along else None
+        order = modal_model(arm, outputs, USUAL_MODES, x).order
+        reduced = reduce(arm, outputs, order=order, method="modal", x=x)
+        found[f"reduced_{n + 1}" if n else "reduced"] = reduced_system(reduced, tuple(names[row] for row in rows))
+    return found
+
+
+def response_data(
+    arm: Arm, of: str, outputs: tuple[str, ...], band: tuple[float, float], G: Callable[[Complex], Complex]
+) -> dict[str, Any]:
+    """Return the exact frequency response (outputs, 1, n) over a range [rad/s], clear of the poles on the axis."""
+    omega = np.geomspace(*band, RESPONSE_POINTS)
+    omega = omega[distance(omega, frequencies_around(arm, band[1])) > CLEAR_OF_POLES * omega]
+    names = {"exact_input": np.array([of], object), "exact_outputs": np.array(outputs, object)}
+    return {"omega": omega, "response": G(1j * omega)[:, None, :], **names}
+
+
+# ------------------------------------------------------------ those of a task
+
+
+class Linear(NamedTuple):
+    """The systems of a task by their names in its files, that of the file first, and the first lines of a script.
+
+    `response` is the exact frequency response of the arm, if any; `verdict` that of the loop.
+    """
+
+    systems: Mapping[str, NamedSystem]
+    head: Sequence[str]
+    response: Mapping[str, Any]
+    verdict: str = ""
+
+
+def linear(task: ExportTask) -> Linear:
+    """Return the systems of a task.  Raises ParameterError for a loop that is not certified stable."""
+    law, chain, what = task.law, task.chain, task.what
+    arm, _ = arm_and_law(task.arm, law)
+    facts, verdict = {"arm": arm.name, "SHA-256 of the inputs": task.sha256, "tfarm": version("tfarm")}, ""
+    if what != "plant":
+        judged = task.analysis(law)
+        facts, verdict = task.facts(law, judged), judged.verdict.sentence
+    controller, head = controller_system(arm, law, chain), [f"{label}: {value}" for label, value in facts.items()]
+    if what == "controller":
+        return Linear({what: controller}, head, {}, verdict)
+    plant = plant_system(arm, law, chain)
+    read = Signals(damped_at_hub(arm, chain), plant.outputs)
+    systems = {"plant": plant, **reduced_systems(read.arm, read.names)}
+    if what == "loop":
+        systems = {"loop": loop_system(plant, controller), "controller": controller, **systems}
+    return Linear(systems, head, response_data(read.arm, arm.input, read.names, BAND, read.values), verdict)
+
+
+WRITTEN_BY = "written by tfarm"  # in the first line of every script, load.m
+
+
+def mat(task: ExportTask) -> Export:
+    """Return the MATLAB file of a task and its script."""
+    found = linear(task)
+    return Export(
+        what=task.what, form=task.form, contents=mat_files(f"{task.what}.mat", found), names=[],
+        verdict=found.verdict, sha256=task.sha256,
+    )  # fmt: skip
+
+
+def mat_files(name: str, of: Linear) -> dict[str, bytes]:
+    """Return a MATLAB file of that name, and the script that builds its systems, by their names."""
+    script = f"load_{re.sub(r'[^A-Za-z0-9_]', '_', Path(name).stem)}.m"
+    first, *others = ((name, entries_of(system)) for name, system in of.systems.items())
+    content = mat_content({**first[1], **dict(others), **of.response}, "row")
+    return {name: content, script: render("load.m", file=matlab_text(name), of=of)}
+
+
+def entries_of(system: NamedSystem) -> dict[str, Any]:
+    """Return the variables of one system, with its names and facts."""
+    return {
+        **dict(zip("ABCD", system.matrices, strict=True)),
+        "period": system.period,
+        "input_name": np.array(system.inputs, dtype=object),
+        "output_names": np.array(system.outputs, dtype=object),
+        "state_names": np.array(system.states, dtype=object),
+        "name": comment(system.name),
+        **system.facts,
+    }
+
+
+def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[Path, ...]:
+    """Write a MATLAB file of a reduced model and in its folder a script of `sys` and `exact`; return the paths.
+
+    The file has A, B, C, D, all names, the exact response over the frequency range, and the worst error.  To standard
+    output it is written alone.  Raises ParameterError, naming `key`, where they cannot be written, or a script of that
+    name is another file's.
+    """
+    path, model = Path(path), reduced.model
+    G = transfer(model.arm, model.rows, x=model.x)
+    exact = response_data(model.arm, reduced.input, reduced.outputs, reduced.band, G)
+    of = Linear({"sys": reduced_system(reduced, reduced.outputs)}, [], exact)
+    if is_standard_output(path):
+        write_file(path, mat_files(path.name, of)[path.name], key=key)
+        return (path,)
+    is_file = os.path.isfile(path) or not os.path.exists(path)
+    require(is_file, key, str(path), "is no regular file, and its script needs a folder")
+    path = path if path.suffix == ".mat" else path.with_name(path.name + ".mat")
+    require(comment(path.name) == path.name, key, path.name, "a name of printable ASCII, as its script contains it")
+    contents = {path.with_name(name): content for name, content in mat_files(path.name, of).items()}
+    other = next(reversed(contents))
+    text = ""
+    with suppress(OSError):  # a file that cannot be read is not ours
+        text = other.read_text("utf-8", errors="replace") if other.is_file() else ""
+    is_ours = not os.path.exists(other) or (WRITTEN_BY in text and matlab_text(path.name) in text)
+    remedy = f"{other.name} in that folder is not its script and would be replaced; choose another name"
+    require(is_ours, key, str(path), remedy)
+    for place in reversed(contents):
+        write_file(place, contents[place], key=key)
+    return tuple(contents)
+
+
+def py(task: ExportTask) -> Export:
+    """Return the script of a task."""
+    found = linear(task)
+    content = render("systems.txt", of=found, listed=listed)
+    every = [name for each in found.systems.values() for name in (*each.inputs, *each.outputs)]
+    changed = {name: new for name, new in zip(every, plain(every), strict=True) if new != name}
+    return Export(
+        what=task.what, form=task.form, contents={f"{task.what}.py": content}, names=names_of(changed),
+        verdict=found.verdict, sha256=task.sha256,
+    )  # fmt: skip
+
+
+def plain(names: Iterable[str]) -> list[str]:
+    """Return names of signals without dots, which separate system and signal in python-control."""
+    return [name.replace(".", "_") for name in names]
+
+
+def listed(names: Iterable[str]) -> str:
+    """Return a literal of these names."""
+    return f"[{', '.join(map(python_text, plain(names)))}]"

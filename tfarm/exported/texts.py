@@ -1,0 +1,91 @@
+"""The user's words in the languages of targets: identifiers, comments, quoted texts, and templates.
+
+No text of a user reaches a file but through one function here: `comment`, `identifiers`, `python_text`, `matlab_text`;
+XML is written by ElementTree.
+"""
+
+import re
+import unicodedata
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from tfarm.schema import entries, text
+
+LONGEST_IDENTIFIER = 31  # characters of an identifier that C99 compares
+LONGEST_NAME = 16  # of identifiers in C, before "_step" and the like
+LONGEST_COMMENT = 200
+COMMENT_MARKS = (("\\", "|"), ("*/", "* /"), ("/*", "/ *"), ("??/", "? ?/"))  # of C, and the trigraph of a backslash
+
+
+def identifiers(names: Iterable[str], prefix: str, longest: int = LONGEST_IDENTIFIER) -> dict[str, str]:
+    """Return an identifier of C, C++, MATLAB and Python for each name: `prefix`, letters, digits and underscores.
+
+    A prefix that ends in an underscore, such as "y_", begins no keyword.  Equal identifiers are numbered.
+    """
+    found: dict[str, str] = {}
+    taken: set[str] = set()
+    for name in dict.fromkeys(names):
+        plain = f"{prefix}{re.sub(r'[^A-Za-z0-9]+', '_', name).strip('_') or 'unnamed'}"
+        tries = (plain[:longest], *(f"{plain[: longest - 1 - len(str(n))]}_{n}" for n in range(2, len(found) + 3)))
+        found[name] = next(each for each in tries if each.lower() not in taken)
+        taken.add(found[name].lower())
+    return found
+
+
+def comment(words: str) -> str:
+    """Return one line of printable ASCII that ends no comment of C and continues none."""
+    plain = unicodedata.normalize("NFKD", words)
+    line = "".join(c if " " <= c <= "~" else " " if c.isspace() else "?" for c in plain if not unicodedata.combining(c))
+    for mark, instead in COMMENT_MARKS:
+        line = line.replace(mark, instead)
+    return line[:LONGEST_COMMENT].strip()
+
+
+def python_text(words: str) -> str:
+    """Return a literal of Python in ASCII."""
+    return ascii(words)
+
+
+def matlab_text(words: str) -> str:
+    """Return a character vector of MATLAB in one line of ASCII, its quotes doubled."""
+    return "'" + comment(words).replace("'", "''") + "'"
+
+
+def name_in_c(wanted: str) -> dict[str, str]:
+    """Return the name that the identifiers of a file in C begin with, by the wanted one."""
+    prefix = "" if wanted[:1].isascii() and wanted[:1].isalpha() else "n_"
+    return identifiers([wanted], prefix, LONGEST_NAME)
+
+
+def literal(value: float, suffix: str = "") -> str:
+    """Return a number in C: whole, or hexadecimal with all its bits."""
+    return f"{value:d}" if isinstance(value, int) else f"{float(value).hex()}{suffix}"
+
+
+@cache
+def templates() -> Environment:
+    """The templates of source files, without the escapes of HTML."""
+    folder = Path(__file__).parent / "templates"
+    environment = Environment(
+        loader=FileSystemLoader(folder), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+        keep_trailing_newline=True, autoescape=False,
+    )  # fmt: skip
+    environment.filters["comment"] = comment
+    return environment
+
+
+def render(template: str, **values: Any) -> bytes:
+    """Return a source file from its template."""
+    return templates().get_template(template).render(**values).encode("ascii")
+
+
+def facts_of(record: Any) -> list[tuple[str, str]]:
+    """The entries of a record that have one value, by label with unit, for a comment."""
+    rows = (
+        (f"{label} [{of.unit}]" if of.unit else label, text(value, of.digits)) for label, of, value in entries(record)
+    )
+    return [(label, shown) for label, shown in rows if shown]

@@ -1,0 +1,276 @@
+"""A trained tuner as C99: header, source and self-test, and the same tuner as a controller of simulations."""
+
+import hashlib
+import math
+from fractions import Fraction
+from importlib.metadata import version
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tfarm.arm import HubFeedback
+from tfarm.arrays import Real, Whole
+from tfarm.dsp import Measurement, sampled_loop
+from tfarm.errors import MISSING, ParameterError, must_be_known, require
+from tfarm.exact.compiled import compiled
+from tfarm.exported.controller import FEEDFORWARD, REAL, Port, recorded
+from tfarm.exported.result import ANYWAY, Export, ExportTask, names_of
+from tfarm.exported.texts import literal, name_in_c, render
+from tfarm.exported.twin import INPUT_ERROR, OVERFLOW
+from tfarm.exported.word_length import FLOATS
+from tfarm.tuner.guard import sector_guard
+from tfarm.tuner.trial import TRIAL_MODES, SavedTuner, load_tuner
+
+ULPS = {"exp": 1.5, "log": 2.0}  # bounds of the errors: of e^x, x from `lowest` to 0, and of ln(1 + y), y from 0 to 1
+LN_2 = Fraction(math.log(2.0)) + Fraction(2319046813846299558, 10**35)  # 35 digits: math.log(2) and its remainder
+
+ANGLE, RATE, MOMENT, WANTED_ANGLE, WANTED_RATE, WANTED_MOMENT, FORWARD = 0, 1, 2, 3, 4, 5, -1
+U, E, X, K, E_BEFORE, TORQUE = range(6)  # places of the state: the last sample, and e of the one before
+
+
+ZERO, HALF, ONE, TWO = np.array([0.0, 0.5, 1.0, 2.0], np.float32)  # exact, and of either precision with another number
+
+
+class Numbers(NamedTuple):
+    """Numbers of a tuner in one precision.
+
+    e^x is 0 up to `lowest`; adding and subtracting `shift` rounds to a whole number; `inverse` is 1/ln 2, ln 2 = `high`
+    + `low`; series in ascending order.  Then network, servo and guard, as in `tfarm.tuner.kernel`.
+    """
+
+    lowest: float
+    shift: float
+    inverse: float
+    high: float
+    low: float
+    turn: float
+    taylor: Real
+    artanh: Real
+    W1: Real
+    w2: Real
+    scales: Real
+    K1: float
+    Kp: float
+    lo: float
+    hi: float
+    largest: float
+    is_total: bool
+    is_free: bool
+
+
+def numbers_of(saved: SavedTuner, real: Any) -> Numbers:
+    """The numbers of a tuner in np.float64 or np.float32, the guard rounded inwards.
+
+    Raises ParameterError for a number beyond the range of the precision.
+    """
+    bits, lowest, terms, odd = (42, -708.0, 14, 10) if real is np.float64 else (16, -87.0, 9, 4)
+    high = Fraction(round(LN_2 * 2**bits), 2**bits)
+    shift = 1.5 * 2 ** np.finfo(real).nmant
+    scalars = lowest, shift, 1 / math.log(2.0), high, LN_2 - high, math.sqrt(2.0) - 1
+    series = [1 / math.factorial(n) for n in range(terms)], [2 / (2 * j + 1) for j in range(1, odd + 1)]
+    limits, names = saved.gain().guard, ("W1", "w2", "scales", "K1", "Kp")
+    with np.errstate(over="ignore", under="ignore"):
+        W1, w2, scales, K1, Kp = rounded = [np.array(getattr(saved, name), dtype=real) for name in names]
+        lo, hi = map(real, limits)
+    lo = np.nextafter(lo, real(math.inf)) if float(lo) < limits.lo else lo
+    hi = np.nextafter(hi, real(0.0)) if float(hi) > limits.hi else hi
+    usable = [*(np.isfinite(each).all() for each in rounded), scales.all(), lo < hi]
+    for name, is_usable in zip((*names, "scales", "guard"), usable, strict=True):
+        require(is_usable, name, getattr(saved, name), "beyond the range or the digits of float: export it in double")
+    share = float(scales.min()) / (2 * scales.size * max(1.0, float(abs(W1).max())))
+    largest = real(min(1.0, share) * float(np.finfo(real).max))
+    return Numbers._make([
+        *(real(float(each)) for each in scalars), *(np.array(each, dtype=real) for each in series),
+        W1, w2, scales, real(K1), real(Kp), lo, hi, largest, saved.signals == "total", saved.guard is None,
+    ])  # fmt: skip
+
+
+@compiled
+def polynomial(x: float, coefficients: Real) -> float:
+    """The sum of coefficients[n] x^n, by Horner's rule."""
+    total = coefficients[coefficients.size - 1]
+    for n in range(coefficients.size - 2, -1, -1):
+        total = total * x + coefficients[n]
+    return total
+
+
+@compiled
+def exponential(x: float, of: Numbers) -> float:
+    """e^x for x <= 0; 0 of NaN, which u, e or x then is too: the step is refused."""
+    if not x > of.lowest:
+        return ZERO
+    k = (x * of.inverse + of.shift) - of.shift
+    result = polynomial((x - k * of.high) - k * of.low, of.taylor)
+    power, n = HALF, int(-k)
+    while n > 0:  # at most ten times
+        if n % 2 == 1:
+            result *= power
+        power *= power
+        n //= 2
+    return result
+
+
+@compiled
+def logarithm(y: float, of: Numbers) -> float:
+    """ln(1 + y) for 0 <= y <= 1."""
+    is_small = y < of.turn
+    f = y if is_small else HALF * (y - ONE)
+    s = f / (TWO + f)
+    square = s * s
+    below = s * (f - square * polynomial(square, of.artanh))
+    return f - below if is_small else of.high + (f - (below - of.low))
+
+
+@compiled
+def sigmoid(z: float, of: Numbers) -> float:
+    """1/(1 + e^-z)."""
+    small = exponential(-z if z > ZERO else z, of)
+    return (ONE if z > ZERO else small) / (ONE + small)
+
+
+@compiled
+def softplus(z: float, of: Numbers) -> float:
+    """ln(1 + e^z)."""
+    is_positive = z > ZERO
+    tail = logarithm(exponential(-z if is_positive else z, of), of)
+    return z + tail if is_positive else tail
+
+
+@compiled
+def network_gain(of: Numbers, row: Real) -> float:
+    """K of a row of inputs."""
+    z = ZERO
+    for j in range(of.w2.size):
+        net = ZERO
+        for i in range(of.scales.size):
+            net += of.W1[j, i] * (row[i] / of.scales[i])
+        z += of.w2[j] * sigmoid(net, of)
+    if of.is_free:
+        return softplus(z, of)
+    gain = of.lo + (of.hi - of.lo) * sigmoid(z, of)  # not below lo; above hi by rounding
+    return of.hi if gain > of.hi else gain
+
+
+@compiled
+def step(of: Numbers, state: Real, inputs: Real) -> int:
+    """Advance by one sample; return 0, or the kind of an error."""
+    for value in inputs:
+        if not -of.largest <= value <= of.largest:
+            return INPUT_ERROR
+    x = inputs[MOMENT] if of.is_total else inputs[MOMENT] - inputs[WANTED_MOMENT]
+    servo = of.Kp * (inputs[WANTED_ANGLE] - inputs[ANGLE]) + of.K1 * (inputs[WANTED_RATE] - inputs[RATE])
+    u = servo + inputs[FORWARD] if of.is_total else servo
+    row = np.array([u, state[U], state[E], state[E_BEFORE], x, state[X], state[K]])
+    gain = network_gain(of, row)
+    e, torque = u - gain * x, (inputs[FORWARD] + servo) - gain * x
+    for value in (u, e, x, gain, torque):
+        if not -of.largest <= value <= of.largest:
+            return OVERFLOW
+    state[U], state[E], state[X], state[K], state[E_BEFORE], state[TORQUE] = u, e, x, gain, state[E], torque
+    return 0
+
+
+@compiled
+def run(of: Numbers, state: Real, inputs: Real, torque: Real, status: Whole) -> None:
+    """Step over rows of inputs."""
+    for k in range(status.size):
+        status[k] = step(of, state, inputs[k])
+        torque[k] = state[TORQUE]
+
+
+INPUTS = {  # by identifier in C: the field of a `Measurement`, the meaning, and the unit ("": that of the arm's input)
+    "y_hub_angle": ("hub_angle", "hub angle", "rad"),
+    "y_hub_rate": ("hub_rate", "hub rate", "rad/s"),
+    "y_root_moment": ("root_moment", "root moment", "N m"),
+    "r_hub_angle": ("angle_reference", "reference of the hub angle", "rad"),
+    "r_hub_rate": ("rate_reference", "reference of the hub rate", "rad/s"),
+    "r_root_moment": ("rigid_moment", "root moment of the rigid arm", "N m"),
+    FEEDFORWARD: ("feedforward", "feedforward", ""),
+}
+
+
+class ExportedTuner:
+    """A tuner in the arithmetic of its C source: a controller of `Simulator.controller`.
+
+    `precision` is "double" or "float".  Raises ParameterError for a number of the tuner beyond its range.
+    """
+
+    def __init__(self, saved: SavedTuner, precision: str = "double") -> None:
+        must_be_known("precision", precision, FLOATS)
+        self.real, self.scale = FLOATS[precision][0], saved.scales[0]
+        self.numbers = numbers_of(saved, self.real)
+        self.inputs = {key: of for key, of in INPUTS.items() if not (self.numbers.is_total and key == "r_root_moment")}
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to the state before the first sample."""
+        self.state = np.zeros(6, self.real)
+
+    def run(self, inputs: Real) -> tuple[Real, Whole]:
+        """Advance over rows of `inputs` (n, inputs); return torques and status (n,), as the C code has them."""
+        torque, status = np.zeros(len(inputs), self.real), np.zeros(len(inputs), np.int64)
+        with np.errstate(over="ignore"):
+            rows = np.ascontiguousarray(inputs, dtype=self.real)
+        run(self.numbers, self.state, rows, torque, status)
+        return torque, status
+
+    def __call__(self, m: Measurement) -> float:
+        """The torque of a sample; that of the sample before where a number is NaN, infinite or too large."""
+        if m.k == 0:
+            self.reset()
+        return float(self.run(np.array([[getattr(m, name) for name, _, _ in self.inputs.values()]]))[0][0])
+
+
+def c_tuner(task: ExportTask) -> Export:
+    """The files of a trained tuner in C99.
+
+    Raises ParameterError without a tuner, for one of another sampling period, and, unless `anyway`, for one whose gain
+    is not certified to vary in its guard on this arm.
+    """
+    if task.tuned is None:
+        raise ParameterError(key="tuned", value=MISSING, remedy="give the file of tfarm tune ARM --save FILE.json")
+    saved, period = load_tuner(task.tuned, "tuned"), task.chain.sampling.period
+    remedy = f"the tuner was trained every {saved.period!r} s: sample so, or train one at this period"
+    require(saved.period == period, "sampling.period", period, remedy)
+    tuner = ExportedTuner(saved, task.precision)
+    of = tuner.numbers
+    loop = sampled_loop(task.arm, HubFeedback(K1=float(of.K1), K2=1.0, Kp=float(of.Kp)), task.chain, count=TRIAL_MODES)
+    guard = None if of.is_free else sector_guard(loop, float(of.lo), float(of.hi))
+    certainty = "not certified for a gain that varies" if guard is None else guard.sentence
+    is_proven = guard is not None and guard.is_proven
+    remedy = f"on this arm the gain is {certainty}; --anyway exports it"
+    require(is_proven or task.anyway, "tuned", str(task.tuned), remedy)
+    facts = {
+        "arm": task.arm.name, "tuner": f"trained on {saved.arm}", **({} if is_proven else {"warning": ANYWAY}),
+        "sampling period": f"{period!r} s", "moment gain": certainty,
+        "network": f"{of.scales.size}-{of.w2.size}-1, {task.precision}",
+        "SHA-256 of the tuner": hashlib.sha256(task.tuned.read_bytes()).hexdigest(),
+        "SHA-256 of the inputs": task.sha256, "tfarm": version("tfarm"),
+    }  # fmt: skip
+    name = name_in_c(task.name or "tuner")
+    contents = written(task, tuner, next(iter(name.values())), facts)
+    return Export(
+        what=task.what, form=task.form, contents=contents, names=names_of(name), verdict=certainty, sha256=task.sha256
+    )
+
+
+def written(task: ExportTask, tuner: ExportedTuner, name: str, facts: dict[str, str]) -> dict[str, bytes]:
+    """The files by name; constants have the names that they have in `tuner_twin`."""
+    of, (real, suffix, _) = tuner.numbers, REAL[task.precision]
+    unused = {"lo", "hi"} if of.is_free else {"turn", "artanh"}
+    kept: dict[str, Any] = {key: each for key, each in of._asdict().items() if key not in unused}
+    ports = [
+        Port(of_sample, key, f"{meaning} [{unit or task.arm.input_unit}]", 1.0 if "rad" in unit else tuner.scale)
+        for key, (of_sample, meaning, unit) in tuner.inputs.items()
+    ]
+    values = {
+        "name": name, "facts": list(facts.items()), "fixed": False, "real": real, "suffix": suffix, "header": "tuner.h",
+        "fields": ports, "output": f"{task.arm.input} [{task.arm.input_unit}]", "of": of, "ulps": ULPS,
+        "scalars": {key: literal(float(x), suffix) for key, x in kept.items() if isinstance(x, np.floating)},
+        "tables": {
+            key: [literal(x, suffix) for x in each.ravel().tolist()]
+            for key, each in kept.items() if isinstance(each, np.ndarray)
+        },
+        **recorded(tuner.run, ports, task.precision),
+    }  # fmt: skip
+    return {file: render(file, **values) for file in ("tuner.h", "tuner.c", "self_test.c")}
