@@ -181,7 +181,7 @@ def studies():
     """An arm of a study, its chunk against a plain loop, and two processes against one, by the time that passes."""
     over = {"payload.mass": {"uniform": [0.0, 0.2]}, "law.K2": {"uniform": [0.0, 0.6]}}
     for ask, n in (("modes", 200), ("card", 5)):
-        space = space_of(over, draws=n, seed=0, posterior=None, listed=((), 0))
+        space = space_of(over, draws=n, seed=0, posterior=None)
         plan = Plan(LAB, LAW, Chain(), space, asked_columns([ask]))
 
         def plain(plan=plan, n=n):

@@ -84,7 +84,7 @@ def test_two_processes_and_the_declared_study_have_the_same_bytes(whole, tmp_pat
 
 def test_csv_has_the_numbers_of_parquet(tmp_path, monkeypatch):
     parquet = STUDY(out=tmp_path / "a", draws=6, part=4, workers=1).table()
-    monkeypatch.setattr(running, "find_spec", lambda _: None)
+    monkeypatch.setattr(running.importlib.util, "find_spec", lambda _: None)
     csv = STUDY(out=tmp_path / "b", draws=6, part=4, workers=1)
     assert {path.suffix for path in (tmp_path / "b").glob("part-*")} == {".csv"}
     for name, values in csv.table().items():

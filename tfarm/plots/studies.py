@@ -25,8 +25,6 @@ from tfarm.studies.quantities import (
     quantity_of,
     stability_of,
 )
-from tfarm.studies.running import Plan
-from tfarm.studies.space import LAW
 from tfarm.studies.study import Study
 
 from .frequency import over_frequency
@@ -103,10 +101,11 @@ def _folded(label: str) -> str:
     return textwrap.fill(safe(label).replace(" [", "\u00a0["), LINE).replace("\u00a0", " ")
 
 
-def key_label(key: str, plan: Plan) -> str:
+def key_label(key: str, found: Study) -> str:
     """A varied number with its SI unit."""
-    if key.startswith(LAW):
-        return number_label(key.removeprefix(LAW), plan.arm, plan.law)
+    plan = found.parts.plan
+    if key.startswith("law."):
+        return number_label(key.removeprefix("law."), plan.arm, plan.law)
     is_known = ".".join(word for word in key.split(".") if not word.isdecimal()) in file_keys()
     return f"{key} [{(file_key(key, plan.arm).unit if is_known else '') or '−'}]"
 
@@ -144,7 +143,7 @@ def study_scatter(found: Study, quantity: str | None = None, *, ax: Sequence[Axe
                     if (here := own & (words == word)).any():
                         one.plot(table[key][here], height[here], mark, color=colour, ms=3.4, alpha=0.75,
                                  transform=transform, label=word or "not determined")  # fmt: skip
-            one.set(xlabel=_folded(key_label(key, found.parts.plan)) * one.xaxis.get_tick_params()["labelbottom"])
+            one.set(xlabel=_folded(key_label(key, found)) * one.xaxis.get_tick_params()["labelbottom"])
             one.set(ylabel=_folded(f"{of.label} [{of.unit or '−'}]") * one.yaxis.get_tick_params()["labelleft"])
             one.xaxis.set_major_locator(MaxNLocator(4))
             plain_ticks(one.xaxis)

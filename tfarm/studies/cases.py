@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from tfarm import tuner
 from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback, Section
 from tfarm.arm.checks import whole
 from tfarm.arrays import Real
@@ -22,8 +23,6 @@ from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import default_gains
-from tfarm.tuner import LearningCurves
-from tfarm.tuner import Plan as TunerPlan
 
 from .quantities import FREQUENCY, INTERVAL, SENSITIVITY, STABILITY, TRIAL_COST
 from .running import Chunk, Plan, Progress, chunk
@@ -227,8 +226,8 @@ def _with_own(candidates: Sequence[float], own: float) -> list[float]:
 
 
 def learning_curves(
-    arm: Arm, plan: TunerPlan, chain: Chain, seeds: int, progress: Progress = lambda *_: None
-) -> LearningCurves:
+    arm: Arm, plan: tuner.Plan, chain: Chain, seeds: int, progress: Progress = lambda *_: None
+) -> tuner.LearningCurves:
     """Return the learning curves of a plan from a number of seeds, its own and those that follow (paper's Figure 5).
 
     `progress` gets (done, total, text).  Raises ParameterError for a number of seeds out of range.
@@ -241,7 +240,7 @@ def learning_curves(
         for table in pool.map(lambda n: results(own, n, n + 1), range(seeds)):
             tables.append({name: np.inf if value is None else value for name, (value,) in table.items()})
             progress(len(tables), seeds, "learning curves")
-    return LearningCurves(
+    return tuner.LearningCurves(
         costs=np.array([[each[name] for name in costs] for each in tables]),
         final=np.array([each[FINAL] for each in tables]),
         diverged=sum(each[STOPPED] != np.inf for each in tables),

@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import chain
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -29,8 +28,7 @@ from tfarm.errors import ConvergenceError, TfarmError, must_be_known, require
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Interval, windows_of
-from tfarm.schema import Percent, Quantity
-from tfarm.schema.quantities import quantities
+from tfarm.schema import Percent, Quantity, quantities
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.shapes import PARAMETERS
 from tfarm.tuner.tuning import tuned
@@ -231,7 +229,7 @@ def asked_columns(words: Sequence[str]) -> tuple[str, ...]:
     column.
     """
     found: dict[str, None] = {}
-    for word in chain.from_iterable(LOOPS if each == CARD else (each,) for each in words):
+    for word in [each for name in words for each in (LOOPS if name == CARD else (name,))]:
         begun = [name for name in COLUMNS if f"{name}.".startswith(f"{word}.")]
         after = [name for name in COLUMNS if f"{name}.".partition(".")[2].startswith(f"{word}.")]
         own = [word] if first_of(word) in COLUMNS else begun or after

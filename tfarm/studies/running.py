@@ -7,6 +7,7 @@ and kept in `study.json`: an interrupted study goes on with the parts that are m
 
 import csv
 import hashlib
+import importlib.util
 import io
 import json
 import math
@@ -14,8 +15,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from importlib import import_module
-from importlib.util import find_spec
 from itertools import islice
 from logging import getLogger
 from pathlib import Path
@@ -147,7 +146,7 @@ class Parts:
     def write(self, number: int, table: Mapping[str, Sequence[Any]]) -> None:
         """Write the table of a part under a temporary name, then rename it."""
         if self.suffix == PARQUET:
-            module, arrow, binary = parquet("out", "Parquet"), import_module("pyarrow"), io.BytesIO()
+            module, arrow, binary = parquet("out", "Parquet"), importlib.import_module("pyarrow"), io.BytesIO()
             texts, kinds = self.plan.texts, (arrow.float64(), arrow.string())
             arrays = {name: arrow.array(values, kinds[name in texts]) for name, values in table.items()}
             module.write_table(arrow.table(arrays), binary)
@@ -188,7 +187,7 @@ def opened(folder: Path, plan: Plan, files: Mapping[str, bytes], workers: int, s
 
     `rows` are the values of the first rows.  Raises ParameterError for a folder that has another study.
     """
-    space, file, suffix = plan.space, folder / FILE, PARQUET if find_spec("pyarrow") else ".csv"
+    space, file, suffix = plan.space, folder / FILE, PARQUET if importlib.util.find_spec("pyarrow") else ".csv"
     hashes = {name: hashlib.sha256(content).hexdigest() for name, content in files.items() if name != STUDY_FILE}
     inputs = json.loads(json.dumps({
         "over": list(space.over.items()), "columns": plan.names, "draws": space.draws, "seed": space.seed,
@@ -220,7 +219,7 @@ def _sha256(path: Path) -> str:
 
 def versions() -> dict[str, str]:
     """Return the versions of the packages on which numbers depend."""
-    return {name: import_module(name).__version__ for name in PACKAGES}
+    return {name: importlib.import_module(name).__version__ for name in PACKAGES}
 
 
 # ------------------------------------------------------------------------------------------------------------ runs

@@ -28,8 +28,7 @@ from tfarm.arrays import Real
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError, must_be_known, naming, require
 from tfarm.fitting.posterior import Posterior
-from tfarm.tuner.tuning import NUMBERS, NUMBERS_OF_LEARNING
-from tfarm.tuner.tuning import Plan as TunerPlan
+from tfarm.tuner import tuning
 
 LAW, TUNER = "law.", "tuner."  # prefixes of the numbers of the controller and of the tuner
 MOST_ROWS = 10_000_000  # of one study
@@ -73,7 +72,7 @@ class Subject(NamedTuple):
     law: AnyLaw
     chain: Chain
     tuner: dict[str, float]
-    plan: TunerPlan | None = None
+    plan: tuning.Plan | None = None
 
 
 class Listing(NamedTuple):
@@ -200,7 +199,9 @@ class Subjects:
     controller (`Law.having`), and "tuner.seed" and others of the tuner.  Raises ParameterError for an unknown one.
     """
 
-    def __init__(self, arm: Arm, law: AnyLaw, chain: Chain, keys: Sequence[str], plan: TunerPlan | None = None) -> None:
+    def __init__(
+        self, arm: Arm, law: AnyLaw, chain: Chain, keys: Sequence[str], plan: tuning.Plan | None = None
+    ) -> None:
         self.law, self.chain, self.keys, self.plan = law, chain, keys, plan
         numbers = {
             f"{table.name}.{each.name}": (table.name, each.name)
@@ -214,7 +215,7 @@ class Subjects:
         signals = [OUTPUT_OF.get(name, name).removesuffix(".gain") for name in of_law]
         require(len(set(signals)) == len(signals), "over", of_law, "two keys are one number of the controller")
         for name in of_tuner:
-            must_be_known("tuner", name, (*NUMBERS, *NUMBERS_OF_LEARNING))
+            must_be_known("tuner", name, (*tuning.NUMBERS, *tuning.NUMBERS_OF_LEARNING))
         own = [key for key in keys if not key.startswith((LAW, TUNER)) and key not in numbers]
         for key in own:
             must_be_known("over", key, [*numbers_of(arm), *numbers, f"{LAW}NUMBER", f"{TUNER}NUMBER"])

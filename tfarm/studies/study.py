@@ -30,8 +30,7 @@ from tfarm.arm.law_tables import load_law
 from tfarm.arm.reading import arm_in, load_tables, presets
 from tfarm.arm.writing import LAW_DEFAULTS, law_toml, toml_tables, toml_text
 from tfarm.arrays import Real
-from tfarm.dsp import Chain
-from tfarm.dsp.chain import chain_or_usual, file_text, load_chain
+from tfarm.dsp.chain import Chain, chain_or_usual, file_text, load_chain
 from tfarm.errors import ParameterError, must_be_known, naming, require
 from tfarm.files import mat_content, write_file
 from tfarm.fitting.posterior import load_posterior
