@@ -436,4 +436,4 @@ def _numbers(found: Study) -> list[Column]:
         Column("key", "number", of=space.keys),
         Column("distribution", "distribution", of=[kinds.get(key, "list or posterior") for key in space.keys]),
     ]
-    return columns + [Column("worst", "worst arm", of=worst)] * bool(worst)
+    return columns + [Column("worst", "worst arm", of=worst, shown=list(map(text, worst)))] * bool(worst)
