@@ -246,10 +246,12 @@ class Word:
         of, at = around(self.rounded, loop), [read.index(name) for name in signals]
         left = np.vstack([np.eye(len(of.matrix))[of.states], of.reads[at], of.output])
         S, is_whole = absolute_sum(observed(of.matrix, left), left, np.c_[of.of_rounding, of.of_signals[:, at]])
+        if not is_whole:
+            return None
         Q = abs(system_matrix(self.rounded))[:, : n + len(at)]  # references are at rest
         S[-1, n:] += np.r_[1.0, Q[n, n:]]  # u itself
         relative, absolute = self.errors
-        loops = relative * S[:, : n + 1] @ Q if is_whole else np.ones((len(left), n + len(at)))
+        loops = relative * S[:, : n + 1] @ Q
         rest = S @ np.r_[absolute, HALF_STEP * self.ranges[: len(at)] * (self.precision == FIXED)]
         bound = float(rest[-1] + loops[-1] @ least_solution(loops[:-1], rest[:-1]))
         return bound if bound < math.inf else None
