@@ -59,6 +59,7 @@ def test_the_hash_is_that_of_arm_law_and_chain():
     assert len({sha(), *others}) == 4
 
 
+@pytest.mark.survey
 def test_a_law_of_another_input_is_in_its_unit(tmp_path):
     """A controller of the motor's current, on the file of its arm."""
     arm, law, chain = hinf()

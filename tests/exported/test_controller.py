@@ -37,7 +37,7 @@ def exported(tmp_path_factory):
     return of
 
 
-@pytest.mark.parametrize(("case", "precision", "compiler"), [*thinned(GCC, 2), *thinned(CLANG, 4)])
+@pytest.mark.parametrize(("case", "precision", "compiler"), [*thinned(GCC, 3), *thinned(CLANG, 6)])
 def test_c_equals_python_bit_for_bit(exported, case, precision, compiler):
     """Saturated, quantised and refused samples too, with and without optimisation; the self-test agrees."""
     folder, controller = exported(case, precision)

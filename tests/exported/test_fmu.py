@@ -25,7 +25,7 @@ from tfarm.dsp import Simulator, scenario
 from tfarm.dsp.results import simulated_run
 from tfarm.exported import fmu as module
 
-QUICK = ("integral", "late", "single", "impulse", "pulse")
+QUICK = ("late", "single", "impulse", "pulse")
 MODES = 4
 EQUAL = 1e-12  # of the largest value of a signal: roundings in another order
 LATE = replace(REAL, sampling=replace(REAL.sampling, delay_samples=1.3, antialias_corner=400.0))

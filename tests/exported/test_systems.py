@@ -142,7 +142,7 @@ def test_reduced_models_are_within_their_error():
     for each in reduced_systems(LAB, names).values():
         rows, h = [names.index(name) for name in each.outputs], 1e-5
         exact, above, below = (read.values(1j * omega * factor)[rows] for factor in (1, 1 + h, 1 - h))
-        mine = np.array([each(1j * w)[:, 0] for w in omega]).T
+        mine = np.array([value(each, 1j * w)[:, 0] for w in omega]).T
         error = abs(mine - exact) / (abs(exact) + abs(above - below) / (2 * h))
         assert error.max() < each.facts["worst_error"] + 1e-11  # rounding of the solution of order 42
         assert math.isclose(each.facts["band"][1], 1000.0)

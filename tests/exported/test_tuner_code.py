@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from fractions import Fraction
+from itertools import product
 
 import mpmath
 import numpy as np
@@ -13,7 +14,7 @@ from tests.exported import tuners
 from tests.exported.compilers import COMPILERS, KINDS, STRICT, build, needed, run
 from tests.exported.tuners import DIFFERENCE, LEVELS, PRECISIONS, SECTOR, exported, is_equal
 from tests.hostile import C_TEXTS, NAME
-from tests.shared import sized
+from tests.shared import sized, thinned
 from tests.shell import answer, refused
 from tests.survey import tally
 from tests.tuner.plain import plain_gain
@@ -274,9 +275,7 @@ def folders(tmp_path_factory):
     return found
 
 
-@pytest.mark.parametrize("level", LEVELS)
-@pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("precision", PRECISIONS)
+@pytest.mark.parametrize(("precision", "compiler", "level"), thinned([*product(PRECISIONS, COMPILERS, LEVELS)], 3))
 def test_c_is_python_to_the_last_bit(folders, compiler, level, precision):
     """20,000 samples in all."""
     needed(compiler)
@@ -373,7 +372,7 @@ def test_what_is_refused(tmp_path, lab):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("words", [each[:80] for each in C_TEXTS])
+@pytest.mark.parametrize("words", thinned([each[:80] for each in C_TEXTS], 3))
 def test_hostile_names(tmp_path, lab, words):
     """Of the arm, of the arm of the training, and of the identifiers."""
     saved = tuner_of(0, arm=words, **FREE)

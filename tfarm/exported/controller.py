@@ -3,7 +3,8 @@
     e = reference - signal,  u = feedforward + C x + D e,  x = A x + B e
 
 in double, float or Q31, in the realisation with the least round-off noise, with the DAC, the limit of the actuator and
-the delay of the law as the simulation has them.  The loop is judged with the coefficients as they are exported.
+the delay of the law as the simulation has them.  The loop is judged with the coefficients as they are exported.  A step
+refuses inputs that are not finite, and results that are not: it holds the output and keeps the states.
 """
 
 import math
@@ -22,13 +23,13 @@ from tfarm.arm.law import REFERENCE
 from tfarm.arrays import Real, Whole
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.discretise import discretised
-from tfarm.dsp.kernel import DAC
+from tfarm.dsp.kernel import DAC, estimate, product, quantise, rounded
 from tfarm.dsp.sampled import Sampled
 from tfarm.dsp.simulate import quantisers
 from tfarm.dsp.verdict import Analysis, sampled
 from tfarm.errors import ParameterError, must_be_known, require
+from tfarm.exact.compiled import compiled, inlined
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.exported import twin
 from tfarm.exported.result import Export, ExportTask, Name, is_certified, names_of
 from tfarm.exported.texts import facts_of, identifiers, literal, name_in_c, render
 from tfarm.exported.word_length import (
@@ -54,6 +55,9 @@ RECORDED, REFUSED, SEED = 1000, 500, 1  # samples of the self-test, the one with
 WHOLE_SAMPLE = 1e-9  # of a sample: rounding of a delay
 RATE, ANGLE, FEEDFORWARD = "hub_rate", "hub_angle", "feedforward"
 REAL = {"double": ("double", "", "DBL_MAX"), "float": ("float", "f", "FLT_MAX"), FIXED: ("int32_t", "", "")}  # in C
+INPUT_ERROR, OVERFLOW = 1, 2  # what a step returns, 0 for a sample without an error
+MINUEND, SUBTRAHEND = 0, 1  # columns of a plan
+LARGEST = 2147483647  # of 32 bits
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,9 +79,8 @@ class WordLength:
 
 
 class Port(NamedTuple):
-    """One input of the C function: its name, identifier, text of a comment, and size in the self-test."""
+    """One input of the C function: its identifier, text of a comment, and size in the self-test."""
 
-    name: str
     identifier: str
     text: str
     size: float
@@ -100,7 +103,7 @@ class Controller:
 
     @cached_property
     def plan(self) -> Whole:
-        """The two inputs whose difference is e of each column, as `twin` has them: references less signals."""
+        """The two inputs whose difference is e of each column, as `run_real` has them: references less signals."""
         law, rate, zero = self.word.law, self.inputs, self.inputs + 1
         signals = {name: n for n, name in enumerate(self.signals)} | ({RATE: rate} if self.hub else {})
         wanted = {name: len(self.signals) + n for n, name in enumerate(self.references)}
@@ -116,7 +119,7 @@ class Controller:
     def whole_dac(self) -> Whole:
         """The converter in fixed point: shift of its step, 0 for none, lowest and highest output."""
         step, low, high = self.dac / self.word.output * 2.0**31
-        limits = np.clip([np.ceil(low), np.floor(high)], -twin.LARGEST - 1, twin.LARGEST)
+        limits = np.clip([np.ceil(low), np.floor(high)], -LARGEST - 1, LARGEST)
         return np.array([round(math.log2(step)) if step > 1 else 0, *limits], dtype=np.int64)
 
     def run(self, inputs: NDArray[Any]) -> tuple[NDArray[Any], Whole]:
@@ -125,11 +128,11 @@ class Controller:
         outputs, status = np.zeros(len(inputs), kind), np.zeros(len(inputs), int)
         table, inputs = (np.ascontiguousarray(each, dtype=kind) for each in (word.table, inputs))
         if word.precision == FIXED:
-            twin.run_fixed(table, word.shifts, self.plan, inputs, self.whole_dac, outputs)
+            run_fixed(table, word.shifts, self.plan, inputs, self.whole_dac, outputs)
         else:
             hub = np.array([self.signals.index(ANGLE), *self.hub] if self.hub else [-1.0, 0.0, 1.0])
             is_single = word.precision == "float"
-            twin.run_real(table, self.plan, inputs, self.dac, hub, is_single, outputs, status)
+            run_real(table, self.plan, inputs, self.dac, hub, is_single, outputs, status)
         is_good = status == 0  # a refused sample moves no delay line: the output is held
         return np.r_[np.zeros(1 + self.delay, kind), outputs[is_good]][np.cumsum(is_good)], status
 
@@ -218,6 +221,65 @@ def judged(task: ExportTask, word: Word, loop: Sampled) -> Analysis:
     raise ParameterError(key=coefficient(worst), value=float(exact[worst]), remedy=remedy)
 
 
+# ------------------------------------------------------------ its arithmetic, that of C and of a simulation
+
+
+@compiled
+def run_real(table: Any, plan: Any, inputs: Any, dac: Any, hub: Any, single: bool, outputs: Any, status: Any) -> None:
+    """Fill outputs and status (n,) of inputs (n, k), the last of which is the feedforward; refused ones are left as 0.
+
+    `table` is [A B; C D]; `plan` (columns, 2) has the two numbers whose difference is e of a column, by their places
+    among the inputs, an estimated hub rate and 0; `dac` is a row of the quantisers; `hub` index of the hub angle (-1:
+    no estimate), pole and period of the estimated rate.
+    """
+    n, forward = table.shape[0] - 1, inputs.shape[1] - 1
+    known, z, following = np.zeros(forward + 3), np.zeros(table.shape[1]), np.zeros(n + 1)
+    memory, clipped = np.zeros(3), np.zeros(3, np.bool_)
+    for k in range(inputs.shape[0]):
+        known[: forward + 1], before = inputs[k], memory.copy()
+        status[k] = INPUT_ERROR
+        if np.isfinite(inputs[k]).all():
+            if hub[0] >= 0.0:
+                known[-2] = rounded(estimate(known[int(hub[0])], 0.0, memory, True, hub[1], hub[2]), single)
+            for j in range(plan.shape[0]):
+                z[n + j] = rounded(known[plan[j, MINUEND]] - known[plan[j, SUBTRAHEND]], single)
+            for i in range(n + 1):
+                following[i] = product(table[i], z, known[forward] if i == n else 0.0, single)
+            status[k] = 0 if np.isfinite(following).all() else OVERFLOW
+            if status[k] == 0:
+                z[:n] = following[:n]
+                outputs[k] = rounded(quantise(following[n], dac, clipped, DAC), single)
+            else:
+                memory[:] = before
+
+
+@inlined
+def shifted(value: int, shift: int) -> int:
+    """value/2^shift, to the nearest whole number, halves upwards."""
+    return (value + (1 << (shift - 1))) >> shift
+
+
+@compiled
+def run_fixed(table: Any, shifts: Any, plan: Any, inputs: Any, dac: Any, outputs: Any) -> None:
+    """The same in fixed point; `dac` is the shift of the step of the DAC, 0 for none, lowest and highest output."""
+    n, forward = table.shape[0] - 1, inputs.shape[1] - 1
+    known, z = np.zeros(forward + 3, np.int64), np.zeros(table.shape[1], np.int64)
+    following = np.zeros(n + 1, np.int64)
+    for k in range(inputs.shape[0]):
+        known[: forward + 1] = inputs[k]
+        for j in range(plan.shape[0]):
+            z[n + j] = known[plan[j, MINUEND]] - known[plan[j, SUBTRAHEND]]
+        for i in range(n + 1):
+            total = known[forward] << shifts[n] if i == n else 0
+            for j in range(z.size):
+                total += table[i, j] * z[j]
+            following[i] = shifted(total, shifts[i])
+        for i in range(n):
+            z[i] = min(max(following[i], -LARGEST - 1), LARGEST)
+        u = shifted(following[n], dac[0]) << dac[0] if dac[0] > 0 else following[n]
+        outputs[k] = min(max(u, dac[1]), dac[2])
+
+
 # ------------------------------------------------------------ values of the templates
 
 
@@ -248,13 +310,13 @@ def ports_of(task: ExportTask, controller: Controller, *known: dict[str, str]) -
     names = (name.removeprefix(REFERENCE) for name in (*law.signals, *law.wanted))
     sizes = dict(zip(names, word.ranges.tolist(), strict=True))
     rows = [
-        (name, own, f"{title}{name} [{OUTPUTS[name.partition('@')[0]].unit}]", sizes.get(name, 1.0))
+        (own, f"{title}{name} [{OUTPUTS[name.partition('@')[0]].unit}]", sizes.get(name, 1.0))
         for title, found in zip(("", "reference of "), known, strict=True)
         for name, own in found.items()
     ]
-    rows.append((FEEDFORWARD, FEEDFORWARD, f"{FEEDFORWARD} [{task.arm.input_unit}]", word.output))
+    rows.append((FEEDFORWARD, f"{FEEDFORWARD} [{task.arm.input_unit}]", word.output))
     is_fixed = word.precision == FIXED
-    return [Port(name, own, f"{text}, over {size!r}" if is_fixed else text, size) for name, own, text, size in rows]
+    return [Port(own, f"{text}, over {size!r}" if is_fixed else text, size) for own, text, size in rows]
 
 
 def recorded(

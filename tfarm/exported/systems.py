@@ -6,6 +6,9 @@ With the references w and a feedforward r the sampled loop of the plant x and th
 
 A quantity of the loop acts as in `tfarm.dsp.sampled`: delay, hold and analog filters are states of the plant, the
 estimate of a hub rate is one of the controller.  Quantisation and saturation are not linear and not in it.
+
+They are written as a MATLAB file with its script, whose variables are the entries of the first system, a structure for
+each other one, and the exact frequency response of the arm; or as a script of python-control.
 """
 
 import os

@@ -1,4 +1,31 @@
-"""A trained tuner as C99: header, source and self-test, and the same tuner as a controller of simulations."""
+"""A trained tuner as C99: header, source and self-test, and the same tuner as a controller of simulations.
+
+Its arithmetic in Python is that of its C code, operation by operation in the same order:
+
+    u = servo (+ r),   x = moment (- rigid moment),   K = network(u, u1, e1, e2, x, x1 (, K1)),   e = u - K x
+
+    torque = r + servo - K x,   servo = Kp (angle reference - hub angle) + K1 (rate reference - hub rate)
+
+with r the feedforward torque, counted in u under the reading "total", where no rigid moment is subtracted.  Numbers 1
+and 2 are those of one and two samples before.  Where an input, or u, e, x, K or the torque, is NaN, infinite or beyond
+`largest`, a step returns the kind of the error, holds the torque of the step before and keeps its state.  Below
+`largest` no sum of the network overflows, so that a kept state refuses no later sample.
+
+exp and log of its activation:
+
+    e^x = 2^k e^r,   k = x/ln 2 to the nearest whole number,   r = (x - k h) - k l,   |r| <= ln(2)/2
+
+with ln 2 = h + l, h of so few bits that k h is exact (Cody and Waite, Software Manual for the Elementary Functions,
+1980), e^r by Taylor's polynomial, coefficients 1/n!, and 2^k as a product of powers of 1/2.
+
+    ln(1 + y) = n ln 2 + 2 artanh s,   2 artanh s = f - s (f - R),   s = f/(2 + f),   R = 2 s^2/3 + 2 s^4/5 + ...
+
+with n = 0, f = y, or from y = sqrt(2) - 1 on n = 1, f = (y - 1)/2 (the form of FDLIBM's e_log.c).  The coefficients
+are those of the two series, rounded to the precision; what the series leave out is below a tenth of half a unit in the
+last place.  The largest errors are `ULPS` of these units.
+
+Every number has one precision: literals of Python would make doubles of single-precision operands.
+"""
 
 import hashlib
 import math
@@ -13,10 +40,9 @@ from tfarm.arrays import Real, Whole
 from tfarm.dsp import Measurement, sampled_loop
 from tfarm.errors import MISSING, ParameterError, must_be_known, require
 from tfarm.exact.compiled import compiled
-from tfarm.exported.controller import FEEDFORWARD, REAL, Port, recorded
+from tfarm.exported.controller import FEEDFORWARD, INPUT_ERROR, OVERFLOW, REAL, Port, recorded
 from tfarm.exported.result import ANYWAY, Export, ExportTask, names_of
 from tfarm.exported.texts import literal, name_in_c, render
-from tfarm.exported.twin import INPUT_ERROR, OVERFLOW
 from tfarm.exported.word_length import FLOATS
 from tfarm.tuner.guard import sector_guard
 from tfarm.tuner.trial import TRIAL_MODES, SavedTuner, load_tuner
@@ -28,7 +54,7 @@ ANGLE, RATE, MOMENT, WANTED_ANGLE, WANTED_RATE, WANTED_MOMENT, FORWARD = 0, 1, 2
 U, E, X, K, E_BEFORE, TORQUE = range(6)  # places of the state: the last sample, and e of the one before
 
 
-ZERO, HALF, ONE, TWO = np.array([0.0, 0.5, 1.0, 2.0], np.float32)  # exact, and of either precision with another number
+ZERO, ONE, TWO = np.array([0.0, 1.0, 2.0], np.float32)  # exact, and of either precision with another number
 
 
 class Numbers(NamedTuple):
@@ -38,6 +64,7 @@ class Numbers(NamedTuple):
     + `low`; series in ascending order.  Then network, servo and guard, as in `tfarm.tuner.kernel`.
     """
 
+    half: float
     lowest: float
     shift: float
     inverse: float
@@ -66,7 +93,7 @@ def numbers_of(saved: SavedTuner, real: Any) -> Numbers:
     bits, lowest, terms, odd = (42, -708.0, 14, 10) if real is np.float64 else (16, -87.0, 9, 4)
     high = Fraction(round(LN_2 * 2**bits), 2**bits)
     shift = 1.5 * 2 ** np.finfo(real).nmant
-    scalars = lowest, shift, 1 / math.log(2.0), high, LN_2 - high, math.sqrt(2.0) - 1
+    scalars = 0.5, lowest, shift, 1 / math.log(2.0), high, LN_2 - high, math.sqrt(2.0) - 1
     series = [1 / math.factorial(n) for n in range(terms)], [2 / (2 * j + 1) for j in range(1, odd + 1)]
     limits, names = saved.gain().guard, ("W1", "w2", "scales", "K1", "Kp")
     with np.errstate(over="ignore", under="ignore"):
@@ -101,7 +128,7 @@ def exponential(x: float, of: Numbers) -> float:
         return ZERO
     k = (x * of.inverse + of.shift) - of.shift
     result = polynomial((x - k * of.high) - k * of.low, of.taylor)
-    power, n = HALF, int(-k)
+    power, n = of.half, int(-k)
     while n > 0:  # at most ten times
         if n % 2 == 1:
             result *= power
@@ -114,7 +141,7 @@ def exponential(x: float, of: Numbers) -> float:
 def logarithm(y: float, of: Numbers) -> float:
     """ln(1 + y) for 0 <= y <= 1."""
     is_small = y < of.turn
-    f = y if is_small else HALF * (y - ONE)
+    f = y if is_small else of.half * (y - ONE)
     s = f / (TWO + f)
     square = s * s
     below = s * (f - square * polynomial(square, of.artanh))
@@ -255,13 +282,13 @@ def c_tuner(task: ExportTask) -> Export:
 
 
 def written(task: ExportTask, tuner: ExportedTuner, name: str, facts: dict[str, str]) -> dict[str, bytes]:
-    """The files by name; constants have the names that they have in `tuner_twin`."""
+    """The files by name; constants have the names of `Numbers`."""
     of, (real, suffix, _) = tuner.numbers, REAL[task.precision]
     unused = {"lo", "hi"} if of.is_free else {"turn", "artanh"}
     kept: dict[str, Any] = {key: each for key, each in of._asdict().items() if key not in unused}
     ports = [
-        Port(of_sample, key, f"{meaning} [{unit or task.arm.input_unit}]", 1.0 if "rad" in unit else tuner.scale)
-        for key, (of_sample, meaning, unit) in tuner.inputs.items()
+        Port(key, f"{meaning} [{unit or task.arm.input_unit}]", 1.0 if "rad" in unit else tuner.scale)
+        for key, (_, meaning, unit) in tuner.inputs.items()
     ]
     values = {
         "name": name, "facts": list(facts.items()), "fixed": False, "real": real, "suffix": suffix, "header": "tuner.h",

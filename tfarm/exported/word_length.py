@@ -39,7 +39,8 @@ from tfarm.dsp.sampled import Sampled
 from tfarm.errors import ParameterError, require
 from tfarm.schema import Quantity
 
-DOUBLINGS = 40  # of the samples that a sum of squares has: 1e12 of them
+MOST_DOUBLINGS = 40  # of the samples that a sum has: 1e12 of them
+SUMMED = 1e-9  # of a sum of squares: its last terms
 LEAST_SHARE = 1e-12  # of the largest singular value: below it a state is not controllable or not observable
 WORST_CONDITION = 1e8  # of the eigenvectors: beyond it poles are not separated
 NEXT_TO = 1.01  # times the least noise gain: for less a law keeps its states, and an integral its pole z = 1
@@ -110,13 +111,16 @@ def around(law: Law, loop: Sampled) -> Around:
 
 def gramians(of: Around) -> tuple[Real, Real] | None:
     """K over the variance of u, and W, of the states of the law; None where their sums do not converge."""
-    M, own = observed(of.matrix, np.vstack([np.eye(len(of.matrix))[of.states], of.output])), of.states
-    K, W = of.of_signals @ of.of_signals.T, np.outer(of.output, of.output)
-    if abs(np.linalg.eigvals(M)).max() >= 1:
-        return None
-    for _ in range(DOUBLINGS):
-        K, W, M = K + M @ K @ M.T, W + M.T @ W @ M, M @ M
-    return K[own, own] / (of.output @ K @ of.output), W[own, own]
+    M, K, W = of.matrix, of.of_signals @ of.of_signals.T, np.outer(of.output, of.output)
+    rows = of.states
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(MOST_DOUBLINGS):
+            more, seen = M @ K @ M.T, M.T @ W @ M
+            K, W, M = K + more, W + seen, M @ M
+            left = [(abs(a[rows, rows]).max(), abs(b[rows, rows]).max()) for a, b in ((more, K), (seen, W))]
+            if all(last <= SUMMED * whole < np.inf for last, whole in left):
+                return K[rows, rows] / (of.output @ K @ of.output), W[rows, rows]
+    return None
 
 
 def balancing(K: Real, W: Real) -> Real | None:
@@ -219,7 +223,7 @@ class Word:
         """Bound on each state as exported, whether it is over all samples, and bound on the error of u.
 
         The error d of the states obeys d' = A d + w, w = |dS| [X; E] + roundings; X includes d.  Where a state may
-        saturate, in fixed point, the error has no bound.
+        saturate, in fixed point, and where that has no solution, the error has no bound.
         """
         exact, rounded, n = system_matrix(self.law), system_matrix(self.rounded), self.law.order
         relative, absolute = self.errors
@@ -228,7 +232,7 @@ class Word:
         S, _ = absolute_sum(A, np.vstack([np.eye(n), exact[n, :n]]), np.eye(n))
         rest, error = V[:, n:] @ self.sizes + absolute, math.inf
         largest = least_solution(S[:n] @ V[:n, :n], X @ self.sizes + S[:n] @ rest[:n])
-        if self.precision != FIXED or max(largest, default=0.0) < 1:
+        if max(largest, default=0.0) < (1 if self.precision == FIXED else math.inf):
             w = V[:, :n] @ largest + rest
             error = float(S[n] @ w[:n] + w[n] + relative * self.output)
         return largest, is_whole, error
@@ -246,10 +250,12 @@ class Word:
         of, at = around(self.rounded, loop), [read.index(name) for name in signals]
         left = np.vstack([np.eye(len(of.matrix))[of.states], of.reads[at], of.output])
         S, is_whole = absolute_sum(observed(of.matrix, left), left, np.c_[of.of_rounding, of.of_signals[:, at]])
+        if not is_whole:
+            return None
         Q = abs(system_matrix(self.rounded))[:, : n + len(at)]  # references are at rest
         S[-1, n:] += np.r_[1.0, Q[n, n:]]  # u itself
         relative, absolute = self.errors
-        loops = relative * S[:, : n + 1] @ Q if is_whole else np.ones((len(left), n + len(at)))
+        loops = relative * S[:, : n + 1] @ Q
         rest = S @ np.r_[absolute, HALF_STEP * self.ranges[: len(at)] * (self.precision == FIXED)]
         bound = float(rest[-1] + loops[-1] @ least_solution(loops[:-1], rest[:-1]))
         return bound if bound < math.inf else None

@@ -23,7 +23,7 @@ static {{ real }} polynomial({{ real }} x, const {{ real }} *coefficients, int s
 /* e^x for x <= 0, within {{ ulps.exp }} units in the last place: 2^k e^r, x = k ln 2 + r (Cody and Waite), Taylor */
 static {{ real }} exponential({{ real }} x)
 {
-    {{ real }} k, result, power = 0.5{{ suffix }};
+    {{ real }} k, result, power = half;
     if (!(x > lowest))
         return 0;
     k = (x * inverse + shift) - shift;
@@ -46,7 +46,7 @@ static {{ real }} sigmoid({{ real }} z)
 /* ln(1 + y) for 0 <= y <= 1, within {{ ulps.log }} units in the last place: f - s (f - R), s = f/(2 + f), series of artanh */
 static {{ real }} logarithm({{ real }} y)
 {
-    const {{ real }} f = y < turn ? y : 0.5{{ suffix }} * (y - 1), s = f / (2 + f), square = s * s;
+    const {{ real }} f = y < turn ? y : half * (y - 1), s = f / (2 + f), square = s * s;
     const {{ real }} below = s * (f - square * polynomial(square, artanh, {{ tables.artanh|length }}));
     return y < turn ? f - below : high + (f - (below - low));
 }
