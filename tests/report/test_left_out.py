@@ -1,6 +1,7 @@
 """Sections that cannot be made have their reason; a report is written whole or not at all; hostile texts are text."""
 
 import hashlib
+import os
 import re
 import shutil
 import sys
@@ -248,7 +249,7 @@ def test_pages_are_moved_after_what_they_name(tmp_path, monkeypatch):
     for name in ("a.html", "data/x.csv"):
         (tmp_path / "made" / name).touch()
     moved = []
-    monkeypatch.setattr(writing.os, "replace", lambda _, place: moved.append(place.name))
+    monkeypatch.setattr(os, "replace", lambda _, place: moved.append(place.name))
     writing.move_into(tmp_path / "made", tmp_path / "out")
     assert moved == ["x.csv", "a.html"]
 
