@@ -15,7 +15,7 @@ Disk margin: the largest alpha for which the loop is stable with every factor (2
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Annotated, Any, NamedTuple, Protocol
 
 import numpy as np
@@ -169,11 +169,18 @@ class Margins:
     """
 
     stability: Annotated[Stability, Quantity(flat=True)]
-    windows: dict[str, Windows]
     in_band: Annotated[LoopMargins | None, IN_RANGE]
     exact_delay: Annotated[float | None, EXACT_DELAY]
     exact_disk: Annotated[float | None, EXACT_DISK]
     exact_peak: Annotated[float | None, EXACT_PEAK]
+
+    @cached_property
+    def windows(self) -> dict[str, Windows]:
+        """Stability intervals of each number of the law, found when they are read: a result card has no use for them.
+
+        Raises ConvergenceError where poles cannot be counted along one.
+        """
+        return windows_of(self.stability)
 
     @property
     def exact_complementary(self) -> Annotated[float | None, EXACT_COMPLEMENTARY]:
@@ -235,11 +242,10 @@ def margins(arm: Arm, law: AnyLaw, band: float | None = None) -> Margins:
     one is on the axis to working precision.
     """
     verdict = stability(arm, law, band)
-    windows = windows_of(verdict)
     if not verdict.is_stable:
-        return Margins(verdict, windows, None, None, None, None)
+        return Margins(verdict, None, None, None, None)
     found = loop_margins(verdict)
-    return Margins(verdict, windows, found, *_exact(verdict, found))
+    return Margins(verdict, found, *_exact(verdict, found))
 
 
 def _exact(verdict: Stability, found: LoopMargins) -> tuple[float | None, float | None, float | None]:
