@@ -120,6 +120,8 @@ def test_a_folder_has_one_run_at_a_time(tmp_path):
     refused("cannot be made", STUDY, out=tmp_path / "file" / "x", draws=2)
     illegal = {"payload.mass": {"uniform": [-0.1, 0.1]}}
     refused("arms are illegal", tfarm.study, LAB, illegal, ("modes",), out=tmp_path / "none", draws=9)
+    unknown = {"payload.mas": {"uniform": [0.0, 0.1]}}
+    refused("'payload.mas': did you mean", tfarm.study, LAB, unknown, ("modes",), out=tmp_path / "none", draws=9)
     assert not (tmp_path / "none").exists()
 
 

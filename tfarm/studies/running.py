@@ -254,10 +254,10 @@ def run(
 
 def check_rows(plan: Plan, rows: Real) -> None:
     """Raise ParameterError where some of the first rows are illegal, with their number and the first reason."""
-    errors = dict[int, ParameterError]()
+    subjects, errors = plan.subjects, dict[int, ParameterError]()  # which refuse an unknown key, before any row
     for number, row in enumerate(rows.tolist()):
         try:
-            plan.subjects.at(row)
+            subjects.at(row)
         except ParameterError as error:
             errors[number] = error
     for number, first in errors.items():
