@@ -33,7 +33,7 @@ from tfarm.loop.loop import Loop
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import gain_map
 from tfarm.spectrum.proofs import enclosed
-from tfarm.studies.quantities import asked_columns, values_of
+from tfarm.studies.quantities import column_names, values_of
 from tfarm.studies.running import Plan, chunk
 from tfarm.studies.space import space_of
 from tfarm.tuner import Guard, Learning, initial_network, slew_trial, train
@@ -182,7 +182,7 @@ def studies():
     over = {"payload.mass": {"uniform": [0.0, 0.2]}, "law.K2": {"uniform": [0.0, 0.6]}}
     for ask, n in (("modes", 200), ("card", 5)):
         space = space_of(over, draws=n, seed=0, posterior=None)
-        plan = Plan(LAB, LAW, Chain(), space, asked_columns([ask]))
+        plan = Plan(LAB, LAW, Chain(), space, column_names([ask]))
 
         def plain(plan=plan, n=n):
             return [values_of(plan.subjects.at(row), plan.names) for row in plan.space.rows(0, n, None).tolist()]

@@ -70,7 +70,7 @@ int main(void) {
 
 @contextmanager
 def modes_of_units(count):
-    """Units of so many flexible modes, instead of those that the simulation of a slew takes seconds to choose."""
+    """Units of a number of flexible modes, in place of those that the simulation of a slew takes seconds to choose."""
     with mock.patch.object(fmu, "simulated", return_value=(None, SimpleNamespace(modes=count))):
         yield
 

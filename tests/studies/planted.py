@@ -5,7 +5,7 @@
 Without damping of the link the loop is stable exactly where K1 > 0 and K2 < 1 (the paper's theorem).  With K1 and K2
 drawn independently the share of stable arms is P(K1 > 0) P(K2 < 1).  Each of SIZE studies has other distributions and
 another number of draws.  A bound with 95 % confidence exceeds the share in at most 5 % of the studies: the survey is
-wrong where so many exceed it that chance has a probability below 0.1 %.  The share of the draws themselves, in the
+wrong where their number has a probability below 0.1 % by chance.  The share of the draws themselves, in the
 place of the bound, has to be found out: it exceeds the true one in about half of the studies.
 """
 

@@ -11,7 +11,7 @@ from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.studies import quantities as room
 from tfarm.studies.cases import learning_curves, over_values, results
-from tfarm.studies.quantities import asked_columns, values_of
+from tfarm.studies.quantities import column_names, values_of
 from tfarm.studies.running import Plan, chunk
 from tfarm.studies.space import Subjects
 from tfarm.tuner import tune
@@ -25,7 +25,7 @@ LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
 def values(words, arm=LAB, law=LAW, **numbers):
     """Values of the columns of some words for one arm, with other numbers by key."""
     subject = Subjects(arm, law, Chain(), tuple(numbers)).at(tuple(numbers.values()))
-    return values_of(subject, asked_columns(words))
+    return values_of(subject, column_names(words))
 
 
 def grid(key, points, names):
@@ -42,7 +42,7 @@ def test_a_mode_of_any_number_has_a_column():
     assert room.quantity_of(name).unit == "rad/s"
     for word in ("modes.natural_frequency_rad_s.0", "poles.unstable.2", "modes.colour.1"):
         with pytest.raises(ParameterError, match=r"^ask = "):
-            asked_columns([word])
+            column_names([word])
 
 
 def test_sensitivities_are_the_quotients_of_differences():
@@ -107,4 +107,4 @@ def test_learning_curves_have_guard_and_baselines_computed_once(monkeypatch):
 
 def test_a_row_without_a_result_is_an_error_of_a_case():
     with pytest.raises(ConvergenceError, match=r"payload\.mass = -1"):
-        results(grid("payload.mass", (0.1, -1.0), asked_columns(["modes"])), 0, 2)
+        results(grid("payload.mass", (0.1, -1.0), column_names(["modes"])), 0, 2)

@@ -18,7 +18,7 @@ from tfarm.spectrum.table import default_gains
 from tfarm.studies import running
 from tfarm.studies.quantities import (
     COLUMNS,
-    asked_columns,
+    column_names,
     failures_of,
     least_share,
     order_of,
@@ -164,7 +164,7 @@ def test_arms_that_fail_are_counted_with_reasons(lab, tmp_path, monkeypatch):
     ],
 )
 def test_a_word_names_the_columns_nearest_to_the_front(word, names):
-    assert set(asked_columns([word])) == names
+    assert set(column_names([word])) == names
 
 
 @pytest.mark.parametrize(
@@ -172,14 +172,14 @@ def test_a_word_names_the_columns_nearest_to_the_front(word, names):
 )
 def test_an_unknown_quantity_is_one_line_with_the_nearest(word, near):
     with pytest.raises(ParameterError, match=near) as caught:
-        asked_columns([word])
+        column_names([word])
     assert "\n" not in str(caught.value)
 
 
 def test_values_are_those_of_the_card_and_no_more_is_computed(lab, monkeypatch):
     one = Subject(lab, GAINS, Chain(), {})
     card = tfarm.result_card(lab, GAINS)
-    whole = values_of(one, asked_columns(["card"]))
+    whole = values_of(one, column_names(["card"]))
     for loop in ("continuous", "sampled"):
         own = getattr(card, loop)
         assert whole[f"{loop}.delay_margin_ms"] == own.delay_margin.value
@@ -221,7 +221,7 @@ ASKED = ["step.sampled.tip.settling_time_s", "step.continuous.tip.settling_time_
 def test_time_response_and_damping_ratios_of_every_preset(name, monkeypatch):
     arm, chain, seen = tfarm.load(name), load_chain(name), []
     monkeypatch.setattr("tfarm.studies.quantities.step", lambda *args: seen.append(tfarm.step(*args)) or seen[-1])
-    found = values_of(Subject(arm, default_gains(arm), chain, {}), asked_columns(ASKED))
+    found = values_of(Subject(arm, default_gains(arm), chain, {}), column_names(ASKED))
     assert found["failed"] is None
     for loop in ("sampled", "continuous"):
         own = getattr(seen[0], loop)
@@ -327,8 +327,8 @@ def test_indices_of_a_product_are_the_closed_form(lab, tmp_path):
 
 def test_a_quantity_without_a_value_on_each_arm_has_no_indices(lab, tmp_path):
     over = {"law.K1": {"uniform": [-0.3, 0.3]}, "payload.mass": {"uniform": [0.0, 0.1]}}
-    asked = ["continuous.time_constant_s", FIRST]
-    found = run(lab, over, asked, tfarm.HubFeedback(K1=0.3), draws=1, sobol=2, out=tmp_path / "s").sobol
+    words = ["continuous.time_constant_s", FIRST]
+    found = run(lab, over, words, tfarm.HubFeedback(K1=0.3), draws=1, sobol=2, out=tmp_path / "s").sobol
     by_name = {each.quantity: each for each in found}
     assert by_name["continuous.time_constant_s"].note.startswith("no finite value on ")
     assert by_name["continuous.time_constant_s"].first is None

@@ -51,7 +51,7 @@ def test_each_histogram_counts_the_arms(found):
     assert all(f"of {DRAWS} arms" in each for each in titles)  # some failed in each
 
 
-def test_one_quantity_is_named_as_it_is_asked_for(found):
+def test_a_quantity_has_one_name(found):
     by_place, by_name = study.figure(found, "phase_margin_deg"), study.figure(found, quantity="phase_margin_deg")
     assert [ax.get_xlabel() for ax in by_place.axes] == [ax.get_xlabel() for ax in by_name.axes]
     assert len(by_name.axes) == 1

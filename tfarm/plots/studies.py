@@ -20,7 +20,7 @@ from tfarm.studies.quantities import (
     COLUMNS,
     QUANTILES,
     Spread,
-    asked_columns,
+    column_names,
     loop_of,
     quantity_of,
     stability_of,
@@ -51,7 +51,7 @@ def distributions(found: Study, quantity: str | None = None, most: int = MOST_QU
     Raises ParameterError where the study has no number of it.
     """
     both: dict[str, list[Spread]] = {}
-    names = asked_columns([quantity]) if quantity else COLUMNS
+    names = column_names([quantity]) if quantity else COLUMNS
     for each in (each for each in found.spreads if each.name in names):
         both.setdefault(each.name.replace(f"{loop_of(each.name)}.", ""), []).append(each)
     require(both, "quantity", quantity, "the study has no number of it: name it in `ask`")

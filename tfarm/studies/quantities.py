@@ -222,7 +222,7 @@ ASKED: tuple[Asked, ...] = (
 COLUMNS = {name: column for columns, _ in ASKED for name, column in columns.items()}
 
 
-def asked_columns(words: Sequence[str]) -> tuple[str, ...]:
+def column_names(words: Sequence[str]) -> tuple[str, ...]:
     """Return the names of the columns that are asked for: "card", "sampled.delay_margin_ms", "delay_margin_ms".
 
     A word is a name, or the first parts of one, or those after the first.  Raises ParameterError for a word of no
@@ -246,7 +246,7 @@ def order_of(word: str) -> tuple[str, ...]:
 
     Raises ParameterError for a word of no number or of several.
     """
-    names = [name for name in asked_columns([word]) if quantity_of(name).is_number and quantity_of(name).label]
+    names = [name for name in column_names([word]) if quantity_of(name).is_number and quantity_of(name).label]
     remedy = f"{len(names)} quantities of numbers, not one: {', '.join(names[:6])}"
     require(len(names) == 1 or word in names, "worst", word, remedy)
     quantity = word if word in names else names[0]

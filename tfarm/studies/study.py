@@ -46,7 +46,7 @@ from .quantities import (
     Failure,
     Spread,
     StableShare,
-    asked_columns,
+    column_names,
     failures_of,
     order_of,
     quantity_of,
@@ -244,7 +244,7 @@ def study(
     listing = None if rows is None else listing_of(Path(rows))
     space = space_of(over or {}, draws=draws, seed=seed, posterior=known, listing=listing)
     order = order_of(worst) if worst else ()
-    plan = Plan(arm, law, chain, space, asked_columns([*ask, *order]))
+    plan = Plan(arm, law, chain, space, column_names([*ask, *order]))
     require(sobol >= 0 and sobol & (sobol - 1) == 0, "sobol", sobol, "a power of 2, such as 256; 0 for no indices")
     is_possible = not sobol or (space.is_independent and posterior is None and len(space.keys) > 1)
     require(is_possible, "sobol", sobol, "needs two or more independent distributions")
