@@ -279,7 +279,9 @@ def test_every_function_of_the_standard_is_there_and_no_other():
 def test_the_source_compiles_without_a_warning(tmp_path, compiler, what):
     unit, _ = made(what, "single")
     for file in sorted(unit.folder.glob("sources/*.c")):
-        run(needed(compiler), *STRICT, "-Wshadow", "-O2", "-c", file, "-o", tmp_path / "object.o")
+        made_of = tmp_path / f"{file.stem}.o"
+        run(needed(compiler), *STRICT, "-Wshadow", "-O2", "-c", file, "-o", made_of)
+        assert made_of.stat().st_size > 0
 
 
 def test_the_check_of_c_finds_nothing():

@@ -109,6 +109,8 @@ def test_another_study_and_its_parts_are_refused(tmp_path, monkeypatch):
     other = {**running.versions(), "numpy": "1.0"}
     monkeypatch.setattr(running, "versions", lambda: other)
     refused("has a study with other versions", STUDY, out=tmp_path / "a", draws=6)
+    assert part in (tmp_path / "a").glob("part-*")  # nothing was lost by any refusal
+    assert not [*(tmp_path / "c").glob("study.*")]
     (tmp_path / "a" / "study.json").write_text("{}")
     refused("a study.json of tfarm study", STUDY, out=tmp_path / "a", draws=6)
 

@@ -1,6 +1,6 @@
 """The commands that choose a law or compare, write pages, give evidence, and help with the others."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
@@ -32,6 +32,7 @@ from tfarm.cli.app import (
     load_arm,
     load_chain,
     load_law,
+    load_loop,
     named,
     numbers,
     preset_names,
@@ -304,6 +305,24 @@ def announce(done: int, total: int, text: str) -> None:
         print_line(text)
 
 
+def study_arguments(
+    name: str, typed: Mapping[str, Any], loop: Callable[[], Any], chain: Callable[[str], Any]
+) -> tuple[dict[str, Any], dict[str, Any] | None]:
+    """Return the arguments of a study, and of default gains what JSON has: those of its file, or those that are typed.
+
+    Raises ParameterError for both.
+    """
+    from tfarm.arm.reading import load_tables
+    from tfarm.studies.study import load_study
+
+    if "arm" in load_tables(name)[0]:  # an arm's file names no arm
+        refuse({f"--{key}": value for key, value in typed.items()}, f"the study is that of {name}; leave this out")
+        return load_study(name), None
+    subject, controller, defaults = loop()
+    given = {key: value for key, value in typed.items() if value is not None}
+    return {"arm": subject, "law": controller, "chain": chain(name), **given}, defaults
+
+
 @command(epilog="study sasaki2012-lab --over payload.mass=uniform:0,0.2 --ask card --draws 100 --out study")
 def study(
     arm: ArmName,
@@ -348,9 +367,7 @@ def study(
     stop_after: seconds after which no further part is begun
     report: write a page, index.html, to that folder
     """
-    from tfarm.arm.reading import load_tables
     from tfarm.studies.running import cluster
-    from tfarm.studies.study import load_study
     from tfarm.studies.study import study as run
 
     typed: dict[str, Any] = {
@@ -359,17 +376,9 @@ def study(
     }  # fmt: skip
     keys = [key for key, _ in over or []]
     require(len(set(keys)) == len(keys), "--over", keys, "a key is varied twice")
-    if "arm" in load_tables(arm)[0]:  # an arm's file names no arm
-        refuse({f"--{key}": value for key, value in typed.items()}, f"the study is that of {arm}; leave this out")
-        arguments, defaults = load_study(arm), None
-    else:
-        subject = load_arm(arm, theory)
-        controller, defaults = load_law(subject, arm, gains, law)
-        given = {key: value for key, value in typed.items() if value is not None}
-        arguments = {"arm": subject, "law": controller, "chain": chain(arm), **given}
-    arguments |= {"out": out, "workers": workers, "stop_after": stop_after, "progress": announce}
+    arguments, defaults = study_arguments(arm, typed, lambda: load_loop(arm, theory, gains, law), chain)
     with nullcontext() if scheduler is None else cluster(scheduler) as client:
-        found = run(**arguments, client=client)
+        found = run(**arguments, out=out, workers=workers, stop_after=stop_after, progress=announce, client=client)
     page = None
     if report:
         from tfarm.report.writing import write_study

@@ -235,9 +235,7 @@ def study(
         Where a worker process or the scheduler was killed; another run goes on.
     """
     chain, law = chain_or_usual(chain), default_gains(arm) if law is None else law
-    if workers is None:
-        processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        workers = processors if client is None else max(1, len(client.nthreads()))
+    workers = usual_workers(client) if workers is None else workers
     for key, value in {"draws": draws, "seed": seed, "workers": workers, "part": 1 if part is None else part}.items():
         whole(key, value, int(key != "seed"), MOST_SEED, f"a whole number from {int(key != 'seed')}")
     known = None if posterior is None else load_posterior(posterior)
@@ -257,6 +255,13 @@ def study(
         indices = sobol_indices(plan, sobol, workers, engine, progress) if sobol else ()
         found = replace(found, sobol=indices, worst=worst_arm(found, order) if order else None)
     return found
+
+
+def usual_workers(client: Any) -> int:
+    """Return the number of workers of a client of Dask, or of processors of this machine that may be used."""
+    if client is not None:
+        return max(1, len(client.nthreads()))
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 # ------------------------------------------------------------------------------------------------------------ file
