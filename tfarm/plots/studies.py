@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from tfarm.arm.schema import file_key, file_keys
-from tfarm.digits import how_many
+from tfarm.digits import how_many, unit
 from tfarm.errors import TfarmError, require
 from tfarm.exact.outputs import signal_words, unit_over
 from tfarm.loop.curve import decibels
@@ -107,7 +107,7 @@ def key_label(key: str, found: Study) -> str:
     if key.startswith("law."):
         return number_label(key.removeprefix("law."), plan.arm, plan.law)
     is_known = ".".join(word for word in key.split(".") if not word.isdecimal()) in file_keys()
-    return f"{key} [{(file_key(key, plan.arm).unit if is_known else '') or '−'}]"
+    return f"{key} [{unit(file_key(key, plan.arm).unit if is_known else '') or '−'}]"
 
 
 def _shown(found: Study, quantity: str | None = None) -> tuple[list[Spread], list[str]]:
