@@ -75,6 +75,28 @@ def did_you_mean(word: str, choices: Iterable[str]) -> str:
     return f"{hint}known are: {', '.join(known)}"
 
 
+def unknown_key(word: str, known: Iterable[str]) -> str:
+    """Return the remedy for an unknown key of a file: why its physics is not modelled, else the nearest of `known`."""
+    not_modelled = {
+        "gravity": "the arm moves in a horizontal plane",
+        "coriolis": "the rotation is slow compared with the first mode",
+        "centrifugal": "the rotation is slow compared with the first mode",
+        "torsion": "the arm bends in the plane of rotation alone",
+        "backlash": "joints and gears are linear",
+        "hysteresis": "joints and gears are linear",
+        "coulomb": "friction is viscous, [hub] friction",
+        "breakaway": "friction is viscous, [hub] friction",
+        "stiction": "friction is viscous, [hub] friction",
+        "dry_friction": "friction is viscous, [hub] friction",
+        "temperature": "all numbers are constant",
+        "aerodynamic": "damping is that of the link, the joints and the hub",
+    }
+    for physics, reason in not_modelled.items():
+        if physics in word.lower():
+            return f"not modelled: {reason}; leave it out"
+    return f"unknown key; {did_you_mean(word, known)}"
+
+
 def close_to(word: str, choices: Iterable[str]) -> list[str]:
     """Return the nearest choice to a misspelt word, else up to three that begin with it."""
     known = list(choices)

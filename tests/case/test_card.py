@@ -12,6 +12,7 @@ import tfarm
 from tests.shell import answer, run
 from tfarm.case import card
 from tfarm.dsp import Chain, Sampling, load_chain, sampled_verdict
+from tfarm.schema.terminal import table_lines
 
 BARE, LAB = tfarm.load("sasaki2012"), tfarm.load("sasaki2012-lab")
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
@@ -115,6 +116,28 @@ def test_a_notebook_shows_the_card():
     assert "poor: phase margin, Ms; sampled, 10 ms stable, poor: phase margin" in repr(own)
     shown = own._repr_html_()
     assert re.search(r'<td class="text" data-label="continuous-time"[^>]*>7.901 at 63.28 rad/s, poor</td>', shown)
+
+
+def test_print_shows_the_card_and_a_narrow_terminal_opens_with_values(capsys):
+    own = tfarm.result_card(LAB, tfarm.default_gains(LAB))
+    print(own)
+    lines = capsys.readouterr().out.splitlines()
+    assert re.search(
+        r"^phase margin +deg +7.901 at 63.28 rad/s, poor +26.15 at 63.4 rad/s, poor$", "\n".join(lines), re.M
+    )
+    assert lines[-1] == own.notes[0]
+    narrow = table_lines(own.table, 80)
+    assert max(map(len, narrow)) <= 80
+    assert narrow[1].split() == ["stability", "stable"]
+    first = narrow[: narrow.index("")]
+    assert any(re.fullmatch(r"phase margin +deg +7.901 at 63.28 rad/s, poor", line) for line in first)
+
+
+def test_print_shows_the_modes(capsys):
+    """The frequencies are the design table's, by another solution (30 digits)."""
+    print(tfarm.modes(BARE, 2))
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()[-2:]]
+    assert rows == [["1", "71.5056824669", "11.3804828"], ["2", "204.333139364", "32.5206292"]]
 
 
 def test_default_gains_are_no_design():

@@ -5,6 +5,7 @@ import math
 import re
 import sys
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -241,7 +242,8 @@ den = [0.01, 1.0]
     found = answer(capsys, "check", str(file))
     names = [each["name"] for each in found["warnings"]]
     assert names[:2] == ["input", "link.density = 7.85"]
-    assert [each.split(" = ")[0] for each in names[2:]] == ["slenderness", "link.damping"]
+    assert [each.split(" = ")[0] for each in names[2:]] == ["slenderness", "link.damping", "sampling.period"]
+    assert found["period"] == 0.01
     assert found["law"] == [{"name": "hub_angle", "text": "([1, 2], [0.01, 1])"}]
     _, out, err = run(capsys, "check", str(file))
     assert err == ""
@@ -250,6 +252,31 @@ den = [0.01, 1.0]
     assert "sampling.period = -1.0" in refused(capsys, "check", str(file))
     file.write_text(text.replace("num", "nun"))
     assert "law.hub_angle.nun" in refused(capsys, "check", str(file))
+
+
+@pytest.mark.parametrize(("periods", "is_slow"), [(0.49, False), (0.51, True)])
+def test_check_prints_period_and_limit_and_warns_of_an_aliased_first_mode(tmp_path, capsys, periods, is_slow):
+    """Half the period of the first mode is pi/w: a longer sampling period aliases it."""
+    period = periods * 2 * math.pi / 71.505682466890
+    file = tmp_path / "arm.toml"
+    preset = Path(tfarm.__file__).parent / "arm/presets/sasaki2012-lab.toml"
+    limits = f"\n[sampling]\nperiod = {period!r}\n[actuator]\ntorque_limit = 5.0\n"
+    file.write_text(preset.read_text() + limits)
+    found = answer(capsys, "check", str(file))
+    assert (found["period"], found["torque_limit"], found["input_unit"]) == (period, 5.0, "N m")
+    assert [each["name"].startswith("sampling.period") for each in found["warnings"]] == [True] * is_slow
+    assert re.search(r"limit of the input +5 N m\n", run(capsys, "check", str(file))[1])
+
+
+@pytest.mark.parametrize(
+    "text", ["[gravity]\ng = 9.81\n", "[hub]\ncoulomb_friction = 0.1\n", "[actuator]\nbacklash = 0.1\n"]
+)
+def test_physics_that_is_left_out_is_called_not_modelled(tmp_path, capsys, text):
+    file = tmp_path / "arm.toml"
+    preset = (Path(tfarm.__file__).parent / "arm/presets/sasaki2012-lab.toml").read_text()
+    head, _, own = text.partition("\n")
+    file.write_text(preset.replace(f"{head}\n", text) if head in preset else preset + text)
+    assert ": not modelled: " in refused(capsys, "check", str(file))
 
 
 @pytest.mark.parametrize("name", tfarm.presets())

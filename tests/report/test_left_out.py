@@ -16,7 +16,7 @@ import pytest
 import tfarm
 from tests.hostile import NAME, TEXT, check_drawing, check_page
 from tests.report.written import ANCHORS, ARM, HELD, Links, Unmakeable, files_of, links_of, plain_cards
-from tests.shell import run
+from tests.shell import refused, run
 from tfarm import processes
 from tfarm.arm import to_toml
 from tfarm.cli import app as cli_app
@@ -128,6 +128,10 @@ def test_a_page_has_the_same_sections_whatever_is_written_with_it(tmp_path, monk
 def bare(anchor, *_):
     """A section without content."""
     return PageSection(anchor=anchor, title=anchor)
+
+
+def test_an_unknown_page_is_refused_before_anything_is_read(capsys):
+    assert "--only = 'bodes': did you mean \"bode\"?" in refused(capsys, "report", "no-such-arm", "--only", "bodes")
 
 
 @pytest.mark.parametrize(

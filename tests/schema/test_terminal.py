@@ -24,6 +24,21 @@ def printed(width, columns=COLUMNS):
     return table_lines(Table(columns=columns), width)
 
 
+def test_in_a_pipe_only_a_long_text_is_folded():
+    text = "lightly damped " * 9
+    lines = printed(None, (*COLUMNS[:3], replace(COLUMNS[3], of=[text, "-"])))
+    assert max(map(len, lines)) <= 120
+    assert [line.split()[0] for line in lines if line[:4].strip()] == ["mode", "1", "2"]
+    numbers = [Column(str(n), "frequency", of=["71.505682466890"]) for n in range(20)]
+    assert len(printed(None, numbers)) == 2  # a row of numbers is one line, however long
+
+
+def test_blocks_begin_with_every_leading_column():
+    table = Table(columns=COLUMNS, leading=2)
+    lines = table_lines(table, 50)
+    assert [line.split()[:2] for line in lines if line.startswith("1")] == [["1", "71.505682466890"]] * 2
+
+
 def words(lines):
     return sorted(" ".join(lines).split())
 

@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 from tfarm.arm.materials import assumed, filled, materials
 from tfarm.arm.parts import Attachment, Gauge, Hub, Link, Motor, Payload, RotarySpring, Section
 from tfarm.arm.records import MOST_PARTS, Arm
-from tfarm.errors import MISSING, ParameterError, did_you_mean, must_be_known, require
+from tfarm.errors import MISSING, ParameterError, must_be_known, require, unknown_key
 from tfarm.files import read_file
 from tfarm.schema import Quantity
 
@@ -70,7 +70,7 @@ def validated(model: type[_Strict], table: Any, place: str) -> _Strict:
     word, value, known = str(problem["loc"][0]), problem["input"], model.model_fields
     if word not in known:
         is_of_top = place and word in AT_THE_TOP
-        remedy = f"unknown key; {f'{word} belongs at the top of the file' if is_of_top else did_you_mean(word, known)}"
+        remedy = f"unknown key; {word} belongs at the top of the file" if is_of_top else unknown_key(word, known)
     else:
         expected = f"a table, headed [{word}]" if word in ARM_TABLES else EXPECTED.get(known[word].annotation)
         remedy = f"give {expected}" if expected else f"{problem['msg'][:1].lower()}{problem['msg'][1:]}"

@@ -1,5 +1,6 @@
 """Check of an arm's file: derived numbers, warnings, controller, and the tables that it leaves out."""
 
+import math
 import shlex
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from tfarm.arm.law_tables import load_law
 from tfarm.arm.reading import arm_in, load_tables
 from tfarm.arm.schema import arm_of_table
 from tfarm.dsp import Chain
-from tfarm.dsp.chain import chain_of_tables, load_chain
+from tfarm.dsp.chain import PERIOD, chain_of_tables, load_chain
 from tfarm.errors import require
 from tfarm.schema import Percent, Quantity
 from tfarm.spectrum import modes
@@ -65,6 +66,10 @@ class ArmCheck:
         Percent | None,
         Quantity("damping ratio of mode 1", "", 4, "exact, without controller; null where not determined"),
     ]
+    period: Annotated[float, PERIOD]
+    torque_limit: Annotated[float, Quantity("limit of the input", "", 4, "of [actuator]; inf for none",
+                                            unit_of="input_unit")]  # fmt: skip
+    input_unit: Annotated[str, Quantity(help="SI unit of the arm's input")]
     assumptions: Annotated[tuple[str, ...], Quantity("assumptions", help="of the file, and sources of its materials")]
     next_command: Annotated[str, Quantity("next", help="command to try next")]
     warnings: Annotated[list[Note], Quantity("warnings", help="values that may have a wrong unit, and limits")]
@@ -80,7 +85,7 @@ def check_arm(name: str, theory: Theory | None = None) -> ArmCheck:
     tables, file = load_tables(name)
     arm = arm_in(tables, file) if theory is None else arm_in(tables, file).under(theory)
     law = load_law(name)
-    load_chain(name)
+    chain = load_chain(name)
     first = listed_modes(modes(arm, 1)).modes[-1]
     omega = float(first.natural_frequency)
     of_bernoulli = first.theories["euler-bernoulli"]
@@ -91,8 +96,10 @@ def check_arm(name: str, theory: Theory | None = None) -> ArmCheck:
         arm=arm.name, theory=arm.theory, mass=arm.own_mass, inertia=arm.total_inertia, slenderness=slenderness,
         frequency=omega, frequency_hz=first.natural_frequency_hz, euler_bernoulli=of_bernoulli, error=error,
         damping_ratio=None if ratio is None else Percent(ratio), assumptions=arm.assumptions,
+        period=chain.sampling.period, torque_limit=chain.actuator.torque_limit, input_unit=arm.input_unit,
         next_command=f"tfarm {'modes' if arm.is_locked else 'margins'} {shlex.quote(name)}",
-        warnings=[Note(*text.split(": ", 1)) for text in _warnings(tables, arm, slenderness, error)],
+        warnings=[Note(*text.split(": ", 1)) for text in _warnings(tables, arm, slenderness, error)]
+        + _slow_sampling(chain, omega),
         law=[] if law is None else [Note(*each) for each in law.as_typed()],
         missing=[Note(f"[{table}]", text) for table, text in DEFAULTS.items() if table not in tables],
     )  # fmt: skip
@@ -110,6 +117,15 @@ def _warnings(tables: Mapping[str, Any], arm: Arm, slenderness: float, error: fl
             "link.damping = 0: undamped model, in which any delay destabilises a mode; "
             f"damping = {reference_damping(arm):.3g} in [link] is a damping ratio of 0.1 % in mode 1"
         )
+
+
+def _slow_sampling(chain: Chain, omega: float) -> list[Note]:
+    """Return the warning of a sampling period above half that of the first mode [rad/s]: samples cannot show it."""
+    longest = math.pi / omega
+    if chain.sampling.period <= longest:
+        return []
+    text = f"above half the period of the first mode, {longest:.3g} s, which is aliased; choose a tenth of that"
+    return [Note(f"sampling.period = {chain.sampling.period:g}", text)]
 
 
 def with_damping(tables: dict[str, Any], ratio: float | None) -> dict[str, Any]:

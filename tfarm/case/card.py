@@ -36,8 +36,7 @@ from tfarm.loop.curve import LoopCurve, curve_of, gain_margin, lowest_drawn, ref
 from tfarm.loop.margins import LoopMargins, Margins, margins, margins_of_curve
 from tfarm.loop.stability import SMALL_GAIN, Stability, stability
 from tfarm.records import record
-from tfarm.schema import Percent, Quantity, Table, across, text
-from tfarm.schema.html import as_html, with_symbols
+from tfarm.schema import Percent, Quantity, Table, Tabled, across, text
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import default_gains
 
@@ -137,7 +136,7 @@ class LoopCard:
 
 @dataclass(frozen=True, kw_only=True)
 @record
-class ResultCard:
+class ResultCard(Tabled):
     """The card of an arm under a controller: the continuous-time loop, None under a law in z, and the sampled one."""
 
     continuous: Annotated[LoopCard | None, Quantity(help="continuous-time loop; null under a law in z")]
@@ -160,9 +159,6 @@ class ResultCard:
     def table(self) -> Table:
         """A row a quantity, a column a loop."""
         return across(self.loops, title="result")
-
-    def _repr_html_(self) -> str:
-        return as_html(self.table) + "".join(f"<p>{with_symbols(note)}</p>" for note in self.notes)
 
 
 def result_card(

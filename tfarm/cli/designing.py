@@ -39,7 +39,7 @@ from tfarm.cli.app import (
     print_line,
     refuse,
 )
-from tfarm.errors import require
+from tfarm.errors import must_be_known, require
 
 command = partial(add_command, "Design")
 report_command = partial(add_command, "Report")
@@ -418,8 +418,10 @@ def report(
     """
     from tfarm.arm import law_tables
     from tfarm.fitting import data, recording
-    from tfarm.report import page, write
+    from tfarm.report import page, write, writing
 
+    if only is not None:
+        must_be_known("--only", only, writing.QUESTIONS)
     names: list[str] = arms or list(tfarm.presets())
     files: list[Path | None] = [*(law or [])]
     subjects = [load_arm(name, theory) for name in names]

@@ -14,7 +14,7 @@ from tfarm.arm import Arm, schema, to_toml
 from tfarm.arm.checks import check_fields, extended, not_negative, number, positive, whole
 from tfarm.arm.reading import load_tables
 from tfarm.arm.schema import ArmTable, TomlTable, validated
-from tfarm.errors import ParameterError, did_you_mean, must_be_known, naming, require
+from tfarm.errors import ParameterError, must_be_known, naming, require, unknown_key
 from tfarm.schema import Quantity
 
 Reading = Literal["vibration", "total"]
@@ -210,7 +210,7 @@ def chain_of_tables(tables: Mapping[str, Any]) -> Chain:
     """The chain of a parsed file, which may also have the tables of an arm."""
     for key in tables:
         known = key in CHAIN_TABLES or key in OF_AN_ARM
-        require(known, key, tables[key], f"unknown table; {did_you_mean(key, CHAIN_TABLES)}")
+        require(known, key, tables[key], unknown_key(key, CHAIN_TABLES))
     given = [name for name in CHAIN_TABLES if name in tables]
     records = {name: validated(CHAIN_TABLES[name], tables[name], name).build() for name in given}
     return Chain(**records, period_from="the file's period" if "period" in tables.get("sampling", {}) else "")

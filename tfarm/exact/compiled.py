@@ -6,13 +6,14 @@ import this module.
 """
 
 import hashlib
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from numba import config, njit
-from numba.core import types
+from numba.core import event, types
 from numba.core.extending import intrinsic
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -26,7 +27,7 @@ def compiled(function: _Function) -> _Function:
     Its cache is below the user's cache folder of numba, or else below this room.
     """
     parent = config.CACHE_DIR
-    config.CACHE_DIR = str(Path(parent or _HERE / "__pycache__") / f"tfarm-{_SOURCE_HASH}")
+    config.CACHE_DIR = str(_CACHE)
     try:
         return njit(cache=True, **OPTIONS)(function)
     except (RuntimeError, OSError):  # no folder for the cache can be written
@@ -60,7 +61,23 @@ def _source_hash() -> str:
     return digest.hexdigest()[:16]
 
 
-_SOURCE_HASH = _source_hash()
+_CACHE = Path(config.CACHE_DIR or _HERE / "__pycache__") / f"tfarm-{_source_hash()}"
+
+
+class _FirstUse(event.Listener):  # type: ignore[misc]  # numba comes without types
+    """A line on standard error at the first compilation, where no compiled kernel has been kept before."""
+
+    is_silent = _CACHE.exists()
+
+    def on_start(self, _: Any) -> None:
+        if not self.is_silent:
+            self.is_silent = True
+            print("tfarm: compiling kernels, once (about a minute)", file=sys.stderr)
+
+    def on_end(self, _: Any) -> None: ...
+
+
+event.register("numba:compile", _FirstUse())
 
 if TYPE_CHECKING:
 

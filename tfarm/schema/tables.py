@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -87,13 +87,15 @@ class Column:
 class Table:
     """Columns of one length; a sequence of their rows as JSON has them.
 
-    `stem` names its files; `title` and `caption` are those of the page.
+    `stem` names its files; `title` and `caption` are those of the page.  Blocks of a narrow terminal begin with the
+    `leading` columns.
     """
 
     columns: tuple[Column, ...]
     stem: str = ""
     title: str = ""
     caption: str = ""
+    leading: int = 1
 
     def __post_init__(self) -> None:
         keys = [column.key for column in self.columns]
@@ -103,6 +105,21 @@ class Table:
     def __iter__(self) -> Iterator[dict[str, Any]]:
         keys = [column.key for column in self.columns]
         return (dict(zip(keys, row, strict=True)) for row in zip(*(column.of for column in self.columns), strict=True))
+
+
+class Tabled:
+    """A record that prints as its `table`, then its `notes`, and shows the same in a notebook."""
+
+    def __str__(self) -> str:
+        from .terminal import table_lines
+
+        return "\n".join([*table_lines(cast("Any", self).table), *getattr(self, "notes", ())])
+
+    def _repr_html_(self) -> str:
+        from .html import as_html, with_symbols
+
+        notes = "".join(f"<p>{with_symbols(note)}</p>" for note in getattr(self, "notes", ()))
+        return as_html(cast("Any", self).table) + notes
 
 
 def table(
@@ -121,10 +138,14 @@ def table(
             cells = [
                 NO_VALUE if isinstance(each, list | tuple) and not each else text(each, of.digits) for each in values
             ]
-            folds = max(map(len, cells), default=0) > LONGEST_LINE
             columns.append(Column(of.key, of.label, of.unit, of=list(map(to_json_value, values)), shown=cells,
-                                  folds=folds, help=of.help))  # fmt: skip
+                                  folds=_folds(cells), help=of.help))  # fmt: skip
     return Table(columns=tuple(columns), stem=stem, title=title, caption=caption)
+
+
+def _folds(cells: Sequence[str]) -> bool:
+    """Whether a column of these cells may be folded."""
+    return max(map(len, cells), default=0) > LONGEST_LINE
 
 
 def across(
@@ -142,10 +163,9 @@ def across(
         pairs = [each.get(label, (Quantity(), None)) for label in labels]
         values = [to_json_value(value.value if isinstance(value, At) and value.omega is None else value)
                   for _, value in pairs]  # fmt: skip
-        columns.append(
-            Column(key, name, of=values, shown=[with_unit(value, replace(of, unit="")) for of, value in pairs])
-        )
-    return Table(columns=tuple(columns), stem=stem, title=title, caption=caption)
+        cells = [with_unit(value, replace(of, unit="")) for of, value in pairs]
+        columns.append(Column(key, name, of=values, shown=cells, folds=_folds(cells)))
+    return Table(columns=tuple(columns), stem=stem, title=title, caption=caption, leading=2)
 
 
 def roots_table(values: Any, of: Quantity, *, stem: str = "", title: str = "", caption: str = "") -> Table:

@@ -1,7 +1,7 @@
-"""Records and tables on a terminal, by rich: no number is broken or cut there, and in a pipe every row is one line.
+"""Records and tables on a terminal, by rich: no number is broken or cut there.
 
 Where the terminal is too narrow, titles and long texts are folded.  If that is not enough, the columns that do not fit
-follow in a block below, after the first column again.
+follow in a block below, after the leading ones again.  In a pipe only texts are folded: a row of numbers is one line.
 """
 
 import io
@@ -19,7 +19,7 @@ from .tables import Column, Section, Table, sections
 
 COLUMN_GAP = 2  # spaces between two columns
 LEAST_FOLDED = 20  # characters to which a text may be folded
-PIPE_WIDTH = 10**6  # columns of a pipe: more than any row has
+PIPE_WIDTH, LEAST_IN_PIPE = 120, 48  # columns of a pipe, and characters to which a text may be folded there
 
 
 def show(record: Any, rows: Table | None = None, last: str = "") -> None:
@@ -48,21 +48,23 @@ def show_text(text: str) -> None:
         print("\n".join(rendered(Text(text), terminal_width())))
 
 
-def pair_lines(pairs: Sequence[tuple[str, str]], width: int) -> list[str]:
+def pair_lines(pairs: Sequence[tuple[str, str]], width: int | None) -> list[str]:
     """Return the lines of labels and values one below the other; long values are folded."""
     labels, values = zip(*pairs, strict=True)
     columns = Column("label", of=labels), Column("value", of=values, folds=True)
     return table_lines(Table(columns=columns), width)[1:]  # without their titles
 
 
-def terminal_width() -> int:
-    """Return the columns of the terminal, or more than any row has where standard output is none."""
-    return shutil.get_terminal_size().columns if sys.stdout.isatty() else PIPE_WIDTH
+def terminal_width() -> int | None:
+    """Return the columns of the terminal, or None where standard output is none."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
 
 
-def table_lines(table: Table, width: int) -> list[str]:
-    """Return the lines of a table, each within `width` as far as its widest column allows."""
+def table_lines(table: Table, width: int | None = None) -> list[str]:
+    """Return the lines of a table, each within `width` as far as its widest column allows; without one, for a pipe."""
     columns = table.columns
+    is_pipe, width = width is None, width or PIPE_WIDTH
+    shortest = LEAST_IN_PIPE if is_pipe else LEAST_FOLDED
     widths = [max(cell_len(each.heading), widest(each)) for each in columns]
     if sum(widths) + COLUMN_GAP * (len(widths) - 1) <= width:  # rich would take a second for two thousand rows
         aligned = [
@@ -71,40 +73,44 @@ def table_lines(table: Table, width: int) -> list[str]:
             for each, size in zip(columns, widths, strict=True)
         ]  # fmt: skip
         return [(" " * COLUMN_GAP).join(row).rstrip() for row in zip(*aligned, strict=True)]
-    blocks: list[list[Column]] = [[columns[0]]]
-    for column in columns[1:]:
-        if len(blocks[-1]) > 1 and least_width([*blocks[-1], column]) > width:
-            blocks.append([columns[0]])
+    leading = columns[: table.leading]
+    blocks: list[list[Column]] = [[*leading]]
+    for column in columns[table.leading :]:
+        is_wide = least_width([*blocks[-1], column], shortest) > width
+        if is_wide and len(blocks[-1]) > len(leading) and not is_pipe:
+            blocks.append([*leading])
         blocks[-1].append(column)
     lines: list[str] = []
     for block in blocks:
         grid = RichTable(box=None, pad_edge=False, padding=(0, COLUMN_GAP, 0, 0), header_style="")
         for column in block:
-            size, side = least(column), "left" if column.is_text else "right"
+            size, side = least(column, shortest), "left" if column.is_text else "right"
             fixed = None if column.folds else size
             grid.add_column(Text(column.heading), justify=cast("Any", side), width=fixed, min_width=size)
         for row in zip(*(column.cells for column in block), strict=True):
             grid.add_row(*map(Text, row))
-        lines += [""] * bool(lines) + rendered(grid, max(width, least_width(block)))
+        lines += [""] * bool(lines) + rendered(grid, max(width, least_width(block, shortest)))
     return lines
 
 
-def rendered(shown: RenderableType, width: int) -> list[str]:
-    """Return the lines of a text or of a table of rich in that width."""
-    console = Console(file=io.StringIO(), width=width, color_system=None, legacy_windows=False)
+def rendered(shown: RenderableType, width: int | None) -> list[str]:
+    """Return the lines of a text or of a table of rich in that width; without one, in that of a pipe."""
+    console = Console(file=io.StringIO(), width=width or PIPE_WIDTH, color_system=None, legacy_windows=False)
     with console.capture() as captured:
         console.print(shown, crop=False)
     return [line.rstrip() for line in captured.get().splitlines()]
 
 
-def least_width(columns: Sequence[Column]) -> int:
+def least_width(columns: Sequence[Column], shortest: int) -> int:
     """Return the characters that columns take at least."""
-    return sum(map(least, columns)) + COLUMN_GAP * (len(columns) - 1)
+    return sum(least(column, shortest) for column in columns) + COLUMN_GAP * (len(columns) - 1)
 
 
-def least(column: Column) -> int:
-    """Return the characters below which a word or a number of a column would be broken."""
-    cells = max(LEAST_FOLDED, *map(widest_word, column.cells)) if column.folds else widest(column)
+def least(column: Column, shortest: int) -> int:
+    """Return the characters below which a word or a number of a column, or a text of `shortest`, would be broken."""
+    cells = widest(column)
+    if column.folds:
+        cells = min(cells, max(shortest, *map(widest_word, column.cells)))
     return max(cells, widest_word(column.heading))
 
 

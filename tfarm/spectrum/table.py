@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tfarm.arm import GAINS, THEORIES, Arm, HubFeedback, Theory, input_words, load, must_be_arm, written_unit
 from tfarm.arm.checks import on_the_arm, whole
 from tfarm.arrays import Real, Whole
-from tfarm.digits import DOUBLE_DIGITS
+from tfarm.digits import DOUBLE_DIGITS, general, singly
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.appendix import natural_frequency, roots_near
 from tfarm.exact.system import System, shear_flexibility, system_of
@@ -30,6 +30,7 @@ from tfarm.exact.values import (
     why_no_appendix,
 )
 from tfarm.records import record
+from tfarm.schema import Column, Table, Tabled
 
 from .frequencies import ARMS_KEPT, count_below, natural_frequencies, refine
 from .proofs import Certificate, certify
@@ -46,7 +47,7 @@ NODE_STEPS = 6  # of Newton's method from a secant of that grid: from two digits
 
 @dataclass(frozen=True)
 @record
-class Modes:
+class Modes(Tabled):
     """The undamped modes of an arm, in ascending order, complete up to the last one.
 
     A rigid-body mode has the index 0, flexible modes those from 1.  Every mode has unit modal mass (1 kg m^2 of hub
@@ -67,6 +68,16 @@ class Modes:
         if not flexible.size:
             return "no flexible mode"
         return f"{flexible.size} flexible, {flexible[0]:.6g} to {flexible[-1]:.6g} rad/s"
+
+    @property
+    def table(self) -> Table:
+        """A row a mode."""
+        columns = (
+            Column("index", "mode", of=self.index),
+            Column("omega", "natural frequency", "rad/s", of=self.natural_frequency, digits=singly(general, 12)),
+            Column("hertz", "frequency", "Hz", of=self.natural_frequency_hz, digits=singly(general, 9)),
+        )
+        return Table(columns=columns, title=f"modes of {self.arm.name}")
 
     @property
     def system(self) -> System:
