@@ -105,6 +105,22 @@ def test_a_bug_of_ours_stays_loud(tmp_path, monkeypatch):
     assert not (tmp_path / "out").exists()
 
 
+def test_overview_and_live_page_are_written_first_and_stay(tmp_path, monkeypatch):
+    """They are whole when a later section fails: every file that they name is there."""
+    without_a_section(monkeypatch, ValueError("a bug"))
+    monkeypatch.setattr(writing, "gather", lambda: None)
+    announced = []
+    with pytest.raises(ValueError, match="a bug"):
+        write([ARM], tmp_path, announce=announced.append)
+    first = [tmp_path / NAME / "index.html", tmp_path / NAME / "live.html"]
+    assert announced == [f"written first: {first[0]} and {first[1]}; the other pages follow"]
+    for page in first:
+        targets = [unquote(target.partition("#")[0]) for target in Links(page).targets]
+        assert [each for each in targets if each and "://" not in each and not (page.parent / each).is_file()] == []
+    assert (tmp_path / "assets" / "live.js").is_file()
+    assert not list(tmp_path.glob(".writing-*"))
+
+
 def test_every_piece_has_the_anchor_of_its_section(pages):
     pieces = pieces_of(Case(ARM, Chain()))
     for page in {piece.page for piece in pieces}:

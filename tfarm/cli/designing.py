@@ -438,7 +438,7 @@ def report(
     ]
     print(write(
         subjects, out, laws=laws, only=None if only is None else (only,), paper=paper, progress=advance,
-        notice=print_line, chains=[chain(name) for name in names],
+        notice=print_line, announce=print_line, chains=[chain(name) for name in names],
         measured=[data.data_of(text, "--measured") for text in measured or []],
     ))  # fmt: skip
 

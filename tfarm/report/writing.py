@@ -4,6 +4,7 @@ The sections of an arm's page in their order, its page by templates, the index, 
 """
 
 import hashlib
+import shutil
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,14 +18,14 @@ from tfarm.digits import how_many
 from tfarm.dsp import Chain
 from tfarm.errors import TfarmError, must_be_known, one_line, require
 from tfarm.exact.outputs import signal_words
-from tfarm.files import move_into, place_in
+from tfarm.files import move_into, place_in, temporary_folder
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.plots import studies
 from tfarm.plots.regions import comparison
 from tfarm.processes import shared
 from tfarm.report.arm_section import arm_section, assumptions_section
-from tfarm.report.live import ASSETS, is_live, save_live, write_assets
+from tfarm.report.live import ASSETS, LIVE_PAGE, is_live, save_live, write_assets
 from tfarm.report.loop_section import (
     law_section,
     locus_section,
@@ -67,7 +68,8 @@ ReportProgress = Callable[[int, int, str], object]
 Calls = Mapping[str, Sequence[Callable[[], Any]]]  # by task: what one process does in turn
 MOST_WORKERS = 2  # processes that share the pieces of a report: as many cores as a small machine has
 WORTH_A_PROCESS = 8  # pieces for which a second process, which takes a second or two to start, is worth it
-EVIDENCE, SCRIPTS = "method and proofs", "scripts of the live pages"  # tasks of no arm
+EVIDENCE = "method and proofs"  # a task of no arm
+MAP = "margins-map"  # anchor of the section that the overview begins with
 LOOP_TASK, SAMPLED_TASK = "continuous loop", "sampled loop"  # each of sections that share a design or damped modes
 LONGEST = (SAMPLED_TASK, LOOP_TASK, EVIDENCE)  # tasks of five seconds and more, which are begun first
 EXPORTS = "export"  # folder in that of an arm, to whose files its pages lead
@@ -115,7 +117,7 @@ def _of_gains(case: Case) -> bool:
 
 
 PIECES = (
-    Piece("stability region of both gains", "margins-map", map_section, _of_gains, task=LOOP_TASK),
+    Piece("stability region of both gains", MAP, map_section, _of_gains, task=LOOP_TASK),
     Piece("recommended gains", "margins-recommended", recommended_section, _of_gains, task=LOOP_TASK),
     Piece("stability margins", "margins", margins_section, _in_s, "Gains and margins", task=LOOP_TASK),
     Piece("Nyquist plot", "margins-nyquist", nyquist_section, _in_s, task=LOOP_TASK),
@@ -171,6 +173,7 @@ def write(
     paper: bool = False,
     progress: ReportProgress | None = None,
     notice: Callable[[str], object] | None = None,
+    announce: Callable[[str], object] | None = None,
 ) -> Path:
     """Write the report of each arm to out/<name>/, out/trust/ and out/index.html; the page to open first.
 
@@ -180,10 +183,12 @@ def write(
     are laid over those of every arm.
     `only` ("bode", "modes", "margins", ...) writes those pages alone, out/<name>/bode.html and so on.  With `paper`
     each picture of a section is a PDF at the width of a paper's column too, pictures/*.pdf.  `progress` gets
-    (done, total, what runs) whenever a piece of work begins, and at the end.  A section that tfarm cannot make of an
-    arm has the reason in its place, and `notice` gets the same in one line at the end.  Raises ParameterError before
-    any work if `out` cannot be written, two arms share a name or there is none, or an arm or its chain does not suit a
-    law; ConvergenceError if a process dies.  If the work itself fails, `out` is as it was.
+    (done, total, what runs) whenever a piece of work begins, and at the end.  Overview and live page of an arm are
+    written before the other pages, and stay if these fail; `announce`, a function of a module, is called with a line
+    that names them, by the process that wrote them.  A section that tfarm cannot make of an arm has the reason in its
+    place, and `notice` gets the same in one line at the end.  Raises ParameterError before any work if `out` cannot be
+    written, two arms share a name or there is none, or an arm or its chain does not suit a law; ConvergenceError if a
+    process dies.  If the work itself fails, the other pages in `out` are as they were.
     """
     out, n, names, only = Path(out), len(arms), [arm.name for arm in arms], only or ()
     _check(names, only)
@@ -192,7 +197,7 @@ def write(
     for case in cases:
         check_laws(case)
     with place_in(out, "out", names + [TRUST_FOLDER, ASSETS] * (not only)) as place:
-        sections = _written(cases, out, place, only, progress)
+        sections = _written(cases, out, place, only, progress, announce)
     for name, section in sections:
         if section.failure and notice is not None:
             notice(f"{name}: the page leaves out “{section.title}”: {section.failure}")
@@ -211,13 +216,16 @@ def _check(names: Sequence[str], only: tuple[str, ...]) -> None:
 
 
 def _written(
-    cases: Sequence[Case], out: Path, place: Path, only: tuple[str, ...], progress: ReportProgress | None
+    cases: Sequence[Case],
+    out: Path,
+    place: Path,
+    only: tuple[str, ...],
+    progress: ReportProgress | None,
+    announce: Callable[[str], object] | None,
 ) -> list[tuple[str, PageSection]]:
     """Make all pages in `place` and move them to `out`, the index last; every section with the name of its arm."""
     tasks: dict[str, Sequence[Callable[[], Any]]] = {} if only else {EVIDENCE: [gather]}
-    if not only and any(map(is_live, cases)):
-        tasks[SCRIPTS] = [partial(write_assets, place / ASSETS)]
-    own = [tasks_of(case, place / case.arm.name, only) for case in cases]
+    own = [tasks_of(case, place / case.arm.name, only, out, announce) for case in cases]
     for each in own:
         tasks |= each
     done = make_all(tasks, progress)
@@ -236,24 +244,50 @@ def _written(
     return sections
 
 
-def tasks_of(case: Case, folder: Path, only: tuple[str, ...]) -> Calls:
-    """What is to be made of one arm: its sections, its card and proof, and of a full report its live page.
+def tasks_of(
+    case: Case, folder: Path, only: tuple[str, ...], out: Path, announce: Callable[[str], object] | None
+) -> Calls:
+    """What is to be made of one arm: its sections, its card and proof, and of a full report its first pages.
 
-    Card, proof and live page are made by the process of the section that has computed most of them: the card has the
+    Card, proof and first pages are made by the process of the section that has computed most of them: the card has the
     verdicts, the proof certifies the modes that are listed, the live page has the regions of the map.
     """
     folder.mkdir()
     tasks: dict[str, list[Callable[[], Any]]] = defaultdict(list)
+    if not only:
+        tasks[LOOP_TASK].append(partial(first_pages, case, folder, out, announce))
     for piece in pieces_of(case):
-        if not only or piece.page in only:
+        if piece.page in only or (not only and piece.anchor != MAP):
             make = partial(make_section, piece.name, piece.anchor, piece.make, case, folder)
             tasks[piece.task or piece.name].append(make)
-    tasks[LOOP_TASK if LOOP_TASK in tasks else "card"].append(partial(save_card, case, folder))
+    if only:
+        tasks[LOOP_TASK if LOOP_TASK in tasks else "card"].append(partial(save_card, case, folder))
     if not (only and case.laws):
         tasks["modes"].append(partial(save_proof, case.arm, folder, case.chain))
-    if not only and is_live(case):
-        tasks[LOOP_TASK].append(partial(save_live, case, folder))
     return {f"{case.arm.name}: {task}": calls for task, calls in tasks.items()}
+
+
+def first_pages(case: Case, folder: Path, out: Path, announce: Callable[[str], object] | None) -> PageSection | None:
+    """Write map, card, live page and overview of an arm to `out` at once, and to `folder` for its report: the map."""
+    name = case.arm.name
+    with temporary_folder(folder.parent) as stage:
+        own = stage / name
+        own.mkdir()
+        pieces = [piece for piece in pieces_of(case) if piece.anchor == MAP]
+        made = [make_section(piece.name, piece.anchor, piece.make, case, own) for piece in pieces]
+        save_card(case, own)
+        if is_live(case):
+            save_live(case, own)
+            write_assets(stage / ASSETS)
+        _write_pages(case, own, made, ("index",), "", out / name)
+        shutil.copytree(stage, folder.parent, dirs_exist_ok=True)
+        move_into(stage, out)
+        write_text(stage / "index.html", index_page(out, trust=TRUST_PAGE if (out / TRUST_PAGE).is_file() else ""))
+        move_into(stage, out)
+    if announce is not None:
+        pages = [page for page in (out / name / "index.html", out / name / LIVE_PAGE) if page.is_file()]
+        announce(f"written first: {' and '.join(map(str, pages))}; the other pages follow")
+    return made[0] if made else None
 
 
 def make_all(tasks: Calls, progress: ReportProgress | None) -> dict[str, Sequence[Any]]:
