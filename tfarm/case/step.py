@@ -18,7 +18,7 @@ the largest |y| less its bound there and the largest |y| plus bound of the whole
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -69,10 +69,7 @@ CONVERGED = 1e-6  # of the peak of each signal: bound on its error, everywhere i
 OPEN = 0.01  # of a figure: more than its error may be is not determined
 RESOLVED = 1e-3  # of the largest value of a signal: figures of its values below a hundredth of that are 0
 LEAST_OVERSHOOT = 0.01  # whose hundredth is of no interest
-FINER, LAST_CROSSINGS = (
-    16,
-    50,
-)  # times in each record at which the settling band may be crossed, and the number of such records
+FIGURES = ("final_value", "rise_time", "overshoot", "settling_time", "steady_state_error", "residual_rms")
 
 
 class Millimetres(float):
@@ -152,17 +149,15 @@ class _Record:
     def _of_continuous(self, response: TimeResponse) -> LoopResponse:
         """The continuous-time loop."""
         t = np.union1d(self.t, response.near_starts(float(self.t[-1])))
-        y, peaks = response.at(t), response.peaks(t)
-        more = self._crossings(t, dict(zip(response.names, y, strict=True)))
-        order = np.argsort(np.r_[t, more], kind="stable")
-        t, y = np.r_[t, more][order], np.hstack([y, response.at(more)])[:, order]
-        bound, is_even = response.remainder(t), np.isin(t, self.t)
+        t = np.union1d(t, self._crossings(t, dict(zip(response.names, response.at(t), strict=True))))
+        y, bound, peaks = response.at(t), response.remainder(t), response.peaks(t)
         curves = {name: (t, y[n], bound[n], peaks[name]) for n, name in enumerate(response.names)}
-        sizes = np.array([[abs(peak.value)] for peak in peaks.values()])
-        is_converged = bool((bound <= CONVERGED * sizes).all()) and not any(map(response.is_infinite, peaks))
+        is_converged = all(
+            (error <= CONVERGED * abs(peak.value)).all() and math.isfinite(peak.most)
+            for _, _, error, peak in curves.values()
+        )
         word, count = verdict_on(response.poles.loop).verdict, f"{response.poles.count} poles"
-        signals = dict(zip(response.names, y[:, is_even], strict=True))
-        return self._loop(word, is_converged, count, signals, curves, response.is_infinite)
+        return self._loop(word, is_converged, count, curves)
 
     def _of_sampled(self, law: AnyLaw, chain: Chain, task: Scenario, names: Sequence[str]) -> LoopResponse:
         """The sampled loop, with the signals of these names."""
@@ -173,87 +168,80 @@ class _Record:
         is_converged = used.change is not None and used.change <= ENOUGH_CHANGE
         word = UNSTABLE if run.stopped else sampled_verdict(self.arm, law, chain).word
         curves = {name: (self.t[: y.size], y, 0 * y, None) for name, y in signals.items()}
-        return self._loop(word, is_converged, f"{used.modes} modes", signals, curves)
+        return self._loop(word, is_converged, f"{used.modes} modes", curves)
 
-    def _loop(
-        self, stability: str, is_converged: bool, count: str, signals: dict[str, Real],
-        curves: Mapping[str, Curve], is_infinite: Callable[[str], bool] = lambda name: False,
-    ) -> LoopResponse:  # fmt: skip
+    def _loop(self, stability: str, is_converged: bool, count: str, curves: Mapping[str, Curve]) -> LoopResponse:
         """The figures of a loop; of an unstable one those of its signals are left out."""
         names = zip(PARTS, self.names, strict=True) if stability != UNSTABLE else ()
-        of = {part: self._figures(name, *curves[name], is_infinite(name)) for part, name in names}
+        of = {part: self._figures(name, *curves[name]) for part, name in names}
+        signals = {name: y[np.isin(t, self.t)] for name, (t, y, *_) in curves.items()}
         certainty = f"{'converged' if is_converged else 'approximate'}, {count}"
         return LoopResponse(stability=stability, certainty=certainty, signals=signals, **of)
 
-    def _figures(
-        self, name: str, t: Real, y: Real, bound: Real, peak: Peak | None = None, is_infinite: bool = False
-    ) -> SignalFigures:
+    def _figures(self, name: str, t: Real, y: Real, bound: Real, peak: Peak | None = None) -> SignalFigures:
         """Figures of one signal at times `t` with a bound on its error; its peak is the largest there unless given."""
         n = int(abs(y).argmax())
         peak = peak or Peak(float(t[n]), float(y[n]), 0.0, abs(float(y[n])))
+        size, step = max(abs(peak.value), LEAST_SIZE), float(self.t[1])
         found, *others = (self._values(name, t, y, sign * bound) for sign in (0, -1, 1))
-        floors = dict.fromkeys(found, RESOLVED * abs(peak.value))
-        floors |= {"overshoot": LEAST_OVERSHOOT, "settling_time": self.t[1] / OPEN, "rise_time": self.t[1] / OPEN}
-        spread = {key: _spread(value, [each[key] for each in others], floors[key]) for key, value in found.items()}
-        spread["peak"] = (peak.most - abs(peak.value) + peak.bound) / max(abs(peak.value), LEAST_SIZE)
-        if peak.bound:
-            largest = np.r_[peak.time, t[abs(y) + bound >= abs(peak.value) - peak.bound]]
-            spread["peak_time"] = (float(np.ptp(largest)) - 2 * self.t[1]) / max(peak.time, self.t[-1] / 10)
+        least = {"overshoot": LEAST_OVERSHOOT, "settling_time": step / OPEN, "rise_time": step / OPEN}
+        spread = {
+            key: _spread(value, [each[key] for each in others], least.get(key, RESOLVED * size))
+            for key, value in found.items()
+        }
+        largest = t[abs(y) + bound >= abs(peak.value) - peak.bound] if peak.bound else t[:0]
+        spread |= {
+            "peak": (peak.most - abs(peak.value) + peak.bound) / size,
+            "peak_time": (float(np.ptp(np.r_[peak.time, largest])) - 2 * step) / max(peak.time, self.t[-1] / 10),
+        }
         found |= {"peak": peak.value, "peak_time": peak.time}
         words = [f"{key.replace('_', ' ')}: remainder {100 * of:.2g} %" for key, of in spread.items() if of > OPEN]
-        known = {key: value if spread.get(key, 0.0) <= OPEN else None for key, value in found.items()}
-        if is_infinite:
+        known = {key: value if spread[key] <= OPEN else None for key, value in found.items()}
+        if math.isinf(peak.most):
             known |= dict.fromkeys(("peak", "peak_time", "settling_time"))
             words = ["impulse"]
-        residual, settled = known.pop("residual_rms"), known["settling_time"]
+        settled = known["settling_time"]
         return SignalFigures(
             signal=name, unit=unit_of(self.arm, name), **known, note="; ".join(words) or None,
-            at_rest_after=None if settled is None else self.busy_until + settled,
-            residual_rms=Millimetres(residual) if name == "tip_displacement" and residual is not None else residual,
-            remainder_bound=peak.bound or None,
+            at_rest_after=None if settled is None else self.busy_until + settled, remainder_bound=peak.bound or None,
         )  # fmt: skip
 
     def _values(self, name: str, t: Real, y: Real, more: Real) -> dict[str, Any]:
         """Figures but the peak of a signal, `more` being added to it and to its deviations."""
-        is_even = np.isin(t, self.t)
-        final = final_value(t[is_even], (y + more)[is_even])
-        away, scale = self._deviations(name, t, y)
+        final, away, scale = self._deviations(name, t, y)
         settled = settling_time(t, np.maximum(away + more, 0), scale, self.busy_until, self.band)
-        reference = self.reference.get(name)
-        share = (y + more) / final if settled is not None and reference is not None and final else None
-        after = is_even & (t >= self.busy_until * (1 - TIME_ROUNDING))
-        has_final = settled is not None and (name != MOMENT or not self.arm.has_rigid_mode)
-        return {
-            "final_value": final if has_final else None,
-            "rise_time": None if share is None else _reached(t, share, 0.9) - _reached(t, share, 0.1),
-            "overshoot": None if share is None else Percent(max(0.0, float(share.max()) - 1)),
-            "settling_time": settled,
-            "steady_state_error": None if share is None or reference is None else float(reference[-1]) - final,
-            "residual_rms": float(np.sqrt(np.mean((y - final)[after] ** 2)))
-            if self.busy_until and after.any()
-            else None,
-        }
+        after = np.isin(t, self.t) & (t >= self.busy_until * (1 - TIME_ROUNDING))
+        values: dict[str, Any] = dict.fromkeys(FIGURES) | {"settling_time": settled}
+        if self.busy_until and after.any():
+            unit = Millimetres if name == "tip_displacement" else float
+            values["residual_rms"] = unit(np.sqrt(np.mean((y - final)[after] ** 2)))
+        if settled is not None:
+            final += float(more.mean())
+            values["final_value"] = final if name != MOMENT or not self.arm.has_rigid_mode else None
+            if final and name in self.reference:
+                share = (y + more) / final
+                values["rise_time"] = _reached(t, share, 0.9) - _reached(t, share, 0.1)
+                values["overshoot"] = Percent(max(0.0, float(share.max()) - 1))
+                values["steady_state_error"] = float(self.reference[name][-1]) - final
+        return values
 
-    def _deviations(self, name: str, t: Real, y: Real) -> tuple[Real, float]:
-        """Deviations of a signal from its final value, and the scale of its settling band."""
+    def _deviations(self, name: str, t: Real, y: Real) -> tuple[float, Real, float]:
+        """Final value of a signal, deviations from it, and the scale of its settling band."""
         is_even = np.isin(t, self.t)
         final = final_value(t[is_even], y[is_even])
         away = abs(y - final)
-        return away, abs(final - float(y[0])) if name in self.reference else float(away.max())
+        return final, away, abs(final - float(y[0])) if name in self.reference else float(away.max())
 
     def _crossings(self, t: Real, signals: Mapping[str, Real]) -> Real:
-        """Times [s] in the last records in which a signal may cross its settling band."""
-        found = [np.empty(0)]
+        """Times [s] in the last records in which a signal may cross its settling band, 16 in each."""
+        found = []
         for name in self.names:
-            away, scale = self._deviations(name, t, signals[name])
-            outside = away - self.band * scale
-            curved = np.r_[0.0, abs(np.diff(away, 2)), 0.0]
-            low, high = (side(outside[:-1], outside[1:]) for side in (np.minimum, np.maximum))
-            bend = np.maximum(curved[:-1], curved[1:])
-            (places,) = np.nonzero((low - bend <= 0) & (high + bend >= 0))
-            starts, steps = t[places[-LAST_CROSSINGS:]], np.diff(t)[places[-LAST_CROSSINGS:]]
-            found.append((starts[:, None] + steps[:, None] * np.arange(1, FINER) / FINER).ravel())
-        return np.unique(np.concatenate(found))
+            _, away, scale = self._deviations(name, t, signals[name])
+            bend = np.r_[0.0, abs(np.diff(away, 2)), 0.0]
+            reach = abs(np.diff(away)) + np.maximum(bend[:-1], bend[1:])
+            places = np.flatnonzero(abs(away - self.band * scale)[:-1] <= reach)[-50:]
+            found.append(np.linspace(t[places], t[places + 1], 17).ravel())
+        return np.concatenate(found)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -452,9 +440,10 @@ def _times(response: TimeResponse | None, task: Scenario) -> Real:
     T, n = task.period, task.t.size
     finest = (n - 1) * T / LEAST_POINTS
     if response is not None:
-        sizes = abs(response.amplitudes[:-1])
+        z, amplitudes = (np.hstack([part.late[n] for part in response.parts]) for n in (0, 1))
+        sizes = abs(amplitudes[:-1])
         shows = (sizes > traces.VISIBLE * sizes.max(axis=1, keepdims=True)).any(axis=0)
-        fastest = max(response.z.imag[shows].max(initial=0.0), LEAST_SIZE)
+        fastest = max(z.imag[shows].max(initial=0.0), LEAST_SIZE)
         finest = min(finest, 2 * math.pi / (traces.POINTS_A_PERIOD * fastest))
     steps = int(np.clip(math.ceil(T / finest), 1, min(MOST_BETWEEN, max(1, MOST_POINTS // n))))
     k = np.arange((n - 1) * steps + 1)

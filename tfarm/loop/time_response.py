@@ -48,19 +48,9 @@ SLOW_RADIUS = 2.0  # over T, of a circle around s = 0, on which e^{s T} is moder
 POLE_RADIUS = 0.25  # of the way to the next pole: radius of the circle of one pole
 POLE_NODES, FEWEST_NODES, MOST_NODES, NODE_LOG = 32, 128, 512, 40.0  # of circles; e^-40 is below the rounding
 ON_AXIS = 1e-9  # of the least distance of two circles: by so little a centre is off the real axis
-DECAYED = 20.0  # time constants of the poles left of the box, after which the sum over the poles is used
-ABOVE_TOP = 4.0  # of the top of the box: last frequency of the inversion, unless the time constants need a longer one
-EARLIER = 64.0  # times sooner ends a first inversion, for what begins as the root of time
-MOST_EARLY_GROWTH = 10.0  # exponent of an unstable pole during the inversion
-COMPARED, COMPARED_FROM, DIFFERENCE_FACTOR = 400, 0.8, 2.0  # times of the comparison, its start, factor of its bound
-FOLLOWS, GROWS = 1e-3, 2.0  # change of a limit for s -> inf from s to 10 s: at most, and of an infinite one at least
-IDENTITY_DIGITS = 1e-6  # of h(0+), to which its limit is read
 BLOCK = 20_000  # times that are evaluated together: with 200 terms 64 MB
 MOST_GROWTH = 500.0  # exponent of the fastest growing pole at the end of a record
-RIPPLE_RECORDS, RIPPLE_POINTS = (
-    10,
-    801,
-)  # to either side of the largest value, and times there: of ripple too small to see
+RIPPLE = 10  # records to either side of the largest one: there 80 times in each resolve ripple too small to be seen
 ZOOM_POINTS, ZOOMS = 41, 5  # of the search for a peak: each narrows the interval by a factor of 20
 
 Transform = Callable[[Complex], Complex]
@@ -145,16 +135,6 @@ class TimeResponse:
     poles: Poles
     parts: tuple[Part, ...]
 
-    @property
-    def z(self) -> Complex:
-        """Exponents (m,) of the sums over the poles."""
-        return np.concatenate([part.late[0] for part in self.parts])
-
-    @property
-    def amplitudes(self) -> Complex:
-        """Amplitudes (signals, m) of the sums over the poles."""
-        return np.hstack([part.late[1] for part in self.parts])
-
     @cached_property
     def starts(self) -> Real:
         """The times [s] at which signals may jump."""
@@ -181,22 +161,19 @@ class TimeResponse:
                     found[:, block] += size(weight) * h(part, t[block] - start)
         return found
 
-    def is_infinite(self, name: str) -> bool:
-        """Whether a signal has an impulse, or grows without bound at a jump."""
-        return any(np.isinf(part.off[self.names.index(name)]) for part in self.parts)
-
     def peaks(self, t: Real) -> dict[str, Peak]:
         """Return the peak of each signal near the largest of times `t`, and on both sides of its jumps.
 
-        A bound below the rounding of the value, 2.2e-16 of its size, is that.
+        A bound below the rounding of the value, 2.2e-16 of its size, is that.  `most` is infinite of an impulse.
         """
         jumps = self.starts[self.starts <= t[-1]]
         t = np.union1d(t, jumps)
         places = abs(self.at(t)).argmax(axis=1)
-        first, last = (t[np.clip(places + step, 0, t.size - 1)] for step in (-RIPPLE_RECORDS, RIPPLE_RECORDS))
-        t = np.union1d(t, np.linspace(first, last, RIPPLE_POINTS))
+        first, last = (t[np.clip(places + step, 0, t.size - 1)] for step in (-RIPPLE, RIPPLE))
+        t = np.union1d(t, np.linspace(first, last, 80 * RIPPLE + 1))
         sizes, ahead = abs(self.at(t)), self.at(jumps, before=True)
         most = np.hstack([sizes + self.remainder(t), abs(ahead)]).max(axis=1)
+        most += sum(np.where(np.isinf(part.off), math.inf, 0.0) for part in self.parts)
         return {
             name: self._peak(row, t, sizes[row], jumps, ahead[row], float(most[row]))
             for row, name in enumerate(self.names)
@@ -208,12 +185,12 @@ class TimeResponse:
             n = int(sizes.argmax())
             t = np.linspace(t[max(n - 1, 0)], t[min(n + 1, t.size - 1)], ZOOM_POINTS)
             t = np.union1d(t, jumps[(jumps > t[0]) & (jumps < t[-1])])
-            y = self.at(t)[row]
-            sizes = abs(y)
-        t, y = np.r_[t, jumps], np.r_[y, ahead]
+            sizes = abs(self.at(t)[row])
+        t, y = np.r_[t, jumps], np.r_[self.at(t)[row], ahead]
         n = int(abs(y).argmax())
-        bound = max(float(self.remainder(t[[n]])[row, 0]), MACHINE_EPS * abs(float(y[n])))
-        return Peak(float(t[n]), float(y[n]), bound, max(most, abs(float(y[n])) + bound))
+        size = abs(float(y[n]))
+        bound = max(float(self.remainder(t[[n]])[row, 0]), MACHINE_EPS * size)
+        return Peak(float(t[n]), float(y[n]), bound, max(most, size + bound))
 
     def near_starts(self, end: float) -> Real:
         """Times [s] up to an end at which the beginnings after each start are resolved."""
@@ -242,10 +219,10 @@ def time_response(poles: Poles, names: tuple[str, ...], excitation: Excitation, 
     )  # fmt: skip
     delay = poles.loop.law.delay
     kinds = [(0.0, True, False), (delay, False, True)] if delay else [(0.0, True, True)]
-    parts = [
-        _part(poles, Transforms(poles.loop, names, excitation, *which), start, duration) for start, *which in kinds
-    ]
-    return TimeResponse((*names, TORQUE), excitation, poles, tuple(part for part in parts if part is not None))
+    of = [(start, Transforms(poles.loop, names, excitation, *which)) for start, *which in kinds]
+    acting = [(start, each) for start, each in of if each.parts(each.far)[0].any()]
+    parts = [_part(poles, each, start, duration) for start, each in acting or of[:1]]
+    return TimeResponse((*names, TORQUE), excitation, poles, tuple(parts))
 
 
 @dataclass(frozen=True)
@@ -262,25 +239,6 @@ class Transforms:
     acts: bool
     refers: bool
 
-    @property
-    def is_empty(self) -> bool:
-        """Whether there is no such excitation."""
-        inputs, free = self.excitation.inputs, self.excitation.free
-        acts = self.acts and (ACTUATOR in inputs or free)
-        return not acts and not (self.refers and (inputs.keys() - {ACTUATOR} or free.keys() & {*self.loop.law.signals}))
-
-    def whole(self, s: Complex) -> Complex:
-        """H."""
-        return self._parts(s)[0]
-
-    def direct(self, s: Complex) -> Complex:
-        """The direct part of H."""
-        return self._parts(s)[1]
-
-    def rest(self, s: Complex) -> Complex:
-        """H less its direct part."""
-        return self._parts(s)[2]
-
     @cached_property
     def far(self) -> Complex:
         """Places far right of all poles [1/s]."""
@@ -291,7 +249,7 @@ class Transforms:
         """Limits of N/drive for s -> inf (signals, 1): what follows the torque at once; where there is none, 0."""
         drive, row = self._rig(self.far)
         ratio = np.array([row[name] for name in self.names]) / drive
-        follows = abs(ratio[:, -1] - ratio[:, -2]) <= FOLLOWS * abs(ratio[:, -1])
+        follows = abs(ratio[:, -1] - ratio[:, -2]) <= 1e-3 * abs(ratio[:, -1])
         return np.r_[np.where(follows, ratio[:, -1].real, 0.0), 1.0][:, None]
 
     def _rig(self, s: Complex) -> tuple[Complex, dict[str, Complex]]:
@@ -300,7 +258,8 @@ class Transforms:
         drive, numerators, _ = of.parts(s)
         return drive, dict(zip(of.names, numerators, strict=True))
 
-    def _parts(self, s: Complex) -> tuple[Complex, Complex, Complex]:
+    def parts(self, s: Complex) -> tuple[Complex, Complex, Complex]:
+        """Return H, its direct part, and the rest."""
         law, excitation, (drive, row) = self.loop.law, self.excitation, self._rig(s)
         columns = (*law.signals, *law.wanted)
         parts, den = law.shares(s, columns)
@@ -308,12 +267,12 @@ class Transforms:
         fed_back = np.exp(-s * law.delay) * sum(entries[name] * row[name] for name in law.signals)
         free = {name: motion(s) for name, motion in excitation.free.items()}
         driven = 0 * s
-        if self.acts and ACTUATOR in excitation.inputs:
-            driven = driven + excitation.inputs[ACTUATOR](s) * den
-        if self.refers:
-            driven = driven + sum(X(s) * entries[name] for name, X in excitation.inputs.items() if name != ACTUATOR)
-            driven = driven - sum(entries[name] * free[name] for name in law.signals if name in free)
-        added = np.array([free.get(name, 0 * s) if self.acts else 0 * s for name in (*self.names, TORQUE)])
+        for name, X in excitation.inputs.items():
+            if self.acts if name == ACTUATOR else self.refers:
+                driven = driven + X(s) * (den if name == ACTUATOR else entries[name])
+        for name in free.keys() & {*law.signals} if self.refers else ():
+            driven = driven - entries[name] * free[name]
+        added = np.array([free.get(name, 0 * s) * self.acts for name in (*self.names, TORQUE)])
         rig, D = np.array([*(row[name] for name in self.names), drive]), drive * den + fed_back
         whole, direct = rig * driven / D + added, self.shares * driven / den + added
         rest = whole - direct
@@ -321,31 +280,34 @@ class Transforms:
         return whole, direct, rest
 
 
-def _part(poles: Poles, of: Transforms, start: float, duration: float) -> Part | None:
-    """The response to a part of the excitation; None where that is empty."""
-    if of.is_empty:
-        return None
+def _part(poles: Poles, of: Transforms, start: float, duration: float) -> Part:
+    """The response to a part of the excitation."""
     left, _, _, top = poles.box
-    known = np.r_[poles.values, np.array(of.excitation.poles, complex)]
+    own = np.array(of.excitation.poles, complex)
+    known = np.r_[poles.values, own]
     edges = [*poles.loop.k.singular, left, 1j * top]
-    late = _terms(known, edges, MOST_CLOSE * first_frequency(poles.loop.arm), of.whole, duration)
-    is_last = late[0].imag > top / 2
-    slowest = float(late[0][is_last].real.max(initial=left))
-    end = max(DECAYED / -left, min(DECAYED / max(-slowest, LEAST_SIZE), 2 * np.pi * POINTS / (4 * ABOVE_TOP * top)))
+    late = _terms(known, edges, MOST_CLOSE * first_frequency(poles.loop.arm), lambda s: of.parts(s)[0], duration)
+    slowest = float(late[0].real[late[0].imag > top / 2].max(initial=left))
+
+    # 20 time constants of the poles outside the box; above it as well, or until frequencies up to four times its top
+    decayed, resolved = 20.0, 2 * np.pi * POINTS / (4 * 4 * top)
+    end = max(decayed / -left, min(decayed / max(-slowest, LEAST_SIZE), resolved))
     growth = float(known.real.max(initial=0.0))
-    end = min(end, MOST_EARLY_GROWTH / max(growth, LEAST_SIZE))
-    rests = tuple(inverted(of.rest, each, growth) for each in (end / EARLIER, end))
-    own = np.r_[np.array(of.excitation.poles, complex), of.loop.law.poles]
-    direct = _terms(own, [], math.inf, of.direct, end)
+    end = min(end, 10 / max(growth, LEAST_SIZE))  # where an unstable pole has grown by e^10
+    # a first inversion ends 64 times sooner, for what begins as the root of time
+    rests = tuple(inverted(lambda s: of.parts(s)[2], each, growth) for each in (end / 64, end))
+    direct = _terms(np.r_[own, of.loop.law.poles], [], math.inf, lambda s: of.parts(s)[1], end)
     part = Part(start, late, direct, rests, np.zeros(0), slowest, np.zeros(0))
-    t = np.linspace(COMPARED_FROM * end, end, COMPARED)
+
+    t = np.linspace(0.8 * end, end, 400)
     ends = _summed(late, t)
     apart = abs(ends - part.early(t)) + rests[-1].errors_at(t)
-    before, limit = ((of.direct(of.far) + of.rest(of.far)) * of.far).real.T[-2:]
+    _, at_once, after = of.parts(of.far)
+    before, limit = ((at_once + after) * of.far).real.T[-2:]
     off = abs(limit - direct[1].sum(axis=1).real)
-    off[off <= IDENTITY_DIGITS * abs(direct[1]).sum(axis=1)] = 0.0
-    off[(abs(limit) > GROWS * abs(before)) & (abs(limit) > abs(ends).max(axis=1))] = math.inf
-    return replace(part, difference=DIFFERENCE_FACTOR * apart.max(axis=1), off=off)
+    off[off <= 1e-6 * abs(direct[1]).sum(axis=1)] = 0.0  # to which the limit is read
+    off[(abs(limit) > 2 * abs(before)) & (abs(limit) > abs(ends).max(axis=1))] = math.inf
+    return replace(part, difference=2 * apart.max(axis=1), off=off)
 
 
 def _summed(terms: tuple[Complex, Complex], t: Real) -> Real:
