@@ -95,7 +95,7 @@ def test_twelve_digits_of_a_peak_at_the_precision_of_mpmath():
 
     excitation = Excitation({ACTUATOR: pulse}, (0.0, WIDTH), (1.0, -1.0), (1j * w, 2j * w, 3j * w))
     found = time_response(usual_poles(Loop(LAB, as_law(law))), NAMES, excitation, 1.0)
-    at, value, bound = found.peak("hub_angle", np.linspace(0.05, 0.3, 600))
+    at, value, bound, _ = found.peaks(np.linspace(0.05, 0.3, 600))["hub_angle"]
     assert found.remainder(np.array([at]))[0, 0] < 1e-30 * value  # the omitted poles; the sum itself is rounded
     assert 1.1e-16 * value < bound < 4.5e-16 * value
     with mpmath.workdps(20):
@@ -171,3 +171,71 @@ def test_a_growing_response_beyond_doubles_is_refused_with_a_duration():
     poles = usual_poles(Loop(LAB, as_law(tfarm.HubFeedback(K1=-30.0))))
     with pytest.raises(tfarm.ParameterError, match=r"duration = 1000.0: the loop is unstable .* at most [\d.]+ s"):
         time_response(poles, NAMES, versine(), 1000.0)
+
+
+STEP = Excitation({"hub_angle": lambda s: 1 / s})
+FILTERED = {"one pole": ([0.001, 1.0], 1.0), "two equal poles": ([1 / 300**2, 2 / 300, 1.0], 1.1)}
+
+
+@pytest.mark.parametrize("damping", [0.0, 1e-4, 5e-3])
+@pytest.mark.parametrize("filter_", FILTERED)
+def test_until_twice_the_delay_the_torque_is_the_laws_own_step_response(damping, filter_):
+    """Nothing is fed back before: 0 until the delay, then the step response of C alone, here in closed form."""
+    tau, den = 0.01, FILTERED[filter_][0]
+    law = tfarm.Law({"hub_angle": ([1.0, 3.0], den)}, delay=tau, references=("hub_angle",))
+    found = time_response(usual_poles(Loop(LAB.having(damping=damping), law)), NAMES, STEP, 1.0)
+    after = np.array([0.0, 1e-6, 1e-4, 5e-4, 1e-3, 3e-3, 9e-3])
+    own = {
+        "one pole": 3 + 997 * np.exp(-1000 * after),
+        "two equal poles": 3 - 3 * np.exp(-300 * after) * (1 + 300 * after) + 300**2 * after * np.exp(-300 * after),
+    }[filter_]
+    np.testing.assert_allclose(found.at(tau + after)[-1], own, rtol=1e-10, atol=1e-10)
+    early = np.linspace(0.0, tau, 50, endpoint=False)
+    assert not found.at(early).any()
+    assert not found.remainder(early).any()
+
+
+def test_the_largest_torque_is_found_on_both_sides_of_a_jump():
+    """1000 N m after the delay, at no sample of the record; and the end of a ramp that jumps back to 0."""
+    law = tfarm.Law({"hub_angle": ([1.0, 3.0], [0.001, 1.0])}, delay=0.005, references=("hub_angle",))
+    found = time_response(usual_poles(Loop(LAB, law)), NAMES, STEP, 4.0)
+    peak = found.peaks(np.linspace(0.0, 4.0, 1000))["torque"]
+    assert peak[:2] == pytest.approx((0.005, 1000.0), rel=1e-12)
+    assert peak.value <= peak.most <= 1000.0 + 1e-6
+    ramp = Excitation({ACTUATOR: lambda s: 1 / s**2}, (0.0, 0.3), (1.0, -1.0))
+    stopped = Excitation({ACTUATOR: lambda s: 1 / s**2 - 0.3 / s * np.exp(0 * s)}, (0.0,), (1.0,))
+    free = usual_poles(Loop(LAB, as_law(tfarm.HubFeedback())))
+    t = np.linspace(0.0, 0.5, 101)
+    np.testing.assert_allclose(time_response(free, NAMES, ramp, 0.5).at(t)[-1], np.minimum(t, 0.3), atol=1e-9)
+    start = time_response(free, NAMES, stopped, 0.5).peaks(np.linspace(0.1, 0.5, 30))["torque"]
+    assert (start.time, start.value) == pytest.approx((0.0, -0.3), rel=1e-9)
+
+
+@pytest.mark.parametrize(("damping", "delay"), [(5e-3, 0.0), (2e-3, 0.004), (0.0, 0.003)])
+def test_early_torque_and_root_moment_are_those_of_de_hoogs_inversion(damping, delay):
+    """Of a filtered law on damped arms, whose own poles are left of the box; the transform at 20 digits."""
+    arm, num, den = LAB.having(damping=damping), [1.0, 3.0], [1 / 2000, 1.0]
+    law = tfarm.Law({"hub_angle": (num, den)}, delay=delay, references=("hub_angle",))
+    found = time_response(usual_poles(Loop(arm, law)), NAMES, STEP, 1.0)
+
+    def transform(name):
+        def F(s):
+            C = mpmath.polyval(num, s) / mpmath.polyval(den, s)
+            angle = appendix_response(arm, OUTPUTS["hub_angle"], s, 18)
+            direct = C / s / (1 + mpmath.exp(-s * delay) * C * angle)  # its delay is taken out
+            if name == "torque":
+                return direct - C / s
+            return direct * appendix_response(arm, OUTPUTS[name], s, 18)
+
+        return F
+
+    for t in (2e-3, 2e-2) if damping else (2e-3,):
+        y = dict(zip(found.names, found.at(np.array([t + delay]))[:, 0], strict=True))
+        own = 3 + 1997 * np.exp(-2000 * t)
+        with mpmath.workdps(20):
+            torque, moment = (
+                float(mpmath.invertlaplace(transform(name), t, method="dehoog", degree=24))
+                for name in ("torque", "root_moment")
+            )
+        assert y["torque"] == pytest.approx(own + torque, abs=2e-5 * (abs(own) + abs(torque)))
+        assert y["root_moment"] == pytest.approx(moment, rel=1e-3)

@@ -6,9 +6,13 @@ one pair of exponentials at any damping, so the response of the loop to it is ex
 the tip is an equilibrium only where the hub is kept at its angle.)
 
 Figures, as in textbooks (Ogata, Modern Control Engineering, 2010, sec. 5-3): the final value is the mean of the last
-tenth of the record; rise time from 10 to 90 % of it; overshoot beyond it, over it; settling within 5 % of it.  Of a
-signal without a reference, and of root moment and torque, the 5 % are of its largest value: as for `tfarm simulate`,
-which reads the samples alone.
+tenth of the record; rise time from 10 to 90 % of it; overshoot beyond it, over it.  Settling counts from the end of the
+motion, within 2 % of the travel as in python-control and MATLAB.  Of a signal without a reference, and of root moment
+and torque, the share is of the largest deviation from the final value: as for `tfarm simulate`, which reads the samples
+alone.
+
+A figure is not determined where the bound on the error of the signal leaves 1 % of it open.  A peak is enclosed between
+the largest |y| less its bound there and the largest |y| plus bound of the whole record, on both sides of its jumps.
 """
 
 from __future__ import annotations
@@ -16,19 +20,21 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
 from tfarm.arm import AT_HUB, AnyLaw, Arm, Law, as_law, tracked
+from tfarm.arm.checks import number
 from tfarm.arm.law import REFERENCE
 from tfarm.arrays import LEAST_SIZE, Real
+from tfarm.digits import general
 from tfarm.dsp import Chain, sampled_verdict, traces
 from tfarm.dsp.chain import PERIOD, TIME_ROUNDING, chain_or_usual
 from tfarm.dsp.plant import sensed_plant
 from tfarm.dsp.results import ENOUGH_CHANGE, simulated
 from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, described, resting, scenario
-from tfarm.dsp.simulate import LEFT_OF_RECORD, MOST_BETWEEN, first_mode, settled_from
+from tfarm.dsp.simulate import MOST_BETWEEN, SETTLING_BAND, final_value, first_mode, settling_time
 from tfarm.errors import must_be_known, require
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import Poles
@@ -37,6 +43,7 @@ from tfarm.loop.time_response import (
     ACTUATOR,
     TORQUE,
     Excitation,
+    Peak,
     TimeResponse,
     Transform,
     time_response,
@@ -52,13 +59,25 @@ from .card import loop_names
 
 SAMPLED_NAMES = {"reference": "reference", "slew": "slew", "pulse": "pulse", "deflection": "decay"}  # by scenario
 MOMENT, UNSTABLE, GROWS = AT_HUB[-1], "unstable", " (the response grows, its figures are not defined)"
+Curve = tuple[Real, Real, Real, Peak | None]  # times [s], values, bounds of their errors, and the peak where known
 PARTS = ("hub", "tip", "root_moment", "torque")
 TIME_CONSTANTS = 8.0  # of the dominant pole: length of a record after its input, to 3e-4 of the final value
 LONGEST_SLEWS = 20.0  # times the slew: a record without a duration is no longer
 DOMINANT = 2.0  # times the first frequency: a pole farther away is not the dominant one
 LEAST_POINTS, MOST_POINTS = 2000, 20_000  # of a record
-Peak = tuple[float, float, float | None]  # time [s], value, and bound on the remainder there
-CONVERGED = 1e-9  # of the peak of each signal: bound on the remainder there of a converged response
+CONVERGED = 1e-6  # of the peak of each signal: bound on its error, everywhere in the record, of a converged response
+OPEN = 0.01  # of a figure: more than its error may be is not determined
+RESOLVED = 1e-3  # of the largest value of a signal: figures of its values below a hundredth of that are 0
+LEAST_OVERSHOOT = 0.01  # whose hundredth is of no interest
+FIGURES = ("final_value", "rise_time", "overshoot", "settling_time", "steady_state_error", "residual_rms")
+
+
+class Millimetres(float):
+    """A length [m] that a person reads in mm."""
+
+    def as_text(self, digits: int) -> str:
+        """The number of mm."""
+        return general(1e3 * self, digits)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,23 +86,32 @@ class SignalFigures:
 
     signal: Annotated[str, Quantity(help="output of the arm, or torque for its input")]
     unit: Annotated[str, Quantity(help="SI unit of the values of the signal")]
-    peak: Annotated[float, Quantity("peak", digits=6, unit_of="unit", help="largest value in size, with its sign")]
-    peak_time: Annotated[float, Quantity("peak time", "s", 4, help="time of the peak")]
+    peak: Annotated[float | None, Quantity("peak", digits=6, unit_of="unit",
+            help="largest value in size, with its sign, on both sides of jumps")]  # fmt: skip
+    peak_time: Annotated[float | None, Quantity("peak time", "s", 4, help="time of the peak")]
     final_value: Annotated[float | None, Quantity("final value", digits=4, unit_of="unit",
             help="mean over the last tenth of the record; none where the signal has not settled")]  # fmt: skip
     rise_time: Annotated[float | None, Quantity("rise time (10-90 %)", "s", 4,
             help="time from 10 to 90 % of the final value, of a signal with a reference")]  # fmt: skip
     overshoot: Annotated[Percent | None, Quantity("overshoot", "", 4,
             help="excess of the largest value over the final one, as a share of that")]  # fmt: skip
-    settling_time: Annotated[float | None, Quantity("settling time (5 %)", "s", 4,
-            help="time after which deviations stay within 5 % of the final value, "
-            "or of the largest where there is no reference")]  # fmt: skip
+    settling_time: Annotated[float | None, Quantity("settling time", "s", 4,
+            help="time from the end of the motion after which deviations stay within the settling band of the travel, "
+            "or of the largest deviation where there is no reference")]  # fmt: skip
+    at_rest_after: Annotated[float | None, Quantity("at rest after", "s", 4,
+            help="end of the motion plus settling time")]  # fmt: skip
     steady_state_error: Annotated[float | None, Quantity("steady-state error", digits=4, unit_of="unit",
             help="reference less final value")]  # fmt: skip
-    residual_rms: Annotated[float | None, Quantity("residual vibration (rms)", digits=4, unit_of="unit",
+    residual_rms: Annotated[float | None, Quantity("residual vibration (rms)", digits=4, unit_of="residual_unit",
             help="rms about the final value once the slew or the pulse is over")]  # fmt: skip
     remainder_bound: Annotated[float | None, Quantity("remainder bound at the peak", digits=2, unit_of="unit",
-            help="of the omitted poles at the peak, as measured; at least the rounding of the peak")]  # fmt: skip
+            help="of the error at the peak, as measured; at least the rounding of the peak")]  # fmt: skip
+    note: Annotated[str | None, Quantity("not determined", help="figures without a value, with their reason")] = None
+
+    @property
+    def residual_unit(self) -> str:
+        """Unit of the residual for a person."""
+        return "mm" if isinstance(self.residual_rms, Millimetres) else self.unit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,7 +136,7 @@ class LoopResponse:
 class _Record:
     """Times [s] of the signals of a loop, the names of those of hub and tip, root moment and torque, and references.
 
-    `busy_until` [s] is the end of the input.
+    `busy_until` [s] is the end of the input, `band` the share of the travel within which a signal settles.
     """
 
     arm: Arm
@@ -116,14 +144,20 @@ class _Record:
     busy_until: float
     t: Real
     reference: Mapping[str, Real]
+    band: float
 
     def _of_continuous(self, response: TimeResponse) -> LoopResponse:
         """The continuous-time loop."""
-        signals = dict(zip(response.names, response.at(self.t), strict=True))
-        peaks = {name: response.peak(name, self.t) for name in signals}
-        is_converged = all(bound <= CONVERGED * abs(peak) for _, peak, bound in peaks.values())
+        t = np.union1d(self.t, response.near_starts(float(self.t[-1])))
+        t = np.union1d(t, self._crossings(t, dict(zip(response.names, response.at(t), strict=True))))
+        y, bound, peaks = response.at(t), response.remainder(t), response.peaks(t)
+        curves = {name: (t, y[n], bound[n], peaks[name]) for n, name in enumerate(response.names)}
+        is_converged = all(
+            (error <= CONVERGED * abs(peak.value)).all() and math.isfinite(peak.most)
+            for _, _, error, peak in curves.values()
+        )
         word, count = verdict_on(response.poles.loop).verdict, f"{response.poles.count} poles"
-        return self._loop(word, is_converged, count, signals, peaks)
+        return self._loop(word, is_converged, count, curves)
 
     def _of_sampled(self, law: AnyLaw, chain: Chain, task: Scenario, names: Sequence[str]) -> LoopResponse:
         """The sampled loop, with the signals of these names."""
@@ -133,39 +167,81 @@ class _Record:
         signals[TORQUE] = traces.held_at(run, run.torque, self.t[: signals[MOMENT].size])
         is_converged = used.change is not None and used.change <= ENOUGH_CHANGE
         word = UNSTABLE if run.stopped else sampled_verdict(self.arm, law, chain).word
-        return self._loop(word, is_converged, f"{used.modes} modes", signals, {})
+        curves = {name: (self.t[: y.size], y, 0 * y, None) for name, y in signals.items()}
+        return self._loop(word, is_converged, f"{used.modes} modes", curves)
 
-    def _loop(
-        self, stability: str, is_converged: bool, count: str, signals: dict[str, Real],
-        peaks: Mapping[str, Peak],
-    ) -> LoopResponse:  # fmt: skip
+    def _loop(self, stability: str, is_converged: bool, count: str, curves: Mapping[str, Curve]) -> LoopResponse:
         """The figures of a loop; of an unstable one those of its signals are left out."""
         names = zip(PARTS, self.names, strict=True) if stability != UNSTABLE else ()
-        of = {part: self._figures(name, signals[name], peaks.get(name)) for part, name in names}
+        of = {part: self._figures(name, *curves[name]) for part, name in names}
+        signals = {name: y[np.isin(t, self.t)] for name, (t, y, *_) in curves.items()}
         certainty = f"{'converged' if is_converged else 'approximate'}, {count}"
         return LoopResponse(stability=stability, certainty=certainty, signals=signals, **of)
 
-    def _figures(self, name: str, y: Real, peak: Peak | None = None) -> SignalFigures:
-        """Figures of one signal at the times of the record; its peak is the largest there unless given."""
+    def _figures(self, name: str, t: Real, y: Real, bound: Real, peak: Peak | None = None) -> SignalFigures:
+        """Figures of one signal at times `t` with a bound on its error; its peak is the largest there unless given."""
         n = int(abs(y).argmax())
-        peak_time, largest, bound = peak or (float(self.t[n]), float(y[n]), None)
-        t, reference = self.t, self.reference.get(name)
-        final = 0.0 if name == MOMENT else float(y[LEFT_OF_RECORD * t >= (LEFT_OF_RECORD - 1) * t[-1]].mean())
-        away = abs(y - final)
-        scale = float(away.max()) if reference is None else abs(final)
-        settled = settled_from(away, scale)
-        share = y / final if settled is not None and reference is not None and final else None
-        after = t >= self.busy_until * (1 - TIME_ROUNDING)
+        peak = peak or Peak(float(t[n]), float(y[n]), 0.0, abs(float(y[n])))
+        size, step = max(abs(peak.value), LEAST_SIZE), float(self.t[1])
+        found, *others = (self._values(name, t, y, sign * bound) for sign in (0, -1, 1))
+        least = {"overshoot": LEAST_OVERSHOOT, "settling_time": step / OPEN, "rise_time": step / OPEN}
+        spread = {
+            key: _spread(value, [each[key] for each in others], least.get(key, RESOLVED * size))
+            for key, value in found.items()
+        }
+        largest = t[abs(y) + bound >= abs(peak.value) - peak.bound] if peak.bound else t[:0]
+        spread |= {
+            "peak": (peak.most - abs(peak.value) + peak.bound) / size,
+            "peak_time": (float(np.ptp(np.r_[peak.time, largest])) - 2 * step) / max(peak.time, self.t[-1] / 10),
+        }
+        found |= {"peak": peak.value, "peak_time": peak.time}
+        words = [f"{key.replace('_', ' ')}: remainder {100 * of:.2g} %" for key, of in spread.items() if of > OPEN]
+        known = {key: value if spread[key] <= OPEN else None for key, value in found.items()}
+        if math.isinf(peak.most):
+            known |= dict.fromkeys(("peak", "peak_time", "settling_time"))
+            words = ["impulse"]
+        settled = known["settling_time"]
         return SignalFigures(
-            signal=name, unit=unit_of(self.arm, name), peak=largest, peak_time=peak_time,
-            final_value=final if settled is not None and name != MOMENT else None,
-            rise_time=None if share is None else _reached(t, share, 0.9) - _reached(t, share, 0.1),
-            overshoot=None if share is None else Percent(max(0.0, float(share.max()) - 1)),
-            settling_time=None if settled is None else float(t[settled]),
-            steady_state_error=None if share is None or reference is None else float(reference[-1]) - final,
-            residual_rms=float(np.sqrt(np.mean((y - final)[after] ** 2))) if self.busy_until and after.any() else None,
-            remainder_bound=bound,
+            signal=name, unit=unit_of(self.arm, name), **known, note="; ".join(words) or None,
+            at_rest_after=None if settled is None else self.busy_until + settled, remainder_bound=peak.bound or None,
         )  # fmt: skip
+
+    def _values(self, name: str, t: Real, y: Real, more: Real) -> dict[str, Any]:
+        """Figures but the peak of a signal, `more` being added to it and to its deviations."""
+        final, away, scale = self._deviations(name, t, y)
+        settled = settling_time(t, np.maximum(away + more, 0), scale, self.busy_until, self.band)
+        after = np.isin(t, self.t) & (t >= self.busy_until * (1 - TIME_ROUNDING))
+        values: dict[str, Any] = dict.fromkeys(FIGURES) | {"settling_time": settled}
+        if self.busy_until and after.any():
+            unit = Millimetres if name == "tip_displacement" else float
+            values["residual_rms"] = unit(np.sqrt(np.mean((y - final)[after] ** 2)))
+        if settled is not None:
+            final += float(more.mean())
+            values["final_value"] = final if name != MOMENT or not self.arm.has_rigid_mode else None
+            if final and name in self.reference:
+                share = (y + more) / final
+                values["rise_time"] = _reached(t, share, 0.9) - _reached(t, share, 0.1)
+                values["overshoot"] = Percent(max(0.0, float(share.max()) - 1))
+                values["steady_state_error"] = float(self.reference[name][-1]) - final
+        return values
+
+    def _deviations(self, name: str, t: Real, y: Real) -> tuple[float, Real, float]:
+        """Final value of a signal, deviations from it, and the scale of its settling band."""
+        is_even = np.isin(t, self.t)
+        final = final_value(t[is_even], y[is_even])
+        away = abs(y - final)
+        return final, away, abs(final - float(y[0])) if name in self.reference else float(away.max())
+
+    def _crossings(self, t: Real, signals: Mapping[str, Real]) -> Real:
+        """Times [s] in the last records in which a signal may cross its settling band, 16 in each."""
+        found = []
+        for name in self.names:
+            _, away, scale = self._deviations(name, t, signals[name])
+            bend = np.r_[0.0, abs(np.diff(away, 2)), 0.0]
+            reach = abs(np.diff(away)) + np.maximum(bend[:-1], bend[1:])
+            places = np.flatnonzero(abs(away - self.band * scale)[:-1] <= reach)[-50:]
+            found.append(np.linspace(t[places], t[places + 1], 17).ravel())
+        return np.concatenate(found)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -199,6 +275,12 @@ class Step(_Record):
         return "; ".join(f"{name} {each.stability}{'' if each.hub else GROWS}" for name, each in self.loops.items())
 
     @property
+    def settling_band(self) -> Annotated[Percent, Quantity("settling band", digits=3,
+            help="share of the travel within which a signal has settled")]:  # fmt: skip
+        """Share of the travel within which a signal has settled."""
+        return Percent(self.band)
+
+    @property
     def table(self) -> Table:
         """A row a figure, a column a loop."""
         return across(self.loops, title="time response")
@@ -230,6 +312,7 @@ def step(
     duration: float | None = None,
     *,
     outputs: Sequence[str] = (),
+    settling_band: float = SETTLING_BAND,
 ) -> Step:
     """Return the time responses of the continuous-time and of the sampled loop, with their figures.
 
@@ -246,6 +329,8 @@ def step(
         slews more.
     outputs
         Further signals, such as "strain@0.05".
+    settling_band
+        Share of the travel within which a signal has settled.
 
     Raises
     ------
@@ -255,6 +340,8 @@ def step(
         Where the poles of the loop are not complete.
     """
     must_be_known("scenario", scenario_name, SAMPLED_NAMES)
+    band = number("settling_band", settling_band, "a share of the travel, such as 0.02")
+    require(0 < band < 1, "settling_band", settling_band, "a share of the travel between 0 and 1, such as 0.02")
     chain, is_step = chain_or_usual(chain), scenario_name == "reference"
     hub, law = followed(law) if is_step else (AT_HUB[0], law)
     arm, law = tracked(arm, law)
@@ -276,7 +363,7 @@ def step(
     t = _times(response, task)
     angle = traces.reference_angle(task, t) if of_angle else np.ones(t.size)
     reference = {hub: angle, tip: arm.reach * angle} if is_step or scenario_name == "slew" else {}
-    found = _Record(arm, (*names[:3], TORQUE), task.busy_until, t, reference)
+    found = _Record(arm, (*names[:3], TORQUE), task.busy_until, t, reference, band)
     return Step(
         **vars(found), controller=controller(full, arm), scenario=scenario_name, duration=length, period=task.period,
         scenario_in_words=described(task, arm, chain), sampled=found._of_sampled(law, chain, task, names),
@@ -302,7 +389,8 @@ def usual_duration(poles: Poles | None, chain: Chain) -> float:
     rise = chain.slew.rise_time
     if poles is None:
         return TRIAL_SLEWS * rise
-    near = poles.moving[abs(poles.moving) <= DOMINANT * first_frequency(poles.loop.arm)]
+    sizes = abs(poles.moving)
+    near = poles.moving[sizes <= DOMINANT * max(first_frequency(poles.loop.arm), sizes.min(initial=math.inf))]
     slowest = max(abs(near.real).min(initial=math.inf), TIME_CONSTANTS / (LONGEST_SLEWS * rise))
     return float(f"{rise + TIME_CONSTANTS / slowest:.2g}")
 
@@ -352,13 +440,21 @@ def _times(response: TimeResponse | None, task: Scenario) -> Real:
     T, n = task.period, task.t.size
     finest = (n - 1) * T / LEAST_POINTS
     if response is not None:
-        sizes = abs(response.amplitudes[:-1])
+        z, amplitudes = (np.hstack([part.late[n] for part in response.parts]) for n in (0, 1))
+        sizes = abs(amplitudes[:-1])
         shows = (sizes > traces.VISIBLE * sizes.max(axis=1, keepdims=True)).any(axis=0)
-        fastest = max(response.z.imag[shows].max(initial=0.0), LEAST_SIZE)
+        fastest = max(z.imag[shows].max(initial=0.0), LEAST_SIZE)
         finest = min(finest, 2 * math.pi / (traces.POINTS_A_PERIOD * fastest))
     steps = int(np.clip(math.ceil(T / finest), 1, min(MOST_BETWEEN, max(1, MOST_POINTS // n))))
     k = np.arange((n - 1) * steps + 1)
     return T * (k // steps + k % steps / steps)
+
+
+def _spread(value: float | None, others: Sequence[float | None], floor: float) -> float:
+    """Largest difference of other values from a value, over its size or a floor; inf where only one of both exists."""
+    if value is None or None in others:
+        return 0.0 if {value, *others} == {None} else math.inf
+    return max(abs((each or 0.0) - value) for each in others) / max(abs(value), floor, LEAST_SIZE)
 
 
 def _reached(t: Real, share: Real, level: float) -> float:

@@ -266,6 +266,7 @@ def step(
     duration: float | None = None,
     chain: Any = load_chain,
     output: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
+    settling_band: float = 0.02,
     csv: Csv = None,
     png: Png = None,
     law: LawFile = None,
@@ -281,10 +282,13 @@ def step(
         or deflection (first mode released)
     duration: duration [s]; by default a slew and eight time constants of the dominant pole
     output: further signal of the CSV file, as strain@0.05; may be repeated
+    settling-band: share of the travel within which a signal has settled
     """
     subject, controller, defaults = load_loop(arm, theory, gains, law)
-    emit(tfarm.step(subject, controller, chain(arm), scenario, duration, outputs=output or ()), json, defaults,
-         csv=csv, png=png)  # fmt: skip
+    found = tfarm.step(
+        subject, controller, chain(arm), scenario, duration, outputs=output or (), settling_band=settling_band
+    )
+    emit(found, json, defaults, csv=csv, png=png)
 
 
 @sampled_command(epilog="simulate sasaki2012-lab --scenario slew --output tip_rotation --csv slew.csv")

@@ -35,7 +35,7 @@ from tfarm.schema import Quantity
 FOLDED_UP = 10.0  # rad: the simulation stops at the root moment EI/L times this, far beyond small deflections
 MOST_BETWEEN = 1000  # records between two samples
 RESIDUAL = "residual root moment after the slew"
-SETTLED_SHARE = 0.05  # of the largest root moment, within which a slew has settled
+SETTLING_BAND = 0.02  # of the travel, within which a signal has settled: as in python-control and MATLAB
 LEFT_OF_RECORD = 10  # a tenth of a record has to follow a settling time
 NO_GAINS = HubFeedback()
 
@@ -51,11 +51,24 @@ def quantisers(chain: Chain) -> Real:
     return np.array([encoder, _converter(of.moment_bits, of.moment_range), [step, max(low, -limit), min(high, limit)]])
 
 
-def settled_from(away: Real, scale: float) -> int | None:
-    """Index from which on deviations (n,) stay within 5 % of a scale; None where too little of the record is left."""
-    first = 1 + int(np.flatnonzero(away > SETTLED_SHARE * scale).max(initial=-1))
-    is_late = first > 0 and LEFT_OF_RECORD * (away.size - 1 - first) < away.size - 1
-    return None if is_late else first
+def final_value(t: Real, y: Real) -> float:
+    """Mean of a signal (n,) over the last tenth of its record."""
+    return float(y[LEFT_OF_RECORD * t >= (LEFT_OF_RECORD - 1) * t[-1]].mean())
+
+
+def settling_time(
+    t: Real, away: Real, scale: float = 0.0, moves_until: float = 0.0, band: float = SETTLING_BAND
+) -> float | None:
+    """Time [s] from the end of the motion after which deviations (n,) from the final value stay within a band.
+
+    The band is a share of a scale, of the largest deviation where that is 0.  None where the deviation leaves it in the
+    last tenth of the record.
+    """
+    scale = scale or float(away.max(initial=0.0))
+    first = 1 + int(np.flatnonzero(away > band * scale).max(initial=-1))
+    if first > 0 and (first >= t.size or LEFT_OF_RECORD * (t[-1] - t[first]) < t[-1]):
+        return None
+    return max(0.0, float(t[first]) - moves_until)
 
 
 def _converter(bits: int | None, span: float | None) -> list[float]:
@@ -173,12 +186,14 @@ class Simulation:
         return rigid.residual_rms(self.at_samples.root_moment)
 
     @property
-    def settling_time(self) -> Annotated[float | None, Quantity("settling time (5 %)", "s", 4,
-            help="time from which on the root moment stays within 5 % of its largest")]:  # fmt: skip
+    def settling_time(self) -> Annotated[float | None, Quantity("settling time (2 %)", "s", 4,
+            help="time from the end of the motion after which the root moment stays within 2 % of its largest "
+            "deviation from its final value")]:  # fmt: skip
         """None where the simulation stopped, or less than a tenth of the record is left to show it."""
-        moment = abs(self.at_samples.root_moment)
-        first = settled_from(moment, moment.max(initial=0.0))
-        return None if self.stopped or first is None else float(self.t[first])
+        moment = self.at_samples.root_moment
+        if self.stopped or not moment.size:
+            return None
+        return settling_time(self.t, abs(moment - final_value(self.t, moment)), moves_until=self.scenario.busy_until)
 
     @property
     def saturated(self) -> Annotated[dict[str, int], Quantity("saturated samples", key="saturated_samples",

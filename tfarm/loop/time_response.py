@@ -1,24 +1,32 @@
-"""Time responses of the exact loop in continuous time: sums of exponentials from its poles.
+"""Time responses of the exact loop in continuous time: sums of exponentials from its poles, and an inversion before.
 
 An input is sum_i w_i e^{-s t_i} X(s), with X rational: at the actuator, X_u, or the reference X_k of a signal.  So
 
-    y(t) = sum_i w_i h(t - t_i),    h(t) = sum_m A_m e^{z_m t},
-    H(s) = N_y (q X_u + e^{-s tau} sum_k p_k X_k)/D,    D = drive q + e^{-s tau} sum_k p_k N_k
+    y(t) = sum_i w_i (h_u(t - t_i) + h_k(t - t_i - tau)),    h(t) = 0 for t < 0,
+    H_u(s) = N_y q X_u/D,    H_k(s) = N_y sum_k p_k X_k/D,    D = drive q + e^{-s tau} sum_k p_k N_k
 
-with numerators N, law p_k/q and delay tau of `loop`.  The poles z_m are those of D, complete in a box, and those of X.
-Residues are trapezoidal sums on circles, which converge geometrically (Trefethen and Weideman, SIAM Review 56, 2014).
-Poles that are closer than 1/T, T the duration, cancel in a sum of residues, as do those at s = 0: there the terms are
-the nodes s_j of one circle around all of them, with H(s_j) (s_j - c)/n.
+with numerators N, law p_k/q and delay tau of `loop`: the reference acts through the law, tau later.
 
-Remainder, the poles outside the box.  Above its top: residues fall from octave to octave of frequency by a factor that
-is measured in the last ones, and the sum goes on as a geometric series.  Left of it: h(0+) = lim s H(s) is known, so
-the sum of all omitted residues is, and these decay at least as fast as the left edge.  This is a measured bound and no
-proof.  Shear modes above the shear cut-off of a damped arm are not in it.
+Late, h is the sum over the poles: h(t) = sum_m A_m e^{z_m t}.  The z_m are those of D, complete in a box, and those of
+X.  Residues are trapezoidal sums on circles, which converge geometrically (Trefethen and Weideman, SIAM Review 56,
+2014).  Poles that are closer than 1/T, T the duration, cancel in a sum of residues, as do those at s = 0: there the
+terms are the nodes s_j of one circle around all of them, with H(s_j) (s_j - c)/n.
+
+Early, poles left of the box have not decayed: those of a law, of its delay, and of overdamped bending.  There h has two
+parts.  The direct one is the law's own response, of u to X_u or sum_k p_k X_k/q, and the share of u in a signal that
+follows it at once: a rational function, with the jumps.  The rest is smoother, and inverted by `inversion`.
+
+Bounds.  Early, the error of the inversion as measured.  At the end of that time the sum over the poles is compared with
+it; from there on the difference decays at least as fast as the slowest pole outside the box, left of it or above.  Two
+identities are checked at each run: h = 0 before its start (by `inversion`), and h(0+) = lim s H for s -> inf.  The
+bounds are measured and no proofs.  Shear modes above the shear cut-off of a damped arm are not in them.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
@@ -29,6 +37,7 @@ from tfarm.records import record
 from tfarm.response.signals import Signals
 from tfarm.spectrum.table import first_frequency
 
+from .inversion import POINTS, Inversion, inverted
 from .loop import FAR_RIGHT, Loop, band_of
 from .poles import Poles, poles_below
 
@@ -39,10 +48,9 @@ SLOW_RADIUS = 2.0  # over T, of a circle around s = 0, on which e^{s T} is moder
 POLE_RADIUS = 0.25  # of the way to the next pole: radius of the circle of one pole
 POLE_NODES, FEWEST_NODES, MOST_NODES, NODE_LOG = 32, 128, 512, 40.0  # of circles; e^-40 is below the rounding
 ON_AXIS = 1e-9  # of the least distance of two circles: by so little a centre is off the real axis
-LEAST_FALL, MOST_FALL = 0.5, 0.9  # of the sum of residues from one octave of frequency to the next
-IDENTITY_FACTOR = 2.0  # on the sum of the omitted residues at t = 0+, whose signs differ
 BLOCK = 20_000  # times that are evaluated together: with 200 terms 64 MB
 MOST_GROWTH = 500.0  # exponent of the fastest growing pole at the end of a record
+RIPPLE = 10  # records to either side of the largest one: there 80 times in each resolve ripple too small to be seen
 ZOOM_POINTS, ZOOMS = 41, 5  # of the search for a peak: each narrows the interval by a factor of 20
 
 Transform = Callable[[Complex], Complex]
@@ -63,62 +71,132 @@ class Excitation:
     free: Mapping[str, Transform] = field(default_factory=dict)
 
 
+class Peak(NamedTuple):
+    """Time [s] and value of a signal where it is largest in size, and bounds there and on the largest size of all."""
+
+    time: float
+    value: float
+    bound: float
+    most: float
+
+
+@dataclass(frozen=True)
+class Part:
+    """What an excitation does with one delay [s]: h of each signal, (signals, n) at t >= 0.
+
+    `late` are exponents and amplitudes (signals, m) of the poles, `direct` those of the direct response, `rests`
+    inversions of what is left, the first to an early end.  `difference` (signals,) is the bound on the error of `late`
+    at the end of the inversions, which decays with `slowest` [1/s]; `off` (signals,) that of h(0+), infinite where its
+    limit is.
+    """
+
+    delay: float
+    late: tuple[Complex, Complex]
+    direct: tuple[Complex, Complex]
+    rests: tuple[Inversion, ...]
+    difference: Real
+    slowest: float
+    off: Real
+
+    @property
+    def end(self) -> float:
+        """The end of the inversions [s]."""
+        return self.rests[-1].end
+
+    def values(self, t: Real) -> Real:
+        """Return h (signals, n)."""
+        is_early = t < self.end
+        h = np.empty((self.off.size, t.size))
+        h[:, is_early] = self.early(t[is_early])
+        h[:, ~is_early] = _summed(self.late, t[~is_early])
+        return h
+
+    def early(self, t: Real) -> Real:
+        """Return h by the inversions."""
+        first, last = self.rests
+        return np.asarray(_summed(self.direct, t) + np.where(t < first.end, first.values_at(t), last.values_at(t)))
+
+    def errors(self, t: Real) -> Real:
+        """Return the bound on the error of h."""
+        first, last = self.rests
+        early = np.where(t < first.end, first.errors_at(t), last.errors_at(t))
+        early += np.where(np.isfinite(self.off), self.off, 0.0)[:, None]
+        late = self.difference[:, None] * np.exp(self.slowest * np.maximum(t - self.end, 0))
+        return np.where(t < self.end, early, late)
+
+
 @dataclass(frozen=True)
 @record
 class TimeResponse:
-    """Signals over time by name, "torque" being the input: h is Re of the sum of `amplitudes` (signals, m) e^{z t}.
-
-    `initial` is h(0+) (signals,).
-    """
+    """Signals over time by name, "torque" being the input; `parts` are the responses to the excitation by delay."""
 
     names: tuple[str, ...]
     excitation: Excitation
     poles: Poles
-    z: Complex
-    amplitudes: Complex
-    initial: Real
+    parts: tuple[Part, ...]
 
-    def at(self, t: Real) -> Real:
-        """Return the signals (signals, n) at times t [s]."""
-        return self._summed(t, lambda tau: (self.amplitudes @ np.exp(np.outer(self.z, tau))).real)
+    @cached_property
+    def starts(self) -> Real:
+        """The times [s] at which signals may jump."""
+        return np.unique([start + part.delay for start in self.excitation.times for part in self.parts])
+
+    def at(self, t: Real, *, before: bool = False) -> Real:
+        """Return the signals (signals, n) at times t [s], after a jump, or before it."""
+        return self._summed(t, Part.values, before=before)
 
     def remainder(self, t: Real) -> Real:
-        """Return the bound (signals, n) on the contribution of the poles outside the box at times t [s]."""
-        left, _, _, top = self.poles.box
-        last, before = ((self.z.imag > top / 2 ** (n + 1)) & (self.z.imag <= top / 2**n) for n in (0, 1))
-        sizes = abs(self.amplitudes)
-        fall = sizes[:, last].sum(axis=1) / np.maximum(sizes[:, before].sum(axis=1), LEAST_SIZE)
-        fall = np.clip(fall, LEAST_FALL, MOST_FALL)[:, None]
-        slowest = self.z[last].real.max(initial=left)
-        omitted = IDENTITY_FACTOR * abs(self.amplitudes.sum(axis=1).real - self.initial)[:, None]
+        """Return the bound (signals, n) on the error of the signals at times t [s]."""
+        return self._summed(t, Part.errors, np.abs)
 
-        def bound(tau: Real) -> Real:
-            above = fall / (1 - fall) * (sizes[:, last] @ np.exp(np.outer(self.z[last].real, tau)))
-            return np.asarray(np.maximum(above, omitted * np.exp(slowest * tau)))
-
-        return self._summed(t, bound, np.abs)
-
-    def _summed(self, t: Real, h: Callable[[Real], Real], size: Callable[[float], float] = float) -> Real:
+    def _summed(
+        self, t: Real, h: Callable[[Part, Real], Real], size: Callable[[float], float] = float, *, before: bool = False
+    ) -> Real:
         """Sum of w_i h(t - t_i), the weights or their sizes, in blocks of times."""
         found = np.zeros((len(self.names), t.size))
-        for start, weight in zip(self.excitation.times, self.excitation.weights, strict=True):
-            later = np.flatnonzero(t >= start)
-            for part in np.array_split(later, 1 + later.size // BLOCK):
-                found[:, part] += size(weight) * h(t[part] - start)
+        for part in self.parts:
+            for time, weight in zip(self.excitation.times, self.excitation.weights, strict=True):
+                start = time + part.delay
+                later = np.flatnonzero(t > start if before else t >= start)
+                for block in np.array_split(later, 1 + later.size // BLOCK):
+                    found[:, block] += size(weight) * h(part, t[block] - start)
         return found
 
-    def peak(self, name: str, t: Real) -> tuple[float, float, float]:
-        """Return time [s] and value of a signal where it is largest in size, near that of `t`, and the bound there.
+    def peaks(self, t: Real) -> dict[str, Peak]:
+        """Return the peak of each signal near the largest of times `t`, and on both sides of its jumps.
 
-        A bound below the rounding of the value, 2.2e-16 of its size, is that.
+        A bound below the rounding of the value, 2.2e-16 of its size, is that.  `most` is infinite of an impulse.
         """
-        row = self.names.index(name)
+        jumps = self.starts[self.starts <= t[-1]]
+        t = np.union1d(t, jumps)
+        places = abs(self.at(t)).argmax(axis=1)
+        first, last = (t[np.clip(places + step, 0, t.size - 1)] for step in (-RIPPLE, RIPPLE))
+        t = np.union1d(t, np.linspace(first, last, 80 * RIPPLE + 1))
+        sizes, ahead = abs(self.at(t)), self.at(jumps, before=True)
+        most = np.hstack([sizes + self.remainder(t), abs(ahead)]).max(axis=1)
+        most += sum(np.where(np.isinf(part.off), math.inf, 0.0) for part in self.parts)
+        return {
+            name: self._peak(row, t, sizes[row], jumps, ahead[row], float(most[row]))
+            for row, name in enumerate(self.names)
+        }
+
+    def _peak(self, row: int, t: Real, sizes: Real, jumps: Real, ahead: Real, most: float) -> Peak:
+        """The peak of one signal, of sizes (n,) at times t and values `ahead` of the jumps."""
         for _ in range(ZOOMS):
-            n = int(abs(self.at(t)[row]).argmax())
+            n = int(sizes.argmax())
             t = np.linspace(t[max(n - 1, 0)], t[min(n + 1, t.size - 1)], ZOOM_POINTS)
-        y = self.at(t)[row]
+            t = np.union1d(t, jumps[(jumps > t[0]) & (jumps < t[-1])])
+            sizes = abs(self.at(t)[row])
+        t, y = np.r_[t, jumps], np.r_[self.at(t)[row], ahead]
         n = int(abs(y).argmax())
-        return float(t[n]), float(y[n]), max(float(self.remainder(t[[n]])[row, 0]), MACHINE_EPS * abs(float(y[n])))
+        size = abs(float(y[n]))
+        bound = max(float(self.remainder(t[[n]])[row, 0]), MACHINE_EPS * size)
+        return Peak(float(t[n]), float(y[n]), bound, max(most, size + bound))
+
+    def near_starts(self, end: float) -> Real:
+        """Times [s] up to an end at which the beginnings after each start are resolved."""
+        shares = np.r_[np.geomspace(1e-6, 1, 300), np.linspace(0, 1, 700)]
+        t = np.unique([start + part.end * shares for part in self.parts for start in self.starts])
+        return t[t <= end]
 
 
 def usual_poles(loop: Loop, count: int = USUAL_COUNT) -> Poles:
@@ -139,55 +217,134 @@ def time_response(poles: Poles, names: tuple[str, ...], excitation: Excitation, 
         growth < MOST_GROWTH, "duration", duration,
         f"the loop is unstable and grows by e^{growth:.0f}; at most {MOST_GROWTH * duration / max(growth, 1):.3g} s",
     )  # fmt: skip
-
-    def transform(s: Complex) -> Complex:
-        return transformed(poles.loop, names, excitation, s)
-
-    z, amplitudes = zip(*_terms(poles, excitation, transform, duration), strict=True)
-    far = np.array([FAR_RIGHT[1] * first_frequency(poles.loop.arm)], complex)
-    initial = (transform(far) * far).real[:, 0]
-    return TimeResponse((*names, TORQUE), excitation, poles, np.concatenate(z), np.hstack(amplitudes), initial)
+    delay = poles.loop.law.delay
+    kinds = [(0.0, True, False), (delay, False, True)] if delay else [(0.0, True, True)]
+    of = [(start, Transforms(poles.loop, names, excitation, *which)) for start, *which in kinds]
+    acting = [(start, each) for start, each in of if each.parts(each.far)[0].any()]
+    parts = [_part(poles, each, start, duration) for start, each in acting or of[:1]]
+    return TimeResponse((*names, TORQUE), excitation, poles, tuple(parts))
 
 
-def transformed(loop: Loop, names: tuple[str, ...], excitation: Excitation, s: Complex) -> Complex:
-    """Return H (signals and torque, n) at s (n,)."""
-    law, of = loop.law, Signals(loop.arm, tuple(dict.fromkeys((*loop.law.signals, *names))))
-    drive, numerators, _ = of.parts(s)
-    row, columns = dict(zip(of.names, numerators, strict=True)), (*law.signals, *law.wanted)
-    shares, whole = law.shares(s, columns)
-    entries = dict(zip(columns, np.exp(-s * law.delay) * shares.sum(axis=0), strict=True))
-    D = drive * whole + sum(entries[name] * row[name] for name in law.signals)
-    free = {name: motion(s) for name, motion in excitation.free.items()}
-    driven = sum(X(s) * (whole if place == ACTUATOR else entries[place]) for place, X in excitation.inputs.items())
-    driven = driven - sum(entries[name] * free[name] for name in law.signals if name in free)
-    found = np.array([*(row[name] for name in names), drive]) * driven / D
-    return found + np.array([free.get(name, 0 * s) for name in (*names, TORQUE)])
+@dataclass(frozen=True)
+class Transforms:
+    """H of the signals and the torque, its direct part and the rest, each (signals, n) at s (n,).
+
+    `acts`: of what acts at the actuator and is added.  `refers`: of references and of what the law feeds back of it,
+    without the factor e^{-s tau} of its delay.
+    """
+
+    loop: Loop
+    names: tuple[str, ...]
+    excitation: Excitation
+    acts: bool
+    refers: bool
+
+    @cached_property
+    def far(self) -> Complex:
+        """Places far right of all poles [1/s]."""
+        return np.array(FAR_RIGHT, complex) * max(first_frequency(self.loop.arm), *abs(self.loop.law.poles), 0.0)
+
+    @cached_property
+    def shares(self) -> Real:
+        """Limits of N/drive for s -> inf (signals, 1): what follows the torque at once; where there is none, 0."""
+        drive, row = self._rig(self.far)
+        ratio = np.array([row[name] for name in self.names]) / drive
+        follows = abs(ratio[:, -1] - ratio[:, -2]) <= 1e-3 * abs(ratio[:, -1])
+        return np.r_[np.where(follows, ratio[:, -1].real, 0.0), 1.0][:, None]
+
+    def _rig(self, s: Complex) -> tuple[Complex, dict[str, Complex]]:
+        """Drive and numerators by name."""
+        of = Signals(self.loop.arm, tuple(dict.fromkeys((*self.loop.law.signals, *self.names))))
+        drive, numerators, _ = of.parts(s)
+        return drive, dict(zip(of.names, numerators, strict=True))
+
+    def parts(self, s: Complex) -> tuple[Complex, Complex, Complex]:
+        """Return H, its direct part, and the rest."""
+        law, excitation, (drive, row) = self.loop.law, self.excitation, self._rig(s)
+        columns = (*law.signals, *law.wanted)
+        parts, den = law.shares(s, columns)
+        entries = dict(zip(columns, parts.sum(axis=0), strict=True))
+        fed_back = np.exp(-s * law.delay) * sum(entries[name] * row[name] for name in law.signals)
+        free = {name: motion(s) for name, motion in excitation.free.items()}
+        driven = 0 * s
+        for name, X in excitation.inputs.items():
+            if self.acts if name == ACTUATOR else self.refers:
+                driven = driven + X(s) * (den if name == ACTUATOR else entries[name])
+        for name in free.keys() & {*law.signals} if self.refers else ():
+            driven = driven - entries[name] * free[name]
+        added = np.array([free.get(name, 0 * s) * self.acts for name in (*self.names, TORQUE)])
+        rig, D = np.array([*(row[name] for name in self.names), drive]), drive * den + fed_back
+        whole, direct = rig * driven / D + added, self.shares * driven / den + added
+        rest = whole - direct
+        rest[-1] = -driven * fed_back / (D * den)  # the same without cancellation
+        return whole, direct, rest
+
+
+def _part(poles: Poles, of: Transforms, start: float, duration: float) -> Part:
+    """The response to a part of the excitation."""
+    left, _, _, top = poles.box
+    own = np.array(of.excitation.poles, complex)
+    known = np.r_[poles.values, own]
+    edges = [*poles.loop.k.singular, left, 1j * top]
+    late = _terms(known, edges, MOST_CLOSE * first_frequency(poles.loop.arm), lambda s: of.parts(s)[0], duration)
+    slowest = float(late[0].real[late[0].imag > top / 2].max(initial=left))
+
+    # 20 time constants of the poles outside the box; above it as well, or until frequencies up to four times its top
+    decayed, resolved = 20.0, 2 * np.pi * POINTS / (4 * 4 * top)
+    end = max(decayed / -left, min(decayed / max(-slowest, LEAST_SIZE), resolved))
+    growth = float(known.real.max(initial=0.0))
+    end = min(end, 10 / max(growth, LEAST_SIZE))  # where an unstable pole has grown by e^10
+    # a first inversion ends 64 times sooner, for what begins as the root of time
+    rests = tuple(inverted(lambda s: of.parts(s)[2], each, growth) for each in (end / 64, end))
+    direct = _terms(np.r_[own, of.loop.law.poles], [], math.inf, lambda s: of.parts(s)[1], end)
+    part = Part(start, late, direct, rests, np.zeros(0), slowest, np.zeros(0))
+
+    t = np.linspace(0.8 * end, end, 400)
+    ends = _summed(late, t)
+    apart = abs(ends - part.early(t)) + rests[-1].errors_at(t)
+    _, at_once, after = of.parts(of.far)
+    before, limit = ((at_once + after) * of.far).real.T[-2:]
+    off = abs(limit - direct[1].sum(axis=1).real)
+    off[off <= 1e-6 * abs(direct[1]).sum(axis=1)] = 0.0  # to which the limit is read
+    off[(abs(limit) > 2 * abs(before)) & (abs(limit) > abs(ends).max(axis=1))] = math.inf
+    return replace(part, difference=2 * apart.max(axis=1), off=off)
+
+
+def _summed(terms: tuple[Complex, Complex], t: Real) -> Real:
+    """Re of the sum of the terms (signals, n) at times t [s]."""
+    z, amplitudes = terms
+    return np.asarray((amplitudes @ np.exp(np.outer(z, t))).real)
 
 
 def _terms(
-    poles: Poles, excitation: Excitation, transform: Transform, duration: float
-) -> Iterator[tuple[Complex, Complex]]:
-    """Exponents (m,) and amplitudes (signals, m) of each pole or circle with Im >= 0, twice those with a conjugate."""
-    known = np.r_[poles.values, np.array(excitation.poles, complex)]
+    known: Complex, edges: Sequence[complex], most_close: float, transform: Transform, duration: float
+) -> tuple[Complex, Complex]:
+    """Exponents (m,) and amplitudes (signals, m) of each pole or circle with Im >= 0, twice those with a conjugate.
+
+    Real edges bound circles on the real axis, imaginary ones at any place.
+    """
     every = np.unique(np.r_[0, known, known.conj()])
-    reach = min(CLOSE / duration, MOST_CLOSE * first_frequency(poles.loop.arm))
+    reach = min(CLOSE / duration, most_close)
     _, label = connected_components(abs(every[:, None] - every) <= reach)
-    left, _, _, top = poles.box
+    found = []
     for n in range(label.max() + 1):
         own = every[label == n]
         c = complex(own.mean())
-        edges = [*poles.loop.k.singular, complex(left, c.imag), complex(c.real, top)]
-        room = float(abs(np.r_[every[label != n], edges] - c).min())
+        beyond = 2 * (abs(every).max() + 1 / duration)
+        nearest = [complex(edge.real or c.real, edge.imag or c.imag) for edge in map(complex, edges)]
+        room = float(abs(np.r_[every[label != n], nearest, beyond] - c).min())
         if c.imag >= -ON_AXIS * reach:
             z, amplitudes = _circle(own, c, room, transform, duration)
-            yield z, amplitudes * (2.0 if c.imag > ON_AXIS * reach else 1.0)
+            found.append((z, amplitudes * (2.0 if c.imag > ON_AXIS * reach else 1.0)))
+    z, amplitudes = zip(*found, strict=True)
+    return np.concatenate(z), np.hstack(amplitudes)
 
 
 def _circle(own: Complex, c: complex, room: float, transform: Transform, duration: float) -> tuple[Complex, Complex]:
     """The nodes of a circle around poles, to a distance of `room` from others; of a simple pole its residue."""
     is_simple, extent, radius = own.size == 1 and c != 0, float(abs(own - c).max()), POLE_RADIUS * room
     if not is_simple:
-        radius = min(math.sqrt(extent * room) or radius, SLOW_RADIUS * max(extent, 1 / duration))
+        radius = min(max(math.sqrt(extent * room), radius), SLOW_RADIUS * max(extent, 1 / duration))
     ratio = max(extent / radius, radius / room)
     nodes = int(np.clip(-NODE_LOG / math.log(ratio), POLE_NODES if is_simple else FEWEST_NODES, MOST_NODES))
     arrow = radius * np.exp(2j * np.pi * (np.arange(nodes) + 0.5) / nodes)

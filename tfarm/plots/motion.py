@@ -19,10 +19,10 @@ from tfarm.case.step import Step
 from tfarm.digits import how_many, plain, significant, unit
 from tfarm.dsp import GainMap, Simulation, traces
 from tfarm.dsp.results import Run
-from tfarm.dsp.simulate import SETTLED_SHARE
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.fitting.recording import RunComparison
 from tfarm.loop.plane import Plane
+from tfarm.schema import text
 from tfarm.spectrum import Modes
 from tfarm.tuner import LearningCurves, Tuning
 
@@ -256,7 +256,7 @@ def _draw_signal(ax: Axes, t: Real, y: Real, looks: tuple[str, str], every: int 
 def step(found: Step, *, ax: Sequence[Axes]) -> None:
     """Time responses (from `tfarm.step`) in four axes, given or new; these: hub, tip, root moment [N m] and input.
 
-    The continuous-time loop is solid, the sampled one dashed; references are grey, with 5 % to either side.  Of an
+    The continuous-time loop is solid, the sampled one dashed; references are grey, with the settling band.  Of an
     unstable loop the part within the range of a stable one is drawn.
     """
     _name_signals(found.arm, found.names, ax)
@@ -264,9 +264,9 @@ def step(found: Step, *, ax: Sequence[Axes]) -> None:
     for one, name in zip(ax, found.names, strict=True):
         one.set_xlim(0.0, t[-1])
         if (reference := found.reference.get(name)) is not None:
-            ends = np.sort(reference[-1] * np.array([1 - SETTLED_SHARE, 1 + SETTLED_SHARE]))
+            ends = np.sort(reference[-1] * np.array([1 - found.settling_band, 1 + found.settling_band]))
             one.axhspan(*ends, color=FAINT, lw=0, alpha=0.6, zorder=0)
-            one.plot(t, reference[: t.size], color=GREY, lw=0.8, label="reference, 5 %")
+            one.plot(t, reference[: t.size], color=GREY, lw=0.8, label=f"reference, {text(found.settling_band)}")
         for loop, each in found.loops.items():
             y, looks, label = each.signals[name][: t.size], OF_STABILITY[each.stability], f"{loop}, {each.stability}"
             _draw_signal(one, t[: y.size], y, looks, every if each is found.sampled else 0, label=label)
@@ -279,7 +279,7 @@ def step(found: Step, *, ax: Sequence[Axes]) -> None:
 def _shown_until(found: Step) -> float:
     """End of the picture [s]: some time after every signal of a stable loop has settled, else that of the record."""
     ends = [
-        math.inf if of.settling_time is None else SHOWN_SETTLED * of.settling_time
+        math.inf if of.at_rest_after is None else SHOWN_SETTLED * of.at_rest_after
         for loop in found.loops.values()
         for of in (loop.hub, loop.tip, loop.root_moment, loop.torque)
         if of

@@ -201,10 +201,14 @@ def slews(case: Case) -> tuple[list[Picture | Table], list[str], list[Fact]]:
 
 
 def tip_fact(found: Step) -> Fact:
-    """The settling time of the tip in each loop."""
-    times = {name.partition(",")[0]: each.tip and each.tip.settling_time for name, each in found.loops.items()}
-    words = (f"{name} {'not settled' if each is None else f'{text(each, 4)} s'}" for name, each in times.items())
-    return Fact("settling time of the tip", ", ".join(words))
+    """The settling time of the tip in each loop, from the end of the slew, and its residual vibration."""
+    words = []
+    for name, loop in found.loops.items():
+        tip, time = loop.tip, "not settled"
+        if tip and tip.settling_time is not None:
+            time = f"{text(tip.settling_time, 4)} s after the slew, residual {text(tip.residual_rms, 3)} mm rms"
+        words.append(f"{name.partition(',')[0]} {time}")
+    return Fact("settling time of the tip", "; ".join(words))
 
 
 def film_picture(each: Controller, run: Simulation, rise: float) -> Picture:

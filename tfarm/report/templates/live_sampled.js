@@ -308,9 +308,11 @@ class Slew {
   figures({ moment, torque, n, stopped }) {
     const largest = list => list.reduce((top, x) => Math.max(top, Math.abs(x)), 0), T = this.period, top = largest(moment);
     const after = moment.map((x, k) => x - this.ideal[5 * k + 4]).filter((_, k) => k * T >= this.rise * (1 - 1e-12));
+    const tail = moment.slice(0, n).filter((_, k) => 10 * k >= 9 * (n - 1)), final = tail.reduce((sum, x) => sum + x, 0) / tail.length;
+    const away = moment.slice(0, n).map(x => Math.abs(x - final)), band = 0.02 * largest(away);
     let last = n - 1;
-    while (last >= 0 && !(Math.abs(moment[last]) > 0.05 * top)) last -= 1;
-    const first = last + 1, settled = stopped !== null || (first > 0 && 10 * (n - 1 - first) < n - 1) ? Infinity : first * T;
+    while (last >= 0 && !(away[last] > band)) last -= 1;
+    const first = last + 1, settled = stopped !== null || (first > 0 && 10 * (n - 1 - first) < n - 1) ? Infinity : Math.max(0, first * T - this.rise);
     return { moment: top, torque: largest(torque.slice(0, n)), residual: stopped === null ? Math.sqrt(after.reduce((sum, x) => sum + x * x, 0) / after.length) : null, settled };
   }
 
