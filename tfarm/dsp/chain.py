@@ -98,6 +98,11 @@ class Converters:
             remedy = f"{bits} bits need a range +-R{unit}: give it, or leave converters.{signal}_bits out"
             require(bits is None or getattr(self, name), f"converters.{name}", None, remedy)
 
+    @property
+    def is_single(self) -> bool:
+        """Whether the controller calculates in float32."""
+        return self.arithmetic == "float32"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Actuator:

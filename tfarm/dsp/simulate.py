@@ -247,7 +247,7 @@ class Simulator:
             pole=math.exp(-c.rate_filter * sampling.period),
             period=float(sampling.period),
             delay=sampling.whole_delay,
-            is_single=c.arithmetic == "float32",
+            is_single=c.is_single,
             bound=float(FOLDED_UP * arm.bending_scale),
         )
 

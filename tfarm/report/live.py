@@ -133,7 +133,7 @@ def slew_numbers(arm: Arm, chain: Chain, law: HubFeedback) -> dict[str, Any] | N
             **_shapes(arm, plant),
             "ideal": packed(ideal),
             "converters": [[x if math.isfinite(x) else None for x in row] for row in quantisers(chain).tolist()],
-            "single": chain.converters.arithmetic == "float32",
+            "single": chain.converters.is_single,
             "bound": FOLDED_UP * arm.bending_scale,
             "rise": task.busy_until,
             "drive": arm.input.split("_")[1],
