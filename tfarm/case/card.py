@@ -30,6 +30,7 @@ from tfarm.digits import general
 from tfarm.dsp import Chain, Sampled
 from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.crossings import CircleGrid, circle_grid
+from tfarm.dsp.plant import driven
 from tfarm.dsp.verdict import Analysis, Verdict, sampled
 from tfarm.errors import ConvergenceError
 from tfarm.loop.curve import LoopCurve, curve_of, gain_margin, lowest_drawn, refined
@@ -178,7 +179,7 @@ def result_card(
     `continuous` (of `margins`) and `at_samples` (of `sampled`) are what is known of these loops already.  Raises
     ParameterError where there is no loop.
     """
-    law, chain = as_law(law), chain_or_usual(chain)
+    law, (arm, chain) = as_law(law), driven(arm, chain_or_usual(chain))
     _, undamped = graded_arm(arm)
     notes = [SCALED + RECOMMENDED[arm.has_elastic_link]] if law.gains == default_gains(arm) else []
     notes += [undamped] if undamped else []
@@ -196,10 +197,12 @@ def loop_card(loop: str, arm: Arm, law: AnyLaw, chain: Chain, known: Any = None)
 
     Raises ConvergenceError where the loop is not determined.
     """
+    arm, chain = driven(arm, chain)
     if loop == "sampled":
         own = sampled_card(known or _sampled_of(arm, law, chain))
     else:
-        own = continuous_card(known or margins_of(arm, law), chain.sampling.period)
+        is_own = known is not None and known.stability.loop.arm.hub == arm.hub
+        own = continuous_card(known if is_own else margins_of(arm, law), chain.sampling.period)
     damped, _ = graded_arm(arm)
     is_own = damped is arm or own.stability == "unstable"
     return own if is_own else _with_margins(own, loop_card(loop, damped, law, chain))
@@ -323,7 +326,8 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
     ConvergenceError
         Where its stability is not determined.
     """
-    law, (damped, note) = as_law(law), graded_arm(arm)
+    law, (arm, usual) = as_law(law), driven(arm, chain_or_usual(chain))
+    damped, note = graded_arm(arm)
 
     def as_card(curve: LoopCurve, own: str) -> LoopCurve:
         return replace(curve, stability=own, note=note, margins=None if own == "unstable" else curve.margins)
@@ -334,9 +338,8 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
         found = as_card(curve_of(own), (own.stability if damped is arm else stability(arm, law)).verdict)
     if found is not None and chain is None:
         return found
-    chain = chain_or_usual(chain)
-    at_samples = _sampled_of(damped, law, chain)
-    word = _sampled_of(arm, law, chain).verdict.word
+    at_samples = _sampled_of(damped, law, usual)
+    word = _sampled_of(arm, law, usual).verdict.word
     return replace(as_card(sampled_curve(at_samples), word), continuous=found)
 
 

@@ -29,7 +29,7 @@ from tfarm.arm.law import REFERENCE, Part
 from tfarm.arrays import Complex
 from tfarm.dsp import Chain
 from tfarm.dsp.discretise import acting_law, with_all_gains, with_estimate
-from tfarm.dsp.plant import USUAL_MODES, PulseTransfer, damped_at_hub, sensed_plant
+from tfarm.dsp.plant import USUAL_MODES, PulseTransfer, driven, sensed_plant
 from tfarm.errors import require
 from tfarm.exported.result import Export, ExportTask, names_of
 from tfarm.exported.texts import comment, matlab_text, python_text, render
@@ -194,7 +194,7 @@ def linear(task: ExportTask) -> Linear:
     if what == "controller":
         return Linear({what: controller}, head, {}, verdict)
     plant = plant_system(arm, law, chain)
-    read = Signals(damped_at_hub(arm, chain), plant.outputs)
+    read = Signals(driven(arm, chain)[0], plant.outputs)
     systems = {"plant": plant, **reduced_systems(read.arm, read.names)}
     if what == "loop":
         systems = {"loop": loop_system(plant, controller), "controller": controller, **systems}

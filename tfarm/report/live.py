@@ -38,7 +38,7 @@ from tfarm.digits import kept_digits, scientific
 from tfarm.dsp import Chain, GainMap, PulseTransfer, Sampled, Simulator, sampled_verdict, scenario, traces
 from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.edges import LONGEST_DELAY_SAMPLES
-from tfarm.dsp.plant import Plant, sensed_plant
+from tfarm.dsp.plant import Plant, driven, sensed_plant
 from tfarm.dsp.results import enough_modes, ideal_chain
 from tfarm.dsp.simulate import FOLDED_UP, quantisers
 from tfarm.errors import TfarmError, require
@@ -477,7 +477,7 @@ def explore(arm: Arm, law: AnyLaw | None = None, chain: Chain | None = None) -> 
         For what is no arm, and one whose hub does not turn freely or has no inertia.
     """
     must_be_arm(arm)
-    case = Case(arm, chain_or_usual(chain), () if law is None else (GivenLaw(law),))
+    case = Case(*driven(arm, chain_or_usual(chain)), () if law is None else (GivenLaw(law),))
     require(is_live(case), "arm", arm.name, "give one whose hub turns freely and has inertia")
     place = Path(mkdtemp(prefix="tfarm-"))
     (folder := place / "arm").mkdir()

@@ -279,8 +279,8 @@ class _Task:
         """The record of a law for these arms."""
         law, x, own = choice.law, choice.x, choice.search.form
         on_arms = tuple(
-            OnArm(each.name, each.numbers, judge.value(law), stability(each.arm, law),
-                  sampled_brief(each.arm, law, self.chain))
+            OnArm(each.name, each.numbers, judge.value(law), stability(judge.arm, law),
+                  sampled_brief(judge.arm, law, judge.chain))
             for each, judge in zip(named, choice.worst.judges, strict=True)
         )  # fmt: skip
         at_ends = own.at_ends(x)
