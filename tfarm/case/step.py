@@ -24,11 +24,12 @@ from tfarm.arm import AT_HUB, AnyLaw, Arm, Law, as_law, tracked
 from tfarm.arm.law import REFERENCE
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.dsp import Chain, sampled_verdict, traces
-from tfarm.dsp.chain import PERIOD, TIME_ROUNDING, chain_or_usual
-from tfarm.dsp.plant import driven, sensed_plant
+from tfarm.dsp.chain import PERIOD, TIME_ROUNDING
+from tfarm.dsp.plant import sensed_plant
 from tfarm.dsp.results import ENOUGH_CHANGE, simulated
 from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, described, resting, scenario
 from tfarm.dsp.simulate import LEFT_OF_RECORD, MOST_BETWEEN, first_mode, settled_from
+from tfarm.dsp.stages import admit
 from tfarm.errors import must_be_known, require
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import Poles
@@ -255,7 +256,7 @@ def step(
         Where the poles of the loop are not complete.
     """
     must_be_known("scenario", scenario_name, SAMPLED_NAMES)
-    (arm, chain), is_step = driven(arm, chain_or_usual(chain)), scenario_name == "reference"
+    (arm, chain), is_step = admit("step", arm, chain), scenario_name == "reference"
     hub, law = followed(law) if is_step else (AT_HUB[0], law)
     arm, law = tracked(arm, law)
     full, of_angle, response = as_law(law), hub == AT_HUB[0], None

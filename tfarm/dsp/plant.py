@@ -189,6 +189,19 @@ def with_filter(plant: Plant, rows: Sequence[int], corner: float) -> Plant:
     )
 
 
+def with_held_filter(plant: Plant, held: Real) -> Plant:
+    """The plant whose filters, its last pole, start from other values than 0: with the same pole once more.
+
+    An amplitude 1 of it is the excess `held` (outputs,) over the filtered outputs.  The torque drives both poles, and
+    the shares of the second cancel.
+    """
+    residues = plant.residues.copy()
+    residues[:, -1] -= held
+    return replace(
+        plant, poles=np.r_[plant.poles, plant.poles[-1]], residues=np.c_[residues, held], mode=np.r_[plant.mode, 0]
+    )
+
+
 @dataclass(frozen=True)
 @record
 class SensedPlant:

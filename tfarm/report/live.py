@@ -41,6 +41,7 @@ from tfarm.dsp.edges import LONGEST_DELAY_SAMPLES
 from tfarm.dsp.plant import Plant, driven, sensed_plant
 from tfarm.dsp.results import enough_modes, ideal_chain
 from tfarm.dsp.simulate import FOLDED_UP, quantisers
+from tfarm.dsp.stages import admit
 from tfarm.errors import TfarmError, require
 from tfarm.loop.loop import Loop, steep_places
 from tfarm.loop.panels import PANEL_SAMPLES, Sensor, loop_panels, positions, sensed_places
@@ -406,7 +407,7 @@ def save_live(case: Case, folder: Path) -> None:
 
     Where its numbers cannot be made the page has the reason.
     """
-    arm, chain, laws = case.arm, case.chain, case.laws
+    (arm, chain), laws = admit("live page", case.arm, case.chain), case.laws
     title, out = f"{arm.name}: live loop", folder / LIVE_PAGE
     law = next((law for each in laws if has_sliders(law := as_law(each.law))), as_law(default_gains(arm)))
     arm, _ = arm_and_law(arm, law)

@@ -119,7 +119,7 @@ def _card_of(loop: str) -> Asked:
             card = loop_card(loop, one.arm, law, one.chain)
             return {name: value for name, _, value in entries_of(LoopCard, card, loop)}
         known = (
-            words_of(stability(one.driven_arm, law)) if loop == "continuous"
+            words_of(stability(one.driven_arm, law), one.chain) if loop == "continuous"
             else words_of_samples(sampled(one.arm, law, one.chain).verdict)
         )  # fmt: skip
         return {f"{loop}.{key}": text for key, text in known.items()}
