@@ -15,7 +15,7 @@ from tfarm.dsp.chain import Chain, chain_or_usual, stated
 from tfarm.dsp.plant import driven
 from tfarm.errors import require
 
-NAMED = ("named", "partly")
+NAMED, REFUSED = ("named", "partly"), "refused"
 REMAINDERS = {"converters.arithmetic": "rounding of float32 signals"}  # of what acts partly
 
 
@@ -31,9 +31,9 @@ def stages() -> dict[str, dict[str, dict[str, str]]]:
     return {**found, "arm": {key: dict.fromkeys(answers, "acts") for key in arm}}
 
 
-def word_of(key: str, answer: str) -> str | None:
-    """Return the word of an answer for a key; None where that is refused."""
-    return next((keys[key].get(answer) for keys in stages().values() if key in keys), None)
+def word_of(key: str, answer: str) -> str:
+    """Return the word of an answer for a key, "refused" of one without a row."""
+    return next((keys[key][answer] for keys in stages().values() if key in keys), REFUSED)
 
 
 def admit(answer: str, arm: Arm, chain: Chain | None) -> tuple[Arm, Chain]:
@@ -44,7 +44,7 @@ def admit(answer: str, arm: Arm, chain: Chain | None) -> tuple[Arm, Chain]:
     must_be_arm(arm)
     chain = chain_or_usual(chain)
     for key, value in _keys_in_use(arm, chain).items():
-        require(word_of(key, answer), key, value, f"{answer} does not have this key: leave it out")
+        require(word_of(key, answer) != REFUSED, key, value, f"{answer} does not have this key: leave it out")
     return driven(arm, chain)
 
 
