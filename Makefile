@@ -33,6 +33,7 @@ SURVEYS := \
 	reduced.test_accuracy \
 	dsp.settled \
 	dsp.law_orders \
+	dsp.single_laws \
 	fitting.planted \
 	studies.kills \
 	studies.planted \

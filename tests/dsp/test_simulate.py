@@ -6,7 +6,7 @@ from math import comb
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
+from scipy.signal import lfilter, lsim
 
 import tfarm
 from tfarm.arm import HubFeedback
@@ -81,6 +81,21 @@ def test_free_decay_is_the_damping_of_the_first_mode(lab):
     p = modal_model(lab, "hub_rate", 1).eigenvalues[0, 0]
     expected = 0.01 * np.exp(p.real * run.t) * (np.cos(p.imag * run.t) - p.real / p.imag * np.sin(p.imag * run.t))
     np.testing.assert_allclose(tip, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("gains", [HubFeedback(), GAINS])
+def test_a_decay_begins_with_filters_at_the_value_that_they_were_held_at(lab, gains):
+    """The measured signals are the solution of y_f' = w (y - y_f), y_f(0) = y(0), of the recorded ones."""
+    chain, between = Chain(sampling=Sampling(antialias_corner=60.0)), 50
+    run = Simulator(lab, chain, scenario("decay", lab, chain, 0.5), gains, count=2, between=between).run()
+    t = np.r_[run.at_samples.t, run.between.t]
+    order = np.argsort(t, kind="stable")
+    for column, name in ((1, "hub_rate"), (2, "root_moment")):
+        y = np.r_[run.at_samples.signal(name), run.between.signal(name)][order]
+        filtered = lsim((60.0, [1.0, 60.0]), y, t[order], X0=[y[0] / 60.0])[1]
+        at = np.searchsorted(t[order], run.at_samples.t)
+        np.testing.assert_allclose(run.measured[:, column], filtered[at], atol=2e-3 * abs(y).max())
+    assert run.measured[0, 2] == pytest.approx(run.at_samples.root_moment[0], rel=1e-12)
 
 
 @pytest.mark.parametrize("K2", [0.1, 0.9])

@@ -28,8 +28,8 @@ from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arrays import Complex
 from tfarm.digits import general
 from tfarm.dsp import Chain, Sampled
-from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.crossings import CircleGrid, circle_grid
+from tfarm.dsp.stages import admit, not_covered
 from tfarm.dsp.verdict import Analysis, Verdict, sampled
 from tfarm.errors import ConvergenceError
 from tfarm.loop.curve import LoopCurve, curve_of, gain_margin, lowest_drawn, refined
@@ -174,7 +174,7 @@ def result_card(
     `continuous` (of `margins`) and `at_samples` (of `sampled`) are what is known of these loops already.  Raises
     ParameterError where there is no loop.
     """
-    law, chain = as_law(law), chain_or_usual(chain)
+    law, (arm, chain) = as_law(law), admit("card", arm, chain)
     _, undamped = graded_arm(arm)
     notes = [SCALED + RECOMMENDED[arm.has_elastic_link]] if law.gains == default_gains(arm) else []
     notes += [undamped] if undamped else []
@@ -192,10 +192,12 @@ def loop_card(loop: str, arm: Arm, law: AnyLaw, chain: Chain, known: Any = None)
 
     Raises ConvergenceError where the loop is not determined.
     """
+    arm, chain = admit("card", arm, chain)
     if loop == "sampled":
         own = sampled_card(known or _sampled_of(arm, law, chain))
     else:
-        own = continuous_card(known or margins_of(arm, law), chain.sampling.period)
+        is_own = known is not None and known.stability.loop.arm.hub == arm.hub
+        own = continuous_card(known if is_own else margins_of(arm, law), chain)
     damped, _ = graded_arm(arm)
     is_own = damped is arm or own.stability == "unstable"
     return own if is_own else _with_margins(own, loop_card(loop, damped, law, chain))
@@ -214,8 +216,8 @@ def graded_arm(arm: Arm) -> tuple[Arm, str]:
     return arm.having(damping=reference), UNDAMPED.format(reference)
 
 
-def continuous_card(found: Margins, period: float) -> LoopCard:
-    """The card of a continuous-time loop; its delay margin is graded by a sampling period [s]."""
+def continuous_card(found: Margins, chain: Chain) -> LoopCard:
+    """The card of a continuous-time loop; its delay margin is graded by the sampling period of a chain."""
     verdict, band = found.stability, found.in_band
     moving, table = verdict.poles.moving, modes(verdict.loop.arm, up_to=verdict.band)
     own = dict(zip(table.index.tolist(), (1j * table.natural_frequency).tolist(), strict=True))
@@ -225,27 +227,28 @@ def continuous_card(found: Margins, period: float) -> LoopCard:
     abscissa = verdict.spectral_abscissa
     delay = None if band is None else (band.delay if found.exact_delay is None else found.exact_delay)
     return LoopCard(
-        **words_of(verdict),
-        **_margins(band, None if band is None else band.gain, delay, period),
+        **words_of(verdict, chain),
+        **_margins(band, None if band is None else band.gain, delay, chain.sampling.period),
         least_damping=_least_damped([*by_mode.items(), *((HUB, s) for s in oscillating[~is_of_mode].tolist())]),
         time_constant=-1 / abscissa if abscissa < 0 and math.isfinite(abscissa) else None,
         minimum_damping=None,
     )
 
 
-def words_of(verdict: Stability) -> dict[str, Any]:
-    """Stability and certainty of a continuous-time verdict."""
+def words_of(verdict: Stability, chain: Chain) -> dict[str, Any]:
+    """Stability and certainty of a continuous-time verdict on the loop of a chain."""
     beyond = (
         ", small gain beyond" if verdict.tail == SMALL_GAIN else ", theorem beyond" if verdict.is_known_beyond else ""
     )
-    return {"stability": verdict.verdict, "certainty": f"converged to {verdict.band:.4g} rad/s{beyond}"}
+    certainty = f"converged to {verdict.band:.4g} rad/s{beyond}{not_covered('continuous-time column', chain)}"
+    return {"stability": verdict.verdict, "certainty": certainty}
 
 
 def words_of_samples(verdict: Verdict) -> dict[str, Any]:
     """Stability and certainty of a sampled verdict."""
     known = f"{'converged' if verdict.is_converged else 'approximate'}, first {verdict.modes_used} modes"
     certainty = f"certified to {verdict.band.top:.3g} rad/s" if verdict.band else known
-    return {"stability": verdict.word, "certainty": certainty}
+    return {"stability": verdict.word, "certainty": f"{certainty}{verdict.omitted}"}
 
 
 def sampled_card(found: Analysis) -> LoopCard:
@@ -319,7 +322,8 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
     ConvergenceError
         Where its stability is not determined.
     """
-    law, (damped, note) = as_law(law), graded_arm(arm)
+    law, (arm, usual) = as_law(law), admit("card", arm, chain)
+    damped, note = graded_arm(arm)
 
     def as_card(curve: LoopCurve, own: str) -> LoopCurve:
         return replace(curve, stability=own, note=note, margins=None if own == "unstable" else curve.margins)
@@ -330,9 +334,8 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
         found = as_card(curve_of(own), (own.stability if damped is arm else stability(arm, law)).verdict)
     if found is not None and chain is None:
         return found
-    chain = chain_or_usual(chain)
-    at_samples = _sampled_of(damped, law, chain)
-    word = _sampled_of(arm, law, chain).verdict.word
+    at_samples = _sampled_of(damped, law, usual)
+    word = _sampled_of(arm, law, usual).verdict.word
     return replace(as_card(sampled_curve(at_samples), word), continuous=found)
 
 

@@ -16,6 +16,7 @@ from tfarm.crossing import Window
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.crossings import FACTOR, circle_grid, stable_windows
+from tfarm.dsp.plant import driven
 from tfarm.dsp.verdict import Analysis, SampledBrief, Verdict, brief_of, sampled_verdict
 from tfarm.errors import ConvergenceError, one_line, require
 from tfarm.loop.loop import Loop
@@ -378,7 +379,7 @@ def _names(pairs: list[tuple[Arm, AnyLaw]]) -> tuple[str, ...]:
 
 def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_sampled: bool) -> ComparedSide:
     """All that is compared of one arm under its law; a sampled verdict that cannot be settled is left open."""
-    most = count + POLES_BEYOND_MODES
+    most, (arm, chain) = count + POLES_BEYOND_MODES, driven(arm, chain)
     rows, open_loop = _modes_of_arm(arm, count, most)
     loop: Margins | Analysis
     verdict: Verdict | ConvergenceError

@@ -30,11 +30,12 @@ from tfarm.arm.law import REFERENCE
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.digits import general
 from tfarm.dsp import Chain, sampled_verdict, traces
-from tfarm.dsp.chain import PERIOD, TIME_ROUNDING, chain_or_usual
+from tfarm.dsp.chain import PERIOD, TIME_ROUNDING
 from tfarm.dsp.plant import sensed_plant
 from tfarm.dsp.results import ENOUGH_CHANGE, simulated
 from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, described, resting, scenario
 from tfarm.dsp.simulate import MOST_BETWEEN, SETTLING_BAND, final_value, first_mode, settling_time
+from tfarm.dsp.stages import admit
 from tfarm.errors import must_be_known, require
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import Poles
@@ -342,7 +343,7 @@ def step(
     must_be_known("scenario", scenario_name, SAMPLED_NAMES)
     band = number("settling_band", settling_band, "a share of the travel, such as 0.02")
     require(0 < band < 1, "settling_band", settling_band, "a share of the travel between 0 and 1, such as 0.02")
-    chain, is_step = chain_or_usual(chain), scenario_name == "reference"
+    (arm, chain), is_step = admit("step", arm, chain), scenario_name == "reference"
     hub, law = followed(law) if is_step else (AT_HUB[0], law)
     arm, law = tracked(arm, law)
     full, of_angle, response = as_law(law), hub == AT_HUB[0], None

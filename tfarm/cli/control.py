@@ -67,9 +67,12 @@ def poles(
 @command(epilog="margins sasaki2012-lab --K1 0.3 --K2 0.3")
 def margins(arm: ArmName, law: LawFile = None, theory: TheoryName = None, json: Json = False, *, gains: Gains) -> None:
     """Result card, stability, the stability interval of each gain, and the margins of the exact loop function."""
+    from tfarm.dsp.plant import driven
+
     subject, controller, defaults = load_loop(arm, theory, gains, law)
+    subject, chain = driven(subject, load_chain(arm))
     found = tfarm.margins(subject, controller)
-    emit(found, json, defaults, summary=tfarm.result_card(subject, controller, load_chain(arm), continuous=found))
+    emit(found, json, defaults, summary=tfarm.result_card(subject, controller, chain, continuous=found))
 
 
 @command(epilog="nyquist sasaki2012-lab --K1 0.3 --K2 0.3 --png nyquist.png")

@@ -98,6 +98,11 @@ class Converters:
             remedy = f"{bits} bits need a range +-R{unit}: give it, or leave converters.{signal}_bits out"
             require(bits is None or getattr(self, name), f"converters.{name}", None, remedy)
 
+    @property
+    def is_single(self) -> bool:
+        """Whether the controller calculates in float32."""
+        return self.arithmetic == "float32"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Actuator:
@@ -216,15 +221,22 @@ def chain_of_tables(tables: Mapping[str, Any]) -> Chain:
     return Chain(**records, period_from="the file's period" if "period" in tables.get("sampling", {}) else "")
 
 
+def stated(chain: Chain) -> dict[str, dict[str, Any]]:
+    """Return the keys of each table of a chain that are no default."""
+    records = {table: getattr(chain, table) for table in CHAIN_TABLES}
+    return {
+        table: {f.name: value for f in fields(of) if (value := getattr(of, f.name)) != f.default}
+        for table, of in records.items()
+    }
+
+
 def file_text(arm: Arm, chain: Chain | None = None) -> str:
     """Return the arm's TOML file with each key of [sampling], [converters], [actuator] and [slew] that is no default.
 
     Python's shortest exact digits are TOML's too, and so is inf; a text needs its quotes.
     """
     text = to_toml(arm)
-    for table in () if chain is None else CHAIN_TABLES:
-        record = getattr(chain, table)
-        given = {f.name: value for f in fields(record) if (value := getattr(record, f.name)) != f.default}
+    for table, given in stated(chain or Chain()).items():
         lines = [f"{key} = {json.dumps(of) if isinstance(of, str) else repr(of)}\n" for key, of in given.items()]
         text += "".join([f"\n[{table}]\n", *lines]) if lines else ""
     return text

@@ -131,10 +131,10 @@ def with_all_gains(arm: Arm, law: AnyLaw) -> Law:
 
 
 def acting_law(arm: Arm, law: Law, chain: Chain) -> tuple[Law, Chain]:
-    """Return the law in z, and the chain with its delay.
+    """Return the law in z in the numbers of the chain's arithmetic, and the chain with its delay.
 
     Raises ParameterError for a delay that is too long, for a massless hub whose moment is fed back (an algebraic loop),
-    and as `discretised` does.
+    and as `discretised` and `in_single` do.
     """
     T = chain.sampling.period
     samples = chain.sampling.delay_samples + law.delay / T
@@ -143,7 +143,29 @@ def acting_law(arm: Arm, law: Law, chain: Chain) -> tuple[Law, Chain]:
     if "root_moment" in law.signals and law.part_gains.get("root_moment", (0, 1.0))[1]:
         must_not_be_algebraic(arm, "signals", "root_moment")
     late = replace(chain, sampling=replace(chain.sampling, delay_samples=samples))
-    return discretised(law, T), late
+    acting = discretised(law, T)
+    return in_single(acting) if chain.converters.is_single else acting, late
+
+
+def in_single(law: Law) -> Law:
+    """Return a law in z with the numbers of `kernel.run` in float32: of its states as realised there.
+
+    Raises ParameterError for two parts on one signal, whose sum is rounded, and for a number beyond float32.
+    """
+    names = [name for part in law.parts for name in part.signals if name]
+    remedy = "in float32 a signal has one part: add them up first"
+    require(len(set(names)) == len(names), "converters.arithmetic", "float32", remedy)
+    return replace(law, parts=tuple(Part(part.signals, _single_block(part.block)) for part in law.parts))
+
+
+def _single_block(block: LawBlock) -> LawBlock:
+    """A block in the numbers of float32; a constant gain remains one."""
+    with np.errstate(over="ignore"):
+        matrices = [each.astype(np.float32).astype(float) for each in block.matrices()]
+    remedy = f"a number of the law is beyond {np.finfo(np.float32).max:.1e}: scale its states, or take float64"
+    require(all(np.isfinite(each).all() for each in matrices), "converters.arithmetic", "float32", remedy)
+    is_gain = isinstance(block, Rational) and not block.order
+    return Rational((float(matrices[3][0, 0]),)) if is_gain else StateSpace(*matrices)
 
 
 def with_estimate(law: Law, chain: Chain) -> Law:
@@ -232,8 +254,11 @@ def lowest_power(roots: Complex) -> tuple[int, float]:
 
 
 def law_in_z(law: Law, acting: Law, chain: Chain) -> LawInZ:
-    """The parts of a law, and of the same in z (`acting`), at the period of a chain that may estimate the hub rate."""
-    acting = with_estimate(acting, chain)
+    """The parts of a law, and of the same in z (`acting`), at the period of a chain that may estimate the hub rate.
+
+    The factors are those of the law itself; in float32 those of `acting`, whose numbers are rounded.
+    """
+    law, acting = acting if chain.converters.is_single else law, with_estimate(acting, chain)
     alone = [acting.weighted(row).matrices() for row in np.eye(len(acting.parts)).tolist()]
     (A, B, _, _), C, D = alone[0], *(np.vstack([each[n] for each in alone]) for n in (2, 3))
     found = [_factors(part, law, chain) for part in law.parts]

@@ -113,12 +113,18 @@ class Plant:
         return int(self.mode.max(initial=0))
 
 
-def damped_at_hub(arm: Arm, chain: Chain) -> Arm:
-    """The arm with the actuator's analog hub damping, which is friction of its hub."""
+def driven(arm: Arm, chain: Chain) -> tuple[Arm, Chain]:
+    """The arm that a chain drives, with the actuator's analog damping as friction of its hub, and the chain without it.
+
+    So it is in every loop of that arm once: in the sampled and in the continuous-time one.
+    """
     damping = chain.actuator.hub_damping
     remedy = "a hub without inertia has no model of finite order under it; give hub.inertia, or leave it out"
     require(not (damping > 0 and arm.has_massless_hub), "actuator.hub_damping", damping, remedy)
-    return arm if damping == 0 else replace(arm, hub=replace(arm.hub, friction=arm.hub.friction + damping))
+    if damping == 0:
+        return arm, chain
+    hub = replace(arm.hub, friction=arm.hub.friction + damping)
+    return replace(arm, hub=hub), replace(chain, actuator=replace(chain.actuator, hub_damping=0.0))
 
 
 def undelayed_plant(arm: Arm, outputs: Sequence[str], count: int, x: float | None = None) -> Plant:
@@ -183,6 +189,19 @@ def with_filter(plant: Plant, rows: Sequence[int], corner: float) -> Plant:
     )
 
 
+def with_held_filter(plant: Plant, held: Real) -> Plant:
+    """The plant whose filters, its last pole, start from other values than 0: with the same pole once more.
+
+    An amplitude 1 of it is the excess `held` (outputs,) over the filtered outputs.  The torque drives both poles, and
+    the shares of the second cancel.
+    """
+    residues = plant.residues.copy()
+    residues[:, -1] -= held
+    return replace(
+        plant, poles=np.r_[plant.poles, plant.poles[-1]], residues=np.c_[residues, held], mode=np.r_[plant.mode, 0]
+    )
+
+
 @dataclass(frozen=True)
 @record
 class SensedPlant:
@@ -228,7 +247,7 @@ class SensedPlant:
 
 def sensed_plant(arm: Arm, chain: Chain, names: Sequence[str], count: int) -> SensedPlant:
     """Return the signals of these names with `count` flexible modes, of an arm whose hub a chain may damp."""
-    read, plants = Signals(damped_at_hub(arm, chain), tuple(names)), []
+    read, plants = Signals(driven(arm, chain)[0], tuple(names)), []
     for share in dict.fromkeys(read.places):
         here = zip(read.outputs, read.places, strict=True)
         wanted = list(dict.fromkeys(each.name for each, place in here if place == share))

@@ -484,7 +484,7 @@ def sampled_loop(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: in
     """
     law = with_all_gains(arm, law)
     acting, chain = acting_law(arm, law, chain_or_usual(chain))
-    weights, units = [1.0] * len(law.parts), law.part_gains
+    weights, units = [1.0] * len(law.parts), acting.part_gains
     for name, (place, value) in units.items():
         weights[place] = value
         law, acting = (each.having(name, 1.0) for each in (law, acting))

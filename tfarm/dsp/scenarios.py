@@ -11,6 +11,7 @@ from tfarm.arm import AT_HUB, Arm, must_turn
 from tfarm.arm.checks import positive
 from tfarm.arrays import Real
 from tfarm.dsp.chain import PERIOD, TIME_ROUNDING, Chain, Reading
+from tfarm.dsp.plant import driven
 from tfarm.errors import must_be_known, require
 from tfarm.records import record
 from tfarm.schema import Quantity
@@ -82,11 +83,12 @@ class Scenario:
 def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
     """Return the bang-bang slew: hub acceleration +-4 travel/((r + L) rise^2), means over a sample, fed forward with J.
 
-    On a rig also friction and back-EMF at the mean rate, all in the unit of its input.
+    On a rig also friction, back-EMF and analog damping at the mean rate, all in the unit of its input.
     The rigid arm's moment is -(J - I_h) theta_dd_ref of the interval before the sample.  Raises ParameterError for an
     arm that cannot turn.
     """
     must_turn(arm)
+    arm, chain = driven(arm, chain)
     T, manoeuvre = chain.sampling.period, chain.slew
     t = T * np.arange(_samples(duration, T) + 1)
     rate = manoeuvre.acceleration(arm.reach) * np.clip(np.minimum(t, manoeuvre.rise_time - t), 0.0, None)

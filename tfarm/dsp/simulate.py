@@ -25,8 +25,9 @@ from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import kernel
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.discretise import acting_law, with_all_gains
-from tfarm.dsp.plant import RECORDED, USUAL_MODES, Plant, sensed_plant
+from tfarm.dsp.plant import RECORDED, USUAL_MODES, Plant, sensed_plant, with_held_filter
 from tfarm.dsp.scenarios import Scenario
+from tfarm.dsp.stages import admit
 from tfarm.errors import must_be_known, require
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
@@ -243,16 +244,20 @@ class Simulator:
     ) -> None:
         remedy = f"a whole number of records between two samples, 0 to {MOST_BETWEEN}"
         between = whole("between", between, 0, MOST_BETWEEN, remedy)
+        admit("simulate", arm, chain)
         given = with_all_gains(arm, law)
         self.gains = given.gains if given.references == AT_HUB else None
         self.law, self.chain = acting_law(arm, given, chain)
         references_of(self.law, scenario)  # raises for one that is missing
-        self.scenario, self.between = scenario, between
+        self.scenario, self.between, self._released = scenario, between, dict[int, complex]()
         self.others = tuple(dict.fromkeys(name for name in outputs if name not in RECORDED))
         self.measured = tuple(dict.fromkeys((*AT_HUB, *self.law.signals)))
-        self.plant = sensed_plant(arm, chain, self.measured, count).together
+        sensed = sensed_plant(arm, chain, self.measured, count)
+        self.plant = sensed.together
         for names in filter(None, (RECORDED, self.others)):
             self.plant = self.plant.joined(sensed_plant(arm, chain, names, count).unfiltered)
+        if scenario.tip_offset:
+            self._release(sensed.unfiltered, scenario.tip_offset)
         self.kept = np.nonzero(self.plant.poles.imag >= 0)[0]
         self._forcing = kernel.Forcing(scenario.feedforward, scenario.disturbance, float(scenario.impulse))
         c, sampling = self.chain.converters, self.chain.sampling
@@ -262,7 +267,7 @@ class Simulator:
             pole=math.exp(-c.rate_filter * sampling.period),
             period=float(sampling.period),
             delay=sampling.whole_delay,
-            is_single=c.arithmetic == "float32",
+            is_single=c.is_single,
             bound=float(FOLDED_UP * arm.bending_scale),
         )
 
@@ -368,13 +373,25 @@ class Simulator:
             saturated=np.zeros((n, 3), np.bool_),
         )
 
+    def _release(self, unfiltered: Plant, offset: float) -> None:
+        """Displace the tip in the first mode, at rest: analog filters start from the value that they were held at.
+
+        `unfiltered` are the measured signals ahead of the filters.
+        """
+        first, amplitude = first_mode(self.plant, offset)
+        self._released, held = {first: amplitude}, np.zeros(len(self.plant.outputs))
+        n = len(self.measured)
+        held[:n] = 2 * ((unfiltered.residues[:, first] - self.plant.residues[:n, first]) * amplitude).real
+        if held.any():
+            self.plant = with_held_filter(self.plant, held)
+            self._released[self.plant.poles.size - 1] = 1.0
+
     def _at_first(self) -> Complex:
-        """The modal amplitudes (m,) at t = 0: 0, or of the first mode at rest with the tip displaced."""
-        amplitude: Complex = np.zeros(self.kept.size, complex)
-        if offset := self.scenario.tip_offset:
-            first, released = first_mode(self.plant, offset)
-            amplitude[self.kept == first] = released
-        return amplitude
+        """The modal amplitudes (m,) at t = 0: 0, or those of a displaced tip."""
+        amplitude: Complex = np.zeros(self.plant.poles.size, complex)
+        for pole, value in self._released.items():
+            amplitude[pole] = value
+        return amplitude[self.kept]
 
     def _energy(self, amplitude: Complex, rate: float) -> float:
         """Energy of an undamped arm [J]: b^2 |a|^2/2 a mode, b^2 twice the residue of the hub rate, and rigid."""

@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, AnyLaw, Arm, arm_and_law, as_law, cancelled
 from tfarm.arm.checks import whole
 from tfarm.crossing import Window
-from tfarm.dsp.chain import Chain, Sampling, chain_or_usual
+from tfarm.dsp.chain import Chain, Sampling
 from tfarm.dsp.circle import Band, complete_band
 from tfarm.dsp.crossings import FACTOR, around, windows_of
 from tfarm.dsp.discretise import RULE, rule_in_words
@@ -26,6 +26,7 @@ from tfarm.dsp.edges import (
 )
 from tfarm.dsp.modes import ModeTable, dominant, mode_table
 from tfarm.dsp.sampled import OfLoop, Sampled, resized, sampled_loop
+from tfarm.dsp.stages import admit, not_covered
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.schema import Quantity
@@ -128,8 +129,13 @@ class Verdict(OfLoop):
         """The modes for which the verdict is certified."""
         if self.band is None:
             shown = "converged for" if self.is_converged else "model of"
-            return f"{shown} the first {self.modes_used} modes, not determined beyond"
-        return f"certified up to {self.band.top:.3g} rad/s, not determined beyond"
+            return f"{shown} the first {self.modes_used} modes, not determined beyond{self.omitted}"
+        return f"certified up to {self.band.top:.3g} rad/s, not determined beyond{self.omitted}"
+
+    @property
+    def omitted(self) -> str:
+        """The keys of the chain that the verdict does not cover, as the end of its certainty."""
+        return not_covered("verdict", self.loop.chain)
 
     @property
     def time_constant(self) -> Annotated[float | None, Quantity("dominant time constant", "s",
@@ -145,7 +151,7 @@ def sampled_verdict(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count:
     radius that of the loop with every mode of the band.  Raises ParameterError as `sampled_loop` does, and for a count
     outside 1..400.
     """
-    chain = chain_or_usual(chain)
+    arm, chain = admit("verdict", arm, chain)
     if count is not None:
         count = whole("modes", count, 1, MOST_COUNT, f"a whole number of flexible modes from 1 to {MOST_COUNT}")
         return Verdict(sampled_loop(arm, law, chain, count=count))
@@ -324,6 +330,7 @@ def sampled(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | N
     `count` is the number of flexible modes, by default enough for the verdict.  Raises ParameterError for a locked hub,
     an algebraic loop, an unknown signal, and a law in z whose period is not the chain's.
     """
+    arm, chain = admit("margins", arm, chain)
     arm, law = arm_and_law(arm, law)
     return Analysis(sampled_verdict(arm, law, chain, count=count), count or UNDAMPED_MODES)
 

@@ -135,7 +135,7 @@ def law_code(task: ExportTask, law: Law, variables: Sequence[Variable]) -> LawCo
     """
     remedy = "a functional mock-up unit has a controller in double or float; take c for fixed point"
     require(task.precision != FIXED, "precision", task.precision, remedy)
-    is_loop, is_single = task.what == "loop", task.chain.converters.arithmetic == "float32"
+    is_loop, is_single = task.what == "loop", task.chain.converters.is_single
     task = replace(task, precision="float" if is_single else task.precision)
     controller = controller_of(in_z(replace(law, delay=0.0) if is_loop else law, task.chain), task)
     controller = replace(controller, hub=None, signals=law.signals, dac=np.array([0.0, -np.inf, np.inf]))

@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from importlib import import_module
@@ -11,11 +12,12 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 from tfarm.arm import AnyLaw, Arm, Law, arm_and_law, as_law, must_be_arm
-from tfarm.case import result_card
+from tfarm.case.card import loop_card
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual, file_text
+from tfarm.dsp.stages import admit
 from tfarm.dsp.verdict import Analysis, sampled
-from tfarm.errors import ParameterError, must_be_known
+from tfarm.errors import ConvergenceError, ParameterError, must_be_known, require
 from tfarm.exported.texts import facts_of
 from tfarm.files import move_into, place_in
 from tfarm.records import record
@@ -81,8 +83,9 @@ class ExportTask:
 
     def facts(self, law: AnyLaw, found: Analysis) -> dict[str, str]:
         """The facts that a file begins with, by label: arm, law, stability and margins of the sampled loop, version."""
-        card = result_card(self.arm, law, self.chain, at_samples=found).sampled
-        shown = {} if card is None else dict(facts_of(card))
+        shown = {}
+        with suppress(ConvergenceError):
+            shown = dict(facts_of(loop_card("sampled", self.arm, as_law(law), self.chain, found)))
         warning = {} if is_certified(found) else {"warning": ANYWAY}
         head = {"arm": self.arm.name, "controller": self.law.name, **warning}
         sampling = self.chain.sampling
@@ -207,8 +210,13 @@ def export(
     if (what, form) not in WRITERS:
         forms = ", ".join(each for of, each in WRITERS if of == what)
         raise ParameterError(key="as", value=form, remedy=f"a {what} is exported as: {forms}")
+    chain = chain_or_usual(chain)
+    admit(f"export {form}", arm, chain)
+    remedy = f"the code is in {precision}: take precision float, or leave this key out"
+    is_other = form == "c" and chain.converters.is_single and precision != "float"
+    require(not is_other, "converters.arithmetic", "float32", remedy)
     task = ExportTask(
-        arm=arm if law is None else arm_and_law(arm, law)[0], given=law, chain=chain_or_usual(chain),
+        arm=arm if law is None else arm_and_law(arm, law)[0], given=law, chain=chain,
         what=what, form=form, tuned=None if tuned is None else Path(tuned), precision=precision,
         ranges=dict(ranges or {}), name=name, anyway=anyway,
     )  # fmt: skip

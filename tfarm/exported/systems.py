@@ -29,7 +29,8 @@ from tfarm.arm.law import REFERENCE, Part
 from tfarm.arrays import Complex
 from tfarm.dsp import Chain
 from tfarm.dsp.discretise import acting_law, with_all_gains, with_estimate
-from tfarm.dsp.plant import USUAL_MODES, PulseTransfer, damped_at_hub, sensed_plant
+from tfarm.dsp.plant import USUAL_MODES, PulseTransfer, driven, sensed_plant
+from tfarm.dsp.stages import not_covered
 from tfarm.errors import require
 from tfarm.exported.result import Export, ExportTask, names_of
 from tfarm.exported.texts import comment, matlab_text, python_text, render
@@ -186,7 +187,8 @@ def linear(task: ExportTask) -> Linear:
     """Return the systems of a task.  Raises ParameterError for a loop that is not certified stable."""
     law, chain, what = task.law, task.chain, task.what
     arm, _ = arm_and_law(task.arm, law)
-    facts, verdict = {"arm": arm.name, "SHA-256 of the inputs": task.sha256, "tfarm": version("tfarm")}, ""
+    own = {"arm": arm.name, "sampled plant": f"linear{not_covered(f'export {task.form}', chain)}"}
+    facts, verdict = {**own, "SHA-256 of the inputs": task.sha256, "tfarm": version("tfarm")}, ""
     if what != "plant":
         judged = task.analysis(law)
         facts, verdict = task.facts(law, judged), judged.verdict.sentence
@@ -194,7 +196,7 @@ def linear(task: ExportTask) -> Linear:
     if what == "controller":
         return Linear({what: controller}, head, {}, verdict)
     plant = plant_system(arm, law, chain)
-    read = Signals(damped_at_hub(arm, chain), plant.outputs)
+    read = Signals(driven(arm, chain)[0], plant.outputs)
     systems = {"plant": plant, **reduced_systems(read.arm, read.names)}
     if what == "loop":
         systems = {"loop": loop_system(plant, controller), "controller": controller, **systems}

@@ -26,7 +26,6 @@ from tfarm.arm import (
     Law,
     arm_and_law,
     as_law,
-    must_be_arm,
     unit_of,
 )
 from tfarm.arm.blocks import Rational
@@ -36,11 +35,11 @@ from tfarm.case.card import GAIN_LIMITS, GRADED, PEAK_LIMITS, PERIOD_LIMITS, PHA
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits, scientific
 from tfarm.dsp import Chain, GainMap, PulseTransfer, Sampled, Simulator, sampled_verdict, scenario, traces
-from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.edges import LONGEST_DELAY_SAMPLES
 from tfarm.dsp.plant import Plant, sensed_plant
 from tfarm.dsp.results import enough_modes, ideal_chain
 from tfarm.dsp.simulate import FOLDED_UP, quantisers
+from tfarm.dsp.stages import admit
 from tfarm.errors import TfarmError, require
 from tfarm.loop.loop import Loop, steep_places
 from tfarm.loop.panels import PANEL_SAMPLES, Sensor, loop_panels, positions, sensed_places
@@ -133,7 +132,7 @@ def slew_numbers(arm: Arm, chain: Chain, law: HubFeedback) -> dict[str, Any] | N
             **_shapes(arm, plant),
             "ideal": packed(ideal),
             "converters": [[x if math.isfinite(x) else None for x in row] for row in quantisers(chain).tolist()],
-            "single": chain.converters.arithmetic == "float32",
+            "single": chain.converters.is_single,
             "bound": FOLDED_UP * arm.bending_scale,
             "rise": task.busy_until,
             "drive": arm.input.split("_")[1],
@@ -411,6 +410,7 @@ def save_live(case: Case, folder: Path) -> None:
     law = next((law for each in laws if has_sliders(law := as_law(each.law))), as_law(default_gains(arm)))
     arm, _ = arm_and_law(arm, law)
     try:
+        admit("live page", arm, chain)
         data = law_data(arm, chain, law) if law.gains is None else live_data(arm, chain, law.gains)
     except TfarmError as error:
         write_text(out, render("live_failed.html", title=title, why=str(error)))
@@ -476,8 +476,7 @@ def explore(arm: Arm, law: AnyLaw | None = None, chain: Chain | None = None) -> 
     ParameterError
         For what is no arm, and one whose hub does not turn freely or has no inertia.
     """
-    must_be_arm(arm)
-    case = Case(arm, chain_or_usual(chain), () if law is None else (GivenLaw(law),))
+    case = Case(*admit("live page", arm, chain), () if law is None else (GivenLaw(law),))
     require(is_live(case), "arm", arm.name, "give one whose hub turns freely and has inertia")
     place = Path(mkdtemp(prefix="tfarm-"))
     (folder := place / "arm").mkdir()

@@ -16,6 +16,7 @@ from tfarm.arm import Arm
 from tfarm.case import Comparison
 from tfarm.digits import how_many
 from tfarm.dsp import Chain
+from tfarm.dsp.plant import driven
 from tfarm.errors import TfarmError, must_be_known, one_line, require
 from tfarm.exact.outputs import signal_words
 from tfarm.files import move_into, place_in, temporary_folder
@@ -193,7 +194,7 @@ def write(
     out, n, names, only = Path(out), len(arms), [arm.name for arm in arms], only or ()
     _check(names, only)
     each = zip(arms, chains or [Chain()] * n, laws or [()] * n, fits or [None] * n, strict=True)
-    cases = [Case(arm, chain, tuple(own), fit, tuple(measured), paper) for arm, chain, own, fit in each]
+    cases = [Case(*driven(arm, chain), tuple(own), fit, tuple(measured), paper) for arm, chain, own, fit in each]
     for case in cases:
         check_laws(case)
     with place_in(out, "out", names + [TRUST_FOLDER, ASSETS] * (not only)) as place:

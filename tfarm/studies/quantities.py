@@ -119,7 +119,7 @@ def _card_of(loop: str) -> Asked:
             card = loop_card(loop, one.arm, law, one.chain)
             return {name: value for name, _, value in entries_of(LoopCard, card, loop)}
         known = (
-            words_of(stability(one.arm, law)) if loop == "continuous"
+            words_of(stability(one.driven_arm, law), one.chain) if loop == "continuous"
             else words_of_samples(sampled(one.arm, law, one.chain).verdict)
         )  # fmt: skip
         return {f"{loop}.{key}": text for key, text in known.items()}
@@ -148,7 +148,7 @@ def _intervals_of(one: Subject, names: Set[str]) -> dict[str, Any]:
     """Stability and intervals of gains at the hub; undecided, without intervals, where poles cannot be counted."""
     found: dict[str, Any] = {STABILITY: "undecided"}
     with suppress(ConvergenceError):
-        verdict = stability(one.arm, one.law)
+        verdict = stability(one.driven_arm, one.law)
         gains = [gain for gain in PLANE if gain in verdict.loop.numbers and any(f".{gain}." in name for name in names)]
         for gain, of in windows_of(verdict, gains).items():
             found |= {f"{INTERVAL}.{gain}.{name}": getattr(of.interval, name, None) for name in Interval._fields}
@@ -163,7 +163,7 @@ def _damped_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
 
 
 def _poles_of(one: Subject, _: Set[str]) -> dict[str, float | None]:
-    found = closed_loop_poles(one.arm, one.law)
+    found = closed_loop_poles(one.driven_arm, one.law)
     s = found.values
     return {UNSTABLE: float(found.unstable), **_numbered(REAL, s.real), **_numbered(IMAGINARY, s.imag)}
 

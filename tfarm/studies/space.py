@@ -26,6 +26,7 @@ from tfarm.arm.feedback import OUTPUT_OF
 from tfarm.arm.writing import KeyedArms, numbers_of
 from tfarm.arrays import Real
 from tfarm.dsp import Chain
+from tfarm.dsp.plant import driven
 from tfarm.errors import ParameterError, must_be_known, naming, require
 from tfarm.fitting.posterior import Posterior
 from tfarm.tuner import tuning
@@ -73,6 +74,11 @@ class Subject(NamedTuple):
     chain: Chain
     tuner: dict[str, float]
     plan: tuning.Plan | None = None
+
+    @property
+    def driven_arm(self) -> Arm:
+        """The arm of its continuous-time loop: the analog damping of the chain's actuator is friction of its hub."""
+        return driven(self.arm, self.chain)[0]
 
 
 class Listing(NamedTuple):

@@ -15,6 +15,7 @@ from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm, as_law, must_turn
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.edges import most_modes
+from tfarm.dsp.stages import admit
 from tfarm.dsp.verdict import SampledBrief, sampled_brief, sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError, must_be_known
 from tfarm.loop.loop import Loop
@@ -213,6 +214,8 @@ def design(
     ends = {key: (float(low), float(high)) for key, (low, high) in (ranges or {}).items()}
     box = ArmBox(arm, ends) if ends else None
     arms, chain = arms_of(arm, also, box), chain_or_usual(chain)
+    for each in arms:
+        admit("design", each.arm, chain)
     same_input(arms)
     bounds = {"K1": K1, "K2": K2}
     form = structure_of(structure, arm, Kp=Kp, modes=modes, period=chain.sampling.period, bounds=bounds)
@@ -279,8 +282,8 @@ class _Task:
         """The record of a law for these arms."""
         law, x, own = choice.law, choice.x, choice.search.form
         on_arms = tuple(
-            OnArm(each.name, each.numbers, judge.value(law), stability(each.arm, law),
-                  sampled_brief(each.arm, law, self.chain))
+            OnArm(each.name, each.numbers, judge.value(law), stability(judge.arm, law),
+                  sampled_brief(judge.arm, law, judge.chain))
             for each, judge in zip(named, choice.worst.judges, strict=True)
         )  # fmt: skip
         at_ends = own.at_ends(x)

@@ -28,6 +28,7 @@ from tfarm.arm.blocks import Rational
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain, sampled_verdict
 from tfarm.dsp.edges import most_modes
+from tfarm.dsp.plant import driven
 from tfarm.dsp.results import simulated
 from tfarm.dsp.verdict import UNDAMPED_MODES
 from tfarm.errors import ConvergenceError
@@ -252,6 +253,7 @@ def judge_of(
     """The judge of laws on these signals, with `count` flexible modes; more of the continuous-time loop."""
     if OBJECTIVES[objective].of_slew and "root_moment" not in signals:
         signals = (*signals, "root_moment")
+    (known, _), (arm, chain) = driven(known, chain), driven(arm, chain)
     own = continuous_model(
         arm, signals, modes, (CONTINUOUS_TIMES if continuous else 1) * count, 2 / chain.sampling.period
     )

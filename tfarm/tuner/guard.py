@@ -49,6 +49,7 @@ from tfarm.arrays import Real
 from tfarm.dsp import Sampled, sampled_loop, stable_windows
 from tfarm.dsp.crossings import around
 from tfarm.dsp.plant import first_distinct, held_amplitude
+from tfarm.dsp.stages import not_covered
 from tfarm.errors import CertificationError, ConvergenceError, must_be_known
 from tfarm.exact.rationals import exact_matrix, falls, is_positive_definite
 from tfarm.loop.margins import lowest
@@ -213,7 +214,7 @@ class Guard:
     """The interval [lo, hi] of K (inf: no upper end), from models of up to `modes_used` flexible modes.
 
     `is_settled`: more modes do not change it.  `proofs`, of the time-varying kind alone: a Lyapunov function of every
-    model.
+    model.  `omitted` names the keys of the chain that it does not cover.
     """
 
     kind: Annotated[GuardKind, Quantity("kind", help="time-varying (certified), frozen (constant gains) or none")]
@@ -226,6 +227,7 @@ class Guard:
         bool, Quantity("more modes change nothing", key="settled", help="converged in the number of modes")
     ]
     proofs: tuple[CommonLyapunov, ...] = ()
+    omitted: str = ""
 
     @property
     def is_proven(self) -> Annotated[bool, PROVEN]:
@@ -245,10 +247,10 @@ class Guard:
         modes = f"{self.modes_used} modes, {'more change nothing' if self.is_settled else 'more may change it'}"
         interval = f"[{self.lo:.4g}, {self.hi:.4g}]"
         if self.kind == "frozen":
-            return f"{interval}: stable for every constant K, not certified for one that varies ({modes})"
+            return f"{interval}: stable for every constant K, not certified for one that varies ({modes}){self.omitted}"
         rate = max(proof.contraction for proof in self.proofs)
         certified = "certified" if self.is_settled else f"certified for the first {self.modes_used} modes"
-        return f"{interval}: {certified} for any K(t), contraction by {1 - rate:.2g} a sample ({modes})"
+        return f"{interval}: {certified} for any K(t), contraction by {1 - rate:.2g} a sample ({modes}){self.omitted}"
 
 
 def find_guard(loop: Sampled, kind: GuardKind, best_constant: float) -> Guard:
@@ -295,7 +297,9 @@ def _frozen(loops: list[Sampled], best_constant: float) -> Guard | None:
     edge = (1 - RADIUS_SHARE) * (high - low)
     if high - low < NARROWEST_SECTOR:
         return None
-    return Guard("frozen", low + edge * (low > 0), high - edge, loops[-1].plant.count, _settled(loops, found))
+    omitted, count = not_covered("tune", loops[0].chain), loops[-1].plant.count
+    is_settled = _settled(loops, found)
+    return Guard("frozen", low + edge * (low > 0), high - edge, count, is_settled, omitted=omitted)
 
 
 def _moving(loops: list[Sampled], best_constant: float) -> Guard | None:
@@ -324,7 +328,8 @@ def _certified(models: list[MovingGain], lo: float, hi: float, middle: float) ->
         return None
     widest = [(middle - radius, middle + radius) for radius in (model.radius(middle) for model in models)]
     loops = [model.loop for model in models]
-    return Guard("time-varying", lo, hi, loops[-1].plant.count, _settled(loops, widest), proven)
+    omitted = not_covered("tune", loops[0].chain)
+    return Guard("time-varying", lo, hi, loops[-1].plant.count, _settled(loops, widest), proven, omitted)
 
 
 def _middle(model: MovingGain, best_constant: float) -> float | None:

@@ -34,9 +34,10 @@ from tfarm.arm.checks import check_fields, not_negative, number, positive
 from tfarm.arm.schema import StrictTable, validated_file
 from tfarm.arrays import Real
 from tfarm.dsp import Chain, Measurement, Sampled, Scenario, Simulation, Simulator, sampled_loop, scenario
-from tfarm.dsp.chain import Reading, chain_or_usual
+from tfarm.dsp.chain import Reading
 from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
 from tfarm.dsp.simulate import FOLDED_UP
+from tfarm.dsp.stages import admit
 from tfarm.errors import must_be_known, naming, require
 from tfarm.files import write_file
 from tfarm.records import record
@@ -185,10 +186,11 @@ def slew_trial(
     """
     must_be_known("signals", signals, get_args(Reading))
     Kp = not_negative("Kp", Kp, ANGLE_REMEDY)
+    arm, chain = admit("tune", arm, chain)
     K1 = usual_rate_gain(arm, Kp) if K1 is None else K1
     rate_gain = number("K1", K1, "the hub rate gain is a finite number of N m s/rad")
     length = positive("duration", duration, "a trial lasts a positive number of seconds")
-    chain = with_signals(chain_or_usual(chain), signals)
+    chain = with_signals(chain, signals)
     rise = chain.slew.rise_time
     require(length >= rise, "duration", length, f"a trial lasts at least as long as its slew, {rise:g} s")
     must_not_be_algebraic(arm, "hub.inertia", 0.0)
