@@ -243,8 +243,8 @@ def test_loci_have_the_poles_of_their_gains(browser, folder, name):
         page.wait_for_function("live.now.locus?.length", timeout=60_000)
         pole = page.evaluate("[live.now.near[1][0], live.now.near[1][1], live.now.frame]")
         x, y = ((pole[i] - pole[2][k][0]) / (pole[2][k][1] - pole[2][k][0]) for i, k in enumerate("xy"))
-        wide, high = page.evaluate("live.room('poles')")  # right of 54 pixels and below 8 of letters
-        page.mouse.move(box["x"] + 54 + wide * x, box["y"] + 8 + high * (1 - y))
+        wide, high = page.evaluate("live.room('poles')")  # right of 58 pixels and below 8 of letters
+        page.mouse.move(box["x"] + 58 + wide * x, box["y"] + 8 + high * (1 - y))
         page.wait_for_function("document.getElementById('poles-reading').textContent.includes('K2 = ')")
 
 

@@ -13,7 +13,23 @@ from matplotlib.text import Text
 import tfarm
 from tests.shell import refused, run
 from tfarm.plots import column
-from tfarm.plots.style import BLUE, GOOD, GREEN, GREY, INK, LOW, MARGINAL, ORANGE, POOR, PURPLE, REGIONS, save_figure
+from tfarm.plots.regions import SLATE
+from tfarm.plots.style import (
+    BLUE,
+    GOOD,
+    GREEN,
+    GREY,
+    INK,
+    LOW,
+    MARGINAL,
+    ORANGE,
+    POOR,
+    PURPLE,
+    REGIONS,
+    UNSTABLE,
+    drawn_for,
+    save_figure,
+)
 from tfarm.report.page import TEMPLATES
 
 mpl.use("Agg")
@@ -74,7 +90,7 @@ def test_the_ground_of_a_dark_picture_is_that_of_its_page(dark):
     assert not re.search(r"img \{[^}]*background", css)
 
 
-@pytest.mark.parametrize("colour", [INK, GREY, BLUE, ORANGE, GREEN, PURPLE, MARGINAL, GOOD, LOW, POOR])
+@pytest.mark.parametrize("colour", [INK, GREY, BLUE, ORANGE, GREEN, PURPLE, MARGINAL, GOOD, LOW, POOR, UNSTABLE])
 def test_the_palette_can_be_read_on_both_grounds(colour, dark):
     """Letters in any of its colours; in the dark each has the hue that it has in light, to 12 degrees."""
     light, other = rgb(colour), dark(rgb(colour))
@@ -93,6 +109,13 @@ def test_regions_are_in_order_and_their_counts_can_be_read_on_both_grounds(dark)
     for ink, tints in ((rgb(INK), regions), (dark(rgb(INK)), list(map(dark, regions)))):
         assert min(contrast(ink, tint) for tint in tints[:-1]) >= TEXT
         assert contrast(ink, tints[-1]) >= LINES
+
+
+def test_contours_of_damping_can_be_read_on_the_stable_region(dark):
+    """Their lines as letters: they are a point thin."""
+    ground, line = rgb(REGIONS[0]), rgb(SLATE)
+    assert contrast(line, ground) >= TEXT
+    assert contrast(dark(line), dark(ground)) >= TEXT
 
 
 def test_a_colour_that_can_be_read_on_paper_can_be_read_in_the_dark(dark):

@@ -362,8 +362,9 @@ def sampled_margins(curve: SampledCurve) -> LoopMargins:
 def unaliased_poles(loop: Sampled) -> dict[int, complex]:
     """The poles s = ln(z)/T [1/s] with Im s > 0 by mode, each at the frequency that is nearest to that of its mode."""
     T, poles = loop.chain.sampling.period, loop.poles
-    # a real z < 0 oscillates at half the sampling rate; by rounding it may be one of a pair, or below the axis
-    upper = (poles.z.imag > 0) | ((poles.z.real < 0) & (abs(poles.z.imag) <= ON_REAL_AXIS * abs(poles.z)))
+    rounding = ON_REAL_AXIS * abs(poles.z)
+    # a real z < 0 oscillates at half the sampling rate, one > 0 never does, whatever rounding leaves of Im z
+    upper = (poles.z.imag > rounding) | ((poles.z.real < 0) & (abs(poles.z.imag) <= rounding))
     table = modes(loop.plant.arm, max(1, int(poles.mode.max(initial=1))))
     natural = dict(zip(table.index.tolist(), table.natural_frequency.tolist(), strict=True))
     found: dict[int, complex] = {}

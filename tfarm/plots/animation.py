@@ -31,7 +31,7 @@ STATIONS, BETWEEN = 15, 4  # along the link; records between two samples, betwee
 RATE, PERIOD_FRAMES, MOST_FRAMES = 20, 8, 240  # frames: a second, least in a period of the first mode, most of a film
 SEEN, DRAWN = 0.02, 0.1  # of the reach: largest deflection that is seen to scale, and largest of an exaggerated one
 HUB, BEYOND, RIM, MOST = 0.05, 1.07, 0.1, 1.3  # of the reach: hub, end of the reference, edge, and largest picture
-WIDTH, LETTERS, DOTS, INKS, WHITE = 6.0, 0.9, 80, 48, 250  # inches across, above and below; dots an inch; colours
+WIDTH, LETTERS, DOTS, INKS, WHITE = 4.6, 1.0, 104, 48, 250  # inches across, above and below; dots an inch; colours
 
 
 class Motion(NamedTuple):
@@ -105,7 +105,7 @@ def draw_motion(motion: Motion, *, ax: Axes) -> None:
         ax.plot(here.real, here.imag, color=colour, lw=lw, solid_capstyle="butt", marker=mark, ms=6.0, markevery=[-1])
     scale = "deflection to scale" if motion.factor == 1 else f"deflection × {motion.factor}"
     speed = "" if motion.speed == 1 else f", speed × {plain(motion.speed, 2)}"
-    ax.set_xlabel(f"hub to tip {plain(motion.arm.reach, 3)} m, thin: reference, {scale}{speed}")
+    ax.set_xlabel(f"hub to tip {plain(motion.arm.reach, 3)} m, thin: reference,\n{scale}{speed}")
     ax.set_title(motion.words(motion.still), loc="left", fontsize=9.0, color=INK)
 
 

@@ -210,7 +210,7 @@ def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     )  # fmt: skip
     ax.set_xlabel("Re L [−]", loc="left")
     frame = ax.add_patch(Rectangle((-edge, -edge), 2 * edge, 2 * edge, fill=False, ec=GREY, lw=0.8, clip_on=False))
-    zoom.set(xlim=ZOOM[:2], ylim=ZOOM[2:], xlabel="Re L [−]", title="zoom at −1")
+    zoom.set(xlim=ZOOM[:2], ylim=ZOOM[2:], xlabel="Re L [−], zoom at −1")
     circles: list[tuple[complex, float, Looks]] = [
         (0.0, 1.0, {"color": GREY, "ls": "-", "label": "|L| = 1"}),
         (-1.0, 1 / USUAL_PEAK, {"color": INK, "ls": ":", "label": f"Ms = {USUAL_PEAK:g}"}),

@@ -305,7 +305,9 @@ def draw_measured_runs(each: Mapping[str, RunComparison], *, ax: Sequence[Axes])
     for column, (name, found) in zip(axes.T, each.items(), strict=True):
         measured, run = found.measured, found.run
         column[0].plot(measured.t, np.degrees(measured.reference), color=GREY, lw=1.0, ls=DASHED, label="reference")
-        column[0].set(title=safe(name), xlim=(0.0, float(measured.t[-1])))
+        for one, label in zip(column, ("hub angle [deg]", "root moment [N m]"), strict=False):
+            one.set(title=safe(name), xlim=(0.0, float(measured.t[-1])), ylabel=label)
+            one.label_outer()
         column[-1].set_xlabel(TIME)
         signals = (
             (np.degrees(measured.hub_angle), np.degrees(found.hub_angle)),
@@ -315,8 +317,6 @@ def draw_measured_runs(each: Mapping[str, RunComparison], *, ax: Sequence[Axes])
             if seen.size:
                 one.plot(measured.t, seen, color=ORANGE, label="measured")
             one.plot(run.t, computed, color=BLUE, lw=1.2, label="exact sampled loop")
-    for one, label in zip(axes[:, 0], ("hub angle [deg]", "root moment [N m]"), strict=False):
-        one.set_ylabel(label)
 
 
 @picture(
@@ -352,7 +352,8 @@ def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap], *, 
         left.plot([at, at], ends, solid_capstyle="butt", zorder=6, color=colour, lw=width, alpha=alpha)
     tuned_gain(tuning, ax=right)
     left.set_ylim(-0.25, 1.25)  # from 0 to the continuous loop's bound, 1, and a quarter to either side
-    right.set_ylabel("")
+    if right.get_shared_y_axes().joined(left, right):
+        right.set_ylabel("")
 
 
 @picture(

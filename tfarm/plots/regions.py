@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.colors import to_rgb
+from matplotlib.path import Path
 from matplotlib.ticker import LogLocator
 from scipy import ndimage
 
@@ -56,7 +57,7 @@ from .style import (
     safe,
 )
 
-SLATE = "#5b7083"  # of contours of damping: no colour of stability
+SLATE = "#3d5468"  # of contours of damping: no colour of stability
 DASHED, DASH_DOTTED = (0, (5, 2.5)), (0, (6, 2, 1, 2))  # edges of a sampled loop, and of a second one
 HATCHES = ("..", "\\\\\\\\", "////")  # of a sampled loop: with more damping, with less, with its own
 K2_RANGE = (-1.0, 1.5)  # of the gain that balances a torque: 1 where the input is one, less for a motor's current
@@ -143,7 +144,10 @@ def colours(unstable: Whole) -> Real:
 
 
 def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
-    """Of the least damping ratio (up, across), where it is a number: inside the stable region."""
+    """Of the least damping ratio (up, across), where it is a number: inside the stable region.
+
+    Open lines shorter than a twelfth of the picture are stubs at the edge of the grid, and left out.
+    """
     ends = np.nanmin(damping, initial=np.inf), np.nanmax(damping, initial=0.0)
     levels = [level for level in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(*ends) if ends[0] < level < ends[1]]
     if not levels:
@@ -152,11 +156,17 @@ def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
     lines = ax.contour(
         across, up, logarithm, np.log(levels[-5:]), colors=SLATE, linewidths=0.8, linestyles="-", zorder=2.5
     )
-    for level, parts in zip(lines.levels, lines.allsegs, strict=True):
+    to_view = ax.transData - ax.transAxes
+    kept = [
+        [p for p in parts if np.array_equal(p[0], p[-1]) or np.hypot(*np.ptp(to_view.transform(p), axis=0)) > 1 / 12]
+        for parts in lines.allsegs
+    ]
+    lines.set_paths([Path.make_compound_path(*map(Path, parts)) for parts in kept])
+    for level, parts in zip(lines.levels, kept, strict=True):
         longest = max(parts, key=len, default=())
         name = f"{plain(100 * np.exp(level), 3)} %"
         any(
-            note(name, longest[int(share * len(longest))], ax, ha="center", color=SLATE, zorder=6)
+            note(name, longest[int(share * len(longest))], ax, ha="center", color=INK, zorder=6)
             for share in (0.5, 0.35, 0.65, 0.2, 0.8)  # best place first
             if len(longest) > 12
         )

@@ -41,11 +41,11 @@ INK, GREY, FAINT = "#1a1a1a", "#6b6b6b", "#d4d4d4"
 BLUE, ORANGE, GREEN, PURPLE = "#0060a8", "#c4500a", "#00795a", "#8a3b8f"  # distinct for the colour-blind too
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE)  # of several records in one picture
 # stability, the same in every picture, page and live view; each has a mark of its own too, for grey print
-STABLE, MARGINAL, UNSTABLE = BLUE, PURPLE, ORANGE
+STABLE, MARGINAL, UNSTABLE = BLUE, PURPLE, "#a81e2b"
 # regions of a map by the number of unstable poles, 0 first: ever darker in grey; green is kept for good margins
-REGIONS = ("#dcecf9", "#f8d0b0", "#efb286", "#e29259", "#cf7132")
-# grades of margins; with those of a page's dark mode in style.css
-GOOD, LOW, POOR = GREEN, "#8a6100", "#b3310a"
+REGIONS = ("#dcecf9", "#f9cfc0", "#f2ad9b", "#e58a76", "#d46c5a")
+# grades of margins, amber before red, which is kept for what is unstable; with those of a page's dark mode in style.css
+GOOD, LOW, POOR = GREEN, "#735200", ORANGE
 
 
 WIDEST_LEGEND = 0.95  # of a figure's width: letters are a little wider or narrower in a file of other dots an inch
@@ -69,18 +69,29 @@ COORDINATES, LONG_NUMBER, PATH_LETTER = (  # in an SVG
 DARK = Path(__file__).with_name("dark.svg").read_bytes()  # in an SVG: its colours on a dark page
 STYLE, COLUMN = (Path(__file__).with_name(f"{name}.mplstyle") for name in ("tfarm", "column"))
 COLUMN_WIDTH, PAGE_WIDTH, WIDE = 3.5, 7.16, 9.5  # inches: one and both columns of an IEEE paper, and what needs both
+HALF_WIDTH, PHONE_WIDTH = 6.2, 3.83  # inches at 96 pixels: half a page that is 1280 wide, and one that is 400
 COLUMN_POINTS, SMALL_POINTS, THIN = 8.0, 6.5, 0.7  # largest letters, those inside axes; factor on lines and marks
 LONG_LABEL, LINE = 14, 46  # letters of a label up one of several axes, and of a line of a label below the axes
-_in_column: ContextVar[bool] = ContextVar("_in_column", default=False)
+_place: ContextVar[str] = ContextVar("_place", default="")
 
 
 def style() -> AbstractContextManager[None]:
     """The style of pictures, whatever the user's own settings are."""
-    return matplotlib.style.context(["default", STYLE, *[COLUMN] * _in_column.get()])
+    return matplotlib.style.context(["default", STYLE, *[COLUMN] * (_place.get() == "column")])
 
 
 @contextmanager
-def column() -> Iterator[None]:
+def drawn_for(place: str) -> Iterator[None]:
+    """Draw pictures for the "column" of a paper, for half a "page" or for a "phone": no letter is scaled down there."""
+    before = _place.set(place)
+    try:
+        with style():
+            yield
+    finally:
+        _place.reset(before)
+
+
+def column() -> AbstractContextManager[None]:
     """Draw pictures for a paper: at the width of its column, with letters that suit LaTeX, without a headline.
 
     In this context a new figure is 3.5 inches wide, one column of an IEEE paper, or 7.16 inches, both columns, where
@@ -94,12 +105,7 @@ def column() -> Iterator[None]:
     ...     upper, lower = tfarm.plots.bode(tfarm.bode(arm, "root_moment"))
     ...     upper.figure.savefig("bode.pdf")
     """
-    before = _in_column.set(True)
-    try:
-        with style():
-            yield
-    finally:
-        _in_column.reset(before)
+    return drawn_for("column")
 
 
 FIGURES: dict[Any, Callable[..., Figure]] = {}  # by the class of a record its first picture as a figure of its own
@@ -144,13 +150,15 @@ def picture(
             found, how = bound.args, bound.kwargs
             with style():
                 inches = size(*found) if callable(size) else size
-                fitted = column_size(inches, grid is not None) if _in_column.get() else inches
-                drawn = new(figsize=fitted, layout="constrained")  # no label clipped
+                size_here = placed_size(inches, grid is not None)
+                drawn = new(figsize=size_here, layout="constrained")  # no label clipped
                 make(drawn, *found)
+                if grid is not None and _place.get() == "phone":
+                    stack(drawn)
                 draw(*found, ax=drawn.axes[0] if is_one else drawn.axes, **how)
                 for ax in drawn.axes[: len(rows) - 1] if grid is None else []:
                     ax.set_xlabel("")
-                finish(drawn, fitted[1], title(*found))
+                finish(drawn, title(*found))
             drawn.again = partial(figure, *found, **how)  # type: ignore[attr-defined]  # in another style
             return drawn
 
@@ -184,40 +192,56 @@ def given_axes(ax: Any, count: int | None) -> list[Axes]:
     return axes
 
 
-def column_size(inches: tuple[float, float], is_wide: bool) -> tuple[float, float]:
-    """Width and height of a picture in a paper, without its legend; in one column labels need more of the height."""
-    share = inches[1] / inches[0]
-    return (
-        (PAGE_WIDTH, PAGE_WIDTH * share)
-        if is_wide or inches[0] > WIDE
-        else (COLUMN_WIDTH, COLUMN_WIDTH * share**0.4 - 0.2)  # less a line of a legend
-    )
+def placed_size(inches: tuple[float, float], is_grid: bool) -> tuple[float, float]:
+    """Width and height of a picture at its place, there without its legend; labels need more of a smaller height."""
+    share, is_wide = inches[1] / inches[0], is_grid or inches[0] > WIDE
+    match _place.get():
+        case "column" if is_wide:
+            return PAGE_WIDTH, PAGE_WIDTH * share
+        case "column":
+            return COLUMN_WIDTH, COLUMN_WIDTH * share**0.4 - 0.2  # less a line of a legend
+        case "phone":
+            return PHONE_WIDTH, PHONE_WIDTH * (0.3 + 0.75 * share)
+        case "page" if not is_grid and inches[0] > HALF_WIDTH:
+            return HALF_WIDTH, HALF_WIDTH * share**0.7 - 0.2
+    return inches
+
+
+def stack(figure: Figure) -> None:
+    """Put axes that are side by side below each other, on a phone: each as wide as the picture."""
+    boxes = [ax.get_position() for ax in figure.axes]
+    shares = [min(0.7, box.height * figure.get_figheight() / (box.width * figure.get_figwidth())) for box in boxes]
+    figure.clear()
+    figure.set_figheight(sum(PHONE_WIDTH * share + 0.3 for share in shares))
+    figure.subplots(len(shares), height_ratios=shares, squeeze=False)
 
 
 def make_thin(figure: Figure) -> None:
-    """Letters that a picture made larger than those of a column, its lines and marks, made to fit one.
-
-    Where several axes share the height, a long label has its unit on a line of its own.
-    """
+    """Letters that a picture made larger than those of a column, its lines and marks, made to fit one."""
     inside = [text for ax in figure.axes for text in ax.texts]
     for text in (each for each in figure.findobj() if isinstance(each, Text)):
         text.set_fontsize(min(text.get_fontsize(), SMALL_POINTS if text in inside else COLUMN_POINTS))
+        text.set_text(folded(text.get_text(), LINE))
     for ax in figure.axes:
         sizes = product(ax.lines, ("linewidth", "markersize", "markeredgewidth"))
         for each, of in (*sizes, *product(ax.collections, ("linewidth",))):
             each.set(**{of: THIN * np.asarray(getattr(each, f"get_{of}")())})
-        ax.set_xlabel(textwrap.fill(ax.get_xlabel(), LINE))
-        if len(figure.axes) > 1 and len(label := ax.get_ylabel()) > LONG_LABEL:
-            ax.set_ylabel(re.sub(r" +(?=\[)", "\n", label))
 
 
-def finish(drawn: Figure, height: float, words: str) -> None:
-    """Legend and headline; of a figure for a column of a paper thin lines, no headline, and room for its legend."""
-    if _in_column.get():
+def finish(drawn: Figure, words: str) -> None:
+    """Legend and headline; at a place room for the legend, and where that is narrow thin lines and no headline.
+
+    Where several axes share the height there, a long label has its unit on a line of its own.
+    """
+    if is_narrow := _place.get() in ("column", "phone"):
         make_thin(drawn)
-        drawn.set_figheight(height + legend_below(drawn))
-    else:
-        legend_below(drawn)
+    legend = legend_below(drawn)
+    if _place.get():
+        drawn.set_figheight(drawn.get_figheight() + legend)
+        for ax in drawn.axes[: len(drawn.axes) * (len(drawn.axes) > 1)]:
+            label = ax.get_ylabel()
+            ax.set_ylabel(re.sub(r" +(?=\[)", "\n", label) if len(label) > LONG_LABEL else label)
+    if not is_narrow:
         headline(drawn, words)
 
 
@@ -228,9 +252,11 @@ def legend_below(figure: Figure) -> float:
     """
     each = (ax.get_legend_handles_labels() for ax in figure.axes if ax.get_legend() is None)
     keys = {label: handle for own in each for handle, label in zip(*own, strict=True)}
+    # two columns of a legend fit half a page
+    labels = [folded(label, 40 if figure.get_figwidth() <= HALF_WIDTH else 100) for label in keys]
     for number in (5, 3, 2, 1) if keys else ():
         legend = figure.legend(
-            keys.values(), keys, loc="outside lower left", ncols=number,
+            keys.values(), labels, loc="outside lower left", ncols=number,
             fontsize=min(8.2, mpl.rcParams["legend.fontsize"]), handlelength=1.8, columnspacing=1.2,
         )  # fmt: skip
         box = legend.get_window_extent()
@@ -242,9 +268,13 @@ def legend_below(figure: Figure) -> float:
 
 def headline(figure: Figure, text: str) -> None:
     """Text above everything, at the left, its lines folded where they do not fit."""
-    width = round(11.5 * figure.get_figwidth())  # letters
-    lines = [textwrap.fill(line, width) for line in text.replace(" = ", "\u00a0=\u00a0").splitlines()]
-    figure.suptitle(safe("\n".join(lines)), x=0.012, ha="left", fontsize=10.5, color=INK)
+    lines = folded(text.replace(" = ", "\u00a0=\u00a0"), round(11.5 * figure.get_figwidth()))
+    figure.suptitle(safe(lines), x=0.012, ha="left", fontsize=10.5, color=INK)
+
+
+def folded(text: str, letters: int) -> str:
+    """A text with its lines folded where they are longer."""
+    return "\n".join(textwrap.fill(line, letters) for line in text.splitlines())
 
 
 def note(text: str, at: tuple[float, float], ax: Axes, room: tuple[float, float] = NUMBER_ROOM, **looks: Any) -> bool:

@@ -44,7 +44,7 @@ from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.fitting.recording import MeasuredRun
 from tfarm.loop.loop import Loop
-from tfarm.plots.style import Figure, gains_words, save_column, save_figure
+from tfarm.plots.style import Figure, drawn_for, gains_words, save_column, save_figure
 from tfarm.records import record
 from tfarm.response.signals import Signals, sign_of
 from tfarm.schema import Column, Table, quantities, save_table, text, to_json
@@ -203,12 +203,20 @@ def save_section(section: PageSection, folder: Path, is_paper: bool = False) -> 
 
 
 def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> SavedBlock:
-    """A picture as pictures/*.svg, for a paper *.pdf too, its data as data/*.csv; a table as data/*.csv and .json."""
+    """A picture as pictures/*.svg, for a paper *.pdf too, its data as data/*.csv; a table as data/*.csv and .json.
+
+    Of a picture there is a narrow one for phones, *-narrow.svg; a film is small enough.
+    """
     shape: Any = templates().get_template("blocks.html").module
     if isinstance(block, Table):
         files = [f"{DATA}/{name}" for name in save_table(block, folder / DATA)]
         return SavedBlock(block.stem, block.title, shape.table(block, files))
     save_figure(block.figure, folder / PICTURES, block.stem, formats=("svg",))
+    narrow = None
+    if not block.film:
+        with drawn_for("phone"):
+            narrow = block.figure.again()  # type: ignore[attr-defined]
+            save_figure(narrow, folder / PICTURES, f"{block.stem}-narrow", formats=("svg",))
     if is_paper:
         save_column(block.figure, folder / PICTURES, block.stem)
     columns = tuple(
@@ -221,7 +229,7 @@ def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> 
     kinds = ("svg", *["pdf"] * is_paper, *["gif"] * bool(block.film))
     drawn = [f"{PICTURES}/{block.stem}.{kind}" for kind in kinds]
     files = [*drawn, *(f"{DATA}/{name}" for name in saved)]
-    return SavedBlock(block.stem, block.title, shape.picture(block, files), shape.image(block))
+    return SavedBlock(block.stem, block.title, shape.picture(block, files, narrow), shape.image(block, narrow))
 
 
 def explained(text: str, words: str = "") -> Markup:

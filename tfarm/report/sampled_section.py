@@ -10,12 +10,13 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, shown_unit
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, shown_unit, tracked
 from tfarm.case.card import margins_of
 from tfarm.case.step import Step, step
 from tfarm.digits import plain, significant
-from tfarm.dsp import Analysis, Chain, Simulation, modes, results, sampled_verdict, traces, verdict
+from tfarm.dsp import Analysis, Chain, Simulation, Simulator, modes, results, sampled_verdict, traces, verdict
 from tfarm.dsp.chain import MOST_DELAY
+from tfarm.dsp.simulate import SETTLED_SHARE
 from tfarm.errors import ParameterError
 from tfarm.fitting.recording import RunComparison, compare_run, overshoot
 from tfarm.plots import animation, motion, regions, roots, style
@@ -37,6 +38,7 @@ from tfarm.spectrum.table import default_gains
 MORE_DELAY = (0.0, 0.5, 1.0)  # samples of further delay for which the verdict is given
 VERDICT_COLUMNS = ("word", "spectral_radius", "time_constant", "slowest", "holds_for")
 WHOLE_LAW_COLUMNS = ("index", "natural_frequency", "band", "aliased", "first_order", "by_damping", "log_radius")
+MOST_SAMPLES = 10_000  # after a record in which an unstable loop may seem settled: a second of computing
 FILM_SLEWS, FILM_FRAMES = 1.5, 80  # length of a film in slews, and frames at most: a second of computing
 
 
@@ -51,10 +53,11 @@ def sampled_section(case: Case) -> PageSection:
         along = [loci_picture(first)]
     numbers = across({each.title: it for each, it in found}, keys=[each.key for each, _ in found])
     pictures, words, facts = slews(case)
+    growths = [growth_words(each, it.verdict, chain) for each, it in found if it.verdict.log_radius > 0]
     return PageSection(
         title=f"The sampled loop, {plain(1e3 * chain.sampling.period)} ms",
         facts=[*(interval_facts(first) if not case.laws else ()), *facts],
-        words=[chain_words(arm, chain), *words],
+        words=[" ".join([chain_words(arm, chain), *growths]), *words],
         blocks=[
             *planes,
             sheet("sampled", numbers),
@@ -291,6 +294,22 @@ def measured_blocks(case: Case) -> Iterator[Picture | Table]:
     yield picture("sampled_measured", figure, data=columns, found=found)
     rows = [row for name, it in found.items() if it.measured.hub_angle.size for row in step_rows(name, it)]
     yield sheet("sampled_overshoot", table(rows))
+
+
+def growth_words(each: Controller, found: verdict.Verdict, chain: Chain) -> str:
+    """The growth of an unstable loop; of one with a measured run also when the hub angle shows it, after that run."""
+    T, measured, shown = chain.sampling.period, each.given.measured, list[float]()
+    growth = T / found.log_radius
+    if measured is not None:
+        reference, end = measured.reference, float(measured.t[-1])
+        t = np.append(measured.t, end + min(20 * growth, MOST_SAMPLES * T))
+        longer = replace(measured, t=t, reference=np.append(reference, reference[-1]))
+        arm, law = tracked(each.arm, each.law)
+        run = Simulator(arm, chain, longer.scenario(T), law, count=found.modes_used).run().at_samples
+        settled = run.hub_angle[run.t <= end][-1]
+        away = abs(run.hub_angle - settled) > SETTLED_SHARE * abs(measured.step)
+        shown = run.t[away & (run.t > end)].tolist()
+    return prose("growth", name=each.name, found=found, growth=growth, measured=measured, shown=shown)
 
 
 def compared_data(found: Mapping[str, RunComparison]) -> Iterator[Column]:

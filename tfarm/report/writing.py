@@ -24,6 +24,7 @@ from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.plots import studies
 from tfarm.plots.regions import comparison
+from tfarm.plots.style import drawn_for
 from tfarm.processes import shared
 from tfarm.report.arm_section import arm_section, assumptions_section
 from tfarm.report.live import ASSETS, LIVE_PAGE, is_live, save_live, write_assets
@@ -148,7 +149,8 @@ def pieces_of(case: Case) -> list[Piece]:
 def make_section(name: str, anchor: str, make: Callable[[Case], PageSection], case: Case, folder: Path) -> PageSection:
     """A section saved in the arm's folder, or in its place why tfarm could not make it; a bug of ours stays loud."""
     try:
-        section = replace(make(case), anchor=anchor)
+        with drawn_for("page"):
+            section = replace(make(case), anchor=anchor)
     except TfarmError as error:
         section = PageSection(
             anchor=anchor,
@@ -424,7 +426,9 @@ def write_study(found: Study) -> Path:
     """
     folder = found.parts.folder
     with place_in(folder, "--out") as made:
-        sections = [save_section(each, made) for each in study_sections(found)]
+        with drawn_for("page"):
+            drawn = study_sections(found)
+        sections = [save_section(each, made) for each in drawn]
         title = f"{found.arm}: study of {how_many(found.rows, 'arm')}"
         page = render("study.html", title=title, sections=sections, explained=explained, found=found)
         write_text(made / "index.html", page)

@@ -1,7 +1,7 @@
 // Charts on a canvas: plots below each other, each with axes x and y {low, high, kind, constant, label, values} and marks over them.
 "use strict";
 const FORM = { linear: x => x, log: x => Math.log10(Math.max(x, 1e-300)) };
-const CROSS = "cross", DOT = "dot", RING = "ring", BOX = "box", LEFT = 54, RIGHT = 10, TOP = 8, BELOW = 34, BETWEEN = 12; // pixels around the plots
+const CROSS = "cross", DOT = "dot", RING = "ring", BOX = "box", LEFT = 58, RIGHT = 10, TOP = 8, BELOW = 34, BETWEEN = 12; // pixels around the plots
 const formOf = ({ kind = "linear", constant }) => kind === "symlog" ? x => Math.sign(x) * Math.log1p(Math.abs(x) / constant) : FORM[kind];
 
 // From a value to a pixel, and back
@@ -10,7 +10,7 @@ function scaleOf(axis, from, to) {
   const back = pixel => { const y = a + (pixel - from) / (to - from) * (b - a); return axis.kind === "log" ? 10 ** y : axis.kind === "symlog" ? Math.sign(y) * axis.constant * Math.expm1(Math.abs(y)) : y; };
   return { at, back, from, to };
 }
-// Round numbers along an axis, about `most` of them
+// Round numbers along an axis, about `most` of them, two at least
 function ticksOf({ low, high, kind, values }, most) {
   if (values) return values;
   if (kind === "log") {
@@ -19,7 +19,8 @@ function ticksOf({ low, high, kind, values }, most) {
     return tens.length > 2 ? tens : [...Array(b - a + 2).keys()].flatMap(k => [1, 2, 5].map(x => x * 10 ** (a - 1 + k))).filter(x => x >= low && x <= high);
   }
   const rough = (high - low) / most, ten = 10 ** Math.floor(Math.log10(rough)), step = [1, 2, 5, 10].map(k => k * ten).find(k => k >= rough) || 10 * ten;
-  return [...Array(Math.floor(high / step + 1e-9) - Math.ceil(low / step - 1e-9) + 1).keys()].map(k => (Math.ceil(low / step - 1e-9) + k) * step);
+  const found = [...Array(Math.floor(high / step + 1e-9) - Math.ceil(low / step - 1e-9) + 1).keys()].map(k => (Math.ceil(low / step - 1e-9) + k) * step);
+  return found.length < 2 && most < 9 ? ticksOf({ low, high }, most + 1) : found;
 }
 // A number at a tick; powers of ten as such
 function label(x, kind) {

@@ -77,7 +77,7 @@
     text("z-ratio", Number.isFinite(now.zratio) ? general(100 * now.zratio, 4) : "-");
     text("s-constant", Number.isFinite(now.constant) ? general(now.constant, 4) : "-");
     text("z-constant", Number.isFinite(now.zconstant) ? general(now.zconstant, 4) : "-");
-    if (slew) { now.figures = slew.figures(now.run); const { settled } = now.figures; text("slew-settled", Number.isFinite(settled) ? general(settled, 5) : `not settled within ${general((now.run.n - 1) * slew.period, 5)} s`); }
+    if (slew) { now.figures = slew.figures(now.run); const { settled } = now.figures; text("slew-settled", zword === "unstable" ? "unstable" : Number.isFinite(settled) ? general(settled, 5) : `not settled within ${general((now.run.n - 1) * slew.period, 5)} s`); }
     $("scaled").hidden = !data.default || !names.every(name => law[name] === data.default[name]);
     names.forEach(name => { $(`slider-${name}`).value = place(data.axes[name], law[name]); if (document.activeElement !== $(name)) $(name).value = law[name]; });
     text("map-note", !law.Kp ? [across, up].map(name => `${name} = ${general(law[name], 4)}`).join(", ") : "The sampled region is known at Kp = 0 and not shown at this Kp; the verdict is that of the gains.");
@@ -243,10 +243,21 @@
 
   let waiting = false, resting = 0, chord = PRECISE;
   const sharp = () => `${zoom} ${chord}`; // by which curves are kept
-  function set(changes) {
+  // A gain beyond the samples of this page is not run: its limit is, and `range` names both
+  function take(changes) {
+    const beyond = [];
     for (const [name, value] of Object.entries(changes)) {
-      if (name in law) { if (Number.isFinite(value)) law[name] = clip(value, data.axes[name].low, data.axes[name].high); } else state[name] = value;
+      if (!(name in law)) { state[name] = value; continue; }
+      const { low, high } = data.axes[name];
+      if (Number.isFinite(value)) law[name] = clip(value, low, high);
+      if (Math.abs(law[name] - value) <= 1e-3 * Math.abs(law[name])) continue; // of a slider: rounding
+      beyond.push(`${name} = ${Number.isFinite(value) ? value : "no number"} is not run, but ${general(law[name], 6)}: this page has ${general(low, 4)} to ${general(high, 4)}.`);
     }
+    $("range").hidden = !beyond.length;
+    text("range", beyond.join(" "));
+  }
+  function set(changes) {
+    if (Object.keys(changes).length) take(changes);
     if (waiting) return;
     waiting = true;
     requestAnimationFrame(() => { waiting = false; move(); });
@@ -411,7 +422,7 @@
 
   for (const name of names) {
     $(`slider-${name}`).addEventListener("input", event => set({ [name]: gainAt(data.axes[name], +event.target.value) }));
-    $(name).addEventListener("change", event => set({ [name]: +event.target.value }));
+    $(name).addEventListener("change", event => { set({ [name]: event.target.value ? +event.target.value : NaN }); event.target.value = law[name]; });
   }
   for (const [id, act] of Object.entries({ reset: () => set({ ...data.start, ...usual }), undo, copy, save })) $(id).addEventListener("click", act);
   for (const id of ["plane", "loop"]) $(id).addEventListener("click", event => { if (event.target.value) set({ [id]: event.target.value }); });
@@ -420,8 +431,7 @@
   addEventListener("hashchange", () => { if (location.hash.slice(1) !== written) { written = location.hash.slice(1); set(linked()); } });
   addEventListener("resize", () => { set({}); draw("sensor"); });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { dress(); set({}); draw("sensor"); });
-  const first = linked();
-  for (const [name, value] of Object.entries(first)) (name in law ? law : state)[name] = value;
+  take(linked());
   now = numbers(law);
   const sensor = data.sensor && makeSensor(data.sensor, colours, () => draw("sensor")), player = slew && makePlayer(slew, colours, now.run, () => draw("slew", false));
   window.live = { loop, discrete, slew, law, player, sensor, moves: [], set, room, lawFile, past, link, get now() { return now; }, rested: null };

@@ -24,7 +24,6 @@ function makePlayer(slew, colours, first, moved) {
     factor = bent > 0 ? Math.max(1, round(ENLARGED * slew.length / bent)) : 1;
     box = boxOf([0, 0], ...run.angle.flatMap((angle, k) => [turned(slew.reach, 0, slew.ideal[5 * k + 1]), turned(slew.reach, factor * (run.tip[k] - slew.reach * angle), angle)]));
     most = { torque: figures.torque || 1, moment: figures.moment || 1 };
-    $("factor").textContent = factor > 1 ? `Deflection is drawn ${factor} times as large.` : "Deflection is drawn to scale.";
     go(Math.min(t, end()));
   }
   function go(time) {
@@ -32,7 +31,7 @@ function makePlayer(slew, colours, first, moved) {
     $("scrub").value = end() ? t / end() : 0;
     const state = slew.at(found, t), { angle, deflection } = slew.shape(state), moment = slew.read(5, state.a, state.rigid, state.u);
     paint(angle, deflection, state.u, moment, slew.ideal[5 * state.k + 1]);
-    $("frame").textContent = `t = ${t.toFixed(3)} s: hub ${angle.toFixed(4)} rad, ${slew.drive} ${general(state.u, 3)} ${slew.unit}, root moment ${general(moment, 3)} N m, tip deflection ${general(deflection[deflection.length - 1], 3)} m`;
+    $("frame").textContent = `t = ${t.toFixed(3)} s: hub ${angle.toFixed(4)} rad, ${slew.drive} ${general(state.u, 3)} ${slew.unit}, root moment ${general(moment, 3)} N m, tip deflection ${general(deflection[deflection.length - 1], 3)} m, ${factor > 1 ? `drawn × ${factor}` : "to scale"}`;
   }
 
   // The arm from above: hub, its line, where the reference has it, and the arm as it is bent

@@ -195,7 +195,7 @@ class SampledLoop {
 
   // The poles in s, each at the frequency nearest to that of the mode whose pole in z is nearest: tfarm.case.card
   unaliased(poles) {
-    const oscillates = ([x, y]) => y > 0 || (x < 0 && y > 1e-12 * x); // a negative z at half the sampling rate
+    const oscillates = ([x, y]) => y > 1e-9 * Math.abs(x) || (x < 0 && y > 1e-9 * x); // a negative z at half the sampling rate
     return poles.filter(({ z }) => oscillates(z)).map(({ z, growth }) => {
       const q = Math.atan2(Math.abs(z[1]), z[0]), own = size(this.p[this.based(z).base]) * this.period || q;
       const [a, b] = [1, -1].map(side => Math.abs(side * q + 2 * Math.PI * Math.round((own - side * q) / (2 * Math.PI))));
