@@ -43,6 +43,7 @@ SURVEYS := \
 	exported.unit_loops \
 	cli.fuzz \
 	cli.stops \
+	case.steps \
 	report.plausible \
 	report.twice
 
