@@ -107,13 +107,14 @@ def speed() -> list[str]:
         return ["*Not measured on the machine that built this page: run `make bench` first.*"]
     kept = json.loads(BENCH.read_text(encoding="utf-8"))
     rows = (
-        [each["what"], str(each["n"]), _time(each["seconds"]),
+        [each["what"], str(each["n"]),
+         *("" if each[name] is None else _time(each[name]) for name in ("seconds", "median", "worst")),
          "" if each["ratio"] is None else f"{general(each['ratio'], 3)} × {each['to']}",
          "" if each["error"] is None else f"{each['error']:.0e}"]
         for each in kept["rows"]
     )  # fmt: skip
     versions = ", ".join(f"{name} {version}" for name, version in kept["versions"].items())
-    titles = ("computation", "number", "time of each", "ratio", "largest error")
+    titles = ("computation", "number", "time of each", "random arms: median", "worst", "ratio", "largest error")
     return [*markdown_table(titles, rows), "", f"Versions: {versions}."]
 
 

@@ -247,10 +247,10 @@ def test_tables_have_the_numbers_of_their_sources(tables, tmp_path, monkeypatch)
     assert any(line.startswith("| lqg | unstable") for line in made["rig-laws"])
     assert all(1.7 < float(line.split(" | ")[1]) < 2.0 for line in made["rig-ring"][2:])
     assert all(float(line.split(" | ")[3].rstrip(" |")) < 1e-14 for line in made["accuracy"][2:])
-    kept = {"versions": {"tfarm": "1"}, "rows": [asdict(Row("modes", 100, 2e-5, 0.5, "other", 1e-16))]}
+    kept = {"versions": {"tfarm": "1"}, "rows": [asdict(Row("modes", 100, 2e-5, 0.5, "other", 1e-16, 3e-5, 1e-3))]}
     (tmp_path / "bench.json").write_text(json.dumps(kept), encoding="utf-8")
     monkeypatch.setattr(tables, "BENCH", tmp_path / "bench.json")
-    assert "| modes | 100 | 20 µs | 0.5 × other | 1e-16 |" in tables.speed()
+    assert "| modes | 100 | 20 µs | 30 µs | 1 ms | 0.5 × other | 1e-16 |" in tables.speed()
 
 
 @pytest.mark.usefixtures("audited")

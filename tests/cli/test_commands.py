@@ -47,6 +47,18 @@ def test_csv_is_the_same_table(capsys, tmp_path):
     assert list(tmp_path.iterdir()) == [file]
 
 
+def test_files_have_all_rows_of_which_a_person_reads_the_first_and_the_last(capsys, tmp_path):
+    command = ("response", "sasaki2012", "--points", "1000")
+    _, out, _ = run(capsys, *command)
+    run(capsys, *command, "--csv", str(tmp_path / "root.csv"))
+    _, *rows = csv.reader((tmp_path / "root.csv").read_text().splitlines())
+    assert len(rows) == len(answer(capsys, *command)["value"]) == 1000
+    *shown, last = out.splitlines()[-42:]
+    assert last == "rows left out: 960 of 1000; --csv FILE writes all"
+    values = [line.split()[2:] for line in shown if "..." not in line]
+    assert values == [row[2:] for row in rows[:20] + rows[-20:]]
+
+
 def test_presets_are_listed_with_their_assumptions(capsys):
     listed = answer(capsys, "presets")["presets"]
     assert {arm["name"] for arm in listed} == set(tfarm.presets())

@@ -1,5 +1,6 @@
 """Tables in narrow terminals: every character of every cell is there, whatever the width."""
 
+import cProfile
 import os
 import pty
 import re
@@ -8,9 +9,9 @@ from dataclasses import replace
 
 import pytest
 
-from tfarm.digits import general, singly
+from tfarm.digits import TEXTS, general, singly
 from tfarm.schema import Column, Table
-from tfarm.schema.terminal import show_text, table_lines
+from tfarm.schema.terminal import first_and_last, show_text, table_lines
 
 COLUMNS = (
     Column("mode", "mode", of=["1", "2"]),
@@ -68,6 +69,47 @@ def test_columns_that_do_not_fit_are_below_with_the_first_one():
 
 def test_a_table_without_rows_has_its_titles():
     assert printed(80, (Column("a", "a", of=[]), Column("b", "b", of=[]))) == ["a  b"]
+
+
+def points(number, digits=TEXTS):
+    """A table of that many points with three columns of numbers."""
+    values = list(range(1, number + 1))
+    return Table(columns=tuple(Column(key, key, "rad/s", of=values, digits=digits) for key in "abc"))
+
+
+def test_of_many_points_the_first_and_the_last_are_shown():
+    table, words = first_and_last(points(1000))
+    lines = table_lines(table, 80)
+    ends = [*range(1, 21), *range(981, 1001)]
+    assert [line.split() for line in lines[1:21] + lines[22:]] == [[str(each)] * 3 for each in ends]
+    assert lines[21].split() == ["...", "960", "rows", "...", "..."]
+    assert words == "rows left out: 960 of 1000; --csv FILE writes all"
+    assert len({len(line) for line in lines}) == 1
+    for whole in (points(41), points(1), points(0)):
+        assert first_and_last(whole) == (whole, "")
+
+
+def test_no_more_cells_are_formatted_than_are_shown():
+    formatted = []
+
+    def digits(values):
+        formatted.extend(values)
+        return TEXTS(values)
+
+    first_and_last(points(100_000, digits))
+    assert len(formatted) == 3 * 40
+
+
+@pytest.mark.parametrize("width", [sys.maxsize, 20])
+def test_twice_the_rows_take_twice_the_calls(width):
+    """Of every Python function, in the width of all columns and in blocks one below the other."""
+
+    def calls(number):
+        table, profile = points(number), cProfile.Profile()
+        profile.runcall(table_lines, table, width)
+        return sum(each.callcount for each in profile.getstats())
+
+    assert calls(400) < 3 * calls(200)  # four times as many where each cell asks the whole column
 
 
 def test_a_heading_has_the_unit():

@@ -2,12 +2,14 @@
 
 Where the terminal is too narrow, titles and long texts are folded.  If that is not enough, the columns that do not fit
 follow in a block below, after the leading ones again.  In a pipe only texts are folded: a row of numbers is one line.
+Of many points only the first and the last are shown.
 """
 
 import io
 import shutil
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, cast
 
 from rich.cells import cell_len, set_cell_size
@@ -23,8 +25,9 @@ PIPE_WIDTH, LEAST_IN_PIPE = 120, 48  # columns of a pipe, and characters to whic
 
 
 def show(record: Any, rows: Table | None = None, last: str = "") -> None:
-    """Print a record as a person reads it, then a table of rows and a last line of text, if there are any."""
-    for number, each in enumerate([*sections(record), Section(table=rows)]):
+    """Print a record as a person reads it, then a table of points and a last line of text, if there are any."""
+    shown, left_out = (None, "") if rows is None else first_and_last(rows)
+    for number, each in enumerate([*sections(record), Section(table=shown)]):
         if each.pairs or each.table or each.drawing:
             print(end="\n" * bool(number))
             show_text(each.title)
@@ -34,6 +37,7 @@ def show(record: Any, rows: Table | None = None, last: str = "") -> None:
             show_table(each.table)
         if each.drawing:
             print(each.drawing)
+    show_text(left_out)
     show_text(last)
 
 
@@ -46,6 +50,27 @@ def show_text(text: str) -> None:
     """Print a text, folded in the width of the terminal."""
     if text:
         print("\n".join(rendered(Text(text), terminal_width())))
+
+
+def first_and_last(table: Table, most: int = 40) -> tuple[Table, str]:
+    """Return the first and last rows of a table of points, and the option that writes all where some are left out.
+
+    With labels, titles and the row of dots between, 40 rows fill a screen of 50 lines; in a pipe the text is the same.
+    """
+    number, half = len(table.columns[0].of), most // 2
+    left_out = number - 2 * half
+    if left_out <= 1:  # a row of dots takes the place of one
+        return table, ""
+    columns: list[Column] = []
+
+    def ends(values: Sequence[Any], *between: Any) -> list[Any]:
+        return [*values[:half], *between, *values[-half:]]
+
+    for column in table.columns:
+        kept = replace(column, of=ends(column.of), shown=column.shown and ends(column.shown))
+        dots = "..." if columns else f"... {left_out} rows"
+        columns.append(replace(column, of=ends(column.of, None), shown=ends(kept.cells, dots)))
+    return replace(table, columns=tuple(columns)), f"rows left out: {left_out} of {number}; --csv FILE writes all"
 
 
 def pair_lines(pairs: Sequence[tuple[str, str]], width: int | None) -> list[str]:
@@ -68,9 +93,9 @@ def table_lines(table: Table, width: int | None = None) -> list[str]:
     widths = [max(cell_len(each.heading), widest(each)) for each in columns]
     if sum(widths) + COLUMN_GAP * (len(widths) - 1) <= width:  # rich would take a second for two thousand rows
         aligned = [
-            [set_cell_size(cell, size) if each.is_text else " " * (size - cell_len(cell)) + cell
+            [set_cell_size(cell, size) if is_text else " " * (size - cell_len(cell)) + cell
              for cell in (each.heading, *each.cells)]
-            for each, size in zip(columns, widths, strict=True)
+            for each, size, is_text in zip(columns, widths, [each.is_text for each in columns], strict=True)
         ]  # fmt: skip
         return [(" " * COLUMN_GAP).join(row).rstrip() for row in zip(*aligned, strict=True)]
     leading = columns[: table.leading]
