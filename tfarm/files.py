@@ -16,9 +16,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import IO, Any, Literal, cast
 
 from tfarm.errors import ParameterError, require
+from tfarm.foreign import read_arrays
 from tfarm.stopping import undone_if_stopped
 
 if sys.platform != "win32":
@@ -28,6 +29,7 @@ STANDARD_OUTPUT = "-"  # in the place of a path, as other programs have it; a fi
 PART, FOLDER = ".part", ".writing-"  # how the names of temporary files end, and those of temporary folders begin
 MAT_HEADER = b"MATLAB 5.0 MAT-file, written by tfarm"
 HEADER_TEXT = 116  # bytes of text that a MAT-file begins with, before its version
+UNREADABLE = "cannot be read ({}); check the path and its permissions"
 SUFFIX = "[a-z0-9_]{8}"  # in their middle or at their end: eight hexadecimal digits, once Python's tempfile
 
 
@@ -36,32 +38,37 @@ def read_file(path: str | os.PathLike[str], most: int, *, key: str, what: str) -
 
     Raises ParameterError, naming `key`; `what` names the kind of file in the remedy ("a .toml file").
     """
-    unreadable = "cannot be read ({}); check the path and its permissions"
-    with _refused(key, path, unreadable):
-        status = os.stat(path)
-    found = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
-    require(stat.S_ISREG(status.st_mode), key, os.fspath(path), f"is {found}; give {what}")
-    with _refused(key, path, unreadable), open(path, "rb") as file:
+    with open_file(path, most, key=key, what=what) as file, _refused(key, path, UNREADABLE):
         data = file.read(most + 1)
-    size = max(len(data), status.st_size)
-    require(len(data) <= most, "size in bytes", size, f"{what} of at most {most} is read", os.fspath(path))
+    _check_size(path, len(data), most, what)  # of a file that grows, or that has no size
     return data
 
 
+@contextmanager
+def open_file(path: str | os.PathLike[str], most: int, *, key: str, what: str) -> Iterator[IO[bytes]]:
+    """Yield what `read_file` reads as an open file."""
+    with _refused(key, path, UNREADABLE):
+        status = os.stat(path)
+    found = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
+    require(stat.S_ISREG(status.st_mode), key, os.fspath(path), f"is {found}; give {what}")
+    _check_size(path, status.st_size, most, what)
+    with _refused(key, path, UNREADABLE):
+        file = open(path, "rb")  # noqa: SIM115  # closed below
+    with file:
+        yield file
+
+
+def _check_size(path: str | os.PathLike[str], size: int, most: int, what: str) -> None:
+    require(size <= most, "size in bytes", size, f"{what} of at most {most} is read", os.fspath(path))
+
+
 def read_mat(path: str | os.PathLike[str], most: int, *, key: str) -> tuple[dict[str, Any], bytes]:
-    """Return the variables of a .mat file (up to version 7.2) by name, and its bytes.
+    """Return the arrays of a .mat file (up to version 7.2) by name, "structure.name" of a structure, and its bytes.
 
     Raises ParameterError, naming `key`, where there is none or it cannot be read.
     """
-    from scipy.io import loadmat
-
     data = read_file(path, most, key=key, what="a .mat file")
-    try:
-        found = loadmat(cast("Any", io.BytesIO(data)), squeeze_me=False, struct_as_record=True)
-    except Exception as error:  # a parser that is not ours, on data from outside: it may raise anything
-        remedy = f"no .mat file that can be read (up to version 7.2): {str(error)[:80]}"
-        raise ParameterError(key=key, value=os.fspath(path), remedy=remedy) from None
-    return {name: value for name, value in found.items() if not name.startswith("__")}, data
+    return read_arrays("mat", path, key=key, remedy="no .mat file that can be read (up to version 7.2)"), data
 
 
 def mat_content(variables: Mapping[str, Any], oned_as: Literal["row", "column"]) -> bytes:

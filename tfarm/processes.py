@@ -84,7 +84,7 @@ def _pool(count: int) -> Iterator[ProcessPoolExecutor]:
 
 @contextmanager
 def _signals_blocked() -> Iterator[None]:
-    """Hold back Ctrl-C and SIGTERM, where the system can."""
+    """Hold back `SIGNALS`, where the system can."""
     change = getattr(signal, "pthread_sigmask", lambda *_: None)
     change(signal.SIG_BLOCK, SIGNALS)
     try:

@@ -110,7 +110,7 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
     if name.lower().endswith(".mat"):
         found, data = read_mat(name, MOST_RECORD_BYTES, key="record")
         held = {each: np.asarray(value, dtype=float) for each, value in found.items()
-                if getattr(value, "ndim", 0) == 2 and value.dtype.kind in "biuf"}  # fmt: skip
+                if value.ndim == 2 and value.dtype.kind in "biuf"}  # fmt: skip
         units, digest = dict.fromkeys(held, ""), hashlib.sha256(data).hexdigest()
     else:
         sheet = read_sheet(name, key="record")
