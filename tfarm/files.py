@@ -13,7 +13,7 @@ import shutil
 import stat
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import IO, Any, Literal, cast
@@ -118,6 +118,21 @@ def place_in(out: Path, key: str, names: Sequence[str] = ()) -> Iterator[Path]:
     Raises ParameterError, naming `key`, before any work where `out` or a folder of these names in it cannot be written.
     """
     folders = [out, *(out / name for name in names)]
+    try:
+        with _made(folders):
+            for folder in folders:
+                with temporary_folder(folder):  # which fails where it cannot be written to
+                    pass
+            with temporary_folder(out) as place:
+                yield place
+    except OSError as error:
+        remedy = f"cannot be written to ({error.strerror or error}); give a folder that can"
+        raise ParameterError(key=key, value=str(out), remedy=remedy) from None
+
+
+@contextmanager
+def _made(folders: Sequence[Path]) -> Iterator[None]:
+    """Make folders, of which those that are new and empty are removed afterwards, also where the process is stopped."""
     missing = [part for folder in folders for part in (*reversed(folder.parents), folder) if not part.exists()]
 
     def remove_empty() -> None:
@@ -129,13 +144,7 @@ def place_in(out: Path, key: str, names: Sequence[str] = ()) -> Iterator[Path]:
         with undone_if_stopped(remove_empty):
             for folder in folders:
                 folder.mkdir(parents=True, exist_ok=True)
-                with temporary_folder(folder):  # which fails where it cannot be written to
-                    pass
-            with temporary_folder(out) as place:
-                yield place
-    except OSError as error:
-        remedy = f"cannot be written to ({error.strerror or error}); give a folder that can"
-        raise ParameterError(key=key, value=str(out), remedy=remedy) from None
+            yield
     finally:
         remove_empty()
 
@@ -234,14 +243,20 @@ def _locked(path: Path, *, wait: bool) -> Iterator[None]:
 
 @contextmanager
 def locked_folder(path: Path, *, key: str) -> Iterator[None]:
-    """Make a folder, unless it is there, and hold its lock.  Raises ParameterError where another process has it."""
-    with _refused(key, path, "cannot be made ({}); choose another"):
-        path.mkdir(parents=True, exist_ok=True)
-    try:
-        with _locked(path, wait=False):
-            yield
-    except BlockingIOError:
-        raise ParameterError(key=key, value=os.fspath(path), remedy="another run has it: wait for its end") from None
+    """Make a folder, unless it is there, and hold its lock; a new one that stays empty is removed.
+
+    Raises ParameterError where another process has it.
+    """
+    with ExitStack() as stack:
+        with _refused(key, path, "cannot be made ({}); choose another"):
+            stack.enter_context(_made([path]))
+        try:
+            stack.enter_context(_locked(path, wait=False))
+        except BlockingIOError:
+            raise ParameterError(
+                key=key, value=os.fspath(path), remedy="another run has it: wait for its end"
+            ) from None
+        yield
 
 
 def _remove(path: Path) -> None:

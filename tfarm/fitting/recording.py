@@ -56,6 +56,7 @@ TIMES = ("t", "time")  # names of the column of times
 JITTER = 0.1  # of the period: a sample further off its place has been dropped or doubled, or the sampling is uneven
 NOTED_JITTER = 1e-3  # of the period: times written in few digits are off by less
 REFERENCE_COLUMN, ANGLE_COLUMN, MOMENT_COLUMN = "reference:hub_angle", "hub_angle", "root_moment"
+MOST_SAMPLE = 1e70  # of a signal: the fourth power is a number, as spectra are squared
 LEAST_SAMPLES = 8  # of a record and of a segment
 ESTIMATORS, WINDOWS = ("H1", "H2", "Hv"), ("hann", "boxcar")
 USUAL_SEGMENTS = 15  # of a record by default: 8 lengths, half overlapped
@@ -135,8 +136,8 @@ def _columns(held: dict[str, Real], size: int) -> dict[str, Real]:
         elif len(value) == size:
             columns |= {f"{name}.{number}": column for number, column in enumerate(value.T, start=1)}
     for name, column in columns.items():
-        for at in np.flatnonzero(~np.isfinite(column))[:1]:
-            require(False, f"{name}, sample {at + 1}", float(column[at]), "no finite number")
+        for at in np.flatnonzero(~(abs(column) <= MOST_SAMPLE))[:1]:
+            require(False, f"{name}, sample {at + 1}", float(column[at]), f"no finite number up to {MOST_SAMPLE:g}")
     return columns
 
 
@@ -148,6 +149,7 @@ def _timing(times: Real) -> tuple[float, float, float]:
     remedy = "is not later than the sample before; sort the rows, and leave doubled ones out"
     require(steps[back] > 0, f"t of sample {back + 2}", float(times[back + 1]), remedy)
     period = float((times[-1] - times[0]) / (times.size - 1))
+    require(period > 1 / MOST_SAMPLE, "period of t", period, "times are in seconds")
     gap = int(np.argmax(abs(steps - usual)))
     jitter = float(abs(times - times[0] - period * np.arange(times.size)).max() / period)
     remedy = f"{steps[gap]:.6g} s after the one before, where {usual:.6g} s is usual: samples have to be even"
