@@ -70,7 +70,7 @@ BAD = {
     "hz,re,im": "rows = 0",
     "frequency,re,im\n1,2,3": "header = 'frequency': known are: hz, rad_s",
     "Hz,re,im\n1,2,3": "header = 'Hz': did you mean \"hz\"?",
-    "re,im\n1,2": "header = 're, im': one column of frequencies: hz or rad_s",
+    "re,im\n1,2": "header = ['re', 'im']: one column of frequencies: hz or rad_s",
     "hz,rad_s,re,im\n1,1,1,2": "one column of frequencies",
     "hz [rad/s],re,im\n1,1,2": "unit of hz = 'rad/s': hz is in Hz",
     "hz,re,im,db\n1,2,3,4": "one pair of columns",

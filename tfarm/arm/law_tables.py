@@ -22,7 +22,7 @@ from pydantic import Field
 from tfarm.arm.law import Law
 from tfarm.arm.reading import load_tables
 from tfarm.arm.schema import StrictTable, validated
-from tfarm.errors import MISSING, ParameterError, close_to, must_be_known, naming, require
+from tfarm.errors import MISSING, ParameterError, close_to, listed, must_be_known, naming, require
 from tfarm.files import read_mat
 
 LAW_TABLE = "law"  # the table's name
@@ -116,7 +116,7 @@ def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:
         must_be_known("system", head.system, dict.fromkeys(name.split(".")[0] for name in found if "." in name))
     place = "" if head.system is None else f"{head.system}."
     missing = [name for name in "ABCD" if f"{place}{name}" not in found]
-    remedy = f"holds no {', '.join(missing)}; it has {', '.join(found)} (system = names a structure)"
+    remedy = f"holds no {', '.join(missing)}; it has {listed(found, 300)} (system = names a structure)"
     require(not missing, "matrices", head.matrices, remedy)
     try:
         A, B, C, D = (np.atleast_2d(np.asarray(found[f"{place}{name}"], dtype=float)) for name in "ABCD")

@@ -346,7 +346,7 @@ def _frequencies(sheet: Sheet) -> Real:
     for name in sheet.columns:
         require(name in KNOWN_COLUMNS, "header", name, did_you_mean(name.lower(), KNOWN_COLUMNS))
     found = [name for name in FREQUENCIES if name in sheet.columns]
-    require(len(found) == 1, "header", ", ".join(sheet.columns), "one column of frequencies: hz or rad_s")
+    require(len(found) == 1, "header", [*sheet.columns], "one column of frequencies: hz or rad_s")
     name, (unit, scale) = found[0], FREQUENCIES[found[0]]
     own, frequency = sheet.units[name], sheet.columns[name]
     require(own.lower() in ("", unit.lower()), f"unit of {name}", own, f"{name} is in {unit}")
@@ -361,7 +361,7 @@ def _values(sheet: Sheet) -> Complex:
     """The complex response, of whichever two columns there are."""
     pair = tuple(name for name in KNOWN_COLUMNS if name in sheet.columns and name in itertools.chain(*VALUE_PAIRS))
     remedy = "one pair of columns for the value: re, im or abs, deg or db, deg; leave others out"
-    require(pair in VALUE_PAIRS, "header", ", ".join(sheet.columns), remedy)
+    require(pair in VALUE_PAIRS, "header", [*sheet.columns], remedy)
     first, second = (sheet.columns[name] for name in pair)
     if pair == ("re", "im"):
         return np.asarray(first + 1j * second)

@@ -45,7 +45,7 @@ from tfarm.dsp.chain import TIME_ROUNDING, Chain
 from tfarm.dsp.results import enough_modes
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator
-from tfarm.errors import MISSING, did_you_mean, must_be_known, naming, require
+from tfarm.errors import MISSING, did_you_mean, listed, must_be_known, naming, require
 from tfarm.files import read_mat
 from tfarm.records import record
 from tfarm.schema import Quantity, Table
@@ -119,7 +119,7 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
     with naming(name):
         columns = _columns(held, next((held[each].size for each in TIMES if each in held), 0))
         of_times = next((each for each in TIMES if each in columns), "")
-        remedy = f"a record has a column t, in seconds; this one has {', '.join(held) or 'none'}"
+        remedy = f"a record has a column t, in seconds; this one has {listed(held, 300) or 'none'}"
         require(of_times, "t", MISSING, remedy)
         require(units[of_times] in ("", "s"), f"unit of {of_times}", units[of_times], "times are in seconds")
         start, period, jitter = _timing(columns.pop(of_times))

@@ -173,7 +173,7 @@ def space_of(
     found = Space(over=known, posterior=posterior, listing=listing, draws=draws, seed=seed)
     remedy = "nothing is varied: give --over KEY=uniform:LOW,HIGH, a list or a posterior"
     require(found.keys, "over", dict(over), remedy)
-    require(not (found.grids and listing), "over", dict(over), "a list has every value itself: no grid with it")
+    require(not (found.grids and listing), "over", [*found.grids], "a list has every value itself: no grid with it")
     for key in found.keys:
         require(found.keys.count(key) == 1, "over", key, "is varied twice; once is enough")
     if posterior is not None:
