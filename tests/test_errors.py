@@ -1,4 +1,5 @@
 import pickle
+import re
 
 import pytest
 
@@ -38,6 +39,18 @@ def test_whatever_the_input_the_text_is_one_printable_line(word):
 @pytest.mark.parametrize("long", ["x" * 50_000, 10**5000, ["a"] * 50_000], ids=["text", "integer", "list"])
 def test_long_values_are_shortened(long):
     assert len(str(error(value=long))) < 120
+
+
+@pytest.mark.parametrize("count", [1, 3, 40])
+def test_a_list_of_keys_is_never_cut_in_its_middle(count):
+    """Each that is there is whole, they are the first ones, and the others are counted."""
+    keys = [f"link.{n}.youngs_modulus" for n in range(count)]
+    for text in (str(error(value=keys)), str(error(remedy=did_you_mean("lnk.7", keys)))):
+        named = re.findall(r"link\.\d+\.youngs_modulus", text.rpartition("known are: ")[2])
+        assert named == keys[: len(named)]
+        assert "..." not in text
+        more = re.search(r" and (\d+) more", text)
+        assert len(named) + int(more[1] if more else 0) == count
 
 
 def test_a_long_key_keeps_its_beginning_and_end():

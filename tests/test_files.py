@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tfarm.errors import ParameterError
-from tfarm.files import read_file, temporary_folder, write_file
+from tfarm.files import locked_folder, place_in, read_file, temporary_folder, write_file
 
 
 def write(path, content=b"new"):
@@ -157,6 +157,26 @@ def test_a_failed_write_leaves_the_old_file_alone(tmp_path, monkeypatch):
     with pytest.raises(ParameterError, match="No space left"):
         write(file)
     assert [each.read_bytes() for each in tmp_path.iterdir()] == [b"old"]
+
+
+def test_a_name_that_is_too_long_for_the_system_is_one_line(tmp_path):
+    for place in (tmp_path / "a" / ("x" * 300), tmp_path / "a" / ("x" * 300) / "b"):
+        with pytest.raises(
+            ParameterError, match=r"cannot be written to \(File name too long\); give a folder that can"
+        ):
+            place_in(place, "--out").__enter__()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_a_failed_run_made_is_removed_and_no_other_one(tmp_path):
+    (tmp_path / "mine").mkdir()
+    for place in (tmp_path / "a" / "b", tmp_path / "mine"):
+        with pytest.raises(ParameterError, match="no space"), locked_folder(place, key="--out"):
+            raise ParameterError(key="--out", value="", remedy="no space")
+    assert [each.name for each in tmp_path.iterdir()] == ["mine"]
+    with locked_folder(tmp_path / "a" / "b", key="--out"):
+        (tmp_path / "a" / "b" / "file").touch()
+    assert (tmp_path / "a" / "b" / "file").exists()
 
 
 def test_only_regular_files_are_read(tmp_path):

@@ -1,6 +1,8 @@
 """Work shared by processes: each task once, the running ones are named, and a process that dies is one error."""
 
 import os
+import subprocess
+import sys
 import time
 from functools import partial
 
@@ -21,6 +23,25 @@ def test_each_task_has_its_result_and_the_running_ones_are_named(monkeypatch):
     assert {name for names in seen for name in names} == set(tasks)
     assert max(map(len, seen)) == 2
     assert BLAS not in os.environ
+
+
+SCRIPT = """
+import os
+from tfarm.processes import shared
+print("begun")
+found = {process for _, process in shared([(n, os.getpid) for n in range(9)], 2)}
+print(os.getpid() in found, __name__, flush=True)
+"""
+
+
+def test_a_script_without_a_guard_is_run_once_and_has_its_processes(tmp_path):
+    """As a study with two workers has them, which does nothing else."""
+    (tmp_path / "my.py").write_text(SCRIPT)
+    paths = os.pathsep.join([os.getcwd(), os.environ.get("PYTHONPATH", "")])
+    environment = os.environ | {"PYTHONPATH": paths}
+    command = [sys.executable, str(tmp_path / "my.py")]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+    assert (done.stdout, done.stderr) == ("begun\nFalse __main__\n", "")
 
 
 def test_an_error_of_a_task_is_raised_and_the_rest_is_not_begun(tmp_path):

@@ -5,6 +5,7 @@ import os
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
+from itertools import accumulate
 from typing import Any, Self
 
 MISSING = ...  # the value of a missing key
@@ -72,7 +73,15 @@ def did_you_mean(word: str, choices: Iterable[str]) -> str:
     known = list(choices)
     near = close_to(word, known)
     hint = "did you mean " + " or ".join(f'"{choice}"' for choice in near) + "? " if near else ""
-    return f"{hint}known are: {', '.join(known)}"
+    return f"{hint}known are: {listed(known, 400 - len(hint))}"
+
+
+def listed(words: Iterable[str], longest: int) -> str:
+    """Return words with commas: the first that fit into `longest` characters, each whole, and the number of others."""
+    known = list(words)
+    ends = accumulate(len(word) + 2 for word in known)
+    count = sum(end <= longest for end in ends)
+    return ", ".join(known[:count]) + f" and {len(known) - count} more" * (count < len(known))
 
 
 def unknown_key(word: str, known: Iterable[str]) -> str:
@@ -122,6 +131,8 @@ def shown(value: object) -> str:
     """Return the text of a value, in at most 60 characters."""
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, list | tuple) and all(isinstance(each, str) for each in value):
+        return f"[{listed((one_line(repr(each), 50) for each in value), 58)}]"
     try:
         return one_line(repr(value), 60)
     except (ValueError, RecursionError):  # an integer of more than 4300 digits, a very deep table

@@ -13,12 +13,13 @@ import shutil
 import stat
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import IO, Any, Literal, cast
 
 from tfarm.errors import ParameterError, require
+from tfarm.foreign import read_arrays
 from tfarm.stopping import undone_if_stopped
 
 if sys.platform != "win32":
@@ -28,6 +29,7 @@ STANDARD_OUTPUT = "-"  # in the place of a path, as other programs have it; a fi
 PART, FOLDER = ".part", ".writing-"  # how the names of temporary files end, and those of temporary folders begin
 MAT_HEADER = b"MATLAB 5.0 MAT-file, written by tfarm"
 HEADER_TEXT = 116  # bytes of text that a MAT-file begins with, before its version
+UNREADABLE = "cannot be read ({}); check the path and its permissions"
 SUFFIX = "[a-z0-9_]{8}"  # in their middle or at their end: eight hexadecimal digits, once Python's tempfile
 
 
@@ -36,32 +38,37 @@ def read_file(path: str | os.PathLike[str], most: int, *, key: str, what: str) -
 
     Raises ParameterError, naming `key`; `what` names the kind of file in the remedy ("a .toml file").
     """
-    unreadable = "cannot be read ({}); check the path and its permissions"
-    with _refused(key, path, unreadable):
-        status = os.stat(path)
-    found = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
-    require(stat.S_ISREG(status.st_mode), key, os.fspath(path), f"is {found}; give {what}")
-    with _refused(key, path, unreadable), open(path, "rb") as file:
+    with open_file(path, most, key=key, what=what) as file, _refused(key, path, UNREADABLE):
         data = file.read(most + 1)
-    size = max(len(data), status.st_size)
-    require(len(data) <= most, "size in bytes", size, f"{what} of at most {most} is read", os.fspath(path))
+    _check_size(path, len(data), most, what)  # of a file that grows, or that has no size
     return data
 
 
+@contextmanager
+def open_file(path: str | os.PathLike[str], most: int, *, key: str, what: str) -> Iterator[IO[bytes]]:
+    """Yield what `read_file` reads as an open file."""
+    with _refused(key, path, UNREADABLE):
+        status = os.stat(path)
+    found = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
+    require(stat.S_ISREG(status.st_mode), key, os.fspath(path), f"is {found}; give {what}")
+    _check_size(path, status.st_size, most, what)
+    with _refused(key, path, UNREADABLE):
+        file = open(path, "rb")  # noqa: SIM115  # closed below
+    with file:
+        yield file
+
+
+def _check_size(path: str | os.PathLike[str], size: int, most: int, what: str) -> None:
+    require(size <= most, "size in bytes", size, f"{what} of at most {most} is read", os.fspath(path))
+
+
 def read_mat(path: str | os.PathLike[str], most: int, *, key: str) -> tuple[dict[str, Any], bytes]:
-    """Return the variables of a .mat file (up to version 7.2) by name, and its bytes.
+    """Return the arrays of a .mat file (up to version 7.2) by name, "structure.name" of a structure, and its bytes.
 
     Raises ParameterError, naming `key`, where there is none or it cannot be read.
     """
-    from scipy.io import loadmat
-
     data = read_file(path, most, key=key, what="a .mat file")
-    try:
-        found = loadmat(cast("Any", io.BytesIO(data)), squeeze_me=False, struct_as_record=True)
-    except Exception as error:  # a parser that is not ours, on data from outside: it may raise anything
-        remedy = f"no .mat file that can be read (up to version 7.2): {str(error)[:80]}"
-        raise ParameterError(key=key, value=os.fspath(path), remedy=remedy) from None
-    return {name: value for name, value in found.items() if not name.startswith("__")}, data
+    return read_arrays("mat", path, key=key, remedy="no .mat file that can be read (up to version 7.2)"), data
 
 
 def mat_content(variables: Mapping[str, Any], oned_as: Literal["row", "column"]) -> bytes:
@@ -111,6 +118,21 @@ def place_in(out: Path, key: str, names: Sequence[str] = ()) -> Iterator[Path]:
     Raises ParameterError, naming `key`, before any work where `out` or a folder of these names in it cannot be written.
     """
     folders = [out, *(out / name for name in names)]
+    try:
+        with _made(folders):
+            for folder in folders:
+                with temporary_folder(folder):  # which fails where it cannot be written to
+                    pass
+            with temporary_folder(out) as place:
+                yield place
+    except OSError as error:
+        remedy = f"cannot be written to ({error.strerror or error}); give a folder that can"
+        raise ParameterError(key=key, value=str(out), remedy=remedy) from None
+
+
+@contextmanager
+def _made(folders: Sequence[Path]) -> Iterator[None]:
+    """Make folders, of which those that are new and empty are removed afterwards, also where the process is stopped."""
     missing = [part for folder in folders for part in (*reversed(folder.parents), folder) if not part.exists()]
 
     def remove_empty() -> None:
@@ -122,13 +144,7 @@ def place_in(out: Path, key: str, names: Sequence[str] = ()) -> Iterator[Path]:
         with undone_if_stopped(remove_empty):
             for folder in folders:
                 folder.mkdir(parents=True, exist_ok=True)
-                with temporary_folder(folder):  # which fails where it cannot be written to
-                    pass
-            with temporary_folder(out) as place:
-                yield place
-    except OSError as error:
-        remedy = f"cannot be written to ({error.strerror or error}); give a folder that can"
-        raise ParameterError(key=key, value=str(out), remedy=remedy) from None
+            yield
     finally:
         remove_empty()
 
@@ -227,14 +243,20 @@ def _locked(path: Path, *, wait: bool) -> Iterator[None]:
 
 @contextmanager
 def locked_folder(path: Path, *, key: str) -> Iterator[None]:
-    """Make a folder, unless it is there, and hold its lock.  Raises ParameterError where another process has it."""
-    with _refused(key, path, "cannot be made ({}); choose another"):
-        path.mkdir(parents=True, exist_ok=True)
-    try:
-        with _locked(path, wait=False):
-            yield
-    except BlockingIOError:
-        raise ParameterError(key=key, value=os.fspath(path), remedy="another run has it: wait for its end") from None
+    """Make a folder, unless it is there, and hold its lock; a new one that stays empty is removed.
+
+    Raises ParameterError where another process has it.
+    """
+    with ExitStack() as stack:
+        with _refused(key, path, "cannot be made ({}); choose another"):
+            stack.enter_context(_made([path]))
+        try:
+            stack.enter_context(_locked(path, wait=False))
+        except BlockingIOError:
+            raise ParameterError(
+                key=key, value=os.fspath(path), remedy="another run has it: wait for its end"
+            ) from None
+        yield
 
 
 def _remove(path: Path) -> None:

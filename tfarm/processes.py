@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from itertools import islice
 from multiprocessing import active_children, get_context, parent_process, resource_tracker
 from threading import Thread
+from types import ModuleType
 from typing import TypeVar
 
 from tfarm.errors import ConvergenceError
@@ -26,12 +27,12 @@ def shared(
     count: int,
     begun: Callable[[Sequence[Task]], object] = lambda _: None,
 ) -> Iterator[tuple[Task, Result]]:
-    """Yield each task with its result as it comes, by `count` processes, or by this one where no others may be started.
+    """Yield each task with its result as it comes, by `count` processes, or by this one for a count of 1.
 
     `begun` is called with the running tasks whenever one is begun.  An error of a task is raised here once the running
     ones have ended; the others are not begun.  Raises ConvergenceError where a process dies.
     """
-    if count == 1 or not may_start_processes():
+    if count == 1:
         for task, call in tasks:
             begun([task])
             yield task, call()
@@ -40,7 +41,7 @@ def shared(
     running: dict[Future[Result], Task] = {}
     with _pool(count) as pool:
         while True:
-            with _signals_blocked():  # of the process that this may start, as long as it lives
+            with _signals_blocked(), _no_main():  # of the process that this may start, as long as it lives
                 running |= {pool.submit(call): task for task, call in islice(waiting, count - len(running))}
             if not running:
                 return
@@ -84,13 +85,24 @@ def _pool(count: int) -> Iterator[ProcessPoolExecutor]:
 
 @contextmanager
 def _signals_blocked() -> Iterator[None]:
-    """Hold back Ctrl-C and SIGTERM, where the system can."""
+    """Hold back `SIGNALS`, where the system can."""
     change = getattr(signal, "pthread_sigmask", lambda *_: None)
     change(signal.SIG_BLOCK, SIGNALS)
     try:
         yield
     finally:
         change(signal.SIG_UNBLOCK, SIGNALS)
+
+
+@contextmanager
+def _no_main() -> Iterator[None]:
+    """Let new processes not run the main script again: no task is of it, and it may have no guard."""
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
 
 
 @contextmanager
@@ -116,10 +128,3 @@ def leave_with_parent() -> None:
             os._exit(1)
 
     Thread(target=leave, daemon=True).start()
-
-
-def may_start_processes() -> bool:
-    """Return whether processes can be started: they run the main script again, which may have no guard."""
-    main = sys.modules.get("__main__")
-    file = getattr(main, "__file__", None)
-    return file is None or getattr(main, "__spec__", None) is not None or not str(file).endswith(".py")

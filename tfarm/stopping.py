@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM of the command line: one line, exit code 130 or 143, and no unfinished file or process left.
+"""Ctrl-C, SIGTERM and SIGHUP of the command line: one line, exit code 130, 143 or 129, no unfinished file or process.
 
 No exception is raised: at a random moment it would meet locks half taken and files half registered.  The handler runs
 between two steps of Python in the main thread, calls the registered functions and ends the process.  Where the main
@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from threading import Lock, Thread
 from types import FrameType
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 PATIENCE = 0.5  # seconds that the main thread has before the second thread ends the process
 
 _undone: list[Callable[[], object]] = []
@@ -32,7 +32,7 @@ def undone_if_stopped(undo: Callable[[], object]) -> Iterator[None]:
 
 
 def stop_on_signals() -> None:
-    """Let SIGINT and SIGTERM stop this process from now on, unless it was started with them ignored.
+    """Let `SIGNALS` stop this process from now on, unless it was started with them ignored.
 
     Called in the main thread.
     """

@@ -11,7 +11,9 @@ import math
 import re
 import shutil
 import statistics
+import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +32,7 @@ from tfarm.loop.loop import Loop
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import gain_map
 from tfarm.loop.stability import stability
-from tfarm.report.live import ASSETS, SCRIPT, save_live, write_assets
+from tfarm.report.live import ASSETS, SCRIPT, LivePage, save_live, write_assets
 from tfarm.report.page import Case, GivenLaw
 from tfarm.schema import to_dict
 
@@ -68,6 +70,14 @@ def browser() -> Iterator[Browser]:
         browser.close()
 
 
+def wait_until(page: Page, expression: str, arg: Any = None, timeout: float = 30_000) -> None:
+    """Wait until an expression, or a function of `arg`, is true in the page."""
+    deadline = time.monotonic() + timeout / 1e3
+    while not page.evaluate(expression, arg):
+        assert time.monotonic() < deadline, expression
+        page.wait_for_timeout(5)
+
+
 class Opened:
     """A page with its requests; any message is an error."""
 
@@ -78,6 +88,7 @@ class Opened:
             viewport={"width": width, "height": 900}, color_scheme=scheme, reduced_motion=motion
         )
         self.page: Page = self.context.new_page()
+        self.page.wait_for_function = partial(wait_until, self.page)  # Playwright's own is refused by the page's policy
         self.messages: list[str] = []
         self.requests: list[str] = []
         self.page.on("console", lambda message: self.messages.append(f"{message.type}: {message.text}"))
@@ -587,3 +598,37 @@ def test_a_law_of_rational_parts_has_a_slider_for_the_gain_of_each(browser, tmp_
                 inside = is_in(page.evaluate("live.now.areas"), across, (gains[across], gains[up]))
                 assert inside == (card.stability == "stable"), gains
         assert "stable" in verdicts
+
+
+@pytest.mark.parametrize("words", ["toString=", "__proto__=x", "constructor=1&loop=nichols"])
+def test_a_link_with_names_of_the_language_opens_the_page(browser, folder, words):
+    with Opened(browser, folder / ARMS[0] / "live.html") as opened:
+        for _ in range(2):  # the address of an open page, then of one that is opened
+            opened.page.evaluate("words => { location.hash = words; }", words)
+            assert opened.page.evaluate("live.now.law") == live_data(opened.page)["start"]
+            opened.page.reload()
+            opened.page.wait_for_selector("body[data-ready]", timeout=20_000)
+
+
+ELEMENTS = {
+    "script": "Object.assign(document.createElement('script'), { textContent: 'window.evil = 1' })",
+    "style": "Object.assign(document.createElement('style'), { textContent: 'main { display: none }' })",
+    "image": "Object.assign(document.createElement('img'), { src: 'x.png' })",
+}
+
+
+@pytest.mark.parametrize("what", ELEMENTS)
+def test_the_policy_allows_what_the_page_holds_alone(browser, folder, what):
+    """Under it the page itself has no message, as in every other test here."""
+    opened = Opened(browser, folder / ARMS[0] / "live.html")
+    opened.page.evaluate(f"document.body.append({ELEMENTS[what]})")
+    assert opened.page.evaluate("window.evil === undefined && getComputedStyle(document.querySelector('main')).display")
+    assert "violates the following Content Security Policy directive" in " ".join(opened.messages)
+    assert opened.page.evaluate("getComputedStyle(document.querySelector('main')).display") != "none"
+    opened.context.close()
+
+
+def test_a_notebook_shows_a_page_under_its_policy(browser, folder, tmp_path):
+    (tmp_path / "cell.html").write_text(LivePage(folder / ARMS[0] / "live.html")._repr_html_())
+    with Opened(browser, tmp_path / "cell.html") as opened:
+        opened.page.frames[1].wait_for_selector("body[data-ready]", timeout=20_000)

@@ -1,8 +1,8 @@
-"""Reports stopped at random moments by Ctrl-C or SIGTERM:  python -m tests.cli.stops SIZE SEED
+"""Reports stopped at random moments by Ctrl-C, SIGTERM or SIGHUP:  python -m tests.cli.stops SIZE SEED
 
 Each run is a process of its own in a session of its own, with two workers.  The signal, or two of them up to 20 ms
-apart, goes to the process or to its group.  Within two seconds the process has ended with 130 or 143 and one line, no
-process of the session is left, and the folder holds what it held before; a run that had ended is not counted.
+apart, goes to the process or to its group.  Within two seconds the process has ended with 130, 143 or 129 and one line,
+no process of the session is left, and the folder holds what it held before; a run that had ended is not counted.
 """
 
 import os
@@ -26,8 +26,8 @@ COMMAND = (sys.executable, "-m", "tfarm", "report", "sasaki2012-lab", "--out", "
 WITHIN = 2.0  # seconds
 LONGEST = 12.0  # seconds after the handlers are set, for the last moments
 HANDLED = 1 << signal.SIGTERM - 1  # in the mask of signals that a process handles: from then on it can be stopped
-BOTH = signal.SIGINT, signal.SIGTERM
-SIGNALS = [*((each,) for each in BOTH), *product(BOTH, BOTH)]
+EACH = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+SIGNALS = [*((each,) for each in EACH), *product(EACH, EACH)]
 
 
 def members(session):
@@ -89,7 +89,7 @@ def stops(size, seed):
     """The outcome of each stop: one and two signals, each kind, to the process and to its group."""
     rng = np.random.default_rng(seed)
     for i in range(size):
-        signals, send = SIGNALS[i % 6], (os.kill, os.killpg)[i // 6 % 2]
+        signals, send = SIGNALS[i % len(SIGNALS)], (os.kill, os.killpg)[i // len(SIGNALS) % 2]
         apart, after = float(rng.choice([0.0, rng.uniform(0, 0.02)])), rng.uniform(0, LONGEST)
         with tempfile.TemporaryDirectory() as place:
             found = outcome(signals, apart, send, after, Path(place))

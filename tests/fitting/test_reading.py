@@ -70,7 +70,7 @@ BAD = {
     "hz,re,im": "rows = 0",
     "frequency,re,im\n1,2,3": "header = 'frequency': known are: hz, rad_s",
     "Hz,re,im\n1,2,3": "header = 'Hz': did you mean \"hz\"?",
-    "re,im\n1,2": "header = 're, im': one column of frequencies: hz or rad_s",
+    "re,im\n1,2": "header = ['re', 'im']: one column of frequencies: hz or rad_s",
     "hz,rad_s,re,im\n1,1,1,2": "one column of frequencies",
     "hz [rad/s],re,im\n1,1,2": "unit of hz = 'rad/s': hz is in Hz",
     "hz,re,im,db\n1,2,3,4": "one pair of columns",
@@ -221,6 +221,9 @@ BAD_RECORDS = {
     "doubled": (("t", "x"), (np.insert(T, 20, T[20]), np.insert(X, 20, 0)), "t of sample 22"),
     "short": (("t", "x"), (T[:7], X[:7]), "samples = 7"),
     "milliseconds": (("t [ms]", "x"), (T, X), "unit of t = 'ms': times are in seconds"),
+    "huge": (("t", "x"), (T, np.where(T > 1.05, 1e300, X)), "x, sample 27 = 1e+300: no finite number up to 1e+70"),
+    "long": (("t", "x"), (np.where(T > 1.05, 1e300, T), X), "t, sample 27 = 1e+300: no finite number up to 1e+70"),
+    "instant": (("t", "x"), (5e-324 * np.arange(50), X), "period of t = 5e-324: times are in seconds"),
 }
 
 

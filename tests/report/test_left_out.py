@@ -4,7 +4,6 @@ import hashlib
 import os
 import re
 import shutil
-import sys
 import time
 from dataclasses import replace
 from functools import partial
@@ -17,7 +16,6 @@ import tfarm
 from tests.hostile import NAME, TEXT, check_drawing, check_page
 from tests.report.written import ANCHORS, ARM, HELD, Links, Unmakeable, files_of, links_of, plain_cards
 from tests.shell import refused, run
-from tfarm import processes
 from tfarm.arm import to_toml
 from tfarm.cli import app as cli_app
 from tfarm.dsp import Chain, load_chain
@@ -195,17 +193,6 @@ def test_other_files_in_the_folder_are_kept_and_strange_cards_passed_over(tmp_pa
     assert NAME in (tmp_path / "trust" / "index.html").read_text(encoding="utf-8").replace("&amp;", "&").replace(
         "&#39;", "'"
     )
-
-
-def test_a_plain_script_starts_no_processes(monkeypatch):
-    class Script:
-        __file__ = "analysis.py"
-        __spec__ = None
-
-    monkeypatch.setitem(sys.modules, "__main__", Script())
-    assert not processes.may_start_processes()
-    monkeypatch.delattr(Script, "__file__")
-    assert processes.may_start_processes()
 
 
 # ------------------------------------------------------------ all or nothing

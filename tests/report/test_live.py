@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import hashlib
 import itertools
 import json
 import math
@@ -178,6 +179,15 @@ def test_a_slew_of_too_many_samples_is_left_to_the_command():
     assert slew_numbers(arm, fast, HubFeedback(K1=0.3)) is None
 
 
+def policy_of(page):
+    """The directives of the page's Content-Security-Policy, and a source for each of its styles and inline scripts."""
+    (policy,) = re.findall('<meta http-equiv="Content-Security-Policy" content="([^"]*)">', page)
+    named = {name: values for name, *values in map(str.split, policy.split(";"))}
+    texts = {tag: [part.split(f"</{tag}>")[0] for part in page.split(f"<{tag}>")[1:]] for tag in ("style", "script")}
+    digests = {tag: [hashlib.sha256(text.encode()).digest() for text in of] for tag, of in texts.items()}
+    return named, {tag: [f"'sha256-{base64.b64encode(each).decode()}'" for each in of] for tag, of in digests.items()}
+
+
 def test_the_page_stays_small_and_has_its_text_alone(tmp_path, monkeypatch):
     monkeypatch.setattr("tfarm.report.live.live_data", data_of)
     odd = replace(tfarm.load(ARMS[0]), name=ARMS[0] + ODD)
@@ -188,6 +198,13 @@ def test_the_page_stays_small_and_has_its_text_alone(tmp_path, monkeypatch):
     assert page.count("</script>") == 2
     (text,) = re.findall(r'<script type="application/json" id="live-data">(.*?)</script>', page, re.S)
     assert json.loads(text)["name"] == odd.name
+    policy, sources = policy_of(page)
+    assert policy == {
+        "default-src": ["'none'"], "base-uri": ["'none'"], "form-action": ["'none'"], "script-src": ["'self'"],
+        "style-src": sources["style"],
+    }  # fmt: skip
+    assert page.index("Content-Security-Policy") < page.index("<style>")
+    assert (len(sources["style"]), sources["script"]) == (2, [])
 
 
 def test_explore_writes_the_page_that_a_report_has_and_opens_it(tmp_path, monkeypatch):
@@ -209,6 +226,8 @@ def test_explore_writes_the_page_that_a_report_has_and_opens_it(tmp_path, monkey
     page = base64.b64decode(text).decode()
     assert (found.path.parents[1] / "assets" / "live.js").read_text(encoding="utf-8") in page
     assert "<script src=" not in page
+    policy, sources = policy_of(page)
+    assert policy["script-src"] == sources["script"]
     with pytest.raises(tfarm.ParameterError, match="hub turns freely"):
         tfarm.explore(arm.having(hub_inertia=math.inf))
     with pytest.raises(tfarm.ParameterError, match="is no Arm"):

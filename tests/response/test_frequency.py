@@ -87,6 +87,7 @@ def test_from_another_input_it_is_the_ratio_of_two_responses():
         ({"output": "root_moment", "input": "motor_voltage"}, "there is no motor"),
         ({"output": "root_moment", "band": 3}, "two frequencies in rad/s"),
         ({"output": "root_moment", "band": (5.0, 1.0)}, "two frequencies in rad/s"),
+        ({"output": "root_moment", "band": (1e-308, 5.0)}, "at most 30 decades apart"),
         ({"output": "root_moment", "band": ("low", "high")}, "two frequencies in rad/s"),
     ],
 )

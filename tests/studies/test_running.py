@@ -1,10 +1,12 @@
 """Studies on processes and on a cluster: the same bytes by any workers, after any kill; one line for what cannot be."""
 
 import json
+import math
 import os
 import resource
 import signal
 import sys
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -127,6 +129,75 @@ def test_a_folder_has_one_run_at_a_time(tmp_path):
     assert not (tmp_path / "none").exists()
 
 
+RATE = "modes.natural_frequency_rad_s.1"
+SAMPLED = partial(tfarm.study, LAB, {"payload.mass": {"uniform": [0.0, 0.2]}, "hub.inertia": {"uniform": [0.1, 0.3]}},
+                  (RATE,), None, Chain(), draws=6, part=4, worst=RATE, sobol=8, workers=1)  # fmt: skip
+
+
+def counted(monkeypatch, most=math.inf):
+    """The rows that are computed from now on; after `most` of them the study is interrupted."""
+    rows, values = [], running.values_of
+
+    def count(*arguments):
+        if len(rows) >= most:
+            raise KeyboardInterrupt
+        rows.append(arguments)
+        return values(*arguments)
+
+    monkeypatch.setattr(running, "values_of", count)
+    return rows
+
+
+def findings(found):
+    """Without the intervals of Sobol' indices, which are SciPy's by chance."""
+    return (
+        [(each.quantity, each.key, each.first, each.total) for each in found.sobol],
+        replace(found.worst, file=""),
+        found.shares,
+        found.spreads,
+    )
+
+
+def test_sobol_samples_and_the_search_for_the_worst_arm_are_resumed(tmp_path, monkeypatch):
+    """Interrupted again and again: at most a part is lost each time, and a complete folder computes nothing."""
+    whole = SAMPLED(out=tmp_path / "whole")
+    pilot = 1 + running.PILOT  # arms whose cost is measured, at each run with missing parts of Sobol' indices
+    expected = 6 + 8 * 4 + pilot + whole.worst.evaluations
+    with monkeypatch.context() as patch:
+        rows = counted(patch)
+        assert findings(SAMPLED(out=tmp_path / "whole")) == findings(whole)
+        assert rows == []
+        assert findings(SAMPLED(out=tmp_path / "once")) == findings(whole)
+        assert len(rows) == expected
+    total, runs = 0, 0
+    while runs < 40:
+        with monkeypatch.context() as patch:
+            rows = counted(patch, most=17)
+            try:
+                found = SAMPLED(out=tmp_path / "parts")
+                break
+            except KeyboardInterrupt:
+                runs += 1
+            finally:
+                total += len(rows)
+    assert findings(found) == findings(whole)
+    assert runs >= 4
+    assert total <= expected + runs * (3 + pilot)  # of a part of 4 rows three at most are lost
+    files = [{path.name: path.read_bytes() for path in (tmp_path / name).glob("_*")} for name in ("parts", "whole")]
+    assert files[0] == files[1]
+    assert {name[:6] for name in files[0]} == {"_sobol", "_worst"}
+
+
+def test_after_its_time_a_study_begins_no_part_of_any_kind(tmp_path, monkeypatch):
+    SAMPLED(out=tmp_path, worst="", sobol=0)
+    with monkeypatch.context() as patch:
+        rows = counted(patch)
+        found = SAMPLED(out=tmp_path, stop_after=0.0)
+        assert (found.sobol, found.worst) == ((), None)
+        assert len(rows) == 1 + running.PILOT
+    assert SAMPLED(out=tmp_path).worst.evaluations > 0
+
+
 def full(call, most):
     """The error of a call in a process whose files have at most that many bytes, as on a full disk."""
     resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
@@ -150,6 +221,9 @@ def test_a_full_disk_is_one_line_and_loses_nothing(tmp_path):
     assert "cannot be written (File too large); choose another" in line
     assert (kills.parts(tmp_path), sorted(os.listdir(tmp_path))) == (kept, files)
     assert call().is_complete
+    ((_, line),) = shared([(0, partial(full, partial(STUDY, out=tmp_path / "a" / "b", draws=4, workers=1), 100))], 2)
+    assert "cannot be written (File too large)" in line
+    assert not (tmp_path / "a").exists()
 
 
 def test_chunks_last_5_to_30_s_and_workers_end_together():

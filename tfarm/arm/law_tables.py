@@ -22,7 +22,7 @@ from pydantic import Field
 from tfarm.arm.law import Law
 from tfarm.arm.reading import load_tables
 from tfarm.arm.schema import StrictTable, validated
-from tfarm.errors import MISSING, ParameterError, close_to, must_be_known, naming, require
+from tfarm.errors import MISSING, ParameterError, close_to, listed, must_be_known, naming, require
 from tfarm.files import read_mat
 
 LAW_TABLE = "law"  # the table's name
@@ -112,17 +112,14 @@ def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:
     signals = head.signals or []
     require(signals, "signals", MISSING, "name a signal for each column of B")
     found, _ = read_mat(folder / str(head.matrices), MOST_MAT_BYTES, key="matrices")
-    holder, names = found, tuple(found)
     if head.system is not None:
-        structs = [key for key, value in found.items() if getattr(value, "dtype", np.dtype(float)).names]
-        must_be_known("system", head.system, structs)
-        holder = found[head.system][0, 0]
-        names = holder.dtype.names
-    missing = [name for name in "ABCD" if name not in names]
-    remedy = f"holds no {', '.join(missing)}; it has {', '.join(names)} (system = names a structure)"
+        must_be_known("system", head.system, dict.fromkeys(name.split(".")[0] for name in found if "." in name))
+    place = "" if head.system is None else f"{head.system}."
+    missing = [name for name in "ABCD" if f"{place}{name}" not in found]
+    remedy = f"holds no {', '.join(missing)}; it has {listed(found, 300)} (system = names a structure)"
     require(not missing, "matrices", head.matrices, remedy)
     try:
-        A, B, C, D = (np.atleast_2d(np.asarray(holder[name], dtype=float)) for name in "ABCD")
+        A, B, C, D = (np.atleast_2d(np.asarray(found[f"{place}{name}"], dtype=float)) for name in "ABCD")
     except (TypeError, ValueError):
         raise ParameterError(key="matrices", value=head.matrices, remedy="A, B, C and D hold numbers") from None
     if head.scales is not None:

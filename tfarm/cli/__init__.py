@@ -9,7 +9,7 @@ from tfarm.stopping import stop_on_signals
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run one command and exit: 0, 2 for bad input, 3 for what could not be solved or proven, 130 or 143 if stopped.
+    """Run one command and exit: 0, 2 for bad input, 3 for what was not solved or proven, 128 + N for signal N.
 
     Everything is imported inside, so that an interrupt is one line from the first moment on (see `stopping`).  BLAS
     has one thread, unless the user chose a number: on matrices of a hundred rows more only wait for each other.

@@ -375,7 +375,8 @@ def study(
         "posterior": posterior, "worst": worst, "sobol": sobol,
     }  # fmt: skip
     keys = [key for key, _ in over or []]
-    require(len(set(keys)) == len(keys), "--over", keys, "a key is varied twice")
+    for key in keys:
+        require(keys.count(key) == 1, "--over", key, "is varied twice; once is enough")
     arguments, defaults = study_arguments(arm, typed, lambda: load_loop(arm, theory, gains, law), chain)
     with nullcontext() if scheduler is None else cluster(scheduler) as client:
         found = run(**arguments, out=out, workers=workers, stop_after=stop_after, progress=announce, client=client)

@@ -21,7 +21,8 @@ import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, cast
+from importlib.util import find_spec
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,7 @@ from tfarm.digits import general, singly
 from tfarm.errors import MISSING, ParameterError, did_you_mean, naming, require
 from tfarm.exact.outputs import OUTPUTS, signal_words, unit_over
 from tfarm.files import read_file
+from tfarm.foreign import read_arrays
 from tfarm.records import record
 from tfarm.response.frequency import HERTZ
 from tfarm.schema import Column, Quantity, Table
@@ -211,10 +213,8 @@ FREQUENCIES = {"hz": ("Hz", 2 * np.pi), "rad_s": ("rad/s", 1.0)}  # its unit, an
 VALUE_PAIRS = (("re", "im"), ("abs", "deg"), ("db", "deg"))
 KNOWN_COLUMNS = (*FREQUENCIES, "re", "im", "abs", "db", "deg", "coherence", "sigma", "averages")
 DATA_FORM = "OUTPUT/INPUT=FILE, such as tip_acceleration/hub_angle=sweep.csv"
-UFF = (".uff", ".unv", ".uf")
+UFF = r"\.uff|\.unv|\.uf"  # ends of its names
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"  # as it is written in a cell or an option
-UFF_RESPONSE = 4  # in UFF 58 the type of a function that is a frequency response
-UFF_FREQUENCY = 18  # and the kind of an abscissa that is a frequency
 
 
 @dataclass(frozen=True, slots=True)
@@ -310,8 +310,8 @@ def read_measured(path: str | os.PathLike[str], output: str, input: str) -> Meas
     check_signal(output, "output")
     check_signal(input, "input")
     name = os.fspath(path)
-    if re.sub(r"#\d+$", "", name).lower().endswith(UFF):
-        return _of_uff(name, output, input)
+    if uff := re.fullmatch(rf"(.*(?:{UFF}))(?:#(\d{{1,9}}))?", name, re.DOTALL | re.IGNORECASE):
+        return _of_uff(uff[1], uff[2] or "", output, input)
     sheet = read_sheet(path, key=f"{output}/{input}")
     with naming(name):
         omega, values, averages = _frequencies(sheet), _values(sheet), sheet.columns.get("averages")
@@ -346,7 +346,7 @@ def _frequencies(sheet: Sheet) -> Real:
     for name in sheet.columns:
         require(name in KNOWN_COLUMNS, "header", name, did_you_mean(name.lower(), KNOWN_COLUMNS))
     found = [name for name in FREQUENCIES if name in sheet.columns]
-    require(len(found) == 1, "header", ", ".join(sheet.columns), "one column of frequencies: hz or rad_s")
+    require(len(found) == 1, "header", [*sheet.columns], "one column of frequencies: hz or rad_s")
     name, (unit, scale) = found[0], FREQUENCIES[found[0]]
     own, frequency = sheet.units[name], sheet.columns[name]
     require(own.lower() in ("", unit.lower()), f"unit of {name}", own, f"{name} is in {unit}")
@@ -361,7 +361,7 @@ def _values(sheet: Sheet) -> Complex:
     """The complex response, of whichever two columns there are."""
     pair = tuple(name for name in KNOWN_COLUMNS if name in sheet.columns and name in itertools.chain(*VALUE_PAIRS))
     remedy = "one pair of columns for the value: re, im or abs, deg or db, deg; leave others out"
-    require(pair in VALUE_PAIRS, "header", ", ".join(sheet.columns), remedy)
+    require(pair in VALUE_PAIRS, "header", [*sheet.columns], remedy)
     first, second = (sheet.columns[name] for name in pair)
     if pair == ("re", "im"):
         return np.asarray(first + 1j * second)
@@ -373,40 +373,24 @@ def _values(sheet: Sheet) -> Complex:
 
 
 # ------------------------------------------------------------ UFF
-def _of_uff(name: str, output: str, input: str) -> Measured:
-    """The response of a UFF file: the only one, or that of the number after a #, from 1 in their order there."""
-    path, _, number = name.partition("#")
-    data = read_file(path, MOST_RECORD_BYTES, key=f"{output}/{input}", what="a .uff file")
+def _of_uff(path: str, number: str, output: str, input: str) -> Measured:
+    """The response of a UFF file: the only one, or that of a number from 1 in their order there."""
+    key = f"{output}/{input}"
+    data = read_file(path, MOST_RECORD_BYTES, key=key, what="a .uff file")
+    remedy = "is not installed, and reads UFF files: pip install 'tfarm[uff]', or export the response as CSV"
+    require(find_spec("pyuff"), "package", "pyuff", remedy)
+    found = read_arrays("uff", path, key=key, remedy="no UFF file that can be read")
     with naming(path):
-        found = _responses(path)
-        remedy = "the file holds no frequency response function (type 58, function 4)"
-        require(found, "data set", 58, remedy)
-        remedy = f"the file holds {len(found)} responses; choose one by its number, as file.uff#2"
-        require(number or len(found) == 1, "data set", MISSING, remedy)
+        count = len(found) // 2  # frequencies and values of each
+        require(count, "data set", 58, "the file holds no frequency response function (type 58, function 4)")
+        remedy = f"the file holds {count} responses; choose one by its number, as file.uff#2"
+        require(number or count == 1, "data set", MISSING, remedy)
         place = int(number or 1)
-        require(1 <= place <= len(found), "data set", place, f"from 1 to {len(found)}, the responses of the file")
-        omega = 2 * np.pi * np.asarray(found[place - 1]["x"], dtype=float)
-        values: NDArray[Any] = np.asarray(found[place - 1]["data"], dtype=complex)
+        require(1 <= place <= count, "data set", place, f"from 1 to {count}, the responses of the file")
+        omega = 2 * np.pi * np.asarray(found[f"x{place - 1}"], dtype=float)
+        values: NDArray[Any] = np.asarray(found[f"data{place - 1}"], dtype=complex)
         kept = slice(int(omega.size > 0 and omega[0] == 0), None)  # the line at 0 Hz that spectra begin with
-        digest = hashlib.sha256(data).hexdigest()
-        return Measured(output=output, input=input, omega=omega[kept], values=values[kept], source=name, digest=digest)
-
-
-def _responses(path: str) -> list[dict[str, Any]]:
-    """The frequency response functions of a UFF file, as pyuff has them."""
-    try:
-        import pyuff
-    except ImportError:
-        remedy = "is not installed, and reads UFF files: pip install 'tfarm[uff]', or export the response as CSV"
-        raise ParameterError(key="package", value="pyuff", remedy=remedy) from None
-    try:
-        file = pyuff.UFF(path)
-        sets = [file.read_sets(n) for n, kind in enumerate(file.get_set_types()) if int(kind) == 58]
-    except Exception as error:  # a parser that is not ours, on data from outside: it may raise anything
-        remedy = f"no UFF file that can be read: {str(error)[:80]}"
-        raise ParameterError(key="data set", value=58, remedy=remedy) from None
-    return [
-        cast("dict[str, Any]", each)
-        for each in sets
-        if each.get("func_type") == UFF_RESPONSE and each.get("abscissa_spec_data_type", UFF_FREQUENCY) == UFF_FREQUENCY
-    ]
+        digest, source = hashlib.sha256(data).hexdigest(), f"{path}#{number}" if number else path
+        return Measured(
+            output=output, input=input, omega=omega[kept], values=values[kept], source=source, digest=digest
+        )

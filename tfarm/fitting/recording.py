@@ -45,7 +45,7 @@ from tfarm.dsp.chain import TIME_ROUNDING, Chain
 from tfarm.dsp.results import enough_modes
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator
-from tfarm.errors import MISSING, did_you_mean, must_be_known, naming, require
+from tfarm.errors import MISSING, did_you_mean, listed, must_be_known, naming, require
 from tfarm.files import read_mat
 from tfarm.records import record
 from tfarm.schema import Quantity, Table
@@ -56,6 +56,7 @@ TIMES = ("t", "time")  # names of the column of times
 JITTER = 0.1  # of the period: a sample further off its place has been dropped or doubled, or the sampling is uneven
 NOTED_JITTER = 1e-3  # of the period: times written in few digits are off by less
 REFERENCE_COLUMN, ANGLE_COLUMN, MOMENT_COLUMN = "reference:hub_angle", "hub_angle", "root_moment"
+MOST_SAMPLE = 1e70  # of a signal: the fourth power is a number, as spectra are squared
 LEAST_SAMPLES = 8  # of a record and of a segment
 ESTIMATORS, WINDOWS = ("H1", "H2", "Hv"), ("hann", "boxcar")
 USUAL_SEGMENTS = 15  # of a record by default: 8 lengths, half overlapped
@@ -110,7 +111,7 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
     if name.lower().endswith(".mat"):
         found, data = read_mat(name, MOST_RECORD_BYTES, key="record")
         held = {each: np.asarray(value, dtype=float) for each, value in found.items()
-                if getattr(value, "ndim", 0) == 2 and value.dtype.kind in "biuf"}  # fmt: skip
+                if value.ndim == 2 and value.dtype.kind in "biuf"}  # fmt: skip
         units, digest = dict.fromkeys(held, ""), hashlib.sha256(data).hexdigest()
     else:
         sheet = read_sheet(name, key="record")
@@ -118,7 +119,7 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
     with naming(name):
         columns = _columns(held, next((held[each].size for each in TIMES if each in held), 0))
         of_times = next((each for each in TIMES if each in columns), "")
-        remedy = f"a record has a column t, in seconds; this one has {', '.join(held) or 'none'}"
+        remedy = f"a record has a column t, in seconds; this one has {listed(held, 300) or 'none'}"
         require(of_times, "t", MISSING, remedy)
         require(units[of_times] in ("", "s"), f"unit of {of_times}", units[of_times], "times are in seconds")
         start, period, jitter = _timing(columns.pop(of_times))
@@ -135,8 +136,8 @@ def _columns(held: dict[str, Real], size: int) -> dict[str, Real]:
         elif len(value) == size:
             columns |= {f"{name}.{number}": column for number, column in enumerate(value.T, start=1)}
     for name, column in columns.items():
-        for at in np.flatnonzero(~np.isfinite(column))[:1]:
-            require(False, f"{name}, sample {at + 1}", float(column[at]), "no finite number")
+        for at in np.flatnonzero(~(abs(column) <= MOST_SAMPLE))[:1]:
+            require(False, f"{name}, sample {at + 1}", float(column[at]), f"no finite number up to {MOST_SAMPLE:g}")
     return columns
 
 
@@ -148,6 +149,7 @@ def _timing(times: Real) -> tuple[float, float, float]:
     remedy = "is not later than the sample before; sort the rows, and leave doubled ones out"
     require(steps[back] > 0, f"t of sample {back + 2}", float(times[back + 1]), remedy)
     period = float((times[-1] - times[0]) / (times.size - 1))
+    require(period > 1 / MOST_SAMPLE, "period of t", period, "times are in seconds")
     gap = int(np.argmax(abs(steps - usual)))
     jitter = float(abs(times - times[0] - period * np.arange(times.size)).max() / period)
     remedy = f"{steps[gap]:.6g} s after the one before, where {usual:.6g} s is usual: samples have to be even"

@@ -1,8 +1,10 @@
 """The live page of an arm's loop: what it carries as numbers, and the script that all such pages share."""
 
 import base64
+import hashlib
 import json
 import math
+import re
 import sys
 import webbrowser
 from collections.abc import Sequence
@@ -58,6 +60,7 @@ SENSED_MODES = 6  # whose frequencies and zeros the chart of sensors has
 SENSOR_DIGITS = 6  # of the numbers of that chart: far more than a screen has
 FRAME = 780  # pixels: height of the page in a notebook
 LIVE_PAGE, ASSETS, SCRIPT = "live.html", "assets", "live.js"
+SCRIPTS = "script-src 'self'"  # in the policy of a page, from the folder of its script
 BEYOND = "|L| < 0.5 beyond the frequency range at all gains of this page: no unstable pole there (small gain)"
 AT_HUB = {  # `rows`: of each gain a part of the samples, and the power of s on it
     "names": ["K1", "K2", "Kp"],
@@ -417,9 +420,18 @@ def save_live(case: Case, folder: Path) -> None:
         return
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False).replace("<", "\\u003c")
     colours = {"stable": STABLE, "marginal": MARGINAL, "unstable": UNSTABLE, "good": GOOD, "low": LOW, "poor": POOR}
-    write_text(out, render("live.html", title=title, data=data, text=text, sign=sign_words(arm), columns=LIVE_COLUMNS,
-                           samples=PANEL_SAMPLES * len(data["low"]), error=scientific(data["error"], 1),
-                           assets=f"../{ASSETS}", script=SCRIPT, colours=colours))  # fmt: skip
+    page = render("live.html", title=title, data=data, text=text, sign=sign_words(arm), columns=LIVE_COLUMNS,
+                  samples=PANEL_SAMPLES * len(data["low"]), error=scientific(data["error"], 1),
+                  assets=f"../{ASSETS}", script=SCRIPT, colours=colours)  # fmt: skip
+    styles = " ".join(_source(each) for each in re.findall("<style>(.*?)</style>", page, re.DOTALL))
+    policy = f"default-src 'none'; base-uri 'none'; form-action 'none'; style-src {styles}; {SCRIPTS}"
+    first = '<meta charset="utf-8">'
+    write_text(out, page.replace(first, f'{first}\n<meta http-equiv="Content-Security-Policy" content="{policy}">', 1))
+
+
+def _source(text: str) -> str:
+    """The source of a policy that allows an element with that text."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
 def write_assets(folder: Path) -> None:
@@ -443,8 +455,9 @@ class LivePage:
 
     def _repr_html_(self) -> str:
         """The page in a frame, with its script in it: a notebook serves no other file."""
-        link, script = f'<script src="../{ASSETS}/{SCRIPT}">', self.path.parents[1] / ASSETS / SCRIPT
-        page = self.path.read_text(encoding="utf-8").replace(link, f"<script>{script.read_text(encoding='utf-8')}")
+        script = (self.path.parents[1] / ASSETS / SCRIPT).read_text(encoding="utf-8")
+        page = self.path.read_text(encoding="utf-8").replace(SCRIPTS, f"script-src {_source(script)}", 1)
+        page = page.replace(f'<script src="../{ASSETS}/{SCRIPT}">', f"<script>{script}")
         text = base64.b64encode(page.encode()).decode("ascii")  # no srcdoc: its links lead into the notebook's own page
         return (
             f'<iframe src="data:text/html;charset=utf-8;base64,{text}" title="live page" '

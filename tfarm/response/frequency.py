@@ -166,7 +166,7 @@ POLES_IN = Quantity(
 ZEROS_IN = Quantity(
     "zeros complete in Re s", "1/s", help="all with Im s up to the last frequency", key="zeros_between_re_1_s"
 )
-BODE_BAND = "two frequencies in rad/s, the lower first: (1.0, 1000.0)"  # the expected form
+BODE_BAND = "two frequencies in rad/s, the lower first, at most 30 decades apart: (1.0, 1000.0)"  # the expected form
 RESONANCES_SHOWN = 10  # flexible modes in the range, by default
 EVEN_PER_DECADE = 120  # points of the even grid
 PER_ROOT_DECADE = 12  # points for each decade of distance, on each side of a pole or zero
@@ -307,7 +307,7 @@ def bode(
     """
     G = transfer(arm, output, x=x, input=input)
     arm, (row,) = G.arm, G.rows
-    band = resonant_band(arm) if band is None else known_band(band, BODE_BAND)
+    band = resonant_band(arm) if band is None else known_band(band, BODE_BAND, 1e30)
     G.must_be_of_the_hub("a Bode plot, with its zeros,")
     if not np.any(G(1j * np.geomspace(*band, 3))):
         return _no_motion(arm, row, G.x, band)

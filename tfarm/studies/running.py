@@ -12,10 +12,10 @@ import io
 import json
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import islice
+from itertools import islice, takewhile
 from logging import getLogger
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ from tfarm.arm.schema import StrictTable, validated_file
 from tfarm.arrays import Real
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError, ParameterError, TfarmError, one_line, require
-from tfarm.files import locked_folder, write_file
+from tfarm.files import write_file
 from tfarm.tuner import Plan as TunerPlan
 
 from .quantities import FAILED, quantity_of, values_of
@@ -35,6 +35,7 @@ from .space import Space, Subjects, extra, parquet
 
 Progress = Callable[[int, int, str], object]
 Chunk = dict[str, list[Any]]  # columns of a range of rows
+Row = dict[str, Any]  # the columns of one
 Task = tuple[int, Callable[[], Chunk]]  # number of a part, and the call that returns its table
 Engine = Callable[[Iterator[Task]], Iterator[tuple[int, Chunk]]]  # yields each task with its table as it comes
 OUT, SCHEDULER = "--out", "--scheduler"  # keys of errors
@@ -45,6 +46,7 @@ PILOT, CHECKED = 3, 1000  # rows whose cost is measured, and whose arms are buil
 LEAST_SECONDS, MOST_SECONDS = 5.0, 30.0  # of a chunk
 CHUNKS_A_WORKER = 10  # where that leaves them within these
 MOST_ROWS = 50_000  # of a chunk
+MOST_OTHERS = 64  # rows of a part of Sobol' indices or of a search, which has few: all workers have some
 LONGEST_REASON = 200  # characters
 PATIENCE = 20  # seconds for a scheduler to answer, and for its first worker
 PACKAGES = ("tfarm", "numpy", "scipy", "numba")  # versions that all workers have in common
@@ -124,19 +126,31 @@ class Parts:
     digest: str
     rows: int  # of a part
     suffix: str
+    size: int  # rows of all parts
+    prefix: str = PREFIX
 
     @property
     def count(self) -> int:
-        """Number of parts of the whole study."""
-        return math.ceil(self.plan.space.count / self.rows)
+        """Number of all parts."""
+        return math.ceil(self.size / self.rows)
+
+    def others(self, prefix: str, size: int, names: Sequence[str]) -> "Parts":
+        """Return parts of that many other rows with these columns, in the same folder; "_": no file of the table."""
+        plan = replace(self.plan, names=tuple(names))
+        return replace(self, plan=plan, prefix=prefix, size=size, rows=min(self.rows, MOST_OTHERS))
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every part is written."""
+        return len(self.written()) == self.count
 
     def path(self, number: int) -> Path:
         """Return the file of a part."""
-        return self.folder / f"{PREFIX}{self.digest[:8]}-{number:06}{self.suffix}"
+        return self.folder / f"{self.prefix}{self.digest[:8]}-{number:06}{self.suffix}"
 
     def written(self) -> list[int]:
         """Return the numbers of the parts that are there.  Raises ParameterError for a part of another study."""
-        names = {each.name for each in self.folder.glob(f"{PREFIX}*")}
+        names = {each.name for each in self.folder.glob(f"{self.prefix}*")}
         found = [number for number in range(self.count) if self.path(number).name in names]
         strange = sorted(names - {self.path(number).name for number in found})
         remedy = f"{strange[:1]} is a part of another study: choose another folder"
@@ -204,7 +218,7 @@ def opened(folder: Path, plan: Plan, files: Mapping[str, bytes], workers: int, s
     else:
         count = size or rows_a_chunk(seconds_an_arm(plan, rows[:PILOT]), space.count, workers)
     digest = hashlib.sha256(json.dumps([inputs, count]).encode()).hexdigest()
-    parts = Parts(folder, plan, digest, count, suffix)
+    parts = Parts(folder, plan, digest, count, suffix, space.count)
     parts.written()  # is refused before a file is written
     text = StudyRecord(inputs=inputs, rows_a_part=count).model_dump_json(indent=1)
     for name, content in {**files, FILE: f"{text}\n".encode()}.items() if not file.exists() else ():
@@ -231,25 +245,79 @@ def run(
     files: Mapping[str, bytes],
     engine: Engine,
     workers: int,
-    stop_after: float | None,
+    deadline: float,
     size: int | None,
     progress: Progress,
 ) -> Parts:
-    """Write the missing parts of a study to its folder; after `stop_after` seconds none is begun any more."""
-    deadline = time.monotonic() + (math.inf if stop_after is None else stop_after)
+    """Write the missing parts of a study to its folder."""
     count, listing = min(CHECKED, plan.space.count), plan.space.listing
     rows = plan.space.rows(0, count, None if listing is None else next(listing.blocks([(0, count)])))
     check_rows(plan, rows)
-    with locked_folder(folder, key=OUT):
-        parts = opened(folder, plan, files, workers, size, rows)
-        done, began = set(parts.written()), time.monotonic()
-        missing = [number for number in range(parts.count) if number not in done]
-        progress(len(done), parts.count, "parts of the study")
-        for ready, (number, table) in enumerate(engine(_tasks(parts, missing, deadline)), start=1):
-            parts.write(number, table)
-            left = (time.monotonic() - began) / ready * (len(missing) - ready)
-            progress(len(done) + ready, parts.count, f"parts of the study, {left:.0f} s left")
+    parts = opened(folder, plan, files, workers, size, rows)
+
+    def calls(ends: Sequence[tuple[int, int]]) -> Iterator[Callable[[], Chunk]]:
+        blocks = [None] * len(ends) if listing is None else listing.blocks(ends)
+        for (first, last), listed in zip(ends, blocks, strict=True):
+            yield partial(chunk, plan, first, last, listed)
+
+    complete(parts, calls, engine, deadline, progress, "parts of the study")
     return parts
+
+
+def complete(
+    parts: Parts,
+    calls: Callable[[Sequence[tuple[int, int]]], Iterable[Callable[[], Chunk]]],
+    engine: Engine,
+    deadline: float,
+    progress: Progress,
+    text: str,
+) -> None:
+    """Write the missing parts by the calls for their ranges of rows; after the deadline [s] none is begun any more."""
+    done, began = set(parts.written()), time.monotonic()
+    missing = [number for number in range(parts.count) if number not in done]
+    progress(len(done), parts.count, text)
+    ends = [(number * parts.rows, min((number + 1) * parts.rows, parts.size)) for number in missing]
+    tasks = takewhile(lambda _: time.monotonic() < deadline, zip(missing, calls(ends), strict=True))
+    for ready, (number, table) in enumerate(engine(tasks), start=1):
+        parts.write(number, table)
+        left = (time.monotonic() - began) / ready * (len(missing) - ready)
+        progress(len(done) + ready, parts.count, f"{text}, {left:.0f} s left")
+
+
+def searched(parts: Parts, search: Callable[[Callable[[Real], Row]], object], deadline: float) -> list[Row] | None:
+    """Return the rows of a search, which asks for the results of one row of values (1, keys) after another.
+
+    They are written as parts, and computed once: an interrupted search goes on where it was.  None where it has no end
+    before the deadline [s].
+    """
+    columns, seen, new = parts.column(*parts.plan.columns), list[Row](), set[int]()
+    rows = zip(*([None if each == "" or each != each else each for each in of] for of in columns.values()), strict=True)
+    known = {int(values[0]): dict(zip(columns, values, strict=True)) for values in rows}
+
+    def result(values: Real) -> Row:
+        n = len(seen)
+        if n not in known:
+            if time.monotonic() >= deadline:
+                raise TimeoutError
+            known[n] = {name: of[0] for name, of in table_of(parts.plan, n, values).items()}
+            new.add(n // parts.rows)
+        seen.append(known[n])
+        if len(seen) % parts.rows == 0:
+            write()
+        return known[n]
+
+    def write() -> None:
+        while new:
+            own = seen[(number := new.pop()) * parts.rows :][: parts.rows]
+            parts.write(number, {name: [row[name] for row in own] for name in columns})
+
+    try:
+        search(result)
+    except TimeoutError:
+        return None
+    finally:
+        write()
+    return seen
 
 
 def check_rows(plan: Plan, rows: Real) -> None:
@@ -263,17 +331,6 @@ def check_rows(plan: Plan, rows: Real) -> None:
     for number, first in errors.items():
         remedy = f"{len(errors)} of {len(rows)} arms are illegal, the first in row {number}: {first.remedy}"
         raise ParameterError(key=first.key, value=first.value, remedy=remedy)
-
-
-def _tasks(parts: Parts, missing: Sequence[int], deadline: float) -> Iterator[Task]:
-    """Yield the number of each missing part with the call that returns its table."""
-    space, n = parts.plan.space, parts.rows
-    ends = [(number * n, min((number + 1) * n, space.count)) for number in missing]
-    blocks = [None] * len(ends) if space.listing is None else space.listing.blocks(ends)
-    for number, (first, last), listed in zip(missing, ends, blocks, strict=True):
-        if time.monotonic() >= deadline:
-            return
-        yield number, partial(chunk, parts.plan, first, last, listed)
 
 
 # ------------------------------------------------------------------------------------------------------------ cluster

@@ -6,12 +6,13 @@ So a row is the same for any number of workers and in any order.
 """
 
 import csv
+import io
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from importlib import import_module
 from itertools import islice
 from pathlib import Path
@@ -28,11 +29,16 @@ from tfarm.arrays import Real
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import driven
 from tfarm.errors import ParameterError, must_be_known, naming, require
+from tfarm.files import open_file
 from tfarm.fitting.posterior import Posterior
+from tfarm.foreign import read_by_child
 from tfarm.tuner import tuning
 
 LAW, TUNER = "law.", "tuner."  # prefixes of the numbers of the controller and of the tuner
 MOST_ROWS = 10_000_000  # of one study
+MOST_BYTES = 4 << 30  # of a list: these rows, of twenty numbers
+LONGEST_LINE = 1 << 20  # characters, of some ten thousand numbers
+LIST = "a CSV or Parquet file with a column a key"
 MOST_SEED = 2**63
 ENDS = 2.0**-54, 1 - 2.0**-53  # of uniform numbers: at 0 and 1 the inverse of a normal distribution is infinite
 LEAST_PYARROW = (14, 0, 1)  # older ones unpickle what they read (CVE-2023-47248)
@@ -173,7 +179,7 @@ def space_of(
     found = Space(over=known, posterior=posterior, listing=listing, draws=draws, seed=seed)
     remedy = "nothing is varied: give --over KEY=uniform:LOW,HIGH, a list or a posterior"
     require(found.keys, "over", dict(over), remedy)
-    require(not (found.grids and listing), "over", dict(over), "a list has every value itself: no grid with it")
+    require(not (found.grids and listing), "over", [*found.grids], "a list has every value itself: no grid with it")
     for key in found.keys:
         require(found.keys.count(key) == 1, "over", key, "is varied twice; once is enough")
     if posterior is not None:
@@ -255,7 +261,7 @@ def lines_of(path: Path) -> Iterator[Any]:
 
     Raises ParameterError, naming row and column, for a name that is doubled or missing, and for any other value.
     """
-    lines = _cells(path, parquet("list", str(path)) if path.suffix == ".parquet" else None)
+    lines = _cells(path)
     names = tuple(next(lines, ()))
     with naming(path):
         for name in names:
@@ -264,25 +270,24 @@ def lines_of(path: Path) -> Iterator[Any]:
         for n, row in enumerate(lines):  # from 0, as in the results
             require(len(row) == len(names), f"row {n}", len(row), f"{len(names)} values, one a column")
             for name, cell in zip(names, row, strict=True):
-                is_finite = PLAIN_NUMBER.fullmatch(str(cell)) and math.isfinite(float(cell))
+                is_finite = PLAIN_NUMBER.fullmatch(cell) and math.isfinite(float(cell))
                 require(is_finite, f"row {n}, column {name}", cell, "every cell is a finite number")
             yield list(map(float, row))
 
 
-def _cells(path: Path, module: Any) -> Iterator[Sequence[Any]]:
-    """Yield names and rows of a CSV file, or of a Parquet one by its module, a batch in memory at a time."""
-    try:
-        if module is None:
-            with path.open(newline="", encoding="utf-8-sig") as file:
-                yield from csv.reader(file, strict=True)
-        else:
-            with module.ParquetFile(path) as file:
-                yield file.schema_arrow.names
-                for batch in file.iter_batches():
-                    yield from zip(*(column.to_pylist() for column in batch.columns), strict=True)
-    except Exception as error:  # of parsers that are not ours, on data from outside
-        remedy = f"cannot be read ({error}); give a CSV or Parquet file with a column a key"
-        raise ParameterError(key="list", value=str(path), remedy=remedy) from None
+def _cells(path: Path) -> Iterator[Sequence[str]]:
+    """Yield names and rows of a CSV file, or of a Parquet one by another process, a few in memory at a time."""
+    with open_file(path, MOST_BYTES, key="list", what=LIST) as file:
+        is_parquet = path.suffix == ".parquet" and parquet("list", str(path))
+        try:
+            child = partial(read_by_child, "parquet", path, key="list", remedy=f"cannot be read; give {LIST}")
+            with child() if is_parquet else nullcontext(file) as rows:
+                text = io.TextIOWrapper(rows, encoding="utf-8-sig", newline="")
+                # a file without an end of a line is no reason to have it in memory
+                yield from csv.reader(iter(partial(text.readline, LONGEST_LINE), ""), strict=True)
+        except (OSError, UnicodeDecodeError, csv.Error) as error:
+            remedy = f"cannot be read ({error}); give {LIST}"
+            raise ParameterError(key="list", value=str(path), remedy=remedy) from None
 
 
 def parquet(key: str, value: str) -> Any:

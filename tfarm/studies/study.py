@@ -12,8 +12,9 @@ draws = 2000
 
 import math
 import os
+import time
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -32,7 +33,7 @@ from tfarm.arm.writing import LAW_DEFAULTS, law_toml, toml_tables, toml_text
 from tfarm.arrays import Real
 from tfarm.dsp.chain import Chain, chain_or_usual, file_text, load_chain
 from tfarm.errors import ParameterError, must_be_known, naming, require
-from tfarm.files import mat_content, write_file
+from tfarm.files import locked_folder, mat_content, write_file
 from tfarm.fitting.posterior import load_posterior
 from tfarm.processes import shared
 from tfarm.records import record
@@ -53,7 +54,22 @@ from .quantities import (
     shares_of,
     spreads_of,
 )
-from .running import OUT, ROW, STUDY_FILE, Engine, Parts, Plan, Progress, on_cluster, run, seconds_an_arm, table_of
+from .running import (
+    OUT,
+    ROW,
+    STUDY_FILE,
+    Engine,
+    Parts,
+    Plan,
+    Progress,
+    Row,
+    complete,
+    on_cluster,
+    run,
+    searched,
+    seconds_an_arm,
+    table_of,
+)
 from .space import ENDS, MOST_SEED, listing_of, space_of
 
 SHARES = "stable arms (confidence one-sided, Clopper-Pearson)"
@@ -71,7 +87,6 @@ LARGER_IS_WORSE = (
 )  # fmt: skip
 SIGNED = "peak", "steady_state_error"  # of these by their size
 BOOTSTRAP = "95 % bootstrap interval; none without any influence"
-SOBOL_BLOCK = 64  # rows of the sample of Sobol' indices that are computed at a time
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -249,11 +264,13 @@ def study(
     files = files_of(arm, law, chain, {"over": over or {}, "ask": ask, "draws": draws, "seed": seed, "rows": rows,
                                        "posterior": posterior, "worst": worst, "sobol": sobol})  # fmt: skip
     engine = partial(shared, count=workers) if client is None else partial(on_cluster, client=client)
-    parts = run(Path(out), plan, files, engine, workers, stop_after, part, progress)
-    found = Study(parts=parts, arm=arm.name, rows=space.count, rows_a_part=parts.rows)
-    if found.is_complete:
-        indices = sobol_indices(plan, sobol, workers, engine, progress) if sobol else ()
-        found = replace(found, sobol=indices, worst=worst_arm(found, order) if order else None)
+    deadline = time.monotonic() + (math.inf if stop_after is None else stop_after)
+    with locked_folder(Path(out), key=OUT):
+        parts = run(Path(out), plan, files, engine, workers, deadline, part, progress)
+        found = Study(parts=parts, arm=arm.name, rows=space.count, rows_a_part=parts.rows)
+        if found.is_complete:
+            indices = sobol_indices(parts, sobol, workers, engine, deadline, progress) if sobol else ()
+            found = replace(found, sobol=indices, worst=worst_arm(found, order, deadline) if order else None)
     return found
 
 
@@ -328,67 +345,76 @@ def badness(order: Sequence[str], values: Mapping[str, Any]) -> float:
     return min(max(size if any(name in order[0] for name in LARGER_IS_WORSE) else -size, -BEYOND), BEYOND / 2)
 
 
-def worst_arm(study: Study, order: Sequence[str]) -> WorstArm:
+def worst_arm(study: Study, order: Sequence[str], deadline: float) -> WorstArm | None:
     """Return the worst arm in a quantity, by Nelder and Mead's simplex from the worst drawn, and write its file.
 
     The search stays within the range of a bounded distribution of n draws, else within its quantiles 1/(2 n) and
-    1 - 1/(2 n).
+    1 - 1/(2 n).  None where it has no end before the deadline [s].
     """
     plan, space, table = study.parts.plan, study.parts.plan.space, study.table()
-    own, columns = replace(plan, names=tuple(order)), {name: table[name].tolist() for name in order}
+    columns = {name: table[name].tolist() for name in order}
     ranks = [badness(order, {name: of[n] for name, of in columns.items()}) for n in range(study.done)]
     first = int(np.argmax(ranks))
     require(ranks[first] > -math.inf, "worst", order[0], "no arm has a value of it")
-    worst, count = {name: of[first] for name, of in table.items()}, 0
-    drawn = found = None if math.isnan(worst[order[0]]) else float(worst[order[0]])
-
-    def values(uniform: Real) -> dict[str, Any]:
-        return {name: of[0] for name, of in table_of(own, 0, space.values(uniform[None])).items()}
-
+    drawn, seen = {name: of[first] for name, of in table.items()}, list[Row]()
     if space.is_independent:
         start = space.uniform(first)
         with np.errstate(all="ignore"):
             is_bounded = np.isfinite(space.values(np.array([0 * start, 0 * start + 1]))).all(axis=0)
         edge = np.minimum(np.where(is_bounded, 0.0, 0.5 / space.draws), np.minimum(start, 1 - start))
         steps = np.diag(np.where(start < 0.5, FIRST_STEP, -FIRST_STEP))
-        searched: Any = scipy.optimize.minimize(  # type: ignore[call-overload]  # bounds as an array
-            lambda u: -badness(order, values(u)), start, method="Nelder-Mead", bounds=np.array([edge, 1 - edge]).T,
-            options={"maxfev": LEAST_STEPS + STEPS_A_NUMBER * len(start), "initial_simplex": [start, *(start + steps)]},
-        )  # fmt: skip
-        worst, count = values(searched.x), int(searched.nfev)
-        found = worst[order[0]]
+        most = LEAST_STEPS + STEPS_A_NUMBER * len(start)
+
+        def search(result: Callable[[Real], Row]) -> None:
+            scipy.optimize.minimize(  # type: ignore[call-overload]  # bounds as an array
+                lambda u: -badness(order, result(space.values(u[None]))), start, method="Nelder-Mead",
+                bounds=np.array([edge, 1 - edge]).T,
+                options={"maxfev": most, "initial_simplex": [start, *(start + steps)]},
+            )  # fmt: skip
+
+        parts = study.parts.others(f"_worst-{order[0]}-", most, order)
+        if (found := searched(parts, search, deadline)) is None:
+            return None
+        seen = found
+    worst = max([*seen, *[drawn] * (not seen)], key=partial(badness, order))
     numbers = {key: float(worst[key]) for key in space.keys}
     file, subject = study.parts.folder / WORST_FILE, plan.subjects.at([*numbers.values()])
     text = file_text(replace(subject.arm, name=f"{plan.arm.name}-worst"), subject.chain)
     with suppress(ParameterError):  # of a state space, which has no table
         text = f"{text}\n{law_toml(as_law(subject.law))}"
     write_file(file, text.encode(), key=OUT)
+    values = (each[order[0]] for each in (drawn, worst))
+    of_drawn, of_worst = (None if each is None or math.isnan(each) else float(each) for each in values)
     return WorstArm(
-        quantity=order[0], row=first, drawn=drawn, found=found, evaluations=count, numbers=numbers, file=str(file),
+        quantity=order[0], row=first, drawn=of_drawn, found=of_worst, evaluations=len(seen), numbers=numbers,
+        file=str(file),
     )  # fmt: skip
 
 
 # ------------------------------------------------------------------------------------------------------------ Sobol'
 
 
-def sobol_indices(plan: Plan, size: int, workers: int, engine: Engine, progress: Progress) -> tuple[SobolIndex, ...]:
-    """Return Sobol' indices of every quantity, of a sample of its own of N (numbers + 2) arms.
+def sobol_indices(
+    study: Parts, size: int, workers: int, engine: Engine, deadline: float, progress: Progress
+) -> tuple[SobolIndex, ...]:
+    """Return Sobol' indices of every quantity, of a sample of its own of N (numbers + 2) arms, written as parts.
 
-    The first progress has their number and time.  A quantity without a finite value on each arm has no indices.
+    The first progress has their number and time.  A quantity without a finite value on each arm has no indices.  None
+    where the sample is not complete before the deadline [s].
     """
-    keys = plan.space.keys
+    plan, keys = study.plan, study.plan.space.keys
     names = [name for name in plan.names if quantity_of(name).is_number and quantity_of(name).label]
     A, B = np.hsplit(scipy.stats.qmc.Sobol(2 * len(keys), rng=np.random.default_rng(plan.space.seed)).random(size), 2)
     pages = [np.where(np.arange(len(keys)) == n, B, A) for n in range(len(keys))]  # A with one column of B
     rows = plan.space.values(np.clip(np.vstack([A, B, *pages]), *ENDS))
-    seconds = seconds_an_arm(plan, rows) * len(rows) / workers
-    progress(0, 0, f"Sobol' indices of {len(rows):,} further arms, about {seconds:.0f} s")
-    tasks = ((n, partial(table_of, plan, n, rows[n : n + SOBOL_BLOCK])) for n in range(0, len(rows), SOBOL_BLOCK))
-    found = np.empty((len(rows), len(names)))
-    for n, table in engine(tasks):
-        found[n : n + SOBOL_BLOCK] = np.array([table[name] for name in names], dtype=float).T
-        progress(min(n + SOBOL_BLOCK, len(rows)), len(rows), "arms of Sobol' indices")
-    return tuple(index for name, values in zip(names, found.T, strict=True) for index in _indices(name, keys, values))
+    parts = study.others(f"_sobol-{size}-", len(rows), plan.names)
+    if not parts.is_complete:
+        seconds = seconds_an_arm(plan, rows) * len(rows) / workers
+        progress(0, 0, f"Sobol' indices of {len(rows):,} further arms, about {seconds:.0f} s")
+    calls = partial(map, lambda ends: partial(table_of, plan, ends[0], rows[slice(*ends)]))
+    complete(parts, calls, engine, deadline, progress, "parts of Sobol' indices")
+    table = parts.column(*names) if parts.is_complete else {}
+    return tuple(index for name, values in table.items() for index in _indices(name, keys, values))
 
 
 def _indices(name: str, keys: Sequence[str], values: Real) -> Iterator[SobolIndex]:

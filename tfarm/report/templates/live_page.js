@@ -335,7 +335,7 @@
   function linked() {
     const pairs = new URLSearchParams(location.hash.slice(1)), found = { ...data.start, ...usual };
     const choices = { plane: discrete ? ["poles", "zplane"] : ["poles"], loop: ["nyquist", "nichols", "sensitivity"], vary: names, shown: ["3", "5", "8", "12"] };
-    for (const [name, value] of pairs) if (name in law && value && Number.isFinite(+value)) found[name] = +value; else if (choices[name]?.includes(value)) found[name] = value;
+    for (const [name, value] of pairs) if (Object.hasOwn(law, name) && value && Number.isFinite(+value)) found[name] = +value; else if (Object.hasOwn(choices, name) && choices[name].includes(value)) found[name] = value;
     return found;
   }
   function keep() {

@@ -1,0 +1,128 @@
+"""Binary files of other programs (.mat, UFF, Parquet), read by a process of its own with limits of time and memory.
+
+Their readers are not ours: on a file from outside one may end its process, loop or fill the memory.  Arrays come back
+through a pipe as .npy without pickle, rows of a Parquet file as CSV.
+"""
+
+import csv
+import io
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
+from itertools import chain
+from typing import IO, Any, cast
+
+import numpy as np
+
+from tfarm.errors import ParameterError
+from tfarm.stopping import undone_if_stopped
+
+MOST_MEMORY = 4 << 30  # bytes: a UFF file of 256 MiB, the largest that is read, takes 3.4e9
+LONGEST = 120  # seconds, of a file or a batch of rows: that file takes 8 s of a processor, which others may share
+WORDS = 200  # characters of an error
+alarm: Callable[[int], object] = getattr(signal, "alarm", lambda _: None)  # the system's, where it has one
+
+
+@contextmanager
+def read_by_child(kind: str, path: str | os.PathLike[str], *, key: str, remedy: str) -> Iterator[IO[bytes]]:
+    """Yield the output of a process that reads a file of that kind, a key of `READERS`.
+
+    Raises ParameterError, naming `key`, where it ends with an error, by a signal or at a limit.
+    """
+    command = [sys.executable, "-P", "-W", "ignore", "-m", "tfarm.foreign", kind, os.fspath(path)]
+    paths = os.pathsep.join(each or os.getcwd() for each in sys.path)
+    own = os.environ | {"PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1", "PYTHONIOENCODING": "utf-8"}
+    pipes: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, env=own, **pipes) as process, undone_if_stopped(process.kill):
+        yield cast("Any", process.stdout)
+        errors = process.communicate()[1].decode("utf-8", "replace").splitlines()
+    if code := process.returncode:
+        ends = {-getattr(signal, "SIGALRM", 0): f"its reader takes more than {LONGEST} s"}
+        last = [f"its reader was ended by {code}", *errors][-1][:WORDS]
+        reason = last if code > 0 else ends.get(code, f"its reader was ended by signal {-code}")
+        raise ParameterError(key=key, value=os.fspath(path), remedy=f"{remedy}: {reason}")
+
+
+def read_arrays(kind: str, path: str | os.PathLike[str], *, key: str, remedy: str) -> dict[str, Any]:
+    """Return the arrays of a .mat or UFF file by their names.  Raises ParameterError as `read_by_child` does."""
+    with read_by_child(kind, path, key=key, remedy=remedy) as output:
+        load = partial(np.load, io.BytesIO(output.read()), allow_pickle=False)
+    return {str(name): load() for name in load()}
+
+
+# ------------------------------------------------------------------------------------------------------------ child
+
+
+def of_mat(path: str) -> Iterator[memoryview]:
+    """Return the numbers of a .mat file (up to version 7.2); those of a structure as "structure.name"."""
+    from scipy.io import loadmat
+
+    found = loadmat(path, appendmat=False, squeeze_me=False, struct_as_record=True)
+    return packed(dict(each for item in found.items() if item[0][:2] != "__" for each in _numbers(*item)))
+
+
+def _numbers(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the dense arrays of a variable; none of a cell or an object."""
+    value = value.toarray() if hasattr(value, "toarray") else np.asarray(value)  # of a sparse matrix
+    for each in value.dtype.names or () if value.size == 1 else ():
+        yield from _numbers(f"{name}.{each}", value[each].item())
+    if value.dtype.kind in "biufcU":
+        yield name, value
+
+
+def of_uff(path: str) -> Iterator[memoryview]:
+    """Return frequencies and values of each frequency response function (data set 58, function 4) of a UFF file."""
+    import pyuff
+
+    file, found = pyuff.UFF(path), dict[str, Any]()
+    for n, kind in enumerate(file.get_set_types()):
+        each = file.read_sets(n) if int(kind) == 58 else {}
+        # 18: the kind of an abscissa that is a frequency
+        if each.get("func_type") == 4 and each.get("abscissa_spec_data_type", 18) == 18:
+            found |= {f"x{len(found) // 2}": each["x"], f"data{len(found) // 2}": each["data"]}
+    return packed(found)
+
+
+def packed(found: dict[str, Any]) -> Iterator[memoryview]:
+    """Yield the names of arrays, then each of them."""
+    for each in (np.array([*found], dtype=str), *found.values()):
+        np.save(stream := io.BytesIO(), each, allow_pickle=False)
+        yield stream.getbuffer()
+
+
+def of_parquet(path: str) -> Iterator[bytes]:
+    """Yield names and rows of a Parquet file as CSV, a batch at a time."""
+    from pyarrow.parquet import ParquetFile  # type: ignore[import-untyped]
+
+    with ParquetFile(path) as file:
+        batches = (zip(*(column.to_pylist() for column in batch.columns), strict=True) for batch in file.iter_batches())
+        for rows in chain([[file.schema_arrow.names]], batches):
+            csv.writer(text := io.StringIO()).writerows(rows)
+            yield text.getvalue().encode()
+
+
+READERS: dict[str, Callable[[str], Iterator[Any]]] = {"mat": of_mat, "uff": of_uff, "parquet": of_parquet}
+
+
+def main(kind: str, path: str) -> None:
+    """Write the content of a file to standard output; the last line of an error is its reason."""
+    with suppress(ImportError, ValueError, OSError):  # of a system without limits, or with a tighter one
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # no file with the memory of a reader that crashed
+        resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
+    with open(os.dup(1), "wb") as output:
+        os.dup2(2, 1)  # a reader may print
+        alarm(LONGEST)
+        for each in READERS[kind](path):
+            alarm(0)  # while it waits to be taken
+            output.write(each)
+            alarm(LONGEST)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
