@@ -16,7 +16,6 @@ from tfarm.case.step import Step, step
 from tfarm.digits import plain, significant
 from tfarm.dsp import Analysis, Chain, Simulation, Simulator, modes, results, sampled_verdict, traces, verdict
 from tfarm.dsp.chain import MOST_DELAY
-from tfarm.dsp.simulate import SETTLING_BAND
 from tfarm.errors import ParameterError
 from tfarm.fitting.recording import RunComparison, compare_run, overshoot
 from tfarm.plots import animation, motion, regions, roots, style
@@ -307,7 +306,8 @@ def growth_words(each: Controller, found: verdict.Verdict, chain: Chain) -> str:
         arm, law = tracked(each.arm, each.law)
         run = Simulator(arm, chain, longer.scenario(T), law, count=found.modes_used).run().at_samples
         settled = run.hub_angle[run.t <= end][-1]
-        away = abs(run.hub_angle - settled) > SETTLING_BAND * abs(measured.step)
+        visible = 0.05 * abs(measured.step)
+        away = abs(run.hub_angle - settled) > visible
         shown = run.t[away & (run.t > end)].tolist()
     return prose("growth", name=each.name, found=found, growth=growth, measured=measured, shown=shown)
 
