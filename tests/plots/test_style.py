@@ -27,7 +27,6 @@ from tfarm.plots.style import (
     PURPLE,
     REGIONS,
     UNSTABLE,
-    drawn_for,
     save_figure,
 )
 from tfarm.report.page import TEMPLATES
