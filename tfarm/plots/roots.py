@@ -19,6 +19,7 @@ from .style import (
     FAINT,
     FIGURES,
     GREY,
+    HALF_WIDTH,
     INK,
     MARGINAL,
     REGIONS,
@@ -49,7 +50,10 @@ def zoomed(exact: Locus) -> list[int]:
 @picture(
     size=(9.0, 5.8), title=lambda data: _title(data.exact),
     grid=lambda figure, data: figure.subplot_mosaic(
-        "AABC;AADE".translate(dict.fromkeys(b"BCDE"[len(zoomed(data.exact)) :], ".")),  # gaps beyond the last
+        # gaps beyond the last; on a phone the first alone
+        "AABC;AADE".translate(
+            dict.fromkeys(b"BCDE"[min(len(zoomed(data.exact)), 4 if figure.get_figwidth() > HALF_WIDTH else 1) :], ".")
+        ),
         width_ratios=[1.7, 1.7, 1.3, 1.3],
     ),
 )  # fmt: skip
@@ -59,7 +63,7 @@ def draw_loci(data: Loci, *, ax: Sequence[Axes]) -> None:
     whole, *panels = ax
     _panel(fine, exact, data.reduced, range(len(exact.branches)), whole)
     whole.set_title("all branches", fontsize=9.0)
-    for n, one in zip(chosen, panels, strict=True):
+    for n, one in zip(chosen, panels, strict=False):
         _panel(fine, exact, data.reduced, [n], one)
         one.set_title(origin_name(int(exact.origin[n])), fontsize=9.0)
 

@@ -67,7 +67,7 @@ COORDINATES, LONG_NUMBER, PATH_LETTER = (  # in an SVG
 
 
 DARK = Path(__file__).with_name("dark.svg").read_bytes()  # in an SVG: its colours on a dark page
-STYLE, COLUMN = (Path(__file__).with_name(f"{name}.mplstyle") for name in ("tfarm", "column"))
+STYLE, COLUMN, PHONE = (Path(__file__).with_name(f"{name}.mplstyle") for name in ("tfarm", "column", "phone"))
 COLUMN_WIDTH, PAGE_WIDTH, WIDE = 3.5, 7.16, 9.5  # inches: one and both columns of an IEEE paper, and what needs both
 HALF_WIDTH, PHONE_WIDTH = 6.2, 3.83  # inches at 96 pixels: half a page that is 1280 wide, and one that is 400
 COLUMN_POINTS, SMALL_POINTS, THIN = 8.0, 6.5, 0.7  # largest letters, those inside axes; factor on lines and marks
@@ -77,7 +77,8 @@ _place: ContextVar[str] = ContextVar("_place", default="")
 
 def style() -> AbstractContextManager[None]:
     """The style of pictures, whatever the user's own settings are."""
-    return matplotlib.style.context(["default", STYLE, *[COLUMN] * (_place.get() == "column")])
+    more = {"column": [COLUMN], "phone": [PHONE]}
+    return matplotlib.style.context(["default", STYLE, *more.get(_place.get(), [])])
 
 
 @contextmanager
@@ -201,7 +202,7 @@ def placed_size(inches: tuple[float, float], is_grid: bool) -> tuple[float, floa
         case "column":
             return COLUMN_WIDTH, COLUMN_WIDTH * share**0.4 - 0.2  # less a line of a legend
         case "phone":
-            return PHONE_WIDTH, PHONE_WIDTH * (0.3 + 0.75 * share)
+            return PHONE_WIDTH, PHONE_WIDTH * (0.36 + 0.75 * share)
         case "page" if not is_grid and inches[0] > HALF_WIDTH:
             return HALF_WIDTH, HALF_WIDTH * share**0.7 - 0.2
     return inches
@@ -221,27 +222,36 @@ def make_thin(figure: Figure) -> None:
     inside = [text for ax in figure.axes for text in ax.texts]
     for text in (each for each in figure.findobj() if isinstance(each, Text)):
         text.set_fontsize(min(text.get_fontsize(), SMALL_POINTS if text in inside else COLUMN_POINTS))
-        text.set_text(folded(text.get_text(), LINE))
     for ax in figure.axes:
         sizes = product(ax.lines, ("linewidth", "markersize", "markeredgewidth"))
         for each, of in (*sizes, *product(ax.collections, ("linewidth",))):
             each.set(**{of: THIN * np.asarray(getattr(each, f"get_{of}")())})
 
 
-def finish(drawn: Figure, words: str) -> None:
-    """Legend and headline; at a place room for the legend, and where that is narrow thin lines and no headline.
+def fold_labels(figure: Figure) -> None:
+    """Fold long labels and titles; where several axes share the height, a long label has its unit on another line."""
+    for ax in figure.axes:
+        for text in (each for each in (*ax.get_children(), ax.xaxis.label) if isinstance(each, Text)):
+            text.set_text(folded(text.get_text(), LINE))
+        if len(figure.axes) > 1 and len(label := ax.get_ylabel()) > LONG_LABEL:
+            ax.set_ylabel(re.sub(r" +(?=\[)", "\n", label))
 
-    Where several axes share the height there, a long label has its unit on a line of its own.
-    """
-    if is_narrow := _place.get() in ("column", "phone"):
+
+def finish(drawn: Figure, words: str) -> None:
+    """Legend and headline; at a place room for the legend and short lines of letters, and no headline if narrow."""
+    place = _place.get()
+    if place == "column":
         make_thin(drawn)
+    if place:
+        fold_labels(drawn)
+    for ax in drawn.axes if place == "phone" else ():
+        for each in (ax, *ax.child_axes):
+            each.minorticks_off()
+        for text in ax.texts:
+            text.set_fontsize(SMALL_POINTS)
     legend = legend_below(drawn)
-    if _place.get():
-        drawn.set_figheight(drawn.get_figheight() + legend)
-        for ax in drawn.axes[: len(drawn.axes) * (len(drawn.axes) > 1)]:
-            label = ax.get_ylabel()
-            ax.set_ylabel(re.sub(r" +(?=\[)", "\n", label) if len(label) > LONG_LABEL else label)
-    if not is_narrow:
+    drawn.set_figheight(drawn.get_figheight() + legend * bool(place))
+    if place in ("", "page"):
         headline(drawn, words)
 
 
@@ -254,7 +264,7 @@ def legend_below(figure: Figure) -> float:
     keys = {label: handle for own in each for handle, label in zip(*own, strict=True)}
     # two columns of a legend fit half a page
     labels = [folded(label, 40 if figure.get_figwidth() <= HALF_WIDTH else 100) for label in keys]
-    for number in (5, 3, 2, 1) if keys else ():
+    for number in (5, 3, 2, 1)[2 * (_place.get() == "phone") :] if keys else ():
         legend = figure.legend(
             keys.values(), labels, loc="outside lower left", ncols=number,
             fontsize=min(8.2, mpl.rcParams["legend.fontsize"]), handlelength=1.8, columnspacing=1.2,
@@ -284,6 +294,7 @@ def note(text: str, at: tuple[float, float], ax: Axes, room: tuple[float, float]
     """
     to_view = ax.transData - ax.transAxes
     others = [to_view.transform(each.xy) for each in ax.texts if isinstance(each, Annotation) and each.get_text()]
+    room = (1.6 * room[0], 1.6 * room[1]) if _place.get() == "phone" else room
     is_free = bool((abs(np.reshape(others, (-1, 2)) - to_view.transform(at)) > room).any(axis=1).all())
     if is_free:
         own: Any = {"fontsize": 8.0, "textcoords": "offset points", "xytext": (0, 0), "va": "center", "zorder": 5}
