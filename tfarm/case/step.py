@@ -211,11 +211,11 @@ class _Record:
         """Figures but the peak of a signal, `more` being added to it and to its deviations."""
         final, away, scale = self._deviations(name, t, y)
         settled = settling_time(t, np.maximum(away + more, 0), scale, self.busy_until, self.band)
-        after = np.isin(t, self.t) & (t >= self.busy_until * (1 - TIME_ROUNDING))
+        after = t >= self.busy_until * (1 - TIME_ROUNDING)
         values: dict[str, Any] = dict.fromkeys(FIGURES) | {"settling_time": settled}
-        if self.busy_until and after.any():
+        if self.busy_until and after.sum() > 1:
             unit = Millimetres if name == "tip_displacement" else float
-            values["residual_rms"] = unit(np.sqrt(np.mean((y - final)[after] ** 2)))
+            values["residual_rms"] = unit(np.sqrt(np.trapezoid((y - final)[after] ** 2, t[after]) / np.ptp(t[after])))
         if settled is not None:
             final += float(more.mean())
             values["final_value"] = final if name != MOMENT or not self.arm.has_rigid_mode else None

@@ -23,7 +23,7 @@ from tfarm.arm.checks import whole
 from tfarm.arm.law import REFERENCE, Law
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import kernel
-from tfarm.dsp.chain import Chain
+from tfarm.dsp.chain import TIME_ROUNDING, Chain
 from tfarm.dsp.discretise import acting_law, with_all_gains
 from tfarm.dsp.plant import RECORDED, USUAL_MODES, Plant, sensed_plant, with_held_filter
 from tfarm.dsp.scenarios import Scenario
@@ -67,7 +67,7 @@ def settling_time(
     """
     scale = scale or float(away.max(initial=0.0))
     first = 1 + int(np.flatnonzero(away > band * scale).max(initial=-1))
-    if first > 0 and (first >= t.size or LEFT_OF_RECORD * (t[-1] - t[first]) < t[-1]):
+    if first > 0 and (first >= t.size or LEFT_OF_RECORD * (t[-1] - t[first]) < t[-1] * (1 - TIME_ROUNDING)):
         return None
     return max(0.0, float(t[first]) - moves_until)
 

@@ -167,26 +167,28 @@ class TimeResponse:
         A bound below the rounding of the value, 2.2e-16 of its size, is that.  `most` is infinite of an impulse.
         """
         jumps = self.starts[self.starts <= t[-1]]
-        t = np.union1d(t, jumps)
+        sides = np.hstack([self.at(jumps), self.at(jumps, before=True)])
         places = abs(self.at(t)).argmax(axis=1)
         first, last = (t[np.clip(places + step, 0, t.size - 1)] for step in (-RIPPLE, RIPPLE))
-        t = np.union1d(t, np.linspace(first, last, 80 * RIPPLE + 1))
-        sizes, ahead = abs(self.at(t)), self.at(jumps, before=True)
-        most = np.hstack([sizes + self.remainder(t), abs(ahead)]).max(axis=1)
+        t = np.unique(np.r_[t, np.linspace(first, last, 80 * RIPPLE + 1).ravel()])
+        sizes, errors = abs(self.at(t)), self.remainder(np.r_[jumps, jumps, t])
+        most = (np.hstack([abs(sides), sizes]) + errors).max(axis=1)
         most += sum(np.where(np.isinf(part.off), math.inf, 0.0) for part in self.parts)
         return {
-            name: self._peak(row, t, sizes[row], jumps, ahead[row], float(most[row]))
+            name: self._peak(row, t, sizes[row], jumps, sides[row], float(most[row]))
             for row, name in enumerate(self.names)
         }
 
-    def _peak(self, row: int, t: Real, sizes: Real, jumps: Real, ahead: Real, most: float) -> Peak:
-        """The peak of one signal, of sizes (n,) at times t and values `ahead` of the jumps."""
+    def _peak(self, row: int, t: Real, sizes: Real, jumps: Real, sides: Real, most: float) -> Peak:
+        """The peak of one signal, of sizes (n,) at times t, and with values on both `sides` of the jumps."""
+        y = np.empty(0)
         for _ in range(ZOOMS):
             n = int(sizes.argmax())
-            t = np.linspace(t[max(n - 1, 0)], t[min(n + 1, t.size - 1)], ZOOM_POINTS)
-            t = np.union1d(t, jumps[(jumps > t[0]) & (jumps < t[-1])])
-            sizes = abs(self.at(t)[row])
-        t, y = np.r_[t, jumps], np.r_[self.at(t)[row], ahead]
+            ends = np.searchsorted(t, t[n] + np.array([-1, 1]) * 1e-12 * t[-1])  # next to times that are the same
+            t = np.linspace(t[max(ends[0] - 1, 0)], t[min(ends[1], t.size - 1)], ZOOM_POINTS)
+            y = self.at(t)[row]
+            sizes = abs(y)
+        t, y = np.r_[jumps, jumps, t], np.r_[sides, y]
         n = int(abs(y).argmax())
         size = abs(float(y[n]))
         bound = max(float(self.remainder(t[[n]])[row, 0]), MACHINE_EPS * size)
@@ -302,11 +304,14 @@ def _part(poles: Poles, of: Transforms, start: float, duration: float) -> Part:
     t = np.linspace(0.8 * end, end, 400)
     ends = _summed(late, t)
     apart = abs(ends - part.early(t)) + rests[-1].errors_at(t)
-    _, at_once, after = of.parts(of.far)
-    before, limit = ((at_once + after) * of.far).real.T[-2:]
-    off = abs(limit - direct[1].sum(axis=1).real)
-    off[off <= 1e-6 * abs(direct[1]).sum(axis=1)] = 0.0  # to which the limit is read
-    off[(abs(limit) > 2 * abs(before)) & (abs(limit) > abs(ends).max(axis=1))] = math.inf
+    # s times the transform of the direct sum, right of its circles and far right, where it is h(0+)
+    s = np.r_[(10 / end + abs(of.loop.law.poles).max(initial=0.0)) * np.array([1.0, 3.0]), of.far]
+    _, at_once, after = of.parts(s)
+    before, limit = abs((at_once + after) * s)[:, -2:].T
+    z, amplitudes = direct
+    off = abs((at_once - (amplitudes / (s[:, None, None] - z)).sum(axis=-1).T).real * s).max(axis=1)
+    off[off <= 1e-6 * abs(amplitudes).sum(axis=1)] = 0.0
+    off[(limit > 2 * before) & (limit > abs(ends).max(axis=1))] = math.inf
     return replace(part, difference=2 * apart.max(axis=1), off=off)
 
 
@@ -323,26 +328,28 @@ def _terms(
 
     Real edges bound circles on the real axis, imaginary ones at any place.
     """
-    every = np.unique(np.r_[0, known, known.conj()])
+    every, count = np.unique(np.r_[0, known, known[known.imag != 0].conj()], return_counts=True)
     reach = min(CLOSE / duration, most_close)
     _, label = connected_components(abs(every[:, None] - every) <= reach)
     found = []
     for n in range(label.max() + 1):
-        own = every[label == n]
+        own, order = every[label == n], int(count[label == n].sum())
         c = complex(own.mean())
         beyond = 2 * (abs(every).max() + 1 / duration)
         nearest = [complex(edge.real or c.real, edge.imag or c.imag) for edge in map(complex, edges)]
         room = float(abs(np.r_[every[label != n], nearest, beyond] - c).min())
         if c.imag >= -ON_AXIS * reach:
-            z, amplitudes = _circle(own, c, room, transform, duration)
+            z, amplitudes = _circle(own, order, c, room, transform, duration)
             found.append((z, amplitudes * (2.0 if c.imag > ON_AXIS * reach else 1.0)))
     z, amplitudes = zip(*found, strict=True)
     return np.concatenate(z), np.hstack(amplitudes)
 
 
-def _circle(own: Complex, c: complex, room: float, transform: Transform, duration: float) -> tuple[Complex, Complex]:
+def _circle(
+    own: Complex, order: int, c: complex, room: float, transform: Transform, duration: float
+) -> tuple[Complex, Complex]:
     """The nodes of a circle around poles, to a distance of `room` from others; of a simple pole its residue."""
-    is_simple, extent, radius = own.size == 1 and c != 0, float(abs(own - c).max()), POLE_RADIUS * room
+    is_simple, extent, radius = order == 1 and c != 0, float(abs(own - c).max()), POLE_RADIUS * room
     if not is_simple:
         radius = min(max(math.sqrt(extent * room), radius), SLOW_RADIUS * max(extent, 1 / duration))
     ratio = max(extent / radius, radius / room)
