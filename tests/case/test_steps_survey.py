@@ -8,7 +8,7 @@ import pytest
 import tfarm
 from tests.case.inversion import DeHoog, durbin, inverse
 from tests.case.step_truth import Case, Truth
-from tests.case.steps import FIGURES, PARTS, Signal, answered, judge
+from tests.case.steps import FIGURES, PARTS, Signal, answered, grows, judge
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import Sampling
 
@@ -86,6 +86,13 @@ def test_torque_of_a_filtered_controller_after_its_delay():
     share = np.exp(-300 / 297)
     assert time == pytest.approx(0.01 + 1 / 297, abs=1e-6)
     assert peak == pytest.approx(3 * (1 - share * (1 + 300 / 297)) + 9e4 / 297 * share, rel=1e-9)
+
+
+def test_loops_that_grow_are_not_drawn():
+    """Rate feedback of the wrong sign, and one whose delay is far too long for its gain."""
+    late = replace(FAST, delay=0.1)
+    wrong = replace(SERVO, entries={"hub_rate": ((-0.3,), ())})
+    assert [grows(case, 71.5) for case in (SERVO, FAST, late, wrong)] == [False, False, True, True]
 
 
 @pytest.mark.parametrize("case", [FAST, SERVO], ids=["delay", "slew"])
