@@ -89,8 +89,8 @@ def test_torque_of_a_filtered_controller_after_its_delay():
 
 
 def test_loops_that_grow_are_not_drawn():
-    """Rate feedback of the wrong sign, and one whose delay is far too long for its gain."""
-    late = replace(FAST, delay=0.1)
+    """Rate feedback of the wrong sign, and a delay that is too long for the first mode."""
+    late = replace(FAST, delay=0.15)
     wrong = replace(SERVO, entries={"hub_rate": ((-0.3,), ())})
     assert [grows(case, 71.5) for case in (SERVO, FAST, late, wrong)] == [False, False, True, True]
 
