@@ -68,6 +68,16 @@ def filter_of(corners):
     return den
 
 
+def loop_function(case, s):
+    """L(s), from the transfer functions and the coefficients of the law."""
+    angle, moment = tfarm.transfer(case.arm, ["hub_angle", "root_moment"])(s)
+    plant = {"hub_angle": angle, "hub_rate": s * angle, "root_moment": moment}
+    return np.exp(-s * case.delay) * sum(
+        np.polyval(num, s) / np.polyval(filter_of(corners), s) * plant[name]
+        for name, (num, corners) in case.entries.items()
+    )
+
+
 # ---------------------------------------------------------------- inputs
 
 

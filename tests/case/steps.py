@@ -22,7 +22,7 @@ import numpy as np
 
 import tfarm
 from tests import survey
-from tests.case.step_truth import Case, Truth
+from tests.case.step_truth import Case, Truth, loop_function
 from tests.plausible.arms import draw, log
 from tests.survey import Finding
 from tfarm.arm import Motor
@@ -30,12 +30,11 @@ from tfarm.case import step
 from tfarm.case.step import PARTS, LoopResponse
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import Sampling, Slew
-from tfarm.loop.loop import Loop
-from tfarm.loop.stability import verdict_on
 
 AGREES, ENOUGH = 1e-6, 1e-4  # of the peak of a signal, there and elsewhere: two methods differ by no more
-RIGHT, CONVERGED, BAND = 0.01, 1e-6, 0.05  # of the peak, and under that word; of the final value: settled
+RIGHT, CONVERGED, BAND = 0.01, 1e-6, 0.02  # of the peak, and under that word; of the final value: settled
 MOST_UNDETERMINED, MOST_WITHOUT_TRUTH = 0.02, 0.05  # of the figures
+SLOW, FAST = 1e-3, 1e3  # of the first frequency: growth, and the end of the line along which it is looked for
 CHECKS = 40  # times at which both methods are compared, and the deciding ones
 SCENARIOS = ("reference", "slew", "pulse")
 FIGURES = ("peak", "peak_time", "final_value", "rise_time", "overshoot", "settling_time", "steady_state_error",
@@ -60,8 +59,7 @@ class Signal:
     def __init__(self, part, figures, found, truth):
         self.part, self.figures, self.found, self.truth = part, figures, found, truth
         self.row = PARTS.index(part)
-        keep = truth.curve[0] <= found.t[-1] * (1 + 1e-12)
-        self.t, self.y = truth.curve[0][keep], truth.curve[1][self.row, keep]
+        self.t, self.y = truth.curve[0], truth.curve[1][self.row]
         self.space = 2 * float(found.t[1])
         self.peak_time, self.peak = truth.peak(self.row)
         self.stated = getattr(figures, "remainder_bound", None)
@@ -118,7 +116,7 @@ class Signal:
         """The true signal in words."""
         final = f"final {self.final:.6g}, swing {self.swing:.3g}"
         peak = f"peak {self.peak:.8g} at {self.peak_time:.8g} s"
-        last = f"last outside of 5 % at {self.last(1.0):.6g} s"
+        last = f"last outside of 2 % at {self.last(1.0):.6g} s"
         rise = "" if self.reference is None else f", rise {self.rise(1.0, 0)[0]:.6g} s"
         true = f"true: {peak}, {final}, {last}{rise}, rms {self.rms}, right to {self.error:.2g}"
         return f"stated bound {self.stated}, {true}"
@@ -146,7 +144,8 @@ class Signal:
 
     def _final_value(self, value):
         if value is None:
-            return "undefined" if self.part == "root_moment" or self.may_be_unsettled else None
+            is_zero = self.part == "root_moment" and self.truth.case.arm.has_rigid_mode
+            return "undefined" if is_zero or self.may_be_unsettled else None
         return abs(value - self.final) <= self.slack
 
     def _steady_state_error(self, value):
@@ -220,11 +219,12 @@ class Signal:
         return any(self.settles(value, final) for final in self.finals)
 
     def settles(self, value, final):
-        """Whether a signal settles at that time."""
+        """Whether a signal settles at that time after the end of the motion."""
         near, far = self.shares(final)
         inner, outer = self.outside(near, final), self.outside(far, final)
-        is_late = (outer > value + self.space).any()
-        return not is_late and (value <= self.space or bool((abs(inner - value) <= self.space).any()))
+        at = value + self.truth.input.end
+        is_late = (outer > at + self.space).any()
+        return not is_late and (value <= self.space or bool((abs(inner - at) <= self.space).any()))
 
 
 def strings(of, without):
@@ -281,7 +281,7 @@ def judge(case):
         return [Judged(f"{part}.{name}", "not determined", str(refused)) for part in PARTS for name in FIGURES]
     if found.continuous.stability == "unstable":
         return None
-    truth = Truth(case, max(found.duration, float(found.t[-1])))
+    truth = Truth(case, float(found.t[-1]))
     signals = [Signal(part, getattr(found.continuous, part), found, truth) for part in PARTS]
     judged = []
     if case.duration is None:
@@ -330,20 +330,24 @@ def some_motor(rng, arm):
 
 
 def some_case(rng):
-    """A case whose loop is not called unstable, without delay in a third of them, half of them steps of a reference."""
+    """A case whose loop does not grow fast, without delay in a third of them, half of them steps of a reference."""
     delay = 0.0 if rng.random() < 1 / 3 else float(rng.uniform(0, 0.01))
     name = str(rng.choice(SCENARIOS, p=[0.5, 0.25, 0.25]))
     while True:
         arm, first = some_arm(rng)
-        if name == "slew" and not arm.has_rigid_mode:
+        if (name == "slew" and not arm.has_rigid_mode) or (arm.is_undamped and delay):  # unstable at any gain
             continue
         for attempt in range(6):
             case = some_loop(rng, arm, first, delay, name, 0.6**attempt)
-            try:
-                if verdict_on(Loop(arm, case.law)).verdict != "unstable":
-                    return case
-            except (tfarm.ConvergenceError, tfarm.ParameterError):
-                continue
+            if not grows(case, first):
+                return case
+
+
+def grows(case, first):
+    """Whether 1 + L has a zero right of `SLOW` by its turns along that line: so have most loops that are not stable."""
+    s = SLOW * first + 1j * np.r_[0.0, np.geomspace(1e-4, FAST, 2**15)] * first
+    F = 1 + loop_function(case, s)
+    return round(float(np.angle(F[1:] / F[:-1]).sum()) / math.pi) != 0
 
 
 def some_loop(rng, arm, first, delay, name, share):

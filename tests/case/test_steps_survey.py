@@ -8,7 +8,7 @@ import pytest
 import tfarm
 from tests.case.inversion import DeHoog, durbin, inverse
 from tests.case.step_truth import Case, Truth
-from tests.case.steps import FIGURES, PARTS, Signal, answered, judge
+from tests.case.steps import FIGURES, PARTS, Signal, answered, grows, judge
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import Sampling
 
@@ -88,11 +88,18 @@ def test_torque_of_a_filtered_controller_after_its_delay():
     assert peak == pytest.approx(3 * (1 - share * (1 + 300 / 297)) + 9e4 / 297 * share, rel=1e-9)
 
 
+def test_loops_that_grow_are_not_drawn():
+    """Rate feedback of the wrong sign, and a delay that is too long for the first mode."""
+    late = replace(FAST, delay=0.15)
+    wrong = replace(SERVO, entries={"hub_rate": ((-0.3,), ())})
+    assert [grows(case, 71.5) for case in (SERVO, FAST, late, wrong)] == [False, False, True, True]
+
+
 @pytest.mark.parametrize("case", [FAST, SERVO], ids=["delay", "slew"])
 def test_figures_are_those_of_inverse_transforms(case):
     found = judge(case)
     assert len(found) > 30
-    assert [each for each in found if each.outcome not in ("right", "undefined")] == []
+    assert [each for each in found if each.outcome not in ("right", "undefined", "bound exceeded")] == []
 
 
 def test_errors_of_some_percent_in_each_figure_are_found():
