@@ -191,3 +191,9 @@ def test_code_in_c_is_in_the_arithmetic_of_the_chain(tmp_path):
         with pytest.raises(ParameterError, match=f"arithmetic = 'float32': the code is in {precision}"):
             tfarm.export(ARM, GAINS, precision=precision, **wanted)
     assert tfarm.export(ARM, GAINS, precision="float", **wanted).details.precision == "float"
+
+
+def test_the_continuous_column_of_a_step_names_a_limit():
+    found = tfarm.step(ARM, GAINS, Chain(actuator=Actuator(torque_limit=1.0)), duration=0.5)
+    assert found.continuous.certainty.endswith(" poles; not covered: torque_limit")
+    assert "not covered" not in found.sampled.certainty

@@ -29,7 +29,7 @@ from tfarm.dsp.plant import sensed_plant
 from tfarm.dsp.results import ENOUGH_CHANGE, simulated
 from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, described, resting, scenario
 from tfarm.dsp.simulate import LEFT_OF_RECORD, MOST_BETWEEN, first_mode, settled_from
-from tfarm.dsp.stages import admit
+from tfarm.dsp.stages import admit, not_covered
 from tfarm.errors import must_be_known, require
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import Poles
@@ -118,12 +118,12 @@ class _Record:
     t: Real
     reference: Mapping[str, Real]
 
-    def _of_continuous(self, response: TimeResponse) -> LoopResponse:
-        """The continuous-time loop."""
+    def _of_continuous(self, response: TimeResponse, omitted: str) -> LoopResponse:
+        """The continuous-time loop; `omitted` ends its certainty."""
         signals = dict(zip(response.names, response.at(self.t), strict=True))
         peaks = {name: response.peak(name, self.t) for name in signals}
         is_converged = all(bound <= CONVERGED * abs(peak) for _, peak, bound in peaks.values())
-        word, count = verdict_on(response.poles.loop).verdict, f"{response.poles.count} poles"
+        word, count = verdict_on(response.poles.loop).verdict, f"{response.poles.count} poles{omitted}"
         return self._loop(word, is_converged, count, signals, peaks)
 
     def _of_sampled(self, law: AnyLaw, chain: Chain, task: Scenario, names: Sequence[str]) -> LoopResponse:
@@ -277,11 +277,12 @@ def step(
     t = _times(response, task)
     angle = traces.reference_angle(task, t) if of_angle else np.ones(t.size)
     reference = {hub: angle, tip: arm.reach * angle} if is_step or scenario_name == "slew" else {}
+    omitted = not_covered("continuous-time column", chain)
     found = _Record(arm, (*names[:3], TORQUE), task.busy_until, t, reference)
     return Step(
         **vars(found), controller=controller(full, arm), scenario=scenario_name, duration=length, period=task.period,
         scenario_in_words=described(task, arm, chain), sampled=found._of_sampled(law, chain, task, names),
-        continuous=None if response is None else found._of_continuous(response), response=response,
+        continuous=None if response is None else found._of_continuous(response, omitted), response=response,
     )  # fmt: skip
 
 
