@@ -22,6 +22,7 @@ from tfarm.arm.materials import materials
 from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES, StrictTable, file_keys
 from tfarm.cli.app import whole_command
 from tfarm.dsp.chain import CHAIN_TABLES
+from tfarm.dsp.stages import stages
 from tfarm.fitting.recording import RunTable
 from tfarm.schema.glossary import CERTAINTY, declared_records
 
@@ -106,7 +107,21 @@ def arm_file_page() -> str:
         rows = (row_of(name.partition("]")[0] or "top", *field) for field in table.model_fields.items())
         lines += [*markdown_table(("key", "label", "unit", "type", "default", "meaning"), rows), ""]
         lines += materials_table() if name == "link" else []
-    return "\n".join(lines)
+    return "\n".join([*lines, *stages_table()])
+
+
+def stages_table() -> list[str]:
+    """Return the stages of one sample, their keys, and what each answer does with them."""
+    rows = [(stage, key, words) for stage, keys in stages().items() if stage != "arm" for key, words in keys.items()]
+    titles = ("stage", "key", *rows[0][2])
+    text = (
+        "Stages of one sample, in the order in which they act. **acts**: the key changes the answer. **named**: the "
+        "answer is without it, and its line of certainty names the key where a file has it. **partly**: both. "
+        "**none**: the answer has no such stage. Every other key of an arm acts in all answers. A key that is not in "
+        "this table is refused."
+    )
+    table = markdown_table(titles, ([stage, f"`{key}`", *words.values()] for stage, key, words in rows))
+    return ["## Keys and answers", "", text, "", *table, ""]
 
 
 def materials_table() -> list[str]:

@@ -35,6 +35,17 @@ def test_every_key_of_an_arm_file_is_on_its_page(conf):
     assert "| `inertia` | hub inertia I_h | kg m^2 | float |  | about the axis" in page
 
 
+def test_the_table_of_keys_has_each_key_and_each_answer(conf):
+    table = conf.arm_file_page().partition("## Keys and answers")[2]
+    titles = (
+        "stage | key | continuous-time column | verdict | margins | card | step | simulate | design | tune | "
+        "export c | export fmu | export mat | export py | live page"
+    )
+    assert f"| {titles} |" in table
+    assert "| plant | `actuator.hub_damping` | acts | acts |" in table
+    assert all(f"`{name}.{key}`" in table for name, kind in conf.CHAIN_TABLES.items() for key in kind.model_fields)
+
+
 def test_every_json_key_of_every_record_is_in_its_section(conf):
     sections = dict(re.findall(r"^## (\S+ \(\w+\))$(.*?)(?=^## |\Z)", conf.json_page(), re.MULTILINE | re.DOTALL))
     records = list(declared_records())

@@ -52,3 +52,14 @@ def test_what_float32_does_not_have_is_refused(law, message):
         with pytest.raises(ParameterError, match=r"converters\.arithmetic = 'float32'") as refused:
             ask(ARM, law, SINGLE)
         assert message in str(refused.value)
+
+
+def test_code_has_a_realisation_of_its_own(tmp_path):
+    """In sections of second order a law keeps its poles in float32, and the code is certified with them."""
+    den, num = (np.poly(np.exp(np.array(poles) * T)) for poles in ((-4.0, -13.0, -21.0, -39.0), (-5.0,)))
+    law = Law({"hub_angle": (0.05 * den.sum() / num.sum() * num, den), "hub_rate": 0.3}, period=T)
+    found = tfarm.export(ARM, law, chain=SINGLE, what="controller", form="c", precision="float", folder=tmp_path)
+    assert found.details.realisation == "second-order sections"
+    assert found.verdict.startswith("stable (certified up to ")
+    with pytest.raises(ParameterError, match="is not certified stable: unstable"):  # as given, in every entry
+        tfarm.export(ARM, law, chain=SINGLE, what="controller", form="py", folder=tmp_path)

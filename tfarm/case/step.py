@@ -35,7 +35,7 @@ from tfarm.dsp.plant import sensed_plant
 from tfarm.dsp.results import ENOUGH_CHANGE, simulated
 from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, described, resting, scenario
 from tfarm.dsp.simulate import MOST_BETWEEN, SETTLING_BAND, final_value, first_mode, settling_time
-from tfarm.dsp.stages import admit
+from tfarm.dsp.stages import admit, not_covered
 from tfarm.errors import must_be_known, require
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import Poles
@@ -147,8 +147,8 @@ class _Record:
     reference: Mapping[str, Real]
     band: float
 
-    def _of_continuous(self, response: TimeResponse) -> LoopResponse:
-        """The continuous-time loop."""
+    def _of_continuous(self, response: TimeResponse, omitted: str) -> LoopResponse:
+        """The continuous-time loop; `omitted` ends its certainty."""
         t = np.union1d(self.t, response.near_starts(float(self.t[-1])))
         t = np.union1d(t, self._crossings(t, dict(zip(response.names, response.at(t), strict=True))))
         y, bound, peaks = response.at(t), response.remainder(t), response.peaks(t)
@@ -157,7 +157,7 @@ class _Record:
             (error <= CONVERGED * abs(peak.value)).all() and math.isfinite(peak.most)
             for _, _, error, peak in curves.values()
         )
-        word, count = verdict_on(response.poles.loop).verdict, f"{response.poles.count} poles"
+        word, count = verdict_on(response.poles.loop).verdict, f"{response.poles.count} poles{omitted}"
         return self._loop(word, is_converged, count, curves)
 
     def _of_sampled(self, law: AnyLaw, chain: Chain, task: Scenario, names: Sequence[str]) -> LoopResponse:
@@ -364,11 +364,12 @@ def step(
     t = _times(response, task)
     angle = traces.reference_angle(task, t) if of_angle else np.ones(t.size)
     reference = {hub: angle, tip: arm.reach * angle} if is_step or scenario_name == "slew" else {}
+    omitted = not_covered("continuous-time column", chain)
     found = _Record(arm, (*names[:3], TORQUE), task.busy_until, t, reference, band)
     return Step(
         **vars(found), controller=controller(full, arm), scenario=scenario_name, duration=length, period=task.period,
         scenario_in_words=described(task, arm, chain), sampled=found._of_sampled(law, chain, task, names),
-        continuous=None if response is None else found._of_continuous(response), response=response,
+        continuous=None if response is None else found._of_continuous(response, omitted), response=response,
     )  # fmt: skip
 
 
