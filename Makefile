@@ -39,6 +39,7 @@ SURVEYS := \
 	studies.planted \
 	tuner.bounded \
 	exported.laws \
+	exported.worst \
 	exported.tuners \
 	exported.unit_loops \
 	cli.fuzz \

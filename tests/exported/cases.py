@@ -42,7 +42,7 @@ def task_of(case, precision="double", **others):
     arm, law, chain = CASES[case] if isinstance(case, str) else case
     ranges = {name: size for name, size in RANGES.items() if precision == "q31"} | others.pop("ranges", {})
     if precision == "q31":
-        names = {*tfarm.arm.as_law(law).signals, "output"}
+        names = {*tfarm.arm.as_law(law).signals, "output", "feedforward"}
         ranges = {name: size for name, size in ranges.items() if name in names}
     return ExportTask(
         arm=arm, given=law, chain=chain, what="controller", form="c", precision=precision, ranges=ranges, **others

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.exported.cases import CASES, realised, task_of
+from tests.exported.cases import CASES, GAINS, IDEAL, LAB, realised, task_of
 from tests.exported.compilers import build, needed, random_inputs, run, stepped
 from tests.shared import thinned
 from tfarm.dsp.scenarios import scenario
@@ -98,6 +98,49 @@ def test_the_code_is_the_simulation(case, precision):
     assert abs(done.torque).max() > 0.1
 
 
+def test_the_status_names_a_clipped_output_and_the_header_its_limits(tmp_path):
+    """Inputs within their ranges ask for K1 20 = 6 N m and for 5 + K1 5 = 6.5 N m of an output of 5 N m."""
+    ranges = {"hub_rate": 10.0, "root_moment": 2.0, "output": 5.0}
+    task = task_of((LAB, GAINS, IDEAL), "q31", ranges=ranges)
+    found = c_controller(task)
+    write_into(tmp_path, found.contents)
+    low, high = -(2**31), 2**31 - 1
+    # hub rate, root moment, their references, feedforward
+    inputs = np.array([[low, 0, high, 0, 0], [-(2**30), 0, 0, 0, high], [low, 0, 0, 0, 0]])
+    out, status = stepped(tmp_path, realised(task)[0], inputs, "gcc", "-O2")
+    assert status.tolist() == [3, 3, 0]
+    assert (out / 2.0**31 * 5).tolist() == pytest.approx([5.0, 5.0, 3.0], abs=2 * found.details.error)
+    assert found.details.largest_output == pytest.approx(5.0 + 0.3 * 20.0 + 0.3 * 4.0)
+    header = found.contents["controller.h"].decode()
+    assert f" *   saturation: saturates from -5.0 down and from {high / 2.0**31 * 5!r} up\n" in header
+    assert "controller_SATURATED where it clipped the output.\n" in header
+    for line in ("y_hub_rate: hub_rate [rad/s], over 10.0, within +-10.0", "samples of these bounds: all",
+                 "r_root_moment: reference of root_moment [N m], over 2.0, within +-2.0",
+                 "feedforward: feedforward [N m], over 5.0, within +-5.0"):  # fmt: skip
+        assert f" *   {line}\n" in header
+
+
+def test_an_output_that_no_input_clips_is_certified():
+    ranges = {"hub_rate": 10.0, "root_moment": 2.0, "output": 16.0, "feedforward": 5.0}
+    found = c_controller(task_of((LAB, GAINS, IDEAL), "q31", ranges=ranges)).details
+    assert found.saturation.startswith("excluded for inputs within their ranges (limits -16.0 and 15.99")
+    assert found.largest_output == pytest.approx(12.2)
+
+
+def test_a_state_that_saturates_is_named(exported):
+    """The integral of a constant error, which ends at 4 to 8 times the range of the output, and no other state."""
+    _, controller = exported("integral", "q31")
+    inputs = np.zeros((4000, controller.inputs), np.int64)
+    inputs[:, controller.signals.index("hub_angle")] = -(2**31)
+    inputs[:, 3 + controller.references.index("hub_angle")] = 2**31 - 1
+    _, status = controller.run(inputs)
+    first = int(np.argmax(status == 4))
+    # 0.2 s^-1 of 6 rad and an output of 2 N m
+    assert 4 * 2.0 <= 0.2 * 6.0 * 0.01 * first <= 8.1 * 2.0
+    assert (status[:first] != 4).all()
+    assert (status[first:] == 4).all()
+
+
 def test_the_source_has_no_allocation_and_no_function_of_another_library(exported):
     source = (exported("integral", "float")[0] / "controller.c").read_text(encoding="ascii")
     assert not re.search(r"\b(malloc|calloc|free|math\.h|goto|while|sin|cos|exp|fabs|rint|fma)\b", source)
@@ -118,6 +161,36 @@ def test_sanitizers_find_nothing_on_fuzzed_inputs(exported, case, precision):
     outputs, own = controller.run(inputs)
     assert out.astype(outputs.dtype).tobytes() == outputs.tobytes()
     assert (status == own).all()
+
+
+ADVISORY = (  # rules of MISRA C 2012
+    "1.2 2.3 2.4 2.5 2.6 2.7 4.2 5.9 8.7 8.9 8.11 8.13 10.5 11.4 11.5 12.1 12.3 12.4 13.3 13.4 15.1 15.4 15.5 17.5 "
+    "17.8 18.4 18.5 19.2 20.1 20.5 21.12"
+)
+TESTS_ONLY = {"self_test.c": {"21.6", "21.16"}, "example.c": {"21.6"}}  # they print, and compare bits
+
+
+@pytest.mark.parametrize(("case", "precision"), thinned(RUNS, 2))
+def test_every_branch_and_loop_has_braces(exported, case, precision):
+    folder, _ = exported(case, precision)
+    for file in ("controller.c", "self_test.c", "example.c"):
+        lines = (folder / file).read_text(encoding="ascii").splitlines()
+        heads = [line for line in lines if re.match(r"\s*(\} )?(if|else|for|while)\b", line)]
+        assert len(heads) >= 1
+        assert [line for line in heads if not line.endswith("{")] == []
+
+
+@pytest.mark.parametrize(("case", "precision"), thinned(RUNS, 4))
+def test_the_required_rules_of_misra_c_are_kept(exported, case, precision):
+    folder, _ = exported(case, precision)
+    options = ["--addon=misra", "--std=c99", "--enable=style", "--quiet"]
+    for file in ("controller.c", *(TESTS_ONLY if (case, precision) == RUNS[0] else ())):
+        done = subprocess.run(
+            [needed("cppcheck"), *options, str(folder / file)], capture_output=True, timeout=60, check=False
+        )
+        found = set(re.findall(r"misra-c2012-([\d.]+)\]", done.stderr.decode()))
+        assert found & {"12.3", "8.9"}  # it ran
+        assert found - {*ADVISORY.split()} - TESTS_ONLY.get(file, set()) == set()
 
 
 @pytest.mark.parametrize(("case", "precision"), thinned(RUNS, 4))

@@ -8,7 +8,10 @@ import pytest
 from scipy.linalg import solve_discrete_lyapunov
 
 import tfarm
+from tests.exported import worst
 from tests.exported.cases import GAINS, IDEAL, LAB, NOTCH, PI, REAL, realised, task_of
+from tests.survey import tally
+from tfarm.dsp import Converters
 from tfarm.errors import ParameterError
 from tfarm.exported.controller import c_controller, in_z
 from tfarm.exported.word_length import (
@@ -19,6 +22,7 @@ from tfarm.exported.word_length import (
     candidates,
     gramians,
     observed,
+    similar,
     with_system_matrix,
 )
 
@@ -27,6 +31,8 @@ SERVO = tfarm.Law(
 )
 
 LAG = tfarm.Law({"hub_rate": ([0.3], [0.02, 1.0]), "root_moment": ([0.1], [0.01, 1.0])}, references=("hub_rate",))
+MULTIPLE = tfarm.Law({"hub_angle": ([1e-10], np.poly(np.full(8, 0.95)).tolist())}, period=0.01)
+WITH_DAC = replace(IDEAL, converters=Converters(torque_bits=12, torque_range=2.0))
 UNSTABLE = tfarm.HubFeedback(K1=0.3, K2=30.0)
 
 
@@ -101,7 +107,7 @@ def test_errors_and_states_stay_within_their_bounds_under_the_worst_inputs(law, 
     """Inputs at the ends of their ranges with the signs of the response; exact arithmetic in fractions."""
     controller, _ = realised(task_of((LAB, law, IDEAL), precision, ranges={"root_moment": 2.0}))
     word = controller.word
-    bounds, is_whole, error = word.bounds
+    bounds, is_whole, error, _ = word.bounds
     assert is_whole
     A, B, C, _ = word.law.parts[0].block.matrices()
     n, steps = len(A), 300
@@ -155,10 +161,11 @@ def in_fractions(word, controller, inputs, scale):
     return out, largest
 
 
-@pytest.mark.parametrize("law", [SERVO, NOTCH, GAINS])
-def test_a_limit_cycle_in_fixed_point_stays_within_its_bound(law):
+@pytest.mark.parametrize(("law", "bits"), [(SERVO, None), (NOTCH, None), (GAINS, None), (SERVO, 12)])
+def test_a_limit_cycle_in_fixed_point_stays_within_its_bound(law, bits):
     """The closed loop with whole numbers in the controller, from a start off its rest, once it has decayed."""
-    controller, loop = realised(task_of((LAB, law, IDEAL), "q31"))
+    chain = replace(IDEAL, converters=Converters(torque_bits=bits, torque_range=2.0))
+    controller, loop = realised(task_of((LAB, law, chain), "q31"))
     word = controller.word
     bound = word.limit_cycle(loop)
     A, B, C = loop.pulse.matrices()
@@ -166,12 +173,14 @@ def test_a_limit_cycle_in_fixed_point_stays_within_its_bound(law):
     a, b, c, d = (each.tolist() for each in (table[:n, :n], table[:n, n:], table[n:, :n], table[n:, n:]))
     shift, R, U = word.shifts.tolist(), word.ranges, word.output
     reads = [loop.in_z.signals.index(name) for name in word.law.signals]
-    plant, x, seen = np.random.default_rng(1).normal(size=len(A)) * 1e-6, [0] * len(a), []
+    start = 1e-1 if bits else 1e-6
+    plant, x, seen = np.random.default_rng(1).normal(size=len(A)) * start, [0] * len(a), []
     plant[loop.pulse.integrals_at] = 0.0
     for _ in range(6000):
         e = [-round(each) for each in (C[reads] @ plant) / R * 2.0**31]
         sums = [sum(map(int.__mul__, a[i], x)) + sum(map(int.__mul__, b[i], e)) for i in range(len(a))]
         u = (sum(map(int.__mul__, c[0], x)) + sum(map(int.__mul__, d[0], e)) + (1 << (shift[-1] - 1))) >> shift[-1]
+        u = round(u / 2 ** (32 - bits)) * 2 ** (32 - bits) if bits else u
         x = [(each + (1 << (s - 1))) >> s for each, s in zip(sums, shift, strict=False)]
         plant = A @ plant + B * (u * U / 2.0**31)
         seen.append(u * U / 2.0**31)
@@ -192,8 +201,9 @@ def test_a_pole_that_no_output_shows_is_left_out():
 
 def test_an_integral_can_overflow_and_a_servo_cannot():
     found = c_controller(task_of("integral", "q31")).details
-    assert found.overflow == "not excluded"
+    assert found.overflow.startswith("not excluded: a state may saturate")
     assert found.samples == 20_000
+    assert 1e-9 < found.error < 1e-3  # until that state saturates
     found = c_controller(task_of((LAB, SERVO, IDEAL), "q31")).details
     assert found.overflow.startswith("excluded")
     assert found.samples is None
@@ -204,7 +214,13 @@ def test_an_integral_can_overflow_and_a_servo_cannot():
     ("task", "error"),
     [
         (task_of((LAB, GAINS, IDEAL), "q31", ranges={"root_moment": -1.0}), "range.root_moment = -1.0: the largest"),
-        (task_of("gains", ranges={"tip": 1.0}), "range = 'tip': known are: hub_rate, root_moment, output"),
+        (task_of("gains", ranges={"tip": 1.0}), "range = 'tip': known are: hub_rate, root_moment, feedforward, output"),
+        (task_of((LAB, GAINS, IDEAL), "q31", ranges={"output": 1.0, "feedforward": 2.0}),
+         "range.feedforward = 2.0: in fixed point feedforward is a fraction of the range of the output: at most 1.0"),
+        (task_of((LAB, GAINS, WITH_DAC), "q31", ranges={"output": 3.0}),
+         "range.output = 3.0: q31 has steps of a DAC that are a power of 2 of its own: output=2.0, or"),
+        (task_of((LAB, MULTIPLE, IDEAL), "q31", anyway=True),
+         r"law = 'law': ill-conditioned or unstable in z: modulus of its poles up to 0.96"),
         (replace(task_of("gains"), precision="q31", ranges={"hub_rate": 1.0}), "range = 'root_moment': q31 needs"),
         (replace(task_of("gains", "q31"), ranges={"hub_rate": 1.0, "root_moment": 1.0}), "range = 'output': q31 needs"),
         (task_of((LAB, GAINS, REAL), "q31"), 'converters.hub_rate = \'difference\': with q31 the hub rate is an input'),
@@ -239,3 +255,63 @@ def test_a_loop_that_is_not_certified_is_exported_anyway_and_the_header_warns():
     found = c_controller(task_of((LAB, UNSTABLE, IDEAL), anyway=True))
     assert b"warning: NOT CERTIFIED STABLE; exported by --anyway" in found.contents["controller.h"]
     assert found.verdict.startswith("unstable")
+
+
+def test_a_realisation_has_coefficients_that_are_rounded_once():
+    """States of condition 1e7, against fractions."""
+    rng = np.random.default_rng(3)
+    S = rng.normal(size=(4, 5))
+    T = np.linalg.qr(rng.normal(size=(3, 3)))[0] @ np.diag([1.0, 1e-3, 1e-7]) @ rng.normal(size=(3, 3))
+    found = similar(S, T)
+    exact = [[Fraction(x) for x in row] for row in S.tolist()]
+    own = [[Fraction(x) for x in row] for row in T.tolist()]
+    # T A' = A T, T B' = B, C' = C T, to the rounding of the coefficients
+    for i in range(3):
+        for j in range(5):
+            left = [own[i][k] * Fraction(found[k, j]) for k in range(3)]
+            right = sum(exact[i][k] * own[k][j] for k in range(3)) if j < 3 else exact[i][j]
+            assert abs(sum(left) - right) <= sum(map(abs, left)) / 2**53
+    assert found[3, :3] == pytest.approx(S[3, :3] @ T, rel=1e-13)
+
+
+@pytest.mark.parametrize("precision", ["double", "float", "q31"])
+def test_a_dac_adds_half_of_its_step_to_the_error(precision):
+    without, of_dac = (
+        c_controller(task_of((LAB, LAG, each), precision, ranges={"output": 2.0})).details for each in (IDEAL, WITH_DAC)
+    )
+    half = 2.0 / 4096
+    assert half <= of_dac.error <= half + 3 * without.error
+    assert of_dac.limit_cycle >= half > without.limit_cycle
+
+
+@pytest.mark.parametrize("corner", [50.0, np.inf])
+def test_the_range_of_an_estimated_rate_is_that_of_the_angle_or_of_its_differences(corner):
+    """The largest output, attained by signs: gain times the rate of such an angle, and what is added."""
+    T, K1, K2, R, M, F = 0.01, 0.3, 0.3, 0.2, 2.0, 0.5
+    chain = replace(IDEAL, converters=Converters(encoder_counts=8192, hub_rate="difference", rate_filter=corner))
+    law = tfarm.Law({"hub_rate": K1, "root_moment": K2})
+    ranges = {"hub_angle": R, "root_moment": M, "feedforward": F}
+    of_angle = c_controller(task_of((LAB, law, chain), ranges=ranges, anyway=True))
+    # the estimate of an angle of the worst signs, by its recursion
+    pole, h = np.exp(-corner * T), [(1 - np.exp(-corner * T)) / T]
+    for _ in range(2000):
+        h.append(h[-1] * pole)
+    worst_rate = abs(np.diff([0.0, *h])).sum() * R
+    assert of_angle.details.largest_output == pytest.approx(K1 * worst_rate + K2 * M + F, rel=1e-9)
+    of_rate = c_controller(task_of((LAB, law, chain), ranges=ranges | {"hub_rate": 3.0}, anyway=True))
+    assert of_rate.details.largest_output == pytest.approx(K1 * 3.0 + K2 * M + F, rel=1e-9)
+    assert b"y_hub_angle: hub_angle [rad], at most 0.03 a sample, within +-0.2\n" in of_rate.contents["controller.h"]
+    assert b"y_hub_angle: hub_angle [rad], within +-0.2\n" in of_angle.contents["controller.h"]
+
+
+def test_a_law_whose_rounded_poles_are_unknown_has_no_bounds():
+    found = c_controller(task_of((LAB, MULTIPLE, IDEAL), anyway=True)).details
+    assert found.overflow == "not determined: the law is unstable or ill-conditioned in z"
+    assert (found.error, found.largest_output) == (None, None)
+
+
+def test_a_small_survey_of_what_the_code_returns():
+    outcomes, figures, wrong = tally(worst.worst, 2, 2)
+    assert wrong == 0
+    assert sum(outcomes.values()) == 6
+    assert max(max(values) for values in figures.values()) > 0.9

@@ -117,7 +117,7 @@ def export(
     Options:
     tuned: trained tuner, written by tune --save
     precision: double, float or q31 (fixed point), of a controller in C
-    ranges: largest absolute value of an input in fixed point, in SI units; may be repeated
+    ranges: largest absolute value of an input or of the output, in SI units; may be repeated
     name: beginning of the identifiers in C
     anyway: also where the loop is not certified stable
     """

@@ -4,11 +4,12 @@
 
 in double, float or Q31, in the realisation with the least round-off noise, with the DAC, the limit of the actuator and
 the delay of the law as the simulation has them.  The loop is judged with the coefficients as they are exported.  A step
-refuses inputs that are not finite, and results that are not: it holds the output and keeps the states.
+refuses inputs that are not finite, and results that are not: it holds the output and keeps the states.  Its status
+names a clipped output and, in fixed point, a clipped state.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
@@ -33,10 +34,13 @@ from tfarm.exact.outputs import OUTPUTS
 from tfarm.exported.result import Export, ExportTask, Name, is_certified, names_of
 from tfarm.exported.texts import facts_of, identifiers, literal, name_in_c, render
 from tfarm.exported.word_length import (
+    ANGLE,
+    FEEDFORWARD,
     FIXED,
     FLOATS,
     MOST_SUMMED,
     OUTPUT,
+    RATE,
     NoiseGain,
     Word,
     around,
@@ -53,9 +57,8 @@ NAME = "controller"  # of identifiers in C
 FILES = ("controller.h", "controller.c", "self_test.c", "example.c")
 RECORDED, REFUSED, SEED = 1000, 500, 1  # samples of the self-test, the one with a NaN, its first random number
 WHOLE_SAMPLE = 1e-9  # of a sample: rounding of a delay
-RATE, ANGLE, FEEDFORWARD = "hub_rate", "hub_angle", "feedforward"
 REAL = {"double": ("double", "", "DBL_MAX"), "float": ("float", "f", "FLT_MAX"), FIXED: ("int32_t", "", "")}  # in C
-INPUT_ERROR, OVERFLOW = 1, 2  # what a step returns, 0 for a sample without an error
+INPUT_ERROR, OVERFLOW, SATURATED, STATE_SATURATED = 1, 2, 3, 4  # status of a step, 0 of one without an event
 MINUEND, SUBTRAHEND = 0, 1  # columns of a plan
 LARGEST = 2147483647  # of 32 bits
 
@@ -71,11 +74,14 @@ class WordLength:
     largest_states: Annotated[tuple[float, ...], Quantity("largest values of the states", "", 3,
             help="bounds for inputs within their ranges; in fixed point over the range of each state")]  # fmt: skip
     overflow: Annotated[str, Quantity("overflow", help="whether a state can overflow, for inputs within their ranges")]
+    largest_output: Annotated[float | None, Quantity("largest output of the law", "", 6,
+            help="bound for inputs within their ranges, before the limits of the output")]  # fmt: skip
+    saturation: Annotated[str, Quantity("saturation", help="limits of the output, and whether inputs reach them")]
     error: Annotated[float | None, Quantity("bound on the error of the output", "", 4,
             help="for inputs within their ranges, 1 SI unit by default, against exact arithmetic")]  # fmt: skip
     samples: Annotated[int | None, Quantity("samples of these bounds", help="null where they hold for all samples")]
     limit_cycle: Annotated[float | None, Quantity("bound on a limit cycle of the output by round-off", "", 4,
-            help="output that roundings sustain in the closed loop at rest; null where not determined")]  # fmt: skip
+            help="that roundings and a DAC in the code sustain at rest; null where not determined")]  # fmt: skip
 
 
 class Port(NamedTuple):
@@ -90,13 +96,15 @@ class Port(NamedTuple):
 class Controller:
     """A realised law in the numbers of a target, its inputs, and what acts on its output.
 
-    `signals` and `references` are the names of its inputs, before the feedforward; `dac` is the step (0: none), the
-    lowest and the highest output; `hub` is the pole and the period [s] of an estimated hub rate.
+    `signals` and `references` are the names of its inputs, before the feedforward; `ranges` are largest absolute values
+    by name, where known; `dac` is the step (0: none), the lowest and the highest output; `hub` is the pole and the
+    period [s] of an estimated hub rate.
     """
 
     word: Word
     signals: tuple[str, ...]
     references: tuple[str, ...]
+    ranges: Mapping[str, float]
     dac: Real
     delay: int
     hub: tuple[float, float] | None
@@ -122,18 +130,25 @@ class Controller:
         limits = np.clip([np.ceil(low), np.floor(high)], -LARGEST - 1, LARGEST)
         return np.array([round(math.log2(step)) if step > 1 else 0, *limits], dtype=np.int64)
 
+    @property
+    def limits(self) -> list[float]:
+        """The lowest and the highest output that the code returns, in SI units."""
+        if self.word.precision == FIXED:
+            return [each * self.word.output / 2.0**31 for each in self.whole_dac[1:].tolist()]
+        return [float(each) for each in self.dac[1:].astype(FLOATS[self.word.precision][0])]
+
     def run(self, inputs: NDArray[Any]) -> tuple[NDArray[Any], Whole]:
         """Outputs and status (n,) of inputs (n, k), those of the C code bit for bit; whole numbers in fixed point."""
         word, kind = self.word, np.int64 if self.word.precision == FIXED else np.float64
         outputs, status = np.zeros(len(inputs), kind), np.zeros(len(inputs), int)
         table, inputs = (np.ascontiguousarray(each, dtype=kind) for each in (word.table, inputs))
         if word.precision == FIXED:
-            run_fixed(table, word.shifts, self.plan, inputs, self.whole_dac, outputs)
+            run_fixed(table, word.shifts, self.plan, inputs, self.whole_dac, outputs, status)
         else:
             hub = np.array([self.signals.index(ANGLE), *self.hub] if self.hub else [-1.0, 0.0, 1.0])
             is_single = word.precision == "float"
             run_real(table, self.plan, inputs, self.dac, hub, is_single, outputs, status)
-        is_good = status == 0  # a refused sample moves no delay line: the output is held
+        is_good = ~np.isin(status, (INPUT_ERROR, OVERFLOW))  # a refused sample moves no delay line: the output is held
         return np.r_[np.zeros(1 + self.delay, kind), outputs[is_good]][np.cumsum(is_good)], status
 
 
@@ -144,29 +159,48 @@ def c_controller(task: ExportTask) -> Export:
     controller = controller_of(law, task)
     word = controller.word
     found = judged(task, word, exact.verdict.loop)
-    bounds, is_whole, error = word.bounds
-    details = WordLength(
-        precision=task.precision, realisation=name, noise_gains=gains, largest_states=tuple(bounds.tolist()),
-        overflow="excluded for inputs within their ranges" if is_whole and error < math.inf else "not excluded",
-        error=error if error < math.inf else None, samples=None if is_whole else MOST_SUMMED,
-        limit_cycle=word.limit_cycle(found.verdict.loop),
-    )  # fmt: skip
-    contents, names = source_files(task, controller, [*task.facts(word.rounded, found).items(), *facts_of(details)])
+    details = word_length(controller, name, gains, word.limit_cycle(found.verdict.loop))
+    bounds = dict(facts_of(details)) | ({} if details.samples else {"samples of these bounds": "all"})
+    contents, names = source_files(task, controller, [*task.facts(word.rounded, found).items()], [*bounds.items()])
     return Export(
         what=task.what, form=task.form, contents=contents, names=names, verdict=found.verdict.sentence,
         details=details, sha256=task.sha256,
     )  # fmt: skip
 
 
+def word_length(controller: Controller, name: str, gains: list[NoiseGain], limit_cycle: float | None) -> WordLength:
+    """The record of a controller's arithmetic, in the realisation of this name."""
+    word, (low, high), bounds = controller.word, controller.limits, controller.word.bounds
+    until = "" if bounds.is_whole else f", for {MOST_SUMMED} samples"
+    overflow = "not excluded: a state may saturate, and the bounds hold until it does"
+    if bounds.output == math.inf:
+        overflow = "not determined: the law is unstable or ill-conditioned in z"
+    elif max(bounds.states, default=0.0) < largest_state(word.precision):
+        overflow = f"excluded for inputs within their ranges{until}"
+    reach = bounds.output + bounds.error
+    saturation = "no limit" if high == math.inf else f"saturates from {low!r} down and from {high!r} up"
+    if reach <= min(-low, high) < math.inf:
+        saturation = f"excluded for inputs within their ranges{until} (limits {low!r} and {high!r})"
+    return WordLength(
+        precision=word.precision, realisation=name, noise_gains=gains, largest_states=tuple(bounds.states.tolist()),
+        overflow=overflow, largest_output=bounds.output if bounds.output < math.inf else None, saturation=saturation,
+        error=bounds.error if bounds.error < math.inf else None, samples=None if bounds.is_whole else MOST_SUMMED,
+        limit_cycle=limit_cycle,
+    )  # fmt: skip
+
+
 def source_files(
-    task: ExportTask, controller: Controller, facts: Sequence[tuple[str, str]]
+    task: ExportTask, controller: Controller, facts: Sequence[tuple[str, str]], bounds: Sequence[tuple[str, str]] = ()
 ) -> tuple[dict[str, bytes], list[Name]]:
-    """The files that begin with these facts, by name, and the identifiers in them, that of the controller first."""
+    """The files that begin with these facts, by name, and the identifiers in them, that of the controller first.
+
+    `bounds` are stated with the ranges of the inputs.
+    """
     name, signals = name_in_c(task.name or NAME), identifiers(controller.signals, "y_")
     references = identifiers(controller.references, "r_")
     values = values_of(task, controller, ports_of(task, controller, signals, references))
-    contents = {file: render(file, name=next(iter(name.values())), facts=facts, **values) for file in FILES}
-    return contents, names_of(name, signals, references)
+    values |= {"name": next(iter(name.values())), "facts": facts, "bounds": bounds}
+    return {file: render(file, **values) for file in FILES}, names_of(name, signals, references)
 
 
 def in_z(law: Law, chain: Chain) -> Law:
@@ -189,16 +223,25 @@ def controller_of(law: Law, task: ExportTask) -> Controller:
     require(not (is_estimated and task.precision == FIXED), "converters.hub_rate", of.hub_rate, remedy)
     signals = tuple(dict.fromkeys(ANGLE if is_estimated and name == RATE else name for name in law.signals))
     references = tuple(dict.fromkeys((*law.references, *(name.removeprefix(REFERENCE) for name in law.wanted))))
-    known = (*dict.fromkeys((*law.signals, *references)), OUTPUT)
+    known = (*dict.fromkeys((*signals, *law.signals, *references)), FEEDFORWARD, OUTPUT)
     for name, value in task.ranges.items():
         must_be_known("range", name, known)
         positive(f"range.{name}", value, "the largest absolute value of a signal is a positive, finite number")
     limit = float(max(abs(dac[1:]))) if of.torque_range is None else of.torque_range
-    output = task.ranges.get(OUTPUT, limit if math.isfinite(limit) else None)
-    ranges = {"root_moment": of.moment_range, **task.ranges} if of.moment_range else task.ranges
+    usual = {"root_moment": of.moment_range, OUTPUT: limit if math.isfinite(limit) else None}
+    ranges = {name: size for name, size in usual.items() if size} | dict(task.ranges)
     hub = (math.exp(-of.rate_filter * T), T) if is_estimated else None
-    word = word_of(law, task.precision, ranges, output)
-    return Controller(word, signals, references, dac, round(law.delay / T), hub)
+    word = word_of(law, task.precision, ranges, float(dac[0]), hub)
+    # in fixed point a step of the DAC is a power of 2 of those of the output
+    steps = math.log2(max(1.0, float(dac[0]) / word.output * 2.0**31))
+    remedy = f"q31 has steps of a DAC that are a power of 2 of its own: output={limit!r}, or this times a power of 2"
+    require(task.precision != FIXED or steps.is_integer(), "range.output", word.output, remedy)
+    return Controller(word, signals, references, ranges, dac, round(law.delay / T), hub)
+
+
+def largest_state(precision: str) -> float:
+    """The largest absolute value of a state: in fixed point its scale."""
+    return 1.0 if precision == FIXED else float(np.finfo(FLOATS[precision][0]).max)
 
 
 def judged(task: ExportTask, word: Word, loop: Sampled) -> Analysis:
@@ -245,12 +288,13 @@ def run_real(table: Any, plan: Any, inputs: Any, dac: Any, hub: Any, single: boo
                 z[n + j] = rounded(known[plan[j, MINUEND]] - known[plan[j, SUBTRAHEND]], single)
             for i in range(n + 1):
                 following[i] = product(table[i], z, known[forward] if i == n else 0.0, single)
-            status[k] = 0 if np.isfinite(following).all() else OVERFLOW
-            if status[k] == 0:
+            if np.isfinite(following).all():
                 z[:n] = following[:n]
                 outputs[k] = rounded(quantise(following[n], dac, clipped, DAC), single)
+                status[k] = SATURATED if clipped[DAC] else 0
             else:
                 memory[:] = before
+                status[k] = OVERFLOW
 
 
 @inlined
@@ -260,7 +304,7 @@ def shifted(value: int, shift: int) -> int:
 
 
 @compiled
-def run_fixed(table: Any, shifts: Any, plan: Any, inputs: Any, dac: Any, outputs: Any) -> None:
+def run_fixed(table: Any, shifts: Any, plan: Any, inputs: Any, dac: Any, outputs: Any, status: Any) -> None:
     """The same in fixed point; `dac` is the shift of the step of the DAC, 0 for none, lowest and highest output."""
     n, forward = table.shape[0] - 1, inputs.shape[1] - 1
     known, z = np.zeros(forward + 3, np.int64), np.zeros(table.shape[1], np.int64)
@@ -274,10 +318,13 @@ def run_fixed(table: Any, shifts: Any, plan: Any, inputs: Any, dac: Any, outputs
             for j in range(z.size):
                 total += table[i, j] * z[j]
             following[i] = shifted(total, shifts[i])
-        for i in range(n):
-            z[i] = min(max(following[i], -LARGEST - 1), LARGEST)
         u = shifted(following[n], dac[0]) << dac[0] if dac[0] > 0 else following[n]
         outputs[k] = min(max(u, dac[1]), dac[2])
+        status[k] = SATURATED if outputs[k] != u else 0
+        for i in range(n):
+            z[i] = min(max(following[i], -LARGEST - 1), LARGEST)
+            if z[i] != following[i]:
+                status[k] = STATE_SATURATED
 
 
 # ------------------------------------------------------------ values of the templates
@@ -287,36 +334,44 @@ def values_of(task: ExportTask, controller: Controller, ports: Sequence[Port]) -
     """The values of the templates, but for name and facts."""
     word, is_fixed, (real, suffix, largest) = controller.word, task.precision == FIXED, REAL[task.precision]
     dac, unit = controller.whole_dac if is_fixed else controller.dac, task.arm.input_unit
-    cast = "(int64_t)" if is_fixed else ""
-    known = [*(f"{cast}input->{each.identifier}" for each in ports), f"({real})rate", "0"]
+    cast, zero = ("(int64_t)", "") if is_fixed else ("", f"0.0{suffix}")
+    known = [*(f"{cast}input->{each.identifier}" for each in ports), f"({real})rate", zero]
     return {
         "fixed": is_fixed, "real": real, "wide": "int64_t" if is_fixed else real, "largest": largest, "suffix": suffix,
         "cast": cast, "fields": ports,
         **recorded(controller.run, ports, task.precision), "header": FILES[0],
         "n": word.law.order, "m": len(controller.plan), "shifts": word.shifts,
         "table": [[literal(x, suffix) for x in row] for row in word.table.tolist()],
-        "errors": [f"{known[minuend]} - {known[subtrahend]}" for minuend, subtrahend in controller.plan.tolist()],
-        "converter": bool(np.isfinite(dac).all()), "delay": controller.delay, "step": bool(dac[0]),
-        "dac": [literal(each, "") for each in dac.tolist()],
+        "errors": [f"{known[of]} - {known[less]}".strip() for of, less in controller.plan.tolist()],
+        "converter": bool(np.isfinite(dac).all()), "delay": controller.delay, "step": dac.tolist()[0],
+        "dac": [literal(each, "") for each in dac.tolist()], "statuses": statuses(controller),
         "hub": controller.hub and (ports[controller.signals.index(ANGLE)].identifier, *map(float.hex, controller.hub)),
         "output": f"{task.arm.input} over {word.output!r} {unit}" if is_fixed else f"{task.arm.input} [{unit}]",
         "period": repr(task.chain.sampling.period),
     }  # fmt: skip
 
 
+def statuses(controller: Controller) -> dict[str, int]:
+    """What a step can return but 0, by the names in C."""
+    if controller.word.precision == FIXED:
+        return {"SATURATED": SATURATED} | ({"STATE_SATURATED": STATE_SATURATED} if controller.word.law.order else {})
+    refused = {"INPUT_ERROR": INPUT_ERROR, "OVERFLOW": OVERFLOW}
+    return refused | ({"SATURATED": SATURATED} if math.isfinite(controller.limits[1]) else {})
+
+
 def ports_of(task: ExportTask, controller: Controller, *known: dict[str, str]) -> list[Port]:
     """The inputs of the C function: signals, references, and the feedforward."""
-    word, law = controller.word, controller.word.law
-    names = (name.removeprefix(REFERENCE) for name in (*law.signals, *law.wanted))
-    sizes = dict(zip(names, word.ranges.tolist(), strict=True))
+    word, ranges = controller.word, controller.ranges
+    steps = f", at most {ranges[RATE] * controller.hub[1]!r} a sample" if controller.hub and RATE in ranges else ""
     rows = [
-        (own, f"{title}{name} [{OUTPUTS[name.partition('@')[0]].unit}]", sizes.get(name, 1.0))
+        (own, f"{title}{name} [{OUTPUTS[name.partition('@')[0]].unit}]{steps * (name == ANGLE)}", ranges.get(name, 1.0))
         for title, found in zip(("", "reference of "), known, strict=True)
         for name, own in found.items()
     ]
-    rows.append((FEEDFORWARD, f"{FEEDFORWARD} [{task.arm.input_unit}]", word.output))
+    scales = [*(f", over {size!r}" for *_, size in rows), f", over {word.output!r}"]
+    rows.append((FEEDFORWARD, f"{FEEDFORWARD} [{task.arm.input_unit}]", word.feedforward))
     is_fixed = word.precision == FIXED
-    return [Port(own, f"{text}, over {size!r}" if is_fixed else text, size) for own, text, size in rows]
+    return [Port(own, text + scale * is_fixed, size) for (own, text, size), scale in zip(rows, scales, strict=True)]
 
 
 def recorded(

@@ -30,10 +30,10 @@ from tfarm.dsp.results import simulated
 from tfarm.dsp.scenarios import TRIAL_DURATION
 from tfarm.errors import ParameterError, one_line, require
 from tfarm.exact.outputs import signal_words
-from tfarm.exported.controller import FEEDFORWARD, controller_of, in_z, source_files
+from tfarm.exported.controller import controller_of, in_z, source_files
 from tfarm.exported.result import ANYWAY, Export, ExportTask, What, is_certified, names_of
 from tfarm.exported.texts import identifiers, literal, render
-from tfarm.exported.word_length import FIXED
+from tfarm.exported.word_length import FEEDFORWARD, FIXED
 from tfarm.files import temporary_folder
 from tfarm.records import record
 from tfarm.schema import Quantity

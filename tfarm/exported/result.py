@@ -42,8 +42,8 @@ class Name(NamedTuple):
 class ExportTask:
     """What to export, and how: an arm, a law (by default the default gains), and the chain of its sampled loop.
 
-    `ranges` are the largest absolute values of signals by name, in SI units, for fixed point.  `tuned` is the file of a
-    trained tuner.  `anyway`: also a loop that is not certified stable.
+    `ranges` are the largest absolute values of signals, feedforward and output by name, in SI units.  `tuned` is the
+    file of a trained tuner.  `anyway`: also a loop that is not certified stable.
     """
 
     arm: Arm
@@ -190,7 +190,7 @@ def export(
     precision
         Arithmetic of a controller in C: "double", "float" or "q31" (fixed point).
     ranges
-        Largest absolute value of each input in fixed point, in SI units.
+        Largest absolute value of each input, of the feedforward and of the output, in SI units.
     name
         Beginning of the identifiers of a file in C.
     anyway

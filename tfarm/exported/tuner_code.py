@@ -40,10 +40,10 @@ from tfarm.arrays import Real, Whole
 from tfarm.dsp import Measurement, sampled_loop
 from tfarm.errors import MISSING, ParameterError, must_be_known, require
 from tfarm.exact.compiled import compiled
-from tfarm.exported.controller import FEEDFORWARD, INPUT_ERROR, OVERFLOW, REAL, Port, recorded
+from tfarm.exported.controller import INPUT_ERROR, OVERFLOW, REAL, Port, recorded
 from tfarm.exported.result import ANYWAY, Export, ExportTask, names_of
 from tfarm.exported.texts import literal, name_in_c, render
-from tfarm.exported.word_length import FLOATS
+from tfarm.exported.word_length import FEEDFORWARD, FLOATS
 from tfarm.tuner.guard import sector_guard
 from tfarm.tuner.trial import TRIAL_MODES, SavedTuner, load_tuner
 
@@ -292,6 +292,7 @@ def written(task: ExportTask, tuner: ExportedTuner, name: str, facts: dict[str, 
     ]
     values = {
         "name": name, "facts": list(facts.items()), "fixed": False, "real": real, "suffix": suffix, "header": "tuner.h",
+        "bounds": (), "statuses": {"INPUT_ERROR": INPUT_ERROR, "OVERFLOW": OVERFLOW},
         "fields": ports, "output": f"{task.arm.input} [{task.arm.input_unit}]", "of": of, "ulps": ULPS,
         "scalars": {key: literal(float(x), suffix) for key, x in kept.items() if isinstance(x, np.floating)},
         "tables": {

@@ -19,11 +19,13 @@ coefficients has one shift f, so that the sum of all products is below 2^63 and 
 
 Bounds are sums of absolute values of responses over all samples, the l1 norm (Dahleh and Diaz-Bobillo, Control of
 Uncertain Systems, 1995).  Where the law itself is not stable, as with an integral, they are over `MOST_SUMMED` samples.
+A DAC adds half of its step to the rounding of u.  Limits of u keep every bound, as clipping separates no two numbers.
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple
 
@@ -46,13 +48,15 @@ WORST_CONDITION = 1e8  # of the eigenvectors: beyond it poles are not separated
 NEXT_TO = 1.01  # times the least noise gain: for less a law keeps its states, and an integral its pole z = 1
 GIVEN, SECTIONS, BALANCED = "law as given", "second-order sections", "balanced state space"
 MOST_SUMMED, BLOCK = 20_000, 32  # samples of a sum without a bound on all others, and of one step
+MOST_LOST = 1e-3  # of a sum: lost to the roundings of its terms
 DECAYED = 1e-3  # row sum of |M^n| from which all later samples are bounded
 ON_CIRCLE, UNSEEN = 1e-9, 1e-8  # of 1: modulus of a pole on the unit circle; share of one that no output shows
 FRACTION_BITS, MOST_SHIFT = 31, 62  # of a number in fixed point, and of a sum of products
 HALF_STEP = 2.0 ** -(FRACTION_BITS + 1)  # of the range of a number: its largest rounding
 HEADROOM, LEAST_SCALE = 1 + 2.0**-10, 2.0**-100  # of the range of a state: for roundings, and the least of all
 OF_OUTPUT = 4.0  # ranges of u that a state without a bound reaches before it saturates
-FIXED, OUTPUT = "q31", "output"  # fixed point; the name of the controller's output among ranges
+FIXED, OUTPUT, FEEDFORWARD = "q31", "output", "feedforward"  # fixed point; names of u and of r among ranges
+RATE, ANGLE = "hub_rate", "hub_angle"
 FLOATS: dict[str, tuple[Any, float]] = {"double": (np.float64, 2.0**-53), "float": (np.float32, 2.0**-24)}  # roundoff
 
 
@@ -62,6 +66,18 @@ class NoiseGain(NamedTuple):
     realisation: Annotated[str, Quantity("realisation", help="structure of the states of the controller")]
     gain: Annotated[float | None, Quantity("noise gain", "", 5,
             help="variance of the output by roundings, for states of unit variance, in the closed loop")]  # fmt: skip
+
+
+class Bounds(NamedTuple):
+    """Bounds on the states as exported, on the error of the returned u, and on u of the law, for inputs within ranges.
+
+    `is_whole` where they are over all samples.
+    """
+
+    states: Real
+    is_whole: bool
+    error: float
+    output: float
 
 
 class Around(NamedTuple):
@@ -155,10 +171,19 @@ def candidates(law: Law, loop: Sampled) -> list[tuple[NoiseGain, Real]]:
     changes = {GIVEN: np.eye(n), SECTIONS: sections(S[:n, :n], K, W), BALANCED: balancing(K, W)}
     known = [(name, T, np.linalg.inv(T)) for name, T in changes.items() if T is not None]
     gains = [abs(float(np.diag(inverse @ K @ inverse.T) @ np.diag(T.T @ W @ T))) for _, T, inverse in known]
-    return [
-        (NoiseGain(name, gain), block_diag(inverse, np.eye(1)) @ S @ block_diag(T, np.eye(S.shape[1] - n)))
-        for gain, (name, T, inverse) in zip(gains, known, strict=True)
-    ]
+    return [(NoiseGain(name, gain), similar(S, T)) for gain, (name, T, _) in zip(gains, known, strict=True)]
+
+
+def similar(S: Real, T: Real) -> Real:
+    """[A B; C D] of the states T^-1 x, each coefficient rounded once: whole numbers of 256 digits."""
+    n, bits = len(T), 256
+    given = S, block_diag(T, np.eye(S.shape[1] - n)), block_diag(np.linalg.inv(T), np.eye(1))
+    tables = [[[int(Fraction(x) * 2**bits) for x in row] for row in each.tolist()] for each in given]
+    own, change, back = (np.array(each, dtype=object) for each in tables)
+    for _ in range(6):  # Newton's iteration doubles the digits of an inverse
+        error = (change[: n + 1, : n + 1] @ back >> bits) - 2**bits * np.eye(n + 1, dtype=object)
+        back = back - (back @ error >> bits)
+    return np.asarray((back @ own @ change >> 2 * bits) / 2**bits, dtype=float)
 
 
 def least_noise(law: Law, loop: Sampled) -> tuple[Law, str, list[NoiseGain]]:
@@ -168,16 +193,16 @@ def least_noise(law: Law, loop: Sampled) -> tuple[Law, str, list[NoiseGain]]:
     return with_system_matrix(law, S), best.realisation, [gain for gain, _ in found]
 
 
-def absolute_sum(M: Real, left: Real, right: Real) -> tuple[Real, bool]:
-    """Bound on sum_k |left M^k right|, entry by entry, and whether it is over all samples.
+def absolute_sum(M: Real, left: Real, right: Real, most: int = MOST_SUMMED) -> tuple[Real, bool]:
+    """Bound on sum_k |left M^k right|, entry by entry, and whether it is over all samples, or over the `most` first.
 
     With G = sum_{k<n} |left M^k|, sum_k |left M^k| <= G (I - |M^n|)^-1 once the row sums of |M^n| are below 1.
     """
-    block = np.array([left @ np.linalg.matrix_power(M, k) for k in range(BLOCK)])
-    step = last = np.linalg.matrix_power(M, BLOCK)
     G, S = np.zeros(left.shape), np.zeros((len(left), right.shape[1]))
     with np.errstate(over="ignore", invalid="ignore"):  # of a matrix that grows
-        for _ in range(MOST_SUMMED // BLOCK):
+        block = np.array([left @ np.linalg.matrix_power(M, k) for k in range(BLOCK)])
+        step = last = np.linalg.matrix_power(M, BLOCK)
+        for _ in range(most // BLOCK):
             G, S = G + abs(block).sum(axis=0), S + abs(block @ right).sum(axis=0)
             if abs(last).sum(axis=1).max(initial=0.0) <= DECAYED:
                 return S + np.linalg.solve(np.eye(len(M)) - abs(last).T, G.T).T @ abs(last @ right), True
@@ -189,8 +214,9 @@ def absolute_sum(M: Real, left: Real, right: Real) -> tuple[Real, bool]:
 class Word:
     """A realised law in z of one state space, in the numbers of a target.
 
-    `sizes` bounds e of each column; in fixed point `ranges` are the scales of e, that of each state is 1, and `output`
-    is that of u.  `table` is [A B; C D] as exported, whole numbers in fixed point, and `shifts` those of its rows.
+    `sizes` bounds e of each column, and `slips` the error of an estimate in it; `feedforward` bounds r, and `step` is
+    that of the DAC.  In fixed point `ranges` are the scales of e, that of each state is 1, and `output` is that of u.
+    `table` is [A B; C D] as exported, whole numbers in fixed point, and `shifts` those of its rows.
     """
 
     law: Law
@@ -198,6 +224,9 @@ class Word:
     sizes: Real
     ranges: Real
     output: float
+    feedforward: float
+    step: float
+    slips: Real
     table: Any
     shifts: Any = None
 
@@ -212,30 +241,42 @@ class Word:
     @cached_property
     def errors(self) -> tuple[float, Real]:
         """Relative and absolute rounding error of a sum: of each state, and of u last."""
-        n, terms = self.law.order, self.law.order + self.sizes.size + 3
+        n, terms = self.law.order, self.law.order + self.sizes.size + (6 if self.step else 3)
+        of_dac = np.r_[np.zeros(n), self.step / 2]
         if self.precision == FIXED:
-            return 0.0, HALF_STEP * np.r_[np.ones(n), self.output]
+            return 0.0, HALF_STEP * np.r_[np.ones(n), self.output] + of_dac
         kind, unit = FLOATS[self.precision]
-        return terms * unit / (1 - terms * unit), np.full(n + 1, terms * float(np.finfo(kind).smallest_subnormal))
+        tiny = terms * float(np.finfo(kind).smallest_subnormal)
+        return terms * unit / (1 - terms * unit), tiny + of_dac
 
     @cached_property
-    def bounds(self) -> tuple[Real, bool, float]:
-        """Bound on each state as exported, whether it is over all samples, and bound on the error of u.
+    def bounds(self) -> Bounds:
+        """Bounds on what the code returns, against the law in exact arithmetic.
 
-        The error d of the states obeys d' = A d + w, w = |dS| [X; E] + roundings; X includes d.  Where a state may
-        saturate, in fixed point, and where that has no solution, the error has no bound.
+        The error d of the states obeys d' = A d + w, w = |dS| [X; E] + roundings; X includes d.  In fixed point a state
+        is at most 1, and the bounds hold until one saturates.  Where the sums have no digits or X has no solution there
+        are none.
         """
         exact, rounded, n = system_matrix(self.law), system_matrix(self.rounded), self.law.order
         relative, absolute = self.errors
+        # the coefficients of both are rounded in double, those of fixed point by their units
+        relative += (3 if self.precision == FIXED else 1) * FLOATS["double"][1]
         V, A = abs(rounded - exact) + relative * abs(rounded), exact[:n, :n]
-        X, is_whole = absolute_sum(A, np.eye(n), exact[:n, n:])
-        S, _ = absolute_sum(A, np.vstack([np.eye(n), exact[n, :n]]), np.eye(n))
-        rest, error = V[:, n:] @ self.sizes + absolute, math.inf
-        largest = least_solution(S[:n] @ V[:n, :n], X @ self.sizes + S[:n] @ rest[:n])
-        if max(largest, default=0.0) < (1 if self.precision == FIXED else math.inf):
-            w = V[:, :n] @ largest + rest
-            error = float(S[n] @ w[:n] + w[n] + relative * self.output)
-        return largest, is_whole, error
+        sums, is_whole = absolute_sum(A, np.vstack([np.eye(n), exact[n, :n]]), np.hstack([np.eye(n), exact[:n, n:]]))
+        lost = lost_share(A, sums[:n, :n])
+        if lost > MOST_LOST:
+            return Bounds(np.full(n, np.inf), False, math.inf, math.inf)
+        S, X = np.hsplit(sums * (1 + lost), [n])
+        largest = X @ self.sizes
+        output = float(largest[n] + abs(exact[n, n:]) @ self.sizes + self.feedforward)
+        output *= 1 + (n + self.sizes.size + 3) * FLOATS["double"][1]  # the sum itself is rounded
+        rest = V[:, n:] @ self.sizes + abs(rounded[:, n:]) @ self.slips + absolute
+        states = least_solution(S[:n] @ V[:n, :n], largest[:n] + S[:n] @ rest[:n])
+        states = np.minimum(states, 1.0 if self.precision == FIXED else np.inf)
+        if not np.isfinite(states).all():
+            return Bounds(states, is_whole, math.inf, output)
+        w = V[:, :n] @ states + rest
+        return Bounds(states, is_whole, float(S[n] @ w[:n] + w[n] + relative * self.feedforward), output)
 
     def limit_cycle(self, loop: Sampled) -> float | None:
         """Bound on u in a limit cycle that roundings sustain in a loop at rest; None where none was found.
@@ -261,6 +302,13 @@ class Word:
         return bound if bound < math.inf else None
 
 
+def lost_share(M: Real, sums: Real) -> float:
+    """Share of sum_k |M^k| that the roundings of its powers in double can change; infinite for a matrix that grows."""
+    if not np.isfinite(sums).all():
+        return math.inf
+    return len(M) * FLOATS["double"][1] * float(max(abs(np.linalg.eigvals(abs(M) @ sums)), default=0.0))
+
+
 def least_solution(P: Real, q: Real) -> Real:
     """The least z = P z + q of entries that are not negative; infinite where an eigenvalue of P is not below 1."""
     if np.isfinite(P).all() and max(abs(np.linalg.eigvals(P)), default=0.0) < 1:
@@ -276,25 +324,35 @@ def observed(M: Real, left: Real) -> Real:
     return M - np.real(vectors[:, gone] * poles[gone] @ np.linalg.pinv(vectors)[gone]) if gone.any() else M
 
 
-def word_of(law: Law, precision: str, ranges: Mapping[str, float], output: float | None) -> Word:
-    """A realised law in the numbers of a target, with the largest absolute values of its signals in SI units.
+def word_of(
+    law: Law, precision: str, ranges: Mapping[str, float], step: float = 0.0, hub: tuple[float, float] | None = None
+) -> Word:
+    """A realised law in the numbers of a target, with the largest absolute values of its inputs and of u in SI units.
 
-    Raises ParameterError, in fixed point for a signal or an output without a range, and for a coefficient that is
-    beyond the numbers of the target.
+    `step` is that of the DAC, `hub` pole and period [s] of an estimated hub rate.  Raises ParameterError, in fixed
+    point for a signal or an output without a range, and for a coefficient that is beyond the numbers of the target.
     """
     names = [name.removeprefix(REFERENCE) for name in (*law.signals, *law.wanted)]
     for name in (*names, OUTPUT):
-        is_known = name in ranges or (name == OUTPUT and output) or precision != FIXED
-        require(is_known, "range", name, f"q31 needs the largest absolute value: --range {name}=VALUE, in SI units")
+        remedy = f"q31 needs the largest absolute value: --range {name}=VALUE, in SI units"
+        require(name in ranges or precision != FIXED, "range", name, remedy)
     R = np.array([ranges.get(name, 1.0) for name in names])
-    E = R * np.array([2.0 if name in law.references else 1.0 for name in (*law.signals, *law.wanted)])
+    E, slips, U = R.copy(), np.zeros(R.size), ranges.get(OUTPUT, 1.0)
+    if hub:
+        at, (pole, period) = names.index(RATE), hub
+        # the l1 norm of (1 - p)/T (z - 1)/(z - p); of differences within RATE T the estimate is within RATE
+        E[at] = min(2 * (1 - pole) / period * ranges.get(ANGLE, 1.0), ranges.get(RATE, math.inf))
+        of_double = (6 + 2 / (1 - pole)) * FLOATS["double"][1] / (1 - pole)  # of its operations, and of the pole
+        slips[at] = E[at] * (FLOATS[precision][1] + of_double)
+    E += R * np.array([name in law.references for name in (*law.signals, *law.wanted)])
+    word = Word(law, precision, E, R, U, ranges.get(FEEDFORWARD, U), step, slips, system_matrix(law))
     if precision == FIXED:
-        return _fixed(law, E, R, float(output or 1.0))
-    kind, S = FLOATS[precision][0], system_matrix(law)
+        return _fixed(word)
+    kind, S = FLOATS[precision][0], word.table
     with np.errstate(over="ignore"):
         own = S.astype(kind)
     _check(S, ~np.isfinite(own) | ((own == 0) & (S != 0)), np.dtype(kind).name)
-    return Word(law, precision, E, R, output or 1.0, own)
+    return replace(word, table=own)
 
 
 def _check(S: Real, is_beyond: Any, kind: str) -> None:
@@ -309,12 +367,30 @@ def coefficient(place: Sequence[int]) -> str:
     return f"ABCD[{place[0]}][{place[1]}]"
 
 
-def _fixed(law: Law, E: Real, R: Real, U: float) -> Word:
-    """A law in fixed point: the states scaled by powers of 2 beyond their bounds, or where there is none by u."""
+def _fixed(word: Word) -> Word:
+    """A law in fixed point: the states scaled by powers of 2 beyond their bounds, or where there is none by u.
+
+    Raises ParameterError for a feedforward beyond the output, a state without a scale, and coefficients without digits.
+    """
+    E, R, U, law = word.sizes, word.ranges, word.output, word.law
+    remedy = f"in fixed point feedforward is a fraction of the range of the output: at most {U!r}"
+    require(word.feedforward <= U, "range.feedforward", word.feedforward, remedy)
     S, n, one = system_matrix(law), law.order, np.ones(law.order)
     X, is_whole = absolute_sum(S[:n, :n], np.eye(n), S[:n, n:])
+    reach = X @ E
     of_output = np.divide(OF_OUTPUT * U, abs(S[n, :n]), out=np.full(n, np.inf), where=S[n, :n] != 0)
-    size = np.maximum(X @ E if is_whole else np.minimum(X @ E, of_output), LEAST_SCALE)
+    if not is_whole:  # a state whose sum still grows has the scale of u
+        earlier, _ = absolute_sum(S[:n, :n], np.eye(n), S[:n, n:], MOST_SUMMED // 2)
+        of_output[np.isfinite(reach) & (reach <= (1 + SUMMED) * (earlier @ E))] = np.inf
+    size = np.maximum(reach if is_whole else np.minimum(reach, of_output), LEAST_SCALE)
+    if not np.isfinite(size).all():
+        poles, vectors = np.linalg.eig(S[:n, :n])
+        remedy = (
+            f"ill-conditioned or unstable in z: modulus of its poles up to {max(abs(poles)):.4g} in double, condition "
+            f"number of their eigenvectors {np.linalg.cond(vectors):.2g}; q31 needs states with a bound: give the law "
+            "in s, or in z as a state space of sections in cascade"
+        )
+        raise ParameterError(key="law", value=law.name, remedy=remedy)
     scale = np.exp2(np.ceil(np.log2(HEADROOM * size)))
     scaled = with_system_matrix(law, S * np.r_[scale, np.ones(R.size)] / np.r_[scale, 1.0][:, None])
     table = system_matrix(scaled) * np.r_[one, R] / np.r_[one, U][:, None]
@@ -323,4 +399,5 @@ def _fixed(law: Law, E: Real, R: Real, U: float) -> Word:
     shifts = np.minimum(np.floor(np.log2(most / np.maximum(sums, LEAST_SCALE))).astype(int), MOST_SHIFT)
     is_largest = abs(table) == abs(table).max(axis=1)[:, None]
     _check(table, is_largest & (shifts < 1)[:, None], "q31 at these ranges")
-    return Word(scaled, FIXED, E, R, U, np.rint(np.ldexp(table, shifts[:, None])).astype(np.int64), shifts)
+    whole = np.rint(np.ldexp(table, shifts[:, None])).astype(np.int64)
+    return replace(word, law=scaled, table=whole, shifts=shifts)

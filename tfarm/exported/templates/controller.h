@@ -5,16 +5,31 @@
  *
  * Inputs {{ "as fractions of their ranges, 2147483648 for each range" if fixed else "in SI units" }}:
 {% for field in fields %}
- *   {{ field.identifier }}: {{ field.text|comment }}
+ *   {{ field.identifier }}: {{ field.text|comment }}{{ ", within +-%r"|format(field.size) if bounds }}
 {% endfor %}
  * Output: {{ output|comment }}
+{% if bounds %}
  *
- * Call {{ name }}_init once and {{ name }}_step at each sample.
-{% if fixed %}
- * {{ name }}_step returns 0.
-{% else %}
- * {{ name }}_step returns 0, {{ name }}_INPUT_ERROR for an input that is not finite, or {{ name }}_OVERFLOW for such a
- * result: it then holds the output and keeps the state.  Compile with -ffp-contract=off, without -ffast-math.
+ * Arithmetic, and bounds for inputs within +- these ranges, from {{ name }}_init on ("-": not determined):
+{% for label, value in bounds %}
+ *   {{ label|comment }}: {{ value|comment }}
+{% endfor %}
+ * The error is the distance of *output from the discretised law in exact arithmetic{{ ", its output clipped to these limits" if "SATURATED" in statuses }}.
+{% endif %}
+ *
+ * Call {{ name }}_init once and {{ name }}_step at each sample.  It returns 0, or
+{% if not fixed %}
+ *   {{ name }}_INPUT_ERROR for an input that is not finite, {{ name }}_OVERFLOW for such a result: it then holds the
+ *   output and keeps the state.
+{% endif %}
+{% if "SATURATED" in statuses %}
+ *   {{ name }}_SATURATED where it clipped the output{{ " that it returns %d samples later"|format(delay) if delay }}.
+{% endif %}
+{% if "STATE_SATURATED" in statuses %}
+ *   {{ name }}_STATE_SATURATED where it clipped a state, and perhaps the output.
+{% endif %}
+{% if not fixed %}
+ * Compile with -ffp-contract=off, without -ffast-math.
 {% endif %}
  */
 #ifndef {{ name }}_CONTROLLER_H
@@ -29,8 +44,9 @@
 #endif
 {% endif %}
 
-#define {{ name }}_INPUT_ERROR 1
-#define {{ name }}_OVERFLOW 2
+{% for status, number in statuses.items() %}
+#define {{ name }}_{{ status }} {{ number }}
+{% endfor %}
 
 typedef {{ real }} {{ name }}_number;
 

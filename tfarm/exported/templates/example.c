@@ -10,7 +10,8 @@
 static int wait_for_sample(void) /* until the timer of {{ period }} s; 0 ends the loop */
 {
     static int samples_left = 10;
-    return samples_left-- > 0;
+    samples_left--;
+    return (samples_left >= 0) ? 1 : 0;
 }
 
 static void read_inputs({{ name }}_input *input)
@@ -22,7 +23,13 @@ static void read_inputs({{ name }}_input *input)
 
 static void write_output({{ name }}_number output, int status) /* {{ output|comment }} */
 {
-    printf("%.9g%s\n", (double)output, status ? " held: a sensor has failed" : "");
+    const char *words = "";
+{% for number, text in ((1, "held: a sensor has failed"), (2, "held: overflow"), (3, "clipped"), (4, "clipped, a state too")) if number in statuses.values() %}
+    if (status == {{ number }}) {
+        words = " {{ text }}";
+    }
+{% endfor %}
+    (void)printf("%.9g%s\n", (double)output, words);
 }
 
 int main(void)
@@ -33,7 +40,7 @@ int main(void)
     int status;
 
     {{ name }}_init(&state);
-    while (wait_for_sample()) {
+    while (wait_for_sample() != 0) {
         read_inputs(&input);
         status = {{ name }}_step(&state, &input, &output);
         write_output(output, status);

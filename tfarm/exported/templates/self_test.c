@@ -33,12 +33,15 @@ int main(void)
         input.{{ field.identifier }} = next({{ sizes[loop.index0] if not fixed }});
 {% endfor %}
 {% if not fixed %}
-        if (k == {{ refused }})
+        if (k == {{ refused }}) {
             input.{{ fields[0].identifier }} = 0.0{{ suffix }} / (input.feedforward - input.feedforward); /* NaN */
+        }
 {% endif %}
         status = {{ name }}_step(&state, &input, &output);
-        wrong += status != expected[k] || memcmp(&output, &recorded[k], sizeof output) != 0;
+        if ((status != expected[k]) || (memcmp(&output, &recorded[k], sizeof output) != 0)) {
+            wrong++;
+        }
     }
-    printf("%d of {{ recorded|length }} samples differ\n", wrong);
-    return wrong != 0;
+    (void)printf("%d of {{ recorded|length }} samples differ\n", wrong);
+    return (wrong == 0) ? 0 : 1;
 }
