@@ -19,6 +19,7 @@ import numpy as np
 import tfarm
 from tfarm.arm.law_tables import load_law
 from tfarm.audit.published import Validation, validate
+from tfarm.case.card import GAIN_LIMITS, PEAK_LIMITS, PERIOD_LIMITS, PHASE_LIMITS
 from tfarm.digits import general
 from tfarm.dsp.chain import load_chain
 from tfarm.fitting.recording import compare_run, load_run, overshoot, read_recording
@@ -43,6 +44,26 @@ def markdown_table(titles: Iterable[str], rows: Iterable[Iterable[str]]) -> list
     cells = ([cell.replace("|", r"\|").replace("\n", " ") for cell in row] for row in rows)
     head = [*titles]
     return [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *cells)]
+
+
+@table
+def grades() -> list[str]:
+    """Limits of the grades of the result card, from the code that grades."""
+    rows = [
+        ("gain margin, upwards and downwards", GAIN_LIMITS, "at least", "dB", "[2] section 6.4, [5] section 7-7"),
+        ("phase margin", PHASE_LIMITS, "at least", "deg", "[2] section 6.4, [5] section 7-7"),
+        ("delay margin", PERIOD_LIMITS, "at least", "sampling periods", "one more sample of computing time"),
+        ("peak sensitivity Ms", PEAK_LIMITS, "at most", "", "[1] section 10.3, [3] section 2.4"),
+    ]
+    beyond = {"at least": "below", "at most": "above"}
+    return markdown_table(
+        ("quantity", "good", "low", "poor", "source"),
+        (
+            [name, *(f"{side} {limit:g} {unit}".strip() for limit in limits),
+             f"{beyond[side]} {limits[1]:g} {unit}".strip(), source]
+            for name, limits, side, unit, source in rows
+        ),
+    )  # fmt: skip
 
 
 @table

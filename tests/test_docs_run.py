@@ -27,6 +27,7 @@ from tests.shell import heard
 from tfarm.arm.law_tables import load_law
 from tfarm.audit import audit
 from tfarm.audit.published import validate
+from tfarm.case.card import GAIN_LIMITS, PEAK_LIMITS, PERIOD_LIMITS, PHASE_LIMITS, grade_of
 from tfarm.cli import main
 from tfarm.cli.running import whole_command
 from tfarm.dsp.chain import CHAIN_TABLES, load_chain
@@ -251,6 +252,24 @@ def test_tables_have_the_numbers_of_their_sources(tables, tmp_path, monkeypatch)
     (tmp_path / "bench.json").write_text(json.dumps(kept), encoding="utf-8")
     monkeypatch.setattr(tables, "BENCH", tmp_path / "bench.json")
     assert "| modes | 100 | 20 µs | 30 µs | 1 ms | 0.5 × other | 1e-16 |" in tables.speed()
+
+
+def test_grades_of_the_documentation_are_those_of_the_card(tables):
+    """Each limit of the table has the grade of its column, and a thousandth beyond it the next one."""
+    page = (DOCS / "words.md").read_text(encoding="utf-8")
+    assert not re.search(r"(phase|gain) margin[^:\n]*\d+ (deg|dB)", page)  # no second limits next to the table
+    limits = {"gain": GAIN_LIMITS, "phase": PHASE_LIMITS, "delay": PERIOD_LIMITS, "peak": PEAK_LIMITS}
+    caption = (ROOT / "tfarm/report/templates/index.html").read_text(encoding="utf-8")
+    assert ", ".join("{:g} and {:g}".format(*each) for each in limits.values()) in re.sub(
+        " (dB|deg|sampling periods)", "", caption
+    )
+    for row in tables.grades()[2:]:
+        name, *cells = row.strip("| ").split(" | ")
+        for cell, word, beyond in zip(cells, ("good", "low"), ("low", "poor"), strict=False):
+            side, number, *_ = cell.removeprefix("at ").split()
+            worse = float(number) * (0.999 if side == "least" else 1.001)
+            own = limits[name.split()[0]]
+            assert (grade_of(float(number), own), grade_of(worse, own)) == (word, beyond), row
 
 
 @pytest.mark.usefixtures("audited")

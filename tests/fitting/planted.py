@@ -1,6 +1,6 @@
 """Arms found again from responses of finite elements with noise.
 
-    python -m tests.fitting.planted SIZE SEED [arms pairs rigs]
+    python -m tests.fitting.planted SIZE SEED [arms pairs rigs misses]
 
 Random arms, two or three responses of an independent model (`tests.chain_elements`, nothing of tfarm in it), noise of
 known size, four to six free numbers, each started up to 30 % off.  A fit is right where its sum of squares is at most
@@ -8,6 +8,8 @@ that of the truth and every number within five deviations of it; nominal 95 % in
 of the numbers are known by their product or ratio alone, and a fit is right where it finds these two and no other.
 With "rigs" they have springs, friction, a radius and a motor at the hub, over whatever drives them, their
 frequencies even or in proportion and often few for the sharpness of a resonance.  None may end above the truth's sum.
+No good fit may be called a miss, even if the size of its noise were unknown.  With "misses" one response has a factor
+of 3, a delay of 5 ms, or the other sign, or the rig a body that the arm has not: each has to be named.
 """
 
 import math
@@ -22,6 +24,7 @@ from tests.survey import Finding
 from tfarm.arm.writing import KeyedArms
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import fit
+from tfarm.fitting.misses import misses_of
 from tfarm.spectrum.table import first_frequency
 
 ALWAYS = ("link.youngs_modulus", "hub.inertia", "link.damping")
@@ -80,6 +83,12 @@ def chi_squared_at(found, values):
     problem = found.problem
     residuals = problem.residuals(np.array([each.coordinate(values[each.key]) for each in problem.parameters]))
     return float(residuals @ residuals)
+
+
+def is_called_a_miss(found):
+    """Whether a fit would be called a miss if the size of its noise were unknown."""
+    responses = [replace(each, noise=replace(each.noise, is_known=False)) for each in found.problem.responses]
+    return bool(misses_of(replace(found, problem=replace(found.problem, responses=tuple(responses)))))
 
 
 def with_noise(rng, pair, omega, H):
@@ -164,7 +173,7 @@ def judged(seed, *, profile=True):
     """One fit: right or why not, the shares of its nominal 95 % intervals that hold the truth, and itself."""
     arm, data, keys, truth, start = planted(np.random.default_rng([852780, seed]))
     found, inside = fit(arm, data, free=keys, start=start, profile=profile), {}
-    problems = ["not converged"] * (not found.converged)
+    problems = ["not converged"] * (not found.converged) + ["called a miss"] * is_called_a_miss(found)
     problems += ["a worse minimum"] * (found.chi_squared > chi_squared_at(found, truth) * (1 + 1e-9))
     for each in found.parameters:
         if not each.identified:
@@ -210,7 +219,7 @@ def judged_pair(seed):
     found = fit(arm, [data], free=keys, start=start, profile=False)
     unknown = [each.key for each in found.parameters if not each.identified]
     named = [words for words in found.not_determined if all(key in words for key in both) and "only" in words]
-    is_right = found.converged and unknown == both and len(named) == 1
+    is_right = found.converged and unknown == both and len(named) == 1 and not is_called_a_miss(found)
     return "right" if is_right else f"wrong: {unknown}, {found.not_determined}", {}, found
 
 
@@ -219,9 +228,56 @@ def judged_rig(seed):
     arm, data, keys, truth, start = planted_rig(np.random.default_rng([852780, seed]))
     found = fit(arm, data, free=keys, start=start, profile=False)
     at_truth, starts = chi_squared_at(found, truth), found.starts
+    if is_called_a_miss(found):
+        return "called a miss", {}, found
     is_worse = found.chi_squared > at_truth * (1 + 1e-9)
     words = f"above the truth: {found.chi_squared:.5g} > {at_truth:.5g} of {found.freedom}, {starts} starts: {keys}"
     return words if is_worse else "right", {}, found
+
+
+MISSES = ("gain", "delay", "sign", "arm")  # of one response, by a factor of 3 and by 5 ms; of the arm by a body
+SHORTEST_TOP = 600.0  # rad/s: a lower range does not show 5 ms
+
+
+def planted_miss(seed):
+    """The kind, the arm of the fit, its measured responses, the free keys, their start, and the response changed."""
+    rng, kind = np.random.default_rng([852780, seed]), MISSES[seed % len(MISSES)]
+    arm = true = some_arm(rng)
+    if kind == "arm":
+        body = tfarm.Attachment(x=arm.length * rng.uniform(0.4, 0.6), mass=3 * arm.own_mass)
+        true = replace(arm, attachments=(body,))
+    w1 = first_frequency(arm)
+    omega = np.geomspace(0.3 * w1, max(rng.uniform(15, 60) * w1, SHORTEST_TOP), POINTS)
+    pairs = [PAIRS[n] for n in rng.choice(len(PAIRS), size=rng.integers(1, 3), replace=False)]
+    factors = {"gain": 3.0, "sign": -1.0, "delay": np.exp(-5e-3j * omega)}
+    responses, wrong = elements_response(true, omega, pairs), int(rng.integers(len(pairs)))
+    responses[wrong] = responses[wrong] * factors.get(kind, 1.0)
+    data = [with_noise(rng, pair, omega, H) for pair, H in zip(pairs, responses, strict=True)]
+    data = data if seed // len(MISSES) % 2 else [replace(each, sigma=None) for each in data]
+    truth = (arm.link.youngs_modulus, arm.hub.inertia, arm.link.damping)
+    start = {key: value * (1 + rng.uniform(-OFF, OFF)) for key, value in zip(ALWAYS, truth, strict=True)}
+    return kind, arm, data, list(ALWAYS), start, wrong
+
+
+def judged_miss(seed):
+    """Whether a miss is called so, and the remedy is what was planted."""
+    kind, arm, data, keys, start, wrong = planted_miss(seed)
+    found = fit(arm, data, free=keys, start=start, profile=False)
+    if found.verdict != "misses the data":
+        return f"{kind} not called a miss: {found.verdict}, rms {found.rms_log_error:.3g}", {}, found
+    of_sensors = {"gain": "a free gain (--free gain): ", "delay": "a free delay (--free delay): "}
+    if kind in of_sensors:
+        words, _, values = found.advice.partition(of_sensors[kind])
+        numbers = [float(each.removesuffix(" s")) for each in values.split(" and ")] if values else [0.0]
+        expected = {"gain": [1.0, 3.0], "delay": [0.0, 5e-3]}[kind]
+        wanted = [expected[n == wrong] for n in range(len(data))]
+        is_right = words == "" and np.allclose(numbers, wanted, rtol=0.1, atol=5e-4)
+    elif kind == "sign":
+        is_right = found.advice == f"the other sign of {data[wrong].name}"
+    else:
+        is_right = found.advice.startswith("no gain, delay, sign or bound is enough")
+        is_right |= found.advice.endswith("the arm does not explain the data even then")
+    return "right" if is_right else f"{kind} wrong: {found.advice}", {}, found
 
 
 def share_right(name, judge, least):
@@ -241,5 +297,10 @@ def share_right(name, judge, least):
 
 
 if __name__ == "__main__":
-    judges = (("arms", judged, MOSTLY), ("pairs", judged_pair, MOSTLY), ("rigs", judged_rig, 1.0))
+    judges = (
+        ("arms", judged, MOSTLY),
+        ("pairs", judged_pair, MOSTLY),
+        ("rigs", judged_rig, 1.0),
+        ("misses", judged_miss, 1.0),
+    )
     survey.main(*(share_right(*each) for each in judges))

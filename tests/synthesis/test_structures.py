@@ -12,11 +12,12 @@ from tests.shared import thinned
 from tests.shell import answer, refused
 from tests.synthesis.held_loop import HeldLoop
 from tests.synthesis.judged import judge_of
-from tfarm import Law, ParameterError
+from tfarm import HubFeedback, Law, ParameterError
 from tfarm.arm import as_law
 from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import Converters
+from tfarm.schema import text
 from tfarm.synthesis import judge, search
 from tfarm.synthesis.design import design
 from tfarm.synthesis.judge import LOST, RESERVE, entries_of
@@ -65,6 +66,28 @@ def test_the_delay_objective_is_the_delay_margin():
     law = start_of("lead")
     found = judge_of(LAB, law, "delay").value(law)
     assert found == pytest.approx(T * tfarm.sampled(LAB, law).delay_margin.samples, rel=0.05)
+
+
+def test_a_delay_margin_beyond_the_longest_is_a_lower_bound_and_not_flat():
+    """|L| is nowhere 1; the exact loop is stable with any delay that is looked for, and more damping is better."""
+    weak, strong = HubFeedback(K1=0.02, K2=0.001), HubFeedback(K1=0.05, K2=0.003)
+    judged = judge_of(LAB, weak, "delay")
+    for law in (weak, strong):
+        assert tfarm.sampled(LAB, law).delay_margin.is_bound
+        assert text(judged.value(law)) == "≥ 1"
+    by_damping = [judge_of(LAB, law, "damping").value(law) for law in (weak, strong)]
+    assert by_damping[0] < by_damping[1]
+    assert judged.score(weak) / judged.score(strong) == pytest.approx(
+        (1 + by_damping[0]) / (1 + by_damping[1]), rel=1e-9
+    )
+
+
+def test_a_peak_of_the_loop_function_between_two_lines_limits_the_delay():
+    """|L| passes 1 between two points of the grid alone: 4.4 samples, not 100."""
+    law = HubFeedback(K1=0.07188231867270396, K2=0.0038754877582053197)
+    exact = tfarm.sampled(LAB, law).delay_margin
+    assert not exact.is_bound
+    assert judge_of(LAB, law, "delay").value(law) == pytest.approx(T * exact.samples, rel=0.3)
 
 
 @pytest.fixture(scope="module")

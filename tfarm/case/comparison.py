@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from tfarm.arm import PLANE, AnyLaw, Arm, HubFeedback, arm_and_law, as_law, must_be_arm
+from tfarm.arm import PLANE, AnyLaw, Arm, HubFeedback, arm_and_law, as_law, must_be_arm, must_have_free_hub
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
 from tfarm.crossing import Window
@@ -345,6 +345,8 @@ def compare(
     called = tuple(one_line(name, LONGEST_SIDE_NAME) for name in names) or _names(pairs)
     require(len(called) == 2, "names", list(called), "two names")
     (first, _), (second, _) = pairs
+    must_have_free_hub(first)
+    must_have_free_hub(second)
     remedy = f"gains of {called[0]} are in another unit, its input being {first.input}: give both one input"
     require(first.input_unit == second.input_unit, "input", second.input, remedy)
     is_sampled, chain = any(as_law(law).is_discrete for _, law in pairs), chain_or_usual(chain)

@@ -354,7 +354,7 @@ def fit(
 
         page = write([found.arm], out, fits=[found], progress=advance, notice=print_line)
     emit(found, json, png=png, also=(save, page))
-    if not found.converged:
+    if not found.converged or found.misses:
         raise typer.Exit(3)
 
 

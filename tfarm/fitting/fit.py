@@ -32,7 +32,8 @@ from tfarm.records import record
 from tfarm.schema import Quantity
 
 from .data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of
-from .model import Parameter, Problem, Response, RingMode, parameters
+from .misses import Miss, Remedy, misses_of, remedies_of
+from .model import SENSOR_DELAY, SENSOR_GAIN, Problem, Response, RingMode, parameters
 from .overlay import ResonanceShift, ratio_of, resonance_shifts
 from .posterior import SUFFIX, Posterior, posterior_of
 from .solve import (
@@ -48,7 +49,6 @@ from .solve import (
     sum_of_squares,
 )
 
-SENSOR_GAIN, SENSOR_DELAY = "gain", "delay"  # of a sensor, as `Response` has them: free like the arm's numbers
 LONGEST_NAME = 200  # characters of a file in an assumption
 LONGEST_SYMBOL = 3  # characters at the end of a label: I_h, Kt
 MOST_RESTARTS = 4  # times that a profile may find a lower sum of squares than the search did
@@ -197,22 +197,48 @@ class Fit(Solution):
         """Whether noise alone is often so large; None where its size was taken from the residuals."""
         return is_explained(self)
 
+    @cached_property
+    def misses(
+        self,
+    ) -> Annotated[tuple[Miss, ...], Quantity("misses", help="responses that the fitted curve misses by a factor")]:
+        """The responses that the curve misses."""
+        return misses_of(self)
+
+    @cached_property
+    def remedies(
+        self,
+    ) -> Annotated[
+        tuple[Remedy, ...],
+        Quantity("remedies", help="single changes that were tried on a curve that misses, the most helpful first"),
+    ]:
+        """The changes tried on a curve that misses; none of one that does not."""
+        return remedies_of(self) if self.misses else ()
+
     @property
     def verdict(
         self,
-    ) -> Annotated[str, Quantity(help="fitted, not converged, or fitted although the arm does not explain the data")]:
-        """Whether it converged, and whether the model is rejected."""
+    ) -> Annotated[
+        str,
+        Quantity(
+            "verdict",
+            help="fitted, not converged, misses the data, or fitted although the arm does not explain the data",
+        ),
+    ]:
+        """Whether it converged, whether the curve misses the data, and whether the model is rejected."""
         if not self.converged:
             return "not converged"
+        if self.misses:
+            return "misses the data"
         return "fitted, but the arm does not explain the data" if self.is_explained is False else "fitted"
 
     @property
     def in_words(
         self,
     ) -> Annotated[
-        str, Quantity("fit", key="in_words", help="convergence, identified numbers and reduced chi-squared")
+        str,
+        Quantity("fit", key="in_words", help="convergence, identified numbers, reduced chi-squared, misses"),
     ]:
-        """Convergence, identified numbers, and whether the model is rejected."""
+        """Convergence, identified numbers, whether the model is rejected, and what is missed."""
         known = sum(each.identified for each in self.parameters)
         share = f"reduced chi-squared = {self.chi_squared / max(self.freedom, 1):.3g}"
         tests = {
@@ -221,7 +247,23 @@ class Fit(Solution):
             False: f"model rejected: {share}; the intervals, which rest on the noise alone, are too narrow",
         }
         start = "" if self.converged else "not converged: these are the best numbers so far; "
-        return f"{start}{known} of {len(self.parameters)} numbers identified; {tests[self.is_explained]}"
+        words = f"{start}{known} of {len(self.parameters)} numbers identified; {tests[self.is_explained]}"
+        return "; ".join([words, *(each.in_words for each in self.misses)])
+
+    @property
+    def advice(
+        self,
+    ) -> Annotated[
+        str | None, Quantity("remedy", key="remedy", help="change of the search that helps most where the curve misses")
+    ]:
+        """The remedy that helps most, or that none of those tried is enough; None where the curve does not miss."""
+        if not self.misses:
+            return None
+        best = next(iter(self.remedies), None)
+        if best is not None and best.is_enough:
+            return best.in_words
+        most = f"; most helps {best.change}" if best is not None else ""
+        return f"no gain, delay, sign or bound is enough: the rig differs from the arm of the file{most}"
 
 
 def fit(
@@ -303,22 +345,14 @@ def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: An
     require(data or rings, "data", 0, "give at least one measured response, or a decay (--mode)")
     keys = [str(key) for key in free if key not in (SENSOR_GAIN, SENSOR_DELAY)]
     family, numbers = parameters(arm, keys, start=start or {}, bounds=bounds or {}, priors=priors or {})
-    own, responses = [*numbers], []
-    for n, each in enumerate(data, start=1):
+    for each in data:
         ratio_of(arm, each)
-        places, which = {}, "" if len(data) == 1 else f":{n}"
-        sensors = (
-            Parameter(SENSOR_GAIN, 1.0, -np.inf, np.inf, by_logarithm=True, size=1.0),
-            Parameter(SENSOR_DELAY, 0.0, -np.inf, np.inf, by_logarithm=False, size=1.0 / each.band[1]),
-        )
-        for sensor in (sensor for sensor in sensors if sensor.key in free):
-            places[sensor.key] = len(own)
-            own.append(replace(sensor, key=sensor.key + which))
-        responses.append(Response(each, noise_of(each), **places))
-    require(own, "free", "nothing", "name what is free, such as link.youngs_modulus")
-    subject = Problem(family, tuple(own), tuple(responses), tuple(rings))
-    size = subject.residuals(np.zeros(len(own))).size
-    require(size >= len(own), "free", len(own), f"{size} numbers were measured; leave some out")
+    responses = tuple(Response(each, noise_of(each)) for each in data)
+    subject = Problem(family, numbers, responses, tuple(rings)).with_sensors(free)
+    count = len(subject.parameters)
+    require(count, "free", "nothing", "name what is free, such as link.youngs_modulus")
+    size = subject.residuals(np.zeros(count)).size
+    require(size >= count, "free", count, f"{size} numbers were measured; leave some out")
     return subject
 
 
@@ -333,11 +367,13 @@ WIDER = 1.5  # times the deviation by the noise: a wider scatter is named
 def arms_drawn(fit: Fit, count: int) -> tuple[Arm, ...]:
     """Return arms drawn from the posterior that explain the data as well as the best one does, but for the noise.
 
-    Numbers of sensors follow by the linearised residuals.  Raises ConvergenceError where the sum of squares is so far
-    from a parabola that draws of one are none of it.
+    Numbers of sensors follow by the linearised residuals.  Raises ConvergenceError where the curve misses the
+    data, or the sum of squares is so far from a parabola that draws of one are none of it.
     """
     own, J = fit.problem.of_the_arm, fit.jacobian
     of_sensors = -np.linalg.pinv(J[:, len(own) :]) @ J[:, : len(own)]
+    if fit.misses:
+        raise ConvergenceError("the fitted curve misses the data", [], 0)
     normal = np.random.default_rng(FIT_SEED).standard_normal((DRAWS_EACH * count, len(own)))
     most = fit.chi_squared + 2.0 * float(gammaincinv(len(own) / 2, DRAWS_KEPT))  # the quantile of chi squared
     kept: list[Arm] = []

@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -215,6 +215,7 @@ def eigenvalue(arm: Arm, number: int) -> complex:
     return s
 
 
+SENSOR_GAIN, SENSOR_DELAY = "gain", "delay"  # of a sensor, as `Response` has them: free like the arm's numbers
 WALL = 10.0  # times the largest residual of the first point: so high that no search goes on there
 INSIDE_BOUNDS = 1e-9  # of a coordinate: so far inside its bounds a search begins
 
@@ -317,6 +318,22 @@ class Problem:
             for place, usual in ((one.gain, 1.0), (one.delay, 0.0))
         )
         return np.asarray(gain * np.exp(-1j * delay * one.data.omega))
+
+    def with_sensors(self, free: Sequence[str]) -> Problem:
+        """The problem with "gain" or "delay" of each sensor free, too."""
+        own, responses = [*self.parameters], []
+        for n, each in enumerate(self.responses, start=1):
+            places: dict[str, Any] = {}
+            which = "" if len(self.responses) == 1 else f":{n}"
+            sensors = (
+                Parameter(SENSOR_GAIN, 1.0, -np.inf, np.inf, by_logarithm=True, size=1.0),
+                Parameter(SENSOR_DELAY, 0.0, -np.inf, np.inf, by_logarithm=False, size=1.0 / each.data.band[1]),
+            )
+            for sensor in (one for one in sensors if one.key in free and getattr(each, one.key) is None):
+                places[sensor.key] = len(own)
+                own.append(replace(sensor, key=sensor.key + which))
+            responses.append(replace(each, **places))
+        return replace(self, parameters=tuple(own), responses=tuple(responses))
 
     def at(self, number: int, omega: Real) -> Problem:
         """The problem of one of its responses alone, at other frequencies: for curves."""

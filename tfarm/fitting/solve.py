@@ -28,7 +28,7 @@ from scipy.optimize import brentq, least_squares
 from scipy.special import chdtrc, ndtri, stdtrit
 
 from tfarm.arm.schema import file_key
-from tfarm.arrays import Real
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.schema import Quantity
@@ -95,12 +95,29 @@ def with_gains(problem: Problem, point: Real) -> tuple[Problem, Real]:
     """The problem with the sign of each sensor's gain as the data have it at a point; the point with its size."""
     parameters, point = list(problem.parameters), point.copy()
     for H, each in zip(problem.computed(point), problem.responses, strict=True):
+        ratio = each.data.values / H
+        if each.delay is not None:
+            delay = aligning_delay(each.data.omega, ratio)
+            point[each.delay] += delay / parameters[each.delay].size
+            ratio = ratio * np.exp(1j * delay * each.data.omega)
         if each.gain is not None:
-            ratio, own = each.data.values / H, parameters[each.gain]
+            own = parameters[each.gain]
             if np.median(ratio.real / abs(ratio)) < 0:
                 parameters[each.gain] = replace(own, start=-own.start)
             point[each.gain] += float(np.median(np.log(abs(ratio))))
     return replace(problem, parameters=tuple(parameters)), point
+
+
+def aligning_delay(omega: Real, ratio: Complex) -> float:
+    """Return the delay [s] within a period of the first line that aligns the phases of ratios, 0 where 0 is as good.
+
+    Phases wrap between far lines, so that no search comes there from 0.  It maximises abs(sum e^{i (phase + w tau)}).
+    """
+    period, count = 2 * math.pi / omega[0], math.ceil(16 * min(omega[-1] / omega[0], LINES))
+    delays = np.linspace(-period, period, 2 * count + 1)
+    phases = ratio[ratio != 0] / abs(ratio[ratio != 0])
+    aligned = abs(np.exp(1j * np.outer(delays, omega[ratio != 0])) @ phases)
+    return float(delays[aligned.argmax()]) if aligned.max() > 1.5 * aligned[count] else 0.0
 
 
 def thinned(problem: Problem, most: int) -> Problem:
@@ -187,8 +204,8 @@ class Solution:
         return float(ndtri(share) if self.has_known_noise else stdtrit(max(self.freedom, 1), share))
 
 
-def best_solution(problem: Problem) -> Solution:
-    """The least sum of squares over the starts; one of noise alone ends the search early.
+def best_solution(problem: Problem, is_enough: Callable[[Solution], bool | None] | None = None) -> Solution:
+    """The least sum of squares over the starts; one that `is_enough` (by default of noise alone) ends the search early.
 
     Where something is left open the valleys are wide, and the equation errors may lead into the wrong one: a pole that
     is there only between two lines.  Then the fit's own start is tried too.
@@ -197,7 +214,7 @@ def best_solution(problem: Problem) -> Solution:
     for draws, shares in STARTS:
         found.append(_rescaled(nearest_minimum(*start_by(problem, draws, shares))))
         best = min(found, key=lambda each: each.misfit)
-        if best.converged and is_explained(best):
+        if best.converged and (is_enough or is_explained)(best):
             break
     if open_axes(best.jacobian).size:
         at_start = _rescaled(nearest_minimum(*with_gains(problem, problem.start)))

@@ -226,6 +226,7 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
     fit = case.fit
     assert fit is not None
     words = [f"{upper(each)}." for each in fit.not_determined]
+    words += [f"Remedy: {fit.advice}."] * bool(fit.misses)
     blocks: list[Picture | Table] = []
     if fit.responses:
         names = listed([f"{each.label} [{each.unit}]" for each in fit.responses])

@@ -3,7 +3,8 @@
 damping       least damping ratio of the oscillating poles of the first modes
 margin        disk margin min 2 |1 + L|/|1 - L|; of nearly equal ones that with more damping
 sensitivity   max |S|, S = 1/(1 + L)
-delay         least further delay [s] that turns L to -1 where |L| = 1: (pi + arg L)/w
+delay         least further delay [s] that turns L to -1 where |L| = 1: (pi + arg L)/w; of laws that reach the longest
+              one looked for that with most damping
 residual      root mean square of the arm's own root moment less the rigid arm's, over a period of the first mode after
               the slew
 cost          T sum of (a x^2 + b e^2)/2 over a slew, the tuner's: x as the controller reads it, e what is added
@@ -27,7 +28,7 @@ from tfarm.arm import AnyLaw, Arm, as_law, tracked
 from tfarm.arm.blocks import Rational
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain, sampled_verdict
-from tfarm.dsp.edges import most_modes
+from tfarm.dsp.edges import LowerBound, most_modes
 from tfarm.dsp.plant import driven
 from tfarm.dsp.results import simulated
 from tfarm.dsp.verdict import UNDAMPED_MODES
@@ -40,7 +41,7 @@ from tfarm.synthesis.structures import Entry
 
 REAL_ANGLE = 1e-9  # rad, of ln z or s: a pole at a smaller angle is real
 AS_NEAR = 4.0  # of the least distance to an open-loop pole: up to there a pole may be its own too
-LONGEST_MARGIN = 100.0  # samples, or s: the delay margin where |L| is nowhere 1
+LONGEST_MARGIN = 100.0  # samples, or s: the longest delay margin, and that where |L| is nowhere 1
 TIE = 1e-3  # weight of the damping ratio in a disk margin: without sampling rate feedback alone has margin 2
 
 
@@ -82,7 +83,17 @@ def disk_of(L: Complex) -> Real:
 
 
 def delay(model: Model, L: Complex) -> Real:
-    """The delay [s] that turns L to -1 where |L| passes 1, between two points of the grid along straight lines."""
+    """The delay [s] that turns L to -1 where |L| passes 1, between two points of the grid along straight lines.
+
+    A law is without limit where `RESERVE` L passes 1 nowhere either: a resonance peaks between two points of the grid.
+    """
+    longest = (model.period or 1.0) * LONGEST_MARGIN
+    late = _passing_delay(model, L)
+    return np.where(late < longest, late, _passing_delay(model, RESERVE * L))
+
+
+def _passing_delay(model: Model, L: Complex) -> Real:
+    """That delay [s] by the passages between points of the grid alone, at most the longest."""
     q = model.angles
     size, turn = np.log(np.maximum(abs(L), LEAST_SIZE)), np.mod(np.pi + np.unwrap(np.angle(L)), 2 * np.pi)
     passes = (size[:, 1:] * size[:, :-1] <= 0) & (size[:, 1:] != size[:, :-1])
@@ -90,6 +101,13 @@ def delay(model: Model, L: Complex) -> Real:
     step = np.mod(turn[:, 1:] - turn[:, :-1] + np.pi, 2 * np.pi) - np.pi
     late = np.mod(turn[:, :-1] + share * step, 2 * np.pi) / (q[:-1] + share * np.diff(q))
     return (model.period or 1.0) * np.where(passes, late, LONGEST_MARGIN).min(axis=1, initial=LONGEST_MARGIN)
+
+
+def delay_score(model: Model, L: Complex, poles: Complex) -> Real:
+    """Minus that delay, times 1 + damping ratio at the longest one: many laws reach it, and it says no more of them."""
+    late = delay(model, L)
+    is_longest = late >= (model.period or 1.0) * LONGEST_MARGIN
+    return np.where(is_longest, -late * (1 + damping_of(model, poles)), -late)
 
 
 OBJECTIVES = {
@@ -112,9 +130,10 @@ OBJECTIVES = {
         lambda judge, law: float(judge.peak(judge.lowest(law, lambda L: np.asarray(abs(1 + L))))),
     ),
     "delay": Objective(
-        lambda judge, entries, poles: -delay(judge.model, judge.model.loop(entries)),
-        lambda judge, law: -judge.score(law),
+        lambda judge, entries, poles: delay_score(judge.model, judge.model.loop(entries), poles),
+        lambda judge, law: judge.delay_margin(law),
         is_negated=True,
+        of_poles=True,
     ),
     "residual": Objective(
         lambda judge, entries, poles: judge.slews.residual(entries),
@@ -213,6 +232,11 @@ class Judge:
         s = stability(self.arm, law, self.model.band).poles.values
         s = s[(s.imag > 0) & (s.imag < self.model.band)]
         return float((-s.real / abs(s)).min(initial=1.0))
+
+    def delay_margin(self, law: AnyLaw) -> float:
+        """The delay margin [s] by the model; a lower bound where it is the longest that is looked for."""
+        late = float(delay(self.model, self.model.loop(entries_of(law)))[0])
+        return late if late < (self.model.period or 1.0) * LONGEST_MARGIN else LowerBound(late)
 
     def simulated_residual(self, law: AnyLaw) -> float:
         """The residual of `tfarm simulate` after the slew [N m], with the converters; inf where it stops."""
