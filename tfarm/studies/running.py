@@ -76,7 +76,8 @@ class Plan:
     @cached_property
     def subjects(self) -> Subjects:
         """The arms and loops of the rows."""
-        return Subjects(self.arm, self.law, self.chain, self.space.keys, self.tuner)
+        fitted = self.space.posterior.keys if self.space.posterior else ()
+        return Subjects(self.arm, self.law, self.chain, self.space.keys, self.tuner, fitted)
 
 
 def chunk(plan: Plan, first: int, last: int, listed: Real | None = None) -> Chunk:

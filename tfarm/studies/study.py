@@ -173,6 +173,11 @@ class Study:
         return failures_of(self._table)
 
     @property
+    def shear(self) -> Annotated[str, Quantity("shear modulus", help="with a varied Young's modulus; else empty")]:
+        """Shear moduli where Young's modulus is varied."""
+        return "; ".join(self.parts.plan.subjects.notes)
+
+    @property
     def finding(self) -> Annotated[str, Quantity(help="stable arms of each loop, with their confidence")]:
         """Stable arms of each loop."""
         words = [f"{each.loop}: {each.finding}" for each in self.shares]
