@@ -104,8 +104,7 @@ def test_a_number_of_a_response_that_is_none_is_one_line(number, tmp_path):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM])
-def test_a_stopped_command_ends_its_reader(number, reader):
+def test_a_stopped_command_ends_its_reader(reader):
     """A terminal that is closed is a stop as any other."""
     file = reader("os.write(1, bytes(1)); open(path + '.begun', 'w'); time.sleep(60)")
     command = [sys.executable, "-m", "tfarm", "fit", "sasaki2012-lab", "--free", "hub.inertia", "--data",
@@ -118,9 +117,9 @@ def test_a_stopped_command_ends_its_reader(number, reader):
     while not Path(f"{file}.begun").exists() and time.monotonic() < deadline:
         time.sleep(0.02)
     assert len(members(process.pid)) == 2
-    process.send_signal(number)
+    process.send_signal(signal.SIGHUP)
     _, err = process.communicate(timeout=30)
-    assert (process.returncode, heard(err.decode())) == (128 + number, "tfarm: stopped\n")
+    assert (process.returncode, heard(err.decode())) == (128 + signal.SIGHUP, "tfarm: stopped\n")
     while (left := members(process.pid)) and time.monotonic() < deadline:
         time.sleep(0.02)
     assert left == []

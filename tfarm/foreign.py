@@ -21,9 +21,9 @@ import numpy as np
 from tfarm.errors import ParameterError
 from tfarm.stopping import undone_if_stopped
 
-MOST_MEMORY = 4 << 30  # bytes: a UFF file of 256 MiB, the largest that is read, takes 3.4e9
-LONGEST = 120  # seconds, of a file or a batch of rows: that file takes 8 s of a processor, which others may share
-WORDS = 200  # characters of an error
+LONGEST = (
+    120  # seconds, of a file or a batch of rows: the largest file takes 8 s of a processor, which others may share
+)
 alarm: Callable[[int], object] = getattr(signal, "alarm", lambda _: None)  # the system's, where it has one
 
 
@@ -36,13 +36,17 @@ def read_by_child(kind: str, path: str | os.PathLike[str], *, key: str, remedy: 
     command = [sys.executable, "-P", "-W", "ignore", "-m", "tfarm.foreign", kind, os.fspath(path)]
     paths = os.pathsep.join(each or os.getcwd() for each in sys.path)
     own = os.environ | {"PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1", "PYTHONIOENCODING": "utf-8"}
-    pipes: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    with subprocess.Popen(command, env=own, **pipes) as process, undone_if_stopped(process.kill):
+    with (
+        subprocess.Popen(
+            command, env=own, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        ) as process,
+        undone_if_stopped(process.kill),
+    ):
         yield cast("Any", process.stdout)
         errors = process.communicate()[1].decode("utf-8", "replace").splitlines()
     if code := process.returncode:
         ends = {-getattr(signal, "SIGALRM", 0): f"its reader takes more than {LONGEST} s"}
-        last = [f"its reader was ended by {code}", *errors][-1][:WORDS]
+        last = [f"its reader was ended by {code}", *errors][-1][:200]
         reason = last if code > 0 else ends.get(code, f"its reader was ended by signal {-code}")
         raise ParameterError(key=key, value=os.fspath(path), remedy=f"{remedy}: {reason}")
 
@@ -114,7 +118,8 @@ def main(kind: str, path: str) -> None:
         import resource
 
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # no file with the memory of a reader that crashed
-        resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
+        most = 4 << 30  # bytes: a UFF file of 256 MiB, the largest that is read, takes 3.4e9
+        resource.setrlimit(resource.RLIMIT_AS, (most, most))
     with open(os.dup(1), "wb") as output:
         os.dup2(2, 1)  # a reader may print
         alarm(LONGEST)

@@ -26,7 +26,7 @@ from tfarm.dsp import Chain
 
 ROOT = Path(__file__).parents[2]
 OVER = {"payload.mass": {"uniform": [0.0, 0.2]}, "law.K2": {"uniform": [0.0, 0.6]}}
-DRAWS, PART = 800, 40
+DRAWS, PART = 480, 40
 KINDS = ("worker", "study", "Dask worker", "scheduler")
 PATIENCE = 300.0  # seconds, for any run
 

@@ -182,7 +182,7 @@ def test_sobol_samples_and_the_search_for_the_worst_arm_are_resumed(tmp_path, mo
                 total += len(rows)
     assert findings(found) == findings(whole)
     assert runs >= 4
-    assert total <= expected + runs * (3 + pilot)  # of a part of 4 rows three at most are lost
+    assert total <= expected + runs * (3 + pilot)  # of a part of 4 rows three at most are lost, and none of a search
     files = [{path.name: path.read_bytes() for path in (tmp_path / name).glob("_*")} for name in ("parts", "whole")]
     assert files[0] == files[1]
     assert {name[:6] for name in files[0]} == {"_sobol", "_worst"}

@@ -1,13 +1,17 @@
 """Rows of a study: distributions, grids, lists; independent of chunks, workers and order."""
 
 import csv
+import dataclasses
 import math
+import tomllib
 
 import numpy as np
 import pytest
 from scipy import stats
 
 import tfarm
+from tfarm.arm import to_toml
+from tfarm.arm.schema import arm_of_table
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
 from tfarm.fitting.posterior import Posterior, PosteriorNumber
@@ -192,12 +196,32 @@ def test_values_reach_arm_chain_controller_and_tuner(lab):
             "actuator.hub_damping")  # fmt: skip
     one = Subjects(lab, GAINS, Chain(), keys).at((0.1, 7e10, 0.005, 1.5, 0.25, 3.0, 0.01))
     assert (one.arm.payload.mass, one.arm.link.youngs_modulus) == (0.1, 7e10)
-    assert one.arm.link.shear_modulus == lab.link.shear_modulus * (7e10 / lab.link.youngs_modulus)
+    assert one.arm.link.shear_modulus == lab.link.shear_modulus
     assert (one.chain.sampling.period, one.chain.sampling.delay_samples) == (0.005, 1.5)
     assert one.chain.actuator.hub_damping == 0.01
     assert (one.law, one.tuner) == (tfarm.HubFeedback(K1=0.3, K2=0.25), {"seed": 3.0})
     by_block = Subjects(lab, tfarm.Law({"hub_rate": ([1.0], [0.1, 1.0])}), Chain(), ("law.hub_rate.den.0",)).at((0.2,))
     assert by_block.law == tfarm.Law({"hub_rate": ([1.0], [0.2, 1.0])})
+
+
+def test_a_stated_shear_modulus_stays_and_one_by_poissons_ratio_follows(lab):
+    """In a study of the arm as it was loaded, and of its own file; the numbers of a fit are changed as the fit did."""
+    E = "link.youngs_modulus"
+    steel = tfarm.load("stocky-steel")
+    for arm in (steel, arm_of_table(tomllib.loads(to_toml(steel)))):
+        for modulus in (1.9e11, 2.2e11):
+            one = Subjects(arm, GAINS, Chain(), (E,)).at((modulus,)).arm
+            assert one.link.shear_modulus == modulus / 2.6  # the file: Poisson's ratio 0.3
+        assert Subjects(arm, GAINS, Chain(), (E,)).notes == [f"{E}: G changes with it, at a constant Poisson's ratio"]
+    both = Subjects(steel, GAINS, Chain(), (E, "link.shear_modulus"))
+    assert both.at((1.9e11, 7e10)).arm.link.shear_modulus == 7e10
+    stated = Subjects(lab, GAINS, Chain(), (E,))
+    assert stated.notes == both.notes == [f"{E}: G as it is stated or varied itself"]
+    assert stated.at((8e10,)).arm.link.shear_modulus == lab.link.shear_modulus
+    fitted = Subjects(lab, GAINS, Chain(), (E,), fitted=(E,)).at((8e10,)).arm.link
+    assert fitted.poissons_ratio == pytest.approx(lab.link.poissons_ratio, rel=1e-14)
+    changed = dataclasses.replace(steel.link, youngs_modulus=1.9e11)  # which states its shear modulus
+    assert (changed.stated_ratio, changed.shear_modulus) == (None, steel.link.shear_modulus)
 
 
 def test_laws_that_differ_in_the_last_bit_are_other_studies(lab):

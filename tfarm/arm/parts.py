@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING as NO_DEFAULT
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, Literal, cast
 
 from tfarm.arm.checks import check_fields, extended, not_negative, number, positive, signed
@@ -183,7 +183,8 @@ def _properties(shape: str, dimensions: Mapping[str, float]) -> tuple[float, flo
 class Link:
     """The flexible link, or a segment of it: `length` [m], `density` [kg/m^3], its moduli [Pa] and its `section`.
 
-    `damping` is Kelvin-Voigt damping C [s], on bending only: E -> E (1 + C s).
+    `damping` is Kelvin-Voigt damping C [s], on bending only: E -> E (1 + C s).  `stated_ratio` is the Poisson's ratio
+    from which G was computed, None where G itself was stated.
     """
 
     length: float
@@ -192,8 +193,11 @@ class Link:
     shear_modulus: float
     section: Section
     damping: float = 0.0
+    stated_ratio: float | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
+        if self.stated_ratio is not None and self.shear_modulus != self.youngs_modulus / (2 * (1 + self.stated_ratio)):
+            object.__setattr__(self, "stated_ratio", None)  # of a link with another modulus
         check_fields(self, "link", positive, **MEANINGS)
         check_fields(
             self, "link", not_negative, damping="damping C is zero or a positive time in seconds, as in E (1 + C s)"
@@ -236,6 +240,7 @@ class Link:
             shear_modulus=E / (2 * (1 + nu)),
             section=section,
             damping=damping,
+            stated_ratio=nu,
         )
 
     @property

@@ -105,7 +105,7 @@ def of(makes: Callable[..., Any]) -> Callable[[type[_Table]], type[_Table]]:
         own: dict[str, Any] = {
             each.name: (hints[each.name], ... if each.default is Parameter.empty else each.default)
             for each in known
-            if each.name not in table.model_fields
+            if each.name not in (*table.model_fields, "stated_ratio")  # which is poissons_ratio in a file
         }
         made: type[_Table] = create_model(table.__name__, __base__=table, __doc__=table.__doc__, **own)
         made.makes, made.parameters = makes, frozenset(hints) & frozenset(signature(makes).parameters)

@@ -4,13 +4,14 @@ The numbers of an arm have keys, those of its TOML file, such as "link.2.section
 """
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Law, Part
+from tfarm.arm.materials import SHEAR
 from tfarm.arm.parts import Link, differing
 from tfarm.arm.records import MOST_PARTS, Arm
 from tfarm.arm.schema import arm_of_table
@@ -58,7 +59,10 @@ def _link_table(link: Link) -> dict[str, Any]:
     section = link.section
     numbers = dict(section.dimensions) or {"area": section.area, "second_moment": section.second_moment}
     factor = {} if section.shear_factor is None else {"shear_factor": section.shear_factor}
-    own = {name: getattr(link, name) for name in LINK_NUMBERS if name != "poissons_ratio"}
+    other = SHEAR[link.stated_ratio is None]
+    own = {name: getattr(link, name) for name in LINK_NUMBERS if name != other}
+    if other != "poissons_ratio":
+        own["poissons_ratio"] = link.stated_ratio
     return {**own, "section": {"shape": section.shape, **numbers, **factor}}
 
 
@@ -118,12 +122,12 @@ def _value(value: Any) -> str:
 class KeyedArms:
     """Arms with other values of some numbers of one arm, by their TOML keys.
 
-    With Young's modulus alone the shear modulus changes too, at a constant Poisson's ratio.  Raises ParameterError,
-    naming `what`, for an unknown key, with the nearest.
+    With Young's modulus the shear modulus changes too, at a constant Poisson's ratio, but for a key in `alone` whose
+    link has a stated shear modulus.  Raises ParameterError, naming `what`, for an unknown key, with the nearest.
     """
 
-    def __init__(self, arm: Arm, keys: Sequence[str], what: str = "free") -> None:
-        self.arm, self.keys = arm, tuple(keys)
+    def __init__(self, arm: Arm, keys: Sequence[str], what: str = "free", alone: Collection[str] = ()) -> None:
+        self.arm, self.keys, self.alone = arm, tuple(keys), alone
         self._table, self._numbers = arm_table(arm), numbers_of(arm)
         for key in keys:
             must_be_known(what, key, self._numbers)
@@ -134,13 +138,18 @@ class KeyedArms:
         table = deepcopy(self._table)
         for key, value in values.items():
             here, name = _table_of(table, key)
-            place = key.removesuffix(name)
-            if name == "youngs_modulus" and not {f"{place}shear_modulus", f"{place}poissons_ratio"} & set(values):
+            if name == "youngs_modulus" and "shear_modulus" in here and self.is_shear_scaled(key):
                 here["shear_modulus"] *= value / here[name]
-            if name == "poissons_ratio":
-                del here["shear_modulus"]
+            for other in SHEAR if name in SHEAR else ():
+                here.pop(other, None)
             here[name] = value
         return arm_of_table(table)
+
+    def is_shear_scaled(self, key: str) -> bool:
+        """Return whether the shear modulus of a link changes with its Young's modulus, which has that key."""
+        place = key.removesuffix("youngs_modulus")
+        is_given = {f"{place}{name}" for name in SHEAR} & {*self.keys}
+        return not is_given and (key not in self.alone or "shear_modulus" not in _table_of(self._table, key)[0])
 
     def value(self, key: str) -> float:
         """Return a number of the arm, from its file or its default."""

@@ -46,7 +46,6 @@ PILOT, CHECKED = 3, 1000  # rows whose cost is measured, and whose arms are buil
 LEAST_SECONDS, MOST_SECONDS = 5.0, 30.0  # of a chunk
 CHUNKS_A_WORKER = 10  # where that leaves them within these
 MOST_ROWS = 50_000  # of a chunk
-MOST_OTHERS = 64  # rows of a part of Sobol' indices or of a search, which has few: all workers have some
 LONGEST_REASON = 200  # characters
 PATIENCE = 20  # seconds for a scheduler to answer, and for its first worker
 PACKAGES = ("tfarm", "numpy", "scipy", "numba")  # versions that all workers have in common
@@ -76,7 +75,8 @@ class Plan:
     @cached_property
     def subjects(self) -> Subjects:
         """The arms and loops of the rows."""
-        return Subjects(self.arm, self.law, self.chain, self.space.keys, self.tuner)
+        fitted = self.space.posterior.keys if self.space.posterior else ()
+        return Subjects(self.arm, self.law, self.chain, self.space.keys, self.tuner, fitted)
 
 
 def chunk(plan: Plan, first: int, last: int, listed: Real | None = None) -> Chunk:
@@ -134,10 +134,10 @@ class Parts:
         """Number of all parts."""
         return math.ceil(self.size / self.rows)
 
-    def others(self, prefix: str, size: int, names: Sequence[str]) -> "Parts":
-        """Return parts of that many other rows with these columns, in the same folder; "_": no file of the table."""
+    def others(self, prefix: str, size: int, rows: int, names: Sequence[str]) -> "Parts":
+        """Return parts of that many other rows with these columns, in the same folder; at most `rows` in one."""
         plan = replace(self.plan, names=tuple(names))
-        return replace(self, plan=plan, prefix=prefix, size=size, rows=min(self.rows, MOST_OTHERS))
+        return replace(self, plan=plan, prefix=prefix, size=size, rows=min(self.rows, rows))
 
     @property
     def is_complete(self) -> bool:
@@ -287,11 +287,11 @@ def complete(
 def searched(parts: Parts, search: Callable[[Callable[[Real], Row]], object], deadline: float) -> list[Row] | None:
     """Return the rows of a search, which asks for the results of one row of values (1, keys) after another.
 
-    They are written as parts, and computed once: an interrupted search goes on where it was.  None where it has no end
+    Each is written as a part and computed once: an interrupted search goes on where it was.  None where it has no end
     before the deadline [s].
     """
-    columns, seen, new = parts.column(*parts.plan.columns), list[Row](), set[int]()
-    rows = zip(*([None if each == "" or each != each else each for each in of] for of in columns.values()), strict=True)
+    columns, seen = parts.column(*parts.plan.columns), list[Row]()
+    rows = zip(*columns.values(), strict=True)
     known = {int(values[0]): dict(zip(columns, values, strict=True)) for values in rows}
 
     def result(values: Real) -> Row:
@@ -299,24 +299,16 @@ def searched(parts: Parts, search: Callable[[Callable[[Real], Row]], object], de
         if n not in known:
             if time.monotonic() >= deadline:
                 raise TimeoutError
-            known[n] = {name: of[0] for name, of in table_of(parts.plan, n, values).items()}
-            new.add(n // parts.rows)
+            table = table_of(parts.plan, n, values)
+            parts.write(n, table)
+            known[n] = {name: of[0] for name, of in table.items()}
         seen.append(known[n])
-        if len(seen) % parts.rows == 0:
-            write()
         return known[n]
-
-    def write() -> None:
-        while new:
-            own = seen[(number := new.pop()) * parts.rows :][: parts.rows]
-            parts.write(number, {name: [row[name] for row in own] for name in columns})
 
     try:
         search(result)
     except TimeoutError:
         return None
-    finally:
-        write()
     return seen
 
 

@@ -9,7 +9,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
@@ -208,12 +208,14 @@ class Subjects:
     """Arms and loops with other values of some numbers, by their keys.
 
     Keys are those of an arm's file, "sampling.delay_samples" and others of its chain, "law.K1" and other numbers of the
-    controller (`Law.having`), and "tuner.seed" and others of the tuner.  Raises ParameterError for an unknown one.
+    controller (`Law.having`), and "tuner.seed" and others of the tuner.  A stated shear modulus stays as it is, but for
+    a Young's modulus that is `fitted`: a fit has changed both.  Raises ParameterError for an unknown one.
     """
 
     def __init__(
-        self, arm: Arm, law: AnyLaw, chain: Chain, keys: Sequence[str], plan: tuning.Plan | None = None
-    ) -> None:
+        self, arm: Arm, law: AnyLaw, chain: Chain, keys: Sequence[str], plan: tuning.Plan | None = None,
+        fitted: Collection[str] = (),
+    ) -> None:  # fmt: skip
         self.law, self.chain, self.keys, self.plan = law, chain, keys, plan
         numbers = {
             f"{table.name}.{each.name}": (table.name, each.name)
@@ -231,7 +233,13 @@ class Subjects:
         own = [key for key in keys if not key.startswith((LAW, TUNER)) and key not in numbers]
         for key in own:
             must_be_known("over", key, [*numbers_of(arm), *numbers, f"{LAW}NUMBER", f"{TUNER}NUMBER"])
-        self._arms = KeyedArms(arm, own, "over")
+        self._arms = KeyedArms(arm, own, "over", alone={*own} - {*fitted})
+
+    @property
+    def notes(self) -> list[str]:
+        """The shear moduli of links whose Young's modulus is varied."""
+        words = {True: "G changes with it, at a constant Poisson's ratio", False: "G as it is stated or varied itself"}
+        return [f"{key}: {words[self._arms.is_shear_scaled(key)]}" for key in self._arms.keys if "youngs" in key]
 
     def at(self, row: Sequence[float]) -> Subject:
         """Return the arm and loop of a row.  Raises ParameterError for an illegal value."""

@@ -173,6 +173,11 @@ class Study:
         return failures_of(self._table)
 
     @property
+    def shear(self) -> Annotated[str, Quantity("shear modulus", help="with a varied Young's modulus; else empty")]:
+        """Shear moduli where Young's modulus is varied."""
+        return "; ".join(self.parts.plan.subjects.notes)
+
+    @property
     def finding(self) -> Annotated[str, Quantity(help="stable arms of each loop, with their confidence")]:
         """Stable arms of each loop."""
         words = [f"{each.loop}: {each.finding}" for each in self.shares]
@@ -372,7 +377,7 @@ def worst_arm(study: Study, order: Sequence[str], deadline: float) -> WorstArm |
                 options={"maxfev": most, "initial_simplex": [start, *(start + steps)]},
             )  # fmt: skip
 
-        parts = study.parts.others(f"_worst-{order[0]}-", most, order)
+        parts = study.parts.others(f"_worst-{order[0]}-", most, 1, order)
         if (found := searched(parts, search, deadline)) is None:
             return None
         seen = found
@@ -407,7 +412,7 @@ def sobol_indices(
     A, B = np.hsplit(scipy.stats.qmc.Sobol(2 * len(keys), rng=np.random.default_rng(plan.space.seed)).random(size), 2)
     pages = [np.where(np.arange(len(keys)) == n, B, A) for n in range(len(keys))]  # A with one column of B
     rows = plan.space.values(np.clip(np.vstack([A, B, *pages]), *ENDS))
-    parts = study.others(f"_sobol-{size}-", len(rows), plan.names)
+    parts = study.others(f"_sobol-{size}-", len(rows), 64, plan.names)  # all workers have some of a small sample
     if not parts.is_complete:
         seconds = seconds_an_arm(plan, rows) * len(rows) / workers
         progress(0, 0, f"Sobol' indices of {len(rows):,} further arms, about {seconds:.0f} s")
