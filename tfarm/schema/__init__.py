@@ -9,6 +9,7 @@ meaning from here.  `to_dict` and `sections` read a record, `table` records of o
 `schema.terminal` and `schema.html` render tables, `schema.glossary` has every declared quantity.
 """
 
+from .printed import Tabled
 from .quantities import (
     At,
     Difference,
@@ -25,7 +26,6 @@ from .tables import (
     Column,
     Section,
     Table,
-    Tabled,
     across,
     as_csv,
     as_json,

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -105,21 +105,6 @@ class Table:
     def __iter__(self) -> Iterator[dict[str, Any]]:
         keys = [column.key for column in self.columns]
         return (dict(zip(keys, row, strict=True)) for row in zip(*(column.of for column in self.columns), strict=True))
-
-
-class Tabled:
-    """A record that prints as its `table`, then its `notes`, and shows the same in a notebook."""
-
-    def __str__(self) -> str:
-        from .terminal import table_lines
-
-        return "\n".join([*table_lines(cast("Any", self).table), *getattr(self, "notes", ())])
-
-    def _repr_html_(self) -> str:
-        from .html import as_html, with_symbols
-
-        notes = "".join(f"<p>{with_symbols(note)}</p>" for note in getattr(self, "notes", ()))
-        return as_html(cast("Any", self).table) + notes
 
 
 def table(
