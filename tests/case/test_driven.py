@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.shell import answer
 from tfarm.case.comparison import compare
 from tfarm.dsp import Actuator, Chain, Sampling, scenario
+from tfarm.dsp.chain import file_text
 from tfarm.dsp.plant import driven
 from tfarm.report.live import explore
 from tfarm.schema import to_dict
@@ -75,3 +77,25 @@ def test_a_slew_against_analog_damping_arrives():
     task, rate = scenario("slew", ARM, ANALOG, 1.0), scenario("slew", ARM, IDEAL, 1.0)
     means = np.diff(np.r_[task.hub_angle, task.hub_angle[-1]]) / task.period
     np.testing.assert_allclose(task.feedforward - rate.feedforward, DAMPING * means, atol=1e-12)
+
+
+WITHOUT_SAMPLING = {
+    "poles": ("--count", "4"),
+    "nyquist": (),
+    "nichols": (),
+    "spill": ("--modes", "3"),
+    "locus": ("--vary", "K2", "--from", "0", "--to", "0.5", "--points", "5"),
+    "map": ("--K1=0,1", "--K2=0,0.5", "--points", "4"),
+}
+
+
+@pytest.mark.parametrize("command", WITHOUT_SAMPLING)
+def test_a_command_without_sampling_has_the_analog_damping_of_the_file(tmp_path, capsys, command):
+    """The gains are given: default gains are those of the arm without its motor's damping."""
+    gains = () if command == "map" else ("--K1", "0.3", "--K2", "0.3")
+    answers = []
+    for arm, chain in ((ARM, Chain(actuator=Actuator(hub_damping=DAMPING))), (BRAKED, Chain()), (ARM, Chain())):
+        file = tmp_path / "arm.toml"
+        file.write_text(file_text(arm, chain))
+        answers.append(answer(capsys, command, str(file), *gains, *WITHOUT_SAMPLING[command]))
+    assert answers[0] == answers[1] != answers[2]

@@ -275,6 +275,16 @@ def load_loop(name: str, theory: Theory | None, gains: Gains, law: Path | None) 
     return arm, *load_law(arm, name, gains, law)
 
 
+def load_driven_loop(
+    name: str, theory: Theory | None, gains: Gains, law: Path | None
+) -> tuple[Arm, AnyLaw, dict[str, Any]]:
+    """Return the same of a command without sampling, the arm with the analog damping that its file states."""
+    from tfarm.dsp.plant import driven
+
+    arm, controller, defaults = load_loop(name, theory, gains, law)
+    return driven(arm, load_chain(name))[0], controller, defaults
+
+
 def load_chain(arm: str, *, period: Period = None, delay_samples: Delay = None, dsp: DspFile = None) -> Any:
     """Return the sampled chain of a file, or of the arm's, with the period and the delay that are given instead."""
     from tfarm.dsp.chain import load_chain as read
@@ -348,10 +358,9 @@ def emit_loop(
     picture: str, arm: str, theory: Theory | None, gains: Gains, law: Path | None, chain: Any, json: bool, **files: Any
 ) -> None:
     """Emit the loop function of a command with that picture of it; of the sampled loop where sampling is given."""
-    subject, controller, defaults = load_loop(arm, theory, gains, law)
-    found = tfarm.loop_function(
-        subject, controller, chain(arm) if any(value is not None for value in chain.keywords.values()) else None
-    )
+    is_sampled = any(value is not None for value in chain.keywords.values())
+    subject, controller, defaults = (load_loop if is_sampled else load_driven_loop)(arm, theory, gains, law)
+    found = tfarm.loop_function(subject, controller, chain(arm) if is_sampled else None)
     emit(found, json, defaults, picture=picture, **files)
 
 

@@ -25,6 +25,7 @@ from tfarm.cli.app import (
     interval,
     load_arm,
     load_chain,
+    load_driven_loop,
     load_law,
     load_loop,
     named,
@@ -59,7 +60,7 @@ def poles(
     count: poles with Im s >= 0; by default ten, or those below the shear cut-off
     certify: prove each, and that none is missing
     """
-    subject, controller, defaults = load_loop(arm, theory, gains, law)
+    subject, controller, defaults = load_driven_loop(arm, theory, gains, law)
     found = tfarm.closed_loop_poles(subject, controller, count)
     emit(found.certified() if certify else found, json, defaults)
 
@@ -92,7 +93,7 @@ def nyquist(
     Options:
     disc: picture of the whole contour in a disc whose rim is infinity, in place of the linear plot with a zoom at -1
     """
-    subject, controller, defaults = load_loop(arm, theory, gains, law)
+    subject, controller, defaults = load_driven_loop(arm, theory, gains, law)
     emit(tfarm.nyquist(subject, controller), json, defaults, csv=csv, png=png, picture="disc" if disc else "nyquist")
 
 
@@ -149,7 +150,7 @@ def spill(
     Options:
     modes: modes of the largest model
     """
-    subject, controller, defaults = load_loop(arm, theory, gains, law)
+    subject, controller, defaults = load_driven_loop(arm, theory, gains, law)
     emit(tfarm.spill(subject, controller, modes), json, defaults)
 
 
@@ -181,7 +182,7 @@ def locus(
     """
     from tfarm.loop.loci import Loci, reduced_of
 
-    subject, controller, defaults = load_loop(arm, theory, gains, law)
+    subject, controller, defaults = load_driven_loop(arm, theory, gains, law)
     found = tfarm.locus(subject, controller, vary, start, stop, points, branches)
     emit(Loci(found, reduced_of(found)), json, defaults, csv=csv, png=png)
 
@@ -213,6 +214,7 @@ def gain_map(
         SIGNAL.den.N
     """
     from tfarm.dsp import crossings, verdict
+    from tfarm.dsp.plant import driven
     from tfarm.loop.plane import between, ranges_of
 
     subject, typed = load_arm(arm, theory), {RATE_GAIN: k1, MOMENT_GAIN: k2}
@@ -234,6 +236,7 @@ def gain_map(
     number = points or (60 if of_law else 101)
     x, y = between(across[0], across[1], number), between(up[0], up[1], number)
     if all(value is None for value in chain.keywords.values()):
+        subject, _ = driven(subject, chain(arm))
         found: Any = tfarm.map(subject, x, y, law=controller, vary=(first, second))
     else:
         full = controller if of_law else tfarm.default_gains(subject).having(ANGLE_GAIN, kp)
