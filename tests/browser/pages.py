@@ -117,13 +117,11 @@ def slew_words(arm: Arm, law: HubFeedback, chain: Chain, modes: int) -> dict[str
     settled = answer["settling_time_s"]
     largest = {name: max(map(abs, answer[key])) for name, key in (("torque", "torque"), ("moment", "root_moment"))}
     figures = largest | {"residual": answer["residual_moment_rms"]}  # none of a run that stopped
-    unstable = sampled_verdict(arm, law, chain).word == "unstable"
-    return {f"slew-{name}": "not computed" if value is None else f"{value:.5g}" for name, value in figures.items()} | {
-        "slew-settled": "unstable"
-        if unstable
-        else f"not settled within {answer['t'][-1]:.5g} s"
-        if settled is None
-        else f"{settled:.5g}"
+    shown = {name: "not computed" if value is None else f"{value:.5g}" for name, value in figures.items()}
+    words = f"not settled within {answer['t'][-1]:.5g} s" if settled is None else f"{settled:.5g}"
+    is_unstable = sampled_verdict(arm, law, chain).word == "unstable"
+    return {f"slew-{name}": value for name, value in shown.items()} | {
+        "slew-settled": "unstable" if is_unstable else words
     }
 
 
