@@ -101,7 +101,7 @@ def test_a_deflection_is_to_scale_where_it_is_seen_and_else_named(run, motion):
     tip = run.between.tip_displacement - LAB.reach * run.between.hub_angle
     assert 0.04 < motion.factor * abs(tip).max() / LAB.reach <= 0.1
     plain: Motion = motion._replace(factor=1, speed=1)
-    assert draw_motion.figure(plain).axes[0].get_xlabel().endswith(", deflection to scale")
+    assert draw_motion.figure(plain).axes[0].get_xlabel().endswith(",\ndeflection to scale")
 
 
 def test_an_unstable_loop_that_was_stopped_and_another_radius_have_a_film():
