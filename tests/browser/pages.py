@@ -128,8 +128,11 @@ def slew_words(arm: Arm, law: HubFeedback, chain: Chain, modes: int) -> dict[str
     settled = answer["settling_time_s"]
     largest = {name: max(map(abs, answer[key])) for name, key in (("torque", "torque"), ("moment", "root_moment"))}
     figures = largest | {"residual": answer["residual_moment_rms"]}  # none of a run that stopped
-    return {f"slew-{name}": "not computed" if value is None else f"{value:.5g}" for name, value in figures.items()} | {
-        "slew-settled": f"not settled within {answer['t'][-1]:.5g} s" if settled is None else f"{settled:.5g}"
+    shown = {name: "not computed" if value is None else f"{value:.5g}" for name, value in figures.items()}
+    words = f"not settled within {answer['t'][-1]:.5g} s" if settled is None else f"{settled:.5g}"
+    is_unstable = sampled_verdict(arm, law, chain).word == "unstable"
+    return {f"slew-{name}": value for name, value in shown.items()} | {
+        "slew-settled": "unstable" if is_unstable else words
     }
 
 
@@ -464,6 +467,76 @@ def test_the_card_is_the_librarys_at_random_gains(browser, folder, name):
                 assert look == f"pill {each.stability if each.grade == '-' else each.grade}"
                 margins_seen += each.phase_margin.value is not None
         assert margins_seen >= 4
+
+
+@pytest.mark.parametrize(("name", "typed"), [("Kp", "-1"), ("K1", "1e9"), ("K2", "-1e4"), ("K1", "")])
+def test_a_typed_gain_that_is_not_run_is_named_and_its_field_has_what_runs(browser, folder, name, typed):
+    """By a field and by a link; the message goes with the next gain that runs."""
+    for by_link in (False, True) if typed else (False,):
+        address = folder / ARMS[0] / "live.html"
+        with Opened(browser, address) as opened:
+            page = opened.page
+            assert not page.locator("#range").is_visible()
+            if by_link:
+                page.evaluate("hash => { location.hash = hash; }", f"{name}={typed}")
+            else:
+                page.locator(f"#{name}").fill(typed)
+                page.locator(f"#{name}").dispatch_event("change")
+            page.locator("#range").wait_for(state="visible")
+            law, words = page.evaluate("({...live.law})"), page.locator("#range").inner_text()
+            assert float(page.locator(f"#{name}").input_value()) == law[name]
+            low, high = (live_data(page)["axes"][name][end] for end in ("low", "high"))
+            assert low <= law[name] <= high
+            assert words.startswith(f"{name} = {f'{float(typed):.0f}' if typed else 'no number'} is not run")
+            assert f"this page has {low:.4g} to {high:.4g}" in words
+            set_gains(page, HubFeedback(K1=0.3, K2=0.2))
+            assert not page.locator("#range").is_visible()
+
+
+@pytest.mark.parametrize("width", [1280, 400])
+def test_captions_are_whole_and_every_axis_of_the_slew_has_two_ticks(browser, folder, width):
+    for arm in ARMS:
+        with Opened(browser, folder / arm / "live.html", width) as opened:
+            page = opened.page
+            cut = """[...document.querySelectorAll('figcaption')].filter(e => e.scrollHeight > e.clientHeight + 1
+                || e.scrollWidth > e.clientWidth + 1).map(e => e.textContent)"""
+            for K2 in (0.3, -0.9):
+                page.evaluate("K2 => live.set({ K2 })", K2)
+                page.wait_for_function("K2 => live.now.law.K2 === K2", arg=K2)
+                page.wait_for_timeout(400)
+                assert page.evaluate(cut) == []
+                drawn = page.evaluate("""() => {
+                    const found = [], draw = CanvasRenderingContext2D.prototype.fillText;
+                    CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
+                        if (this.canvas.closest('#slew') && this.textAlign === 'right') found.push([text, y]);
+                        return draw.apply(this, arguments);
+                    };
+                    live.player.go(0.1);
+                    live.set({});
+                    return new Promise(done => setTimeout(() => {
+                        CanvasRenderingContext2D.prototype.fillText = draw;
+                        done([found, document.getElementById('slew').clientHeight]);
+                    }, 150));
+                }""")
+                heights, high = np.array([y for _, y in drawn[0]]), drawn[1]
+                assert heights.size
+                share = (high - 8 - 34 - 3 * 12) / 4  # of each of four plots, less what is around them
+                for plot in range(4):
+                    low = 8 + plot * (share + 12)
+                    assert np.unique(heights[(heights >= low - 2) & (heights <= low + share + 2)]).size >= 2
+
+
+def test_an_unstable_loop_has_no_settled_slew_and_its_real_pole_no_damping_ratio(browser, folder):
+    """Least damping of the sampled loop as on the library's card, at rates that drive the hub away."""
+    arm, chain = tfarm.load(ARMS[0]), load_chain(ARMS[0])
+    with Opened(browser, folder / ARMS[0] / "live.html") as opened:
+        for K1 in (-0.02, -0.05, -0.08):
+            law = HubFeedback(K1=K1, K2=0.3)
+            set_gains(opened.page, law)
+            here = texts(opened.page, ["slew-settled", "sampled", "z-ratio"])
+            card = tfarm.result_card(arm, law, chain).sampled
+            wanted = {"slew-settled": "unstable", "sampled": "unstable"}
+            assert here == wanted | {"z-ratio": f"{100 * card.least_damping.ratio:.4g}"}
 
 
 def test_keys_undo_and_link_reach_every_state_and_the_file_is_a_law(browser, folder, tmp_path):

@@ -183,6 +183,19 @@ def test_a_negative_real_pole_oscillates_at_half_the_sampling_rate(K1, K2):
     assert own.imag % (2 * math.pi / 0.01) == pytest.approx(math.pi / 0.01, rel=1e-6)
 
 
+@pytest.mark.parametrize("K1", [-0.08, -0.05, -0.02])
+def test_a_positive_real_pole_has_no_damping_ratio_whatever_rounding_leaves_of_it(K1):
+    """The hub runs away along it; the least damping ratio is that of the oscillating eigenvalues below pi/T."""
+    law = tfarm.HubFeedback(K1=K1, K2=0.3)
+    found = tfarm.sampled(LAB, law).verdict.full
+    z = found.eigenvalues
+    assert (abs(z) > 1).sum() == (z.real[abs(z) > 1] > 0).sum() > 0
+    least = card.result_card(LAB, law).sampled.least_damping
+    assert least.mode.startswith("mode")
+    s = np.log(z[z.imag > 1e-6])
+    assert abs(-s.real / abs(s) / least.ratio - 1).min() < 1e-6  # of mode 1 or 2, which is not aliased
+
+
 def test_a_delay_margin_at_the_end_of_its_search_is_a_lower_bound():
     rig, chain = tfarm.load("quanser-flexlink"), load_chain("quanser-flexlink")
     rig, law = rig.having(damping=card.reference_damping(rig)), tfarm.default_gains(rig)

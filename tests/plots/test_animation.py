@@ -97,11 +97,11 @@ def test_a_film_has_a_frame_for_each_twentieth_of_its_own_second_and_the_same_by
 def test_a_deflection_is_to_scale_where_it_is_seen_and_else_named(run, motion):
     assert [exaggeration(share) for share in (0.0, 0.3, 0.02, 0.019, 0.004, 0.0011)] == [1, 1, 1, 5, 20, 50]
     words = draw_motion.figure(motion).axes[0].get_xlabel()
-    assert words == f"hub to tip 1 m, thin: reference, deflection × {motion.factor}, speed × 0.2"
+    assert words == f"hub to tip 1 m, thin: reference,\ndeflection × {motion.factor}, speed × 0.2"
     tip = run.between.tip_displacement - LAB.reach * run.between.hub_angle
     assert 0.04 < motion.factor * abs(tip).max() / LAB.reach <= 0.1
     plain: Motion = motion._replace(factor=1, speed=1)
-    assert draw_motion.figure(plain).axes[0].get_xlabel().endswith(", deflection to scale")
+    assert draw_motion.figure(plain).axes[0].get_xlabel().endswith(",\ndeflection to scale")
 
 
 def test_an_unstable_loop_that_was_stopped_and_another_radius_have_a_film():

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,9 +16,10 @@ from tests.report.written import blocks_of, plain_cards, values_of
 from tests.shared import sized
 from tests.shell import answer, run
 from tfarm import HubFeedback, Law, ParameterError
+from tfarm.arm import tracked
 from tfarm.arm.law_tables import load_law
 from tfarm.case.card import margins_of
-from tfarm.dsp import Chain, load_chain
+from tfarm.dsp import Chain, Simulator, load_chain
 from tfarm.dsp.sampled import sampled_loop
 from tfarm.errors import one_line
 from tfarm.fitting.recording import compare_run, load_run, overshoot
@@ -214,6 +216,20 @@ def test_a_measured_run_is_put_in_the_place_of_the_slew():
     assert shown["further_delay_ms"] == [0.0, 5.0, 10.0] * 2
     assert not section.facts
     assert "MIT" in blocks["sampled-measured"].caption
+    grows, shows, ends = (float(x) for x in re.findall(r"([\d.]+) s[.;,]", section.words[0]))
+    assert _growth(*real("lqg"), ends) == (pytest.approx(grows, rel=0.005), pytest.approx(shows, rel=0.05))
+
+
+def _growth(law, measured, ends):
+    """Growth [s] by the eigenvalues, and the time [s] at which the hub angle leaves its end, of 24 modes."""
+    arm, chain = tfarm.load(DATA / "rig.toml"), load_chain(DATA / "rig.toml")
+    t, reference = np.append(measured.t, 32.0), np.append(measured.reference, measured.reference[-1])
+    arm, law = tracked(arm, law)
+    task = replace(measured, t=t, reference=reference).scenario(0.01)
+    run = Simulator(arm, chain, task, law, count=24).run().at_samples
+    radius = abs(sampled_loop(arm, law, chain, count=24).eigenvalues).max()
+    away = abs(run.hub_angle - run.hub_angle[run.t < ends][-1]) > 0.05 * abs(measured.step)
+    return 0.01 / np.log(radius), run.t[away & (run.t > ends)][0]
 
 
 def _with_run(name):

@@ -100,6 +100,10 @@ def test_contours_reach_the_frame_and_words_overlap_nothing(lab):
     (contours,) = (each for each in figure.axes[0].collections if isinstance(each, QuadContourSet))
     ends = [line[[0, -1], 1].min() for level in contours.allsegs for line in level if len(line) > 20]
     assert sum(low == lab.y.low for low in ends) > 3
+    to_view = figure.axes[0].transData - figure.axes[0].transAxes
+    lines = [to_view.transform(line) for level in contours.allsegs for line in level]
+    stubs = [line for line in lines if np.hypot(*np.ptp(line, axis=0)) < 0.05 and (line[0] != line[-1]).any()]
+    assert not stubs  # of which one next to K1 = 0
 
 
 def test_the_contours_are_the_damping_of_the_poles(lab):

@@ -9,6 +9,7 @@ import sys
 import time
 from collections import defaultdict
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from urllib.parse import unquote
@@ -38,8 +39,9 @@ from tfarm.report import overview, write, writing
 from tfarm.report.arm_section import arm_section
 from tfarm.report.overview import Card, results, save_card
 from tfarm.report.page import TEMPLATES, Case, GivenLaw, best, explained, prose, sheet, templates
+from tfarm.report.response_sections import bode_section
 from tfarm.report.trust import write_trust, written_proofs
-from tfarm.report.writing import PIECES, QUESTIONS, index_page, kept, navigation, pieces_of
+from tfarm.report.writing import PIECES, QUESTIONS, index_page, kept, make_section, navigation, pieces_of
 from tfarm.schema import Column, quantities, to_dict
 from tfarm.spectrum.table import default_gains
 
@@ -155,14 +157,14 @@ def test_the_foot_has_the_command_to_write_the_page_again(pages):
 # ------------------------------------------------------------ what a reader sees at once
 
 
-BLOCKS = ("result", "margins-map", "margins", "sampled", "modes", "locus")  # of a first page, in their order
+BLOCKS = ("result", "modes", "margins-map", "margins", "sampled", "locus")  # of a first page, in their order
 
 
 def test_the_first_page_has_the_card_and_the_pictures_in_their_order(pages):
     page = pages / NAME / "index.html"
     text, links = page.read_text(encoding="utf-8"), links_of(page)
     assert [each for each in links.ids if each in BLOCKS] == list(BLOCKS)
-    pictures = [target for target in links.targets if target.endswith(".svg")]
+    pictures = [target for target in links.targets if target.endswith(".svg") and not target.endswith("-narrow.svg")]
     assert pictures == [f"pictures/{name}.svg" for name in ("map", "default-bode", "sampled-slew", "locus-K2")]
     assert not links.tags & {"details", "figcaption"}
     for anchor in BLOCKS[1:]:
@@ -231,7 +233,7 @@ def test_no_paragraph_is_on_two_pages_and_words_are_explained_in_one_place(pages
     texts = {page: page.read_text(encoding="utf-8") for page in (*own, pages / "trust" / "index.html")}
     seen = defaultdict(set)
     for page, text in texts.items():
-        for paragraph in re.findall(r"<(?:p|figcaption)[^>]*>(.{60,}?)</", text.partition("<footer>")[0]):
+        for paragraph in re.findall(r"<(?:p|figcaption)\b[^>]*>(.{60,}?)</", text.partition("<footer>")[0]):
             seen[paragraph].add(page)
     assert len(seen) > 20
     assert [paragraph for paragraph, where in seen.items() if len(where) > 1] == []
@@ -246,6 +248,20 @@ def test_no_paragraph_is_on_two_pages_and_words_are_explained_in_one_place(pages
 def test_without_the_page_of_words_none_is_linked():
     assert explained("Proven: `tfarm design`.") == "Proven: <code>tfarm design</code>."
     assert 'href="x.html#word-proven">Proven</a>' in explained("Proven.", "x.html")
+
+
+def test_a_page_has_a_narrow_picture_for_a_phone(tmp_path):
+    """As wide as a screen of 400 pixels less its margins, the other half a page; both of the size that is stated."""
+    make = partial(bode_section, output="root_moment")
+    section = make_section("response", "bode-root-moment", make, Case(tfarm.load("sasaki2012-lab"), Chain()), tmp_path)
+    source, image = re.findall(r"<(?:source|img) ([^>]*)>", section.blocks[0].html)
+    assert 'media="(max-width: 40rem)" srcset="pictures/bode-root-moment-narrow.svg"' in source
+    for tag, end, least, most in ((source, "-narrow", 360, 370), (image, "", 590, 600)):
+        drawn = (tmp_path / "pictures" / f"bode-root-moment{end}.svg").read_text("utf-8")
+        own = [float(re.search(rf'<svg [^>]*{key}="([\d.]+)pt"', drawn).group(1)) for key in ("width", "height")]
+        stated = [float(re.search(rf'{key}="(\d+)"', tag).group(1)) for key in ("width", "height")]
+        assert least <= stated[0] <= most
+        assert stated == pytest.approx([x * 96 / 72 for x in own], abs=0.6)
 
 
 def test_pills_have_the_colours_of_the_grades():
