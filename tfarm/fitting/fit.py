@@ -263,7 +263,9 @@ class Fit(Solution):
         if best is not None and best.is_enough:
             return best.in_words
         most = f"; most helps {best.change}" if best is not None else ""
-        return f"no gain, delay, sign or bound is enough: the rig differs from the arm of the file{most}"
+        return (
+            f"no gain, delay, sign or bound is enough: free other numbers of the arm, or add a part that it lacks{most}"
+        )
 
 
 def fit(
