@@ -113,6 +113,10 @@ def test_the_peak_of_the_torque_of_a_delayed_filter_is_the_laws_own():
     value = 3 - 3 * math.exp(-300 * own) * (1 + 300 * own) + 300**2 * own * math.exp(-300 * own)
     assert found.continuous.torque.peak == pytest.approx(value, rel=1e-9)
     assert found.continuous.torque.peak_time == pytest.approx(0.01 + own, rel=1e-6)
+    gain = tfarm.Law({"hub_angle": 3.0, "hub_rate": 1.0}, delay=0.01, references=("hub_angle",))
+    constant = tfarm.step(LAB, gain, duration=0.5).continuous.torque  # until 2 tau
+    assert abs(constant.peak - 3.0) <= constant.remainder_bound < 1e-4
+    assert 0.01 <= constant.peak_time <= 0.02
     before = found.t < 0.01
     assert not any(y[before].any() for y in found.continuous.signals.values())
 

@@ -190,7 +190,7 @@ class _Record:
             key: _spread(value, [each[key] for each in others], least.get(key, RESOLVED * size))
             for key, value in found.items()
         }
-        largest = t[abs(y) + bound >= abs(peak.value) - peak.bound] if peak.bound else t[:0]
+        largest = t[abs(y) + bound >= abs(peak.value) - peak.bound] if peak.bound > RESOLVED * OPEN * size else t[:0]
         spread |= {
             "peak": (peak.most - abs(peak.value) + peak.bound) / size,
             "peak_time": (float(np.ptp(np.r_[peak.time, largest])) - 2 * step) / max(peak.time, self.t[-1] / 10),

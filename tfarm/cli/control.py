@@ -288,7 +288,7 @@ def step(
         or deflection (first mode released)
     duration: duration [s]; by default a slew and eight time constants of the dominant pole
     output: further signal of the CSV file, as strain@0.05; may be repeated
-    settling-band: share of the travel within which a signal has settled
+    settling_band: share of the travel within which a signal has settled
     """
     subject, controller, defaults = load_loop(arm, theory, gains, law)
     found = tfarm.step(

@@ -189,7 +189,7 @@ class TimeResponse:
             y = self.at(t)[row]
             sizes = abs(y)
         t, y = np.r_[jumps, jumps, t], np.r_[sides, y]
-        n = int(abs(y).argmax())
+        n = int((abs(y) >= (1 - 1e-14) * abs(y).max()).argmax())  # of a constant from a jump on, the jump
         size = abs(float(y[n]))
         bound = max(float(self.remainder(t[[n]])[row, 0]), MACHINE_EPS * size)
         return Peak(float(t[n]), float(y[n]), bound, max(most, size + bound))
