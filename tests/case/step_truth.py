@@ -243,8 +243,12 @@ class Truth:
         for n in set(place.tolist()):
             own = place == n
             found[:, own] = abs(self.second[n].at(t[own]) - interpolated(*self.smooth[n], t[own])).min(axis=0)
-        found[-1] += sum((abs(w) * each.rounding(t - at) for each, at, w in self.closed), np.zeros(t.size))
+        found[-1] += self.rounding(t)
         return found
+
+    def rounding(self, t):
+        """Error of the torque (n,) at times t by rounding of its closed forms."""
+        return sum((abs(w) * each.rounding(t - at) for each, at, w in self.closed), np.zeros(t.size))
 
 
 def interpolated(t, y, at):
