@@ -108,6 +108,12 @@ class Exponentials:
         total = sum(r * later ** (k - 1) / math.factorial(k - 1) * np.exp(p * later) for p, k, r in self.terms)
         return np.where(t >= 0, total, 0.0)
 
+    def rounding(self, t):
+        """Error of these values at times t by rounding, large where poles nearly coincide."""
+        later = np.maximum(t, 0.0)
+        sizes = (abs(r) * later ** (k - 1) / math.factorial(k - 1) * np.exp(p * later) for p, k, r in self.terms)
+        return np.finfo(float).eps * sum(sizes, 0 * later)
+
 
 def inverse(num, poles):
     """The inverse of num(s)/prod (s - p)^m: highest powers first, and `poles` {p: m}, real; by series at each pole."""

@@ -237,13 +237,18 @@ class Truth:
         return best
 
     def disagreement(self, t):
-        """Differences of both methods (rows, n) at times t, of the part that is not in closed form."""
+        """Differences of both methods (rows, n) at times t, and the rounding of what is in closed form."""
         t = np.asarray(t, float)
         found, place = np.zeros((len(PARTS), t.size)), self.windows(t)
         for n in set(place.tolist()):
             own = place == n
             found[:, own] = abs(self.second[n].at(t[own]) - interpolated(*self.smooth[n], t[own])).min(axis=0)
+        found[-1] += self.rounding(t)
         return found
+
+    def rounding(self, t):
+        """Error of the torque (n,) at times t by rounding of its closed forms."""
+        return sum((abs(w) * each.rounding(t - at) for each, at, w in self.closed), np.zeros(t.size))
 
 
 def interpolated(t, y, at):

@@ -246,6 +246,7 @@ def identities(found, truth):
     signals = np.array([loop.signals[name] for name in (*found.names[:3], "torque")])
     bound = getattr(found.response, "remainder", None)
     allowed = bound(found.t)[[*range(3), -1]] if bound else np.zeros(signals.shape)
+    allowed[-1] += truth.rounding(t)
     before = found.t < case.delay * (1 - 1e-9)
     if case.scenario == "reference" and before.any():
         early = (abs(signals[:, before]).max(axis=1) / scale).max()

@@ -73,6 +73,16 @@ def test_partial_fractions_of_multiple_poles():
     np.testing.assert_allclose(inverse([1.0], {0: 1, -5.0: 3}).at(t), expected, atol=1e-15)
 
 
+def test_rounding_where_poles_nearly_coincide_is_named():
+    """Poles 1e-6 apart leave few digits of 1/((s + 5)^2 (s + 5.000005)^2), a quadruple pole but for a millionth."""
+    t = np.array([0.1, 0.3])
+    near, same = inverse([1.0], {-5.0: 2, -5.000005: 2}), inverse([1.0], {-5.0: 4})
+    apart = abs(near.at(t) - same.at(t))
+    assert (apart > 1e-4 * same.at(t)).all()
+    assert (apart < near.rounding(t)).all()
+    assert (same.rounding(t) < 1e-15).all()
+
+
 def test_torque_of_a_filtered_controller_after_its_delay():
     """0 before, the initial value 1/0.001 at the delay, and the controller's own step before the arm moves."""
     truth = Truth(FAST, 4.0)
