@@ -65,7 +65,7 @@ def test_figures_for_a_paper_are_saved_and_linked_where_they_are_wanted(tmp_path
         folder = tmp_path / str(is_paper)
         folder.mkdir()
         first, _ = save_section(section, folder, is_paper).blocks
-        files = sorted((folder / PICTURES).iterdir())
+        files = sorted((folder / PICTURES).iterdir(), key=lambda file: file.suffix)
         assert [file.suffix[1:] for file in files] == kinds
         links = re.findall(r'href="pictures/[^"]+\.(\w+)"', first.html)
         assert sorted(links) == sorted(set(kinds))
