@@ -45,13 +45,14 @@ ACTUATOR, TORQUE = "actuator", "torque"  # the input of the arm as a place of ex
 USUAL_COUNT = 80  # flexible modes below the top of the box
 CLOSE, MOST_CLOSE = 3.0, 0.1  # poles closer than 3/T are one circle, but no farther apart than 0.1 of the first mode
 SLOW_RADIUS = 2.0  # over T, of a circle around s = 0, on which e^{s T} is moderate; or times the extent of its poles
+SPLIT = 0.01  # of their real part: decaying poles closer than that are one circle
 POLE_RADIUS = 0.25  # of the way to the next pole: radius of the circle of one pole
 POLE_NODES, FEWEST_NODES, MOST_NODES, NODE_LOG = 32, 128, 512, 40.0  # of circles; e^-40 is below the rounding
 ON_AXIS = 1e-9  # of the least distance of two circles: by so little a centre is off the real axis
 BLOCK = 20_000  # times that are evaluated together: with 200 terms 64 MB
 MOST_GROWTH = 500.0  # exponent of the fastest growing pole at the end of a record
-RIPPLE = 10  # records to either side of the largest one: there 80 times in each resolve ripple too small to be seen
-ZOOM_POINTS, ZOOMS = 41, 5  # of the search for a peak: each narrows the interval by a factor of 20
+CUTS, ROUNDS, MOST_OPEN = 8, 9, 3000  # of the search for a peak: of each interval, and at most together
+SEEN, SAME_TIME = 1e-13, 1e-10  # of the largest value: less is rounding of its sum; of a record: the same time
 
 Transform = Callable[[Complex], Complex]
 
@@ -162,43 +163,56 @@ class TimeResponse:
         return found
 
     def peaks(self, t: Real) -> dict[str, Peak]:
-        """Return the peak of each signal near the largest of times `t`, and on both sides of its jumps.
+        """Return the peak of each signal over a record of times `t`, and on both sides of its jumps.
 
-        A bound below the rounding of the value, 2.2e-16 of its size, is that.  `most` is infinite of an impulse.
+        Intervals in which a signal may exceed the largest value found, as it bends there, are cut until none is left.
+        The bound of a peak includes what they may hold, and the rounding of its value, 2.2e-16 of its size.  `most` is
+        infinite of an impulse.
         """
         jumps = self.starts[self.starts <= t[-1]]
-        sides = np.hstack([self.at(jumps), self.at(jumps, before=True)])
-        places = abs(self.at(t)).argmax(axis=1)
-        first, last = (t[np.clip(places + step, 0, t.size - 1)] for step in (-RIPPLE, RIPPLE))
-        t = np.unique(np.r_[t, np.linspace(first, last, 80 * RIPPLE + 1).ravel()])
-        sizes, errors = abs(self.at(t)), self.remainder(np.r_[jumps, jumps, t])
-        most = (np.hstack([abs(sides), sizes]) + errors).max(axis=1)
-        most += sum(np.where(np.isinf(part.off), math.inf, 0.0) for part in self.parts)
-        return {
-            name: self._peak(row, t, sizes[row], jumps, sides[row], float(most[row]))
-            for row, name in enumerate(self.names)
-        }
-
-    def _peak(self, row: int, t: Real, sizes: Real, jumps: Real, sides: Real, most: float) -> Peak:
-        """The peak of one signal, of sizes (n,) at times t, and with values on both `sides` of the jumps."""
-        y = np.empty(0)
-        for _ in range(ZOOMS):
-            n = int(sizes.argmax())
-            ends = np.searchsorted(t, t[n] + np.array([-1, 1]) * 1e-12 * t[-1])  # next to times that are the same
-            t = np.linspace(t[max(ends[0] - 1, 0)], t[min(ends[1], t.size - 1)], ZOOM_POINTS)
-            y = self.at(t)[row]
-            sizes = abs(y)
-        t, y = np.r_[jumps, jumps, t], np.r_[sides, y]
-        n = int((abs(y) >= (1 - 1e-14) * abs(y).max()).argmax())  # of a constant from a jump on, the jump
-        size = abs(float(y[n]))
-        bound = max(float(self.remainder(t[[n]])[row, 0]), MACHINE_EPS * size)
-        return Peak(float(t[n]), float(y[n]), bound, max(most, size + bound))
+        t = np.union1d(t[abs(t[:, None] - jumps).min(axis=1, initial=math.inf) > SAME_TIME * t[-1]], jumps)
+        t = t[np.diff(t, append=math.inf) > SAME_TIME * t[-1]]
+        ends, y = np.array([t[:-1], t[1:]]), np.array([self.at(t[:-1]), self.at(t[1:], before=True)])
+        bends = 2 * abs(np.diff((y[1] - y[0]) / np.diff(t))) / (t[2:] - t[:-2])
+        bends[:, np.isin(t[1:-1], jumps)] = 0.0
+        more, errors = _of_both(bends) * np.diff(t) ** 2 / 4, self.remainder(t)
+        errors, most = np.maximum(errors[:, :-1], errors[:, 1:]), np.zeros(len(self.names))
+        times, values = [ends.ravel()], [np.hstack([*y])]
+        for rounds_left in reversed(range(ROUNDS)):
+            largest = np.max([abs(each).max(axis=1) for each in values], axis=0)[:, None] + LEAST_SIZE
+            could = abs(y).max(axis=0) + np.where(more > SEEN * largest, more, 0.0)
+            excess = np.where((could > largest) & (more > SEEN * largest), could / largest, 0.0).max(axis=0)
+            is_open = np.argsort(-excess)[: min(MOST_OPEN, np.count_nonzero(excess)) if rounds_left else 0]
+            most = np.maximum(most, np.delete(could + errors, is_open, axis=1).max(axis=1, initial=0.0))
+            if not is_open.size:
+                break
+            every = np.linspace(ends[0, is_open], ends[1, is_open], CUTS + 1)
+            inner = self.at(every[1:-1].ravel())
+            times, values = [*times, every[1:-1].ravel()], [*values, inner]
+            whole = np.stack([y[0][:, is_open], *np.split(inner, CUTS - 1, axis=1), y[1][:, is_open]], axis=1)
+            more = np.hstack([*_of_both(abs(np.diff(whole, 2, axis=1))).swapaxes(0, 1)]) / 4
+            y = np.array([np.hstack([*part.swapaxes(0, 1)]) for part in (whole[:, :-1], whole[:, 1:])])
+            ends, errors = np.array([every[:-1].ravel(), every[1:].ravel()]), np.tile(errors[:, is_open], CUTS)
+        order = np.argsort(np.concatenate(times), kind="stable")
+        t, y = np.concatenate(times)[order], np.hstack(values)[:, order]
+        places = (abs(y) >= (1 - 1e-14) * abs(y).max(axis=1, keepdims=True)).argmax(axis=1)  # the first of a constant
+        sizes, bounds = abs(y)[:, places].diagonal(), self.remainder(t[places]).diagonal()
+        bounds = np.maximum(np.maximum(most - sizes, bounds), MACHINE_EPS * sizes)
+        most = sizes + bounds + sum(np.where(np.isinf(part.off), math.inf, 0.0) for part in self.parts)
+        columns = zip(t[places], y[:, places].diagonal(), bounds, most, strict=True)
+        return {name: Peak(*map(float, each)) for name, each in zip(self.names, columns, strict=True)}
 
     def near_starts(self, end: float) -> Real:
         """Times [s] up to an end at which the beginnings after each start are resolved."""
         shares = np.r_[np.geomspace(1e-6, 1, 300), np.linspace(0, 1, 700)]
         t = np.unique([start + part.end * shares for part in self.parts for start in self.starts])
         return t[t <= end]
+
+
+def _of_both(bends: Real) -> Real:
+    """The larger of the values (rows, n, ...) at both ends of each interval (rows, n + 1, ...), 0 at the outer ones."""
+    outer = np.zeros((len(bends), 1, *bends.shape[2:]))
+    return np.maximum(np.concatenate([outer, bends], axis=1), np.concatenate([bends, outer], axis=1))
 
 
 def usual_poles(loop: Loop, count: int = USUAL_COUNT) -> Poles:
@@ -310,7 +324,6 @@ def _part(poles: Poles, of: Transforms, start: float, duration: float) -> Part:
     before, limit = abs((at_once + after) * s)[:, -2:].T
     z, amplitudes = direct
     off = abs((at_once - (amplitudes / (s[:, None, None] - z)).sum(axis=-1).T).real * s).max(axis=1)
-    off[off <= 1e-6 * abs(amplitudes).sum(axis=1)] = 0.0
     off[(limit > 2 * before) & (limit > abs(ends).max(axis=1))] = math.inf
     return replace(part, difference=2 * apart.max(axis=1), off=off)
 
@@ -330,7 +343,8 @@ def _terms(
     """
     every, count = np.unique(np.r_[0, known, known[known.imag != 0].conj()], return_counts=True)
     reach = min(CLOSE / duration, most_close)
-    _, label = connected_components(abs(every[:, None] - every) <= reach)
+    alike = SPLIT * np.maximum(-np.maximum.outer(every.real, every.real), 0)  # of a multiple pole, by rounding
+    _, label = connected_components(abs(every[:, None] - every) <= np.maximum(reach, alike))
     found = []
     for n in range(label.max() + 1):
         own, order = every[label == n], int(count[label == n].sum())
@@ -351,7 +365,8 @@ def _circle(
     """The nodes of a circle around poles, to a distance of `room` from others; of a simple pole its residue."""
     is_simple, extent, radius = order == 1 and c != 0, float(abs(own - c).max()), POLE_RADIUS * room
     if not is_simple:
-        radius = min(max(math.sqrt(extent * room), radius), SLOW_RADIUS * max(extent, 1 / duration))
+        moderate = max(SLOW_RADIUS * max(extent, 1 / duration), -c.real / 2)  # where e^{s t} does not grow
+        radius = min(max(math.sqrt(extent * room), radius), moderate)
     ratio = max(extent / radius, radius / room)
     nodes = int(np.clip(-NODE_LOG / math.log(ratio), POLE_NODES if is_simple else FEWEST_NODES, MOST_NODES))
     arrow = radius * np.exp(2j * np.pi * (np.arange(nodes) + 0.5) / nodes)
