@@ -212,6 +212,22 @@ def test_the_largest_torque_is_found_on_both_sides_of_a_jump():
     assert (start.time, start.value) == pytest.approx((0.0, -0.3), rel=1e-9)
 
 
+@pytest.mark.parametrize("corners", [(271.0, 271.0, 271.0), (196.0, 180.0, 102.0)])
+def test_one_filter_of_three_signals_adds_its_poles_once(corners):
+    """Apart they hide in each other, with multiplicities that no search separates; the response is Bromwich's."""
+    den = np.poly(-np.array(corners)) / np.prod(corners)
+    gains = {"hub_angle": 3.0, "hub_rate": 0.3, "root_moment": 0.3}
+    law = tfarm.Law({name: ([gain], den) for name, gain in gains.items()}, delay=0.002)
+    poles = usual_poles(Loop(LAB, law))
+    assert law.order == 9
+    assert (abs(poles.values[:, None] + np.array(corners)) > 1e-3).all()
+    excitation = versine()
+    found = time_response(poles, NAMES, excitation, 1.0)
+    t, expected = durbin(lambda s: exact_signals(LAB, law, excitation, s), 1.0)
+    t, expected = t[t <= 1.0], expected[:, t <= 1.0]
+    assert (abs(found.at(t)[:-1] - expected).max(axis=1) < 1e-9 * abs(expected).max(axis=1)).all()
+
+
 def test_equal_filters_in_series_keep_their_digits():
     """Their poles are split by rounding; until twice the delay the torque is the law's own, in closed form."""
     c, tau = 2480.0, 0.01

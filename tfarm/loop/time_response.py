@@ -31,6 +31,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
+from tfarm.arm.law import of_common_blocks
 from tfarm.arrays import LEAST_SIZE, MACHINE_EPS, Complex, Real
 from tfarm.errors import require
 from tfarm.records import record
@@ -45,14 +46,12 @@ ACTUATOR, TORQUE = "actuator", "torque"  # the input of the arm as a place of ex
 USUAL_COUNT = 80  # flexible modes below the top of the box
 CLOSE, MOST_CLOSE = 3.0, 0.1  # poles closer than 3/T are one circle, but no farther apart than 0.1 of the first mode
 SLOW_RADIUS = 2.0  # over T, of a circle around s = 0, on which e^{s T} is moderate; or times the extent of its poles
-SPLIT = 0.01  # of their real part: decaying poles closer than that are one circle
 POLE_RADIUS = 0.25  # of the way to the next pole: radius of the circle of one pole
 POLE_NODES, FEWEST_NODES, MOST_NODES, NODE_LOG = 32, 128, 512, 40.0  # of circles; e^-40 is below the rounding
 ON_AXIS = 1e-9  # of the least distance of two circles: by so little a centre is off the real axis
 BLOCK = 20_000  # times that are evaluated together: with 200 terms 64 MB
 MOST_GROWTH = 500.0  # exponent of the fastest growing pole at the end of a record
-CUTS, ROUNDS, MOST_OPEN = 8, 9, 3000  # of the search for a peak: of each interval, and at most together
-SEEN, SAME_TIME = 1e-13, 1e-10  # of the largest value: less is rounding of its sum; of a record: the same time
+CUTS, SEEN, SAME_TIME = 8, 1e-13, 1e-10  # of intervals; of a peak: less is rounding; of a record: the same time
 
 Transform = Callable[[Complex], Complex]
 
@@ -173,19 +172,16 @@ class TimeResponse:
         t = np.union1d(t[abs(t[:, None] - jumps).min(axis=1, initial=math.inf) > SAME_TIME * t[-1]], jumps)
         t = t[np.diff(t, append=math.inf) > SAME_TIME * t[-1]]
         ends, y = np.array([t[:-1], t[1:]]), np.array([self.at(t[:-1]), self.at(t[1:], before=True)])
-        bends = 2 * abs(np.diff((y[1] - y[0]) / np.diff(t))) / (t[2:] - t[:-2])
-        bends[:, np.isin(t[1:-1], jumps)] = 0.0
+        bends = np.where(np.isin(t[1:-1], jumps), 0, abs(np.diff((y[1] - y[0]) / np.diff(t))) * 2 / (t[2:] - t[:-2]))
         more, errors = _of_both(bends) * np.diff(t) ** 2 / 4, self.remainder(t)
         errors, most = np.maximum(errors[:, :-1], errors[:, 1:]), np.zeros(len(self.names))
         times, values = [ends.ravel()], [np.hstack([*y])]
-        for rounds_left in reversed(range(ROUNDS)):
-            largest = np.max([abs(each).max(axis=1) for each in values], axis=0)[:, None] + LEAST_SIZE
+        for most_open in (*[3000] * 8, 0):
+            largest = abs(np.hstack(values)).max(axis=1, keepdims=True) + LEAST_SIZE
             could = abs(y).max(axis=0) + np.where(more > SEEN * largest, more, 0.0)
             excess = np.where((could > largest) & (more > SEEN * largest), could / largest, 0.0).max(axis=0)
-            is_open = np.argsort(-excess)[: min(MOST_OPEN, np.count_nonzero(excess)) if rounds_left else 0]
+            is_open = np.argsort(-excess)[: min(most_open, np.count_nonzero(excess))]
             most = np.maximum(most, np.delete(could + errors, is_open, axis=1).max(axis=1, initial=0.0))
-            if not is_open.size:
-                break
             every = np.linspace(ends[0, is_open], ends[1, is_open], CUTS + 1)
             inner = self.at(every[1:-1].ravel())
             times, values = [*times, every[1:-1].ravel()], [*values, inner]
@@ -193,14 +189,13 @@ class TimeResponse:
             more = np.hstack([*_of_both(abs(np.diff(whole, 2, axis=1))).swapaxes(0, 1)]) / 4
             y = np.array([np.hstack([*part.swapaxes(0, 1)]) for part in (whole[:, :-1], whole[:, 1:])])
             ends, errors = np.array([every[:-1].ravel(), every[1:].ravel()]), np.tile(errors[:, is_open], CUTS)
-        order = np.argsort(np.concatenate(times), kind="stable")
-        t, y = np.concatenate(times)[order], np.hstack(values)[:, order]
-        places = (abs(y) >= (1 - 1e-14) * abs(y).max(axis=1, keepdims=True)).argmax(axis=1)  # the first of a constant
-        sizes, bounds = abs(y)[:, places].diagonal(), self.remainder(t[places]).diagonal()
-        bounds = np.maximum(np.maximum(most - sizes, bounds), MACHINE_EPS * sizes)
-        most = sizes + bounds + sum(np.where(np.isinf(part.off), math.inf, 0.0) for part in self.parts)
-        columns = zip(t[places], y[:, places].diagonal(), bounds, most, strict=True)
-        return {name: Peak(*map(float, each)) for name, each in zip(self.names, columns, strict=True)}
+        t, y = np.concatenate(times), np.hstack(values)
+        largest = (1 - 1e-14) * abs(y).max(axis=1, keepdims=True)
+        places = np.where(abs(y) >= largest, t, math.inf).argmin(axis=1)  # the first time of a constant
+        found = np.array([t[places], y[:, places].diagonal(), self.remainder(t[places]).diagonal(), most])
+        found[2] = np.max([found[2], most - abs(found[1]), MACHINE_EPS * abs(found[1])], axis=0)
+        found[3] = abs(found[1]) + found[2] + sum(np.where(np.isinf(part.off), math.inf, 0.0) for part in self.parts)
+        return {name: Peak(*each) for name, each in zip(self.names, found.T.tolist(), strict=True)}
 
     def near_starts(self, end: float) -> Real:
         """Times [s] up to an end at which the beginnings after each start are resolved."""
@@ -211,8 +206,7 @@ class TimeResponse:
 
 def _of_both(bends: Real) -> Real:
     """The larger of the values (rows, n, ...) at both ends of each interval (rows, n + 1, ...), 0 at the outer ones."""
-    outer = np.zeros((len(bends), 1, *bends.shape[2:]))
-    return np.maximum(np.concatenate([outer, bends], axis=1), np.concatenate([bends, outer], axis=1))
+    return np.maximum(np.insert(bends, 0, 0.0, axis=1), np.insert(bends, bends.shape[1], 0.0, axis=1))
 
 
 def usual_poles(loop: Loop, count: int = USUAL_COUNT) -> Poles:
@@ -220,7 +214,8 @@ def usual_poles(loop: Loop, count: int = USUAL_COUNT) -> Poles:
 
     Raises ConvergenceError where they are not complete.
     """
-    return poles_below(loop, band_of(loop.arm, count))
+    seen = loop.under(of_common_blocks(loop.law))
+    return replace(poles_below(seen, band_of(loop.arm, count)), loop=loop)
 
 
 def time_response(poles: Poles, names: tuple[str, ...], excitation: Excitation, duration: float) -> TimeResponse:
@@ -343,7 +338,7 @@ def _terms(
     """
     every, count = np.unique(np.r_[0, known, known[known.imag != 0].conj()], return_counts=True)
     reach = min(CLOSE / duration, most_close)
-    alike = SPLIT * np.maximum(-np.maximum.outer(every.real, every.real), 0)  # of a multiple pole, by rounding
+    alike = 0.01 * np.maximum(-np.maximum.outer(every.real, every.real), 0)  # a multiple pole that rounding has split
     _, label = connected_components(abs(every[:, None] - every) <= np.maximum(reach, alike))
     found = []
     for n in range(label.max() + 1):
