@@ -207,7 +207,7 @@ class Truth:
         y, place = np.zeros((len(PARTS), t.size)), self.windows(t)
         for n in set(place.tolist()):
             y[:, place == n] = interpolated(*self.smooth[n], t[place == n])
-        near = t + side * 1e-14 * self.duration
+        near = t + side * 1e-15 * self.duration
         y[-1] += sum((w * each.at(near - at) for each, at, w in self.closed), np.zeros(t.size))
         return y
 

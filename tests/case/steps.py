@@ -73,7 +73,8 @@ class Signal:
         }
         angle = reference.get(truth.case.scenario)
         self.reference = {"hub": angle, "tip": angle and angle * truth.case.arm.reach}.get(part)
-        self.peak_error = self.disagreement([self.peak_time, figures.peak_time])
+        near = self.t[max(0, int(np.searchsorted(self.t, self.peak_time)) - 2) :][:4]
+        self.peak_error = self.disagreement([self.peak_time, figures.peak_time, *np.linspace(near[0], near[-1], 9)])
         rng = np.random.default_rng(1)
         spread = np.r_[rng.uniform(0, 1, CHECKS // 2), rng.uniform(0, 1, CHECKS // 2) ** 6] * found.t[-1]
         self.rms = []

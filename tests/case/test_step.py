@@ -121,6 +121,12 @@ def test_the_peak_of_the_torque_of_a_delayed_filter_is_the_laws_own():
     assert not any(y[before].any() for y in found.continuous.signals.values())
 
 
+def test_the_duration_is_that_of_the_record():
+    """Of samples of 10 ms."""
+    found = tfarm.step(LAB, LAW, duration=0.5049)
+    assert (found.duration, found.t[-1]) == (0.5, 0.5)
+
+
 def test_settling_counts_from_the_end_of_the_motion_within_the_band():
     """Of the sampled signals by hand: the last time outside the band of the travel, less the slew; none is negative."""
     found = tfarm.step(LAB, SERVO, scenario_name="slew", duration=3.0, settling_band=0.0005)

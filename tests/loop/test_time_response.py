@@ -212,6 +212,48 @@ def test_the_largest_torque_is_found_on_both_sides_of_a_jump():
     assert (start.time, start.value) == pytest.approx((0.0, -0.3), rel=1e-9)
 
 
+@pytest.mark.parametrize("corners", [(271.0, 271.0, 271.0), (196.0, 180.0, 102.0)])
+def test_one_filter_of_three_signals_adds_its_poles_once(corners):
+    """Apart they hide in each other, with multiplicities that no search separates; the response is Bromwich's."""
+    den = np.poly(-np.array(corners)) / np.prod(corners)
+    gains = {"hub_angle": 3.0, "hub_rate": 0.3, "root_moment": 0.3}
+    law = tfarm.Law({name: ([gain], den) for name, gain in gains.items()}, delay=0.002)
+    poles = usual_poles(Loop(LAB, law))
+    assert law.order == 9
+    assert (abs(poles.values[:, None] + np.array(corners)) > 1e-3).all()
+    excitation = versine()
+    found = time_response(poles, NAMES, excitation, 1.0)
+    t, expected = durbin(lambda s: exact_signals(LAB, law, excitation, s), 1.0)
+    t, expected = t[t <= 1.0], expected[:, t <= 1.0]
+    assert (abs(found.at(t)[:-1] - expected).max(axis=1) < 1e-9 * abs(expected).max(axis=1)).all()
+
+
+def test_equal_filters_in_series_keep_their_digits():
+    """Their poles are split by rounding; until twice the delay the torque is the law's own, in closed form."""
+    c, tau = 2480.0, 0.01
+    law = tfarm.Law({"hub_angle": ([0.1, 1.0], np.poly([-c] * 3) / c**3)}, delay=tau, references=("hub_angle",))
+    found = time_response(usual_poles(Loop(LAB, law)), NAMES, STEP, 1.0)
+    after = np.linspace(0.0, 0.9 * tau, 40)
+    x = c * after
+    own = 1 - np.exp(-x) * (1 + x + x**2 / 2) + 0.1 * c * np.exp(-x) * x**2 / 2
+    t = tau + after
+    assert abs(found.at(t)[-1] - own).max() < 1e-11 * own.max()
+    assert (found.remainder(t)[-1] < 1e-10 * own.max()).all()
+
+
+def test_the_largest_of_many_maxima_is_found_whatever_the_record():
+    """That of a torque of two frequencies over forty periods, as on a grid of two million times."""
+    w = np.array([50.0, 50.0 * 2**0.5])
+    two = Excitation({ACTUATOR: lambda s: sum(0.5 * each / (s * s + each**2) for each in w)}, poles=tuple(1j * w))
+    found = time_response(usual_poles(Loop(LAB, as_law(tfarm.HubFeedback()))), NAMES, two, 5.0)
+    t = np.linspace(0.0, 5.0, 2_000_001)
+    expected = abs(0.5 * np.sin(np.outer(w, t)).sum(axis=0)).max()
+    for points in (400, 701, 1000):
+        peak = found.peaks(np.linspace(0.0, 5.0, points))["torque"]
+        assert abs(peak.value) == pytest.approx(expected, rel=1e-8)
+        assert expected <= peak.most * (1 + 1e-12) < expected * (1 + 1e-8)
+
+
 @pytest.mark.parametrize(("damping", "delay"), [(5e-3, 0.0), (2e-3, 0.004), (0.0, 0.003)])
 def test_early_torque_and_root_moment_are_those_of_de_hoogs_inversion(damping, delay):
     """Of a filtered law on damped arms, whose own poles are left of the box; the transform at 20 digits."""

@@ -357,6 +357,27 @@ def full_law(law: AnyLaw) -> Law:
     return Law({gain.output: gains[gain.name] for gain in GAINS}, name="gains at the hub", references=AT_HUB)
 
 
+def of_common_blocks(law: Law) -> Law:
+    """Return the law with ratios of the same denominator as one block: apart, each adds poles that no signal shows."""
+    alike: dict[object, list[Part]] = {}
+    for part in law.parts:
+        alike.setdefault(
+            getattr(part.block, "den", id(part)) if part.block.order and part.block.excess <= 0 else id(part), []
+        ).append(part)
+    return replace(law, parts=tuple(map(_common, alike.values())))
+
+
+def _common(parts: Sequence[Part]) -> Part:
+    """Ratios of the same denominator as one block, in observable form: the transpose of each one's states."""
+    if len(parts) == 1:
+        return parts[0]
+    A, B, C, D = zip(*(part.block.matrices() for part in parts), strict=True)
+    return Part(
+        tuple(name for part in parts for name in part.signals),
+        StateSpace(A[0].T, np.vstack(C).T, B[0].T, np.hstack(D)),
+    )
+
+
 def arm_and_law(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
     """Return the arm with the input of the law, and the law, as gains at the hub where it has no more than those.
 

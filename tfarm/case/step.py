@@ -154,7 +154,7 @@ class _Record:
         y, bound, peaks = response.at(t), response.remainder(t), response.peaks(t)
         curves = {name: (t, y[n], bound[n], peaks[name]) for n, name in enumerate(response.names)}
         is_converged = all(
-            (error <= CONVERGED * abs(peak.value)).all() and math.isfinite(peak.most)
+            (error <= CONVERGED * abs(peak.value)).all() and peak.bound <= CONVERGED * abs(peak.value)
             for _, _, error, peak in curves.values()
         )
         word, count = verdict_on(response.poles.loop).verdict, f"{response.poles.count} poles{omitted}"
@@ -367,9 +367,10 @@ def step(
     omitted = not_covered("continuous-time column", chain)
     found = _Record(arm, (*names[:3], TORQUE), task.busy_until, t, reference, band)
     return Step(
-        **vars(found), controller=controller(full, arm), scenario=scenario_name, duration=length, period=task.period,
-        scenario_in_words=described(task, arm, chain), sampled=found._of_sampled(law, chain, task, names),
-        continuous=None if response is None else found._of_continuous(response, omitted), response=response,
+        **vars(found), controller=controller(full, arm), scenario=scenario_name, period=task.period,
+        duration=min(length, float(t[-1])), scenario_in_words=described(task, arm, chain), response=response,
+        sampled=found._of_sampled(law, chain, task, names),
+        continuous=None if response is None else found._of_continuous(response, omitted),
     )  # fmt: skip
 
 

@@ -31,6 +31,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
+from tfarm.arm.law import of_common_blocks
 from tfarm.arrays import LEAST_SIZE, MACHINE_EPS, Complex, Real
 from tfarm.errors import require
 from tfarm.records import record
@@ -50,8 +51,7 @@ POLE_NODES, FEWEST_NODES, MOST_NODES, NODE_LOG = 32, 128, 512, 40.0  # of circle
 ON_AXIS = 1e-9  # of the least distance of two circles: by so little a centre is off the real axis
 BLOCK = 20_000  # times that are evaluated together: with 200 terms 64 MB
 MOST_GROWTH = 500.0  # exponent of the fastest growing pole at the end of a record
-RIPPLE = 10  # records to either side of the largest one: there 80 times in each resolve ripple too small to be seen
-ZOOM_POINTS, ZOOMS = 41, 5  # of the search for a peak: each narrows the interval by a factor of 20
+CUTS, SEEN, SAME_TIME = 8, 1e-13, 1e-10  # of intervals; of a peak: less is rounding; of a record: the same time
 
 Transform = Callable[[Complex], Complex]
 
@@ -162,37 +162,40 @@ class TimeResponse:
         return found
 
     def peaks(self, t: Real) -> dict[str, Peak]:
-        """Return the peak of each signal near the largest of times `t`, and on both sides of its jumps.
+        """Return the peak of each signal over a record of times `t`, and on both sides of its jumps.
 
-        A bound below the rounding of the value, 2.2e-16 of its size, is that.  `most` is infinite of an impulse.
+        Intervals in which a signal may exceed the largest value found, as it bends there, are cut until none is left.
+        The bound of a peak includes what they may hold, and the rounding of its value, 2.2e-16 of its size.  `most` is
+        infinite of an impulse.
         """
         jumps = self.starts[self.starts <= t[-1]]
-        sides = np.hstack([self.at(jumps), self.at(jumps, before=True)])
-        places = abs(self.at(t)).argmax(axis=1)
-        first, last = (t[np.clip(places + step, 0, t.size - 1)] for step in (-RIPPLE, RIPPLE))
-        t = np.unique(np.r_[t, np.linspace(first, last, 80 * RIPPLE + 1).ravel()])
-        sizes, errors = abs(self.at(t)), self.remainder(np.r_[jumps, jumps, t])
-        most = (np.hstack([abs(sides), sizes]) + errors).max(axis=1)
-        most += sum(np.where(np.isinf(part.off), math.inf, 0.0) for part in self.parts)
-        return {
-            name: self._peak(row, t, sizes[row], jumps, sides[row], float(most[row]))
-            for row, name in enumerate(self.names)
-        }
-
-    def _peak(self, row: int, t: Real, sizes: Real, jumps: Real, sides: Real, most: float) -> Peak:
-        """The peak of one signal, of sizes (n,) at times t, and with values on both `sides` of the jumps."""
-        y = np.empty(0)
-        for _ in range(ZOOMS):
-            n = int(sizes.argmax())
-            ends = np.searchsorted(t, t[n] + np.array([-1, 1]) * 1e-12 * t[-1])  # next to times that are the same
-            t = np.linspace(t[max(ends[0] - 1, 0)], t[min(ends[1], t.size - 1)], ZOOM_POINTS)
-            y = self.at(t)[row]
-            sizes = abs(y)
-        t, y = np.r_[jumps, jumps, t], np.r_[sides, y]
-        n = int((abs(y) >= (1 - 1e-14) * abs(y).max()).argmax())  # of a constant from a jump on, the jump
-        size = abs(float(y[n]))
-        bound = max(float(self.remainder(t[[n]])[row, 0]), MACHINE_EPS * size)
-        return Peak(float(t[n]), float(y[n]), bound, max(most, size + bound))
+        t = np.union1d(t[abs(t[:, None] - jumps).min(axis=1, initial=math.inf) > SAME_TIME * t[-1]], jumps)
+        t = t[np.diff(t, append=math.inf) > SAME_TIME * t[-1]]
+        ends, y = np.array([t[:-1], t[1:]]), np.array([self.at(t[:-1]), self.at(t[1:], before=True)])
+        bends = np.where(np.isin(t[1:-1], jumps), 0, abs(np.diff((y[1] - y[0]) / np.diff(t))) * 2 / (t[2:] - t[:-2]))
+        more, errors = _of_both(bends) * np.diff(t) ** 2 / 4, self.remainder(t)
+        errors, most = np.maximum(errors[:, :-1], errors[:, 1:]), np.zeros(len(self.names))
+        times, values = [ends.ravel()], [np.hstack([*y])]
+        for most_open in (*[3000] * 8, 0):
+            largest = abs(np.hstack(values)).max(axis=1, keepdims=True) + LEAST_SIZE
+            could = abs(y).max(axis=0) + np.where(more > SEEN * largest, more, 0.0)
+            excess = np.where((could > largest) & (more > SEEN * largest), could / largest, 0.0).max(axis=0)
+            is_open = np.argsort(-excess)[: min(most_open, np.count_nonzero(excess))]
+            most = np.maximum(most, np.delete(could + errors, is_open, axis=1).max(axis=1, initial=0.0))
+            every = np.linspace(ends[0, is_open], ends[1, is_open], CUTS + 1)
+            inner = self.at(every[1:-1].ravel())
+            times, values = [*times, every[1:-1].ravel()], [*values, inner]
+            whole = np.stack([y[0][:, is_open], *np.split(inner, CUTS - 1, axis=1), y[1][:, is_open]], axis=1)
+            more = np.hstack([*_of_both(abs(np.diff(whole, 2, axis=1))).swapaxes(0, 1)]) / 4
+            y = np.array([np.hstack([*part.swapaxes(0, 1)]) for part in (whole[:, :-1], whole[:, 1:])])
+            ends, errors = np.array([every[:-1].ravel(), every[1:].ravel()]), np.tile(errors[:, is_open], CUTS)
+        t, y = np.concatenate(times), np.hstack(values)
+        largest = (1 - 1e-14) * abs(y).max(axis=1, keepdims=True)
+        places = np.where(abs(y) >= largest, t, math.inf).argmin(axis=1)  # the first time of a constant
+        found = np.array([t[places], y[:, places].diagonal(), self.remainder(t[places]).diagonal(), most])
+        found[2] = np.max([found[2], most - abs(found[1]), MACHINE_EPS * abs(found[1])], axis=0)
+        found[3] = abs(found[1]) + found[2] + sum(np.where(np.isinf(part.off), math.inf, 0.0) for part in self.parts)
+        return {name: Peak(*each) for name, each in zip(self.names, found.T.tolist(), strict=True)}
 
     def near_starts(self, end: float) -> Real:
         """Times [s] up to an end at which the beginnings after each start are resolved."""
@@ -201,12 +204,18 @@ class TimeResponse:
         return t[t <= end]
 
 
+def _of_both(bends: Real) -> Real:
+    """The larger of the values (rows, n, ...) at both ends of each interval (rows, n + 1, ...), 0 at the outer ones."""
+    return np.maximum(np.insert(bends, 0, 0.0, axis=1), np.insert(bends, bends.shape[1], 0.0, axis=1))
+
+
 def usual_poles(loop: Loop, count: int = USUAL_COUNT) -> Poles:
     """Return the poles of a response: those below a frequency with `count` flexible modes, complete in their box.
 
     Raises ConvergenceError where they are not complete.
     """
-    return poles_below(loop, band_of(loop.arm, count))
+    seen = loop.under(of_common_blocks(loop.law))
+    return replace(poles_below(seen, band_of(loop.arm, count)), loop=loop)
 
 
 def time_response(poles: Poles, names: tuple[str, ...], excitation: Excitation, duration: float) -> TimeResponse:
@@ -310,7 +319,6 @@ def _part(poles: Poles, of: Transforms, start: float, duration: float) -> Part:
     before, limit = abs((at_once + after) * s)[:, -2:].T
     z, amplitudes = direct
     off = abs((at_once - (amplitudes / (s[:, None, None] - z)).sum(axis=-1).T).real * s).max(axis=1)
-    off[off <= 1e-6 * abs(amplitudes).sum(axis=1)] = 0.0
     off[(limit > 2 * before) & (limit > abs(ends).max(axis=1))] = math.inf
     return replace(part, difference=2 * apart.max(axis=1), off=off)
 
@@ -330,7 +338,8 @@ def _terms(
     """
     every, count = np.unique(np.r_[0, known, known[known.imag != 0].conj()], return_counts=True)
     reach = min(CLOSE / duration, most_close)
-    _, label = connected_components(abs(every[:, None] - every) <= reach)
+    alike = 0.01 * np.maximum(-np.maximum.outer(every.real, every.real), 0)  # a multiple pole that rounding has split
+    _, label = connected_components(abs(every[:, None] - every) <= np.maximum(reach, alike))
     found = []
     for n in range(label.max() + 1):
         own, order = every[label == n], int(count[label == n].sum())
@@ -351,7 +360,8 @@ def _circle(
     """The nodes of a circle around poles, to a distance of `room` from others; of a simple pole its residue."""
     is_simple, extent, radius = order == 1 and c != 0, float(abs(own - c).max()), POLE_RADIUS * room
     if not is_simple:
-        radius = min(max(math.sqrt(extent * room), radius), SLOW_RADIUS * max(extent, 1 / duration))
+        moderate = max(SLOW_RADIUS * max(extent, 1 / duration), -c.real / 2)  # where e^{s t} does not grow
+        radius = min(max(math.sqrt(extent * room), radius), moderate)
     ratio = max(extent / radius, radius / room)
     nodes = int(np.clip(-NODE_LOG / math.log(ratio), POLE_NODES if is_simple else FEWEST_NODES, MOST_NODES))
     arrow = radius * np.exp(2j * np.pi * (np.arange(nodes) + 0.5) / nodes)
