@@ -126,8 +126,9 @@ def place_in(out: Path, key: str, names: Sequence[str] = ()) -> Iterator[Path]:
             with temporary_folder(out) as place:
                 yield place
     except OSError as error:
-        remedy = f"cannot be written to ({error.strerror or error}); give a folder that can"
-        raise ParameterError(key=key, value=str(out), remedy=remedy) from None
+        raise ParameterError(
+            key=key, value=str(out), remedy=f"cannot be written to ({error.strerror or error}); give a folder that can"
+        ) from None
 
 
 @contextmanager
