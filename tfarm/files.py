@@ -261,8 +261,6 @@ def locked_folder(path: Path, *, key: str) -> Iterator[None]:
 
 
 def _remove(path: Path) -> None:
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        with suppress(OSError):
-            path.unlink(missing_ok=True)
+    shutil.rmtree(path, ignore_errors=True)  # of a folder alone, and not of a link to one
+    with suppress(OSError):
+        path.unlink(missing_ok=True)
