@@ -126,8 +126,9 @@ def place_in(out: Path, key: str, names: Sequence[str] = ()) -> Iterator[Path]:
             with temporary_folder(out) as place:
                 yield place
     except OSError as error:
-        remedy = f"cannot be written to ({error.strerror or error}); give a folder that can"
-        raise ParameterError(key=key, value=str(out), remedy=remedy) from None
+        raise ParameterError(
+            key=key, value=str(out), remedy=f"cannot be written to ({error.strerror or error}); give a folder that can"
+        ) from None
 
 
 @contextmanager
@@ -260,8 +261,6 @@ def locked_folder(path: Path, *, key: str) -> Iterator[None]:
 
 
 def _remove(path: Path) -> None:
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        with suppress(OSError):
-            path.unlink(missing_ok=True)
+    shutil.rmtree(path, ignore_errors=True)  # of a folder alone, and not of a link to one
+    with suppress(OSError):
+        path.unlink(missing_ok=True)

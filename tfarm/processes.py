@@ -3,7 +3,7 @@
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, MutableMapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -11,7 +11,7 @@ from itertools import islice
 from multiprocessing import active_children, get_context, parent_process, resource_tracker
 from threading import Thread
 from types import ModuleType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from tfarm.errors import ConvergenceError
 from tfarm.stopping import SIGNALS, undone_if_stopped
@@ -41,7 +41,8 @@ def shared(
     running: dict[Future[Result], Task] = {}
     with _pool(count) as pool:
         while True:
-            with _signals_blocked(), _no_main():  # of the process that this may start, as long as it lives
+            # as long as a process lives that this may start; no task is of the main script, which may have no guard
+            with _signals_blocked(), _entry(sys.modules, "__main__", ModuleType("__main__")):
                 running |= {pool.submit(call): task for task, call in islice(waiting, count - len(running))}
             if not running:
                 return
@@ -65,10 +66,10 @@ def _pool(count: int) -> Iterator[ProcessPoolExecutor]:
             child.kill()
             child.join()
 
-    with _environment("PYTHONWARNINGS", "ignore:resource_tracker"):  # of semaphores of a stopped process
+    with _entry(os.environ, "PYTHONWARNINGS", "ignore:resource_tracker"):  # of semaphores of a stopped process
         resource_tracker.ensure_running()
     with (
-        _environment(BLAS, os.environ.get(BLAS, "1")),
+        _entry(os.environ, BLAS, os.environ.get(BLAS, "1")),
         undone_if_stopped(kill),
         ProcessPoolExecutor(count, get_context("spawn"), initializer=leave_with_parent) as pool,
     ):
@@ -76,8 +77,9 @@ def _pool(count: int) -> Iterator[ProcessPoolExecutor]:
             yield pool
         except BrokenProcessPool:
             kill()  # one that never began its work would be waited for
-            words = "a worker process ended before its work was done, perhaps for want of memory; ask for less"
-            raise ConvergenceError(words, None, None) from None
+            raise ConvergenceError(
+                "a worker process ended before its work was done, perhaps for want of memory; ask for less", None, None
+            ) from None
         except KeyboardInterrupt:
             kill()
             raise
@@ -95,26 +97,15 @@ def _signals_blocked() -> Iterator[None]:
 
 
 @contextmanager
-def _no_main() -> Iterator[None]:
-    """Let new processes not run the main script again: no task is of it, and it may have no guard."""
-    main = sys.modules["__main__"]
-    sys.modules["__main__"] = ModuleType("__main__")
+def _entry(of: MutableMapping[str, Any], name: str, value: Any) -> Iterator[None]:
+    """Set an entry of a mapping that new processes read, the environment or the modules."""
+    before = {name: of[name]} if name in of else {}
+    of[name] = value
     try:
         yield
     finally:
-        sys.modules["__main__"] = main
-
-
-@contextmanager
-def _environment(name: str, value: str) -> Iterator[None]:
-    """Set a variable of the environment of new processes."""
-    before = dict(os.environ)
-    os.environ[name] = value
-    try:
-        yield
-    finally:
-        del os.environ[name]
-        os.environ |= before
+        del of[name]
+        of.update(before)
 
 
 def leave_with_parent() -> None:

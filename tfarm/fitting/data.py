@@ -81,8 +81,12 @@ class Measured:
             if getattr(self, name) is not None:
                 array: NDArray[Any] = np.atleast_1d(np.asarray(getattr(self, name), dtype=kind))
                 object.__setattr__(self, name, array)
-                remedy = f"one for each of the {self.omega.size} frequencies"
-                require(array.shape == self.omega.shape, f"{self.name} {name}", array.shape, remedy)
+                require(
+                    array.shape == self.omega.shape,
+                    f"{self.name} {name}",
+                    array.shape,
+                    f"one for each of the {self.omega.size} frequencies",
+                )
         w, one, nothing = self.omega, np.ones(self.omega.size), "0 everywhere: nothing was measured"
         sigma, coherence = (one if each is None else each for each in (self.sigma, self.coherence))
         ordered = "repeated or not in ascending order; sort the rows, and average those of one frequency"
@@ -146,8 +150,12 @@ def in_parts(values: Complex) -> Real:
 
 def must_be_measured(measured: object) -> None:
     """Raise ParameterError for a path or anything else in the place of a measured response."""
-    remedy = "is no measured response; give what tfarm.read_measured returns, or a tfarm.Measured"
-    require(isinstance(measured, Measured), "measured", measured, remedy)
+    require(
+        isinstance(measured, Measured),
+        "measured",
+        measured,
+        "is no measured response; give what tfarm.read_measured returns, or a tfarm.Measured",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,8 +194,11 @@ def noise_of(data: Measured) -> Noise:
         share = np.maximum(np.sqrt((1.0 - g) / (2.0 * (data.averages or 1) * g)), LEAST_SHARE)
     sigma = np.where((g == 0) | (size == 0), np.inf, size * share)  # a share of nothing is no deviation
     known = data.averages is not None
-    source = f"coherence of {data.averages} averages" if known else "coherence, up to a factor"
-    return Noise(sigma=sigma, is_known=known, source=source)
+    return Noise(
+        sigma=sigma,
+        is_known=known,
+        source=f"coherence of {data.averages} averages" if known else "coherence, up to a factor",
+    )
 
 
 def _scatter(values: NDArray[Any]) -> Real:
@@ -257,8 +268,12 @@ def _header(cells: Sequence[str]) -> dict[str, str]:
     units: dict[str, str] = {}
     for place, cell in enumerate(cells, start=1):
         name, unit = re.fullmatch(r"(.*?)\s*(?:\[(.*)\])?", cell, re.DOTALL).groups("")  # type: ignore[union-attr]
-        remedy = "the first line holds numbers; begin the file with the names of its columns"
-        require(math.isnan(_number(name)), "header", MISSING, remedy)
+        require(
+            math.isnan(_number(name)),
+            "header",
+            MISSING,
+            "the first line holds numbers; begin the file with the names of its columns",
+        )
         require(name and name not in units, f"header, column {place}", name, "each column has a name of its own")
         units[name] = unit.strip()
     return units
@@ -272,8 +287,9 @@ def _numbers(names: Sequence[str], rows: Sequence[tuple[int, str]], separator: s
     """The cells (rows, columns) of numbered lines, by NumPy; the line of a row that is none is named."""
     for line, text in rows:
         if (count := text.count(separator) + 1) != len(names):
-            remedy = f"{count} columns where the header names {len(names)}"
-            raise ParameterError(key=f"line {line}", value=text, remedy=remedy)
+            raise ParameterError(
+                key=f"line {line}", value=text, remedy=f"{count} columns where the header names {len(names)}"
+            )
     lines = [text for _, text in rows]
     values = np.loadtxt(lines, delimiter=separator, converters=_number, comments=None, ndmin=2)
     for row, column in np.argwhere(np.isnan(values))[:1]:
@@ -360,8 +376,12 @@ def _frequencies(sheet: Sheet) -> Real:
 def _values(sheet: Sheet) -> Complex:
     """The complex response, of whichever two columns there are."""
     pair = tuple(name for name in KNOWN_COLUMNS if name in sheet.columns and name in itertools.chain(*VALUE_PAIRS))
-    remedy = "one pair of columns for the value: re, im or abs, deg or db, deg; leave others out"
-    require(pair in VALUE_PAIRS, "header", [*sheet.columns], remedy)
+    require(
+        pair in VALUE_PAIRS,
+        "header",
+        [*sheet.columns],
+        "one pair of columns for the value: re, im or abs, deg or db, deg; leave others out",
+    )
     first, second = (sheet.columns[name] for name in pair)
     if pair == ("re", "im"):
         return np.asarray(first + 1j * second)
@@ -377,14 +397,22 @@ def _of_uff(path: str, number: str, output: str, input: str) -> Measured:
     """The response of a UFF file: the only one, or that of a number from 1 in their order there."""
     key = f"{output}/{input}"
     data = read_file(path, MOST_RECORD_BYTES, key=key, what="a .uff file")
-    remedy = "is not installed, and reads UFF files: pip install 'tfarm[uff]', or export the response as CSV"
-    require(find_spec("pyuff"), "package", "pyuff", remedy)
+    require(
+        find_spec("pyuff"),
+        "package",
+        "pyuff",
+        "is not installed, and reads UFF files: pip install 'tfarm[uff]', or export the response as CSV",
+    )
     found = read_arrays("uff", path, key=key, remedy="no UFF file that can be read")
     with naming(path):
         count = len(found) // 2  # frequencies and values of each
         require(count, "data set", 58, "the file holds no frequency response function (type 58, function 4)")
-        remedy = f"the file holds {count} responses; choose one by its number, as file.uff#2"
-        require(number or count == 1, "data set", MISSING, remedy)
+        require(
+            number or count == 1,
+            "data set",
+            MISSING,
+            f"the file holds {count} responses; choose one by its number, as file.uff#2",
+        )
         place = int(number or 1)
         require(1 <= place <= count, "data set", place, f"from 1 to {count}, the responses of the file")
         omega = 2 * np.pi * np.asarray(found[f"x{place - 1}"], dtype=float)

@@ -385,8 +385,11 @@ def arms_drawn(fit: Fit, count: int) -> tuple[Arm, ...]:
         kept += [fit.problem.arm(point)] * (sum_of_squares(fit.problem, point) <= most)
         if len(kept) == count:
             return tuple(kept)
-    message = f"only {len(kept)} of {DRAWS_EACH * count} arms drawn explain the data: their likelihood is not normal"
-    raise ConvergenceError(message, kept, len(kept))
+    raise ConvergenceError(
+        f"only {len(kept)} of {DRAWS_EACH * count} arms drawn explain the data: their likelihood is not normal",
+        kept,
+        len(kept),
+    )
 
 
 @dataclass(frozen=True)

@@ -109,13 +109,26 @@ def parameters(
         at, is_signed = start.get(key, usual), name in SIGNED
         most = arm.length if name == "x" else UPPER_ENDS.get(name, math.inf)
         low, high = bounds.get(key, (-math.inf if is_signed else 0.0, most))
-        remedy = f"starts at {at:g}; give bounds low,high around it, or another start"
-        require(low <= at <= high and low < high, f"bounds of {key}", (low, high), remedy)
+        require(
+            low <= at <= high and low < high,
+            f"bounds of {key}",
+            (low, high),
+            f"starts at {at:g}; give bounds low,high around it, or another start",
+        )
         require(is_signed or at > 0, f"start of {key}", at, "a positive number in SI units")
         is_prior = prior is None or (math.isfinite(prior[0]) and prior[1] > 0)
         require(is_prior, f"prior of {key}", prior, "mean,deviation with a deviation above 0")
-        size = max(abs(at), 0.1 * arm.length) if is_signed else at
-        found.append(Parameter(key, at, low, high, by_logarithm=not is_signed, size=size, prior=prior))
+        found.append(
+            Parameter(
+                key,
+                at,
+                low,
+                high,
+                by_logarithm=not is_signed,
+                size=max(abs(at), 0.1 * arm.length) if is_signed else at,
+                prior=prior,
+            )
+        )
     return family, tuple(found)
 
 
@@ -338,8 +351,18 @@ class Problem:
     def at(self, number: int, omega: Real) -> Problem:
         """The problem of one of its responses alone, at other frequencies: for curves."""
         one = self.responses[number]
-        data = replace(one.data, omega=omega, values=np.ones(omega.size, complex), sigma=None, coherence=None)
-        return replace(self, responses=(replace(one, data=data),), rings=())
+        return replace(
+            self,
+            responses=(
+                replace(
+                    one,
+                    data=replace(
+                        one.data, omega=omega, values=np.ones(omega.size, complex), sigma=None, coherence=None
+                    ),
+                ),
+            ),
+            rings=(),
+        )
 
     # ------------------------------------------------------------ residuals
 

@@ -92,8 +92,12 @@ class Ratio:
             is_held = each is not None and each(SOMEWHERE) == 0
             require(not is_held, key, name, "does not move on this arm: it is held")
         is_idle = self.is_driven and self.driven.is_locked and self.input != "hub_angle"
-        remedy = "drives no locked hub; name what was measured: hub_angle where the angle drives it, or another signal"
-        require(not is_idle, "input", self.input, remedy)
+        require(
+            not is_idle,
+            "input",
+            self.input,
+            "drives no locked hub; name what was measured: hub_angle where the angle drives it, or another signal",
+        )
 
     @property
     def is_driven(self) -> bool:

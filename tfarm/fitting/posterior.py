@@ -114,8 +114,7 @@ def posterior_of(found: Solution, fitted: Sequence[Fitted], not_determined: Sequ
 
 def load_posterior(path: str | os.PathLike[str]) -> Posterior:
     """Return the posterior of a file.  Raises ParameterError, naming the file, for anything else."""
-    what = f"a {SUFFIX} file of tfarm fit --save"
-    found = validated_file(Posterior, path, MOST_BYTES, key="posterior", what=what)
+    found = validated_file(Posterior, path, MOST_BYTES, key="posterior", what=f"a {SUFFIX} file of tfarm fit --save")
     n, covariance = len(found.numbers), found.covariance
     is_legal = (
         0 < n == len(covariance) and all(len(row) == n for row in covariance)

@@ -119,8 +119,9 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
     with naming(name):
         columns = _columns(held, next((held[each].size for each in TIMES if each in held), 0))
         of_times = next((each for each in TIMES if each in columns), "")
-        remedy = f"a record has a column t, in seconds; this one has {listed(held, 300) or 'none'}"
-        require(of_times, "t", MISSING, remedy)
+        require(
+            of_times, "t", MISSING, f"a record has a column t, in seconds; this one has {listed(held, 300) or 'none'}"
+        )
         require(units[of_times] in ("", "s"), f"unit of {of_times}", units[of_times], "times are in seconds")
         start, period, jitter = _timing(columns.pop(of_times))
         require(columns, "signals", MISSING, "a column of times and no other")
@@ -146,14 +147,22 @@ def _timing(times: Real) -> tuple[float, float, float]:
     require(times.size >= LEAST_SAMPLES, "samples", times.size, f"a record has {LEAST_SAMPLES} samples at least")
     steps = np.diff(times)
     back, usual = int(np.argmax(steps <= 0)), float(np.median(steps))
-    remedy = "is not later than the sample before; sort the rows, and leave doubled ones out"
-    require(steps[back] > 0, f"t of sample {back + 2}", float(times[back + 1]), remedy)
+    require(
+        steps[back] > 0,
+        f"t of sample {back + 2}",
+        float(times[back + 1]),
+        "is not later than the sample before; sort the rows, and leave doubled ones out",
+    )
     period = float((times[-1] - times[0]) / (times.size - 1))
     require(period > 1 / MOST_SAMPLE, "period of t", period, "times are in seconds")
     gap = int(np.argmax(abs(steps - usual)))
     jitter = float(abs(times - times[0] - period * np.arange(times.size)).max() / period)
-    remedy = f"{steps[gap]:.6g} s after the one before, where {usual:.6g} s is usual: samples have to be even"
-    require(jitter <= JITTER, f"t of sample {gap + 2}", float(times[gap + 1]), remedy)
+    require(
+        jitter <= JITTER,
+        f"t of sample {gap + 2}",
+        float(times[gap + 1]),
+        f"{steps[gap]:.6g} s after the one before, where {usual:.6g} s is usual: samples have to be even",
+    )
     return float(times[0]), period, jitter
 
 
@@ -236,8 +245,12 @@ def load_run(name_or_path: str | os.PathLike[str]) -> MeasuredRun | None:
         table = validated(RunTable, tables["measured"], "measured")
         found = read_recording(Path(file).parent / table.file)
         reference = found.signal(REFERENCE_COLUMN, "measured.file")
-        remedy = f"has neither {ANGLE_COLUMN} [rad] nor {MOMENT_COLUMN} [N m] with {REFERENCE_COLUMN} [rad]"
-        require({ANGLE_COLUMN, MOMENT_COLUMN} & set(found.signals), "measured.file", table.file, remedy)
+        require(
+            {ANGLE_COLUMN, MOMENT_COLUMN} & set(found.signals),
+            "measured.file",
+            table.file,
+            f"has neither {ANGLE_COLUMN} [rad] nor {MOMENT_COLUMN} [N m] with {REFERENCE_COLUMN} [rad]",
+        )
     angle, moment = (found.signals.get(name, np.empty(0)) for name in (ANGLE_COLUMN, MOMENT_COLUMN))
     return MeasuredRun(found.times - found.start, reference, angle, moment, table.source)
 
@@ -374,7 +387,11 @@ def _cut(recording: Recording, segment: float | None, overlap: float) -> tuple[i
     require(0 <= overlap < 1, "--overlap", overlap, "a share of a segment from 0 to below 1, such as 0.5")
     whole = recording.count * recording.period
     least, wanted = LEAST_SAMPLES * recording.period, 2 * whole / (USUAL_SEGMENTS + 1) if segment is None else segment
-    remedy = f"seconds between {least:.4g} and {whole / 2:.4g}, half the record: one average has no coherence"
-    require(least <= wanted <= whole / 2 * (1 + 1e-9), "--segment", wanted, remedy)
+    require(
+        least <= wanted <= whole / 2 * (1 + 1e-9),
+        "--segment",
+        wanted,
+        f"seconds between {least:.4g} and {whole / 2:.4g}, half the record: one average has no coherence",
+    )
     size = min(round(wanted / recording.period), recording.count // 2)
     return size, max(1, round(size * (1 - overlap)))

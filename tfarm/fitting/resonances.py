@@ -343,8 +343,13 @@ def _part(recording: Recording, name: str, start: float | None, stop: float | No
     kept = (t >= low - rounding) & (t <= high + rounding)
     require(1 <= modes <= MOST_RINGING, "--modes", modes, f"a whole number from 1 to {MOST_RINGING}")
     span = f"the record goes from {t[0]:g} to {t[-1]:g} s"
-    remedy = f"{kept.sum()} samples from {low:g} to {high:g} s; {modes} modes take {least} ({span})"
-    require(kept.sum() >= least, "--from", float(low), remedy, recording.source)
+    require(
+        kept.sum() >= least,
+        "--from",
+        float(low),
+        f"{kept.sum()} samples from {low:g} to {high:g} s; {modes} modes take {least} ({span})",
+        recording.source,
+    )
     require(np.ptp(y[kept]) > 0, "--signal", name, "does not move there", recording.source)
     return t[kept], y[kept]
 

@@ -127,8 +127,13 @@ def thinned(problem: Problem, most: int) -> Problem:
         w, values, sigma = each.data.omega, each.data.values, each.noise.sigma
         kept = np.unique(np.linspace(0, w.size - 1, min(w.size, most)).astype(int))
         kept = kept[np.isfinite(sigma[kept]) & (values[kept] != 0)]
-        data = replace(each.data, omega=w[kept], values=values[kept], sigma=None, coherence=None)
-        responses.append(replace(each, data=data, noise=replace(each.noise, sigma=sigma[kept])))
+        responses.append(
+            replace(
+                each,
+                data=replace(each.data, omega=w[kept], values=values[kept], sigma=None, coherence=None),
+                noise=replace(each.noise, sigma=sigma[kept]),
+            )
+        )
     return replace(problem, responses=tuple(responses))
 
 

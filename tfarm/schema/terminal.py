@@ -90,7 +90,7 @@ def table_lines(table: Table, width: int | None = None) -> list[str]:
     columns = table.columns
     is_pipe, width = width is None, width or PIPE_WIDTH
     shortest = LEAST_IN_PIPE if is_pipe else LEAST_FOLDED
-    widths = [max(cell_len(each.heading), widest(each)) for each in columns]
+    widths = [widest([each.heading, *each.cells]) for each in columns]
     if sum(widths) + COLUMN_GAP * (len(widths) - 1) <= width:  # rich would take a second for two thousand rows
         aligned = [
             [set_cell_size(cell, size) if is_text else " " * (size - cell_len(cell)) + cell
@@ -133,17 +133,12 @@ def least_width(columns: Sequence[Column], shortest: int) -> int:
 
 def least(column: Column, shortest: int) -> int:
     """Return the characters below which a word or a number of a column, or a text of `shortest`, would be broken."""
-    cells = widest(column)
+    cells = widest(column.cells)
     if column.folds:
-        cells = min(cells, max(shortest, *map(widest_word, column.cells)))
-    return max(cells, widest_word(column.heading))
+        cells = min(cells, max(shortest, widest(" ".join(column.cells).split())))
+    return max(cells, widest(column.heading.split()))
 
 
-def widest(column: Column) -> int:
-    """Return the characters of the widest cell of a column."""
-    return max(map(cell_len, column.cells), default=0)
-
-
-def widest_word(text: str) -> int:
-    """Return the characters of the widest word of a text."""
-    return max(map(cell_len, text.split()), default=0)
+def widest(texts: Sequence[str]) -> int:
+    """Return the characters of the widest of some texts."""
+    return max(map(cell_len, texts), default=0)

@@ -154,8 +154,12 @@ def assumptions(arm: Arm, count: int) -> Assumptions:
 
     Raises ParameterError for a rig: the paper leaves section and hub of one beam open.
     """
-    remedy = "the assumptions studied are the paper's, of one Timoshenko beam on a hub; this is a rig"
-    require(arm.is_uniform, "arm", arm.name, remedy)
+    require(
+        arm.is_uniform,
+        "arm",
+        arm.name,
+        "the assumptions studied are the paper's, of one Timoshenko beam on a hub; this is a rig",
+    )
     gains = {name: default_gains(arm)[name] for name in PLANE}
     hub = hub_study(arm, count) if has_hub_inertia(arm) else None
     return Assumptions(arm.name, count, gains, section_study(arm, count), hub)

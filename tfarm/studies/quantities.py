@@ -247,8 +247,12 @@ def order_of(word: str) -> tuple[str, ...]:
     Raises ParameterError for a word of no number or of several.
     """
     names = [name for name in column_names([word]) if quantity_of(name).is_number and quantity_of(name).label]
-    remedy = f"{len(names)} quantities of numbers, not one: {', '.join(names[:6])}"
-    require(len(names) == 1 or word in names, "worst", word, remedy)
+    require(
+        len(names) == 1 or word in names,
+        "worst",
+        word,
+        f"{len(names)} quantities of numbers, not one: {', '.join(names[:6])}",
+    )
     quantity = word if word in names else names[0]
     return (quantity, *filter(None, [stability_of(quantity)]))
 

@@ -136,8 +136,9 @@ class Parts:
 
     def others(self, prefix: str, size: int, rows: int, names: Sequence[str]) -> "Parts":
         """Return parts of that many other rows with these columns, in the same folder; at most `rows` in one."""
-        plan = replace(self.plan, names=tuple(names))
-        return replace(self, plan=plan, prefix=prefix, size=size, rows=min(self.rows, rows))
+        return replace(
+            self, plan=replace(self.plan, names=tuple(names)), prefix=prefix, size=size, rows=min(self.rows, rows)
+        )
 
     @property
     def is_complete(self) -> bool:
@@ -153,8 +154,7 @@ class Parts:
         names = {each.name for each in self.folder.glob(f"{self.prefix}*")}
         found = [number for number in range(self.count) if self.path(number).name in names]
         strange = sorted(names - {self.path(number).name for number in found})
-        remedy = f"{strange[:1]} is a part of another study: choose another folder"
-        require(not strange, OUT, str(self.folder), remedy)
+        require(not strange, OUT, str(self.folder), f"{strange[:1]} is a part of another study: choose another folder")
         return found
 
     def write(self, number: int, table: Mapping[str, Sequence[Any]]) -> None:
@@ -209,11 +209,16 @@ def opened(folder: Path, plan: Plan, files: Mapping[str, bytes], workers: int, s
         "posterior": space.posterior and space.posterior.model_dump(), **hashes,
     }))  # fmt: skip
     if file.exists():
-        what = f"a {FILE} of tfarm study; choose another folder"
-        known = validated_file(StudyRecord, file, MOST_BYTES, key=OUT, what=what)
+        known = validated_file(
+            StudyRecord, file, MOST_BYTES, key=OUT, what=f"a {FILE} of tfarm study; choose another folder"
+        )
         other = sorted(key for key in {*inputs, *known.inputs} if known.inputs.get(key) != inputs.get(key))
-        remedy = f"has a study with other {', '.join(other)}: choose another folder (--worst adds its columns)"
-        require(not other, OUT, str(folder), remedy)
+        require(
+            not other,
+            OUT,
+            str(folder),
+            f"has a study with other {', '.join(other)}: choose another folder (--worst adds its columns)",
+        )
         count = known.rows_a_part
     else:
         count = size or rows_a_chunk(seconds_an_arm(plan, rows[:PILOT]), space.count, workers)
@@ -321,8 +326,11 @@ def check_rows(plan: Plan, rows: Real) -> None:
         except ParameterError as error:
             errors[number] = error
     for number, first in errors.items():
-        remedy = f"{len(errors)} of {len(rows)} arms are illegal, the first in row {number}: {first.remedy}"
-        raise ParameterError(key=first.key, value=first.value, remedy=remedy)
+        raise ParameterError(
+            key=first.key,
+            value=first.value,
+            remedy=f"{len(errors)} of {len(rows)} arms are illegal, the first in row {number}: {first.remedy}",
+        )
 
 
 # ------------------------------------------------------------------------------------------------------------ cluster
@@ -340,8 +348,11 @@ def cluster(scheduler: str) -> Any:
         client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
         client.wait_for_workers(1, timeout=PATIENCE)
     except (OSError, ValueError, TypeError) as error:
-        remedy = f"no scheduler with a worker answers within {PATIENCE} s ({str(error)[:120]}); give tcp://HOST:PORT"
-        raise ParameterError(key=SCHEDULER, value=scheduler, remedy=remedy) from None
+        raise ParameterError(
+            key=SCHEDULER,
+            value=scheduler,
+            remedy=f"no scheduler with a worker answers within {PATIENCE} s ({str(error)[:120]}); give tcp://HOST:PORT",
+        ) from None
     return client
 
 
@@ -367,8 +378,9 @@ def on_cluster(tasks: Iterator[Task], client: Any) -> Iterator[tuple[int, Chunk]
             )
             yield running.pop(future.key), table
     except Exception as error:  # a chunk itself raises none
-        words = f"the cluster failed ({type(error).__name__}: {one_line(str(error), 200)}); run the study again"
-        raise ConvergenceError(words, None, None) from None
+        raise ConvergenceError(
+            f"the cluster failed ({type(error).__name__}: {one_line(str(error), 200)}); run the study again", None, None
+        ) from None
 
 
 def _with_versions(call: Callable[[], Chunk]) -> tuple[dict[str, str], Chunk]:

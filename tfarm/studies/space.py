@@ -177,15 +177,17 @@ def space_of(
     """Return the space of a declared study.  Raises ParameterError, naming the key."""
     known = {key: _distribution(f"over.{key}", entry) for key, entry in over.items()}
     found = Space(over=known, posterior=posterior, listing=listing, draws=draws, seed=seed)
-    remedy = "nothing is varied: give --over KEY=uniform:LOW,HIGH, a list or a posterior"
-    require(found.keys, "over", dict(over), remedy)
+    require(
+        found.keys, "over", dict(over), "nothing is varied: give --over KEY=uniform:LOW,HIGH, a list or a posterior"
+    )
     require(not (found.grids and listing), "over", [*found.grids], "a list has every value itself: no grid with it")
     for key in found.keys:
         require(found.keys.count(key) == 1, "over", key, "is varied twice; once is enough")
     if posterior is not None:
         posterior.must_be_determined(tuple(over))
-    remedy = f"at most {MOST_ROWS:,} rows: fewer draws, or a coarser grid"
-    require(found.count <= MOST_ROWS, "rows", found.count, remedy)
+    require(
+        found.count <= MOST_ROWS, "rows", found.count, f"at most {MOST_ROWS:,} rows: fewer draws, or a coarser grid"
+    )
     return found
 
 
@@ -294,8 +296,7 @@ def _cells(path: Path) -> Iterator[Sequence[str]]:
                 # a file without an end of a line is no reason to have it in memory
                 yield from csv.reader(iter(partial(text.readline, LONGEST_LINE), ""), strict=True)
         except (OSError, UnicodeDecodeError, csv.Error) as error:
-            remedy = f"cannot be read ({error}); give {LIST}"
-            raise ParameterError(key="list", value=str(path), remedy=remedy) from None
+            raise ParameterError(key="list", value=str(path), remedy=f"cannot be read ({error}); give {LIST}") from None
 
 
 def parquet(key: str, value: str) -> Any:
@@ -311,5 +312,6 @@ def extra(package: str, name: str, key: str, value: object) -> Any:
     try:
         return import_module(package)
     except ImportError:
-        remedy = f"needs {package.partition('.')[0]}: pip install 'tfarm[{name}]'"
-        raise ParameterError(key=key, value=value, remedy=remedy) from None
+        raise ParameterError(
+            key=key, value=value, remedy=f"needs {package.partition('.')[0]}: pip install 'tfarm[{name}]'"
+        ) from None

@@ -259,8 +259,9 @@ def study(
     for key, value in {"draws": draws, "seed": seed, "workers": workers, "part": 1 if part is None else part}.items():
         whole(key, value, int(key != "seed"), MOST_SEED, f"a whole number from {int(key != 'seed')}")
     known = None if posterior is None else load_posterior(posterior)
-    listing = None if rows is None else listing_of(Path(rows))
-    space = space_of(over or {}, draws=draws, seed=seed, posterior=known, listing=listing)
+    space = space_of(
+        over or {}, draws=draws, seed=seed, posterior=known, listing=None if rows is None else listing_of(Path(rows))
+    )
     order = order_of(worst) if worst else ()
     plan = Plan(arm, law, chain, space, column_names([*ask, *order]))
     require(sobol >= 0 and sobol & (sobol - 1) == 0, "sobol", sobol, "a power of 2, such as 256; 0 for no indices")

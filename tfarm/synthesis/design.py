@@ -17,7 +17,7 @@ from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.edges import most_modes
 from tfarm.dsp.stages import admit
 from tfarm.dsp.verdict import SampledBrief, sampled_brief, sampled_verdict
-from tfarm.errors import ConvergenceError, ParameterError, must_be_known
+from tfarm.errors import ConvergenceError, must_be_known, require
 from tfarm.loop.loop import Loop
 from tfarm.loop.stability import Stability, stability
 from tfarm.records import record
@@ -206,9 +206,8 @@ def design(
     stable law is found.
     """
     must_be_known("objective", objective, OBJECTIVES)
-    if objective == "cost" and continuous:
-        remedy = "the cost of the tuner's trial is one of samples: design for the sampled loop"
-        raise ParameterError(key="objective", value=objective, remedy=remedy)
+    remedy = "the cost of the tuner's trial is one of samples: design for the sampled loop"
+    require(objective != "cost" or not continuous, "objective", objective, remedy)
     if OBJECTIVES[objective].of_slew:
         must_turn(arm)
     ends = {key: (float(low), float(high)) for key, (low, high) in (ranges or {}).items()}
@@ -217,8 +216,7 @@ def design(
     for each in arms:
         admit("design", each.arm, chain)
     same_input(arms)
-    bounds = {"K1": K1, "K2": K2}
-    form = structure_of(structure, arm, Kp=Kp, modes=modes, period=chain.sampling.period, bounds=bounds)
+    form = structure_of(structure, arm, Kp=Kp, modes=modes, period=chain.sampling.period, bounds={"K1": K1, "K2": K2})
     for each in arms:
         Loop(each.arm, as_law(form.record_at(form.origin)))
         check_bounds(form, each.arm)

@@ -195,9 +195,12 @@ def simplex(score: Score, box: tuple[Real, Real], found: Points) -> Points:
         "initial_simplex": corners, "maxfev": STEPS_EACH * start.size, "adaptive": start.size > 1,
         "xatol": CONVERGED * (high - low).max(), "fatol": CONVERGED * abs(limit[0]),
     }  # fmt: skip
-    bounds = list(zip(low, high, strict=True))
     done = cast("Any", minimize)(
-        lambda x: float(score(x[:, None], limit)[0]), start, method="Nelder-Mead", bounds=bounds, options=options
+        lambda x: float(score(x[:, None], limit)[0]),
+        start,
+        method="Nelder-Mead",
+        bounds=list(zip(low, high, strict=True)),
+        options=options,
     )
     return Points(done.x[:, None], np.array([done.fun]))
 

@@ -29,7 +29,7 @@ import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, PLANE, TWO_GAINS, AnyLaw, Arm, HubFeedback, Law, must_not_be_algebraic
 from tfarm.arrays import Real
-from tfarm.errors import ParameterError, did_you_mean
+from tfarm.errors import must_be_known, require
 from tfarm.loop.loop import band_of
 from tfarm.records import record
 from tfarm.spectrum import modes as natural_modes
@@ -170,10 +170,9 @@ def structure_of(
     a sample if that is less.  `bounds` of coefficients are those to be searched, where not None.
     Raises ParameterError for an unknown structure, bad bounds or Kp, and for gains too large for the arm.
     """
-    if name not in STRUCTURES:
-        raise ParameterError(key="structure", value=name, remedy=did_you_mean(name, list(STRUCTURES)))
-    if name != TWO_GAINS and not (0.0 <= Kp < np.inf):
-        raise ParameterError(key=ANGLE_GAIN, value=Kp, remedy="the hub angle gain is zero (chosen) or positive")
+    must_be_known("structure", name, STRUCTURES)
+    is_gain = name == TWO_GAINS or 0.0 <= Kp < np.inf
+    require(is_gain, ANGLE_GAIN, Kp, "the hub angle gain is zero (chosen) or positive")
     speed = ANGLE_SPEED * min(first_frequency(arm), 1 / period)
     usual = 0.0 if name == TWO_GAINS else float(f"{turning_inertia(arm) * speed**2:.3g}")
     form = STRUCTURES[name](arm, Kp or usual, modes, period)
@@ -181,13 +180,15 @@ def structure_of(
         must_not_be_algebraic(arm, "structure", name)
     given = {key: pair for key, pair in bounds.items() if pair is not None}
     for key, pair in given.items():
-        if name != TWO_GAINS:
-            raise ParameterError(key=key, value=pair, remedy=f"goes with the structure {TWO_GAINS} alone")
-        if not -np.inf < pair[0] < pair[1] < np.inf:
-            raise ParameterError(key=key, value=pair, remedy="bounds are two finite numbers, the lower first")
+        require(name == TWO_GAINS, key, pair, f"goes with the structure {TWO_GAINS} alone")
+        is_range = -np.inf < pair[0] < pair[1] < np.inf
+        require(is_range, key, pair, "bounds are two finite numbers, the lower first")
     ends = {key: (float(low), float(high)) for key, (low, high) in given.items()}
-    free = tuple(each._replace(bounds=ends.get(each.name, each.bounds)) for each in form.free)
-    return replace(form, free=free, given=tuple(given))
+    return replace(
+        form,
+        free=tuple(each._replace(bounds=ends.get(each.name, each.bounds)) for each in form.free),
+        given=tuple(given),
+    )
 
 
 def check_bounds(form: Structure, arm: Arm) -> None:
@@ -280,10 +281,12 @@ def _integral_gain(arm: Arm, Kp: float) -> Coefficient:
 
 
 def _pi(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
-    def entries(c: Real) -> tuple[Entry, ...]:
-        return (Entry("hub_angle", polynomial(Kp, c[0]), polynomial(1.0, 0.0)),)
-
-    return Structure("PI", (_integral_gain(arm, Kp),), {ANGLE_GAIN: Kp}, entries)
+    return Structure(
+        "PI",
+        (_integral_gain(arm, Kp),),
+        {ANGLE_GAIN: Kp},
+        lambda c: (Entry("hub_angle", polynomial(Kp, c[0]), polynomial(1.0, 0.0)),),
+    )
 
 
 def _pid(arm: Arm, Kp: float, modes: int, period: float) -> Structure:

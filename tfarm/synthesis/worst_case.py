@@ -19,7 +19,7 @@ from tfarm.arm import Arm
 from tfarm.arm.records import ADJUSTABLE
 from tfarm.arm.writing import KeyedArms
 from tfarm.arrays import Real
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError, require
 from tfarm.records import record
 from tfarm.synthesis.structures import Bounds
 
@@ -73,13 +73,13 @@ class ArmBox:
     ranges: dict[str, Bounds]
 
     def __post_init__(self) -> None:
-        if len(self.ranges) > MOST_RANGES:
-            remedy = f"at most {MOST_RANGES} ranges, which have {2**MOST_RANGES} corners"
-            raise ParameterError(key="range", value=len(self.ranges), remedy=remedy)
+        count = len(self.ranges)
+        require(
+            count <= MOST_RANGES, "range", count, f"at most {MOST_RANGES} ranges, which have {2**MOST_RANGES} corners"
+        )
         for key, ends in self.ranges.items():
-            if not -math.inf < ends[0] < ends[1] < math.inf:
-                remedy = "two finite numbers, the lower first, such as 0.1,0.5"
-                raise ParameterError(key=f"range {key}", value=ends, remedy=remedy)
+            is_range = -math.inf < ends[0] < ends[1] < math.inf
+            require(is_range, f"range {key}", ends, "two finite numbers, the lower first, such as 0.1,0.5")
         _ = self.corners
 
     @property
@@ -125,8 +125,7 @@ def worst_inside(box: ArmBox, badness: Callable[[Arm], float]) -> tuple[NamedArm
 
 def arms_of(arm: Arm, also: Sequence[Arm], box: ArmBox | None) -> list[NamedArm]:
     """The arm, those of the list, and the corners of the box.  Raises ParameterError for too many in the list."""
-    if len(also) > MOST_ARMS:
-        raise ParameterError(key="also", value=len(also), remedy=f"at most {MOST_ARMS} further arms")
+    require(len(also) <= MOST_ARMS, "also", len(also), f"at most {MOST_ARMS} further arms")
     corners = [] if box is None else [each for each in box.corners if each.arm != arm]
     return [*(NamedArm(each.name, each, {}) for each in (arm, *also)), *corners]
 
@@ -174,8 +173,11 @@ def for_the_worst(
         except ConvergenceError as error:
             if len(named) == 1:
                 raise
-            text = f"{error.message}; for {len(named)} arms at once: {'; '.join(each.name for each in named)}"
-            raise ConvergenceError(text, error.best, error.residual) from None
+            raise ConvergenceError(
+                f"{error.message}; for {len(named)} arms at once: {'; '.join(each.name for each in named)}",
+                error.best,
+                error.residual,
+            ) from None
         if box is None:
             return found, named, WorstCase({}, 0)
         limit = max(score_on(found, each.arm) for each in named)
@@ -202,6 +204,5 @@ def same_input(arms: Sequence[NamedArm]) -> None:
     """Raise ParameterError for arms with different inputs."""
     first = arms[0].arm.input
     for each in arms:
-        if each.arm.input != first:
-            remedy = f"the input of {each.name} is {each.arm.input}, that of {arms[0].name} {first}: one law has one"
-            raise ParameterError(key="also", value=each.name, remedy=remedy)
+        remedy = f"the input of {each.name} is {each.arm.input}, that of {arms[0].name} {first}: one law has one"
+        require(each.arm.input == first, "also", each.name, remedy)

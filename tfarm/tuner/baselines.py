@@ -27,6 +27,7 @@ moving arm.
 """
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -63,15 +64,10 @@ class BestConstant(NamedTuple):
     cost: float
 
 
-def tried_gains(samples: int) -> int:
-    """Number of constant gains of an interval that are tried in trials of `samples` samples."""
-    return min(CONSTANT_GAINS, max(LEAST_GAINS, GAIN_SAMPLES // samples))
-
-
 def best_constant(trial: Trial) -> BestConstant:
     """Return the best constant gain K >= 0 of a stable loop: a grid, its three lowest costs refined; 0 without one."""
     windows = constant_windows(trial.loop)
-    number = tried_gains(trial.n)
+    number = min(CONSTANT_GAINS, max(LEAST_GAINS, GAIN_SAMPLES // trial.n))
     found = [BestConstant(0.0, trial.with_constant(0.0).cost)] if not windows or windows[0][0] == 0.0 else []
     for low, high in windows:
         gains = np.linspace(low, high, number + 2)[1:-1]
@@ -274,30 +270,28 @@ def compare_controllers(
     for condition in tried_loops(trial.arm, trial.loop.chain) if listed is None else listed:
         here = trial.on(condition.arm, condition.chain, gain.servo)
         own, bound = best_constant(here), lq_bound(here)
-        outcomes = Outcomes(
-            condition=condition.name,
-            without=_constant(here, here.task, 0.0),
-            best_constant=_constant(here, here.task, nominal),
-            own_constant=_constant(here, here.task, own.gain),
-            own_gain=own.gain,
-            ZV=_constant(here, late["ZV"], 0.0),
-            EI=_constant(here, late["EI"], 0.0),
-            tuner=_outcome(gain.run(here.simulator()), here),
-            bound=Outcome(bound.cost, residual_rms(bound, here.task), None),
-            proven=guard.is_proven and _proven(here, guard),
+        found.append(
+            Outcomes(
+                condition=condition.name,
+                without=_constant(here, here.task, 0.0),
+                best_constant=_constant(here, here.task, nominal),
+                own_constant=_constant(here, here.task, own.gain),
+                own_gain=own.gain,
+                ZV=_constant(here, late["ZV"], 0.0),
+                EI=_constant(here, late["EI"], 0.0),
+                tuner=_outcome(gain.run(here.simulator()), here),
+                bound=Outcome(bound.cost, residual_rms(bound, here.task), None),
+                proven=guard.is_proven and _proven(here, guard),
+            )
         )
-        found.append(outcomes)
     return found
 
 
 def _proven(here: Trial, guard: Guard) -> bool:
     """Whether the sector is certified for this loop, with the trial's modes."""
-    if here.arm.is_undamped:
-        return False
-    try:
-        return MovingGain(here.loop).proof(guard.lo, guard.hi) is not None
-    except ConvergenceError:
-        return False
+    with suppress(ConvergenceError):
+        return not here.arm.is_undamped and MovingGain(here.loop).proof(guard.lo, guard.hi) is not None
+    return False
 
 
 def _constant(trial: Trial, task: Scenario, K: float) -> Outcome:

@@ -330,8 +330,9 @@ def save_tuner(tuner: SavedTuner, path: Path) -> None:
 
 def load_tuner(path: str | os.PathLike[str], key: str = "controller") -> SavedTuner:
     """Read the tuner of a file.  Raises ParameterError, in one line, for the first problem of the file."""
-    what = "a tuner's file of tfarm tune ARM --save FILE.json"
-    found = validated_file(SavedTuner, path, MOST_TUNER_BYTES, key=key, what=what)
+    found = validated_file(
+        SavedTuner, path, MOST_TUNER_BYTES, key=key, what="a tuner's file of tfarm tune ARM --save FILE.json"
+    )
     with naming(path):
         found.gain()  # refuses parts that do not match
         Cost(a=found.a, b=found.b)

@@ -73,8 +73,7 @@ class Plan:
     scale: float = 1.0
 
     def __post_init__(self) -> None:
-        remedy = "a scale is a positive, finite number of N m"
-        require(0.0 < self.scale < np.inf, "scale", self.scale, remedy)
+        require(0.0 < self.scale < np.inf, "scale", self.scale, "a scale is a positive, finite number of N m")
 
     def trial(self, arm: Arm, chain: Chain | None) -> Trial:
         """The trial on an arm, with the weights of the cost on moments and torques in units of the scale."""
@@ -85,8 +84,9 @@ class Plan:
 
     def network(self, seed: int) -> Network:
         """The network with the first weights of a seed."""
-        scales = np.r_[np.full(PAPER_INPUTS, self.scale), np.ones(int(self.seventh_input))]
-        return initial_network(seed, hidden=self.hidden, scales=scales)
+        return initial_network(
+            seed, hidden=self.hidden, scales=np.r_[np.full(PAPER_INPUTS, self.scale), np.ones(int(self.seventh_input))]
+        )
 
 
 @dataclass(frozen=True)
@@ -148,14 +148,14 @@ def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuni
 
     Raises ParameterError for an invalid plan, arm or chain, and CertificationError where there is no guard.
     """
-    remedy = "give a tfarm.tuner.Plan, such as Plan(trials=50, K1=0.3)"
-    require(isinstance(plan, Plan | None), "plan", plan, remedy)
+    require(isinstance(plan, Plan | None), "plan", plan, "give a tfarm.tuner.Plan, such as Plan(trials=50, K1=0.3)")
     must_be_arm(arm)
     plan = usual_plan(arm, chain) if plan is None else plan
     network, own = plan.network(plan.seed), replace(plan, learning=Learning(), trials=1, seed=0)
     trial, guard, baselines = _baselines(arm, chain, own)
-    training = train(trial, network, guard, plan.learning, plan.trials)
-    return Tuning(trial=trial, plan=plan, training=training, **baselines)
+    return Tuning(
+        trial=trial, plan=plan, training=train(trial, network, guard, plan.learning, plan.trials), **baselines
+    )
 
 
 @lru_cache(maxsize=1)
