@@ -16,7 +16,7 @@ import numpy as np
 
 from tfarm.arm import AnyLaw, Arm, tracked
 from tfarm.arrays import LEAST_SIZE, Real
-from tfarm.dsp.chain import Chain, chain_or_usual
+from tfarm.dsp.chain import Chain, Converters, chain_or_usual
 from tfarm.dsp.discretise import RULE, rule_in_words, with_all_gains
 from tfarm.dsp.plant import MODES_USED
 from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, described, scenario
@@ -243,15 +243,8 @@ def _half_range(signal: Real) -> float:
 
 def ideal_chain(chain: Chain) -> Chain:
     """The chain with the same sampling and filters, and ideal converters: no steps, no ranges, no limit, float64."""
-    converters = replace(
-        chain.converters,
-        encoder_counts=None,
-        moment_bits=None,
-        moment_range=None,
-        torque_bits=None,
-        torque_range=None,
-        arithmetic="float64",
-    )
+    of = chain.converters
+    converters = Converters(hub_rate=of.hub_rate, rate_filter=of.rate_filter)
     return replace(chain, converters=converters, actuator=replace(chain.actuator, torque_limit=math.inf))
 
 

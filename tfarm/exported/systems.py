@@ -33,7 +33,7 @@ from tfarm.dsp.plant import USUAL_MODES, PulseTransfer, driven, sensed_plant
 from tfarm.dsp.stages import not_covered
 from tfarm.errors import require
 from tfarm.exported.result import Export, ExportTask, names_of
-from tfarm.exported.texts import comment, matlab_text, python_text, render
+from tfarm.exported.texts import comment, matlab_text, render
 from tfarm.files import is_standard_output, mat_content, write_file
 from tfarm.records import record
 from tfarm.reduced import BAND, ReducedModel, modal_model, reduce
@@ -286,4 +286,4 @@ def plain(names: Iterable[str]) -> list[str]:
 
 def listed(names: Iterable[str]) -> str:
     """Return a literal of these names."""
-    return f"[{', '.join(map(python_text, plain(names)))}]"
+    return f"[{', '.join(map(ascii, plain(names)))}]"

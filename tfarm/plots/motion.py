@@ -260,7 +260,13 @@ def step(found: Step, *, ax: Sequence[Axes]) -> None:
     unstable loop the part within the range of a stable one is drawn.
     """
     _name_signals(found.arm, found.names, ax)
-    t, every = found.t[found.t <= _shown_until(found)], round(found.period / found.t[1])
+    settled = [  # some time after every signal of a stable loop has settled
+        math.inf if of.at_rest_after is None else SHOWN_SETTLED * of.at_rest_after
+        for loop in found.loops.values()
+        for of in (loop.hub, loop.tip, loop.root_moment, loop.torque)
+        if of
+    ]
+    t, every = found.t[found.t <= max(settled, default=math.inf)], round(found.period / found.t[1])
     for one, name in zip(ax, found.names, strict=True):
         one.set_xlim(0.0, t[-1])
         if (reference := found.reference.get(name)) is not None:
@@ -274,17 +280,6 @@ def step(found: Step, *, ax: Sequence[Axes]) -> None:
         if stable and len(stable) < len(found.loops):
             low, high = stable[0].min(), stable[0].max()
             one.set_ylim(low - OFF_FRAME * (high - low), high + OFF_FRAME * (high - low))
-
-
-def _shown_until(found: Step) -> float:
-    """End of the picture [s]: some time after every signal of a stable loop has settled, else that of the record."""
-    ends = [
-        math.inf if of.at_rest_after is None else SHOWN_SETTLED * of.at_rest_after
-        for loop in found.loops.values()
-        for of in (loop.hub, loop.tip, loop.root_moment, loop.torque)
-        if of
-    ]
-    return min(max(ends, default=math.inf), float(found.t[-1]))
 
 
 FIGURES[Run] = lambda run: slew.figure(run.arm, run.simulation, run.scenario_in_words)

@@ -237,17 +237,6 @@ def published_tables(found: published.Validation) -> list[Table]:
     ]
 
 
-def again_tables(proofs: Sequence[ArmProof]) -> list[Table]:
-    """The hashes of the arms' files, and the versions that computed this."""
-    found = {"tfarm": tfarm.__version__, "python": platform.python_version(), **{p: version(p) for p in PACKAGES}}
-    return [
-        sheet("inputs", table(proofs, ("name", "source", "sha256"))),
-        sheet(
-            "versions", [Column("package", "package", of=list(found)), Column("version", "version", of=found.values())]
-        ),
-    ]
-
-
 AUDIT_COLUMNS = (
     "equation", "verdict", "printed", "corrected", "residual_printed", "residual_corrected", "evidence",
 )  # fmt: skip
@@ -323,8 +312,11 @@ def write_trust(
     """index.html and its tables, into a folder of their own."""
     folder.mkdir()
     found = published.Validation(tuple(printed))
+    versions = {"tfarm": tfarm.__version__, "python": platform.python_version(), **{p: version(p) for p in PACKAGES}}
+    columns = Column("package", "package", of=list(versions)), Column("version", "version", of=versions.values())
+    again = [sheet("inputs", table(proofs, ("name", "source", "sha256"))), sheet("versions", columns)]
     blocks = {"proofs": proof_tables(proofs), "accuracy": [accuracy_table(proofs)],
-              "published": published_tables(found), "again": again_tables(proofs)}  # fmt: skip
+              "published": published_tables(found), "again": again}  # fmt: skip
     sections = {name: save_section(PageSection(blocks=own), folder) for name, own in blocks.items()}
     save_table(table(audited, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation"), folder / DATA)
     errors = [error for proof in proofs for _, error in proof.errors]
