@@ -265,8 +265,8 @@ def simulate(
     `outputs` are recorded in addition, as "tip_rotation" or "strain@0.05".  Raises ParameterError for a locked hub, an
     algebraic loop, an unknown signal, a law in z whose period is not the chain's, and as `scenario` does.
     """
-    how: dict[str, Any] = {"count": count, "between": between, "outputs": outputs}
-    return simulated_run(arm, law, chain_or_usual(chain), scenario_name, duration, **how).simulation
+    arm, law, chain = *tracked(arm, law), chain_or_usual(chain)
+    return simulated(arm, law, chain, scenario(scenario_name, arm, chain, duration), count, between, outputs)[0]
 
 
 def drawn(arm: Arm, law: AnyLaw, chain: Chain, scenario_name: str, duration: float) -> Simulation:
@@ -291,8 +291,7 @@ def simulated(
 
     Gains at the hub follow the references of all their signals.
     """
-    ideal = ideal_chain(chain)
-    used = enough_modes(lambda n: Simulator(arm, ideal, task, law, count=n, outputs=outputs).run(), count)
+    used = enough_modes(lambda n: Simulator(arm, ideal_chain(chain), task, law, count=n, outputs=outputs).run(), count)
     return Simulator(arm, chain, task, law, count=used.modes, between=between, outputs=outputs).run(), used
 
 

@@ -164,8 +164,12 @@ def response_data(
     """Return the exact frequency response (outputs, 1, n) over a range [rad/s], clear of the poles on the axis."""
     omega = np.geomspace(*band, RESPONSE_POINTS)
     omega = omega[distance(omega, frequencies_around(arm, band[1])) > CLEAR_OF_POLES * omega]
-    names = {"exact_input": np.array([of], object), "exact_outputs": np.array(outputs, object)}
-    return {"omega": omega, "response": G(1j * omega)[:, None, :], **names}
+    return {
+        "omega": omega,
+        "response": G(1j * omega)[:, None, :],
+        "exact_input": np.array([of], object),
+        "exact_outputs": np.array(outputs, object),
+    }
 
 
 # ------------------------------------------------------------ those of a task

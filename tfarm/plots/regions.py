@@ -14,7 +14,7 @@ from matplotlib.path import Path
 from matplotlib.ticker import LogLocator
 from scipy import ndimage
 
-from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback
+from tfarm.arm import PLANE, Arm, HubFeedback
 from tfarm.arrays import Real, Whole
 from tfarm.case import Comparison
 from tfarm.crossing import Window, pieces
@@ -240,15 +240,6 @@ def draw_region(
         ax.vlines(x[-ends], low[-ends], high[-ends], **line)
     key = looks if hatch else looks | {"edgecolor": INK, "ls": ls, "lw": 1.0}
     ax.fill_between([], [], [], **key, label=safe(label) + ("" if parts else ": nowhere in this picture"))
-
-
-def draw_proven(arm: Arm, x: Axis, y: Axis, ax: Axes) -> None:
-    """The quarter of the plane that is proven at C = 0; at C > 0 only the line without moment feedback is."""
-    dashes, kind = ("-", "proven") if arm.is_undamped else ((0, (1, 1)), "not a proof here")
-    label = f"Lyapunov ({LYAPUNOV}): {kind}"
-    ax.plot([0, 0, x.high], [y.low, 1, 1], color=GREY, lw=2.2, ls=dashes, label=label)
-    if not arm.is_undamped:
-        ax.plot([0, x.high], [0, 0], color=GREY, lw=1.6, label=f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven")
 
 
 # ------------------------------------------------------------ continuous and sampled regions

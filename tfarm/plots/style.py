@@ -223,22 +223,16 @@ def make_thin(figure: Figure) -> None:
             each.set(**{of: THIN * np.asarray(getattr(each, f"get_{of}")())})
 
 
-def fold_labels(figure: Figure) -> None:
-    """Fold long labels and titles; where several axes share the height, a long label has its unit on another line."""
-    for ax in figure.axes:
-        for text in (each for each in (*ax.get_children(), ax.xaxis.label) if isinstance(each, Text)):
-            text.set_text(folded(text.get_text(), LINE))
-        if len(figure.axes) > 1 and len(label := ax.get_ylabel()) > LONG_LABEL:
-            ax.set_ylabel(re.sub(r" +(?=\[)", "\n", label))
-
-
 def finish(drawn: Figure, words: str) -> None:
     """Legend and headline; at a place room for the legend and short lines of letters, and no headline if narrow."""
     place = _place.get()
     if place == "column":
         make_thin(drawn)
-    if place:
-        fold_labels(drawn)
+    for ax in drawn.axes if place else ():
+        for text in (each for each in (*ax.get_children(), ax.xaxis.label) if isinstance(each, Text)):
+            text.set_text(folded(text.get_text(), LINE))
+        if len(drawn.axes) > 1 and len(label := ax.get_ylabel()) > LONG_LABEL:  # axes that share the height
+            ax.set_ylabel(re.sub(r" +(?=\[)", "\n", label))
     for ax in drawn.axes if place == "phone" else ():
         for each in (ax, *ax.child_axes):
             each.minorticks_off()

@@ -230,7 +230,13 @@ def draw_map_of_arm(data: MapOfArm, *, ax: Axes) -> None:
         label = f"stable when sampled every {ms} ms (first {plane.modes_used} modes)"
         regions.draw_region(plane.x, plane.stable_intervals, label, ax, hatch="////")
     if case.arm.is_uniform:
-        regions.draw_proven(case.arm, x, y, ax)
+        # at C > 0 only the line without moment feedback is proven
+        dashes, kind = ("-", "proven") if case.arm.is_undamped else ((0, (1, 1)), "not a proof here")
+        label = f"Lyapunov ({style.LYAPUNOV}): {kind}"
+        ax.plot([0, 0, x.high], [y.low, 1, 1], color=style.GREY, lw=2.2, ls=dashes, label=label)
+        if not case.arm.is_undamped:
+            label = f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven"
+            ax.plot([0, x.high], [0, 0], color=style.GREY, lw=1.6, label=label)
     points = (default_gains(case.arm), *([] if designed is None else [designed.law]))
     for each, gains in zip(case.in_s, points, strict=True):
         brief = brief_on(case.arm, each.law, case.chain)
