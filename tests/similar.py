@@ -67,7 +67,7 @@ class Units:
 
     def _part(self, part):
         own = DIMENSIONS[type(part)]
-        assert {each.name for each in fields(part)} - {"section"} == set(own)
+        assert {each.name for each in fields(part)} - {"section", "stated_ratio"} == set(own)
         return replace(part, **{name: getattr(part, name) * self.of(dimension) for name, dimension in own.items()})
 
     def _link(self, link):

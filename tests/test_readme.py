@@ -72,7 +72,7 @@ def test_a_report_runs(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("tfarm.report.writing.PIECES", pieces)
     code, out, err = run(capsys, "report", "sasaki2012-lab", "--out", "pages")
     assert (code, out.strip()) == (0, "pages/index.html")
-    assert err == ""
+    assert err == "tfarm: written first: pages/sasaki2012-lab/index.html; the other pages follow\n"
     assert {path.name for path in (tmp_path / "pages").iterdir()} == {"assets", "index.html", "sasaki2012-lab", "trust"}
     assert (tmp_path / "pages" / "sasaki2012-lab" / "index.html").exists()
 

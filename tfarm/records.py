@@ -49,7 +49,7 @@ def record(cls: _Class) -> _Class:
         "__eq__": _equal,
         "__hash__": _hash,
         "__repr__": _repr,
-        "_repr_html_": getattr(cls, "_repr_html_", _repr_html),
+        "_repr_html_": vars(cls).get("_repr_html_", _repr_html),
     }
     for name, method in methods.items():
         setattr(cls, name, method)

@@ -76,7 +76,7 @@ def test_names_are_text_and_every_file_is_there(folder):
 def test_the_same_comparison_is_the_same_bytes(compared, folder, tmp_path):
     again = write_comparison(compared, tmp_path).parent
     files = [path.relative_to(folder) for path in folder.rglob("*") if path.is_file()]
-    assert len(files) == 11
+    assert len(files) == 12
     assert [name for name in files if (folder / name).read_bytes() != (again / name).read_bytes()] == []
 
 

@@ -85,7 +85,7 @@ def test_gains_that_fail_when_sampled_are_not_recommended_without_a_word(capsys,
     assert found["designed_for"] == "continuous"
     _, out, _ = run(capsys, "design", "sasaki2012-lab", "--continuous")
     assert "inside bounds that were widened" in out
-    assert re.search(r"^sampled loop +UNSTABLE .*\(tfarm's default period\)$", out, re.MULTILINE)
+    assert re.search(r"\nsampled loop +UNSTABLE [^\n]*\n? .*\(tfarm's\s+default\s+period\)\n", out)
 
 
 @pytest.mark.parametrize(

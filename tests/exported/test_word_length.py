@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+import sympy
 from scipy.linalg import solve_discrete_lyapunov
 
 import tfarm
@@ -258,20 +259,14 @@ def test_a_loop_that_is_not_certified_is_exported_anyway_and_the_header_warns():
 
 
 def test_a_realisation_has_coefficients_that_are_rounded_once():
-    """States of condition 1e7, against fractions."""
+    """States of condition 1e7, against rational numbers."""
     rng = np.random.default_rng(3)
     S = rng.normal(size=(4, 5))
     T = np.linalg.qr(rng.normal(size=(3, 3)))[0] @ np.diag([1.0, 1e-3, 1e-7]) @ rng.normal(size=(3, 3))
     found = similar(S, T)
-    exact = [[Fraction(x) for x in row] for row in S.tolist()]
-    own = [[Fraction(x) for x in row] for row in T.tolist()]
-    # T A' = A T, T B' = B, C' = C T, to the rounding of the coefficients
-    for i in range(3):
-        for j in range(5):
-            left = [own[i][k] * Fraction(found[k, j]) for k in range(3)]
-            right = sum(exact[i][k] * own[k][j] for k in range(3)) if j < 3 else exact[i][j]
-            assert abs(sum(left) - right) <= sum(map(abs, left)) / 2**53
-    assert found[3, :3] == pytest.approx(S[3, :3] @ T, rel=1e-13)
+    own, change = (sympy.Matrix(each.shape[0], each.shape[1], [*map(sympy.Rational, each.ravel())]) for each in (S, T))
+    exact = sympy.diag(change.inv(), 1) * own * sympy.diag(change, sympy.eye(2))
+    assert found.ravel().tolist() == pytest.approx([float(each) for each in exact], rel=2.0**-52, abs=0.0)
 
 
 @pytest.mark.parametrize("precision", ["double", "float", "q31"])

@@ -76,7 +76,7 @@ def test_of_an_undamped_arm_it_is_the_loop_with_which_the_card_grades():
 
 def test_a_margin_is_a_line_from_the_curve_to_one():
     found = tfarm.margins(LAB, LAW)
-    card, (upper, lower) = continuous_card(found, 0.01), Figure().subplots(2)
+    card, (upper, lower) = continuous_card(found, Chain()), Figure().subplots(2)
     tfarm.plots.loop(found, ax=(upper, lower))
     (gain,) = (each for each in upper.get_lines() if each.get_linewidth() == 1.6)
     assert gain.get_xdata() == pytest.approx([card.gain_margin.omega] * 2)

@@ -37,6 +37,7 @@ from tfarm.loop.margins import LoopMargins, Margins, margins, margins_of_curve
 from tfarm.loop.stability import SMALL_GAIN, Stability, stability
 from tfarm.records import record
 from tfarm.schema import Percent, Quantity, Table, Tabled, across, text
+from tfarm.schema.html import as_html, with_symbols
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import default_gains
 
@@ -159,6 +160,9 @@ class ResultCard(Tabled):
     def table(self) -> Table:
         """A row a quantity, a column a loop."""
         return across(self.loops, title="result")
+
+    def _repr_html_(self) -> str:
+        return as_html(self.table) + "".join(f"<p>{with_symbols(note)}</p>" for note in self.notes)
 
 
 def result_card(

@@ -198,19 +198,19 @@ def slews(case: Case) -> tuple[list[Picture | Table], list[str], list[Fact]]:
         ],
         words,
         [settling_fact(each, runs[each.name], len(case.laws) > 1) for each in simulated if each is not bare]
-        + [tip_fact(it) for _, it in responses],
+        + [fact for _, it in responses for fact in tip_facts(it)],
     )
 
 
-def tip_fact(found: Step) -> Fact:
+def tip_facts(found: Step) -> Iterator[Fact]:
     """The settling time of the tip in each loop, from the end of the slew, and its residual vibration."""
-    words = []
     for name, loop in found.loops.items():
-        tip, time = loop.tip, "not settled"
-        if tip and tip.settling_time is not None:
-            time = f"{text(tip.settling_time, 4)} s after the slew, residual {text(tip.residual_rms, 3)} mm rms"
-        words.append(f"{name.partition(',')[0]} {time}")
-    return Fact("settling time of the tip", "; ".join(words))
+        label = f"settling time of the tip after the slew, {name.partition(',')[0]}"
+        if loop.tip is None or loop.tip.settling_time is None:
+            yield Fact(label, "not settled")
+        else:
+            residual = f"residual {text(loop.tip.residual_rms, 3)} mm rms"
+            yield Fact(label, text(loop.tip.settling_time, 4), "s", residual)
 
 
 def film_picture(each: Controller, run: Simulation, rise: float) -> Picture:
