@@ -95,11 +95,6 @@ def accelerations(at: str = "") -> dict[Expression, Expression]:
     return dict(found)
 
 
-def places_after_time(text: str) -> str:
-    """How many derivatives have their arguments in the order of time and place."""
-    return str(len(re.findall(r"\([ts],", text)))
-
-
 WAVES = formula_of("(A.1)")
 BEAM_DIGITS = 50  # of both methods; RESIDUAL_NOISE leaves half of them to rounding
 BEAM_NAMES = ["rho", "A", "L", "E", "I", "kappa", "G", "C", "m", "I_c", "I_h", "s"]
@@ -242,7 +237,7 @@ CHECKS: dict[str, Callable[[str], str]] = {
     "(6)": partial(at_clamp, "y"),
     "(7)": partial(at_clamp, "phi"),
     **{f"({number})": partial(is_transform, number) for number in range(8, 15)},
-    "(3), (10), (18), (19): order of arguments": places_after_time,
+    "(3), (10), (18), (19): order of arguments": lambda text: str(len(re.findall(r"\([ts],", text))),
     "(1)-(14): damping C": partial(solves, WAVES),
     "(A.1)": solves,
     "(A.2)": is_dispersion,

@@ -212,11 +212,6 @@ def is_aluminium(text: str) -> str:
     return f"{distance:.4f}" if distance else "0"
 
 
-def is_unit_of_damping(text: str) -> str:
-    """C: the dimensions of 1 + C s."""
-    return mismatch(parsed("1 + C*s"), PAPER_UNITS | {"C": unit_dimension(text.partition(": ")[2])})
-
-
 def are_units(text: str) -> str:
     """Every sum in (1), (2), (4), (5) and (A.2) with the units of the text."""
     given = {name: unit_dimension(of) for name, of in (clause.split(": ") for clause in clauses(text))}
@@ -313,7 +308,9 @@ CHECKS: dict[str, Callable[[str], str]] = {
     "section 5: alpha_c": partial(beyond, 1, ";"),
     "section 5: eta_c": partial(beyond, 1, ";"),
     "Table 1 (rho)": is_aluminium,
-    "Table 1 (C's unit)": is_unit_of_damping,
+    "Table 1 (C's unit)": lambda text: mismatch(  # that of C in 1 + C s
+        parsed("1 + C*s"), PAPER_UNITS | {"C": unit_dimension(text.partition(": ")[2])}
+    ),
     "Table 1 (other units)": are_units,
     "Table 1 (I)": is_section,
     "Table 1 (I_h)": partial(is_given, "I_h"),

@@ -98,14 +98,15 @@ def check_arm(name: str, theory: Theory | None = None) -> ArmCheck:
         damping_ratio=None if ratio is None else Percent(ratio), assumptions=arm.assumptions,
         period=chain.sampling.period, torque_limit=chain.actuator.torque_limit, input_unit=arm.input_unit,
         next_command=f"tfarm {'modes' if arm.is_locked else 'margins'} {shlex.quote(name)}",
-        warnings=[Note(*text.split(": ", 1)) for text in _warnings(tables, arm, slenderness, error)]
-        + _slow_sampling(chain, omega),
+        warnings=[Note(*text.split(": ", 1)) for text in _warnings(tables, arm, slenderness, error, chain, omega)],
         law=[] if law is None else [Note(*each) for each in law.as_typed()],
         missing=[Note(f"[{table}]", text) for table, text in DEFAULTS.items() if table not in tables],
     )  # fmt: skip
 
 
-def _warnings(tables: Mapping[str, Any], arm: Arm, slenderness: float, error: float) -> Iterator[str]:
+def _warnings(
+    tables: Mapping[str, Any], arm: Arm, slenderness: float, error: float, chain: Chain, omega: float
+) -> Iterator[str]:
     """Yield the warnings of an arm: a motor without input, values that may have a wrong unit, a short link, C = 0."""
     if "motor" in tables and "input" not in tables:
         yield "input: hub_torque is assumed; with a [motor] give hub_torque, motor_voltage or motor_current"
@@ -117,15 +118,11 @@ def _warnings(tables: Mapping[str, Any], arm: Arm, slenderness: float, error: fl
             "link.damping = 0: undamped model, in which any delay destabilises a mode; "
             f"damping = {reference_damping(arm):.3g} in [link] is a damping ratio of 0.1 % in mode 1"
         )
-
-
-def _slow_sampling(chain: Chain, omega: float) -> list[Note]:
-    """Return the warning of a sampling period above half that of the first mode [rad/s]: samples cannot show it."""
-    longest = math.pi / omega
-    if chain.sampling.period <= longest:
-        return []
-    text = f"above half the period of the first mode, {longest:.3g} s, which is aliased; choose a tenth of that"
-    return [Note(f"sampling.period = {chain.sampling.period:g}", text)]
+    if chain.sampling.period > (longest := math.pi / omega):  # samples cannot show the mode
+        yield (
+            f"sampling.period = {chain.sampling.period:g}: above half the period of the first mode, {longest:.3g} s, "
+            "which is aliased; choose a tenth of that"
+        )
 
 
 def with_damping(tables: dict[str, Any], ratio: float | None) -> dict[str, Any]:

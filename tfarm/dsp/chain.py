@@ -171,8 +171,8 @@ class Chain:
     def is_linear(self) -> bool:
         """Whether there is neither quantisation nor saturation."""
         c = self.converters
-        steps = c.encoder_counts, c.moment_bits, c.moment_range, c.torque_bits, c.torque_range
-        return steps == (None,) * len(steps) and self.actuator.torque_limit == math.inf
+        ideal = Converters(hub_rate=c.hub_rate, rate_filter=c.rate_filter, arithmetic=c.arithmetic)
+        return c == ideal and math.isinf(self.actuator.torque_limit)
 
 
 def chain_or_usual(chain: object) -> Chain:

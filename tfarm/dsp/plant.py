@@ -127,15 +127,14 @@ def driven(arm: Arm, chain: Chain) -> tuple[Arm, Chain]:
     return replace(arm, hub=hub), replace(chain, actuator=replace(chain.actuator, hub_damping=0.0))
 
 
+# the simulations of one page need the same model some twenty times
+_modelled_once = lru_cache(maxsize=LISTS_KEPT)(modal_model)
+
+
 def undelayed_plant(arm: Arm, outputs: Sequence[str], count: int, x: float | None = None) -> Plant:
     """The arm with `count` flexible modes, its outputs not filtered; `x` [m] is the place of outputs along the arm."""
     must_have_free_hub(arm)
     return with_modes(_modelled_once(arm, tuple(outputs), count, x), count)
-
-
-@lru_cache(maxsize=LISTS_KEPT)  # the simulations of one page need the same model some twenty times
-def _modelled_once(arm: Arm, names: tuple[str, ...], count: int, x: float | None) -> ModalModel:
-    return modal_model(arm, names, count, x)
 
 
 def with_modes(model: ModalModel, count: int) -> Plant:

@@ -16,7 +16,7 @@ import numpy as np
 
 from tfarm.arm import AnyLaw, Arm, tracked
 from tfarm.arrays import LEAST_SIZE, Real
-from tfarm.dsp.chain import Chain, chain_or_usual
+from tfarm.dsp.chain import Chain, Converters, chain_or_usual
 from tfarm.dsp.discretise import RULE, rule_in_words, with_all_gains
 from tfarm.dsp.plant import MODES_USED
 from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, described, scenario
@@ -243,15 +243,8 @@ def _half_range(signal: Real) -> float:
 
 def ideal_chain(chain: Chain) -> Chain:
     """The chain with the same sampling and filters, and ideal converters: no steps, no ranges, no limit, float64."""
-    converters = replace(
-        chain.converters,
-        encoder_counts=None,
-        moment_bits=None,
-        moment_range=None,
-        torque_bits=None,
-        torque_range=None,
-        arithmetic="float64",
-    )
+    of = chain.converters
+    converters = Converters(hub_rate=of.hub_rate, rate_filter=of.rate_filter)
     return replace(chain, converters=converters, actuator=replace(chain.actuator, torque_limit=math.inf))
 
 
@@ -272,8 +265,8 @@ def simulate(
     `outputs` are recorded in addition, as "tip_rotation" or "strain@0.05".  Raises ParameterError for a locked hub, an
     algebraic loop, an unknown signal, a law in z whose period is not the chain's, and as `scenario` does.
     """
-    how: dict[str, Any] = {"count": count, "between": between, "outputs": outputs}
-    return simulated_run(arm, law, chain_or_usual(chain), scenario_name, duration, **how).simulation
+    arm, law, chain = *tracked(arm, law), chain_or_usual(chain)
+    return simulated(arm, law, chain, scenario(scenario_name, arm, chain, duration), count, between, outputs)[0]
 
 
 def drawn(arm: Arm, law: AnyLaw, chain: Chain, scenario_name: str, duration: float) -> Simulation:
@@ -298,8 +291,7 @@ def simulated(
 
     Gains at the hub follow the references of all their signals.
     """
-    ideal = ideal_chain(chain)
-    used = enough_modes(lambda n: Simulator(arm, ideal, task, law, count=n, outputs=outputs).run(), count)
+    used = enough_modes(lambda n: Simulator(arm, ideal_chain(chain), task, law, count=n, outputs=outputs).run(), count)
     return Simulator(arm, chain, task, law, count=used.modes, between=between, outputs=outputs).run(), used
 
 

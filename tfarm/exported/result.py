@@ -88,14 +88,16 @@ class ExportTask:
         shown = {}
         with suppress(ConvergenceError):
             shown = dict(facts_of(loop_card("sampled", self.arm, as_law(law), self.chain, found)))
-        warning = {} if is_certified(found) else {"warning": ANYWAY}
-        head = {"arm": self.arm.name, "controller": self.law.name, **warning}
-        sampling = self.chain.sampling
-        times = {
-            "sampling period [s]": repr(sampling.period),
-            "delay beyond this code [samples]": repr(sampling.delay_samples),
+        return {
+            "arm": self.arm.name,
+            "controller": self.law.name,
+            **({} if is_certified(found) else {"warning": ANYWAY}),
+            "sampling period [s]": repr(self.chain.sampling.period),
+            "delay beyond this code [samples]": repr(self.chain.sampling.delay_samples),
+            **shown,
+            "SHA-256 of the inputs": self.sha256,
+            "tfarm": version("tfarm"),
         }
-        return head | times | shown | {"SHA-256 of the inputs": self.sha256, "tfarm": version("tfarm")}
 
 
 def is_certified(found: Analysis) -> bool:
@@ -145,15 +147,11 @@ def write_into(folder: Path, contents: Mapping[str, bytes]) -> None:
 WRITERS = {  # module and function of `tfarm.exported` that make an `Export` of a task
     ("controller", "c"): "controller:c_controller",
     ("tuner", "c"): "tuner_code:c_tuner",
-    ("plant", "fmu"): "fmu:fmu",
-    ("controller", "fmu"): "fmu:fmu",
-    ("loop", "fmu"): "fmu:fmu",
-    ("plant", "mat"): "systems:mat",
-    ("controller", "mat"): "systems:mat",
-    ("loop", "mat"): "systems:mat",
-    ("plant", "py"): "systems:py",
-    ("controller", "py"): "systems:py",
-    ("loop", "py"): "systems:py",
+    **{
+        (what, form): function
+        for form, function in {"fmu": "fmu:fmu", "mat": "systems:mat", "py": "systems:py"}.items()
+        for what in ("plant", "controller", "loop")
+    },
 }
 
 

@@ -33,7 +33,7 @@ from tfarm.dsp.plant import USUAL_MODES, PulseTransfer, driven, sensed_plant
 from tfarm.dsp.stages import not_covered
 from tfarm.errors import require
 from tfarm.exported.result import Export, ExportTask, names_of
-from tfarm.exported.texts import comment, matlab_text, python_text, render
+from tfarm.exported.texts import comment, matlab_text, render
 from tfarm.files import is_standard_output, mat_content, write_file
 from tfarm.records import record
 from tfarm.reduced import BAND, ReducedModel, modal_model, reduce
@@ -164,8 +164,12 @@ def response_data(
     """Return the exact frequency response (outputs, 1, n) over a range [rad/s], clear of the poles on the axis."""
     omega = np.geomspace(*band, RESPONSE_POINTS)
     omega = omega[distance(omega, frequencies_around(arm, band[1])) > CLEAR_OF_POLES * omega]
-    names = {"exact_input": np.array([of], object), "exact_outputs": np.array(outputs, object)}
-    return {"omega": omega, "response": G(1j * omega)[:, None, :], **names}
+    return {
+        "omega": omega,
+        "response": G(1j * omega)[:, None, :],
+        "exact_input": np.array([of], object),
+        "exact_outputs": np.array(outputs, object),
+    }
 
 
 # ------------------------------------------------------------ those of a task
@@ -286,4 +290,4 @@ def plain(names: Iterable[str]) -> list[str]:
 
 def listed(names: Iterable[str]) -> str:
     """Return a literal of these names."""
-    return f"[{', '.join(map(python_text, plain(names)))}]"
+    return f"[{', '.join(map(ascii, plain(names)))}]"

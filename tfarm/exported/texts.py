@@ -1,7 +1,7 @@
 """The user's words in the languages of targets: identifiers, comments, quoted texts, and templates.
 
-No text of a user reaches a file but through one function here: `comment`, `identifiers`, `python_text`, `matlab_text`;
-XML is written by ElementTree.
+No text of a user reaches a file but through one function here: `comment`, `identifiers`, `matlab_text`, or Python's
+`ascii`; XML is written by ElementTree.
 """
 
 import re
@@ -43,11 +43,6 @@ def comment(words: str) -> str:
     for mark, instead in COMMENT_MARKS:
         line = line.replace(mark, instead)
     return line[:LONGEST_COMMENT].strip()
-
-
-def python_text(words: str) -> str:
-    """Return a literal of Python in ASCII."""
-    return ascii(words)
 
 
 def matlab_text(words: str) -> str:

@@ -263,7 +263,9 @@ class Word:
         relative += (3 if self.precision == FIXED else 1) * FLOATS["double"][1]
         V, A = abs(rounded - exact) + relative * abs(rounded), exact[:n, :n]
         sums, is_whole = absolute_sum(A, np.vstack([np.eye(n), exact[n, :n]]), np.hstack([np.eye(n), exact[:n, n:]]))
-        lost = lost_share(A, sums[:n, :n])
+        lost = math.inf  # share of a sum that the roundings of its powers in double can change
+        if np.isfinite(sums[:n, :n]).all():
+            lost = n * FLOATS["double"][1] * max(abs(np.linalg.eigvals(abs(A) @ sums[:n, :n])), default=0.0)
         if lost > MOST_LOST:
             return Bounds(np.full(n, np.inf), False, math.inf, math.inf)
         S, X = np.hsplit(sums * (1 + lost), [n])
@@ -300,13 +302,6 @@ class Word:
         rest = S @ np.r_[absolute, HALF_STEP * self.ranges[: len(at)] * (self.precision == FIXED)]
         bound = float(rest[-1] + loops[-1] @ least_solution(loops[:-1], rest[:-1]))
         return bound if bound < math.inf else None
-
-
-def lost_share(M: Real, sums: Real) -> float:
-    """Share of sum_k |M^k| that the roundings of its powers in double can change; infinite for a matrix that grows."""
-    if not np.isfinite(sums).all():
-        return math.inf
-    return len(M) * FLOATS["double"][1] * float(max(abs(np.linalg.eigvals(abs(M) @ sums)), default=0.0))
 
 
 def least_solution(P: Real, q: Real) -> Real:

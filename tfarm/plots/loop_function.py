@@ -101,24 +101,19 @@ def loop(found: Margins | LoopCurve, *, ax: Sequence[Axes]) -> None:
     draw_loops([(each.omega, each.L, _looks(each)) for each in sides], "|L| [dB]", upper, lower)
     for each in sides:
         if each.margins is not None:
-            _crossovers(each.margins, upper)
+            gain = [(w, 1.0) for w, _ in each.margins.gain_crossovers]
+            phase = [(w, 1 / t) for w, t in each.margins.phase_crossovers if w and t]
+            for marker, label, crossed in (
+                (PHASE_MARGIN, "gain crossovers, |L| = 1", gain), (GAIN, "phase crossovers, L < 0", phase)
+            ):  # fmt: skip
+                w, sizes = np.reshape(crossed, (-1, 2)).T
+                upper.plot(w, decibels(sizes), marker, ms=3.0, color=GREY, label=label)
             for omega, L, label, marker in decisive(each.margins):
                 size, angle = float(decibels(abs(L))), math.degrees(float(np.angle(L)))
                 upper.plot([omega], [size], **_marked(each, label, marker))
                 lower.plot([omega], [angle], **_marked(each, label, marker))
                 place, ends = (upper, (size, 0)) if marker == GAIN else (lower, (math.copysign(180, angle), angle))
                 place.plot([omega, omega], ends, color=INK, lw=1.6, ls=_looks(each)["ls"], zorder=4)
-
-
-def _crossovers(margins: LoopMargins, ax: Axes) -> None:
-    """A small mark at every |L| = 1, and at every L < 0."""
-    gain = [(w, 1.0) for w, _ in margins.gain_crossovers]
-    phase = [(w, 1 / t) for w, t in margins.phase_crossovers if w and t]
-    for marker, label, found in (
-        (PHASE_MARGIN, "gain crossovers, |L| = 1", gain), (GAIN, "phase crossovers, L < 0", phase)
-    ):  # fmt: skip
-        omega, size = np.reshape(found, (-1, 2)).T
-        ax.plot(omega, decibels(size), marker, ms=3.0, color=GREY, label=label)
 
 
 def _chart(L: Complex) -> tuple[Real, Real]:

@@ -226,18 +226,6 @@ def _draw_curve(curve: traces.TimeCurve, ax: Axes, colour: str, *, scale: float 
         ax.plot(curve.t, low, color=colour, lw=1.3, **looks)
 
 
-def _name_signals(arm: Arm, names: Sequence[str], ax: Sequence[Axes]) -> None:
-    """Along the axes: the signals with their units, the last being the input of the arm, and time."""
-    of_input = "motor torque [N m]" if arm.input_unit == "N m" else f"motor [{arm.input_unit}]"
-    labels = [
-        f"{of.label.replace('at x', 'of the tip')} [{of.unit}]"
-        for of in (OUTPUTS[name.partition("@")[0]] for name in names[:-1])
-    ]
-    for one, label in zip(ax, (*labels, of_input), strict=True):
-        one.axhline(0.0, color=GREY, lw=0.6)
-        one.set(xlabel=TIME, ylabel=label)
-
-
 def _draw_signal(ax: Axes, t: Real, y: Real, looks: tuple[str, str], every: int = 0, **how: Any) -> None:
     """A signal at even times; with `every` that of a sampled loop, with marks at the samples where these are few."""
     (colour, mark), step = looks, math.ceil(t.size / traces.MOST_LINE)
@@ -259,32 +247,33 @@ def step(found: Step, *, ax: Sequence[Axes]) -> None:
     The continuous-time loop is solid, the sampled one dashed; references are grey, with the settling band.  Of an
     unstable loop the part within the range of a stable one is drawn.
     """
-    _name_signals(found.arm, found.names, ax)
-    t, every = found.t[found.t <= _shown_until(found)], round(found.period / found.t[1])
-    for one, name in zip(ax, found.names, strict=True):
-        one.set_xlim(0.0, t[-1])
-        if (reference := found.reference.get(name)) is not None:
-            ends = np.sort(reference[-1] * np.array([1 - found.settling_band, 1 + found.settling_band]))
-            one.axhspan(*ends, color=FAINT, lw=0, alpha=0.6, zorder=0)
-            one.plot(t, reference[: t.size], color=GREY, lw=0.8, label=f"reference, {text(found.settling_band)}")
-        for loop, each in found.loops.items():
-            y, looks, label = each.signals[name][: t.size], OF_STABILITY[each.stability], f"{loop}, {each.stability}"
-            _draw_signal(one, t[: y.size], y, looks, every if each is found.sampled else 0, label=label)
-        stable = [each.signals[name] for each in found.loops.values() if each.hub]
-        if stable and len(stable) < len(found.loops):
-            low, high = stable[0].min(), stable[0].max()
-            one.set_ylim(low - OFF_FRAME * (high - low), high + OFF_FRAME * (high - low))
-
-
-def _shown_until(found: Step) -> float:
-    """End of the picture [s]: some time after every signal of a stable loop has settled, else that of the record."""
-    ends = [
+    arm = found.arm
+    labels = [
+        f"{of.label.replace('at x', 'of the tip')} [{of.unit}]"
+        for of in (OUTPUTS[name.partition("@")[0]] for name in found.names[:-1])
+    ]
+    labels.append("motor torque [N m]" if arm.input_unit == "N m" else f"motor [{arm.input_unit}]")
+    settled = [  # some time after every signal of a stable loop has settled
         math.inf if of.at_rest_after is None else SHOWN_SETTLED * of.at_rest_after
         for loop in found.loops.values()
         for of in (loop.hub, loop.tip, loop.root_moment, loop.torque)
         if of
     ]
-    return min(max(ends, default=math.inf), float(found.t[-1]))
+    t, every = found.t[found.t <= max(settled, default=math.inf)], round(found.period / found.t[1])
+    for one, name, label in zip(ax, found.names, labels, strict=True):
+        one.axhline(0.0, color=GREY, lw=0.6)
+        one.set(xlabel=TIME, ylabel=label, xlim=(0.0, t[-1]))
+        if (reference := found.reference.get(name)) is not None:
+            ends = np.sort(reference[-1] * np.array([1 - found.settling_band, 1 + found.settling_band]))
+            one.axhspan(*ends, color=FAINT, lw=0, alpha=0.6, zorder=0)
+            one.plot(t, reference[: t.size], color=GREY, lw=0.8, label=f"reference, {text(found.settling_band)}")
+        for loop, each in found.loops.items():
+            y, looks, key = each.signals[name][: t.size], OF_STABILITY[each.stability], f"{loop}, {each.stability}"
+            _draw_signal(one, t[: y.size], y, looks, every if each is found.sampled else 0, label=key)
+        stable = [each.signals[name] for each in found.loops.values() if each.hub]
+        if stable and len(stable) < len(found.loops):
+            low, high = stable[0].min(), stable[0].max()
+            one.set_ylim(low - OFF_FRAME * (high - low), high + OFF_FRAME * (high - low))
 
 
 FIGURES[Run] = lambda run: slew.figure(run.arm, run.simulation, run.scenario_in_words)

@@ -4,7 +4,7 @@ Each region is a list of intervals of one gain at each value of the other, with 
 and in `dsp`); nothing is read off a raster.  Edges are rounded as they are seen in a picture of that plane.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -14,7 +14,7 @@ from matplotlib.path import Path
 from matplotlib.ticker import LogLocator
 from scipy import ndimage
 
-from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback
+from tfarm.arm import PLANE, Arm, HubFeedback
 from tfarm.arrays import Real, Whole
 from tfarm.case import Comparison
 from tfarm.crossing import Window, pieces
@@ -214,14 +214,6 @@ def _undamped_boundary(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
         note(significant(omega, 4), (x.high, t), ax, (1.0, 0.05), xytext=(4, 0), fontsize=7.5)
 
 
-def draw_sampled(plane: GainMap | None, ax: Axes) -> None:
-    """Where the sampled loop is stable: hatched, its edge exact.  Nothing where it could not be settled."""
-    if plane is not None:
-        ms = plain(1e3 * plane.loop.chain.sampling.period)
-        label = f"stable when sampled every {ms} ms (first {plane.modes_used} modes)"
-        draw_region(plane.x, plane.stable_intervals, label, ax, hatch="////")
-
-
 def draw_region(
     across: Real, stable: Sequence[Sequence[Window]], label: str, ax: Axes, *, hatch: str = "", ls: Any = "-"
 ) -> None:
@@ -248,29 +240,6 @@ def draw_region(
         ax.vlines(x[-ends], low[-ends], high[-ends], **line)
     key = looks if hatch else looks | {"edgecolor": INK, "ls": ls, "lw": 1.0}
     ax.fill_between([], [], [], **key, label=safe(label) + ("" if parts else ": nowhere in this picture"))
-
-
-def draw_proven(arm: Arm, x: Axis, y: Axis, ax: Axes) -> None:
-    """The quarter of the plane that is proven at C = 0; at C > 0 only the line without moment feedback is."""
-    dashes, kind = ("-", "proven") if arm.is_undamped else ((0, (1, 1)), "not a proof here")
-    label = f"Lyapunov ({LYAPUNOV}): {kind}"
-    ax.plot([0, 0, x.high], [y.low, 1, 1], color=GREY, lw=2.2, ls=dashes, label=label)
-    if not arm.is_undamped:
-        ax.plot([0, x.high], [0, 0], color=GREY, lw=1.6, label=f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven")
-
-
-def law_mark(law: HubFeedback, is_best: bool, label: str, ax: Axes) -> None:
-    """One controller, as a diamond, or as a star."""
-    ax.plot(
-        *law.point, "*" if is_best else "D", ms=13.0 if is_best else 8.0, mfc=INK, mec="white", mew=1.0, zorder=7,
-        ls="none", label=label,
-    )  # fmt: skip
-
-
-def search_frame(bounds: Mapping[str, tuple[float, float]], ax: Axes) -> None:
-    """Bounds of the search of a design."""
-    (a, b), (c, d) = (bounds[name] for name in PLANE)
-    ax.plot([a, b, b, a, a], [c, c, d, d, c], color=GREY, lw=0.8, ls=(0, (1, 2)), label="bounds of its search")
 
 
 # ------------------------------------------------------------ continuous and sampled regions

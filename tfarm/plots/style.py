@@ -173,7 +173,9 @@ def picture(
                 pyplot.draw_if_interactive()  # type: ignore[no-untyped-call]
                 axes = figure(*found, new=pyplot.figure, **how).axes
             else:
-                axes = given_axes(ax, None if grid else len(rows))
+                axes, count = list(np.ravel(np.asarray(ax, dtype=object))), len(rows)
+                remedy = f"{count} axes, as figure.subplots({count}) makes them"
+                require(grid or count == len(axes), "ax", len(axes), remedy)
                 with style():
                     draw(*found, ax=axes[0] if is_one else axes, **how)
             return axes[0] if is_one else tuple(axes)
@@ -184,13 +186,6 @@ def picture(
         return shown
 
     return decorated
-
-
-def given_axes(ax: Any, count: int | None) -> list[Axes]:
-    """The axes that a picture is drawn in.  Raises ParameterError for another number of them than `count`, if any."""
-    axes = list(np.ravel(np.asarray(ax, dtype=object)))
-    require(count in (None, len(axes)), "ax", len(axes), f"{count} axes, as figure.subplots({count}) makes them")
-    return axes
 
 
 def placed_size(inches: tuple[float, float], is_grid: bool) -> tuple[float, float]:
@@ -228,22 +223,16 @@ def make_thin(figure: Figure) -> None:
             each.set(**{of: THIN * np.asarray(getattr(each, f"get_{of}")())})
 
 
-def fold_labels(figure: Figure) -> None:
-    """Fold long labels and titles; where several axes share the height, a long label has its unit on another line."""
-    for ax in figure.axes:
-        for text in (each for each in (*ax.get_children(), ax.xaxis.label) if isinstance(each, Text)):
-            text.set_text(folded(text.get_text(), LINE))
-        if len(figure.axes) > 1 and len(label := ax.get_ylabel()) > LONG_LABEL:
-            ax.set_ylabel(re.sub(r" +(?=\[)", "\n", label))
-
-
 def finish(drawn: Figure, words: str) -> None:
     """Legend and headline; at a place room for the legend and short lines of letters, and no headline if narrow."""
     place = _place.get()
     if place == "column":
         make_thin(drawn)
-    if place:
-        fold_labels(drawn)
+    for ax in drawn.axes if place else ():
+        for text in (each for each in (*ax.get_children(), ax.xaxis.label) if isinstance(each, Text)):
+            text.set_text(folded(text.get_text(), LINE))
+        if len(drawn.axes) > 1 and len(label := ax.get_ylabel()) > LONG_LABEL:  # axes that share the height
+            ax.set_ylabel(re.sub(r" +(?=\[)", "\n", label))
     for ax in drawn.axes if place == "phone" else ():
         for each in (ax, *ax.child_axes):
             each.minorticks_off()
@@ -252,7 +241,8 @@ def finish(drawn: Figure, words: str) -> None:
     legend = legend_below(drawn)
     drawn.set_figheight(drawn.get_figheight() + legend * bool(place))
     if place in ("", "page"):
-        headline(drawn, words)
+        lines = folded(words.replace(" = ", "\u00a0=\u00a0"), round(11.5 * drawn.get_figwidth()))
+        drawn.suptitle(safe(lines), x=0.012, ha="left", fontsize=10.5, color=INK)
 
 
 def legend_below(figure: Figure) -> float:
@@ -274,12 +264,6 @@ def legend_below(figure: Figure) -> float:
             return float(box.height / figure.dpi)
         legend.remove()
     return 0.0
-
-
-def headline(figure: Figure, text: str) -> None:
-    """Text above everything, at the left, its lines folded where they do not fit."""
-    lines = folded(text.replace(" = ", "\u00a0=\u00a0"), round(11.5 * figure.get_figwidth()))
-    figure.suptitle(safe(lines), x=0.012, ha="left", fontsize=10.5, color=INK)
 
 
 def folded(text: str, letters: int) -> str:
@@ -384,12 +368,6 @@ def save_figure(figure: Figure, folder: Path, stem: str, formats: tuple[str, ...
     """The figure as folder/stem.svg and .png, or as one of these."""
     for kind, content in zip(formats, _drawn(figure, formats, dpi), strict=True):
         (folder / f"{stem}.{kind}").write_bytes(content)
-
-
-def save_column(figure: Figure, folder: Path, stem: str) -> None:
-    """The same picture drawn for the column of a paper, as folder/stem.pdf."""
-    with column():
-        save_figure(figure.again(), folder, stem, formats=("pdf",))  # type: ignore[attr-defined]
 
 
 def save_picture(draw: Callable[[Any], Figure], record: Any, path: Path) -> None:

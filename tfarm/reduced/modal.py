@@ -170,7 +170,10 @@ def modal_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) -
     k, share = G.system, G.share
     wanted = list(G.rows)
     for each in wanted:
-        must_be_proper(k, each, share)
+        remedy = "a power of s times the input, which no state space has; choose another output"
+        require(not (each.power and constant_of(k, each, share)), "outputs", each.name, remedy)
+        remedy = f"s^{each.power} makes it improper, which no state space is; choose a lower derivative"
+        require(each.power <= MOST_PROPER, "outputs", each.name, remedy)
     table = modes(arm, max(1, int(count)))
     collocated = OUTPUTS["root_moment" if arm.is_locked else "hub_angle"]
     index, p, single = _eigenvalues(arm, table)
@@ -240,14 +243,6 @@ def _at_rest(G: TransferFunction, single: Real, table: Modes) -> tuple[Real, NDA
         expansion = np.c_[expansion[:, :2], without_slow_pole(G.system, G.rows, G.share)]
         kept = abs(single) > slowest
     return expansion, kept
-
-
-def must_be_proper(k: System, wanted: Output, share: float) -> None:
-    """Raise ParameterError for an output that no state space of finite order has."""
-    remedy = "a power of s times the input, which no state space has; choose another output"
-    require(not (wanted.power and constant_of(k, wanted, share)), "outputs", wanted.name, remedy)
-    remedy = f"s^{wanted.power} makes it improper, which no state space is; choose a lower derivative"
-    require(wanted.power <= MOST_PROPER, "outputs", wanted.name, remedy)
 
 
 def _eigenvalues(arm: Arm, table: Modes) -> tuple[NDArray[np.int64], Complex, Real]:

@@ -225,15 +225,29 @@ def draw_map_of_arm(data: MapOfArm, *, ax: Axes) -> None:
     regions.ground(found, x, y, ax)
     regions.contours(*data.coarse.axes, np.where(data.coarse.unstable == 0, data.damping, np.nan), ax)
     regions.draw_boundary(found, data.edge, x, y, ax)
-    regions.draw_sampled(data.sampled, ax)
+    if (plane := data.sampled) is not None:  # else it could not be settled
+        ms = plain(1e3 * plane.loop.chain.sampling.period)
+        label = f"stable when sampled every {ms} ms (first {plane.modes_used} modes)"
+        regions.draw_region(plane.x, plane.stable_intervals, label, ax, hatch="////")
     if case.arm.is_uniform:
-        regions.draw_proven(case.arm, x, y, ax)
+        # at C > 0 only the line without moment feedback is proven
+        dashes, kind = ("-", "proven") if case.arm.is_undamped else ((0, (1, 1)), "not a proof here")
+        label = f"Lyapunov ({style.LYAPUNOV}): {kind}"
+        ax.plot([0, 0, x.high], [y.low, 1, 1], color=style.GREY, lw=2.2, ls=dashes, label=label)
+        if not case.arm.is_undamped:
+            label = f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven"
+            ax.plot([0, x.high], [0, 0], color=style.GREY, lw=1.6, label=label)
     points = (default_gains(case.arm), *([] if designed is None else [designed.law]))
     for each, gains in zip(case.in_s, points, strict=True):
         brief = brief_on(case.arm, each.law, case.chain)
-        regions.law_mark(gains, each.key == "best", f"{each.title};\n{brief.short}", ax)
+        mark, size = ("*", 13.0) if each.key == "best" else ("D", 8.0)
+        looks: dict[str, Any] = {"ms": size, "mfc": style.INK, "mec": "white", "mew": 1.0, "zorder": 7, "ls": "none"}
+        ax.plot(*gains.point, mark, label=f"{each.title};\n{brief.short}", **looks)
     if designed is not None:
-        regions.search_frame(designed.bounds, ax)
+        (a, b), (c, d) = (designed.bounds[name] for name in PLANE)
+        ax.plot(
+            [a, b, b, a, a], [c, c, d, d, c], color=style.GREY, lw=0.8, ls=(0, (1, 2)), label="bounds of its search"
+        )
 
 
 def map_data(data: MapOfArm) -> Sequence[Column]:

@@ -44,7 +44,7 @@ from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.fitting.recording import MeasuredRun
 from tfarm.loop.loop import Loop
-from tfarm.plots.style import Figure, drawn_for, gains_words, save_column, save_figure
+from tfarm.plots.style import Figure, drawn_for, gains_words, save_figure
 from tfarm.records import record
 from tfarm.response.signals import Signals, sign_of
 from tfarm.schema import Column, Table, quantities, save_table, text, to_json
@@ -218,7 +218,8 @@ def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> 
             narrow = block.figure.again()  # type: ignore[attr-defined]
             save_figure(narrow, folder / PICTURES, f"{block.stem}-narrow", formats=("svg",))
     if is_paper:
-        save_column(block.figure, folder / PICTURES, block.stem)
+        with drawn_for("column"):
+            save_figure(block.figure.again(), folder / PICTURES, block.stem, formats=("pdf",))  # type: ignore[attr-defined]
     columns = tuple(
         replace(each, of=[kept_digits((x,), DRAWN_DIGITS)[0] if isinstance(x, float) else x for x in each.of])
         for each in block.data

@@ -306,8 +306,7 @@ def growth_words(each: Controller, found: verdict.Verdict, chain: Chain) -> str:
         arm, law = tracked(each.arm, each.law)
         run = Simulator(arm, chain, longer.scenario(T), law, count=found.modes_used).run().at_samples
         settled = run.hub_angle[run.t <= end][-1]
-        visible = 0.05 * abs(measured.step)
-        away = abs(run.hub_angle - settled) > visible
+        away = abs(run.hub_angle - settled) > 0.05 * abs(measured.step)  # which shows
         shown = run.t[away & (run.t > end)].tolist()
     return prose("growth", name=each.name, found=found, growth=growth, measured=measured, shown=shown)
 

@@ -214,18 +214,6 @@ def proof_tables(proofs: Sequence[ArmProof]) -> list[Table]:
     ]
 
 
-def accuracy_table(proofs: Sequence[ArmProof]) -> Table:
-    """The worst error of each arm's two responses."""
-    errors = {output: [dict(proof.errors).get(output) for proof in proofs] for output in PROVEN_OUTPUTS}
-    return sheet("accuracy", (
-        Column("arm", "arm", of=[proof.name for proof in proofs]),
-        Column("band_rad_s", "from … to, rad/s", of=[" … ".join(significant(x, 4) for x in p.band) for p in proofs]),
-        *(Column(output, output.replace("_", " "), of=own,
-                 shown=["zero throughout" if error is None else scientific(error, 2) for error in own])
-          for output, own in errors.items()),
-    ))  # fmt: skip
-
-
 def published_tables(found: published.Validation) -> list[Table]:
     """The sources of printed numbers and how many of each agree; the numbers that differ, by reason; all of them."""
     agrees = [[row.agrees for row in found.rows if row.source == source.key] for source in found.sources]
@@ -234,17 +222,6 @@ def published_tables(found: published.Validation) -> list[Table]:
         sheet("sources", (*table(found.sources).columns, *counts)),
         sheet("differences", table(found.differences)),
         sheet("published", table(found.rows)),
-    ]
-
-
-def again_tables(proofs: Sequence[ArmProof]) -> list[Table]:
-    """The hashes of the arms' files, and the versions that computed this."""
-    found = {"tfarm": tfarm.__version__, "python": platform.python_version(), **{p: version(p) for p in PACKAGES}}
-    return [
-        sheet("inputs", table(proofs, ("name", "source", "sha256"))),
-        sheet(
-            "versions", [Column("package", "package", of=list(found)), Column("version", "version", of=found.values())]
-        ),
     ]
 
 
@@ -323,8 +300,19 @@ def write_trust(
     """index.html and its tables, into a folder of their own."""
     folder.mkdir()
     found = published.Validation(tuple(printed))
-    blocks = {"proofs": proof_tables(proofs), "accuracy": [accuracy_table(proofs)],
-              "published": published_tables(found), "again": again_tables(proofs)}  # fmt: skip
+    versions = {"tfarm": tfarm.__version__, "python": platform.python_version(), **{p: version(p) for p in PACKAGES}}
+    worst = {output: [dict(proof.errors).get(output) for proof in proofs] for output in PROVEN_OUTPUTS}
+    accuracy = (
+        Column("arm", "arm", of=[proof.name for proof in proofs]),
+        Column("band_rad_s", "from … to, rad/s", of=[" … ".join(significant(x, 4) for x in p.band) for p in proofs]),
+        *(Column(output, output.replace("_", " "), of=own,
+                 shown=["zero throughout" if error is None else scientific(error, 2) for error in own])
+          for output, own in worst.items()),
+    )  # fmt: skip
+    columns = Column("package", "package", of=list(versions)), Column("version", "version", of=versions.values())
+    again = [sheet("inputs", table(proofs, ("name", "source", "sha256"))), sheet("versions", columns)]
+    blocks = {"proofs": proof_tables(proofs), "accuracy": [sheet("accuracy", accuracy)],
+              "published": published_tables(found), "again": again}  # fmt: skip
     sections = {name: save_section(PageSection(blocks=own), folder) for name, own in blocks.items()}
     save_table(table(audited, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation"), folder / DATA)
     errors = [error for proof in proofs for _, error in proof.errors]

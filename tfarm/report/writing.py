@@ -427,8 +427,7 @@ def write_study(found: Study) -> Path:
     folder = found.parts.folder
     with place_in(folder, "--out") as made:
         with drawn_for("page"):
-            drawn = study_sections(found)
-        sections = [save_section(each, made) for each in drawn]
+            sections = [save_section(each, made) for each in study_sections(found)]
         title = f"{found.arm}: study of {how_many(found.rows, 'arm')}"
         page = render("study.html", title=title, sections=sections, explained=explained, found=found)
         write_text(made / "index.html", page)
