@@ -110,7 +110,7 @@ def test_every_link_leads_somewhere_and_none_leaves_the_disk(pages):
         scripts = {"script"} if page.name != "live.html" else set()  # the one page that answers while one points
         assert not links.tags & ({"link", "iframe", "object", "b"} | scripts)
         text = page.read_text(encoding="utf-8")
-        assert "http" not in text
+        assert "http" not in text.replace("<meta http-equiv=", "")  # the policy that refuses other addresses
         assert "@import" not in text
         assert "url(" not in text
 
