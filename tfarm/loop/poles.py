@@ -238,8 +238,9 @@ def slow_poles(loop: Loop, below: float) -> Complex:
     slow = slow[(slow != 0) & (abs(slow) <= below)]
     exact = slow.copy()
     for _ in range(SLOW_STEPS if slow.size else 0):
-        at = loop.function(exact)
-        exact = exact - at.value / at.slope
+        with np.errstate(all="ignore"):  # a start whose slope is rounding diverges, and is left out
+            at = loop.function(exact)
+            exact = exact - at.value / at.slope
     return exact[abs(exact - slow) <= NEAR_RIGID * abs(slow)]
 
 
