@@ -104,7 +104,7 @@ def _passing_delay(model: Model, L: Complex) -> Real:
 
 
 def delay_score(model: Model, L: Complex, poles: Complex) -> Real:
-    """Minus that delay, times 1 + damping ratio at the longest one: many laws reach it, and it says no more of them."""
+    """Minus that delay, times 1 + damping ratio at the longest one, so that damping decides among such laws."""
     late = delay(model, L)
     is_longest = late >= (model.period or 1.0) * LONGEST_MARGIN
     return np.where(is_longest, -late * (1 + damping_of(model, poles)), -late)
