@@ -1,15 +1,18 @@
 """Speed and accuracy, compared with other packages: `make bench`, kept in reports/bench.json.
 
-Nothing here is a test: times depend on the machine, so they are medians of processor time in one process, in which what
-is compared takes turns, on one thread of BLAS.  Every timed call is on an arm and a law that this process has not seen,
-so that no cache has anything of them; what is made beforehand is named as prepared.  The same calls on plausible arms
-drawn at random have a median and a worst.
+Nothing here is a test: times depend on the machine, so they are medians of processor time in one process, in which
+what is compared takes turns, on one thread of BLAS; those of commands are of processes of their own. Every timed call
+is on an arm and a law that this process has not seen, so that no cache has anything of them; what is made beforehand
+is named as prepared. The same calls on plausible arms drawn at random have a median and a worst.
 """
 
 import itertools
 import json
 import math
+import os
 import platform
+import resource
+import subprocess
 import sys
 import tempfile
 import time
@@ -177,6 +180,35 @@ def appendix(points):
     return lambda subject: lambda: values(subject.arm)
 
 
+def four_by_four(points):
+    """The same by the paper's 4x4 system in float64, all points at once; a growing wave is measured from the tip."""
+    s = axis(points)
+    return lambda subject: lambda: solved(subject.arm, s)
+
+
+def solved(arm, s):
+    """The three outputs (3, points) by (A.1), (A.2) and one solution of each 4x4 system."""
+    link, payload, L = arm.link, arm.payload, arm.link.length
+    EI, kGA, s2 = link.EI * (1 + link.damping * s), link.kGA, s * s
+    stretch, shear = link.rhoI / EI, link.rhoA / kGA  # rho/(E(1 + C s)) and rho/(kappa G)
+    inner = np.sqrt((stretch - shear) ** 2 * s2 * s2 - 4 * link.rhoA * s2 / EI)
+    waves = [np.sqrt(((stretch + shear) * s2 + inner) / 2), np.sqrt(((stretch + shear) * s2 - inner) / 2)]
+    l = np.stack([waves[0], waves[1], -waves[0], -waves[1]], axis=-1)
+    EI, s2 = EI[:, None], s2[:, None]
+    gamma, over, grows = l - shear * s2 / l, np.exp(-abs(l.real) * L + 1j * l.imag * L), l.real > 0
+    turned = np.exp(-abs(l.real) * L - 1j * l.imag * L)
+    tip, root = np.where(grows, 1, over), np.where(grows, turned, 1)
+    rows = [
+        (payload.mass * s2 + link.rhoA * s2 / l) * tip,
+        gamma * (payload.inertia * s2 + EI * l) * tip,
+        root,
+        (arm.hub.inertia * s2 - EI * l) * gamma * root,
+    ]
+    k = np.linalg.solve(np.stack(rows, axis=1), np.array([0, 0, 0, 1.0])[:, None])[..., 0]
+    angle = (gamma * k * root).sum(axis=1)
+    return np.stack([angle, link.EI * (gamma * l * k * root).sum(axis=1), (k * tip).sum(axis=1)])
+
+
 def plane(law):
     """The gains of a map, about those of a law."""
     return abs(law.K1) * np.linspace(1 / 30, 50 / 3, 200), np.linspace(-0.5, 1.5, 200)
@@ -276,6 +308,11 @@ def responses():
                 f"response, prepared: {subject.arm.name}", response(n), exponentials(n), "two exponentials", n, rounds,
                 subject, error=error, **at_random,
             )  # fmt: skip
+    few = axis(100)
+    yield compared(
+        "response by NumPy, 4x4 systems", four_by_four(1000), response(1000), "tfarm, prepared", 1000, 20, LAB,
+        error=response_error(LAB.arm, few, solved(LAB.arm, few)),
+    )  # fmt: skip
     ours, (theirs,) = timed([response(100)], 50, LAB), timed([appendix(100)], 1, LAB)[0]
     yield Row("response by mpmath, 30 digits", 100, theirs / 100, theirs / np.median(ours), "tfarm")
 
@@ -342,10 +379,36 @@ def studies():
     yield Row("study of modes, two processes", n, taken[2] / n, taken[1] / taken[2], "as fast as one")
 
 
+def of_process(*words, **environment):
+    """Processor time of a Python process with these arguments and environment."""
+
+    def used():
+        times = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return times.ru_utime + times.ru_stime
+
+    before = used()
+    subprocess.run([sys.executable, *words], env=os.environ | environment, capture_output=True, check=True)
+    return used() - before
+
+
+def commands():
+    """Commands as a shell runs them: the first ones of a new machine, the shortest one, a report."""
+    tfarm_of, arm = ("-m", "tfarm"), LAB.arm.name
+    with tempfile.TemporaryDirectory() as folder:
+        first = [
+            of_process(*tfarm_of, ask, arm, NUMBA_CACHE_DIR=folder) for ask in ("modes", "margins", "simulate", "tune")
+        ]
+        yield Row("modes, margins, simulate, tune: nothing compiled", 4, sum(first) / 4)
+        again = [(of_process(*tfarm_of, "modes", arm), of_process("-c", "import numba")) for _ in range(9)]
+        ours, theirs = np.array(again).T
+        yield Row("modes, compiled before", 1, np.median(ours), np.median(ours / theirs), "import numba")
+        yield Row("report of an arm", 1, of_process(*tfarm_of, "report", arm, "--out", folder))
+
+
 def main(path):
     """Measure, print, keep."""
     rows = []
-    for row in itertools.chain(*(group() for group in (responses, spectra, loops, loci, studies))):
+    for row in itertools.chain(*(group() for group in (responses, spectra, loops, loci, studies, commands))):
         rows.append(row)
         ratio = "" if row.ratio is None else f", {row.ratio:.3g} x {row.to}"
         error = "" if row.error is None else f", largest error {row.error:.1e}"

@@ -123,3 +123,15 @@ def test_only_bounded_caches_keep_anything_of_an_arm():
     assert caches.grown(before) == set()
     assert [each.cache_info().misses for each in known] == misses
     assert not hasattr(LOADED.arm, "__dict__")
+
+
+def test_the_peer_of_the_response_solves_the_same_equations():
+    arm, s = LOADED.arm, bench.axis(20)
+    assert np.allclose(bench.solved(arm, s), tfarm.transfer(arm, list(bench.OUTPUTS))(s), rtol=1e-9, atol=0)
+
+
+def test_the_time_of_a_command_is_that_of_its_process():
+    """A loop of as much processor time as is asked for, in a process that is told so by its environment."""
+    loop = "import os, time\nwhile time.process_time() < float(os.environ['LONG']): pass"
+    short, long = (bench.of_process("-c", loop, LONG=each) for each in ("0.2", "0.7"))
+    assert 0.2 < short < 0.7 < long
