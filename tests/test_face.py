@@ -7,7 +7,8 @@ import pytest
 import tfarm
 from tests.shared import thinned
 
-HEAVY = ("control", "matplotlib", "matplotlib.pyplot", "sympy", "scipy.signal", "scipy.stats", "scipy.optimize")
+HEAVY = ("control", "matplotlib", "matplotlib.pyplot", "sympy", "mpmath",
+         "scipy.linalg", "scipy.signal", "scipy.stats", "scipy.optimize")  # fmt: skip
 
 
 def loaded_after(*codes):

@@ -39,7 +39,8 @@ AT_THE_TOP = ("name", "assumptions", "theory", "input")  # keys before the first
 class StrictTable(BaseModel):
     """A table without unknown keys and conversions."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+    # each is built at its first use: most files have few of the tables
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, defer_build=True)
 
 
 class TomlTable(StrictTable):

@@ -8,17 +8,32 @@ import this module.
 import hashlib
 import sys
 from collections.abc import Callable
+from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from numba import config, njit
 from numba.core import event, types
+from numba.core.caching import FunctionCache
 from numba.core.extending import intrinsic
+from numba.core.runtime import rtsys
+from numba.np import linalg
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _HERE = Path(__file__).parent
 OPTIONS = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
+
+
+class _Kept(FunctionCache):  # type: ignore[misc]  # numba comes without types
+    """Kernels on disk, loaded without numba's tables of every function it knows, which only compiling reads."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the kernel of a signature, None where it is not kept; numba's own fills those tables first."""
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
 
 def compiled(function: _Function) -> _Function:
@@ -26,14 +41,14 @@ def compiled(function: _Function) -> _Function:
 
     Its cache is below the user's cache folder of numba, or else below this room.
     """
+    kernel = njit(**OPTIONS)(function)
     parent = config.CACHE_DIR
     config.CACHE_DIR = str(_CACHE)
-    try:
-        return njit(cache=True, **OPTIONS)(function)
-    except (RuntimeError, OSError):  # no folder for the cache can be written
-        return njit(**OPTIONS)(function)
-    finally:
-        config.CACHE_DIR = parent
+    # no folder for the cache can be written
+    with suppress(RuntimeError, OSError):
+        kernel._cache = _Kept(function)
+    config.CACHE_DIR = parent
+    return kernel
 
 
 def inlined(function: _Function) -> _Function:
@@ -78,6 +93,11 @@ class _FirstUse(event.Listener):  # type: ignore[misc]  # numba comes without ty
 
 
 event.register("numba:compile", _FirstUse())
+# At their import numba's functions of arrays look for a BLAS by loading scipy.linalg, a tenth of a short command.  No
+# kernel calls it, and where one did, numba would look again as it compiles it.
+_look_for_blas, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+import_module("numba.np.arraymath")
+linalg.ensure_blas = _look_for_blas
 
 if TYPE_CHECKING:
 

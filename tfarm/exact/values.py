@@ -25,7 +25,6 @@ from tfarm.errors import CertificationError, ParameterError, must_be_known, requ
 from tfarm.records import record
 from tfarm.schema import Quantity
 
-from . import appendix
 from .balls import Ball, Sweep, first_success, nearest_float, point, rational
 from .layout import Layout, Reading, readings
 from .outputs import Output
@@ -357,6 +356,8 @@ def slow_values(method: Method, arm: Arm, k: System, wanted: Sequence[Output], s
     """
     if method == "balls":
         return np.array([[value_with_care(k, each, complex(at), each.share(x)) for at in s] for each in wanted])
+    from . import appendix  # here: mpmath takes a while to load
+
     must_be_of_appendix(arm, arm.theory, wanted)
     place, digits = x * arm.link.length, APPENDIX_DIGITS
     return np.array(

@@ -18,7 +18,6 @@ from tfarm.arm.checks import on_the_arm, whole
 from tfarm.arrays import Real, Whole
 from tfarm.digits import DOUBLE_DIGITS, general, singly
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.exact.appendix import natural_frequency, roots_near
 from tfarm.exact.system import System, shear_flexibility, system_of
 from tfarm.exact.values import (
     APPENDIX_DIGITS,
@@ -95,6 +94,8 @@ class Modes(Tabled):
         Under the Timoshenko theory each is also confirmed as a root of the paper's Delta(s), by mpmath.
         Raises ConvergenceError where a digit is not determined (a double frequency) or Delta has no root there.
         """
+        from tfarm.exact.appendix import roots_near  # here: mpmath takes a while to load
+
         digits = max(digits, FEWEST_LISTED)
         flexible = [refine(self._k, float(omega), digits) for omega in self.natural_frequency[self._rigid :]]
         for text in flexible if self.theory == "timoshenko" and self.arm.is_uniform else ():
@@ -115,6 +116,8 @@ class Modes(Tabled):
             brackets = self.certify(BEYOND_DOUBLE).brackets
             flexible = [float((Fraction(lower) + Fraction(upper)) / 2) for lower, upper in brackets]
         else:
+            from tfarm.exact.appendix import natural_frequency  # here: mpmath takes a while to load
+
             must_be_of_appendix(self.arm, self.theory)
             starts = self.natural_frequency[self._rigid :].tolist()
             flexible = [float(natural_frequency(self.arm, omega, APPENDIX_DIGITS)) for omega in starts]
