@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from numba import config, njit
 from numba.core import event, types
 from numba.core.extending import intrinsic
+from numba.core.types.misc import unliteral
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _HERE = Path(__file__).parent
@@ -29,16 +30,30 @@ def compiled(function: _Function) -> _Function:
     parent = config.CACHE_DIR
     config.CACHE_DIR = str(_CACHE)
     try:
-        return njit(cache=True, **OPTIONS)(function)
+        return _without_literals(njit(cache=True, **OPTIONS)(function))
     except (RuntimeError, OSError):  # no folder for the cache can be written
-        return njit(**OPTIONS)(function)
+        return _without_literals(njit(**OPTIONS)(function))
     finally:
         config.CACHE_DIR = parent
 
 
 def inlined(function: _Function) -> _Function:
-    """Return a small function compiled and inlined into its callers, so that loops over it vectorise."""
-    return njit(forceinline=True, **OPTIONS)(function)
+    """Return a function compiled and inlined into the kernels that call it, so that loops over it vectorise."""
+    kernel = _without_literals(njit(forceinline=True, no_cpython_wrapper=True, **OPTIONS)(function))
+    kernel._insert = lambda *_: None  # what Python would call: a null pointer
+    kernel._compile_for_args = _refuse
+    return kernel
+
+
+def _refuse(*_: Any) -> None:
+    raise TypeError("an inlined kernel is called by kernels alone; python_of(it) is for Python")
+
+
+def _without_literals(kernel: Any) -> Any:
+    """Return a kernel that others call with the type of a constant: numba would compile it anew for each value."""
+    template_for = kernel.get_call_template
+    kernel.get_call_template = lambda args, kws: template_for([unliteral(each) for each in args], kws)
+    return kernel
 
 
 def python_of(function: Any) -> Callable[..., Any]:
@@ -72,7 +87,7 @@ class _FirstUse(event.Listener):  # type: ignore[misc]  # numba comes without ty
     def on_start(self, _: Any) -> None:
         if not self.is_silent:
             self.is_silent = True
-            print("tfarm: compiling kernels, once (about a minute)", file=sys.stderr)
+            print("tfarm: compiling kernels, once (about half a minute)", file=sys.stderr)
 
     def on_end(self, _: Any) -> None: ...
 
