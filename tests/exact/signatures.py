@@ -1,12 +1,15 @@
-"""Kernels that numba has compiled or loaded for more than one signature where one would do.
+"""The kernels of the usual commands: compiled in one process, and those with more than one signature.
 
-Real and complex numbers, two precisions, and counts of tuples may have one each; layouts, flags of arrays and literals
-may not.  With a warm cache only kernels that Python calls are seen, with an empty one those that kernels call too.
+    python -m tests.exact.signatures           # compiles them, with a line for each command: the end of `make install`
+
+Real and complex numbers, two precisions, and counts of tuples may have a signature each; layouts, flags of arrays and
+literals may not.  With a warm cache only kernels that Python calls are seen, with an empty one those that kernels call.
 """
 
 import gc
 import io
 import json
+import sys
 from collections import Counter
 from contextlib import redirect_stderr, redirect_stdout
 from itertools import chain
@@ -17,12 +20,13 @@ from numba.core.registry import CPUDispatcher
 from tfarm.cli.running import run
 
 COMMANDS = (
-    "modes sasaki2012",
+    "modes sasaki2012-lab",
+    "modes tests/data/quanser-2dsfl/rig.toml",
     "margins sasaki2012",
     "simulate sasaki2012-lab --duration 0.1",
+    "sampled sasaki2012-lab",
     "tune sasaki2012-lab --trials 1",
     "tune sasaki2012-lab --trials 1 --mode online",
-    "sampled sasaki2012-lab",
 )
 
 
@@ -52,10 +56,22 @@ def compiled_twice(*kernels):
     }
 
 
+def run_all():
+    """Run the commands, which compile what they call; what they print is not shown."""
+    for n, command in enumerate(COMMANDS, 1):
+        print(f"compiling kernels {n} of {len(COMMANDS)} (tfarm {command})", file=sys.stderr, flush=True)
+        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()) as said:
+            code = run(command.split())
+        assert code == 0, said.getvalue()
+
+
 def save(file):
-    """Run the commands and write what was compiled twice since this process began."""
+    """Run the commands and write what has been compiled twice since this process began."""
     gc.unfreeze()
-    for command in COMMANDS:
-        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
-            assert run(command.split()) == 0, command
+    with redirect_stderr(io.StringIO()):
+        run_all()
     file.write_text(json.dumps(compiled_twice()), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    run_all()
