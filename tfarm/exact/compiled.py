@@ -2,7 +2,7 @@
 
 numba keys a cached function by its own file only and ignores an edited callee in another file (numba 0.68).  So the
 cache of this package is in a folder named by a hash of all sources of compiled code: those of this room, and those that
-import this module.
+import this module, but for those that only take the Python function of a kernel.
 """
 
 import hashlib
@@ -71,7 +71,7 @@ def _source_hash() -> str:
     digest = hashlib.sha256()
     for source in sorted(_HERE.parent.rglob("*.py")):
         text = source.read_bytes()
-        if source.parent == _HERE or b"exact.compiled import" in text:
+        if b"import python_of\n" not in text and (source.parent == _HERE or b"exact.compiled import" in text):
             digest.update(text)
     return digest.hexdigest()[:16]
 
