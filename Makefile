@@ -120,9 +120,8 @@ clean: ## remove everything that was generated
 	@find tfarm tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # pip alone would byte-compile on one core, with every package's own tests and with what is never imported again: itself
-# and what mypy has as machine code.  Meanwhile six commands compile the numerical kernels, which numba then keeps on
-# disk: two at a time that need different ones.  A rig under a law is half of it, and without it a report's two
-# processes would each compile those.
+# and what mypy has as machine code.  Meanwhile one process compiles the numerical kernels, which numba then keeps on
+# disk: two would each compile those that kernels call.
 NOT_COMPILED := /tests?/|/(pip|setuptools|pkg_resources|mypy|mypyc)/|/pygments/(lexers|styles)/
 $(INSTALLED): pyproject.toml requirements.lock
 	$(if $(shell $(PYTHON) -c 'import sys; print("yes" * (sys.version_info >= (3, 11)))' 2>/dev/null),,$(error \
@@ -131,12 +130,8 @@ $(INSTALLED): pyproject.toml requirements.lock
 	@$(PYTHON) -m venv .venv
 	@$(PIP) --no-compile -e '.[dev]'
 	@touch $@
-	@{ $(BIN)/tfarm modes sasaki2012 --count 1 > /dev/null && { \
-		$(BIN)/python -m compileall -q -x '$(NOT_COMPILED)' .venv/lib tfarm tests || true; } && \
-		$(BIN)/tfarm poles sasaki2012-lab > /dev/null && $(BIN)/tfarm simulate sasaki2012-lab > /dev/null; } & \
-		$(BIN)/tfarm simulate $(RIG)/rig.toml --law $(RIG)/lqg.toml --duration 0.1 > /dev/null && \
-		$(BIN)/tfarm tune sasaki2012-lab --trials 1 > /dev/null && \
-		$(BIN)/tfarm tune sasaki2012-lab --trials 1 --mode online > /dev/null && wait $$!
+	@{ $(BIN)/python -m compileall -q -x '$(NOT_COMPILED)' .venv/lib tfarm tests || true; } & \
+		$(BIN)/python -m tests.exact.signatures && wait $$!
 
 # pip itself knows only the newest versions
 $(LOWEST)/.installed: pyproject.toml

@@ -1,8 +1,12 @@
-"""Kernels are compiled once, and a line says so."""
+"""Kernels are compiled once, and a line says so; those without an entry for Python refuse to be called from it."""
 
 import os
 import subprocess
 import sys
+
+import pytest
+
+from tfarm.exact.compiled import inlined, python_of
 
 KERNELS = """
 from tfarm.exact.compiled import compiled
@@ -28,4 +32,11 @@ def test_the_first_compilation_is_announced_once_and_a_kept_kernel_is_not(tmp_pa
         for _ in range(2)
     ]
     assert [run.stdout for run in runs] == ["3.0 4.5\n"] * 2
-    assert [run.stderr for run in runs] == ["tfarm: compiling kernels, once (about a minute)\n", ""]
+    assert [run.stderr for run in runs] == ["tfarm: compiling kernels, once (about half a minute)\n", ""]
+
+
+def test_an_inlined_kernel_refuses_python_where_it_would_call_a_null_pointer():
+    half = inlined(lambda x: 0.5 * x)
+    with pytest.raises(TypeError, match="called by kernels alone"):
+        half(3.0)
+    assert python_of(half)(3.0) == 1.5

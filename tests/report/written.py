@@ -1,8 +1,8 @@
 """What the tests of pages share: coarse grids, a full report on one arm, and the files, links and anchors of pages.
 
 On coarse grids words, links and bytes are tested: where a boundary lies has tests of its own.  The report is made once
-a session, by a process with other hashes and in another time zone; its name and assumptions are as hostile as they may
-be; its audit is the one that the command of this session has made.
+a session, by a process with other hashes and in another time zone, which then lists its kernels; its name and
+assumptions are as hostile as they may be; its audit is the one that the command of this session has made.
 """
 
 import math
@@ -59,7 +59,8 @@ REPORT = (
     "from tests.report.written import coarsen; coarsen();"  # the map and the sampled section have tests of their own
     "print(write([tfarm.load(sys.argv[1])], Path(sys.argv[2])));"
     "pyplot = sys.modules.get('matplotlib.pyplot');"  # python-control imports it; no figure may be its own
-    "print(bool(pyplot and pyplot.get_fignums()))"
+    "print(bool(pyplot and pyplot.get_fignums()));"
+    "from tests.exact.signatures import save; save(Path(sys.argv[2]).with_suffix('.signatures'))"
 )
 
 

@@ -8,6 +8,7 @@ import pytest
 from tests.shared import thinned
 from tests.tuner.plain import PlainTrial, complex_step, gradient_of, gradient_of_sample, plain_gain
 from tfarm.dsp import Chain, Converters, Sampling
+from tfarm.exact.compiled import compiled
 from tfarm.tuner import initial_network, kernel, slew_trial, training
 from tfarm.tuner.kernel import Limits
 
@@ -49,10 +50,11 @@ def test_reverse_and_forward_accumulation_agree(lab, chain, inputs, hidden):
     total, weights, setting = np.zeros(gradient.size), network.weights, trial.setting(network, SECTOR)
     (run, work), T = trial.room(network), trial.numbers.T
     S, spare, D = (np.zeros((rows, total.size)) for rows in (work.state.size, work.state.size, 3 * training.BEFORE))
+    sense, act, derive = (compiled(each.py_func) for each in (kernel.sense, kernel.act, training.derive))
     for k in range(trial.n):
-        assert kernel.sense(k, setting, run, work)
-        kernel.act(k, setting, weights, run, work)
-        training.derive(k, setting, weights, run, work, S, spare, D)
+        assert sense(k, setting, run, work)
+        act(k, setting, weights, run, work)
+        derive(k, setting, weights, run, work, S, spare, D)
         total += T * (trial.cost.a * run.x[k] * D[training.X] + trial.cost.b * run.e[k] * D[training.E])
     np.testing.assert_allclose(total, gradient, atol=1e-12 * abs(gradient).max())
 

@@ -201,13 +201,13 @@ def after(k: int, u: float, model: Any, state: Any, forcing: Any, of: Any) -> No
 _before, _converted, _after = inlined(before), inlined(converted), inlined(after)  # those of Python loops are plain
 
 
-@compiled
+@inlined
 def rounded(value: float, single: bool) -> float:
     """A number in the precision of the controller: float32 or float64."""
     return float(np.float32(value)) if single else value
 
 
-@compiled
+@inlined
 def product(row: Any, values: Any, start: float, single: bool) -> float:
     """start + row . values, every product and sum in the precision of the controller."""
     total = start
@@ -240,6 +240,7 @@ def run(model: Any, state: Any, forcing: Any, electronics: Any, matrices: Any, s
         u = product(D[min(k, D.shape[0] - 1)], e, product(C[0], x, u, single), single)
         for i in range(x.size):
             following[i] = product(B[i], e, product(A[i], x, 0.0, single), single)
-        x[:] = following
+        for i in range(x.size):
+            x[i] = following[i]
         _after(k, u, model, state, forcing, electronics)
     return n

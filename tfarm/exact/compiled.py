@@ -2,7 +2,7 @@
 
 numba keys a cached function by its own file only and ignores an edited callee in another file (numba 0.68).  So the
 cache of this package is in a folder named by a hash of all sources of compiled code: those of this room, and those that
-import this module.
+import this module, but for those that only take the Python function of a kernel.
 """
 
 import hashlib
@@ -19,6 +19,7 @@ from numba.core import event, types
 from numba.core.caching import FunctionCache
 from numba.core.extending import intrinsic
 from numba.core.runtime import rtsys
+from numba.core.types.misc import unliteral
 from numba.np import linalg
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -41,7 +42,7 @@ def compiled(function: _Function) -> _Function:
 
     Its cache is below the user's cache folder of numba, or else below this room.
     """
-    kernel = njit(**OPTIONS)(function)
+    kernel = _without_literals(njit(**OPTIONS)(function))
     parent = config.CACHE_DIR
     config.CACHE_DIR = str(_CACHE)
     # no folder for the cache can be written
@@ -52,8 +53,22 @@ def compiled(function: _Function) -> _Function:
 
 
 def inlined(function: _Function) -> _Function:
-    """Return a small function compiled and inlined into its callers, so that loops over it vectorise."""
-    return njit(forceinline=True, **OPTIONS)(function)
+    """Return a function compiled and inlined into the kernels that call it, so that loops over it vectorise."""
+    kernel = _without_literals(njit(forceinline=True, no_cpython_wrapper=True, **OPTIONS)(function))
+    kernel._insert = lambda *_: None  # what Python would call: a null pointer
+    kernel._compile_for_args = _refuse
+    return kernel
+
+
+def _refuse(*_: Any) -> None:
+    raise TypeError("an inlined kernel is called by kernels alone; python_of(it) is for Python")
+
+
+def _without_literals(kernel: Any) -> Any:
+    """Return a kernel that others call with the type of a constant: numba would compile it anew for each value."""
+    template_for = kernel.get_call_template
+    kernel.get_call_template = lambda args, kws: template_for([unliteral(each) for each in args], kws)
+    return kernel
 
 
 def python_of(function: Any) -> Callable[..., Any]:
@@ -71,7 +86,7 @@ def _source_hash() -> str:
     digest = hashlib.sha256()
     for source in sorted(_HERE.parent.rglob("*.py")):
         text = source.read_bytes()
-        if source.parent == _HERE or b"exact.compiled import" in text:
+        if b"import python_of\n" not in text and (source.parent == _HERE or b"exact.compiled import" in text):
             digest.update(text)
     return digest.hexdigest()[:16]
 
@@ -87,7 +102,7 @@ class _FirstUse(event.Listener):  # type: ignore[misc]  # numba comes without ty
     def on_start(self, _: Any) -> None:
         if not self.is_silent:
             self.is_silent = True
-            print("tfarm: compiling kernels, once (about a minute)", file=sys.stderr)
+            print("tfarm: compiling kernels, once (about half a minute)", file=sys.stderr)
 
     def on_end(self, _: Any) -> None: ...
 

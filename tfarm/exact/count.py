@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from tfarm.arrays import Real
+from tfarm.records import read_only
 
 from .compiled import compiled, inlined
 from .layout import (
@@ -53,7 +54,7 @@ def rows_to_count(layout: Layout) -> tuple[Real, Real]:
     """Return rows and ends of a layout without damping, for `chain_count` and `bisect_chain`."""
     chain = layout.chain
     free = sum(not isinstance(end, float) for end in (chain.tip_mass, chain.tip_inertia))
-    return layout.rows, np.r_[layout.ends, float(free)]
+    return layout.rows, np.asarray(read_only(np.r_[layout.ends, float(free)]))
 
 
 @inlined
@@ -62,7 +63,7 @@ def _clamped(number: int, value: float, step: int) -> int:
     return number + step * ((number % 2 == 1) != (value < 0.0))
 
 
-@compiled
+@inlined
 def chain_count(omega: float, rows: Any, ends: Any) -> int:
     """Return the number of natural frequencies below omega [rad/s], with the rigid body."""
     S = -omega * omega
@@ -83,7 +84,7 @@ def chain_count(omega: float, rows: Any, ends: Any) -> int:
     return _clamped(number, drive, 1)
 
 
-@compiled
+@inlined
 def _joined(outside: int, omega: float, row: Any, plane: Plane, free: int) -> tuple[int, Plane]:
     """Return the count with one more segment, clamped at its inner end, and the plane carried across it.
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tfarm.arrays import Complex
 
-from .compiled import compiled, inlined
+from .compiled import inlined
 from .layout import BENDING, CHAIN_A, LENGTH
 from .waves import (
     DAMPING,
@@ -96,7 +96,7 @@ def plane_at(buffer: Any, i: int) -> Plane:
     return buffer[i], buffer[BLOCK + i], buffer[2 * BLOCK + i], buffer[3 * BLOCK + i], buffer[4 * BLOCK + i]
 
 
-@compiled
+@inlined
 def cross(points: Any, row: Any, j: int, work: Work, lost: Any) -> None:
     """Compute the plane at the inner end of a segment, row j, from that at its outer one, at the points of a block.
 
@@ -118,7 +118,7 @@ def cross(points: Any, row: Any, j: int, work: Work, lost: Any) -> None:
         take_low(low, inner, at, 5)
 
 
-@compiled
+@inlined
 def mark_slow(points: Any, row: Any, low: Any) -> int:
     """Mark the points with slow waves (`is_low`), and return their number."""
     slow = 0
@@ -128,7 +128,7 @@ def mark_slow(points: Any, row: Any, low: Any) -> int:
     return slow
 
 
-@compiled
+@inlined
 def mark_parallel(waves: Any, low: Any, lost: Any) -> None:
     """Mark the points where both waves are nearly one (`PARALLEL`)."""
     for i in range(lost.size):
@@ -137,7 +137,7 @@ def mark_parallel(waves: Any, low: Any, lost: Any) -> None:
             lost[i] = lost[i] or magnitude(z1 - z2) < PARALLEL * (magnitude(z1) + magnitude(z2))
 
 
-@compiled
+@inlined
 def fill_waves(points: Any, row: Any, waves: Any) -> None:
     """Compute numbers and functions of both waves at every point of a block: the latter alone calls a library."""
     for i in range(BLOCK):
@@ -151,7 +151,7 @@ def fill_waves(points: Any, row: Any, waves: Any) -> None:
         put(waves, TWO + FUNCTIONS + i, wave_functions(z2, t2, dt2))
 
 
-@compiled
+@inlined
 def take_low(low: Any, buffer: Any, at: int, parts: int) -> None:
     """Copy the numbers of the slow points from another place of their buffer."""
     if at:
@@ -177,7 +177,7 @@ def _chain_waves(row: Any, waves: Any, i: int) -> tuple[Wave, Wave, complex, com
     return in_chain(one, l), in_chain(two, l), times(gS, EI / (l * l * l * l)), times(d, EI)
 
 
-@compiled
+@inlined
 def _by_waves(row: Any, waves: Any, outer: Any, inner: Any) -> None:
     """Compute `across_waves` at every point of a block."""
     for i in range(BLOCK):
@@ -193,7 +193,7 @@ def rows_at(s: complex, row: Any, waves: Any, i: int) -> tuple[Row, Row, Row, Ro
     return transition_rows(row_at(waves, SERIES + i), s * s, over_d, row[CHAIN_A:])
 
 
-@compiled
+@inlined
 def _by_series(points: Any, row: Any, waves: Any, outer: Any, inner: Any) -> None:
     """Compute F0..F3, F2 - 1 and F3 - 1 of a slow segment in the chain's units, and `across_rows`, in a block."""
     l = row[LENGTH]
@@ -206,14 +206,15 @@ def _by_series(points: Any, row: Any, waves: Any, outer: Any, inner: Any) -> Non
         put(inner, i, across_rows(*rows_at(points[i], row, waves, i), plane_at(outer, i)))
 
 
-@compiled
+@inlined
 def cross_back(points: Any, row: Any, j: int, work: Work, scale: Any) -> None:
     """Compute the condition at the outer end of a segment, row j, from that at its inner one, in place; see `cross`.
 
     The scales less those of the plane are added to `scale`.
     """
-    back, waves, low = work.back, work.waves[j], work.low[j]
-    slow = low.sum()
+    back, waves, low, slow = work.back, work.waves[j], work.low[j], 0
+    for i in range(BLOCK):
+        slow += low[i]
     if slow:
         at = 0 if slow == BLOCK else BY_SERIES
         for i in range(BLOCK):
@@ -229,7 +230,7 @@ def cross_back(points: Any, row: Any, j: int, work: Work, scale: Any) -> None:
             take_low(low, back, at, 4)
 
 
-@compiled
+@inlined
 def _fade(waves: Any, low: Any, scale: Any) -> None:
     """Bring c and s of the slower wave to the scale of the faster one, also where both e^{-t} underflow."""
     for i in range(BLOCK):

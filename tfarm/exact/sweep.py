@@ -40,7 +40,6 @@ from .layout import (
 )
 from .pieces import (
     BLOCK,
-    BY_SERIES,
     F1,
     F2_LESS_1,
     F3_LESS_1,
@@ -84,7 +83,7 @@ SMALL_DIFFERENCE = 0.05  # or else flagged below this share, with four lost bits
 AXIS = read_only(np.array([[1.0], [0.0], [0.0], [0.0]]))  # the condition W = 0 there, at every point
 
 
-@compiled
+@inlined
 def _work(rows: int) -> Work:
     """Return the scratch arrays of a chain of that number of rows."""
     number, by_row = np.complex128, (rows, BLOCK)
@@ -102,14 +101,12 @@ def _work(rows: int) -> Work:
     )
 
 
-@compiled
+@inlined
 def _sweep(points: Any, rows: Any, ends: Any, work: Work, lost: Any) -> None:
     """Compute the plane inside of each element, and the scale of that at the axis; mark lost digits."""
     for i in range(BLOCK):
-        S = points[i] * points[i]
-        mass, shear, inertia, moment = tip_conditions(ends, S)
-        put(work.planes[0], i, end_plane(mass, shear + 0.0 * S, inertia, moment + 0.0 * S))
-    work.scale[:], lost[:], work.watched[:], work.powers[:] = 0.0, False, False, 0
+        put(work.planes[0], i, end_plane(*tip_conditions(ends, points[i] * points[i])))
+        work.scale[i], lost[i], work.watched[i] = 0.0, False, False
     for j in range(len(rows)):
         row, outer, inner = rows[j], work.planes[j], work.planes[j + 1]
         if row[ROW_KIND] == SEGMENT:
@@ -117,6 +114,8 @@ def _sweep(points: Any, rows: Any, ends: Any, work: Work, lost: Any) -> None:
         else:
             for i in range(BLOCK):
                 put(inner, i, inside(row[ROW_KIND], row, points[i], points[i] * points[i], plane_at(outer, i)))
+        for i in range(BLOCK):
+            work.powers[j, i] = 0
         _brought_back(inner, 5, work.powers[j])
         for i in range(BLOCK):
             work.scale[i] += work.powers[j, i] * LN_2
@@ -144,7 +143,7 @@ def beyond(kind: int, row: Any, s: Number, S: Number, f: Row) -> Row:
     return beyond_body(S * row[MASS] + row[GROUND], S * row[INERTIA] + row[TURNING_GROUND], f)
 
 
-@compiled
+@inlined
 def _brought_back(buffer: Any, parts: int, powers: Any) -> None:
     """Divide each point's numbers by a power of two, added to `powers`, where they are near over- or underflow."""
     for i in range(BLOCK):
@@ -158,18 +157,19 @@ def _brought_back(buffer: Any, parts: int, powers: Any) -> None:
                 buffer[BLOCK * j + i] *= math.ldexp(1.0, -power)
 
 
-@compiled
+@inlined
 def _go_back(points: Any, rows: Any, outermost: int, work: Work, differs: bool, lost: Any) -> None:
     """Compute the state at each mark, in place of its plane, from the condition of the axis carried outwards."""
     axis, back, reach, is_root = work.planes[len(rows)], work.back, 0.0, True
     scale, shift = np.zeros(BLOCK, np.complex128), np.zeros(BLOCK, np.int64)
     for i in range(BLOCK):
         work.theta[i] = met(row_at(back, i), plane_at(axis, i))[1]
-    back[LIFT:BY_SERIES] = 0.0  # W = 0 on the axis, of a mode also where another condition determines it
+        back[LIFT + i] = back[TURN + i] = 0.0  # W = 0 on the axis, of a mode also where another condition determines it
     for j in range(len(rows) - 1, outermost - 1, -1):
         row = rows[j]
         if row[ROW_KIND] == MARK:
-            work.scales[j], work.shifts[j] = scale, shift
+            for i in range(BLOCK):
+                work.scales[j, i], work.shifts[j, i] = scale[i], shift[i]
             _meet(work.planes[j + 1], work, is_root, reach, shift)
             for i in range(BLOCK):
                 lost[i] = lost[i] or (work.watched[i] and not is_root)  # there W, M and Q may have lost digits
@@ -181,11 +181,12 @@ def _go_back(points: Any, rows: Any, outermost: int, work: Work, differs: bool, 
         else:
             _beyond(points, row, work.planes[j + 1], back, shift)
             reach += row[REACH] if row[ROW_KIND] == OFFSET else 0.0
-        shift -= work.powers[j]
+        for i in range(BLOCK):
+            shift[i] -= work.powers[j, i]
         _brought_back(back, 4, shift)
 
 
-@compiled
+@inlined
 def _meet(state: Any, work: Work, is_root: bool, reach: float, shift: Any) -> None:
     """Compute the state of a mark, its plane's with the condition there, and W - r theta and Psi - theta.
 
@@ -196,10 +197,10 @@ def _meet(state: Any, work: Work, is_root: bool, reach: float, shift: Any) -> No
         put(state, i, met(row_at(back, i), plane_at(state, i)))
         if is_root:
             state[i] = times(times(work.theta[i], reach) + back[LIFT + i], math.ldexp(1.0, -shift[i]))
-    state[LIFT:BY_SERIES] = back[LIFT:BY_SERIES]
+        state[LIFT + i], state[TURN + i] = back[LIFT + i], back[TURN + i]
 
 
-@compiled
+@inlined
 def _beyond(points: Any, row: Any, inner: Any, back: Any, shift: Any) -> None:
     """Compute condition, W - r theta and Psi - theta beyond an offset, a spring or a body, in place."""
     kind = row[ROW_KIND]
@@ -213,7 +214,7 @@ def _beyond(points: Any, row: Any, inner: Any, back: Any, shift: Any) -> None:
         put(back, i, beyond(kind, row, s, s * s, f))
 
 
-@compiled
+@inlined
 def _beyond_segment(points: Any, row: Any, j: int, work: Work, reach: float, shift: Any) -> None:
     """Compute W - r theta and Psi - theta beyond a slow segment from the state at its inner end; nan for others.
 
@@ -259,15 +260,17 @@ def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, l
     theta, power of s, unit, C, weights of s theta and of the drive.  Digits are lost where two waves of a segment are
     nearly one, where an output is a small difference of fast waves, and where the drive is one, near a pole.
     """
-    differs = bool(np.any((table[:, 0] >= 0.0) & (table[:, 2] != 0.0)))
-    segment, marks = innermost(rows), np.nonzero(rows[:, ROW_KIND] == MARK)[0]
-    outermost = marks[0] if marks.size else len(rows)
-    work, values = _work(len(rows)), np.empty((1 + len(table), BLOCK), np.complex128)
+    differs, outermost = False, 0
+    for o in range(len(table)):
+        differs = differs or (table[o, 0] >= 0.0 and table[o, 2] != 0.0)
+    while outermost < len(rows) and rows[outermost, ROW_KIND] != MARK:
+        outermost += 1
+    work, segment, values = _work(len(rows)), innermost(rows), np.empty((1 + len(table), BLOCK), np.complex128)
     points, lost_here = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.bool_)
     for first in range(0, s.size, BLOCK):
         n = min(BLOCK, s.size - first)
-        here = slice(first, first + n)
-        points[:n], points[n:] = s[here], s[first]
+        for i in range(BLOCK):
+            points[i] = s[first + i] if i < n else s[first]
         _sweep(points, rows, ends, work, lost_here)
         for i in range(BLOCK):
             at = min(first + min(i, n - 1), axis.shape[1] - 1)
@@ -277,8 +280,11 @@ def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, l
         _go_back(points, rows, outermost, work, differs, lost_here)
         for o in range(len(table)):
             _output(points, table[o], work, values[0], values[1 + o], lost_here)
-        found[0, here], found[1, here], found[2:, here] = values[0, :n], work.scale[:n], values[1:, :n]
-        lost[here] = lost_here[:n]
+        for i in range(n):
+            found[0, first + i], found[1, first + i] = values[0, i], work.scale[i]
+            lost[first + i] = lost_here[i]
+            for o in range(len(table)):
+                found[2 + o, first + i] = values[1 + o, i]
 
 
 @inlined
@@ -290,7 +296,7 @@ def innermost(rows: Any) -> Any:
     return rows[j]
 
 
-@compiled
+@inlined
 def _drive(points: Any, segment: Any, ends: Any, plane: Any, drive: Any, lost: Any) -> None:
     """Compute the drive at every point of a block; digits are lost where it is small."""
     for i in range(BLOCK):
@@ -298,7 +304,7 @@ def _drive(points: Any, segment: Any, ends: Any, plane: Any, drive: Any, lost: A
         lost[i] = lost[i] or magnitude(drive[i]) < POLE * terms
 
 
-@compiled
+@inlined
 def _output(points: Any, want: Any, work: Work, drive: Any, value: Any, lost: Any) -> None:
     """Compute an output of the table at every point of a block; digits are lost where it is a small difference."""
     j, field, of_theta, of_rate, of_drive = int(want[0]), BLOCK * int(want[1]), want[2], want[6], want[7]

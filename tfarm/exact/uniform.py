@@ -92,8 +92,8 @@ def fill_ends(s: Any, rows: Any, ends: Any, table: Any, per_input: bool, found: 
     small = 1.0 / max(1.0, ends[OF_ANGLE + 1], ends[OF_ANGLE + 2])  # against overflow of squares of a heavy hub's drive
     for first in range(0, s.size, BLOCK):
         n = min(BLOCK, s.size - first)
-        here = slice(first, first + n)
-        points[:n], points[n:] = s[here], s[first]
+        for i in range(BLOCK):
+            points[i] = s[first + i] if i < n else s[first]
         slow = mark_slow(points, row, low)
         if slow < BLOCK:
             fill_waves(points, row, waves)
@@ -105,15 +105,16 @@ def fill_ends(s: Any, rows: Any, ends: Any, table: Any, per_input: bool, found: 
         _driven(points, row, ends, small, per_input, parts, flags)
         if slow < BLOCK:
             mark_parallel(waves, low, flags)
-        lost[here] = flags[:n]
-        found[0, here], found[1, here] = parts[DRIVE * BLOCK :][:n], parts[SCALE * BLOCK :][:n]
+        for i in range(n):
+            found[0, first + i], found[1, first + i] = parts[DRIVE * BLOCK + i], parts[SCALE * BLOCK + i]
+            lost[first + i] = flags[i]
         for o in range(len(table)):
             source, power = parts[BLOCK * int(table[o, 0]) :], int(table[o, 1])
             unit = table[o, 2] / LIFT if table[o, 0] == TIP else table[o, 2]
-            finish(points, source, power, unit, table[o, 3], found[2 + o, here])
+            finish(points, source, power, unit, table[o, 3], found[2 + o, first : first + n])
 
 
-@compiled
+@inlined
 def _by_waves(ends: Any, waves: Any, parts: Any) -> None:
     """Compute theta, M, Q, W and W - theta times e^{-scale}, and scale, by the two waves."""
     for i in range(BLOCK):
@@ -125,16 +126,17 @@ def _by_waves(ends: Any, waves: Any, parts: Any) -> None:
         parts[SCALE * BLOCK + i] = waves[ONE + PHASE + i] + waves[TWO + PHASE + i]
 
 
-@compiled
+@inlined
 def _by_series(points: Any, row: Any, ends: Any, parts: Any) -> None:
     """Compute the same by the series of the transition functions, at slow points."""
     for i in range(BLOCK):
         theta, M, Q, W, Y = from_transition(points[i], row, tip_conditions(ends, points[i] * points[i]))
         put(parts, i, (theta, M, Q, LIFT * W, Y))
-    parts[SCALE * BLOCK : PARTS * BLOCK] = 0.0  # in the loop above it would prevent vectorisation
+    for i in range(BLOCK):  # in the loop above it would prevent vectorisation
+        parts[SCALE * BLOCK + i] = 0.0
 
 
-@compiled
+@inlined
 def _driven(points: Any, row: Any, ends: Any, small: float, per_input: bool, parts: Any, lost: Any) -> None:
     """Compute the drive of all points, mark lost digits, and with `per_input` divide all numbers by it."""
     for i in range(BLOCK):

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, Theory
 from tfarm.arrays import Complex, Real
 from tfarm.errors import CertificationError, ParameterError, must_be_known, require
-from tfarm.records import record
+from tfarm.records import read_only, record
 from tfarm.schema import Quantity
 
 from .balls import Ball, Sweep, first_success, nearest_float, point, rational
@@ -122,7 +122,7 @@ def free_fields(
         each = [Reading(place, field, zero, 0, one) for place in places for field in range(4)]
         layout = Layout(chain, tuple(dict.fromkeys(places)), (*each, Reading(None, -1, one, 0, one)))
         chain.kept[places] = layout
-    found, _ = _filled(chain.kept[places], s, axis)
+    found, _ = _filled(chain.kept[places], s, np.asarray(read_only(np.ascontiguousarray(axis))))
     return found[2:-1].reshape(len(places), 4, s.size).transpose(1, 2, 0), found[-1], found[1]
 
 

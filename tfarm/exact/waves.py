@@ -239,7 +239,7 @@ def tip_conditions(ends: Any, S: Number) -> Row:
 
     Rest, inertia and force of the mass come first and those of the inertia next (see `system.end_condition`).
     """
-    return ends[0] + ends[1] * S, ends[2], ends[3] + ends[4] * S, ends[5]
+    return ends[0] + ends[1] * S, ends[2] + 0.0 * S, ends[3] + ends[4] * S, ends[5] + 0.0 * S
 
 
 @inlined

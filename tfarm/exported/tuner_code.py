@@ -39,7 +39,7 @@ from tfarm.arm import HubFeedback
 from tfarm.arrays import Real, Whole
 from tfarm.dsp import Measurement, sampled_loop
 from tfarm.errors import MISSING, ParameterError, must_be_known, require
-from tfarm.exact.compiled import compiled
+from tfarm.exact.compiled import compiled, inlined
 from tfarm.exported.controller import INPUT_ERROR, OVERFLOW, REAL, Port, recorded
 from tfarm.exported.result import ANYWAY, Export, ExportTask, names_of
 from tfarm.exported.texts import literal, name_in_c, render
@@ -112,7 +112,7 @@ def numbers_of(saved: SavedTuner, real: Any) -> Numbers:
     ])  # fmt: skip
 
 
-@compiled
+@inlined
 def polynomial(x: float, coefficients: Real) -> float:
     """The sum of coefficients[n] x^n, by Horner's rule."""
     total = coefficients[coefficients.size - 1]
@@ -163,7 +163,7 @@ def softplus(z: float, of: Numbers) -> float:
     return z + tail if is_positive else tail
 
 
-@compiled
+@inlined
 def network_gain(of: Numbers, row: Real) -> float:
     """K of a row of inputs."""
     z = ZERO
@@ -178,7 +178,7 @@ def network_gain(of: Numbers, row: Real) -> float:
     return of.hi if gain > of.hi else gain
 
 
-@compiled
+@inlined
 def step(of: Numbers, state: Real, inputs: Real) -> int:
     """Advance by one sample; return 0, or the kind of an error."""
     for value in inputs:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
-from tfarm.exact.compiled import compiled
+from tfarm.exact.compiled import compiled, inlined
 
 NEWTON_STEPS = 8  # from a close guess: others are followed in shorter steps
 SETTLED = 1e-10  # of its size: the largest last step of a converged zero
@@ -86,6 +86,7 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
     A root is lost at a singular point, and where it is next to no root of the complete set.
     Raises ConvergenceError after too many halvings, with the last value, its roots, and which of them are stray.
     """
+    start = start.copy()  # kernels are compiled anew for read-only arrays
     rows = np.full((values.size, start.size), np.nan, complex)
     rows[0], past, span = start, [(float(values[0]), start)], abs(values[-1] - values[0])
     ahead = [(float(value), n) for n, value in enumerate(values)][:0:-1]
@@ -147,6 +148,7 @@ def between(family: Family, values: Real, rows: Complex, wanted: Real) -> Comple
 
     By interpolation, or where that is uncertain by following them from the known value below.
     """
+    values, rows = values.copy(), rows.copy()  # as in `follow`
     found = np.empty((wanted.size, rows.shape[1]), complex)
     right = np.clip(np.searchsorted(values, wanted), 1, values.size - 1)
     for n in np.unique(right):
@@ -222,20 +224,24 @@ def predicted(at: Any, rows: Any, wanted: Any, base: Any) -> Any:
                 if j >= i and np.isnan(guess[m, i]):
                     guess[m, i], guess[m, j] = _of_couple(weights[low:], rows[low:, i], rows[low:, j], base[i], base[j])
                 elif j < 0 and np.isnan(guess[m, i]):
-                    guess[m, i] = _of_one(weights[low:], rows[low:, i], base[i])
+                    guess[m, i] = _of_one(weights[low:], rows[low:, i], rows[low:, i], base[i])
     return guess
 
 
-@compiled
-def _of_one(weights: Any, past: Any, base: Any) -> Any:
-    """Return the value of the polynomial through a root's past values (k,), NaN where some are on the axis."""
+@inlined
+def _of_one(weights: Any, first: Any, second: Any, base: Any) -> Any:
+    """Return the value of the polynomial through means of two roots' past values (k,), NaN where some are on the axis.
+
+    For one root both are the same.
+    """
     total = 0j
     for k in range(weights.size):
-        total += weights[k] * past[k] if (past[k].imag == 0.0) == (base.imag == 0.0) else LOST
+        past = (first[k] + second[k]) * 0.5
+        total += weights[k] * past if (past.imag == 0.0) == (base.imag == 0.0) else LOST
     return total
 
 
-@compiled
+@inlined
 def _of_couple(weights: Any, first: Any, second: Any, base: Any, other: Any) -> Any:
     """Return both of a couple by polynomials of their mean and of the square of half their distance."""
     square, apart = 0j, (base - other) / 2.0
@@ -246,7 +252,7 @@ def _of_couple(weights: Any, first: Any, second: Any, base: Any, other: Any) -> 
     way = (root * apart.conjugate()).real
     if abs(way) < TURNED * abs(root) * abs(apart):  # they have met: the first is the upper one, or the larger real one
         way = (root.real + root.imag) * (apart.real + apart.imag)
-    middle = _of_one(weights, (first + second) / 2.0, (base + other) / 2.0)
+    middle = _of_one(weights, first, second, (base + other) / 2.0)
     return (middle - root, middle + root) if way < 0.0 else (middle + root, middle - root)
 
 
@@ -270,7 +276,9 @@ def which_plain(guess: Any, found: Any, base: Any, singular: Any, blur: float) -
     """
     is_plain, alone = np.isnan(guess), np.empty(base.size, np.bool_)
     for i in range(base.size):
-        alone[i] = base[i].imag != 0.0 and not np.any(base == base[i].conjugate())
+        alone[i] = base[i].imag != 0.0
+        for j in range(base.size):
+            alone[i] &= base[j] != base[i].conjugate()
     for m in range(len(found)):
         index, away = nearest(found[m])
         for i in range(base.size):

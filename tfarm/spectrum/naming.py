@@ -19,6 +19,7 @@ from tfarm.exact.layout import Reading, readings
 from tfarm.exact.sweep import AXIS, fill_free
 from tfarm.exact.system import Spring, System
 from tfarm.exact.uniform import fill_ends
+from tfarm.records import read_only
 
 from .box import REAL_SHARE, Function, newton
 from .following import LOST, NEWTON_STEPS, SETTLED, follow, settled
@@ -41,10 +42,16 @@ def function_of(k: System) -> Function:
 
 
 @compiled
-def _newton(s: Any, rows: Any, ends: Any, is_uniform: bool, at_rest: int, singular: Any) -> None:
-    """Replace guesses s (n,) by the zeros of D/s^at_rest next to them, or NaN, as `following.settled` does."""
-    moving = np.flatnonzero(~np.isnan(s))
-    count = moving.size
+def _newton(s: Any, rows: Any, ends: Any, axis: Any, at_rest: int, singular: Any) -> None:
+    """Replace guesses s (n,) by the zeros of D/s^at_rest next to them, or NaN, as `following.settled` does.
+
+    `axis` is None for a uniform link: numba then compiles neither the sweep of a chain nor, for a chain, the other.
+    """
+    moving, count = np.empty(s.size, np.int64), 0
+    for i in range(s.size):
+        if not np.isnan(s[i]):
+            moving[count] = i
+            count += 1
     at, h = np.empty(3 * s.size, np.complex128), np.empty(s.size)
     found, lost = np.empty((2, 3 * s.size), np.complex128), np.empty(3 * s.size, np.bool_)
     for _ in range(NEWTON_STEPS):
@@ -54,10 +61,10 @@ def _newton(s: Any, rows: Any, ends: Any, is_uniform: bool, at_rest: int, singul
                 near = min(near, abs(1.0 - here / each))
             h[i] = DIFFERENCE_STEP * max(abs(here) * near, 1e-300)
             at[3 * i], at[3 * i + 1], at[3 * i + 2] = here, here + h[i], here - h[i]
-        if is_uniform:
+        if axis is None:
             fill_ends(at[: 3 * count], rows, ends, NO_ENDS, False, found, lost)
         else:
-            fill_free(at[: 3 * count], rows, ends, AXIS, NO_OUTPUT, found, lost)
+            fill_free(at[: 3 * count], rows, ends, axis, NO_OUTPUT, found, lost)
         kept = 0
         for i in range(count):
             n, j = moving[i], 3 * i
@@ -103,7 +110,7 @@ class Damping:
         still, layout = (readings(k, (), 0.0) for k in (self.k.with_damping(0.0), self.k))
         self.rows = still.rows, layout.rows - still.rows
         self.ends = still.ends, layout.ends - still.ends
-        self.is_uniform = layout.ends_table is not None
+        self.axis = AXIS if layout.ends_table is None else None
         self.at_rest, self.points = self.k.at_rest, np.array(self.k.singular)
 
     def near(self, values: Real, guess: Complex) -> Complex:
@@ -113,9 +120,10 @@ class Damping:
             self.most_halvings = min(self.most_halvings, LATE_HALVINGS)
         units = (values * self.level)[:, None]
         found, (rows, of_rows), (ends, of_ends) = guess / units, self.rows, self.ends
-        for here, share in zip(found, values.tolist(), strict=True):
-            moved = rows + share * of_rows, ends + share * of_ends
-            _newton(here, *moved, self.is_uniform, self.at_rest, self.points / share)
+        rows = read_only(rows + values[:, None, None] * of_rows)  # as those of a layout are
+        ends = read_only(ends + values[:, None] * of_ends)
+        for n, here in enumerate(found):
+            _newton(here, rows[n], ends[n], self.axis, self.at_rest, self.points / values[n])
         return found * units
 
     def complete(self, value: float, guess: Complex) -> Complex:

@@ -106,7 +106,7 @@ class Work(NamedTuple):
     by_input: Real
 
 
-@compiled
+@inlined
 def logistic(z: float) -> float:
     """1/(1 + e^-z), without overflow."""
     if z >= 0.0:
@@ -155,14 +155,14 @@ def gain_gradient(weights: Real, inputs: Real, hidden: Real, by_sum: float, out:
             by_input[i] += by_net * weights[j * m + i]
 
 
-@compiled
+@inlined
 def copied(source: Real, target: Real) -> None:
     """target = source, element by element: an assignment of arrays takes numba seconds to compile, and a loop none."""
     for i in range(target.size):
         target[i] = source[i]
 
 
-@compiled
+@inlined
 def turn(rows: Real, vector: Real, out: Real) -> None:
     """out = rows^T vector, in the order of memory."""
     out.fill(0.0)
@@ -173,7 +173,7 @@ def turn(rows: Real, vector: Real, out: Real) -> None:
                 out[i] += rows[j, i] * v
 
 
-@compiled
+@inlined
 def dot(a: Real, b: Real) -> float:
     total = 0.0
     for i in range(a.size):

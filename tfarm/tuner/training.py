@@ -62,7 +62,7 @@ class Steps(NamedTuple):
     enough: float
 
 
-@compiled
+@inlined
 def _rms(x: Real) -> float:
     """The root of the mean square of x."""
     total = 0.0
@@ -71,7 +71,7 @@ def _rms(x: Real) -> float:
     return sqrt(total / x.size)
 
 
-@compiled
+@inlined
 def _step(weights: Real, change: Real, gradient: Real, steps: Steps, share: float) -> None:
     """Take a step of (21) and (22): dw = -eta g + alpha dw, w = w + dw; eta times `share`, g clipped to `longest`."""
     norm = 0.0
