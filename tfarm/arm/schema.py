@@ -39,13 +39,13 @@ AT_THE_TOP = ("name", "assumptions", "theory", "input")  # keys before the first
 class StrictTable(BaseModel):
     """A table without unknown keys and conversions."""
 
-    # each is built at its first use: most files have few of the tables
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, defer_build=True)
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
 class TomlTable(StrictTable):
-    """A TOML table of the numbers of a record."""
+    """A TOML table of the numbers of a record, whose model is built at its first use: most files have few of them."""
 
+    model_config = ConfigDict(defer_build=True)
     makes: ClassVar[Callable[..., Any]]
     parameters: ClassVar[frozenset[str]]  # their names, read once: a fit builds a thousand arms
 
