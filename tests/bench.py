@@ -259,7 +259,8 @@ def study(ask, n, values):
 
 def rows_of(plan, n):
     """A study by the loop that anyone writes."""
-    return [values_of(plan.subjects.at(row), plan.names) for row in plan.space.rows(0, n, None).tolist()]
+    rows = plan.space.rows(0, n, None).tolist()
+    return [values_of(plan.subjects.at(row), plan.asked) for row in rows]
 
 
 def chunk_of(plan, n):

@@ -5,6 +5,7 @@ A repr begins with the finding: the entries or properties of a record with a nam
 
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, fields, is_dataclass
+from fractions import Fraction
 from functools import cached_property, wraps
 from html import escape
 from operator import is_
@@ -17,7 +18,7 @@ _Class = TypeVar("_Class", bound=type[Any])
 SHOWN_FIRST = ("verdict", "word", "text", "finding", "unstable", "worst_error")  # the finding
 LONGEST_REPR = 200  # characters of a repr: a line or two of a terminal
 LONGEST_ENTRY, LONGEST_FINDING = 60, 100  # characters of an entry, and of the finding
-PLAIN = (float, int, str, bool, type(None))  # types without arrays
+PLAIN = frozenset({float, int, str, bool, type(None), Fraction})  # types without arrays
 LONGEST_INSIDE = 80  # of a record inside another one
 SHOWN_SINGLY = 3  # numbers of an array or a list that are shown
 
@@ -36,8 +37,7 @@ def record(cls: _Class) -> _Class:
         if after is not None:
             after(self)
         for name in self.__dataclass_fields__:
-            if type(value := getattr(self, name)) in PLAIN:
-                continue
+            value = getattr(self, name)
             if (view := read_only(value)) is not value:
                 object.__setattr__(self, name, view)
 
@@ -58,12 +58,16 @@ def record(cls: _Class) -> _Class:
 
 def read_only(value: Any) -> Any:
     """Return the value with read-only views of its arrays; itself where it has none."""
+    if type(value) in PLAIN:
+        return value
     if isinstance(value, np.ndarray):
         if value.flags.writeable:
             value = value.view()
             value.flags.writeable = False
         return value
     entries = value.values() if isinstance(value, dict) else value if isinstance(value, tuple | list) else ()
+    if all(type(each) in PLAIN for each in entries):
+        return value
     views = list(map(read_only, entries))
     if all(map(is_, views, entries)):
         return value

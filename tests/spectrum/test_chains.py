@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests import chain_elements
 from tests.rigs import lossless, rig, some_rig
 from tests.shared import sized, thinned
 from tests.spectrum.chains import judge
@@ -16,6 +17,7 @@ from tfarm import Attachment, Hub, Payload, RotarySpring
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.exact.system import system_of
 from tfarm.reduced.modal import end_residues, undamped_residues
+from tfarm.spectrum.frequencies import list_frequencies
 
 NAMES = ("hub_angle", "root_moment", "root_shear", "tip_displacement", "tip_deflection")
 
@@ -30,6 +32,19 @@ def test_twenty_frequencies_of_random_rigs(count):
     found = [judge(arm, certify=n == 0) for n, arm in enumerate(rigs(11, count, damped=False))]
     assert [each.words for each in found if each.outcome != "right"] == []
     assert max(each.figures["distance from the other model"] for each in found) < 1e-8
+
+
+def test_rigs_of_different_lengths_are_listed_together():
+    """In one loop, as a study does: those of each rig's own finite elements, with and without a rigid body."""
+    arms = rigs(17, 40, damped=False)
+    for rigid in (False, True):
+        alike = [arm for arm in arms if arm.has_rigid_mode == rigid][:4]
+        systems = [system_of(arm) for arm in alike]
+        assert len({len(k.elements) for k in systems}) > 1
+        list_frequencies(systems, rigid + 1, rigid + 5)
+        for arm, k in zip(alike, systems, strict=True):
+            found = k.kept[rigid + 1, rigid + 5]
+            assert found == pytest.approx(chain_elements.natural_frequencies(arm, 5), rel=1e-8)
 
 
 def test_a_prescribed_angle_has_the_modes_of_a_locked_hub():

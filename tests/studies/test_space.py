@@ -10,8 +10,10 @@ import pytest
 from scipy import stats
 
 import tfarm
+from tests.rigs import some_rig
 from tfarm.arm import to_toml
 from tfarm.arm.schema import arm_of_table
+from tfarm.arm.writing import numbers_of
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
 from tfarm.fitting.posterior import Posterior, PosteriorNumber
@@ -202,6 +204,35 @@ def test_values_reach_arm_chain_controller_and_tuner(lab):
     assert (one.law, one.tuner) == (tfarm.HubFeedback(K1=0.3, K2=0.25), {"seed": 3.0})
     by_block = Subjects(lab, tfarm.Law({"hub_rate": ([1.0], [0.1, 1.0])}), Chain(), ("law.hub_rate.den.0",)).at((0.2,))
     assert by_block.law == tfarm.Law({"hub_rate": ([1.0], [0.2, 1.0])})
+
+
+RIG_KEYS = ("link.2.length", "link.1.density", "attachment.1.mass", "hub.inertia", "payload.mass")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_arm_with_other_numbers_is_that_of_the_edited_file(seed):
+    """Whose parts are all read and checked, and refused with the same words."""
+    arm = some_rig(np.random.default_rng([23, seed]), segments=2)
+    table = tomllib.loads(to_toml(arm))
+    keys = [key for key in RIG_KEYS if key in numbers_of(arm)]
+    values = {key: 1.1 * numbers_of(arm)[key] for key in keys}
+    subjects = Subjects(arm, GAINS, Chain(), keys)
+    for key, value in [*values.items(), (keys[-1], -1.0), (keys[-1], 1e-60)]:
+        place, *rest = key.split(".")
+        *numbers, name = rest
+        here = table.setdefault(place, {})
+        (here[int(numbers[0]) - 1] if numbers else here)[name] = value
+        values[key] = value
+        if key == keys[-1]:
+            assert _built(lambda: subjects.at([*values.values()]).arm) == _built(lambda: arm_of_table(table))
+
+
+def _built(make):
+    """The arm, or the words of its refusal."""
+    try:
+        return make()
+    except ParameterError as error:
+        return str(error)
 
 
 def test_a_stated_shear_modulus_stays_and_one_by_poissons_ratio_follows(lab):

@@ -30,6 +30,8 @@ DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt")
 
 def number(key: str, value: object, meaning: str) -> float:
     """Return `value` as a float.  Raises ParameterError for a bool, a text or nan."""
+    if type(value) is float and value == value:
+        return value
     is_number = not isinstance(value, bool) and isinstance(value, Real)
     require(is_number, key, value, f"{meaning}; write a plain number, no text or true")
     try:

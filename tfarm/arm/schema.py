@@ -6,7 +6,7 @@ Label, unit and meaning of every key are in `keys.toml` and read by `file_key`.
 
 import os
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
@@ -39,13 +39,13 @@ AT_THE_TOP = ("name", "assumptions", "theory", "input")  # keys before the first
 class StrictTable(BaseModel):
     """A table without unknown keys and conversions."""
 
-    # each is built at its first use: most files have few of the tables
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, defer_build=True)
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
 class TomlTable(StrictTable):
-    """A TOML table of the numbers of a record."""
+    """A TOML table of the numbers of a record, whose model is built at its first use: most files have few of them."""
 
+    model_config = ConfigDict(defer_build=True)
     makes: ClassVar[Callable[..., Any]]
     parameters: ClassVar[frozenset[str]]  # their names, read once: a fit builds a thousand arms
 
@@ -183,17 +183,30 @@ def arm_of_table(table: dict[str, Any]) -> Arm:
     """Return the arm of a parsed TOML table.  Raises ParameterError for the first problem."""
     head = validated(ArmTable, {key: value for key, value in table.items() if key not in LOOP_TABLES}, "")
     own = head.model_dump(exclude_unset=True)
-    links = [head.link] if isinstance(head.link, dict) else head.link
-    link, *outer = _built("link", links, LINKS) or [None]
-    require(link, "link", MISSING, f"give {LINKS}")
-    own["assumptions"] = [*head.assumptions, *assumed(links)]
-    return Arm(
-        **{name: value for name, value in own.items() if name in AT_THE_TOP},
-        link=link,
-        outer=tuple(outer),
-        attachments=tuple(_built("attachment", head.attachment, "a table for each, headed [[attachment]]")),
-        **{name: _within(name, name, own[name]) for name in PARTS if name in own},
-    )
+    parts = parts_of_tables(own)
+    own["assumptions"] = [*head.assumptions, *assumed(_listed(head.link))]
+    return Arm(**{name: value for name, value in own.items() if name in AT_THE_TOP}, **parts)
+
+
+def parts_of_tables(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parts of an arm of which there are tables, by their names in `Arm`, in the order of their checks.
+
+    Raises ParameterError for the first problem.
+    """
+    found: dict[str, Any] = {}
+    if "link" in tables:
+        link, *outer = _built("link", _listed(tables["link"]), LINKS) or [None]
+        require(link, "link", MISSING, f"give {LINKS}")
+        found = {"link": link, "outer": tuple(outer)}
+    if "attachment" in tables:
+        wanted = "a table for each, headed [[attachment]]"
+        found["attachments"] = tuple(_built("attachment", tables["attachment"], wanted))
+    return found | {name: _within(name, name, tables[name]) for name in PARTS if name in tables}
+
+
+def _listed(link: Any) -> Any:
+    """Return the tables of links as a list, also the single [link]."""
+    return [link] if isinstance(link, dict) else link
 
 
 def _built(name: str, tables: Any, wanted: str) -> list[Any]:

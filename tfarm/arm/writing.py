@@ -5,7 +5,7 @@ The numbers of an arm have keys, those of its TOML file, such as "link.2.section
 
 import json
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from tfarm.arm.law import Law, Part
 from tfarm.arm.materials import SHEAR
 from tfarm.arm.parts import Link, differing
 from tfarm.arm.records import MOST_PARTS, Arm
-from tfarm.arm.schema import arm_of_table
+from tfarm.arm.schema import parts_of_tables
 from tfarm.errors import ParameterError, must_be_known, require
 from tfarm.files import write_file
 
@@ -135,7 +135,9 @@ class KeyedArms:
 
     def at(self, values: Mapping[str, float]) -> Arm:
         """Return the arm with other values of numbers.  Raises ParameterError for an illegal value."""
-        table = deepcopy(self._table)
+        # the other parts stay as they are, and so they are not checked again
+        changed = {key.partition(".")[0] for key in values}
+        table = {name: _copied(self._table.get(name, {})) for name in changed}
         for key, value in values.items():
             here, name = _table_of(table, key)
             if name == "youngs_modulus" and "shear_modulus" in here and self.is_shear_scaled(key):
@@ -143,7 +145,7 @@ class KeyedArms:
             for other in SHEAR if name in SHEAR else ():
                 here.pop(other, None)
             here[name] = value
-        return arm_of_table(table)
+        return replace(self.arm, **parts_of_tables(table))
 
     def is_shear_scaled(self, key: str) -> bool:
         """Return whether the shear modulus of a link changes with its Young's modulus, which has that key."""
@@ -154,6 +156,13 @@ class KeyedArms:
     def value(self, key: str) -> float:
         """Return a number of the arm, from its file or its default."""
         return self._numbers[key]
+
+
+def _copied(table: Any) -> Any:
+    """Return a copy of tables in lists and tables."""
+    if isinstance(table, list):
+        return list(map(_copied, table))
+    return {key: _copied(value) for key, value in table.items()} if isinstance(table, dict) else table
 
 
 def numbers_of(arm: Arm) -> dict[str, float]:

@@ -47,14 +47,15 @@ from .waves import (
     transition_series,
 )
 
+DOUBLINGS = 40  # of the estimate of a slender beam, a factor of 1e12: the end of a search
 FREE_MOTIONS = 12  # in the vector of ends: the number of free motions of the tip
 
 
 def rows_to_count(layout: Layout) -> tuple[Real, Real]:
-    """Return rows and ends of a layout without damping, for `chain_count` and `bisect_chain`."""
+    """Return rows and ends of a layout without damping, for `chain_count`, both read-only as those of a layout."""
     chain = layout.chain
     free = sum(not isinstance(end, float) for end in (chain.tip_mass, chain.tip_inertia))
-    return layout.rows, np.asarray(read_only(np.r_[layout.ends, float(free)]))
+    return layout.rows, np.asarray(read_only(np.append(layout.ends, free)))
 
 
 @inlined
@@ -121,17 +122,28 @@ def chain_counts(omega: Any, rows: Any, ends: Any) -> Any:
 
 
 @compiled
-def bisect_chain(number: Any, rows: Any, ends: Any, low: Any, high: Any) -> None:
-    """Move low[i] and high[i] [rad/s] to the neighbouring floats between which the count reaches number[i]."""
-    for i in range(number.size):
-        while True:
-            middle = 0.5 * (low[i] + high[i])
-            if not (low[i] < middle and middle < high[i]):
-                break
-            if chain_count(middle, rows, ends) >= number[i]:
-                high[i] = middle
-            else:
-                low[i] = middle
+def list_steps(first: Any, last: int, rows: Any, starts: Any, ends: Any, estimate: Any, found: Any) -> None:
+    """Compute the smallest floats [rad/s] at which the count of each chain reaches the numbers first[j]..last.
+
+    They are the last columns of found (chains, numbers), which begins as nan and stays so where a count does not reach
+    `last`.  Chain j has rows[starts[j]:starts[j + 1]] and ends[j]; its estimate [rad/s] is doubled until it is above
+    all of them, `DOUBLINGS` times at most, and each is bisected from there to neighbouring floats.
+    """
+    for j in range(len(ends)):
+        own, above, doubled = rows[starts[j] : starts[j + 1]], estimate[j], 0
+        while doubled < DOUBLINGS and chain_count(above, own, ends[j]) < last:
+            above, doubled = 2.0 * above, doubled + 1
+        for number in range(first[j], last + 1 if doubled < DOUBLINGS else 0):
+            low, high = 0.0, above
+            while True:
+                middle = 0.5 * (low + high)
+                if not (low < middle and middle < high):
+                    break
+                if chain_count(middle, own, ends[j]) >= number:
+                    high = middle
+                else:
+                    low = middle
+            found[j, found.shape[1] - 1 - (last - number)] = high
 
 
 @inlined

@@ -93,14 +93,18 @@ class Layout:
         They are cached for each `key`.
         """
         if key not in self._numbers:
-            chain, drive = self.chain, self.chain.drive
-            ends = end_condition(chain.tip_mass), end_condition(chain.tip_inertia), drive.of_angle, drive.of_moment
             elements = [
                 each if isinstance(each, Mark) else type(each)._make(n if n is None else exact(n) for n in each)
                 for each in self.elements
             ]
-            self._numbers[key] = [elements, *(tuple(map(exact, each)) for each in ends)]
+            self._numbers[key] = [elements, *(tuple(map(exact, each)) for each in self._conditions)]
         return self._numbers[key]
+
+    @property
+    def _conditions(self) -> tuple[tuple[Fraction, ...], ...]:
+        """Both tip conditions, A_0..A_3, and B_0 and B_1."""
+        chain, drive = self.chain, self.chain.drive
+        return end_condition(chain.tip_mass), end_condition(chain.tip_inertia), drive.of_angle, drive.of_moment
 
     @cached_property
     def rows(self) -> Real:
@@ -111,8 +115,7 @@ class Layout:
     @cached_property
     def ends(self) -> Real:
         """Payload and drive (12,)."""
-        _, *numbers = self.numbers("float64", float)
-        return np.asarray(read_only(np.concatenate(numbers)))
+        return np.asarray(read_only(np.array([float(each) for part in self._conditions for each in part])))
 
     @cached_property
     def marks(self) -> dict[Place | None, int]:
@@ -136,18 +139,23 @@ class Layout:
         return np.asarray(read_only(np.array(rows, dtype=float).reshape(-1, 4)))
 
 
-def kernel_row(element: Element) -> Real:
-    """Return an element as a row of the kernel."""
-    row = np.zeros(ROW_WIDTH)
-    row[ROW_KIND] = KINDS[type(element)]
+def kernel_row(element: Element) -> list[float]:
+    """Return the numbers of an element in a row of the kernel."""
+    kind = float(KINDS[type(element)])
     if isinstance(element, Segment):
-        row[:6:2] = element[:3]
-        row[1:6:2] = [value - Fraction(float(value)) for value in element[:3]]
-        row[6:ROW_KIND] = element.sigma, element.damping
-        row[LENGTH:] = element.length, element.stiffness, *element.of_chain
-    elif not isinstance(element, Mark):
-        row[: len(element)] = element
-    return row
+        pairs = [*_two_doubles(element.a), *_two_doubles(element.b), *_two_doubles(element.g)]
+        in_chain = [float(each) for each in (element.length, element.stiffness, *element.of_chain)]
+        return [*pairs, float(element.sigma), element.damping, kind, *in_chain]
+    numbers: Sequence[Any] = () if isinstance(element, Mark) else element
+    zeros = [0.0] * ROW_WIDTH
+    return [*(float(each) for each in numbers), *zeros[len(numbers) : ROW_KIND], kind, *zeros[LENGTH:]]
+
+
+def _two_doubles(value: Fraction) -> tuple[float, float]:
+    """Return the nearest float64 and that of the rest."""
+    high = float(value)
+    p, q = high.as_integer_ratio()
+    return high, (value.numerator * q - p * value.denominator) / (value.denominator * q)
 
 
 def segment_at(chain: System, place: Place) -> Segment:

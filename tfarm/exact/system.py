@@ -65,6 +65,8 @@ class Segment(NamedTuple):
     def of_chain(self) -> tuple[Fraction, Fraction, Fraction, Fraction]:
         """The numbers a, b, g and sigma in the chain's units."""
         l, EI = self.length, self.stiffness
+        if l == EI == 1:
+            return self.a, self.b, self.g, self.sigma
         return self.a * EI / (l * l), self.b / (l * l), self.g * EI / (l * l * l * l), self.sigma * (l * l) / EI
 
 
@@ -133,6 +135,8 @@ class Drive(NamedTuple):
         if not self.turns:
             return ONE, ZERO, ZERO, ZERO
         k, b, J, lag = self.stiffness, self.friction, self.inertia, self.lag
+        if not lag:
+            return k, b + self.back_emf, J, ZERO
         return k, b + lag * k + self.back_emf, J + lag * b, lag * J
 
     @property
@@ -181,9 +185,21 @@ def cut(elements: Sequence[Placed]) -> tuple[Element, ...]:
     return tuple(found)
 
 
+def ratio(above: Iterable[float], below: Iterable[float] = ()) -> Fraction:
+    """Return the exact quotient of two products, as one fraction in lowest terms at the end."""
+    p = q = 1
+    for each in above:
+        n, d = each.as_integer_ratio()
+        p, q = p * n, q * d
+    for each in below:
+        n, d = each.as_integer_ratio()
+        p, q = p * d, q * n
+    return Fraction(p, q)
+
+
 def stiffness_of(link: Link) -> Fraction:
     """Return E I [N m^2] of a link, exact."""
-    return Fraction(link.youngs_modulus) * Fraction(link.section.second_moment)
+    return ratio((link.youngs_modulus, link.section.second_moment))
 
 
 def scaled_inertia(value: float, unit: Fraction) -> Inertia:
@@ -274,6 +290,15 @@ class System:
         """Whether drive and outputs are real at s = i w, up to odd powers of s: no dissipation and no lag."""
         return self.is_undamped and not self.drive.lag
 
+    @property
+    def undamped(self) -> System:
+        """The chain without all damping: itself where nothing dissipates."""
+        return self if self.is_undamped else self._undamped
+
+    @cached_property
+    def _undamped(self) -> System:
+        return self.with_damping(0.0)
+
     def with_damping(self, share: float) -> System:
         """Return the chain with a share of all damping: C, dashpots, friction and back-EMF."""
         parts = [
@@ -292,19 +317,20 @@ def system_of(arm: Arm, theory: Theory | None = None) -> System:
     theory = theory or arm.theory
     must_be_known("theory", theory, THEORIES)
     unit_length, EI = sum((Fraction(link.length) for link in arm.links), ZERO), stiffness_of(arm.link)
-    translation, rotation = unit_length**3 / EI, unit_length / EI
+    rotation = unit_length / EI
+    translation = rotation * unit_length * unit_length
 
     def segment(link: Link) -> Segment:
-        length, area, bending = Fraction(link.length), Fraction(link.section.area), stiffness_of(link)
-        density, kG = Fraction(link.density) * length**2, Fraction(link.shear_factor) * Fraction(link.shear_modulus)
+        L, rho, A, E, I = link.length, link.density, link.section.area, link.youngs_modulus, link.section.second_moment
+        shear = link.shear_factor, link.shear_modulus
         return Segment(
-            a=density / Fraction(link.youngs_modulus) * (theory in WITH_ROTARY_INERTIA),
-            b=density / kG * (theory in WITH_SHEAR),
-            g=density * area * length**2 / bending,
-            sigma=bending / (kG * area * length**2) * (theory in WITH_SHEAR),
+            a=ratio((rho, L, L), (E,)) if theory in WITH_ROTARY_INERTIA else ZERO,
+            b=ratio((rho, L, L), shear) if theory in WITH_SHEAR else ZERO,
+            g=ratio((rho, A, L, L, L, L), (E, I)),
+            sigma=ratio((E, I), (*shear, A, L, L)) if theory in WITH_SHEAR else ZERO,
             damping=link.damping,
-            length=length / unit_length,
-            stiffness=bending / EI,
+            length=Fraction(L) / unit_length if arm.outer else ONE,
+            stiffness=stiffness_of(link) / EI if arm.outer else ONE,
             half_depth=link.section.half_depth,
         )
 

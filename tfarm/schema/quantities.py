@@ -70,7 +70,8 @@ def _quantities(kind: Any) -> dict[str, Quantity]:
     hints = get_type_hints(kind, include_extras=True)
     for base in reversed(kind.__mro__):
         for name, member in vars(base).items():
-            read: Any = getattr(member, "fget", None) or (member.func if isinstance(member, cached_property) else None)
+            is_lazy = isinstance(member, cached_property)
+            read: Any = member.func if is_lazy else member.fget if isinstance(member, property) else None
             if read is not None and "Annotated" in str(read.__annotations__.get("return")):
                 hints[name] = get_type_hints(read, include_extras=True)["return"]
     return {

@@ -16,7 +16,6 @@ real balls, in which each sign is either certain or not determined.
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from functools import lru_cache
 from typing import Any
 
 import flint
@@ -25,27 +24,22 @@ from numpy.typing import NDArray
 
 from tfarm.errors import ConvergenceError
 from tfarm.exact.balls import Ball, Sweep, across_waves, first_success, in_chain, precision, rational
-from tfarm.exact.count import bisect_chain, chain_counts, rows_to_count
-from tfarm.exact.layout import Layout, readings
+from tfarm.exact.count import DOUBLINGS, chain_counts, list_steps, rows_to_count
+from tfarm.exact.layout import LAYOUTS_KEPT, Layout, readings
 from tfarm.exact.system import Segment, Spring, System
 from tfarm.exact.waves import Plane
+from tfarm.records import read_only
 
 
 class Counter:
     """N(omega) of a system: the number of natural frequencies [rad/s] below omega, with the rigid-body mode."""
 
     def __init__(self, system: System) -> None:
-        self._rows, self._ends = rows_to_count(Layout(system.with_damping(0.0)))
+        self._rows, self._ends = rows_to_count(Layout(system.undamped))
 
     def __call__(self, omega: NDArray[np.float64]) -> NDArray[np.int64]:
         """Return the counts at omega (1-D, rad/s, positive)."""
         return chain_counts(np.ascontiguousarray(omega, dtype=float), self._rows, self._ends)
-
-    def first_reaching(self, number: NDArray[np.int64], below: float) -> NDArray[np.float64]:
-        """Return the smallest floats [rad/s] with a count of at least `number`, by bisection of 0..below."""
-        low, high = np.zeros(number.size), np.full(number.size, below)
-        bisect_chain(number, self._rows, self._ends, low, high)
-        return high
 
 
 MOST_AXIS_BITS = 40_000  # of working precision: a root that needs more is double
@@ -161,7 +155,7 @@ class RealAxis:
     """A system without its damping on the imaginary axis, in real balls at the working precision."""
 
     def __init__(self, system: System) -> None:
-        self._system = system if system.is_undamped else system.with_damping(0.0)
+        self._system = system.undamped
 
     def drive(self, omega: Ball) -> Ball:
         """Return D(i omega) times a positive factor."""
@@ -204,36 +198,62 @@ def axis_precisions(digits: int) -> Iterator[int]:
 CLOSE_SHARE = 1e-3  # of the mean spacing: above it rounding moves neither root by more than a few last units
 PAIR_REACH = 4e-6  # relative width around each of a close pair in float64
 PAIR_BITS = 256  # of working precision, for a double frequency to its last float64 digit
-HIGHEST_BOUND = 1e12  # times the estimate of a slender beam: the end of the search
-LISTS_KEPT = 32  # lists of modes in the cache
+LISTS_KEPT = 32  # lists of modes in a cache
 ARMS_KEPT = 64  # arms whose single numbers are in the cache
 
 
-@lru_cache(maxsize=LISTS_KEPT)  # a table of sampled verdicts needs those of one arm some twenty times
 def natural_frequencies(k: System, first: int, last: int) -> NDArray[np.float64]:
     """Return the natural frequencies [rad/s] number first..last of the undamped arm, from 1, double ones twice.
 
+    Raises ConvergenceError if the count does not reach `last` (see `list_frequencies`).
+    """
+    if (first, last) not in k.kept:
+        list_frequencies([k], first, last)
+    if (first, last) not in k.kept:
+        end = _estimate(k, last + 1) * 2.0**DOUBLINGS
+        raise ConvergenceError(f"the count does not reach {last + 1} below {end:.3g} rad/s", end, last + 1)
+    return np.asarray(k.kept[first, last])
+
+
+def list_frequencies(systems: Sequence[System], first: int, last: int) -> None:
+    """Keep with each system its natural frequencies number first..last, by one compiled loop over all of them.
+
     Each is the step of the count to its number, bisected to neighbouring floats, without a start value or a change of
     sign.  Those close to a neighbour are bisected by the count in balls, or in float64 where that is uncertain.
-    Raises ConvergenceError if the count does not reach `last` (up to `HIGHEST_BOUND`).
+    A system whose count does not reach `last` is left out.
     """
-    lowest = min(first, 1 + k.has_rigid_mode)  # not the rigid body at zero: bisection would go through all exponents
-    number = np.arange(max(first - 1, lowest), last + 2)  # with both neighbours: one of them may be close
-    count = Counter(k)
-    omega = count.first_reaching(number, _upper_bound(count, k, int(number[-1])))
-    close = np.diff(omega) * number[1:] < CLOSE_SHARE * omega[1:]
-    for i in np.nonzero(np.r_[close, False] | np.r_[False, close])[0]:
-        low, high = float(omega[i] * (1 - PAIR_REACH)), float(omega[i] * (1 + PAIR_REACH))
-        with precision(PAIR_BITS):
-            axis = RealAxis(k)
-            while low < (middle := 0.5 * (low + high)) < high:
-                below = axis.count(rational(middle))
-                below = int(count(np.array([middle]))[0]) if below is None else below
-                low, high = (low, middle) if below >= number[i] else (middle, high)
-        omega[i] = high
-    found = omega[(first <= number) & (number <= last)]
-    found.flags.writeable = False
-    return found
+    rows, ends = zip(*(rows_to_count(Layout(k.undamped)) for k in systems), strict=True)
+    starts = np.cumsum([0, *map(len, rows)])
+    # with both neighbours: one of them may be close.  The rigid body at zero is left out: bisection would go through
+    # all exponents
+    lowest = np.array([max(first - 1, min(first, 1 + k.has_rigid_mode)) for k in systems])
+    number = np.arange(lowest.min(), last + 2)
+    estimate = np.array([_estimate(k, last + 1) for k in systems])
+    found = np.full((len(systems), number.size), np.nan)
+    stacked = read_only(np.concatenate(rows)), starts, read_only(np.array(ends))
+    list_steps(lowest, last + 1, *stacked, estimate, found)
+    close, near = np.diff(found) * number[1:] < CLOSE_SHARE * found[:, 1:], np.zeros(found.shape, bool)
+    near[:, 1:] = close
+    near[:, :-1] |= close
+    for j, i in np.argwhere(near):
+        found[j, i] = _separated(systems[j], float(found[j, i]), int(number[i]))
+    for k, own in zip(systems, read_only(found[:, number.size - 2 - last + first : -1]), strict=True):
+        if len(k.kept) >= LAYOUTS_KEPT:
+            k.kept.clear()
+        if not np.isnan(own).any():
+            k.kept[first, last] = own
+
+
+def _separated(k: System, omega: float, number: int) -> float:
+    """Return the frequency of that number next to omega, close to another, by the count in balls."""
+    low, high = omega * (1 - PAIR_REACH), omega * (1 + PAIR_REACH)
+    with precision(PAIR_BITS):
+        axis, count = RealAxis(k), Counter(k)
+        while low < (middle := 0.5 * (low + high)) < high:
+            below = axis.count(rational(middle))
+            below = int(count(np.array([middle]))[0]) if below is None else below
+            low, high = (low, middle) if below >= number else (middle, high)
+    return high
 
 
 def count_below(k: System, omega: float) -> int:
@@ -241,15 +261,10 @@ def count_below(k: System, omega: float) -> int:
     return int(Counter(k)(np.array([omega]))[0])
 
 
-def _upper_bound(count: Counter, k: System, last: int) -> float:
-    """Return a frequency above number `last`: the Euler-Bernoulli estimate, doubled until the count reaches it."""
+def _estimate(k: System, last: int) -> float:
+    """Return the Euler-Bernoulli estimate [rad/s] of a frequency above number `last`."""
     transit = math.fsum(float(each.g) ** 0.25 for each in k.segments)  # [s^(1/2)]
-    omega = unit = ((last + 1) * math.pi) ** 2 / transit**2
-    while omega < HIGHEST_BOUND * unit:
-        if count(np.array([omega]))[0] >= last:
-            return omega
-        omega *= 2.0
-    raise ConvergenceError(f"the count does not reach {last} below {omega:.3g} rad/s", omega, last)
+    return float(((last + 1) * math.pi) ** 2 / transit**2)
 
 
 def refine(k: System, omega: float, digits: int) -> str:

@@ -255,7 +255,7 @@ def modes(arm: Arm, count: int | None = None, *, up_to: float | None = None, the
     """
     must_be_arm(arm)
     theory = arm.theory if theory is None else theory
-    k = system_of(arm, theory).with_damping(0.0)
+    k = system_of(arm, theory).undamped
     rigid = arm.has_rigid_mode
     if (count is None) == (up_to is None):
         raise ParameterError(key="count", value=count, remedy="give either a count of modes or a frequency up_to")
@@ -271,7 +271,7 @@ def modes(arm: Arm, count: int | None = None, *, up_to: float | None = None, the
         raise ParameterError(key="count", value=count, remedy=f"at most {MOST_TABLE_MODES} modes")
     flexible = natural_frequencies(k, rigid + 1, rigid + count)
     index = np.arange(1 - rigid, count + 1)
-    return Modes(arm, theory, index, np.r_[[0.0] * rigid, flexible], k)
+    return Modes(arm, theory, index, np.concatenate([[0.0] * rigid, flexible]), k)
 
 
 def compare_theories(table: Modes) -> dict[Theory, Real]:
@@ -297,7 +297,7 @@ def hub_locked(table: Modes) -> Modes:
 
 def modes_below(arm: Arm, up_to: float, *, theory: Theory | None = None) -> int:
     """Return the number of flexible modes of the undamped arm below up_to [rad/s], by the count."""
-    return count_below(system_of(arm, theory).with_damping(0.0), up_to) - arm.has_rigid_mode
+    return count_below(system_of(arm, theory).undamped, up_to) - arm.has_rigid_mode
 
 
 def flexible_frequencies(arm: Arm, up_to: float) -> Real:

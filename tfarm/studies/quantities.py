@@ -10,6 +10,7 @@ result counts as not stable.
 
 import math
 import re
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -25,11 +26,13 @@ from tfarm.case.card import LoopCard, loop_card, words_of, words_of_samples
 from tfarm.case.step import LoopResponse, step
 from tfarm.dsp.verdict import sampled
 from tfarm.errors import ConvergenceError, TfarmError, must_be_known, require
+from tfarm.exact.system import system_of
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Interval, windows_of
 from tfarm.schema import Percent, Quantity, quantities
 from tfarm.spectrum import damped_modes, modes
+from tfarm.spectrum.frequencies import list_frequencies
 from tfarm.spectrum.shapes import PARAMETERS
 from tfarm.tuner.tuning import tuned
 
@@ -52,7 +55,8 @@ SIGNIFICANT = 0.05  # of a rank correlation: a larger probability of chance name
 FEWEST_RANKED = 10  # rows of a rank correlation
 CERTAINTIES = ("exact", "certified", "converged", "approximate", "not determined")
 STABLE = "stable"
-Asked = tuple[Mapping[str, Quantity], Callable[[Subject, Set[str]], Mapping[str, Any]]]  # columns, and their values
+Values = Callable[[Subject, Set[str]], Mapping[str, Any]]  # of an arm, in these columns
+Asked = tuple[Mapping[str, Quantity], Values]  # columns, and their values
 
 
 def first_of(name: str) -> str:
@@ -138,6 +142,19 @@ def _modes_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
     return _numbered(FREQUENCY, modes(one.arm, count).natural_frequency[-count:])
 
 
+def prepare(subjects: Sequence[Subject], names: Sequence[str]) -> None:
+    """Find the natural frequencies of all these arms in one loop, where columns of modes are asked for.
+
+    An arm whose list fails has its reason where it is asked alone.
+    """
+    numbers = {name for name in names if first_of(name) == f"{FREQUENCY}.1"}
+    alike = defaultdict(list)
+    for one in subjects if numbers else ():
+        alike[one.arm.has_rigid_mode].append(system_of(one.arm, one.arm.theory).undamped)
+    for rigid, systems in alike.items():
+        list_frequencies(systems, rigid + 1, rigid + _most(numbers))
+
+
 def _sensitivities_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
     count = _most(names)
     return {name: value for parameter, values in modes(one.arm, count).sensitivity.items()
@@ -170,7 +187,7 @@ def _poles_of(one: Subject, _: Set[str]) -> dict[str, float | None]:
 
 def _numbered(name: str, values: Any) -> dict[str, float | None]:
     """Return values under numbered names, None where there are none."""
-    return {f"{name}.{n}": each if np.isfinite(each) else None for n, each in enumerate(values.tolist(), start=1)}
+    return {f"{name}.{n}": each if math.isfinite(each) else None for n, each in enumerate(values.tolist(), start=1)}
 
 
 def _columns(name: str, label: str, unit: str, meaning: str) -> dict[str, Quantity]:
@@ -257,15 +274,24 @@ def order_of(word: str) -> tuple[str, ...]:
     return (quantity, *filter(None, [stability_of(quantity)]))
 
 
-def values_of(one: Subject, names: Sequence[str]) -> dict[str, Any]:
-    """Return the values of these columns for an arm, and under `FAILED` the reason of missing ones."""
-    found, reasons = dict[str, Any](), []
+def asked_of(names: Sequence[str]) -> list[tuple[Set[str], Values]]:
+    """Return the functions that have values of these columns, each with its own columns."""
+    found = list[tuple[Set[str], Values]]()
     for columns, values in ASKED:
-        if own := {name for name in names if first_of(name) in columns}:
-            try:
-                found |= values(one, own)
-            except TfarmError as error:
-                reasons.append(f"{min(own).split('.')[0]}: {error}")
+        own = dict.fromkeys(name for name in names if first_of(name) in columns)
+        found += [(own.keys(), values)] * bool(own)
+    return found
+
+
+def values_of(one: Subject, asked: Sequence[tuple[Set[str], Values]]) -> dict[str, Any]:
+    """Return the values of columns (`asked_of`) for an arm, and under `FAILED` the reason of missing ones."""
+    found, reasons = dict[str, Any](), []
+    for own, values in asked:
+        try:
+            found |= values(one, own)
+        except TfarmError as error:
+            reasons.append(f"{min(own).split('.')[0]}: {error}")
+    names = (name for own, _ in asked for name in own)
     return {**{name: found.get(name) for name in names}, FAILED: "; ".join(reasons) or None}
 
 

@@ -12,7 +12,7 @@ import io
 import json
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import islice, takewhile
@@ -30,8 +30,8 @@ from tfarm.errors import ConvergenceError, ParameterError, TfarmError, one_line,
 from tfarm.files import write_file
 from tfarm.tuner import Plan as TunerPlan
 
-from .quantities import FAILED, quantity_of, values_of
-from .space import Space, Subjects, extra, parquet
+from .quantities import FAILED, Values, asked_of, prepare, quantity_of, values_of
+from .space import Space, Subject, Subjects, extra, parquet
 
 Progress = Callable[[int, int, str], object]
 Chunk = dict[str, list[Any]]  # columns of a range of rows
@@ -47,6 +47,7 @@ LEAST_SECONDS, MOST_SECONDS = 5.0, 30.0  # of a chunk
 CHUNKS_A_WORKER = 10  # where that leaves them within these
 MOST_ROWS = 50_000  # of a chunk
 LONGEST_REASON = 200  # characters
+BATCH = 32  # arms whose frequencies are found together; the exact numbers of twice as many are kept
 PATIENCE = 20  # seconds for a scheduler to answer, and for its first worker
 PACKAGES = ("tfarm", "numpy", "scipy", "numba")  # versions that all workers have in common
 
@@ -73,6 +74,11 @@ class Plan:
         return {FAILED, *(name for name in self.names if not quantity_of(name).is_number)}
 
     @cached_property
+    def asked(self) -> list[tuple[Set[str], Values]]:
+        """The functions of the columns that are asked for."""
+        return asked_of(self.names)
+
+    @cached_property
     def subjects(self) -> Subjects:
         """The arms and loops of the rows."""
         fitted = self.space.posterior.keys if self.space.posterior else ()
@@ -87,16 +93,26 @@ def chunk(plan: Plan, first: int, last: int, listed: Real | None = None) -> Chun
 def table_of(plan: Plan, first: int, rows: Real) -> Chunk:
     """Return the table of rows of values (rows, keys), numbered from `first`."""
     table: Chunk = {name: [] for name in plan.columns}
-    for number, row in enumerate(rows.tolist(), start=first):
-        found: dict[str, Any] = {ROW: number, **dict(zip(plan.space.keys, row, strict=True))}
-        try:
-            found |= values_of(plan.subjects.at(row), plan.names)
-        except Exception as error:  # one arm never ends a study: its reason is kept, and counted
-            found[FAILED] = str(error) if isinstance(error, TfarmError) else f"{type(error).__name__}: {error}"
-        found[FAILED] = found[FAILED] and one_line(found[FAILED], LONGEST_REASON)
-        for name, column in table.items():
-            column.append(found.get(name))
+    for start in range(0, len(rows), BATCH):
+        batch = rows[start : start + BATCH].tolist()
+        subjects = [_attempt(plan.subjects.at, row) for row in batch]
+        _attempt(prepare, [each for each in subjects if isinstance(each, Subject)], plan.names)
+        for number, (row, subject) in enumerate(zip(batch, subjects, strict=True), start=first + start):
+            found: dict[str, Any] = {ROW: number, **dict(zip(plan.space.keys, row, strict=True))}
+            own = _attempt(values_of, subject, plan.asked) if isinstance(subject, Subject) else subject
+            found |= {FAILED: own} if isinstance(own, str) else own
+            found[FAILED] = found[FAILED] and one_line(found[FAILED], LONGEST_REASON)
+            for name, column in table.items():
+                column.append(found.get(name))
     return table
+
+
+def _attempt(function: Callable[..., Any], *arguments: Any) -> Any:
+    """Return the result of a function, or the reason for none: one arm never ends a study."""
+    try:
+        return function(*arguments)
+    except Exception as error:
+        return str(error) if isinstance(error, TfarmError) else f"{type(error).__name__}: {error}"
 
 
 # ------------------------------------------------------------------------------------------------------------ parts
