@@ -105,13 +105,12 @@ def damping_edge(loop: Sampled) -> float:
 
     Decades are searched from the strongest C down, so that larger ones on that grid are stable too.
     """
-
     count = loop.plant.count
 
     @cache
     def at_decade(C: float) -> float:
-        """The log spectral radius by ringing modes alone, where its sign is certain without overdamped ones."""
-        rough = log_radius_with(loop, C, count, beyond=0)
+        """The log spectral radius, from eigenvalues of ringing modes alone where these have its sign."""
+        rough = math.log(abs(damped_loop(loop, C, count, beyond=0).eigenvalues).max())
         return rough if abs(rough) > ROUGH else log_radius_with(loop, C, count)
 
     def log_radius(C: float) -> float:
@@ -131,14 +130,19 @@ def damping_edge(loop: Sampled) -> float:
     return float(low)
 
 
-def log_radius_with(loop: Sampled, C: float, count: int, beyond: int = KEPT_BEYOND) -> float:
-    """The log spectral radius at C; where two damped modes are one there, at a C that differs by 1e-6."""
+def log_radius_with(loop: Sampled, C: float, count: int) -> float:
+    """The log spectral radius at C."""
+    return damped_loop(loop, C, count, KEPT_BEYOND).poles.log_spectral_radius
+
+
+def damped_loop(loop: Sampled, C: float, count: int, beyond: int) -> Sampled:
+    """The loop with C, of at most `count` modes; where two damped modes are one, with a C that differs by 1e-6."""
 
     def damped(nudge: float) -> Sampled:
         arm = loop.plant.arm.having(damping=C * (1 + nudge))
         return loop.on(arm, max(1, min(count, beyond + outliving(arm, loop.chain))))
 
-    return first_distinct(damped, NUDGES).poles.log_spectral_radius
+    return first_distinct(damped, NUDGES)
 
 
 def outliving(arm: Arm, chain: Chain) -> int:
