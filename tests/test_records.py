@@ -2,8 +2,12 @@
 
 import dataclasses
 import importlib
+import os
+import pickle
 import pkgutil
 import re
+import subprocess
+import sys
 from functools import cached_property
 
 import numpy as np
@@ -163,3 +167,29 @@ def test_every_record_with_arrays_is_one() -> None:
         types = " ".join(str(each.type) for each in dataclasses.fields(value))
         if value.__dataclass_params__.frozen and re.search(r"\b(NDArray|Real|Complex|Whole)\b", types):
             assert name.startswith("_") or value.__repr__.__module__ == "tfarm.records", (module, name)
+
+
+def test_the_hash_of_a_record_is_computed_once_and_stays_in_its_process() -> None:
+    """Texts have other hashes in another process: an arm read there is the key of what was kept under its equal."""
+    asked = []
+
+    class Counted:
+        def __hash__(self) -> int:
+            return len(asked.append(0) or asked)
+
+    @record
+    @dataclasses.dataclass(frozen=True)
+    class Kept:
+        entry: Counted
+
+    kept = Kept(Counted())
+    assert hash(kept) == hash(kept)
+    assert len(asked) == 1
+    hash(LAB)
+    code = (
+        "import pickle, sys, tfarm; arm = pickle.load(sys.stdin.buffer); "
+        "print({tfarm.load('sasaki2012-lab'): 'found'}.get(arm))"
+    )
+    seed = {**os.environ, "PYTHONHASHSEED": "7"}
+    found = subprocess.run([sys.executable, "-c", code], input=pickle.dumps(LAB), env=seed, capture_output=True)
+    assert found.stdout.decode().strip() == "found"

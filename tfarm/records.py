@@ -20,6 +20,7 @@ LONGEST_REPR = 200  # characters of a repr: a line or two of a terminal
 LONGEST_ENTRY, LONGEST_FINDING = 60, 100  # characters of an entry, and of the finding
 PLAIN = frozenset({float, int, str, bool, type(None), Fraction})  # types without arrays
 LONGEST_INSIDE = 80  # of a record inside another one
+OF_TEXTS = hash("tfarm")  # another in each process, as the hash of every record with a text
 SHOWN_SINGLY = 3  # numbers of an array or a list that are shown
 
 
@@ -102,7 +103,13 @@ def _same(one: Any, other: Any) -> bool:
 
 
 def _hash(self: Any) -> int:
-    return hash((type(self), *(_key(getattr(self, each.name)) for each in fields(self) if each.compare)))
+    """Return the hash of the entries, computed once a process: caches ask for that of an arm again and again."""
+    kept: dict[str, Any] = getattr(self, "__dict__", {})
+    of_texts, value = kept.get("_hash", (None, 0))
+    if of_texts != OF_TEXTS:
+        value = hash((type(self), *(_key(getattr(self, each.name)) for each in fields(self) if each.compare)))
+        kept["_hash"] = OF_TEXTS, value
+    return int(value)
 
 
 def _key(value: Any) -> Any:

@@ -11,7 +11,7 @@ import pytest
 import tfarm
 from tests.shell import answer, run
 from tfarm.case import card
-from tfarm.dsp import Chain, Sampling, load_chain, sampled_verdict
+from tfarm.dsp import Chain, Sampling, edges, load_chain, sampled_verdict
 from tfarm.schema.terminal import table_lines
 
 BARE, LAB = tfarm.load("sasaki2012"), tfarm.load("sasaki2012-lab")
@@ -109,6 +109,20 @@ def test_an_undamped_arm_keeps_its_stability_and_is_graded_with_a_little_damping
     assert own.sampled.phase_margin.value is None
     assert own.sampled.minimum_damping == tfarm.sampled(BARE, LAW).minimum_damping.value
     assert "undamped model" in own.notes[-1]
+
+
+def test_a_card_has_the_minimum_damping_without_a_proof_of_its_digits(monkeypatch):
+    """That proof takes whole loops at both ends of the figure, and the card prints four digits of the value alone."""
+    proofs, whole_loop = [], edges.whole_loop
+    monkeypatch.setattr(edges, "whole_loop", lambda *of: proofs.append(of) or whole_loop(*of))
+    found = tfarm.sampled(BARE, LAW)
+    own = tfarm.result_card(BARE, LAW, at_samples=found)
+    assert not proofs
+    figure = found.minimum_damping
+    assert len(proofs) >= 2
+    assert (figure.value, figure.digits) == (own.sampled.minimum_damping, 4)
+    assert tfarm.sampled(BARE.having(damping=1.01 * figure.value), LAW).verdict.is_stable
+    assert not tfarm.sampled(BARE.having(damping=0.99 * figure.value), LAW).verdict.is_stable
 
 
 def test_a_notebook_shows_the_card():

@@ -13,7 +13,7 @@ from tfarm.dsp import Chain, Converters, Sampling, pulse_transfer, sampled_loop,
 from tfarm.dsp import circle as circle_module
 from tfarm.dsp.circle import Arcs, Circle, Discs, complete_band, product
 from tfarm.dsp.crossings import FACTOR, crossings_of
-from tfarm.dsp.edges import shown_delay, whole_loop
+from tfarm.dsp.edges import delay_limit, whole_loop
 from tfarm.reduced import modal_model
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -39,7 +39,7 @@ def test_the_filters_own_pole_errs_by_what_the_model_is_off_at_its_corner(delay)
 def test_without_a_band_a_delay_margin_has_the_digits_that_twice_the_modes_leave():
     """Less than one sample of it: both ends of what is shown are on their sides of the edge with sixteen modes too."""
     loop = sampled_loop(LAB, replace(GAINS, K2=1.1), Chain(sampling=Sampling(delay_samples=0.5)), count=4)
-    figure = shown_delay(loop, None)
+    figure = delay_limit(loop, None).figure
     assert 0 < figure.value < 1
     assert (figure.is_settled, figure.modes) == (False, 4)
     assert figure.digits >= 2

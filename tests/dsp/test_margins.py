@@ -100,6 +100,17 @@ def test_the_required_damping_is_where_the_verdict_turns(lossless):
     assert not at((1 - 4e-6) * C).is_stable
 
 
+@pytest.mark.parametrize(("K1", "K2", "ratio"), [(0.3, -0.2, 0.02), (20.0, 0.3, 0.15)])
+def test_a_required_damping_next_to_overdamped_modes_is_that_of_a_loop_with_all_of_them(lossless, K1, K2, ratio):
+    """The decades are searched by ringing modes alone, the edge with overdamped ones: eigenvalues of 20 turn there."""
+    law, chain = HubFeedback(K1=K1, K2=K2), Chain()
+    C = required_damping(lossless, law, chain)
+    assert ratio / 10 < C * tfarm.modes(lossless, 1).natural_frequency[1] / 2 < ratio
+    sides = [sampled_loop(lossless.having(damping=C * side), law, chain, count=20) for side in (1 - 1e-4, 1 + 1e-4)]
+    radii = [abs(loop.eigenvalues).max() for loop in sides]
+    assert radii[0] > 1 > radii[1]
+
+
 def test_the_region_is_upright_where_intervals_of_the_rate_gain_end(lab):
     """Stable on one side of each end, not on the other, by the eigenvalues at one of the gains that were looked at."""
     loop = sampled_loop(lab, GAINS, count=14)

@@ -129,3 +129,24 @@ def test_a_guess_without_a_slope_is_lost_and_the_others_are_named():
     """In compiled code a complex division by zero is an error: fifteen modes of this rig met one."""
     rig = some_rig(np.random.default_rng(60035))
     assert damped_modes(tfarm.modes(rig, 9)).is_assigned.sum() >= 7
+
+
+def test_overdamped_modes_beyond_the_list_are_not_followed(monkeypatch):
+    """Without shear s^2 + C w^2 s + w^2 = 0 of each mode: the same zeros, and fewer branches on the way to them."""
+    arm, count, branches, near = tfarm.load("sasaki2012").having(damping=1e-3), 7, [], naming.Damping.near
+
+    def counted(self, values, guess):
+        branches.append(guess.shape[1])
+        return near(self, values, guess)
+
+    monkeypatch.setattr(naming.Damping, "near", counted)
+    caches.empty()
+    table = tfarm.modes(arm, count, theory="euler-bernoulli")
+    found = damped_modes(table, reach=2.5)
+    w = table.natural_frequency[1:]
+    assert arm.damping * w[-3] < 2.0
+    assert arm.damping * w[-1] > 2.5
+    exact = [np.roots([1.0, arm.damping * each**2, each**2]) for each in w]
+    exact = [sorted(pair, key=lambda s: (-s.imag, abs(s))) for pair in exact]
+    np.testing.assert_allclose(found.eigenvalues[1:], exact, rtol=1e-8)
+    assert max(branches) == 2 * count

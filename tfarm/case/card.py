@@ -262,7 +262,7 @@ def sampled_card(found: Analysis) -> LoopCard:
     if verdict.is_stable:
         band = sampled_margins(SampledCurve(loop))
     is_small = arm.least_damping < reference_damping(arm)
-    needed = found.minimum_damping if is_small else None
+    needed = found.damping_limit if is_small else None
     return LoopCard(
         **words_of_samples(verdict),
         **_margins(band, found.gain_factors, found.delay_margin_seconds, T),

@@ -5,11 +5,13 @@ unstable at the other, for every mode of the band.  Else the number is converged
 that a loop of twice as many (or half as many, of many) confirms in the same way.
 """
 
+from __future__ import annotations
+
 import math
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from itertools import pairwise
 from typing import Annotated, TypeVar
 
@@ -22,7 +24,7 @@ from tfarm.dsp.chain import Chain
 from tfarm.dsp.circle import Band, complete_band
 from tfarm.dsp.crossings import stable_windows
 from tfarm.dsp.discretise import acting_law, with_all_gains
-from tfarm.dsp.plant import FORGOTTEN, first_distinct, held_amplitude
+from tfarm.dsp.plant import FORGOTTEN, OVERDAMPED, first_distinct, held_amplitude
 from tfarm.dsp.sampled import Sampled, resized, sampled_loop
 from tfarm.records import record
 from tfarm.schema import Quantity
@@ -37,9 +39,9 @@ PUSH_ROOM = 4  # times the first-order shift of a pole by the feedback: a mode w
 DELAY_KNOWN = 1e-10  # samples: tolerance of a delay margin
 CLEARLY = 1e-6  # within the circle: an eigenvalue there is not polished, as even a double one has an error of 1e-7
 KEPT_BEYOND = 2  # modes kept beyond the last one that does not decay within a sample
+ROUGH = 1e-3  # of ln of the spectral radius: more than those change it
 MODES_BEYOND = 4  # those of a whole loop that decay within a sample
 MOST_LOOP_MODES = 128  # of a whole loop: half a second of work
-SURELY_OVERDAMPED = 2.5  # C w from which on a mode surely is: following it further costs a hundred times as much
 FAR_BEYOND = 5.0  # of critical in the first mode: all poles of bending lie left of any line, one mode is enough
 STRONGEST = 0.15  # of critical in the first mode: the largest damping of the search
 DAMPING_MODES = 40  # of the loop in which a required damping is searched, by default
@@ -103,31 +105,44 @@ def damping_edge(loop: Sampled) -> float:
 
     Decades are searched from the strongest C down, so that larger ones on that grid are stable too.
     """
+    count = loop.plant.count
 
     @cache
+    def at_decade(C: float) -> float:
+        """The log spectral radius, from eigenvalues of ringing modes alone where these have its sign."""
+        rough = math.log(abs(damped_loop(loop, C, count, beyond=0).eigenvalues).max())
+        return rough if abs(rough) > ROUGH else log_radius_with(loop, C, count)
+
     def log_radius(C: float) -> float:
-        return log_radius_with(loop, C, loop.plant.count)
+        return at_decade(C) if C in (low, high) else log_radius_with(loop, C, count)
 
     if loop.is_stable:
         return 0.0
     high = 2 * STRONGEST / first_frequency(loop.plant.arm)
-    if log_radius(high) >= 0:
+    if at_decade(high) >= 0:
         return math.inf
-    for low in high / 10.0 ** np.arange(1, DAMPING_DECADES + 1):
-        if log_radius(low) >= 0:  # a radius is nearly linear in C where C is small
-            C = float(brentq(log_radius, low, 10 * low, xtol=DAMPING_XTOL * low, rtol=DAMPING_RTOL))
+    for _ in range(DAMPING_DECADES):
+        low = high / 10
+        if at_decade(low) >= 0:  # a radius is nearly linear in C where C is small
+            C = float(brentq(log_radius, low, high, xtol=DAMPING_XTOL * low, rtol=DAMPING_RTOL))
             return C * (1 + MADE_SURE)
+        high = low
     return float(low)
 
 
 def log_radius_with(loop: Sampled, C: float, count: int) -> float:
-    """The log spectral radius at C; where two damped modes are one there, at a C that differs by 1e-6."""
+    """The log spectral radius at C."""
+    return damped_loop(loop, C, count, KEPT_BEYOND).poles.log_spectral_radius
+
+
+def damped_loop(loop: Sampled, C: float, count: int, beyond: int) -> Sampled:
+    """The loop with C, of at most `count` modes; where two damped modes are one, with a C that differs by 1e-6."""
 
     def damped(nudge: float) -> Sampled:
         arm = loop.plant.arm.having(damping=C * (1 + nudge))
-        return loop.on(arm, min(count, KEPT_BEYOND + outliving(arm, loop.chain)))
+        return loop.on(arm, max(1, min(count, beyond + outliving(arm, loop.chain))))
 
-    return first_distinct(damped, NUDGES).poles.log_spectral_radius
+    return first_distinct(damped, NUDGES)
 
 
 def outliving(arm: Arm, chain: Chain) -> int:
@@ -136,7 +151,7 @@ def outliving(arm: Arm, chain: Chain) -> int:
     Overdamped modes have their slow poles next to -1/C, where those of the remainder are too.
     """
     C, remaining = arm.least_damping, chain.sampling.period * (1 - chain.sampling.fraction)
-    return modes_below(arm, min(math.sqrt(2 * FORGOTTEN / (C * remaining)), SURELY_OVERDAMPED / C))
+    return modes_below(arm, min(math.sqrt(2 * FORGOTTEN / (C * remaining)), OVERDAMPED / C))
 
 
 def most_modes(arm: Arm, chain: Chain) -> int:
@@ -168,15 +183,18 @@ class Figure:
             help="number of modes of the model where the limit is converged and not certified")]  # fmt: skip
     is_bound: bool = False
 
+    is_sharp = True  # as a limit: its digits need no test
+
+    @property
+    def figure(self) -> Figure:
+        """Itself, as a limit whose digits are known."""
+        return self
+
     @property
     def is_settled(self) -> Annotated[bool, Quantity("certified", key="certified",
             help="whether the limit is certified for every mode up to a frequency")]:  # fmt: skip
         """Whether it is certified in a band."""
         return self.band is not None
-
-    def is_sharp(self, digits: int) -> bool:
-        """Whether that number of digits is certified."""
-        return self.is_settled and (self.digits >= digits or self.value == 0.0)
 
     @property
     def text(self) -> Annotated[str, Quantity("in these digits",
@@ -203,34 +221,58 @@ class LowerBound(float):
 Interval = tuple[Figure, Figure]  # both edges of a stable interval
 
 
-def figure(value: float, digits: int, modes: int, proven: Test, other: Test, *, below: bool, spare: float) -> Figure:
-    """Return a limit of stability, with a loop stable `below` it or above, and its significant digits.
+@dataclass(frozen=True)
+class Limit:
+    """A limit of stability at `value`, with a loop stable `below` it or above, and a test of its digits.
 
-    These are the most digits that are `proven` (at least two), or else that the `other` loop confirms.  An edge at 0 is
-    tested at the distance `spare` from 0.
+    Significant are the most digits that are `proven` (at least two), or else that the `other` loop confirms.  An edge
+    at 0 is tested at the distance `spare` from 0.
     """
 
-    def most(test: Test, least: int) -> tuple[int, float]:
-        """The most digits that pass, and their band; by bisection, as intervals of fewer digits contain the others."""
+    value: float
+    digits: int
+    modes: int
+    proven: Test
+    other: Test
+    below: bool
+    spare: float = 0.0
 
-        @cache
-        def turns(number: int) -> float:
-            """The band in which the loop is stable at one end of the interval of these digits alone; 0: none."""
-            if math.isinf(value):
-                return 0.0
-            rounded = float(f"{value:.{number}g}")
-            half = 0.5 * 10.0 ** (math.floor(math.log10(abs(rounded))) - number + 1) if rounded else spare
-            inside, outside = (rounded - half, rounded + half) if below else (rounded + half, rounded - half)
-            stable, band = test(inside)
-            still, narrower = test(outside) if stable else (None, 0.0)
-            return min(band, narrower) if still is False else 0.0
+    is_bound = False
 
-        fewer = range(least, digits)
-        number = digits if turns(digits) else least - 1 + bisect_right(fewer, False, key=lambda each: not turns(each))
-        return (number, turns(number)) if number >= least else (0, 0.0)
+    @property
+    def is_sharp(self) -> bool:
+        """Whether all digits are proven."""
+        return self._proof(self.digits) > 0.0
 
-    number, band = most(proven, 2)
-    return Figure(value, number, band, None) if number else Figure(value, most(other, 1)[0], None, modes)
+    @cached_property
+    def figure(self) -> Figure:
+        """The limit with its significant digits."""
+        if number := self._most(self._proof, 2):
+            return Figure(self.value, number, self._proof(number), None)
+        return Figure(self.value, self._most(lambda each: self._turns(self.other, each), 1), None, self.modes)
+
+    @cached_property
+    def _proof(self) -> Callable[[int], float]:
+        """The band in which a number of digits is proven; 0: not proven."""
+        return cache(lambda number: self._turns(self.proven, number))
+
+    def _most(self, band: Callable[[int], float], least: int) -> int:
+        """Return the most digits with a band, 0 for none; by bisection, as intervals of fewer contain the others."""
+        if band(self.digits):
+            return self.digits
+        number = least - 1 + bisect_right(range(least, self.digits), False, key=lambda each: not band(each))
+        return number if number >= least else 0
+
+    def _turns(self, test: Test, number: int) -> float:
+        """Return the band in which the loop is stable at one end of the interval of these digits alone; 0: none."""
+        if math.isinf(self.value):
+            return 0.0
+        rounded = float(f"{self.value:.{number}g}")
+        half = 0.5 * 10.0 ** (math.floor(math.log10(abs(rounded))) - number + 1) if rounded else self.spare
+        inside, outside = (rounded - half, rounded + half) if self.below else (rounded + half, rounded - half)
+        stable, band = test(inside)
+        still, narrower = test(outside) if stable else (None, 0.0)
+        return min(band, narrower) if still is False else 0.0
 
 
 def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[Interval]:
@@ -239,22 +281,22 @@ def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[Interval]
     def proof(value: float) -> Proof:
         return _proof(band, loop.having(**{name: value}))
 
-    def found(loop: Sampled) -> list[Interval]:
+    def found(loop: Sampled) -> list[tuple[Limit, Limit]]:
         other, modes = _with_others(loop), loop.plant.count
 
         def confirmed(value: float) -> Proof:
             return other().having(**{name: value}).is_stable, math.inf
 
-        def edge(value: float, opposite: float, *, below: bool) -> Figure:
+        def edge(value: float, opposite: float, *, below: bool) -> Limit:
             spare = DISTINCT_FROM_ZERO * (abs(opposite) if opposite and math.isfinite(opposite) else 1.0)
-            return figure(value, GAIN_DIGITS, modes, proof, confirmed, below=below, spare=spare)
+            return Limit(value, GAIN_DIGITS, modes, proof, confirmed, below=below, spare=spare)
 
         return [(edge(low, high, below=False), edge(high, low, below=True)) for low, high in stable_windows(loop, name)]
 
-    def is_sharp(windows: list[Interval]) -> bool:
-        return all(edge.is_sharp(GAIN_DIGITS) for pair in windows for edge in pair)
+    def is_sharp(windows: list[tuple[Limit, Limit]]) -> bool:
+        return all(edge.is_sharp for pair in windows for edge in pair)
 
-    return _most_certain(loop, band, MOST_EDGE_MODES, found, is_sharp)
+    return [(low.figure, high.figure) for low, high in _most_certain(loop, band, MOST_EDGE_MODES, found, is_sharp)]
 
 
 def _most_certain(
@@ -291,8 +333,8 @@ def _proof(band: Band | None, loop: Sampled) -> Proof:
     return None if count is None else count == 0, 0.0 if band is None else band.top
 
 
-def shown_delay(loop: Sampled, band: Band | None) -> Figure:
-    """Return the delay margin [samples] as a figure, with more and more modes until all digits are certified.
+def delay_limit(loop: Sampled, band: Band | None) -> Figure | Limit:
+    """Return the delay margin [samples], with more and more modes until all its digits are certified.
 
     0 is as certain as the verdict that the loop is unstable.
     """
@@ -304,7 +346,7 @@ def shown_delay(loop: Sampled, band: Band | None) -> Figure:
         later = band.loop.with_delay(now + more)
         return _proof(complete_band(later), later)
 
-    def found(loop: Sampled) -> Figure:
+    def found(loop: Sampled) -> Figure | Limit:
         margin, modes, other = delay_margin(loop), loop.plant.count, _with_others(loop)
 
         def holds(more: float) -> Proof:
@@ -314,16 +356,13 @@ def shown_delay(loop: Sampled, band: Band | None) -> Figure:
             return Figure(0.0, OTHER_DIGITS, band.top if band else None, None if band else modes)
         if margin.is_bound:
             return Figure(margin.samples, OTHER_DIGITS, None, modes, is_bound=True)
-        return figure(margin.samples, OTHER_DIGITS, modes, proof, holds, below=True, spare=0.0)
+        return Limit(margin.samples, OTHER_DIGITS, modes, proof, holds, below=True)
 
-    def is_sharp(found: Figure) -> bool:
-        return found.is_bound or found.is_sharp(OTHER_DIGITS)
-
-    return _most_certain(loop, band, MOST_EDGE_MODES // 2, found, is_sharp)
+    return _most_certain(loop, band, MOST_EDGE_MODES // 2, found, lambda limit: limit.is_sharp)
 
 
-def shown_damping(loop: Sampled, count: int) -> Figure:
-    """Return the damping [s] from which on a loop is stable, as a figure, by a search with `count` modes."""
+def damping_limit(loop: Sampled, count: int) -> Figure | Limit:
+    """Return the damping [s] from which on a loop is stable, by a search with `count` modes."""
     count = min(count, MOST_EDGE_MODES)
     bare, law = loop.on(loop.plant.arm.elastic, count), replace(loop.given, delay=0.0)  # that is in the chain
     C = damping_edge(bare)
@@ -337,4 +376,4 @@ def shown_damping(loop: Sampled, count: int) -> Figure:
     def holds(value: float) -> Proof:
         return log_radius_with(bare, value, another(count, MOST_EDGE_MODES)) < 0, math.inf
 
-    return figure(C, OTHER_DIGITS, count, proof, holds, below=False, spare=0.0)
+    return Limit(C, OTHER_DIGITS, count, proof, holds, below=False)

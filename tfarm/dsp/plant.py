@@ -51,6 +51,7 @@ MODES_USED = Quantity("flexible modes", help="number of flexible modes of the ar
 USUAL_MODES = 20  # flexible, of a sampled loop or a simulation by default
 SLOW = 0.1  # |p| T below which a pole is slow: its two parts are then more than ten times their sum
 PHI_TERMS = 12  # of a series in |p| T, below `SLOW`: 0.1^12/14! is left
+OVERDAMPED = 2.5  # C w from which on a mode surely is: following it further costs a hundred times as much
 FORGOTTEN = 40.0  # e^-40 = 4e-18: such a pole has settled before the next sample
 
 
@@ -134,7 +135,7 @@ _modelled_once = lru_cache(maxsize=LISTS_KEPT)(modal_model)
 def undelayed_plant(arm: Arm, outputs: Sequence[str], count: int, x: float | None = None) -> Plant:
     """The arm with `count` flexible modes, its outputs not filtered; `x` [m] is the place of outputs along the arm."""
     must_have_free_hub(arm)
-    return with_modes(_modelled_once(arm, tuple(outputs), count, x), count)
+    return with_modes(_modelled_once(arm, tuple(outputs), count, x, reach=OVERDAMPED), count)
 
 
 def with_modes(model: ModalModel, count: int) -> Plant:

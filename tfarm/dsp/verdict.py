@@ -17,10 +17,11 @@ from tfarm.dsp.edges import (
     DelayMargin,
     Figure,
     Interval,
+    Limit,
     LowerBound,
+    damping_limit,
+    delay_limit,
     delay_margin,
-    shown_damping,
-    shown_delay,
     shown_windows,
     whole_loop,
 )
@@ -209,20 +210,20 @@ class Analysis:
     def delay_margin_samples(self) -> Annotated[float, Quantity(unit="samples", key="delay_margin_samples",
             help="smallest additional delay that destabilises the loop, in samples")]:  # fmt: skip
         """The further delay in samples, to the last digit."""
-        return self.delay.value
+        return self.delay_limit.value
 
     @property
     def delay_margin_seconds(self) -> Annotated[float, Quantity("delay margin", "s", 4, key="delay_margin_s",
             help="smallest additional loop delay that destabilises the loop; 0 of an unstable loop")]:  # fmt: skip
         """The further delay in seconds."""
-        seconds = self.delay.value * self.loop.chain.sampling.period
-        return LowerBound(seconds) if self.delay.is_bound else seconds
+        seconds = self.delay_limit.value * self.loop.chain.sampling.period
+        return LowerBound(seconds) if self.is_lower_bound else seconds
 
     @property
     def is_lower_bound(self) -> Annotated[bool, Quantity("delay margin: lower bound", key="delay_margin_is_lower_bound",
             help="whether the search ended at the margin with the loop still stable")]:  # fmt: skip
         """Whether no further delay up to the margin destabilises the loop."""
-        return self.delay.is_bound
+        return self.delay_limit.is_bound
 
     @property
     def free_hub_angle(self) -> Annotated[str | None, Quantity("free hub angle",
@@ -277,21 +278,31 @@ class Analysis:
     def delay(self) -> Annotated[Figure, Quantity("delay margin in samples", key="delay_margin",
             help="smallest additional delay that destabilises the loop, over the sampling period")]:  # fmt: skip
         """The delay margin [samples]; of any law but gains at the hub with the modes of the verdict."""
+        return self.delay_limit.figure
+
+    @cached_property
+    def delay_limit(self) -> Figure | Limit:
+        """The delay margin [samples] to the last digit, with a test of its digits for gains at the hub."""
         if self.loop.is_of_gains:
-            return shown_delay(self.loop, self.verdict.band)
+            return delay_limit(self.loop, self.verdict.band)
         found = delay_margin(self.loop)
         return Figure(found.samples, LAW_DELAY_DIGITS, None, self.verdict.modes_used, found.is_bound)
 
     @property
     def delay_margin(self) -> DelayMargin:
         """The delay margin, to the last digit."""
-        return DelayMargin(self.delay.value, self.delay.is_bound)
+        return DelayMargin(self.delay_limit.value, self.is_lower_bound)
 
     @cached_property
     def minimum_damping(self) -> Annotated[Figure | None, Quantity("minimum structural damping for stability", "s",
             help="Kelvin-Voigt damping C of the link from which on the loop is stable")]:  # fmt: skip
         """The damping C [s] from which on the loop is stable, for gains at the hub."""
-        return shown_damping(self.loop, self.damping_modes) if self.loop.is_of_gains else None
+        return None if self.damping_limit is None else self.damping_limit.figure
+
+    @cached_property
+    def damping_limit(self) -> Figure | Limit | None:
+        """The same with a test of its digits, which takes as long as the search."""
+        return damping_limit(self.loop, self.damping_modes) if self.loop.is_of_gains else None
 
     @cached_property
     def plain_windows(self) -> Mapping[str, list[Window]]:

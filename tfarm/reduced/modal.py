@@ -158,11 +158,14 @@ NEXT_TO_REST = 1e-3  # of the first frequency: a pole nearer to 0 leaves 1e-15 o
 ModalModel = PartialFractions  # pairs assigned to no mode come last, with the index 0 and |s| for a frequency
 
 
-def modal_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) -> ModalModel:
+def modal_model(
+    arm: Arm, outputs: Wanted, count: int, x: float | None = None, *, reach: float = math.inf
+) -> ModalModel:
     """Return the modal model of an arm with its first `count` flexible modes (0 to 1000), for one output or several.
 
     `x` [m] is the place of outputs along the arm.  With a locked hub the hub angle is the input, and there is no rigid
-    body.  At C > 0 eigenvalues and residues are those of the damped arm, two real poles of an overdamped mode.
+    body.  At C > 0 eigenvalues and residues are those of the damped arm, two real poles of an overdamped mode; `reach`
+    is that of `damped_modes`.
     Raises ParameterError for an unknown or improper output and a count out of range.
     """
     G = transfer(arm, outputs, x=x)
@@ -176,7 +179,7 @@ def modal_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) -
         require(each.power <= MOST_PROPER, "outputs", each.name, remedy)
     table = modes(arm, max(1, int(count)))
     collocated = OUTPUTS["root_moment" if arm.is_locked else "hub_angle"]
-    index, p, single = _eigenvalues(arm, table)
+    index, p, single = _eigenvalues(arm, table, reach)
     r, alone = _residues(table, k, [*wanted, collocated], share, p, single)
     if count == 0:
         index, p, r = index[:0], p[:0], r[:, :0]
@@ -245,7 +248,7 @@ def _at_rest(G: TransferFunction, single: Real, table: Modes) -> tuple[Real, NDA
     return expansion, kept
 
 
-def _eigenvalues(arm: Arm, table: Modes) -> tuple[NDArray[np.int64], Complex, Real]:
+def _eigenvalues(arm: Arm, table: Modes, reach: float) -> tuple[NDArray[np.int64], Complex, Real]:
     """Return the mode of each pair (n,), 0 of one assigned to none, the pairs (n, 2), and single real ones (m,)."""
     flexible = table.index > 0
     if arm.is_undamped:
@@ -254,7 +257,7 @@ def _eigenvalues(arm: Arm, table: Modes) -> tuple[NDArray[np.int64], Complex, Re
             1j * np.outer(table.natural_frequency[flexible], [1, -1]),
             np.array(single_zeros(table)),
         )
-    damped = damped_modes(table, steps=NAMING_STEPS if len(table) > LARGE_MODEL else math.inf)
+    damped = damped_modes(table, steps=NAMING_STEPS if len(table) > LARGE_MODEL else math.inf, reach=reach)
     pairs, more = damped.eigenvalues[flexible], damped.unassigned_pairs
     whole, rings = np.isfinite(pairs).all(axis=1), more[:, 0].imag > 0
     halves = pairs[~whole & np.isfinite(pairs[:, 0]), 0].real

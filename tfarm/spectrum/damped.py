@@ -184,37 +184,39 @@ class DampedModes:
         return np.array(values, dtype=complex).reshape(*zeros.shape, *share.shape)
 
 
-def damped_modes(undamped: Modes, *, steps: float = math.inf) -> DampedModes:
+def damped_modes(undamped: Modes, *, steps: float = math.inf, reach: float = math.inf) -> DampedModes:
     """Return the modes of the arm with its damping, and every eigenvalue of a box up to half-way to the next mode.
 
     Eigenvalues in the box without a certain mode are `unassigned`.  The record has at most 300 modes of a damped arm,
     fewer where a box cannot be searched; `left_out` is the number of others.  After `steps` of following modes the
-    eigenvalues of those not plain are listed as unassigned, or left out beyond the box.
+    eigenvalues of those not plain are listed as unassigned, or left out beyond the box.  Modes beyond the list are
+    followed up to C w = `reach`: overdamped ones take long, and no box ends at them.
     Raises ConvergenceError where not even the box of the first mode can be searched.
     """
     if not isinstance(undamped, Modes):
         raise ParameterError(key="modes", value=undamped, remedy="give what tfarm.modes returns")
     count = int(undamped.index.max())
     most = count if undamped.arm.is_undamped else min(count, MOST_MODES)
-    found = _searched_once(undamped.arm, undamped.theory, most, steps)
+    found = _searched_once(undamped.arm, undamped.theory, most, steps, reach)
     return replace(found, left_out=count - int(found.index.max()))
 
 
 @lru_cache(maxsize=LISTS_KEPT)  # one page needs the same modes some ninety times
-def _searched_once(arm: Arm, theory: Theory, count: int, steps: float) -> DampedModes:
+def _searched_once(arm: Arm, theory: Theory, count: int, steps: float, reach: float) -> DampedModes:
     """Return the first `count` modes of an arm, or half of them where their box cannot be searched."""
     try:
-        return _searched(modes(arm, count, theory=theory), steps)
+        return _searched(modes(arm, count, theory=theory), steps, reach)
     except ConvergenceError:
         if count == 1:
             raise
-        return _searched_once(arm, theory, count // 2, steps)
+        return _searched_once(arm, theory, count // 2, steps, reach)
 
 
-def _searched(undamped: Modes, steps: float) -> DampedModes:
+def _searched(undamped: Modes, steps: float, reach: float) -> DampedModes:
     """Return all eigenvalues in a box, assigned to their modes where that is certain."""
     k, count, function = undamped.system, int(undamped.index.max()), function_of(undamped.system)
-    single, every = named(undamped, count + COMPANY, steps)
+    beyond = modes(undamped.arm, count + COMPANY, theory=undamped.theory).natural_frequency[-COMPANY:]
+    single, every = named(undamped, count + int((k.damping * beyond < reach).sum()), steps)
     pairs, company = every[:count], every[count:]
     listed = np.concatenate([np.stack([single, np.full(single.size, LOST)], axis=1), pairs])
     box = complete_box(function, listed, company, k.damping) if np.isfinite(listed[:, 0]).all() else None
