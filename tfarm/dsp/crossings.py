@@ -297,7 +297,7 @@ def sampled_map(
     return GainMap(loop, vary, x, y, counts_over(y, found, at, there), found)
 
 
-class Row(NamedTuple):
+class MapRow(NamedTuple):
     """A row of a map at the second gain `up`: its `crossings`, with a count of unstable poles `there` at `across`."""
 
     grid: CircleGrid
@@ -307,14 +307,14 @@ class Row(NamedTuple):
     there: int
 
 
-def row_of(loop: Sampled, x: Real, y: Real, vary: tuple[str, str]) -> Row:
+def row_of(loop: Sampled, x: Real, y: Real, vary: tuple[str, str]) -> MapRow:
     """Return the row with which a map of these gains begins, counted by eigenvalues."""
     start = loop.having(**{vary[0]: _off_the_edge(x), vary[1]: _off_the_edge(y)})
     grid, (across, up) = circle_grid(loop), (start.number(name) for name in vary)
-    return Row(grid, up, crossings_along(grid, [line_of(start, vary[0])]), across, start.poles.unstable)
+    return MapRow(grid, up, crossings_along(grid, [line_of(start, vary[0])]), across, start.poles.unstable)
 
 
-def _map_of_gains(loop: Sampled, x: Real, y: Real, vary: tuple[str, str], row: Row) -> GainMap:
+def _map_of_gains(loop: Sampled, x: Real, y: Real, vary: tuple[str, str], row: MapRow) -> GainMap:
     """The map over two gains of parts of the law, from the exact crossings of every column (D-decomposition).
 
     The count of its row starts it; those by eigenvalues at three corners must agree, or a ConvergenceError is raised.
@@ -350,7 +350,7 @@ def rounded_map(plane: GainMap, drawn: Callable[[Real, Real], Complex]) -> GainM
     return plane
 
 
-def with_more(plane: GainMap, x: Real, row: Row | None = None) -> GainMap:
+def with_more(plane: GainMap, x: Real, row: MapRow | None = None) -> GainMap:
     """The map of two gains with further values across, from its row if that is there already."""
     fresh = np.setdiff1d(x, plane.x)
     if not fresh.size:

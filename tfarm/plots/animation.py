@@ -159,7 +159,7 @@ def animate(arm: Arm, run: Simulation) -> Animation:
 
 
 def film(motion: Motion) -> Animation:
-    """The film of a motion: what stands still is drawn once, below what moves and the outlines that lie on that."""
+    """The film of a motion: the background is drawn once, all that moves or lies on what moves in each frame."""
     figure, stream, frames = draw_motion.figure(motion), io.BytesIO(), list[Image.Image]()
     with style():
         settled(figure)
