@@ -9,7 +9,8 @@ from PIL import Image
 
 import tfarm
 from tfarm.dsp import Chain, Sampling, load_chain
-from tfarm.plots.animation import MOST_FRAMES, Motion, draw_motion, exaggeration, film, motion_of
+from tfarm.plots.animation import DOTS, MOST_FRAMES, Motion, draw_motion, exaggeration, film, motion_of
+from tfarm.plots.style import settled, style
 
 LAB = tfarm.load("sasaki2012-lab")
 GAINS = tfarm.default_gains(LAB)
@@ -92,6 +93,22 @@ def test_a_film_has_a_frame_for_each_twentieth_of_its_own_second_and_the_same_by
     assert gif.convert("RGB").getpixel((3, 3)) == (255, 255, 255)
     assert np.corrcoef(heights, angles)[0, 1] > 0.999
     assert shown._repr_html_().startswith('<img src="data:image/gif;base64,R0lGOD')
+
+
+@pytest.mark.parametrize("share", [0.3, 1.0])
+def test_a_frame_is_the_picture_drawn_anew(motion, share):
+    """By a figure of its own, of which nothing was drawn before."""
+    frame, drawn = round(share * (motion.t.size - 1)), io.BytesIO()
+    gif = Image.open(io.BytesIO(film(motion).gif))
+    gif.seek(frame)
+    with style():
+        figure = draw_motion.figure(motion._replace(still=frame))
+        settled(figure)
+        figure.savefig(drawn, format="png", dpi=DOTS)
+    shown, whole = (np.asarray(each.convert("RGB")).astype(int) for each in (gif, Image.open(drawn)))
+    assert shown.shape == whole.shape
+    assert abs(shown - whole).max() < 100  # of 255: edges in 48 colours; a frame away it is 229
+    assert abs(shown - whole).mean() < 0.2
 
 
 def test_a_deflection_is_to_scale_where_it_is_seen_and_else_named(run, motion):

@@ -8,11 +8,13 @@ from xml.etree import ElementTree
 import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
 import tfarm
 from tests.shell import refused, run
-from tfarm.plots import column
+from tfarm.plots import column, frequency, style
 from tfarm.plots.regions import SLATE
 from tfarm.plots.style import (
     BLUE,
@@ -30,6 +32,7 @@ from tfarm.plots.style import (
     save_figure,
 )
 from tfarm.report.page import TEMPLATES
+from tfarm.response.frequency import bode
 
 mpl.use("Agg")
 
@@ -209,3 +212,23 @@ def test_a_figure_of_an_unknown_kind_is_refused_in_one_line(option, tmp_path, ca
     words = refused(capsys, "bode", "sasaki2012-lab", option, str(tmp_path / "a.jpg"))
     assert "give a name that ends in .png, .svg or .pdf" in words
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("place", ["page", "phone"])
+def test_a_layout_measures_axes_once_and_leaves_them_where_two_measured_rounds_do(place, monkeypatch):
+    """Against matplotlib's own layout of the same picture, and by letters of a renderer of its own."""
+    measured, measure = [], Axes.get_tightbbox
+    monkeypatch.setattr(
+        Axes, "get_tightbbox", lambda ax, *how, **more: measured.append(ax) or measure(ax, *how, **more)
+    )
+    with style.drawn_for(place):
+        once, twice = (frequency.bode.figure(bode(LAB, "root_moment")) for _ in range(2))
+        style.settled(once)
+        assert [measured.count(ax) for ax in once.axes] == [1, 1]
+        FigureCanvasAgg(twice)
+        twice.get_layout_engine().execute(twice)
+        assert [measured.count(ax) for ax in twice.axes] == [2, 2]
+    for here, there in zip(once.axes, twice.axes, strict=True):
+        ends = [ax.get_position().extents * np.tile(once.get_size_inches(), 2) for ax in (here, there)]
+        assert ends[0] == pytest.approx(ends[1], abs=0.01)  # inches
+        assert here.yaxis.label.get_window_extent().size == pytest.approx(there.yaxis.label.get_window_extent().size)

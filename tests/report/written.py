@@ -55,7 +55,7 @@ ASSUMPTIONS = (PRINTED, "second assumption", LONG)
 ARM = replace(tfarm.load("stocky-steel"), name=NAME, assumptions=ASSUMPTIONS)
 REPORT = (
     "import pickle, sys, tfarm; from pathlib import Path; from tfarm import audit; from tfarm.report import write;"
-    "rows = pickle.loads(Path(sys.argv[3]).read_bytes()); audit.audit = lambda: rows;"
+    "rows = pickle.loads(Path(sys.argv[3]).read_bytes()); audit.kept_audit = lambda: rows;"
     "from tests.report.written import coarsen; coarsen();"  # the map and the sampled section have tests of their own
     "print(write([tfarm.load(sys.argv[1])], Path(sys.argv[2])));"
     "pyplot = sys.modules.get('matplotlib.pyplot');"  # python-control imports it; no figure may be its own

@@ -9,12 +9,13 @@ What needs SymPy is loaded when it is asked for: a report's processes want this 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from .kept import kept_audit
 from .rows import AuditRow, is_zero
 
 if TYPE_CHECKING:
     from .paper import PAPER, Audit, Claim, audit, claims
 
-__all__ = ["PAPER", "Audit", "AuditRow", "Claim", "audit", "claims", "is_zero"]
+__all__ = ["PAPER", "Audit", "AuditRow", "Claim", "audit", "claims", "is_zero", "kept_audit"]
 
 
 def __getattr__(name: str) -> object:

@@ -283,7 +283,7 @@ def sampled_map(
     x, y = ascending(vary[0], x, 1, MOST_GAINS), ascending(vary[1], y, 1, MOST_GAINS)
     across, up = (loop.place(name) for name in vary)
     if across is not None and up is not None:
-        return _map_of_gains(loop, x, y, vary)
+        return _map_of_gains(loop, x, y, vary, row_of(loop, x, y, vary))
     if across is not None:
         turned = sampled_map(loop, y, x, (vary[1], vary[0]))
         return GainMap(loop, vary, turned.y, turned.x, turned.unstable.T, [])
@@ -297,20 +297,35 @@ def sampled_map(
     return GainMap(loop, vary, x, y, counts_over(y, found, at, there), found)
 
 
-def _map_of_gains(loop: Sampled, x: Real, y: Real, vary: tuple[str, str]) -> GainMap:
+class MapRow(NamedTuple):
+    """A row of a map at the second gain `up`: its `crossings`, with a count of unstable poles `there` at `across`."""
+
+    grid: CircleGrid
+    up: float
+    crossings: list[Crossings]
+    across: float
+    there: int
+
+
+def row_of(loop: Sampled, x: Real, y: Real, vary: tuple[str, str]) -> MapRow:
+    """Return the row with which a map of these gains begins, counted by eigenvalues."""
+    start = loop.having(**{vary[0]: _off_the_edge(x), vary[1]: _off_the_edge(y)})
+    grid, (across, up) = circle_grid(loop), (start.number(name) for name in vary)
+    return MapRow(grid, up, crossings_along(grid, [line_of(start, vary[0])]), across, start.poles.unstable)
+
+
+def _map_of_gains(loop: Sampled, x: Real, y: Real, vary: tuple[str, str], row: MapRow) -> GainMap:
     """The map over two gains of parts of the law, from the exact crossings of every column (D-decomposition).
 
-    One count by eigenvalues starts it; those at three corners must agree, or a ConvergenceError is raised.
+    The count of its row starts it; those by eigenvalues at three corners must agree, or a ConvergenceError is raised.
     """
 
     def at(first: float, second: float) -> Sampled:
         return loop.having(**{vary[0]: first, vary[1]: second})
 
-    grid, start = circle_grid(loop), at(_off_the_edge(x), _off_the_edge(y))
-    (across, up), there = (start.number(name) for name in vary), np.array([start.poles.unstable])
-    at_start = counts_over(x, crossings_along(grid, [line_of(start, vary[0])]), across, there)[0]
-    found = crossings_along(grid, [line_of(at(float(value), up), vary[1]) for value in x])
-    plane = GainMap(loop, vary, x, y, counts_over(y, found, up, at_start), found)
+    at_start = counts_over(x, row.crossings, row.across, np.array([row.there]))[0]
+    found = crossings_along(row.grid, [line_of(at(float(value), row.up), vary[1]) for value in x])
+    plane = GainMap(loop, vary, x, y, counts_over(y, found, row.up, at_start), found)
     for i, j in ((0, 0), (-1, 0), (-1, -1)):
         corner = at(float(x[i]), float(y[j]))
         is_clear = abs(corner.poles.log_radius).min() >= CLEAR_OF_CIRCLE  # else on an edge, or too close to it
@@ -326,20 +341,22 @@ def rounded_map(plane: GainMap, drawn: Callable[[Real, Real], Complex]) -> GainM
 
     `drawn` maps points of the plane to the picture, 1 high.
     """
+    row = row_of(plane.loop, plane.x, plane.y, plane.vary)
     for _ in range(OUTLINE_ROUNDS):
         more = loose_columns(plane.x, pieces(plane.x, plane.stable_intervals), drawn)
         if not more.size or plane.x.size + more.size > MOST_COLUMNS:
             break
-        plane = with_more(plane, more)
+        plane = with_more(plane, more, row)
     return plane
 
 
-def with_more(plane: GainMap, x: Real) -> GainMap:
-    """The map with further values across."""
+def with_more(plane: GainMap, x: Real, row: MapRow | None = None) -> GainMap:
+    """The map of two gains with further values across, from its row if that is there already."""
     fresh = np.setdiff1d(x, plane.x)
     if not fresh.size:
         return plane
-    more = sampled_map(plane.loop, fresh, plane.y, plane.vary)
+    row = row or row_of(plane.loop, plane.x, plane.y, plane.vary)
+    more = _map_of_gains(plane.loop, fresh, plane.y, plane.vary, row)
     both = np.r_[plane.x, more.x]
     order = np.argsort(both, kind="stable")
     found = plane.crossings + more.crossings

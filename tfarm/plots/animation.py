@@ -4,17 +4,18 @@ Frames are at least eight to a period of the first mode where that leaves the fi
 faster than the frames would be seen at a wrong frequency.
 """
 
+import io
 import math
 from base64 import b64encode
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import Circle
+from PIL import Image
 
 from tfarm.arm import Arm
 from tfarm.arrays import Complex, Real
@@ -158,28 +159,30 @@ def animate(arm: Arm, run: Simulation) -> Animation:
 
 
 def film(motion: Motion) -> Animation:
-    """The film of a motion."""
-    figure, writer = draw_motion.figure(motion), Writer(fps=RATE)
-    with style(), TemporaryDirectory() as folder:
+    """The film of a motion: the background is drawn once, all that moves or lies on what moves in each frame."""
+    figure, stream, frames = draw_motion.figure(motion), io.BytesIO(), list[Image.Image]()
+    with style():
         settled(figure)
-        ax, file = figure.axes[0], Path(folder, "film.gif")
-        with writer.saving(figure, str(file), DOTS):
-            for frame in range(motion.t.size):
-                for line, places in zip(ax.lines, (motion.reference[frame], motion.link[frame]), strict=True):
-                    line.set_data(places.real, places.imag)
-                ax.set_title(motion.words(frame), loc="left", fontsize=9.0, color=INK)
-                writer.grab_frame()
-        return Animation(motion.t.size, file.read_bytes())
-
-
-class Writer(PillowWriter):
-    """One that writes the colours of the first frame once, where Pillow chooses 256 new ones for each."""
-
-    _frames: list[Any]
-
-    def finish(self) -> None:
-        """Write the file."""
-        palette = self._frames[0].quantize(INKS)
-        palette.putpalette([255 if each >= WHITE else each for each in palette.getpalette()])  # as the page's
-        self._frames = [each.quantize(palette=palette, dither=0) for each in self._frames]
-        super().finish()
+        figure.set_dpi(DOTS)
+        ax = figure.axes[0]
+        canvas: Any = FigureCanvasAgg(figure)
+        title = ax.set_title(motion.words(0), loc="left", fontsize=9.0, color=INK)
+        drawn = sorted([*ax.lines, *ax.patches, *ax.spines.values(), title], key=lambda each: each.zorder)
+        for each in drawn:
+            each.set_animated(True)
+        canvas.draw()
+        still = canvas.copy_from_bbox(figure.bbox)
+        for frame in range(motion.t.size):
+            canvas.restore_region(still)
+            for line, places in zip(ax.lines, (motion.reference[frame], motion.link[frame]), strict=True):
+                line.set_data(places.real, places.imag)
+            title.set_text(motion.words(frame))
+            for each in drawn:
+                ax.draw_artist(each)
+            frames.append(Image.fromarray(np.array(canvas.buffer_rgba())).convert("RGB"))
+    # the colours of the first frame are those of all, where Pillow chooses 256 new ones for each
+    colours = frames[0].quantize(INKS)
+    colours.putpalette([255 if each >= WHITE else each for each in colours.getpalette() or ()])  # as the page's
+    frames = [each.quantize(palette=colours, dither=Image.Dither.NONE) for each in frames]
+    frames[0].save(stream, "gif", save_all=True, append_images=frames[1:], duration=1000 // RATE, loop=0)
+    return Animation(motion.t.size, stream.getvalue())

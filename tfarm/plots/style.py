@@ -12,9 +12,9 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from contextvars import ContextVar
-from functools import partial, wraps
+from functools import cache, partial, wraps
 from inspect import signature
-from itertools import product
+from itertools import count, product
 from pathlib import Path
 from typing import Any, get_args
 
@@ -23,10 +23,13 @@ import matplotlib.style
 import numpy as np
 from matplotlib.axes import Axes as Axes
 from matplotlib.axis import Axis
+from matplotlib.backend_bases import FigureCanvasBase
+from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.figure import Figure as Figure  # which pages name too
 from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.text import Annotation, Text
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.transforms import Bbox
 
 from tfarm.arm import GAINS, LISTED, PLANE, AnyLaw, Arm, as_law, shown_unit
 from tfarm.arm.law import NUMBER
@@ -109,6 +112,20 @@ def column() -> AbstractContextManager[None]:
     return drawn_for("column")
 
 
+class Measuring(FigureCanvasBase):
+    """A canvas on which nothing is drawn: one renderer measures the letters of all figures, and keeps their sizes."""
+
+    def get_renderer(self) -> RendererAgg:
+        """Return the renderer of this number of dots an inch."""
+        return renderer_of(self.figure.dpi)
+
+
+@cache
+def renderer_of(dpi: float) -> RendererAgg:
+    """Return the renderer that measures letters, for which its width and height do not count."""
+    return RendererAgg(1.0, 1.0, dpi)  # type: ignore[no-untyped-call]
+
+
 FIGURES: dict[Any, Callable[..., Figure]] = {}  # by the class of a record its first picture as a figure of its own
 
 
@@ -153,6 +170,8 @@ def picture(
                 inches = size(*found) if callable(size) else size
                 size_here = placed_size(inches, grid is not None)
                 drawn = new(figsize=size_here, layout="constrained")  # no label clipped
+                if new is Figure:
+                    Measuring(drawn)
                 make(drawn, *found)
                 if grid is not None and _place.get() == "phone":
                     stack(drawn)
@@ -384,10 +403,30 @@ def save_picture(draw: Callable[[Any], Figure], record: Any, path: Path) -> None
 def settled(figure: Figure) -> None:
     """Make the layout of a figure once, for all that is drawn of it."""
     if (layout := figure.get_layout_engine()) is not None:
+        for ax in figure.axes:
+            if ax.get_aspect() == "auto" and ax.get_subplotspec() is not None:
+                measure_once(ax)
         layout.execute(figure)
         figure.set_layout_engine(None)
     for ax in figure.axes:  # at ten digits: the layout's solver orders by address, so its last bit differs
         ax.set_position(tuple(np.round(ax.get_position(original=True).bounds, 10).tolist()))
+
+
+def measure_once(ax: Axes) -> None:
+    """Guess the room of ticks and labels around axes in the first of two rounds of a layout, and measure in the second.
+
+    Both would measure; the first has to be near enough for the ticks of the second to be those that are drawn.
+    """
+    place, rounds = ax.get_subplotspec(), count()
+    guess = [-0.65, -0.5 if place.is_last_row() else -0.05, 0.1, 0.25]  # type: ignore[union-attr]  # inches
+
+    def around(*how: Any, **more: Any) -> Any:
+        if next(rounds):
+            return type(ax).get_tightbbox(ax, *how, **more)
+        inner = ax.get_position(original=True).transformed(ax.figure.transSubfigure)
+        return Bbox.from_extents(*(inner.extents + ax.figure.dpi * np.array(guess)))
+
+    ax.get_tightbbox = around  # type: ignore[method-assign]
 
 
 def _drawn(figure: Figure, formats: tuple[str, ...], dpi: int) -> Iterator[bytes]:

@@ -287,11 +287,11 @@ def _correct(leaf: ElementTree.Element, before: ElementTree.Element) -> None:
 
 
 def gather() -> tuple[Sequence[AuditRow], Sequence[published.PublishedRow]]:
-    """What the whole package shows for itself: the audit of the paper, and the tables of others.  Some seconds.
+    """What the whole package shows for itself: the audit of the paper, kept or new, and the tables of others.
 
     Raises CertificationError where one of them fails.
     """
-    return audit.audit(), published.validate()
+    return audit.kept_audit(), published.validate()
 
 
 def write_trust(

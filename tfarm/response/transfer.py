@@ -7,7 +7,7 @@ response at points s, `ByMethods` those by each method.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, cast
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tfarm.arm import INPUT_UNITS, Arm, Input, must_be_arm
 from tfarm.arm.checks import number, on_the_arm, positive, whole
-from tfarm.arrays import Complex
+from tfarm.arrays import Complex, Real
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import MISSING, require
 from tfarm.exact.balls import nearest_float
@@ -34,6 +34,7 @@ from tfarm.exact.values import (
     differentiate_outputs,
     digits_of,
     evaluate_outputs,
+    free_outputs,
     free_slopes,
     known_method,
     slow_values,
@@ -70,15 +71,21 @@ def zeros_of(arm: Arm, wanted: Output, up_to: float, x: float) -> Roots:
     if constant is not None:
         at_zero = wanted.power if constant else 0
         return Roots(np.zeros(at_zero, complex), (-math.inf, math.inf, -up_to, up_to), "constant")
-    order, numerator = _numerator(k, wanted, x)
+    base = replace(wanted.base, gauge=False)
+    order = order_at_zero(k, base, x)
     at_zero = max(0, order + wanted.power - k.at_rest)
     neighbours = {("theta", "root"): math.inf, ("M", "root"): 0.0 if arm.is_uniform else None}
     neighbour = neighbours.get((wanted.quantity, wanted.place))
     other = arm if neighbour is None else arm.having(hub_inertia=neighbour)
     if neighbour is not None and arm.is_undamped:
         return _on_axis(flexible_frequencies(other, up_to), at_zero, up_to)
-    starts = _starts_by_sampling(numerator, up_to) if neighbour is None else _damped_starts(other, up_to)
-    return _in_box(k, numerator, at_zero, up_to, starts)
+
+    def size(s: Complex) -> Real:
+        here = free_outputs(k, [base], s, x)
+        return np.where(here.lost, np.inf, abs(here.outputs[0] / s**order))
+
+    starts = _starts_by_sampling(size, up_to) if neighbour is None else _damped_starts(other, up_to)
+    return _in_box(k, _numerator(k, base, order, x), at_zero, up_to, starts)
 
 
 def _on_axis(frequencies: NDArray[np.float64], at_zero: int, up_to: float) -> Roots:
@@ -95,31 +102,28 @@ def _damped_starts(arm: Arm, up_to: float) -> Complex:
     return np.r_[starts, np.linspace(-up_to, -up_to / 50, 40)]
 
 
-def _starts_by_sampling(numerator: Function, up_to: float) -> Complex:
-    """Return dips of the numerator along the imaginary and the real axis."""
+def _starts_by_sampling(size_at: Callable[[Complex], Real], up_to: float) -> Complex:
+    """Return dips of the numerator's size along the imaginary and the real axis."""
     line = np.r_[np.geomspace(1e-4 * up_to, up_to, 400), np.linspace(0.01 * up_to, up_to, 1600)]
     line.sort()
     starts = []
     for direction in (1j, 1.0, -1.0):
-        at = numerator(direction * line)
-        size = abs(at.value)
+        size = size_at(direction * line)
         dips = np.nonzero((size[1:-1] < size[:-2]) & (size[1:-1] < size[2:]))[0] + 1
         starts.append(direction * line[dips])
     found = np.concatenate(starts)
     return np.r_[found, found.conj(), -found, -found.conj()]
 
 
-def _numerator(k: System, wanted: Output, x: float) -> tuple[int, Function]:
-    """Return the order of the zero at s = 0 of an output over its power of s, and the function without it."""
-    base = replace(wanted.base, gauge=False)
-    order = order_at_zero(k, base, x)
+def _numerator(k: System, base: Output, order: int, x: float) -> Function:
+    """Return an output over its power of s without its zeros at s = 0, as many as its order."""
 
     def function(s: Complex) -> Analytic:
         s = off_rest(s)
         here, slopes = free_slopes(k, [base], s, x)
         return deflated(here.outputs[0], slopes.outputs[0], here.scale, s, order)
 
-    return order, function
+    return function
 
 
 def _in_box(k: System, function: Function, at_zero: int, up_to: float, starts: Complex) -> Roots:
