@@ -27,6 +27,7 @@ SURVEYS := \
 	spectrum.chains \
 	loop.agreement \
 	loop.loci \
+	loop.spread \
 	loop.law_counts \
 	synthesis.designs \
 	loop.nyquist_counts \

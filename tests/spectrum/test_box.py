@@ -9,7 +9,17 @@ import pytest
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.spectrum import box as room
-from tfarm.spectrum.box import Box, complete, complete_box, distinct, filled_box, newton, winding_number, zeros_in_box
+from tfarm.spectrum.box import (
+    Box,
+    complete,
+    complete_box,
+    distinct,
+    filled_box,
+    newton,
+    repelled,
+    winding_number,
+    zeros_in_box,
+)
 
 UNITS = (2.0**-30, 1.0, 2.0**30)  # of time, which matter nowhere: every tolerance is a share of a size
 
@@ -176,6 +186,33 @@ def test_random_zeros_are_counted_and_found(seed: int) -> None:
         assert winding_number(function, box) == inside.sum()
     found = zeros_in_box(with_zeros(zeros, 3.0), box, np.empty(0, complex))
     np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(zeros[inside]), atol=1e-5)
+
+
+def test_a_missed_zero_is_found_with_the_known_ones_divided_out():
+    """Of 60 zeros far right a plain step is short everywhere; once all but one are known none is there again."""
+    zeros = np.array([1.0 + 2.0j, 1.0 - 2.0j, -1.5, 0.8 + 0.1j, *np.linspace(3.0, 4.0, 60)])
+    box, starts = Box(-2.0, 2.0, -3.0, 3.0), np.array([-0.9 + 0j, 0.5 + 1.5j, -1.0 - 2.0j])
+    function = with_zeros(zeros)
+    near = repelled(function, starts, np.delete(zeros, 3), box, 1)
+    assert near.size
+    np.testing.assert_allclose(near, zeros[3], rtol=1e-5)
+    assert repelled(function, starts, zeros, box, 1).size == 0
+
+
+def test_of_a_function_real_on_the_real_axis_half_a_box_is_searched():
+    """All zeros are found, real, near the axis and double ones too, on fewer points than in a box that is no mirror."""
+    zeros = np.array([2.0 + 3.0j, 2.0 - 3.0j, -1.0, 1e-5, 0.7 + 1e-4j, 0.7 - 1e-4j, -1.7, -1.7])
+    points = []
+
+    def function(s):
+        points[-1] += s.size
+        return with_zeros(zeros)(s)
+
+    for low in (-4.0, -4.001):
+        points.append(0)
+        found = zeros_in_box(function, Box(-5.0, 5.0, low, 4.0), np.empty(0, complex))
+        np.testing.assert_allclose(np.sort_complex(found.round(7)), np.sort_complex(zeros), atol=1e-6)
+    assert points[0] < points[1]
 
 
 def conjugates(*upper):

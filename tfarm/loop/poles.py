@@ -1,14 +1,12 @@
 """Closed-loop poles of the exact rig under any law: zeros of a transcendental function, complete in a printed box.
 
-A reduced model gives starting points alone.  Newton's method finds zeros from many starts, and the winding number of
-the characteristic function around the box is their number (`spectrum.box`).  Where it disagrees the box is cut and
-searched again.
+Newton's method finds zeros from many starts, and the winding number of the characteristic function around the box is
+their number (`spectrum.box`).  Where it disagrees the others are searched for, and the box is cut.
 """
 
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -19,14 +17,14 @@ from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
 from tfarm.arrays import LEAST_SIZE, Complex
 from tfarm.digits import DOUBLE_DIGITS
-from tfarm.errors import CertificationError, ConvergenceError, ParameterError, require
+from tfarm.errors import CertificationError, ConvergenceError, require
 from tfarm.records import record
-from tfarm.reduced.modal import closed, in_series, pade, sensed_model
+from tfarm.reduced.modal import closed, in_series, pade
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.schema import Quantity
-from tfarm.spectrum import modes_below
 from tfarm.spectrum.box import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SINGULAR, TRIED_HEIGHTS, Box, complete
 from tfarm.spectrum.proofs import Disc, disjoint, enclosed, proven_count
+from tfarm.spectrum.starts import damped_starts
 from tfarm.spectrum.table import first_frequency
 
 from .loop import UNDISPERSED, Loop, band_of, steep_places
@@ -50,10 +48,10 @@ LATE = 2.0  # of 1/delay: further left a delayed loop has ever more poles, and a
 BEYOND_OWN = 1.1  # times the rightmost pole of a law, where L is infinite: the nearest right edge that is tried
 # Starts of Newton's method affect the time alone: the winding number counts the zeros that they missed.
 STARTS_REACH = 1.3  # heights of the box: modes of the arm up to there, as a law may draw their poles down into it
-REAL_STARTS, REAL_SPAN, REAL_REACH = 25, 300, 1.4  # on the real axis: their number, from height/300 to 1.4 heights
+REAL_POINTS, REAL_SPAN, REAL_REACH = 300, 1e10, 1.4  # on either side of 0: their number, from 1e-10 to 1.4 heights
+DELAY_STEPS = 3  # of the equation of a delay alone
 LEAST_START = 1e-100  # 1/s: zeros at 0 are divided out
-PADE = 8  # order of the approximation of a delay in the model that starts are taken from
-MODES_ABOVE_BOX, MOST_MODEL_MODES = 4, 40  # modes of the model above the box, and at most
+PADE = 8  # order of the approximation of a delay in a model
 SHRUNK_HEIGHTS = tuple(1 / factor for factor in TRIED_HEIGHTS)  # of a box that may not reach above the shear cut-off
 
 
@@ -245,24 +243,32 @@ def slow_poles(loop: Loop, below: float) -> Complex:
 
 
 def starting_points(loop: Loop, up_to: float) -> Complex:
-    """Starts of Newton's method: the arm's own poles, some real ones, and under a law with states a modal model's."""
-    omega, C = np.asarray(steep_places(loop.arm, up_to)), loop.arm.damping
-    damped = np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))
-    near = -(C * omega**2 / 2) + 1j * omega * damped
-    real = np.geomspace(up_to / REAL_SPAN, REAL_REACH * up_to, REAL_STARTS)  # for poles of unknown place
-    of_model = np.empty(0, complex)
-    if not (loop.law.is_static or loop.law.is_improper):  # which has no states
-        count = min(modes_below(loop.arm, up_to) + MODES_ABOVE_BOX, MOST_MODEL_MODES)
-        with suppress(ParameterError, ConvergenceError):  # the winding number shows whether a pole is missing
-            # undamped modes, each with the damping C w of bending: following the damped ones takes far longer
-            model, drive, read, direct = sensed_model(loop.arm.lossless, (*loop.law.signals, "hub_rate"), count)
-            w = np.diag(model, 1)
-            (pair,) = np.nonzero((w > 0) & (np.diag(model, -1) == -w))
-            model[pair + 1, pair + 1] -= C * w[pair] ** 2
-            model = model - loop.arm.rate_loss * drive @ read[-1:]
-            of_model = poles_of_model(loop, (model, drive, read[:-1], direct[:-1]))
-    starts = np.concatenate([near, near.conj(), real, -real, of_model])
-    return starts[abs(starts) > LEAST_START]
+    """Starts of Newton's method: poles of the damped arm and of the law, real ones, and those of its delay.
+
+    A delay alone would have the poles  s = (ln(-L e^{s delay}) + 2 pi i n)/delay,  where L e^{s delay} changes little.
+    """
+    near = damped_starts(loop.arm, np.asarray(steep_places(loop.arm, up_to)))
+    delay = loop.law.delay
+    turns = 2j * math.pi * np.arange(1.0, up_to * delay / (2 * math.pi))
+    late = turns / (delay or 1.0)
+    for _ in range(DELAY_STEPS if late.size else 0):
+        with np.errstate(all="ignore"):  # at a pole or a zero of L
+            late = (np.log(-loop.loop_function(late) * np.exp(late * delay)) + turns) / delay
+    starts = np.concatenate([near, real_starts(loop, up_to), late, late.conj(), loop.law.poles])
+    return starts[np.isfinite(starts) & (abs(starts) > LEAST_START)]
+
+
+def real_starts(loop: Loop, up_to: float) -> Complex:
+    """Real points next to which D changes its sign, right of -1/C."""
+    line = np.geomspace(up_to / REAL_SPAN, REAL_REACH * up_to, REAL_POINTS)
+    line = np.r_[-line[::-1], line]
+    line = line[line * loop.arm.damping > -TOWARD_SINGULAR]
+    with np.errstate(all="ignore"):  # a power of s may overflow: there is no start
+        D, scale = loop.characteristic(line.astype(complex))
+        D = (D * np.exp(1j * scale.imag)).real
+    (n,) = np.nonzero(np.sign(D[1:]) * np.sign(D[:-1]) < 0)
+    share = abs(D[n]) / (abs(D[n]) + abs(D[n + 1]))
+    return (line[n] + share * (line[n + 1] - line[n])).astype(complex)
 
 
 def poles_of_model(loop: Loop, plant: Matrices) -> Complex:

@@ -44,6 +44,7 @@ from tfarm.records import record
 from tfarm.schema import Column, Quantity, Table, roots_table
 from tfarm.spectrum import flexible_frequencies
 from tfarm.spectrum.box import REAL_SHARE, TOWARD_SINGULAR, Box, Function, complete
+from tfarm.spectrum.starts import damped_starts
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +85,7 @@ def zeros_of(arm: Arm, wanted: Output, up_to: float, x: float) -> Roots:
         here = free_outputs(k, [base], s, x)
         return np.where(here.lost, np.inf, abs(here.outputs[0] / s**order))
 
-    starts = _starts_by_sampling(size, up_to) if neighbour is None else _damped_starts(other, up_to)
+    starts = _starts_by_sampling(size, up_to) if neighbour is None else _near_poles(other, up_to)
     return _in_box(k, _numerator(k, base, order, x), at_zero, up_to, starts)
 
 
@@ -94,12 +95,9 @@ def _on_axis(frequencies: NDArray[np.float64], at_zero: int, up_to: float) -> Ro
     return Roots(np.r_[np.zeros(at_zero, complex), pairs], (-math.inf, math.inf, -up_to, up_to), "count")
 
 
-def _damped_starts(arm: Arm, up_to: float) -> Complex:
-    """Return first-order estimates s = -C w^2/2 +- i w sqrt(1 - (C w/2)^2) from the undamped frequencies."""
-    omega, C = flexible_frequencies(arm, 1.5 * up_to), arm.damping
-    root = np.sqrt((1 - (C * omega / 2) ** 2).astype(complex))
-    starts = np.r_[omega * (-C * omega / 2 + 1j * root), omega * (-C * omega / 2 - 1j * root)]
-    return np.r_[starts, np.linspace(-up_to, -up_to / 50, 40)]
+def _near_poles(arm: Arm, up_to: float) -> Complex:
+    """Return estimates of an arm's poles, and real starts."""
+    return np.r_[damped_starts(arm, flexible_frequencies(arm, 1.5 * up_to)), np.linspace(-up_to, -up_to / 50, 40)]
 
 
 def _starts_by_sampling(size_at: Callable[[Complex], Real], up_to: float) -> Complex:
@@ -319,7 +317,7 @@ class TransferFunction:
         k, up_to = self.system, positive("up_to", up_to, A_FREQUENCY)
         if self.arm.is_undamped:
             return _on_axis(flexible_frequencies(self.arm, up_to), k.at_rest, up_to)
-        starts = _damped_starts(self.arm, up_to)
+        starts = _near_poles(self.arm, up_to)
         return _in_box(k, lambda s: characteristic(k, s, at_zero=k.at_rest), k.at_rest, up_to, starts)
 
     def zeros(self, *, up_to: float) -> Roots:

@@ -1,8 +1,11 @@
 """Zeros of an analytic function in a box of the complex plane, complete by the argument principle.
 
 Newton's method from many starts finds most of them, and the winding number around the box is their number.  Where the
-two differ the box is cut into halves.  After Kravanja and Van Barel (2000), with the function as mantissa and exponent,
-so that it may be of any size.
+two differ the others are found with the known ones divided out, or the box is cut into halves.  After Kravanja and Van
+Barel (2000), with the function as mantissa and exponent, so that it may be of any size.
+
+Where the real axis halves a box the function is real on it: zeros come in conjugate pairs, and the upper half is
+searched.
 """
 
 from __future__ import annotations
@@ -37,6 +40,9 @@ FARTHEST_MOVE = 0.3  # of |s|: the longest step of Newton's method
 SETTLED_MOVE, LAST_MOVE = 1e-11, 1e-15  # of |s|: a start with a smaller step has converged; and ends
 SAME_POINT = 1e-9  # of its size: distance within which two starts have the same zero
 SHRINKING = 0.9  # ratio of two successive steps at a zero of order up to ten
+MOST_IDLE_STEPS = 6  # of Newton's method without a further zero, in a search
+STARTS_A_ZERO, MORE_STARTS = 2, 6  # starts of points that repel each other, for each missing zero and in addition
+MOST_STEPS_APART, NEXT_TO_ZERO = 15, 1e-6  # of these points, and their distance from a zero at the end, of its size
 SPLIT = 0.4871  # of a side, where a box is cut: off the axes, on which zeros often are
 UNEVEN = 8  # ratio of two edges on one side of 0, above which a box is cut near their geometric mean
 OF_CORNER, OF_OPPOSITE = (0.8, 0.55), (0.2, 0.45)  # weights of each corner and of its opposite: eight starts of a box
@@ -60,6 +66,11 @@ class Box(NamedTuple):
         return inside & (self.im_min < points.imag) & (points.imag < self.im_max)
 
     @property
+    def is_symmetric(self) -> bool:
+        """Whether the real axis halves it."""
+        return self.im_min == -self.im_max
+
+    @property
     def corners(self) -> Complex:
         """The four corners, counter-clockwise, and the first again."""
         left, right, low, high = self
@@ -68,6 +79,9 @@ class Box(NamedTuple):
     def halves(self) -> tuple[Box, Box]:
         """Return the box cut across its longer side, geometrically where that side spans decades."""
         left, right, low, high = self
+        if self.is_symmetric and high - low >= right - left:
+            cut = SPLIT * high
+            return Box(left, right, -cut, cut), Box(left, right, cut, high)
         if high - low >= right - left:
             cut = _between(low, high)
             return Box(left, right, low, cut), Box(left, right, cut, high)
@@ -127,39 +141,99 @@ def _phase(function: Function, points: Complex) -> tuple[NDArray[np.float64], Co
     return phase, rate
 
 
-def newton(function: Function, starts: Complex) -> Complex:
+def newton(
+    function: Function, starts: Complex, listed: Callable[[Complex], Complex] | None = None, expected: int = 0
+) -> Complex:
     """Return the zeros that Newton's method finds from the starts, each once.
 
-    A converged point continues while its steps shrink, down to rounding.
+    A converged point continues while its steps shrink, down to rounding.  Where they are `listed` the others are left
+    out as soon as the list has the `expected` number, or has not grown for some steps.
     """
     s = np.array(starts, dtype=complex)
     settled, moving, last = np.zeros(s.size, bool), np.arange(s.size), np.full(s.size, np.inf)
-    for _ in range(NEWTON_STEPS):
+    many = longest = since = 0
+    for step in range(NEWTON_STEPS):
         at = function(s[moving])
         with np.errstate(all="ignore"):  # a diverging start, or one at f' = 0, is dropped
-            move = at.value / at.slope
+            move: Complex = at.value / at.slope
         known = np.isfinite(move)
         settled[moving[~known]] = False
-        moving, move = moving[known], move[known]
-        limit = FARTHEST_MOVE * abs(s[moving])
-        move = np.where(abs(move) > limit, limit * (move / np.maximum(abs(move), LEAST_SIZE)), move)
+        moving, move = moving[known], _shortened(move[known], s[moving[known]])
         s[moving] -= move
         away, size = abs(move), abs(s[moving])
         settled[moving] = away < SETTLED_MOVE * size
         ended = (away <= LAST_MOVE * size) | (settled[moving] & (away > SHRINKING * last[moving]))
         last[moving], moving = away, moving[~ended]
+        if listed is not None and settled.sum() > many:
+            many, length = settled.sum(), listed(s[settled]).size
+            longest, since = (length, step) if length > longest else (longest, since)
+        if listed is not None and (longest >= expected or step - since > MOST_IDLE_STEPS):
+            moving = moving[settled[moving]]
         if not moving.size:
             break
     return distinct(s[settled & np.isfinite(s)])
 
 
+def _shortened(move: Complex, s: Complex) -> Complex:
+    """Return the steps of points s (n,), each of at most the share `FARTHEST_MOVE` of |s|."""
+    return np.asarray(move * np.minimum(1.0, FARTHEST_MOVE * abs(s) / np.maximum(abs(move), LEAST_SIZE)))
+
+
+def repelled(function: Function, starts: Complex, zeros: Complex, box: Box, missing: int) -> Complex:
+    """Return points next to zeros in a box that are not known, by Newton's method with the known ones divided out.
+
+    After Ehrlich (1967) and Aberth (1973):  1/step = f'/f - sum of 1/(s - z),  z being the known zeros and the other
+    points.  So no two points go to one zero, and those far away do not draw them off: of a characteristic function f'/f
+    is large everywhere, as it grows.  Of the starts those with the shortest first step are used, each beyond the steps
+    of the others.
+    """
+    farthest = 0.1 * abs(box.corners[2] - box.corners[0])  # step, as points near 0 may have to go far
+    points, step, away = _apart(function, starts, zeros, starts[:0], farthest)
+    chosen: list[complex] = []
+    while points.size and len(chosen) < STARTS_A_ZERO * missing + MORE_STARTS:
+        n = np.argmin(away)
+        chosen.append(complex(points[n] - step[n]))
+        is_far = abs(points - points[n]) > away[n]
+        points, step, away = points[is_far], step[is_far], away[is_far]
+    points, is_next = np.array(chosen, complex), np.zeros(len(chosen), bool)
+    for _ in range(MOST_STEPS_APART):
+        points, step, away = _apart(function, points, zeros, points, farthest)
+        points = points - step
+        is_next = box.holds(points) & (away < NEXT_TO_ZERO * abs(points))
+        if is_next.sum() >= missing:
+            break
+    return points[is_next]
+
+
+def _apart(
+    function: Function, s: Complex, zeros: Complex, others: Complex, farthest: float
+) -> tuple[Complex, Complex, Real]:
+    """Return the points s without those whose step is infinite, their steps, and their distance from an unknown zero.
+
+    See `repelled`; that distance is the step without the other points.
+    """
+    at = function(s)
+    with np.errstate(all="ignore"):
+        alone = at.slope / at.value - (1 / (s[:, None] - zeros)).sum(axis=1)
+        between = s[:, None] - others
+        step = 1 / (alone - np.where(between == 0, 0, 1 / between).sum(axis=1))
+        away = abs(1 / alone)
+    known = np.isfinite(step)
+    s, step, away = s[known], step[known], away[known]
+    return s, step * np.minimum(1.0, farthest / np.maximum(abs(step), LEAST_SIZE)), away
+
+
 def distinct(points: Complex) -> Complex:
-    """Return the points without those next to an earlier one."""
-    kept: list[complex] = []
-    for point in points:
-        if all(abs(point - other) > SAME_POINT * abs(point) for other in kept):
-            kept.append(complex(point))
-    return np.array(kept, dtype=complex)
+    """Return the points without those next to an earlier one; each is compared with those of nearly its size."""
+    order = np.argsort(abs(points))
+    ranked, again = points[order], np.zeros(points.size, bool)
+    for n in range(1, points.size):
+        larger, smaller = ranked[n:], ranked[:-n]
+        near = SAME_POINT * abs(larger)
+        if not (abs(larger) - abs(smaller) <= near).any():
+            break
+        again[np.maximum(order[n:], order[:-n])[abs(larger - smaller) <= near]] = True
+    return points[~again]
 
 
 NOTHING_KNOWN: Complex = np.empty(0, complex)
@@ -180,7 +254,7 @@ def zeros_in_box(function: Function, box: Box, starts: Complex, known: Complex =
             )
         return function(s)
 
-    return _search(counted, box, starts, known, depth=0)
+    return _search(counted, box, starts, known, NOTHING_KNOWN, depth=0)
 
 
 def complete(
@@ -204,27 +278,57 @@ def complete(
     return np.where(abs(found.imag) < REAL_SHARE * abs(found), found.real, found), box
 
 
-def _search(function: Function, box: Box, starts: Complex, known: Complex, depth: int) -> Complex:
-    """Return all zeros in the box, by halves where some are missing."""
-    expected = winding_number(function, box)
+def _search(function: Function, box: Box, starts: Complex, known: Complex, found: Complex, depth: int) -> Complex:
+    """Return all zeros in the box, by halves where some are missing; `found` are zeros of a larger box."""
+    expected, mirrored = _count(function, box), box.is_symmetric
     if not expected:
-        return np.empty(0, complex)
-    grid = np.outer(box.corners[:4], OF_CORNER) + np.outer(box.corners[[2, 3, 0, 1]], OF_OPPOSITE)
-    found = newton(function, np.concatenate([starts[box.holds(starts)], grid.ravel()]))
+        return NOTHING_KNOWN
     width = max(box.re_max - box.re_min, box.im_max - box.im_min)
-    found = found[
-        box.holds(found) & (abs(found) > DEAD_ZONE * width)
-    ]  # deflation of zeros at s = 0 leaves noise around it
-    again = (abs(found[:, None] - known) < SAME_BOX_ZERO * abs(known)).any(axis=1)
-    found = np.concatenate([known[box.holds(known)], found[~again]])
-    if found.size == expected:
-        return found
-    if found.size == 1 and width < POINT_BOX * abs(found[0]):
-        return np.repeat(found, expected)
+
+    def listed(points: Complex) -> Complex:
+        points = distinct(np.r_[points, points.conj()] if mirrored else points)
+        points = points[box.holds(points) & (abs(points) > DEAD_ZONE * width)]  # deflation at s = 0 leaves noise there
+        again = (abs(points[:, None] - known) < SAME_BOX_ZERO * abs(known)).any(axis=1)
+        return np.concatenate([known[box.holds(known)], points[~again]])
+
+    inside = listed(found)
+    if inside.size != expected:
+        grid = np.outer(box.corners[:4], OF_CORNER) + np.outer(box.corners[[2, 3, 0, 1]], OF_OPPOSITE)
+        starts_here = np.concatenate([starts[box.holds(starts)], grid.ravel()])
+        starts_here = starts_here[starts_here.imag >= 0] if mirrored else starts_here
+        if not depth or inside.size > expected:  # at first, and where rounding makes several points of one zero
+            found = newton(function, starts_here, listed, expected)
+            inside = listed(found)
+    missing = expected - inside.size - (abs(found) <= DEAD_ZONE * width).sum()
+    if missing > 0:
+        missing = math.ceil(missing / (1 + mirrored))
+        zeros = distinct(np.r_[known, found, found.conj()] if mirrored else np.r_[known, found])
+        near = repelled(function, starts_here, zeros, box, missing)
+        if near.size:
+            found = np.r_[found, newton(function, near)]
+            inside = listed(found)
+    if inside.size == expected:
+        return inside
+    if inside.size == 1 and width < POINT_BOX * abs(inside[0]):
+        return np.repeat(inside, expected)
     if depth > MOST_CUTS:
         where = f"{box.re_min:.3g} < Re s < {box.re_max:.3g}, {box.im_min:.3g} < Im s < {box.im_max:.3g}"
-        raise ConvergenceError(f"only {found.size} of {expected} zeros with {where} are separable", found, expected)
-    return np.concatenate([_search(function, half, starts, known, depth + 1) for half in box.halves()])
+        raise ConvergenceError(f"only {inside.size} of {expected} zeros with {where} are separable", inside, expected)
+    first, second = box.halves()
+    parts = [_search(function, half, starts, known, found, depth + 1) for half in (first, second)]
+    if mirrored and not second.is_symmetric:
+        parts.append(parts[1].conj())
+    return np.concatenate(parts)
+
+
+def _count(function: Function, box: Box) -> int:
+    """Return the number of zeros in the box, along its upper half where it is symmetric."""
+    if not box.is_symmetric:
+        return winding_number(function, box)
+    left, right, _, high = box
+    side, top = np.linspace(0, high, FIRST_POINTS // 2, endpoint=False), np.linspace(right, left, FIRST_POINTS)
+    path = np.r_[right + 1j * side, top + 1j * high, left + 1j * side[::-1]]
+    return round(turned(function, path, abs(right - left + 2j * high)) / math.pi)
 
 
 TOWARD_SINGULAR = 0.8  # of -1/C, where real eigenvalues accumulate: the farthest left edge of a box

@@ -31,6 +31,7 @@ from .frequencies import LISTS_KEPT
 from .naming import function_of, named
 from .proofs import Disc, disjoint, enclosed, proven_count
 from .shapes import mode_field
+from .starts import damped_starts
 from .table import Modes, first_frequency, modes
 
 COMPANY = 6  # modes named beyond the list: a box may end below them
@@ -224,7 +225,7 @@ def _searched(undamped: Modes, steps: float, reach: float) -> DampedModes:
     lost = np.flatnonzero(np.isnan(pairs[:, 0]))
     if box is None:
         omega = modes(undamped.arm, count + 1, theory=undamped.theory).natural_frequency[-count - 1 :]
-        starts = np.r_[listed.ravel(), company.ravel(), 1j * omega, -1j * omega]
+        starts = np.r_[listed.ravel(), company.ravel(), damped_starts(undamped.arm, omega)]
         below = listed if not lost.size else listed[:0]  # unknown ones may be above known ones
         box, found = filled_box(function, below, company, float(omega[-2:].mean()), starts, k.damping)
         for zeros in (single, pairs):
