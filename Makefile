@@ -86,10 +86,10 @@ docs: $(DOCS_INSTALLED) ## write the documentation to docs/_build/html/index.htm
 	@$(BIN)/python -m sphinx -q -W --keep-going docs docs/_build/html && echo docs/_build/html/index.html
 
 test: $(INSTALLED) ## run the tests
-	@PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --dist worksteal # else each process compiles what it loads
+	@PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --dist loadfile # else each process compiles what it loads
 
 lowest: $(LOWEST)/.installed ## run the tests with the lowest versions that pyproject.toml allows
-	@PYTHONDONTWRITEBYTECODE= $(LOWEST)/bin/python -m pytest -n 2 --dist worksteal
+	@PYTHONDONTWRITEBYTECODE= $(LOWEST)/bin/python -m pytest -n 2 --dist loadfile
 
 test-browser: $(INSTALLED) ## open pages in Chromium: errors, digits, times, phone, dark, axe, Nu (ONLY=--marked: CI's part)
 	@if ! { command -v chromium || command -v chromium-browser || command -v google-chrome; } > /dev/null; then \

@@ -98,7 +98,7 @@ ANSWERS = {
     "card": lambda arm, chain: to_dict(card_of(arm, chain)),
     "step": lambda arm, chain: {
         name: (loop.certainty, *map(list, loop.signals.values()))
-        for name, loop in tfarm.step(arm, GAINS, chain, "slew", 1.2).loops.items()
+        for name, loop in tfarm.step(arm, GAINS, chain, "slew", 0.3).loops.items()
     },
     "simulate": lambda arm, chain: {name: list(values) for name, values in run_of(arm, chain).items()},
     "design": designed,

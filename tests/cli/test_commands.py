@@ -209,7 +209,7 @@ def test_a_motor_without_an_input_is_named_once(command, capsys, tmp_path):
             "locus --vary K2 --from 0 --to 0.5 --points 5 --branches 3",
             (3, "python-control cannot follow a model of this arm"),
         ),
-        ("sasaki2012-lab", {"damping": "1e-40"}, "sampled --K1 0.3 --K2 0.3", (0, "")),
+        ("sasaki2012-lab", {"damping": "1e-40"}, "sampled --K1 0.3 --K2 0.3 --modes 3", (0, "")),
         (
             "sasaki2012-as-printed",
             {"youngs_modulus": "16.0", "shear_modulus": "1e-40"},

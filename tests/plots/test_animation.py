@@ -20,7 +20,7 @@ GAINS = tfarm.default_gains(LAB)
 def run():
     """As many modes and records as the film has, so that both are equal to rounding."""
     chain = Chain(sampling=Sampling(period=0.01, delay_samples=0.5))
-    return tfarm.simulate(LAB, GAINS, chain, duration=1.0, count=20, between=4, outputs=["deflection@0.5"])
+    return tfarm.simulate(LAB, GAINS, chain, duration=0.5, count=20, between=4, outputs=["deflection@0.5"])
 
 
 @pytest.fixture(scope="module")

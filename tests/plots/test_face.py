@@ -4,6 +4,7 @@ import importlib
 import inspect
 import pkgutil
 import re
+from functools import cache
 from pathlib import Path
 
 import matplotlib as mpl
@@ -60,45 +61,59 @@ def no_figure_left_open():
     assert left == []
 
 
+class Made(dict):
+    """What each function makes, at the first call for its name."""
+
+    def __init__(self, makers):
+        self.makers = makers
+
+    def __missing__(self, name):
+        return self.setdefault(name, self.makers[name]())
+
+
 @pytest.fixture(scope="module")
 def records(tmp_path_factory):
-    """What a plot takes, by its name and further words: of any law, and of a rig without damping, driven by voltage."""
+    """What a plot takes, by its name and further words: of any law, and of a rig without damping, driven by voltage.
+
+    Each is made when a test first wants it.
+    """
     K1, K2 = np.linspace(0.05, 2.0, 40), np.linspace(-1.0, 1.5, 41)
-    plane, analysis = tfarm.map(LAB, K1, K2), tfarm.sampled(LAB, LAW, count=8)
+    plane = cache(lambda: tfarm.map(LAB, K1, K2))
     rig = tfarm.load("quanser-flexlink")
-    study = planted_study(tmp_path_factory.mktemp("study"))
+    study = cache(lambda: planted_study(tmp_path_factory.mktemp("study")))
     law, unit = default_gains(rig), rig.input_per_torque
     factors, delays = np.linspace(0.1, 3.0, 8), np.linspace(0.0, 0.03, 9)
-    return {
-        "comparison": [tfarm.compare([LAB, LAB.having(hub_inertia=0.2)], modes=2)],
-        "bode": [tfarm.bode(LAB, "root_moment", (1.0, 300.0))],
-        "gain_map": [plane],
-        "locus": [tfarm.locus(LAB, LAW, "K2", -1.0, 1.6, points=60, branches=3)],
-        "measured": [tfarm.overlay(LAB, sweep())],
-        "modes": [tfarm.modes(LAB, count=3)],
-        "nyquist": [tfarm.nyquist(LAB, LAW)],
-        "disc": [tfarm.nyquist(LAB, LAW)],
-        "loop": [tfarm.loop_function(LAB, LAW, Chain())],
-        "nichols": [tfarm.margins(LAB, LAW)],
-        "sensitivity": [tfarm.loop_function(LAB, LAW)],
-        "overlay": [plane, sampled_map(analysis.verdict.loop, K1, K2)],
-        "sketch": [LAB],
-        "tuned_gain": [tfarm.tune(LAB, Plan(trials=1))],
-        "slew": [LAB, tfarm.simulate(LAB, LAW, duration=2.0, count=8, between=4)],
-        "study": [study],
-        "study_band": [study],
-        "study_scatter": [study],
-        "step": [tfarm.step(LAB, LAW, scenario_name="slew")],
-        "locus of a law": [tfarm.locus(LAB, LEAD, "gain", 0.0, 2.0, 10, 3)],
-        "gain_map of a law": [tfarm.map(LAB, factors, delays, law=LEAD, vary=("gain", "delay"))],
-        "bode of a rig": [tfarm.bode(rig, "root_moment", (1.0, 1000.0))],
-        "loop of a rig": [tfarm.loop_function(rig, law)],
-        "nichols of a rig": [tfarm.loop_function(rig, law)],
-        "disc of a rig": [tfarm.nyquist(rig, law)],
-        "nyquist of a rig": [tfarm.nyquist(rig, law)],
-        "locus of a rig": [tfarm.locus(rig, law, "K2", -unit, 1.6 * unit, points=40, branches=4)],
-        "gain_map of a rig": [tfarm.map(rig, np.linspace(-1, 4, 40) * law.K1, np.linspace(-1, 1.5, 41) * unit)],
+    makers = {
+        "comparison": lambda: [tfarm.compare([LAB, LAB.having(hub_inertia=0.2)], modes=2)],
+        "bode": lambda: [tfarm.bode(LAB, "root_moment", (1.0, 300.0))],
+        "gain_map": lambda: [plane()],
+        "locus": lambda: [tfarm.locus(LAB, LAW, "K2", -1.0, 1.6, points=60, branches=3)],
+        "measured": lambda: [tfarm.overlay(LAB, sweep())],
+        "modes": lambda: [tfarm.modes(LAB, count=3)],
+        "nyquist": lambda: [tfarm.nyquist(LAB, LAW)],
+        "disc": lambda: [tfarm.nyquist(LAB, LAW)],
+        "loop": lambda: [tfarm.loop_function(LAB, LAW, Chain())],
+        "nichols": lambda: [tfarm.margins(LAB, LAW)],
+        "sensitivity": lambda: [tfarm.loop_function(LAB, LAW)],
+        "overlay": lambda: [plane(), sampled_map(tfarm.sampled(LAB, LAW, count=8).verdict.loop, K1, K2)],
+        "sketch": lambda: [LAB],
+        "tuned_gain": lambda: [tfarm.tune(LAB, Plan(trials=1))],
+        "slew": lambda: [LAB, tfarm.simulate(LAB, LAW, duration=2.0, count=8, between=4)],
+        "study": lambda: [study()],
+        "study_band": lambda: [study()],
+        "study_scatter": lambda: [study()],
+        "step": lambda: [tfarm.step(LAB, LAW, scenario_name="slew", duration=2.0)],
+        "locus of a law": lambda: [tfarm.locus(LAB, LEAD, "gain", 0.0, 2.0, 10, 3)],
+        "gain_map of a law": lambda: [tfarm.map(LAB, factors, delays, law=LEAD, vary=("gain", "delay"))],
+        "bode of a rig": lambda: [tfarm.bode(rig, "root_moment", (1.0, 1000.0))],
+        "loop of a rig": lambda: [tfarm.loop_function(rig, law)],
+        "nichols of a rig": lambda: [tfarm.loop_function(rig, law)],
+        "disc of a rig": lambda: [tfarm.nyquist(rig, law)],
+        "nyquist of a rig": lambda: [tfarm.nyquist(rig, law)],
+        "locus of a rig": lambda: [tfarm.locus(rig, law, "K2", -unit, 1.6 * unit, points=40, branches=4)],
+        "gain_map of a rig": lambda: [tfarm.map(rig, np.linspace(-1, 4, 40) * law.K1, np.linspace(-1, 1.5, 41) * unit)],
     }
+    return Made(makers)
 
 
 def sweep():

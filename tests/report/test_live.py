@@ -17,7 +17,7 @@ import pytest
 from scipy.optimize import brentq
 
 import tfarm
-from tests.shared import remembered, thinned
+from tests.shared import remember, remembered, thinned
 from tfarm.arm import HubFeedback, Law
 from tfarm.dsp import Chain, Sampling, load_chain, sampled_verdict
 from tfarm.exact.characteristic import float_units, loop_parts
@@ -25,6 +25,7 @@ from tfarm.exact.system import system_of
 from tfarm.loop.loop import Loop
 from tfarm.loop.panels import MOST_MISS, loop_panels
 from tfarm.loop.stability import stability
+from tfarm.report import live
 from tfarm.report.live import has_sliders, law_data, live_data, save_live, sensor_numbers, slew_numbers
 from tfarm.report.page import Case, GivenLaw
 
@@ -212,6 +213,7 @@ def test_explore_writes_the_page_that_a_report_has_and_opens_it(tmp_path, monkey
     opened = []
     monkeypatch.setattr("webbrowser.open", opened.append)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    remember(monkeypatch, live, "live_data")
     arm, law, chain = tfarm.load(ARMS[0]), HubFeedback(K1=0.25, K2=0.4), Chain(sampling=Sampling(period=0.005))
     found = tfarm.explore(arm, law, chain)
     (tmp_path / "report").mkdir()

@@ -78,7 +78,7 @@ def test_two_processes_and_the_declared_study_have_the_same_bytes(whole, tmp_pat
     first = tmp_path / "first"
     STUDY(out=first, draws=kills.DRAWS, part=kills.PART, workers=2)
     assert kills.parts(first) == whole
-    again = tfarm.study(**load_study(str(first / "study.toml")), out=tmp_path / "again", part=kills.PART)
+    again = tfarm.study(**load_study(str(first / "study.toml")), out=tmp_path / "again", part=kills.PART, workers=1)
     assert kills.parts(tmp_path / "again") == whole
     assert json.loads((first / "study.json").read_text())["inputs"]["versions"] == running.versions()
     assert again.table()["row"].tolist() == list(range(kills.DRAWS))
@@ -217,13 +217,14 @@ def test_a_full_disk_is_one_line_and_loses_nothing(tmp_path):
     kept, files = kills.parts(tmp_path), sorted(os.listdir(tmp_path))
     assert len(kept) == 3
     call = partial(STUDY, out=tmp_path, draws=400, workers=1)
-    ((_, line),) = shared([(0, partial(full, call, 1000))], 2)
-    assert "cannot be written (File too large); choose another" in line
+    new = tmp_path.with_name("new")
+    begun = partial(STUDY, out=new / "folder", draws=4, workers=1)
+    lines = dict(shared([(0, partial(full, call, 1000)), (1, partial(full, begun, 100))], 2))
+    assert "cannot be written (File too large); choose another" in lines[0]
     assert (kills.parts(tmp_path), sorted(os.listdir(tmp_path))) == (kept, files)
+    assert "cannot be written (File too large)" in lines[1]
+    assert not new.exists()
     assert call().is_complete
-    ((_, line),) = shared([(0, partial(full, partial(STUDY, out=tmp_path / "a" / "b", draws=4, workers=1), 100))], 2)
-    assert "cannot be written (File too large)" in line
-    assert not (tmp_path / "a").exists()
 
 
 def test_chunks_last_5_to_30_s_and_workers_end_together():
