@@ -170,7 +170,7 @@ def test_every_record_with_arrays_is_one() -> None:
 
 
 def test_the_hash_of_a_record_is_computed_once_and_stays_in_its_process() -> None:
-    """Texts have other hashes in another process: an arm read there is the key of what was kept under its equal."""
+    """Texts have other hashes in another process: a table read there is the key of what was kept under its equal."""
     asked = []
 
     class Counted:
@@ -185,11 +185,12 @@ def test_the_hash_of_a_record_is_computed_once_and_stays_in_its_process() -> Non
     kept = Kept(Counted())
     assert hash(kept) == hash(kept)
     assert len(asked) == 1
-    hash(LAB)
+    table = tfarm.modes(LAB, 1)
+    hash(table)
     code = (
-        "import pickle, sys, tfarm; arm = pickle.load(sys.stdin.buffer); "
-        "print({tfarm.load('sasaki2012-lab'): 'found'}.get(arm))"
+        "import pickle, sys, tfarm; table = pickle.load(sys.stdin.buffer); "
+        "print({tfarm.modes(tfarm.load('sasaki2012-lab'), 1): 'found'}.get(table))"
     )
     seed = {**os.environ, "PYTHONHASHSEED": "7"}
-    found = subprocess.run([sys.executable, "-c", code], input=pickle.dumps(LAB), env=seed, capture_output=True)
+    found = subprocess.run([sys.executable, "-c", code], input=pickle.dumps(table), env=seed, capture_output=True)
     assert found.stdout.decode().strip() == "found"
