@@ -155,3 +155,14 @@ def test_refusals(outputs: str, x: float | None, message: str) -> None:
 def test_s_is_finite_and_in_the_range_of_powers(s: complex) -> None:
     with pytest.raises(ParameterError, match="at most" if s == -2e20 else "finite"):
         tfarm.transfer(tfarm.load("sasaki2012"), "hub_rate")([1.0, s])
+
+
+def test_many_points_have_the_values_of_few():
+    """Over the edges of blocks, also of a list of outputs, and a point that is not finite in the last one."""
+    G = tfarm.transfer(tfarm.load("sasaki2012"), ["root_moment", "tip_displacement"])
+    s = 1j * np.geomspace(0.1, 1e3, 20_001)
+    apart = np.concatenate([G(few) for few in np.array_split(s, 7)], axis=1)
+    assert np.array_equal(G(s), apart)
+    for wrong in (np.nan, complex(0.0, -np.inf), complex(-1e21, 0.0)):
+        with pytest.raises(tfarm.ParameterError, match="s = "):
+            G(np.r_[s, wrong])

@@ -293,11 +293,11 @@ class System:
     @property
     def undamped(self) -> System:
         """The chain without all damping: itself where nothing dissipates."""
-        return self if self.is_undamped else self._undamped
+        return self._undamped or self
 
     @cached_property
-    def _undamped(self) -> System:
-        return self.with_damping(0.0)
+    def _undamped(self) -> System | None:
+        return None if self.is_undamped else self.with_damping(0.0)
 
     def with_damping(self, share: float) -> System:
         """Return the chain with a share of all damping: C, dashpots, friction and back-EMF."""

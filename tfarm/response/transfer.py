@@ -140,7 +140,7 @@ def _in_box(k: System, function: Function, at_zero: int, up_to: float, starts: C
 if TYPE_CHECKING:
     import control
 
-POINTS_AT_ONCE = 1 << 16  # points s at once: a megabyte for each output
+POINTS_AT_ONCE = 1 << 13  # points s at once: what each output needs of memory stays in the cache
 LARGEST_S = 1e20  # 1/s: far above any arm, and powers of s do not overflow
 MOST_DIGITS = 1000  # of a value
 A_FREQUENCY = "a positive, finite frequency in rad/s"
@@ -282,8 +282,11 @@ class TransferFunction:
             return slow_values(self.method, self.arm, self.system, self.rows, s, self.share)
         if s.size <= POINTS_AT_ONCE:
             return evaluate_outputs(self.system, self.rows, s, self.share)
-        blocks = np.split(s, range(POINTS_AT_ONCE, s.size, POINTS_AT_ONCE))
-        return np.concatenate([evaluate_outputs(self.system, self.rows, each, self.share) for each in blocks], axis=1)
+        found = np.empty((len(self.rows), s.size), complex)
+        for first in range(0, s.size, POINTS_AT_ONCE):
+            here = slice(first, first + POINTS_AT_ONCE)
+            found[:, here] = evaluate_outputs(self.system, self.rows, s[here], self.share)
+        return found
 
     def _shaped(self, values: NDArray[Any]) -> Any:
         """Return values (outputs, ...) without the first axis for a single output, a scalar as a Python number."""
@@ -344,7 +347,9 @@ class TransferFunction:
 
 def _finite(s: ArrayLike) -> Complex:
     points = np.asarray(s, dtype=complex)
-    if not np.maximum(abs(points.real), abs(points.imag)).max(initial=0.0) <= LARGEST_S:  # NaN too
+    # without an array of a million sizes
+    ends = [end(part, initial=0.0) for part in (points.real, points.imag) for end in (np.min, np.max)]
+    if not all(abs(each) <= LARGEST_S for each in ends):  # NaN too
         worst = complex(points.ravel()[abs(points.ravel()).argmax()])  # of NaN its first
         require(np.isfinite(worst), "s", worst, "a transfer function needs finite s in 1/s")
         require(False, "s", worst, f"at most {LARGEST_S:g} 1/s")
