@@ -146,7 +146,7 @@ def test_bad_input_is_one_line_and_exit_2(capsys, arguments, message):
 
 
 def test_an_unproven_digit_is_exit_3(capsys, monkeypatch):
-    monkeypatch.setattr("tfarm.spectrum.table.roots_near", lambda *_: 0)
+    monkeypatch.setattr("tfarm.exact.appendix.roots_near", lambda *_: 0)
     assert "no root" in refused(capsys, "modes", "sasaki2012", "--digits", "20", "--json", code=3)
 
 

@@ -16,7 +16,7 @@ from tfarm.dsp import Chain, Sampling, sampled_loop, stable_windows
 from tfarm.dsp.circle import complete_band
 from tfarm.dsp.crossings import FACTOR, crossings_of
 from tfarm.dsp.discretise import discretised
-from tfarm.dsp.edges import shown_damping, whole_loop
+from tfarm.dsp.edges import damping_limit, whole_loop
 from tfarm.dsp.verdict import sampled_verdict
 
 T = 0.01
@@ -141,7 +141,7 @@ def test_next_to_z_1_the_loop_goes_as_the_powers_that_are_named(arm, law):
 
 def test_from_the_required_damping_on_a_law_is_stable():
     law = Law({"hub_rate": ([6.0], [0.02, 1.0]), "moment@0.5": 0.2}, delay=0.004)
-    found = shown_damping(sampled_verdict(LAB, law).loop, 20)
+    found = damping_limit(sampled_verdict(LAB, law).loop, 20).figure
     sides = [sampled_verdict(LAB.having(damping=share * found.value), law) for share in (0.999, 1.001)]
     assert (found.is_settled, [each.is_stable for each in sides]) == (True, [False, True])
 

@@ -88,10 +88,10 @@ def test_without_any_name_the_box_is_searched(monkeypatch: pytest.MonkeyPatch) -
         raise ConvergenceError("lost", (values[0], start), False)
 
     monkeypatch.setattr("tfarm.spectrum.naming.follow", lose)
-    found = damped_module._searched(light.undamped, math.inf)
+    found = damped_module._searched(light.undamped, math.inf, math.inf)
     np.testing.assert_allclose(found.eigenvalues, light.eigenvalues, rtol=1e-10)
     assert (found.unassigned, found.left_out) == ((), 0)
-    alone = damped_module._searched(heavy, math.inf)
+    alone = damped_module._searched(heavy, math.inf, math.inf)
     assert 0 < alone.is_assigned.sum() < len(alone.index)
     every = np.r_[alone.eigenvalues[alone.is_assigned, 0], alone.unassigned_pairs[:, 0]]
     inside = pairs.eigenvalues[1:].ravel()[alone.box.holds(pairs.eigenvalues[1:].ravel())]
