@@ -1,5 +1,6 @@
 """Stability intervals, map, delay margin and required damping, each against poles on both of its sides."""
 
+import math
 import re
 from dataclasses import replace
 from importlib import import_module
@@ -10,6 +11,7 @@ import pytest
 
 import tfarm
 from tests.odd_arms import odd_arms
+from tests.plausible.arms import draw
 from tests.rigs import some_rig
 from tests.shared import thinned
 from tests.similar import EITHER
@@ -102,7 +104,7 @@ def test_the_required_damping_is_where_the_verdict_turns(lossless):
 
 @pytest.mark.parametrize(("K1", "K2", "ratio"), [(0.3, -0.2, 0.02), (20.0, 0.3, 0.15)])
 def test_a_required_damping_next_to_overdamped_modes_is_that_of_a_loop_with_all_of_them(lossless, K1, K2, ratio):
-    """The decades are searched by ringing modes alone, the edge with overdamped ones: eigenvalues of 20 turn there."""
+    """The search has few modes that outlive a sample: eigenvalues of 20 turn there."""
     law, chain = HubFeedback(K1=K1, K2=K2), Chain()
     C = required_damping(lossless, law, chain)
     assert ratio / 10 < C * tfarm.modes(lossless, 1).natural_frequency[1] / 2 < ratio
@@ -123,6 +125,16 @@ def test_the_region_is_upright_where_intervals_of_the_rate_gain_end(lab):
             for K2 in ENDS_AT
         ]
         assert [True, False] in sides or [False, True] in sides
+
+
+def test_no_damping_cures_a_hub_that_only_overdamped_modes_destabilise():
+    """At the strongest damping the loop of ringing modes alone is stable, and that of 20 modes is not."""
+    case = draw(63, 531)
+    chain = Chain(sampling=Sampling(period=2 * math.pi / case.first / 9))
+    strongest = case.arm.elastic.having(damping=0.3 / case.first)
+    radii = [abs(sampled_loop(strongest, case.law, chain, count=n).eigenvalues).max() for n in (1, 20)]
+    assert radii[0] < 1 < radii[1]
+    assert required_damping(case.arm.elastic, case.law, chain) == np.inf
 
 
 def test_no_damping_cures_a_gain_far_out_and_none_is_needed_for_few_modes(lossless):

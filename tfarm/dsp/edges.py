@@ -109,8 +109,8 @@ def damping_edge(loop: Sampled) -> float:
 
     @cache
     def at_decade(C: float) -> float:
-        """The log spectral radius, from eigenvalues of ringing modes alone where these have its sign."""
-        rough = math.log(abs(damped_loop(loop, C, count, beyond=0).eigenvalues).max())
+        """The log spectral radius, from eigenvalues that are not polished where its sign is clear."""
+        rough = math.log(abs(damped_loop(loop, C, count).eigenvalues).max())
         return rough if abs(rough) > ROUGH else log_radius_with(loop, C, count)
 
     def log_radius(C: float) -> float:
@@ -132,15 +132,15 @@ def damping_edge(loop: Sampled) -> float:
 
 def log_radius_with(loop: Sampled, C: float, count: int) -> float:
     """The log spectral radius at C."""
-    return damped_loop(loop, C, count, KEPT_BEYOND).poles.log_spectral_radius
+    return damped_loop(loop, C, count).poles.log_spectral_radius
 
 
-def damped_loop(loop: Sampled, C: float, count: int, beyond: int) -> Sampled:
+def damped_loop(loop: Sampled, C: float, count: int) -> Sampled:
     """The loop with C, of at most `count` modes; where two damped modes are one, with a C that differs by 1e-6."""
 
     def damped(nudge: float) -> Sampled:
         arm = loop.plant.arm.having(damping=C * (1 + nudge))
-        return loop.on(arm, max(1, min(count, beyond + outliving(arm, loop.chain))))
+        return loop.on(arm, min(count, KEPT_BEYOND + outliving(arm, loop.chain)))
 
     return first_distinct(damped, NUDGES)
 
