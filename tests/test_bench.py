@@ -84,7 +84,7 @@ def test_random_arms_are_new_in_each_row():
 
 def test_caches_are_found_however_they_are_made():
     known = caches.caches()
-    assert {judge_of, card.margins_of, card._sampled_of, page.brief_on} <= set(known)
+    assert {judge_of, card.margins_of, card.sampled_of, page.brief_on} <= set(known)
     planted = [  # by a call, of a part of the arguments, and inside a function
         functools.lru_cache(maxsize=4)(margins),
         functools.lru_cache(maxsize=4)(functools.partial(margins, law=bench.LAB.law)),

@@ -188,7 +188,7 @@ def test_values_are_those_of_the_card_and_no_more_is_computed(lab, monkeypatch):
         names = [f"{loop}.stability", f"{loop}.certainty"]
         with monkeypatch.context() as patch:
             patch.setattr("tfarm.case.card.margins_of", None)  # needed by no verdict
-            patch.setattr("tfarm.case.card._sampled_of", None)
+            patch.setattr("tfarm.case.card.sampled_of", None)
             assert values_of(one, asked_of(names)) == {name: whole[name] for name in names} | {"failed": None}
     with monkeypatch.context() as patch:
         patch.setattr("tfarm.case.card.margins_of", None)

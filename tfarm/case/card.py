@@ -89,7 +89,7 @@ class LeastDamped(NamedTuple):
 
 
 NOT_DEFINED = Graded(None, None, UNDEFINED)
-margins_of, _sampled_of = lru_cache(maxsize=64)(margins), lru_cache(maxsize=16)(sampled)  # card and curve of a page
+margins_of, sampled_of = lru_cache(maxsize=64)(margins), lru_cache(maxsize=16)(sampled)  # card and curve of a page
 
 
 def loop_names(period: float) -> tuple[str, str]:
@@ -198,7 +198,7 @@ def loop_card(loop: str, arm: Arm, law: AnyLaw, chain: Chain, known: Any = None)
     """
     arm, chain = admit("card", arm, chain)
     if loop == "sampled":
-        own = sampled_card(known or _sampled_of(arm, law, chain))
+        own = sampled_card(known or sampled_of(arm, law, chain))
     else:
         is_own = known is not None and known.stability.loop.arm.hub == arm.hub
         own = continuous_card(known if is_own else margins_of(arm, law), chain)
@@ -338,8 +338,8 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
         found = as_card(curve_of(own), (own.stability if damped is arm else stability(arm, law)).verdict)
     if found is not None and chain is None:
         return found
-    at_samples = _sampled_of(damped, law, usual)
-    word = _sampled_of(arm, law, usual).verdict.word
+    at_samples = sampled_of(damped, law, usual)
+    word = sampled_of(arm, law, usual).verdict.word
     return replace(as_card(sampled_curve(at_samples), word), continuous=found)
 
 

@@ -150,8 +150,11 @@ class _Record:
     def _of_continuous(self, response: TimeResponse, omitted: str) -> LoopResponse:
         """The continuous-time loop; `omitted` ends its certainty."""
         t = np.union1d(self.t, response.near_starts(float(self.t[-1])))
-        t = np.union1d(t, self._crossings(t, dict(zip(response.names, response.at(t), strict=True))))
-        y, bound, peaks = response.at(t), response.remainder(t), response.peaks(t)
+        y = response.at(t)
+        more = np.setdiff1d(self._crossings(t, dict(zip(response.names, y, strict=True))), t)
+        places = np.searchsorted(t, more)
+        t, y = np.insert(t, places, more), np.insert(y, places, response.at(more), axis=1)
+        bound, peaks = response.remainder(t), response.peaks(t)
         curves = {name: (t, y[n], bound[n], peaks[name]) for n, name in enumerate(response.names)}
         is_converged = all(
             (error <= CONVERGED * abs(peak.value)).all() and peak.bound <= CONVERGED * abs(peak.value)

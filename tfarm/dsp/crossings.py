@@ -84,6 +84,12 @@ class CircleGrid:
         """The loop's `terms` (1 + parts, n), each times the offset of the point from its pole."""
         return self.at(self.base, self.shift)
 
+    @cached_property
+    def turns(self) -> Real:
+        """Im(T_i conj T_j) of the rows T of `terms`, i < j, a row each pair: the same along every line of a map."""
+        i, j = np.triu_indices(len(self.terms), 1)
+        return np.asarray((self.terms[i] * self.terms[j].conj()).imag)
+
     def at(self, base: Whole, shift: Real) -> Complex:
         """`terms` at other points."""
         pulse = self.loop.pulse
@@ -166,8 +172,8 @@ def crossings_along(grid: CircleGrid, lines: Sequence[Line]) -> list[Crossings]:
     vanishes: it falls towards that end where it is positive just before.
     """
     others, alone = np.array([line.others for line in lines]), np.array([line.alone for line in lines])
-    A, B = others @ grid.terms, alone @ grid.terms
-    h = (A * B.conj()).imag
+    i, j = np.triu_indices(others.shape[1], 1)
+    h = (others[:, i] * alone[:, j] - others[:, j] * alone[:, i]) @ grid.turns
     (line, step), change = brackets(h)
     base, low = grid.base[step], grid.shift[step]  # where the next point has another pole, both are as far away
     high = np.where(base == grid.base[step + 1], grid.shift[step + 1], grid.q[step + 1] - grid.angles[base])

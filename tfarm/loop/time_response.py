@@ -171,7 +171,10 @@ class TimeResponse:
         jumps = self.starts[self.starts <= t[-1]]
         t = np.union1d(t[abs(t[:, None] - jumps).min(axis=1, initial=math.inf) > SAME_TIME * t[-1]], jumps)
         t = t[np.diff(t, append=math.inf) > SAME_TIME * t[-1]]
-        ends, y = np.array([t[:-1], t[1:]]), np.array([self.at(t[:-1]), self.at(t[1:], before=True)])
+        after = self.at(t)
+        before, at_jump = after.copy(), np.isin(t, jumps)
+        before[:, at_jump] = self.at(t[at_jump], before=True)
+        ends, y = np.array([t[:-1], t[1:]]), np.array([after[:, :-1], before[:, 1:]])
         bends = np.where(np.isin(t[1:-1], jumps), 0, abs(np.diff((y[1] - y[0]) / np.diff(t))) * 2 / (t[2:] - t[:-2]))
         more, errors = _of_both(bends) * np.diff(t) ** 2 / 4, self.remainder(t)
         errors, most = np.maximum(errors[:, :-1], errors[:, 1:]), np.zeros(len(self.names))

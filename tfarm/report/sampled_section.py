@@ -11,7 +11,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, shown_unit, tracked
-from tfarm.case.card import margins_of
+from tfarm.case.card import margins_of, sampled_of
 from tfarm.case.step import Step, step
 from tfarm.digits import plain, significant
 from tfarm.dsp import Analysis, Chain, Simulation, Simulator, modes, results, sampled_verdict, traces, verdict
@@ -44,7 +44,7 @@ FILM_SLEWS, FILM_FRAMES = 1.5, 80  # length of a film in slews, and frames at mo
 def sampled_section(case: Case) -> PageSection:
     """The sampled loop of each controller; in time runs measured under the laws, else the slew."""
     arm, chain = case.arm, case.chain
-    found = [(each, verdict.sampled(each.arm, each.law, chain)) for each in case.controllers]
+    found = [(each, sampled_of(each.arm, each.law, chain)) for each in case.controllers]
     first = found[0][1]
     planes, along = list[Picture | Table](), list[Picture | Table]()
     if not case.laws:
