@@ -25,6 +25,36 @@ def test_each_task_has_its_result_and_the_running_ones_are_named(monkeypatch):
     assert BLAS not in os.environ
 
 
+def appears(file):
+    """Whether a file is there within half a minute."""
+    for _ in range(600):
+        if file.exists():
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def test_a_process_that_joins_is_one_of_them_and_the_other_need_not_wait_for_it(tmp_path):
+    """It takes the second task, and ends it only when the other process has begun a second one of its own."""
+    file, seen = tmp_path / "third", []
+    tasks = {"first": os.getpid, "second": partial(appears, file), "third": file.touch}
+    tasks |= dict.fromkeys(range(5), os.getpid)
+    found = dict(shared(tasks.items(), 2, begun=seen.append, joins=True))
+    assert found["second"]
+    assert found.keys() == tasks.keys()
+    assert len({found[n] for n in ("first", *range(5))} - {os.getpid()}) == 1
+    assert seen[0] == ["first", "second"]
+    assert max(map(len, seen)) == 2
+
+
+@pytest.mark.parametrize("position", [0, 1])
+def test_an_error_is_raised_by_whichever_process_has_it(position, tmp_path):
+    tasks = [(n, partial(os.mkdir, tmp_path / str(n))) for n in range(9)]
+    tasks.insert(position, ("fails", partial(os.listdir, tmp_path / "none")))
+    with pytest.raises(FileNotFoundError):
+        list(shared(tasks, 2, joins=True))
+
+
 SCRIPT = """
 import os
 from tfarm.processes import shared

@@ -26,9 +26,12 @@ def shared(
     tasks: Iterable[tuple[Task, Callable[[], Result]]],
     count: int,
     begun: Callable[[Sequence[Task]], object] = lambda _: None,
+    *,
+    joins: bool = False,
 ) -> Iterator[tuple[Task, Result]]:
     """Yield each task with its result as it comes, by `count` processes, or by this one for a count of 1.
 
+    Where this one `joins`, it is one of them: a process less to start.
     `begun` is called with the running tasks whenever one is begun.  An error of a task is raised here once the running
     ones have ended; the others are not begun.  Raises ConvergenceError where a process dies.
     """
@@ -39,15 +42,25 @@ def shared(
         return
     waiting = iter(tasks)  # which may make each task only when there is a process for it
     running: dict[Future[Result], Task] = {}
-    with _pool(count) as pool:
-        while True:
+    others = count - joins
+    with _pool(others) as pool:
+
+        def begin(most: int) -> None:
             # as long as a process lives that this may start; no task is of the main script, which may have no guard
             with _signals_blocked(), _entry(sys.modules, "__main__", ModuleType("__main__")):
-                running |= {pool.submit(call): task for task, call in islice(waiting, count - len(running))}
-            if not running:
+                new = islice(waiting, max(0, most - len(running)))
+                running.update({pool.submit(call): task for task, call in new})
+
+        while True:
+            begin(others)
+            own = next(waiting, None) if joins else None
+            begin(count)  # one more, for a process that ends its task before this one does
+            if own is None and not running:
                 return
-            begun(list(running.values()))
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
+            begun([*running.values()][:others] + ([] if own is None else [own[0]]))
+            if own is not None:
+                yield own[0], own[1]()
+            for future in wait(running, None if own is None else 0.0, FIRST_COMPLETED).done:
                 task = running.pop(future)
                 yield task, future.result()
 

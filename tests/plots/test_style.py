@@ -2,6 +2,7 @@
 
 import colorsys
 import re
+from contextlib import nullcontext
 from itertools import pairwise
 from xml.etree import ElementTree
 
@@ -9,6 +10,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
@@ -232,3 +234,32 @@ def test_a_layout_measures_axes_once_and_leaves_them_where_two_measured_rounds_d
         ends = [ax.get_position().extents * np.tile(once.get_size_inches(), 2) for ax in (here, there)]
         assert ends[0] == pytest.approx(ends[1], abs=0.01)  # inches
         assert here.yaxis.label.get_window_extent().size == pytest.approx(there.yaxis.label.get_window_extent().size)
+
+
+@pytest.mark.parametrize("place", ["page", "phone"])
+@pytest.mark.parametrize("name", ["bode", "modes", "sketch", "locus"])
+def test_a_file_finds_the_ticks_of_an_axis_once_and_is_what_matplotlib_writes(name, place, tmp_path, monkeypatch):
+    """By matplotlib they are found at every use: the same bytes."""
+    records = {
+        "bode": lambda: bode(LAB, "root_moment"),
+        "modes": lambda: tfarm.modes(LAB, count=2),
+        "sketch": lambda: LAB,
+        "locus": lambda: tfarm.locus(LAB, tfarm.HubFeedback(K1=0.3, K2=0.3), "K2", 0.0, 1.0),
+    }
+    record, found, find = records[name](), [], Axis._update_ticks
+
+    def written(stem):
+        with style.drawn_for(place):
+            figure = getattr(tfarm.plots, name).figure(record)
+            style.settled(figure)
+            found.clear()
+            style.save_figure(figure, tmp_path, stem, formats=("svg",))
+        return (tmp_path / f"{stem}.svg").read_bytes(), max(map(found.count, found), default=0)
+
+    monkeypatch.setattr(Axis, "_update_ticks", lambda axis: found.append(axis) or find(axis))
+    kept, most = written("kept")
+    assert most <= 1
+    monkeypatch.setattr(style, "ticks_kept", lambda _: nullcontext())
+    anew, most = written("anew")
+    assert kept == anew
+    assert most > 1 or name == "sketch"

@@ -404,8 +404,7 @@ def settled(figure: Figure) -> None:
     """Make the layout of a figure once, for all that is drawn of it."""
     if (layout := figure.get_layout_engine()) is not None:
         for ax in figure.axes:
-            if ax.get_aspect() == "auto" and ax.get_subplotspec() is not None:
-                measure_once(ax)
+            measure_once(ax)
         layout.execute(figure)
         figure.set_layout_engine(None)
     for ax in figure.axes:  # at ten digits: the layout's solver orders by address, so its last bit differs
@@ -415,18 +414,49 @@ def settled(figure: Figure) -> None:
 def measure_once(ax: Axes) -> None:
     """Guess the room of ticks and labels around axes in the first of two rounds of a layout, and measure in the second.
 
-    Both would measure; the first has to be near enough for the ticks of the second to be those that are drawn.
+    Both would measure; the first has to be near enough for the ticks of the second to be those that are drawn.  Axes of
+    a shape of their own are measured in both.
     """
-    place, rounds = ax.get_subplotspec(), count()
-    guess = [-0.65, -0.5 if place.is_last_row() else -0.05, 0.1, 0.25]  # type: ignore[union-attr]  # inches
+    place, rounds = ax.get_subplotspec(), count(start=int(ax.get_aspect() != "auto"))
 
     def around(*how: Any, **more: Any) -> Any:
-        if next(rounds):
-            return type(ax).get_tightbbox(ax, *how, **more)
+        if place is None or next(rounds):
+            with ticks_kept([ax]):
+                return type(ax).get_tightbbox(ax, *how, **more)
+        guess = [-0.65, -0.5 if place.is_last_row() else -0.05, 0.1, 0.25]  # inches
         inner = ax.get_position(original=True).transformed(ax.figure.transSubfigure)
         return Bbox.from_extents(*(inner.extents + ax.figure.dpi * np.array(guess)))
 
     ax.get_tightbbox = around  # type: ignore[method-assign]
+
+
+@contextmanager
+def ticks_kept(axes: Sequence[Axes]) -> Iterator[None]:
+    """Find the ticks of axes and the room of their labels once, while limits and places stay as they are.
+
+    matplotlib finds them anew for each spine, label and title, ten times in a drawing.
+    """
+    both = [axis for ax in axes for each in (ax, *ax.child_axes) for axis in (each.xaxis, each.yaxis)]
+    kept = [*product(both, ("_update_ticks", "_get_ticklabel_bboxes"))]  # names of matplotlib's own
+    for axis, name in kept:
+        setattr(axis, name, once(getattr(axis, name)))
+    try:
+        yield
+    finally:
+        for axis, name in kept:
+            delattr(axis, name)
+
+
+def once(call: Callable[..., Any]) -> Callable[..., Any]:
+    """The same call, which returns its first result whatever it is given later."""
+    found: list[Any] = []
+
+    def kept(*given: Any) -> Any:
+        if not found:
+            found.append(call(*given))
+        return found[0]
+
+    return kept
 
 
 def _drawn(figure: Figure, formats: tuple[str, ...], dpi: int) -> Iterator[bytes]:
@@ -439,7 +469,8 @@ def _drawn(figure: Figure, formats: tuple[str, ...], dpi: int) -> Iterator[bytes
         settled(figure)
         for kind in formats:
             content = io.BytesIO()
-            figure.savefig(content, format=kind, dpi=dpi, metadata=METADATA[kind])
+            with ticks_kept(figure.axes):
+                figure.savefig(content, format=kind, dpi=dpi, metadata=METADATA[kind])
             drawn = content.getvalue()
             yield COORDINATES.sub(_short, drawn).replace(b"<defs>", DARK, 1) if kind == "svg" else drawn
 

@@ -304,7 +304,8 @@ def make_all(tasks: Calls, progress: ReportProgress | None) -> dict[str, Sequenc
             progress(len(done), len(tasks), ", ".join(running))
 
     count = MOST_WORKERS if len(tasks) >= WORTH_A_PROCESS else 1
-    for task, results in shared(((task, partial(_in_turn, tasks[task])) for task in longest), count, begun):
+    calls = ((task, partial(_in_turn, tasks[task])) for task in longest)
+    for task, results in shared(calls, count, begun, joins=True):
         done[task] = results  # noqa: PERF403  `begun` counts them meanwhile
     begun(["pages"])
     return done
