@@ -207,3 +207,12 @@ def test_the_continuous_column_of_a_step_names_a_limit():
     found = tfarm.step(ARM, GAINS, Chain(actuator=Actuator(torque_limit=1.0)), duration=0.5)
     assert found.continuous.certainty.endswith(" poles; not covered: torque_limit")
     assert "not covered" not in found.sampled.certainty
+
+
+@pytest.mark.parametrize("key", [key for key in CHANGES if key.startswith("slew.")])
+def test_both_columns_of_a_step_follow_the_slew(key):
+    """One that kept the usual slew would hide behind the other in the walk over all keys."""
+    before, after = (tfarm.step(ARM, GAINS, chain, "slew", 0.3).loops for chain in changed(key))
+    for name, loop in before.items():
+        assert all((here[1:] != there[1:]).any() for here, there in zip(
+            loop.signals.values(), after[name].signals.values(), strict=True))  # fmt: skip

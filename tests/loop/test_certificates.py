@@ -85,7 +85,7 @@ TIP = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], 
 INSIDE = Law({"hub_rate": 0.3, "moment@0.35": ([0.2], [0.01, 1.0]), "tip_displacement": 0.1})
 
 
-@pytest.mark.parametrize(("law", "count"), [(TIP, 5), (INSIDE, 3)], ids=["tip", "inside"])
+@pytest.mark.parametrize(("law", "count"), [(TIP, 5), (INSIDE, 2)], ids=["tip", "inside"])
 def test_a_law_on_signals_along_the_link_has_discs_where_one_plus_l_vanishes(law, count):
     """L from the paper's appendix, a step of Newton's method; real poles among fast waves have a disc too."""
     poles = tfarm.closed_loop_poles(LAB, law, count)

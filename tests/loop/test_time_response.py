@@ -112,20 +112,22 @@ def test_twelve_digits_of_a_peak_at_the_precision_of_mpmath():
     assert abs(value - expected) <= 1e-12 * abs(expected)
 
 
-@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("arm", [LAB, LOSSLESS], ids=["damped", "undamped"])
-def test_the_rest_of_four_times_as_many_modes_is_within_the_bound(arm, name):
+def test_the_rest_of_four_times_as_many_modes_is_within_the_bound(arm):
     """Of a step of the torque, which excites every mode."""
     loop, step = Loop(arm, as_law(LAW)), Excitation({ACTUATOR: lambda s: 1 / s})
     few, many = (time_response(usual_poles(loop, count), NAMES, step, 1.0) for count in (20, 160))
-    row, t = NAMES.index(name), np.linspace(0.0, 1.0, 3001)[1:]
-    rest, bound = abs(few.at(t) - many.at(t))[row], few.remainder(t)[row]
-    assert (rest <= bound + 1e-12 * abs(many.at(t)[row]).max()).all()
-    assert bound.max() <= 0.02 * abs(many.at(t)[row]).max()  # and no bound of everything
+    t = np.linspace(0.0, 1.0, 3001)[1:]
+    whole = many.at(t)[: len(NAMES)]
+    rest, bound = abs(few.at(t)[: len(NAMES)] - whole), few.remainder(t)[: len(NAMES)]
+    most = abs(whole).max(axis=1, keepdims=True)
+    assert (rest <= bound + 1e-12 * most).all()
+    assert (bound.max(axis=1, keepdims=True) <= 0.02 * most).all()  # and no bound of everything
 
 
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("arm", [LAB, LOSSLESS], ids=["damped", "undamped"])
+@pytest.mark.parametrize(
+    ("arm", "name"), thinned([((LAB, LOSSLESS)[n % 2], NAMES[n // 2]) for n in (0, 1, 3, 2, 4, 5)], 2)
+)
 def test_without_feedback_it_is_the_modal_sum(arm, name):
     """The rigid body and the residues of the modal model under a step of the torque, its remainder left out."""
     step = Excitation({ACTUATOR: lambda s: 1 / s})
@@ -177,8 +179,10 @@ def test_a_growing_response_beyond_doubles_is_refused_with_a_duration():
 STEP = Excitation({"hub_angle": lambda s: 1 / s})
 
 
-@pytest.mark.parametrize("damping", [0.0, 1e-4, 5e-3])
-@pytest.mark.parametrize(("corner", "order"), [(1000.0, 1), (300.0, 2), (64.0, 2)])
+@pytest.mark.parametrize(
+    ("damping", "corner", "order"),
+    thinned([(C, *of) for of in ((1000.0, 1), (300.0, 2), (64.0, 2)) for C in (0.0, 1e-4, 5e-3)], 2),
+)
 def test_until_twice_the_delay_the_torque_is_the_laws_own_step_response(damping, corner, order):
     """Nothing is fed back before: 0 until the delay, then the step response of C alone, here in closed form.
 
@@ -273,7 +277,7 @@ def test_early_torque_and_root_moment_are_those_of_de_hoogs_inversion(damping, d
 
         return F
 
-    for t in (2e-3, 2e-2) if damping else (2e-3,):
+    for t in (2e-2,) if damping else (2e-3,):
         y = dict(zip(found.names, found.at(np.array([t + delay]))[:, 0], strict=True))
         own = 3 + 1997 * np.exp(-2000 * t)
         with mpmath.workdps(20):

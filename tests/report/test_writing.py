@@ -373,7 +373,6 @@ POOL = """
 import os, time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from tfarm.report.writing import PIECES
 from tfarm.processes import leave_with_parent
 if __name__ == "__main__":
     pool = ProcessPoolExecutor(1, get_context("forkserver"), leave_with_parent)

@@ -21,7 +21,7 @@ from tfarm.dsp import crossings as sampled_regions
 from tfarm.dsp import modes as sampled_loci
 from tfarm.loop import loci
 from tfarm.plots import regions
-from tfarm.report import live, loop_section, overview, writing
+from tfarm.report import live, loop_section, overview, sampled_section, writing
 from tfarm.report.writing import PIECES
 
 COARSE = (
@@ -32,6 +32,7 @@ COARSE = (
     (sampled_regions, "MOST_COLUMNS", 0),  # with the corners that so few have
     (loci, "LOCUS_POINTS", 60),
     (sampled_loci, "SAMPLED_LOCUS_VALUES", 31),
+    (sampled_section, "FILM_FRAMES", 10),
     (writing, "MOST_WORKERS", 1),  # a second process would have its own grids
     (regions, "sampled_region", regions.sampled_region.__wrapped__),  # what is kept of it is of other grids
     (live, "sampled_region", regions.sampled_region.__wrapped__),

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.shared import sized
 from tests.studies import kills
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.files import locked_folder
-from tfarm.processes import shared
 from tfarm.studies import running
 from tfarm.studies.running import CHUNKS_A_WORKER, LEAST_SECONDS, MOST_SECONDS, rows_a_chunk
 from tfarm.studies.space import extra
@@ -74,9 +74,11 @@ def test_kills_of_a_cluster_lose_one_chunk_a_worker_at_most(whole, tmp_path):
     assert kills.parts(tmp_path) == whole
 
 
-def test_two_processes_and_the_declared_study_have_the_same_bytes(whole, tmp_path):
+@pytest.mark.parametrize("workers", sized(1, 2))
+def test_any_processes_and_the_declared_study_have_the_same_bytes(whole, tmp_path, workers):
+    """What two workers left when one was killed is compared above."""
     first = tmp_path / "first"
-    STUDY(out=first, draws=kills.DRAWS, part=kills.PART, workers=2)
+    STUDY(out=first, draws=kills.DRAWS, part=kills.PART, workers=workers)
     assert kills.parts(first) == whole
     again = tfarm.study(**load_study(str(first / "study.toml")), out=tmp_path / "again", part=kills.PART, workers=1)
     assert kills.parts(tmp_path / "again") == whole
@@ -199,10 +201,14 @@ def test_after_its_time_a_study_begins_no_part_of_any_kind(tmp_path, monkeypatch
 
 
 def full(call, most):
-    """The error of a call in a process whose files have at most that many bytes, as on a full disk."""
-    resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
-    with pytest.raises(ParameterError) as caught:
-        call()
+    """The error of a call while this process's files have at most that many bytes, as on a full disk."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most, before[1]))
+    try:
+        with pytest.raises(ParameterError) as caught:
+            call()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
     return str(caught.value)
 
 
@@ -219,10 +225,9 @@ def test_a_full_disk_is_one_line_and_loses_nothing(tmp_path):
     call = partial(STUDY, out=tmp_path, draws=400, workers=1)
     new = tmp_path.with_name("new")
     begun = partial(STUDY, out=new / "folder", draws=4, workers=1)
-    lines = dict(shared([(0, partial(full, call, 1000)), (1, partial(full, begun, 100))], 2))
-    assert "cannot be written (File too large); choose another" in lines[0]
+    assert "cannot be written (File too large); choose another" in full(call, 1000)
     assert (kills.parts(tmp_path), sorted(os.listdir(tmp_path))) == (kept, files)
-    assert "cannot be written (File too large)" in lines[1]
+    assert "cannot be written (File too large)" in full(begun, 100)
     assert not new.exists()
     assert call().is_complete
 
