@@ -29,7 +29,8 @@ def summed(values, power):
     return (values**power).sum()
 
 
-def test_layouts_and_flags_are_seen_number_types_and_constants_are_not(monkeypatch):
+def test_layouts_and_flags_are_seen_number_types_and_constants_are_not(monkeypatch, tmp_path):
+    monkeypatch.setattr("tfarm.exact.compiled._CACHE", tmp_path)  # a kernel of a test cannot be read again
     monkeypatch.setattr(summed, "__module__", "tfarm.tests")
     kernel, inner = compiled(summed), inlined(summed)
     outer = compiled(lambda values: inner(values, 2) + inner(values, 3))
