@@ -260,7 +260,7 @@ def study(ask, n, values):
 def rows_of(plan, n):
     """A study by the loop that anyone writes."""
     rows = plan.space.rows(0, n, None).tolist()
-    return [values_of(plan.subjects.at(row), plan.asked) for row in rows]
+    return [values_of(plan.subjects.at(row), plan.sources) for row in rows]
 
 
 def chunk_of(plan, n):

@@ -1,5 +1,6 @@
 """Tasks on a pool of a few processes, which end with the one that started them."""
 
+import gc
 import os
 import signal
 import sys
@@ -84,7 +85,7 @@ def _pool(count: int) -> Iterator[ProcessPoolExecutor]:
     with (
         _entry(os.environ, BLAS, os.environ.get(BLAS, "1")),
         undone_if_stopped(kill),
-        ProcessPoolExecutor(count, get_context("spawn"), initializer=leave_with_parent) as pool,
+        ProcessPoolExecutor(count, get_context("spawn"), initializer=_begin, initargs=gc.get_threshold()) as pool,
     ):
         try:
             yield pool
@@ -119,6 +120,12 @@ def _entry(of: MutableMapping[str, Any], name: str, value: Any) -> Iterator[None
     finally:
         del of[name]
         of.update(before)
+
+
+def _begin(*thresholds: int) -> None:
+    """Begin a worker, which collects garbage as seldom as the process that starts it."""
+    gc.set_threshold(*thresholds)
+    leave_with_parent()
 
 
 def leave_with_parent() -> None:

@@ -704,4 +704,7 @@ def test_the_policy_allows_what_the_page_holds_alone(browser, folder, what):
 def test_a_notebook_shows_a_page_under_its_policy(browser, folder, tmp_path):
     (tmp_path / "cell.html").write_text(LivePage(folder / ARMS[0] / "live.html")._repr_html_())
     with Opened(browser, tmp_path / "cell.html") as opened:
-        opened.page.frames[1].wait_for_selector("body[data-ready]", timeout=20_000)
+        cell = opened.page.frames[1]
+        cell.wait_for_selector("body[data-ready]", timeout=20_000)
+        assert cell.evaluate("getComputedStyle(document.querySelector('main')).display") != "none"
+        assert cell.locator("main svg, main canvas").count()

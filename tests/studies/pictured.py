@@ -13,7 +13,7 @@ OVER = {"payload.mass": {"uniform": [0.0, 0.2]}, "law.K2": {"uniform": [0.0, 1.4
 DRAWS = 40
 
 
-def planted(one, asked):
+def planted(one, sources):
     """Return margins that fall with K2; unstable above 1, no limit of the gain below 0.3, an error above 1.3."""
     mass, K2 = one.arm.payload.mass, one.law.K2
     if K2 > 1.3:
@@ -29,7 +29,7 @@ def planted(one, asked):
             f"{loop}.delay_margin_ms": 12.5,
             f"{loop}.least_damping": 0.1 * (1 - K2),
         }
-    names = (name for own, _ in asked for name in own)
+    names = (name for own, _ in sources for name in own)
     return {name: found.get(name) for name in (*names, "failed")}
 
 

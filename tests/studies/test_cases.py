@@ -11,7 +11,7 @@ from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.studies import quantities as room
 from tfarm.studies.cases import learning_curves, over_values, results
-from tfarm.studies.quantities import asked_of, column_names, values_of
+from tfarm.studies.quantities import column_names, sources_of, values_of
 from tfarm.studies.running import Plan, chunk
 from tfarm.studies.space import Subjects
 from tfarm.tuner import tune
@@ -25,7 +25,7 @@ LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
 def values(words, arm=LAB, law=LAW, **numbers):
     """Values of the columns of some words for one arm, with other numbers by key."""
     subject = Subjects(arm, law, Chain(), tuple(numbers)).at(tuple(numbers.values()))
-    return values_of(subject, asked_of(column_names(words)))
+    return values_of(subject, sources_of(column_names(words)))
 
 
 def grid(key, points, names):

@@ -18,12 +18,12 @@ from tfarm.spectrum.table import default_gains
 from tfarm.studies import running
 from tfarm.studies.quantities import (
     COLUMNS,
-    asked_of,
     column_names,
     failures_of,
     least_share,
     order_of,
     shares_of,
+    sources_of,
     spreads_of,
     values_of,
 )
@@ -180,7 +180,7 @@ def test_an_unknown_quantity_is_one_line_with_the_nearest(word, near):
 def test_values_are_those_of_the_card_and_no_more_is_computed(lab, monkeypatch):
     one = Subject(lab, GAINS, Chain(), {})
     card = tfarm.result_card(lab, GAINS)
-    whole = values_of(one, asked_of(column_names(["card"])))
+    whole = values_of(one, sources_of(column_names(["card"])))
     for loop in ("continuous", "sampled"):
         own = getattr(card, loop)
         assert whole[f"{loop}.delay_margin_ms"] == own.delay_margin.value
@@ -189,10 +189,10 @@ def test_values_are_those_of_the_card_and_no_more_is_computed(lab, monkeypatch):
         with monkeypatch.context() as patch:
             patch.setattr("tfarm.case.card.margins_of", None)  # needed by no verdict
             patch.setattr("tfarm.case.card.sampled_of", None)
-            assert values_of(one, asked_of(names)) == {name: whole[name] for name in names} | {"failed": None}
+            assert values_of(one, sources_of(names)) == {name: whole[name] for name in names} | {"failed": None}
     with monkeypatch.context() as patch:
         patch.setattr("tfarm.case.card.margins_of", None)
-        assert values_of(one, asked_of(["sampled.disk_margin"]))["sampled.disk_margin"] == card.sampled.disk_margin
+        assert values_of(one, sources_of(["sampled.disk_margin"]))["sampled.disk_margin"] == card.sampled.disk_margin
 
 
 def test_a_loop_that_is_not_determined_leaves_the_other_one_and_its_reason(lab, monkeypatch):
@@ -200,7 +200,7 @@ def test_a_loop_that_is_not_determined_leaves_the_other_one_and_its_reason(lab, 
         raise tfarm.ConvergenceError("the pole is lost", None, None)
 
     monkeypatch.setattr("tfarm.studies.quantities.stability", lost)
-    found = values_of(Subject(lab, GAINS, Chain(), {}), asked_of(["continuous.stability", "sampled.stability"]))
+    found = values_of(Subject(lab, GAINS, Chain(), {}), sources_of(["continuous.stability", "sampled.stability"]))
     assert found == {
         "continuous.stability": None,
         "sampled.stability": "stable",
@@ -211,7 +211,7 @@ def test_a_loop_that_is_not_determined_leaves_the_other_one_and_its_reason(lab, 
 def test_a_law_in_z_has_a_sampled_loop_alone(lab):
     law = tfarm.Law({"hub_rate": 0.3}, period=0.01, references=("hub_rate",))
     names = ["continuous.stability", "sampled.stability"]
-    found = values_of(Subject(lab, law, Chain(), {}), asked_of(names))
+    found = values_of(Subject(lab, law, Chain(), {}), sources_of(names))
     assert found == {"continuous.stability": None, "sampled.stability": "stable", "failed": None}
 
 
@@ -222,7 +222,7 @@ ASKED = ["step.sampled.tip.settling_time_s", "step.continuous.tip.settling_time_
 def test_time_response_and_damping_ratios_of_every_preset(name, monkeypatch):
     arm, chain, seen = tfarm.load(name), load_chain(name), []
     monkeypatch.setattr("tfarm.studies.quantities.step", lambda *args: seen.append(tfarm.step(*args)) or seen[-1])
-    found = values_of(Subject(arm, default_gains(arm), chain, {}), asked_of(column_names(ASKED)))
+    found = values_of(Subject(arm, default_gains(arm), chain, {}), sources_of(column_names(ASKED)))
     assert found["failed"] is None
     for loop in ("sampled", "continuous"):
         own = getattr(seen[0], loop)

@@ -15,7 +15,7 @@ def main(arguments: list[str] | None = None) -> None:
     has one thread, unless the user chose a number: on matrices of a hundred rows more only wait for each other.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    gc.set_threshold(100_000, 20, 20)  # the usual 700 new objects a look are reached hundreds of times by imports
+    gc.set_threshold(100_000, 20, 20)  # the usual 700 new objects are reached hundreds of times by imports alone
     if arguments is None:
         stop_on_signals()
         atexit.register(gc.freeze)  # a last look through all that was loaded takes half a second, and frees nothing

@@ -39,7 +39,6 @@ PUSH_ROOM = 4  # times the first-order shift of a pole by the feedback: a mode w
 DELAY_KNOWN = 1e-10  # samples: tolerance of a delay margin
 CLEARLY = 1e-6  # within the circle: an eigenvalue there is not polished, as even a double one has an error of 1e-7
 KEPT_BEYOND = 2  # modes kept beyond the last one that does not decay within a sample
-ROUGH = 1e-3  # of ln of the spectral radius: more than those change it
 MODES_BEYOND = 4  # those of a whole loop that decay within a sample
 MOST_LOOP_MODES = 128  # of a whole loop: half a second of work
 FAR_BEYOND = 5.0  # of critical in the first mode: all poles of bending lie left of any line, one mode is enough
@@ -105,44 +104,31 @@ def damping_edge(loop: Sampled) -> float:
 
     Decades are searched from the strongest C down, so that larger ones on that grid are stable too.
     """
-    count = loop.plant.count
 
     @cache
-    def at_decade(C: float) -> float:
-        """The log spectral radius, from eigenvalues that are not polished where its sign is clear."""
-        rough = math.log(abs(damped_loop(loop, C, count).eigenvalues).max())
-        return rough if abs(rough) > ROUGH else log_radius_with(loop, C, count)
-
     def log_radius(C: float) -> float:
-        return at_decade(C) if C in (low, high) else log_radius_with(loop, C, count)
+        return log_radius_with(loop, C, loop.plant.count)
 
     if loop.is_stable:
         return 0.0
     high = 2 * STRONGEST / first_frequency(loop.plant.arm)
-    if at_decade(high) >= 0:
+    if log_radius(high) >= 0:
         return math.inf
-    for _ in range(DAMPING_DECADES):
-        low = high / 10
-        if at_decade(low) >= 0:  # a radius is nearly linear in C where C is small
-            C = float(brentq(log_radius, low, high, xtol=DAMPING_XTOL * low, rtol=DAMPING_RTOL))
+    for low in high / 10.0 ** np.arange(1, DAMPING_DECADES + 1):
+        if log_radius(low) >= 0:  # a radius is nearly linear in C where C is small
+            C = float(brentq(log_radius, low, 10 * low, xtol=DAMPING_XTOL * low, rtol=DAMPING_RTOL))
             return C * (1 + MADE_SURE)
-        high = low
     return float(low)
 
 
 def log_radius_with(loop: Sampled, C: float, count: int) -> float:
-    """The log spectral radius at C."""
-    return damped_loop(loop, C, count).poles.log_spectral_radius
-
-
-def damped_loop(loop: Sampled, C: float, count: int) -> Sampled:
-    """The loop with C, of at most `count` modes; where two damped modes are one, with a C that differs by 1e-6."""
+    """The log spectral radius at C; where two damped modes are one there, at a C that differs by 1e-6."""
 
     def damped(nudge: float) -> Sampled:
         arm = loop.plant.arm.having(damping=C * (1 + nudge))
         return loop.on(arm, min(count, KEPT_BEYOND + outliving(arm, loop.chain)))
 
-    return first_distinct(damped, NUDGES)
+    return first_distinct(damped, NUDGES).poles.log_spectral_radius
 
 
 def outliving(arm: Arm, chain: Chain) -> int:

@@ -3,7 +3,6 @@
 The sections of an arm's page in their order, its page by templates, the index, and the page of a comparison.
 """
 
-import gc
 import hashlib
 import shutil
 from collections import defaultdict
@@ -312,12 +311,7 @@ def make_all(tasks: Calls, progress: ReportProgress | None) -> dict[str, Sequenc
 
 
 def _in_turn(calls: Sequence[Callable[[], Any]]) -> list[Any]:
-    usual = gc.get_threshold()
-    gc.set_threshold(50_000, 20, 20)  # pictures are many objects: passes over all would be a tenth of a report
-    try:
-        return [call() for call in calls]
-    finally:
-        gc.set_threshold(*usual)
+    return [call() for call in calls]
 
 
 # ------------------------------------------------------------ an arm's page

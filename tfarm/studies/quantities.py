@@ -274,7 +274,7 @@ def order_of(word: str) -> tuple[str, ...]:
     return (quantity, *filter(None, [stability_of(quantity)]))
 
 
-def asked_of(names: Sequence[str]) -> list[tuple[Set[str], Values]]:
+def sources_of(names: Sequence[str]) -> list[tuple[Set[str], Values]]:
     """Return the functions that have values of these columns, each with its own columns."""
     found = list[tuple[Set[str], Values]]()
     for columns, values in ASKED:
@@ -283,15 +283,15 @@ def asked_of(names: Sequence[str]) -> list[tuple[Set[str], Values]]:
     return found
 
 
-def values_of(one: Subject, asked: Sequence[tuple[Set[str], Values]]) -> dict[str, Any]:
-    """Return the values of columns (`asked_of`) for an arm, and under `FAILED` the reason of missing ones."""
+def values_of(one: Subject, sources: Sequence[tuple[Set[str], Values]]) -> dict[str, Any]:
+    """Return the values of columns (`sources_of`) for an arm, and under `FAILED` the reason of missing ones."""
     found, reasons = dict[str, Any](), []
-    for own, values in asked:
+    for own, values in sources:
         try:
             found |= values(one, own)
         except TfarmError as error:
             reasons.append(f"{min(own).split('.')[0]}: {error}")
-    names = (name for own, _ in asked for name in own)
+    names = (name for own, _ in sources for name in own)
     return {**{name: found.get(name) for name in names}, FAILED: "; ".join(reasons) or None}
 
 

@@ -30,7 +30,7 @@ from tfarm.errors import ConvergenceError, ParameterError, TfarmError, one_line,
 from tfarm.files import write_file
 from tfarm.tuner import Plan as TunerPlan
 
-from .quantities import FAILED, Values, asked_of, prepare, quantity_of, values_of
+from .quantities import FAILED, Values, prepare, quantity_of, sources_of, values_of
 from .space import Space, Subject, Subjects, extra, parquet
 
 Progress = Callable[[int, int, str], object]
@@ -74,9 +74,9 @@ class Plan:
         return {FAILED, *(name for name in self.names if not quantity_of(name).is_number)}
 
     @cached_property
-    def asked(self) -> list[tuple[Set[str], Values]]:
+    def sources(self) -> list[tuple[Set[str], Values]]:
         """The functions of the columns that are asked for."""
-        return asked_of(self.names)
+        return sources_of(self.names)
 
     @cached_property
     def subjects(self) -> Subjects:
@@ -99,7 +99,7 @@ def table_of(plan: Plan, first: int, rows: Real) -> Chunk:
         _attempt(prepare, [each for each in subjects if isinstance(each, Subject)], plan.names)
         for number, (row, subject) in enumerate(zip(batch, subjects, strict=True), start=first + start):
             found: dict[str, Any] = {ROW: number, **dict(zip(plan.space.keys, row, strict=True))}
-            own = _attempt(values_of, subject, plan.asked) if isinstance(subject, Subject) else subject
+            own = _attempt(values_of, subject, plan.sources) if isinstance(subject, Subject) else subject
             found |= {FAILED: own} if isinstance(own, str) else own
             found[FAILED] = found[FAILED] and one_line(found[FAILED], LONGEST_REASON)
             for name, column in table.items():
