@@ -17,11 +17,11 @@ from typer.cli import get_docs_for_click
 
 import tfarm
 import tfarm.cli.running  # loads every command
+from tfarm.arm.chain import CHAIN_TABLES
 from tfarm.arm.law_tables import LawTable, SignalTable
 from tfarm.arm.materials import materials
 from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES, StrictTable, file_keys
 from tfarm.cli.app import whole_command
-from tfarm.dsp.chain import CHAIN_TABLES
 from tfarm.dsp.stages import stages
 from tfarm.fitting.recording import RunTable
 from tfarm.schema.glossary import CERTAINTY, declared_records

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 
 import tfarm
+from tfarm.arm.chain import load_chain
 from tfarm.arm.law_tables import load_law
+from tfarm.assessment.card import GAIN_LIMITS, PEAK_LIMITS, PERIOD_LIMITS, PHASE_LIMITS
 from tfarm.audit.published import Validation, validate
-from tfarm.case.card import GAIN_LIMITS, PEAK_LIMITS, PERIOD_LIMITS, PHASE_LIMITS
 from tfarm.digits import general
-from tfarm.dsp.chain import load_chain
 from tfarm.fitting.recording import compare_run, load_run, overshoot, read_recording
 from tfarm.fitting.resonances import ring
 from tfarm.spectrum.table import hub_locked

@@ -1,7 +1,8 @@
 """The same gains from a digital controller: does the loop hold at 10 ms, and how does the arm come to rest?"""
 
 import tfarm
-from tfarm.dsp import Chain, Sampling, sampled_verdict
+from tfarm.dsp import Chain, Sampling
+from tfarm.loop.sampled_verdict import sampled_verdict
 
 arm = tfarm.load("sasaki2012-lab")
 law = tfarm.HubFeedback(K1=0.3, K2=0.3)

@@ -28,14 +28,15 @@ import numpy as np
 import tfarm
 from tests.plausible.arms import draw
 from tfarm.arm import Arm, HubFeedback
-from tfarm.dsp import Chain, Sampling, Simulator, sampled_verdict, scenario
-from tfarm.dsp.crossings import sampled_map
+from tfarm.dsp import Chain, Sampling, Simulator, scenario
 from tfarm.exact.appendix import Appendix
 from tfarm.exact.outputs import output
+from tfarm.loop.circle_crossings import sampled_map
 from tfarm.loop.loci import open_loop, reduced_locus
 from tfarm.loop.locus import locus
 from tfarm.loop.loop import Loop
 from tfarm.loop.plane import gain_map
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.schema import to_dict
 from tfarm.spectrum.proofs import enclosed
 from tfarm.studies.quantities import column_names, values_of

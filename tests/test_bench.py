@@ -12,7 +12,7 @@ import tfarm
 from tests import bench, caches
 from tests.shared import thinned
 from tfarm.arm import Payload
-from tfarm.case import card
+from tfarm.assessment import card
 from tfarm.loop.margins import margins
 from tfarm.report import page
 from tfarm.response.signals import Signals

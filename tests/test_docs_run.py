@@ -24,13 +24,13 @@ from tests.bench import Row
 from tests.octave import ABSENT, OCTAVE, left_by_octave
 from tests.shared import docs_module
 from tests.shell import heard
+from tfarm.arm.chain import CHAIN_TABLES, load_chain
 from tfarm.arm.law_tables import load_law
+from tfarm.assessment.card import GAIN_LIMITS, PEAK_LIMITS, PERIOD_LIMITS, PHASE_LIMITS, grade_of
 from tfarm.audit import audit
 from tfarm.audit.published import validate
-from tfarm.case.card import GAIN_LIMITS, PEAK_LIMITS, PERIOD_LIMITS, PHASE_LIMITS, grade_of
 from tfarm.cli import main
 from tfarm.cli.running import whole_command
-from tfarm.dsp.chain import CHAIN_TABLES, load_chain
 from tfarm.exact.outputs import OUTPUTS
 
 ROOT = Path(__file__).parent.parent

@@ -17,9 +17,9 @@ import tfarm
 from tests.hostile import Read
 from tfarm import HubFeedback
 from tfarm.dsp import Chain
-from tfarm.dsp.crossings import sampled_map
 from tfarm.dsp.scenarios import slew
 from tfarm.dsp.simulate import Simulator
+from tfarm.loop.circle_crossings import sampled_map
 from tfarm.loop.locus import locus
 from tfarm.loop.loop import Loop
 from tfarm.loop.plane import gain_map

@@ -30,10 +30,9 @@ if TYPE_CHECKING:
         load,
         presets,
     )
-    from tfarm.case import compare, loop_function, result_card
-    from tfarm.case.step import step
+    from tfarm.assessment import compare, loop_function, result_card
+    from tfarm.assessment.step import step
     from tfarm.dsp.results import simulate
-    from tfarm.dsp.verdict import sampled
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
     from tfarm.exact.outputs import Output
     from tfarm.exported import export
@@ -45,6 +44,7 @@ if TYPE_CHECKING:
     from tfarm.loop.nyquist import nyquist
     from tfarm.loop.plane import gain_map as map
     from tfarm.loop.poles import closed_loop_poles
+    from tfarm.loop.sampled_verdict import sampled
     from tfarm.loop.stability import spill
     from tfarm.reduced import reduce
     from tfarm.report.live import explore
@@ -111,10 +111,10 @@ _ROOMS = {  # the module of a name; after a colon another name there
     "locus": "loop.locus",
     "nyquist": "loop.nyquist",
     "closed_loop_poles": "loop.poles",
-    "compare": "case",
+    "compare": "assessment",
     "damped_modes": "spectrum",
     "default_gains": "spectrum.table",
-    "loop_function": "case",
+    "loop_function": "assessment",
     "map": "loop.plane:gain_map",
     "margins": "loop.margins",
     "explore": "report.live",
@@ -127,11 +127,11 @@ _ROOMS = {  # the module of a name; after a colon another name there
     "plots": "plots",
     "read_measured": "fitting.data",
     "reduce": "reduced",
-    "result_card": "case",
-    "sampled": "dsp.verdict",
+    "result_card": "assessment",
+    "sampled": "loop.sampled_verdict",
     "simulate": "dsp.results",
     "spill": "loop.stability",
-    "step": "case.step",
+    "step": "assessment.step",
     "study": "studies.study",
     "transfer": "response",
     "tune": "tuner",

@@ -3,9 +3,9 @@
 import pytest
 
 from tfarm.arm import load, schema
+from tfarm.arm.chain import CHAIN_TABLES
 from tfarm.arm.law_tables import LawTable, SignalTable
 from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES, ArmTable, LinkTable, file_keys
-from tfarm.dsp.chain import CHAIN_TABLES
 from tfarm.fitting.recording import RunTable
 
 FILE_TABLES = {

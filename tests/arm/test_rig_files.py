@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from tests.arm.test_reading import arms, inertias, positive
 from tfarm.arm import INPUTS, THEORIES, Arm, Attachment, Hub, Motor, Payload, RotarySpring, Section, load, to_toml
+from tfarm.arm.chain import chain_of_tables
 from tfarm.arm.schema import arm_of_table
-from tfarm.dsp.chain import chain_of_tables
 from tfarm.errors import ParameterError
 
 RIG = """\

@@ -25,12 +25,13 @@ from playwright.sync_api import Browser, Page, sync_playwright
 import tfarm
 from tfarm.arm import Arm, HubFeedback, Law, as_law
 from tfarm.arm.law_tables import load_law
-from tfarm.case.card import LoopCard, SampledCurve, reference_damping
-from tfarm.dsp import Chain, load_chain, sampled_verdict
+from tfarm.assessment.card import LoopCard, SampledCurve, reference_damping
+from tfarm.dsp import Chain, load_chain
 from tfarm.dsp.results import simulated_run
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import gain_map
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import stability
 from tfarm.report.live import ASSETS, SCRIPT, LivePage, save_live, write_assets
 from tfarm.report.page import Case, GivenLaw

@@ -26,10 +26,10 @@ from tests.case.step_truth import Case, Truth, loop_function
 from tests.plausible.arms import draw, log
 from tests.survey import Finding
 from tfarm.arm import Motor
-from tfarm.case import step
-from tfarm.case.step import PARTS, LoopResponse
+from tfarm.arm.chain import Sampling, Slew
+from tfarm.assessment import step
+from tfarm.assessment.step import PARTS, LoopResponse
 from tfarm.dsp import Chain
-from tfarm.dsp.chain import Sampling, Slew
 
 AGREES, ENOUGH = 1e-6, 1e-4  # of the peak of a signal, there and elsewhere: two methods differ by no more
 RIGHT, CONVERGED, BAND = 0.01, 1e-6, 0.02  # of the peak, and under that word; of the final value: settled

@@ -11,8 +11,10 @@ import pytest
 import tfarm
 from tests.shared import sized
 from tests.shell import answer, run
-from tfarm.case import card
-from tfarm.dsp import Chain, Sampling, edges, load_chain, sampled_verdict
+from tfarm.assessment import card
+from tfarm.dsp import Chain, Sampling, load_chain
+from tfarm.loop import edges
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.schema.terminal import table_lines
 
 BARE, LAB = tfarm.load("sasaki2012"), tfarm.load("sasaki2012-lab")

@@ -8,8 +8,8 @@ from matplotlib import image
 
 import tfarm
 from tests.shell import answer, run
-from tfarm.case import comparison
-from tfarm.dsp import Analysis, sampled_verdict
+from tfarm.assessment import comparison
+from tfarm.loop.sampled_verdict import Analysis, sampled_verdict
 from tfarm.schema import Difference, Percent, table, to_dict
 
 BARE, LAB = tfarm.load("sasaki2012"), tfarm.load("sasaki2012-lab")

@@ -7,9 +7,9 @@ import pytest
 
 import tfarm
 from tests.shell import answer
-from tfarm.case.comparison import compare
+from tfarm.arm.chain import file_text
+from tfarm.assessment.comparison import compare
 from tfarm.dsp import Actuator, Chain, Sampling, scenario
-from tfarm.dsp.chain import file_text
 from tfarm.dsp.plant import driven
 from tfarm.report.live import explore
 from tfarm.schema import to_dict

@@ -9,13 +9,13 @@ import pytest
 
 import tfarm
 from tests.shared import remembered
+from tfarm.arm.chain import CHAIN_TABLES
 from tfarm.arm.schema import file_keys
 from tfarm.dsp import Actuator, Chain, Converters, stages
-from tfarm.dsp.chain import CHAIN_TABLES
 from tfarm.dsp.results import simulated_run
-from tfarm.dsp.verdict import sampled, sampled_brief, sampled_verdict
 from tfarm.errors import ParameterError
 from tfarm.exported import result
+from tfarm.loop.sampled_verdict import sampled, sampled_brief, sampled_verdict
 from tfarm.report.live import explore, sampled_numbers, slew_numbers
 from tfarm.schema import to_dict
 from tfarm.synthesis.judge import judge_of
@@ -150,7 +150,7 @@ WALKED = [pytest.param(each, marks=[pytest.mark.survey] * (each in LIKE_OTHERS))
 def test_a_key_changes_the_answer_or_is_named_in_it(answer, monkeypatch):
     monkeypatch.setattr(result.ExportTask, "sha256", "of the inputs")
     monkeypatch.setattr("tfarm.exported.fmu.binary_of", lambda sources, identifier: ({}, "none"))
-    for place in ("exported.result.sampled", "exported.controller.sampled", "case.step.sampled_verdict"):
+    for place in ("exported.result.sampled", "exported.controller.sampled", "assessment.step.sampled_verdict"):
         few = partial(sampled if place.endswith("sampled") else sampled_verdict, count=3)
         monkeypatch.setattr(f"tfarm.{place}", few)
     ask = remembered(lambda chain: str(ANSWERS[answer](ARM, chain)))

@@ -10,9 +10,9 @@ import pytest
 import tfarm
 from tests.shell import answer, run
 from tfarm.arm import Attachment
-from tfarm.case.step import PARTS, SAMPLED_NAMES, _Record
+from tfarm.arm.chain import Sampling
+from tfarm.assessment.step import PARTS, SAMPLED_NAMES, _Record
 from tfarm.dsp import Chain
-from tfarm.dsp.chain import Sampling
 from tfarm.loop.time_response import Peak
 
 LAB, LOSSLESS = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")

@@ -9,8 +9,8 @@ import tfarm
 from tests.case.inversion import DeHoog, durbin, inverse
 from tests.case.step_truth import Case, Truth
 from tests.case.steps import FIGURES, PARTS, Signal, answered, grows, judge
+from tfarm.arm.chain import Sampling
 from tfarm.dsp import Chain
-from tfarm.dsp.chain import Sampling
 
 LAB = tfarm.load("sasaki2012-lab")
 COARSE = Chain(sampling=Sampling(period=0.05))

@@ -13,12 +13,12 @@ from scipy.optimize import brentq
 
 import tfarm
 from tests.shell import answer, refused, run
+from tfarm.arm.chain import chain_of_tables
 from tfarm.arm.materials import materials
 from tfarm.arm.schema import arm_of_table
-from tfarm.case.arm_check import DEFAULTS
+from tfarm.assessment.arm_check import DEFAULTS
 from tfarm.cli import arm_files
 from tfarm.dsp import Chain
-from tfarm.dsp.chain import chain_of_tables
 
 STEEL = ("--material", "steel", "--length", "0.8", "--width", "0.06", "--depth", "0.004", "--hub-inertia", "0.05")
 MASS, EI = 7850 * 0.06 * 0.004 * 0.8, 2.1e11 * 0.06 * 0.004**3 / 12  # kg, N m^2

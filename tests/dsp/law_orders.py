@@ -21,8 +21,8 @@ from tests.rigs import some_rig
 from tests.survey import Finding, each_of
 from tfarm.arm import Arm, Law
 from tfarm.dsp import Chain, Sampling, pulse_transfer
-from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.response.signals import Signals
 from tfarm.spectrum.table import first_frequency
 

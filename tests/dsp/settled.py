@@ -18,8 +18,9 @@ from tests.plausible.arms import log
 from tests.strategies import arm_of
 from tests.survey import Finding, each_of
 from tfarm.arm import HubFeedback
-from tfarm.dsp import Chain, Sampling, sampled_verdict
+from tfarm.dsp import Chain, Sampling
 from tfarm.errors import ConvergenceError
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.spectrum import modes
 
 FAINT = 1e-7

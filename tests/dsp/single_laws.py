@@ -22,7 +22,7 @@ from tfarm import Law
 from tfarm.arm.blocks import Rational, StateSpace
 from tfarm.arm.law import Part
 from tfarm.dsp import Chain, Converters, Sampling, Simulator, pulse_transfer, scenario
-from tfarm.dsp.sampled import sampled_loop
+from tfarm.loop.sampled import sampled_loop
 
 ARM, T, MODES, BITS, DURATION = tfarm.load("sasaki2012-lab"), 0.001, 3, 200, 60.0
 SINGLE = Chain(sampling=Sampling(period=T), converters=Converters(arithmetic="float32"))

@@ -9,11 +9,13 @@ import pytest
 
 import tfarm
 from tfarm.arm import FED_BACK, HubFeedback, Law
-from tfarm.dsp import Chain, Converters, Sampling, pulse_transfer, sampled_loop, sampled_verdict
-from tfarm.dsp import circle as circle_module
-from tfarm.dsp.circle import Arcs, Circle, Discs, complete_band, product
-from tfarm.dsp.crossings import FACTOR, crossings_of
-from tfarm.dsp.edges import delay_limit, whole_loop
+from tfarm.dsp import Chain, Converters, Sampling, pulse_transfer
+from tfarm.loop import circle as circle_module
+from tfarm.loop.circle import Arcs, Circle, Discs, complete_band, product
+from tfarm.loop.circle_crossings import FACTOR, crossings_of
+from tfarm.loop.edges import delay_limit, whole_loop
+from tfarm.loop.sampled import sampled_loop
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.reduced import modal_model
 
 LAB = tfarm.load("sasaki2012-lab")

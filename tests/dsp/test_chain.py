@@ -8,8 +8,8 @@ import pytest
 
 import tfarm
 from tfarm.arm import to_toml
+from tfarm.arm.chain import chain_of_tables, file_text
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, Slew, load_chain
-from tfarm.dsp.chain import chain_of_tables, file_text
 from tfarm.dsp.kernel import quantise
 from tfarm.errors import ParameterError
 

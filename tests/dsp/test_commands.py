@@ -14,11 +14,11 @@ import tfarm
 from tests.shared import remember, thinned
 from tests.shell import answer, run
 from tfarm import HubFeedback, Law
+from tfarm.arm.chain import Sampling, chain_of_tables
 from tfarm.cli.app import load_chain
 from tfarm.dsp import Chain
-from tfarm.dsp.chain import Sampling, chain_of_tables
-from tfarm.dsp.verdict import brief_of
 from tfarm.errors import ConvergenceError
+from tfarm.loop.sampled_verdict import brief_of
 from tfarm.plots import slew
 from tfarm.report.sampled_section import response_columns
 from tfarm.synthesis import design

@@ -14,8 +14,8 @@ from tfarm import Law
 from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Chain, Converters, Sampling, load_chain
 from tfarm.dsp.discretise import acting_law, law_in_z, with_estimate
-from tfarm.dsp.sampled import sampled_loop
-from tfarm.dsp.verdict import Analysis, sampled_verdict
+from tfarm.loop.sampled import sampled_loop
+from tfarm.loop.sampled_verdict import Analysis, sampled_verdict
 
 LAB, FILES = tfarm.load("sasaki2012-lab"), Path(__file__).parents[1] / "data" / "reproductions"
 T = 0.01

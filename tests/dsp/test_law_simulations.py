@@ -12,8 +12,8 @@ from tests.shared import thinned
 from tfarm import Law, ParameterError
 from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Chain, Converters, Sampling, Simulator, load_chain, scenario
-from tfarm.dsp.sampled import sampled_loop
-from tfarm.dsp.verdict import sampled_verdict
+from tfarm.loop.sampled import sampled_loop
+from tfarm.loop.sampled_verdict import sampled_verdict
 
 T = 0.01
 LAB, RIG = tfarm.load("sasaki2012-lab"), tfarm.load("quanser-2dsfl")

@@ -12,12 +12,13 @@ from tests.dsp.law_orders import some_case
 from tests.odd_arms import odd_arms
 from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
-from tfarm.dsp import Chain, Sampling, sampled_loop, stable_windows
-from tfarm.dsp.circle import complete_band
-from tfarm.dsp.crossings import FACTOR, crossings_of
+from tfarm.dsp import Chain, Sampling
 from tfarm.dsp.discretise import discretised
-from tfarm.dsp.edges import damping_limit, whole_loop
-from tfarm.dsp.verdict import sampled_verdict
+from tfarm.loop.circle import complete_band
+from tfarm.loop.circle_crossings import FACTOR, crossings_of, stable_windows
+from tfarm.loop.edges import damping_limit, whole_loop
+from tfarm.loop.sampled import sampled_loop
+from tfarm.loop.sampled_verdict import sampled_verdict
 
 T = 0.01
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")

@@ -8,9 +8,10 @@ import pytest
 
 import tfarm
 from tfarm.arm import Hub, HubFeedback
-from tfarm.dsp import Actuator, Chain, Converters, Sampling, sampled_loop
-from tfarm.dsp.modes import STRONGER, dominant, mode_table, sampled_loci, sampled_locus
+from tfarm.dsp import Actuator, Chain, Converters, Sampling
 from tfarm.errors import ParameterError
+from tfarm.loop.sampled import sampled_loop
+from tfarm.loop.sampled_modes import STRONGER, dominant, mode_table, sampled_loci, sampled_locus
 
 pytestmark = pytest.mark.kernels
 

@@ -17,16 +17,17 @@ from tests.shared import thinned
 from tests.similar import EITHER
 from tfarm import HubFeedback, Law, modes
 from tfarm.arm import as_law
-from tfarm.dsp import Chain, Converters, Sampling, delay_margin, required_damping, sampled_loop, sampled_map
-from tfarm.dsp.crossings import ENDS_AT, around, crossings_of, ends_of_K1, stable_windows
-from tfarm.dsp.edges import Figure
-from tfarm.dsp.verdict import Analysis, Verdict, sampled_verdict
+from tfarm.dsp import Chain, Converters, Sampling
 from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.loop.circle_crossings import ENDS_AT, around, crossings_of, ends_of_K1, sampled_map, stable_windows
+from tfarm.loop.edges import Figure, delay_margin, required_damping
+from tfarm.loop.sampled import sampled_loop
+from tfarm.loop.sampled_verdict import Analysis, Verdict, sampled_verdict
 from tfarm.schema import text, to_dict
 from tfarm.spectrum.table import default_gains
 
 GAINS = HubFeedback(K1=0.3, K2=0.3)
-room = import_module("tfarm.dsp.verdict")
+room = import_module("tfarm.loop.sampled_verdict")
 
 
 def growing(loop):

@@ -3,8 +3,8 @@
 import numpy as np
 
 import tfarm
-from tfarm.dsp import sampled_map, sampled_verdict
-from tfarm.dsp.crossings import rounded_map
+from tfarm.loop.circle_crossings import rounded_map, sampled_map
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.spectrum.table import default_gains
 
 

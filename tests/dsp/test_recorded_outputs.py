@@ -13,14 +13,15 @@ from tests.dsp.independent import stepped
 from tests.rigs import some_rig
 from tests.shared import thinned
 from tfarm.arm import HubFeedback, Law, RotarySpring
-from tfarm.dsp import Actuator, Chain, Sampling, Simulator, sampled_verdict, scenario
-from tfarm.dsp.chain import Slew
+from tfarm.arm.chain import Slew
+from tfarm.dsp import Actuator, Chain, Sampling, Simulator, scenario
 from tfarm.dsp.plant import RECORDED
-from tfarm.dsp.sampled import sampled_loop
 from tfarm.dsp.scenarios import slew
 from tfarm.dsp.traces import away
 from tfarm.errors import ParameterError
 from tfarm.exact.outputs import OUTPUTS
+from tfarm.loop.sampled import sampled_loop
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.reduced import modal_model
 from tfarm.tuner.trial import tip_off
 

@@ -11,9 +11,10 @@ from tests.dsp.independent import aliased, aliased_loop
 from tests.odd_arms import odd_arms
 from tests.strategies import arm_of
 from tfarm.arm import FED_BACK, HubFeedback
-from tfarm.dsp import Actuator, Chain, Sampling, pulse_transfer, sampled_loop
+from tfarm.dsp import Actuator, Chain, Sampling, pulse_transfer
 from tfarm.dsp.plant import PulseTransfer, sensed_plant, undelayed_plant, with_filter
 from tfarm.errors import ParameterError
+from tfarm.loop.sampled import sampled_loop
 
 T = 0.01
 BOTH = ["hub_rate", "root_moment"]

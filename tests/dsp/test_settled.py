@@ -12,10 +12,13 @@ from tests.dsp.settled import HoldModel, hurting, ordinary
 from tests.shared import thinned
 from tests.survey import each_of, tally
 from tfarm.arm import FED_BACK, Arm, Hub, HubFeedback, Link, Section
-from tfarm.dsp import Chain, Sampling, sampled_loop, sampled_verdict, stable_windows
-from tfarm.dsp import circle as circle_module
-from tfarm.dsp.circle import Circle, complete_band
-from tfarm.dsp.edges import shown_windows, whole_loop
+from tfarm.dsp import Chain, Sampling
+from tfarm.loop import circle as circle_module
+from tfarm.loop.circle import Circle, complete_band
+from tfarm.loop.circle_crossings import stable_windows
+from tfarm.loop.edges import shown_windows, whole_loop
+from tfarm.loop.sampled import sampled_loop
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.spectrum import modes
 from tfarm.spectrum.box import TOWARD_SINGULAR
 from tfarm.spectrum.damped import damped_modes
@@ -103,7 +106,7 @@ def test_poles_left_of_the_line_weigh_no_more_than_the_bound(delay):
 @pytest.mark.parametrize("coarser", [1, 10])
 def test_the_count_does_not_depend_on_the_arcs_to_begin_with(lab, coarser, monkeypatch):
     """Resonances narrower than 1e-6 rad between the ends of arcs: these are halved until they are seen."""
-    monkeypatch.setattr("tfarm.dsp.circle.ARCS", 64 // coarser)
+    monkeypatch.setattr("tfarm.loop.circle.ARCS", 64 // coarser)
     slightly = replace(lab, link=replace(lab.link, damping=1e-12))
     loop = sampled_loop(slightly, HubFeedback(K1=0.3, K2=0.3), count=14)
     circle = complete_band(loop).circle

@@ -10,9 +10,8 @@ from scipy.signal import lfilter, lsim
 
 import tfarm
 from tfarm.arm import HubFeedback
-from tfarm.dsp import Actuator, Chain, Converters, Sampling, Simulator, sampled_loop, scenario
+from tfarm.dsp import Actuator, Chain, Converters, Sampling, Simulator, scenario
 from tfarm.dsp.kernel import estimate
-from tfarm.dsp.modes import dominant
 from tfarm.dsp.results import (
     ideal_chain,
     limit_cycle,
@@ -21,6 +20,8 @@ from tfarm.dsp.results import (
 from tfarm.dsp.scenarios import SCENARIOS
 from tfarm.dsp.simulate import settling_time
 from tfarm.errors import ParameterError
+from tfarm.loop.sampled import sampled_loop
+from tfarm.loop.sampled_modes import dominant
 from tfarm.reduced import modal_model
 from tfarm.schema import to_dict
 

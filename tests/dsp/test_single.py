@@ -10,7 +10,7 @@ from tfarm import Law, ParameterError
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Part
 from tfarm.dsp import Chain, Sampling
-from tfarm.dsp.verdict import sampled_verdict
+from tfarm.loop.sampled_verdict import sampled_verdict
 
 NUM = [5.309725302697796, -26.46200484409234, 52.751661323395226, -52.58020328197535, 26.20481547108505,
        -5.223993971090474]  # fmt: skip

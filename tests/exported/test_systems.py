@@ -11,11 +11,12 @@ import tfarm
 from tests.dsp.independent import aliased
 from tfarm import HubFeedback, Law
 from tfarm.arm import AT_HUB, as_law
-from tfarm.dsp import Actuator, Chain, Converters, Sampling, sampled_loop
+from tfarm.dsp import Actuator, Chain, Converters, Sampling
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.scenarios import scenario
 from tfarm.dsp.simulate import Simulator
 from tfarm.exported.systems import controller_system, loop_system, plant_system, reduced_systems
+from tfarm.loop.sampled import sampled_loop
 from tfarm.response.signals import Signals
 
 T = 0.01

@@ -19,11 +19,12 @@ from tests.shell import answer, refused
 from tests.survey import tally
 from tests.tuner.plain import plain_gain
 from tfarm.arm import HubFeedback
-from tfarm.dsp import Chain, Sampling, sampled_loop
+from tfarm.dsp import Chain, Sampling
 from tfarm.errors import ParameterError
 from tfarm.exported import tuner_code as functions
 from tfarm.exported.texts import literal
 from tfarm.exported.tuner_code import ExportedTuner
+from tfarm.loop.sampled import sampled_loop
 from tfarm.tuner import find_guard, slew_trial
 from tfarm.tuner.guard import sector_guard
 from tfarm.tuner.trial import to_text

@@ -13,10 +13,11 @@ from tests.loop.rig_loops import RigLoop
 from tests.rigs import some_rig
 from tests.shared import thinned
 from tfarm import HubFeedback
-from tfarm.dsp import Chain, Sampling, sampled_verdict
+from tfarm.dsp import Chain, Sampling
 from tfarm.loop.loop import Loop, band_of
 from tfarm.loop.plane import INFINITE, gain_map
 from tfarm.loop.poles import closed_loop_poles, poles_below
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
 from tfarm.spectrum.table import default_gains, gain_unit

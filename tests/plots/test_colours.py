@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex, to_rgb
 
 import tfarm
-from tfarm.dsp import sampled_map
+from tfarm.loop.circle_crossings import sampled_map
 from tfarm.loop.locus import locus
 from tfarm.loop.stability import stability
 from tfarm.plots import gain_map, overlay, style

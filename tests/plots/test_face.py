@@ -20,8 +20,9 @@ from tests.shared import thinned
 from tests.studies.pictured import planted_study
 from tfarm import Law
 from tfarm.digits import plain
-from tfarm.dsp import Chain, sampled_map
+from tfarm.dsp import Chain
 from tfarm.fitting.data import Measured
+from tfarm.loop.circle_crossings import sampled_map
 from tfarm.loop.loci import reduced_locus
 from tfarm.loop.nyquist import compressed
 from tfarm.plots.regions import colours, contours

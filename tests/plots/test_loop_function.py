@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 import tfarm
 from tests.odd_arms import odd_arms
 from tests.plots.labels import complaints
-from tfarm.case.card import continuous_card, reference_damping
+from tfarm.assessment.card import continuous_card, reference_damping
 from tfarm.dsp import Chain, Sampling
 from tfarm.loop.curve import curve_of, refined
 

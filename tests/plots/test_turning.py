@@ -5,11 +5,12 @@ import pytest
 
 import tfarm
 from tfarm.crossing import pieces
-from tfarm.dsp import load_chain, sampled_loop
-from tfarm.dsp.modes import sampled_loci
+from tfarm.dsp import load_chain
 from tfarm.loop.locus import locus, rounded
 from tfarm.loop.loop import Loop
 from tfarm.loop.plane import moment_axis, rate_axis
+from tfarm.loop.sampled import sampled_loop
+from tfarm.loop.sampled_modes import sampled_loci
 from tfarm.plots import locus as locus_plot
 from tfarm.plots.regions import sampled_region
 from tfarm.plots.roots import draw_sampled_loci

@@ -12,7 +12,7 @@ from tests.transition import determinant
 from tfarm import Hub, damped_modes, load, modes, transfer
 from tfarm.arm import FED_BACK, Motor
 from tfarm.dsp import Chain, Sampling, pulse_transfer
-from tfarm.dsp.verdict import sampled_verdict
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.reduced.modal import modal_model
 from tfarm.spectrum.damped import entered
 from tfarm.spectrum.table import default_gains

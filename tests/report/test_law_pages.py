@@ -18,11 +18,11 @@ from tests.shell import answer, run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.arm import tracked
 from tfarm.arm.law_tables import load_law
-from tfarm.case.card import margins_of
+from tfarm.assessment.card import margins_of
 from tfarm.dsp import Chain, Simulator, load_chain
-from tfarm.dsp.sampled import sampled_loop
 from tfarm.errors import one_line
 from tfarm.fitting.recording import compare_run, load_run, overshoot
+from tfarm.loop.sampled import sampled_loop
 from tfarm.report import writing
 from tfarm.report.loop_section import law_section, margins_section
 from tfarm.report.page import Case, GivenLaw, file_of

@@ -19,11 +19,12 @@ from scipy.optimize import brentq
 import tfarm
 from tests.shared import remember, remembered, thinned
 from tfarm.arm import HubFeedback, Law
-from tfarm.dsp import Chain, Sampling, load_chain, sampled_verdict
+from tfarm.dsp import Chain, Sampling, load_chain
 from tfarm.exact.characteristic import float_units, loop_parts
 from tfarm.exact.system import system_of
 from tfarm.loop.loop import Loop
 from tfarm.loop.panels import MOST_MISS, loop_panels
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import stability
 from tfarm.report import live
 from tfarm.report.live import has_sliders, law_data, live_data, save_live, sensor_numbers, slew_numbers

@@ -11,9 +11,9 @@ import tfarm
 from tests.plots.labels import complaints
 from tests.report.written import coarsen, plain_cards
 from tfarm.arm import Hub, HubFeedback
-from tfarm.case.card import margins_of
+from tfarm.arm.chain import Sampling
+from tfarm.assessment.card import margins_of
 from tfarm.dsp import Chain, load_chain
-from tfarm.dsp.chain import Sampling
 from tfarm.loop import plane as edges
 from tfarm.loop.loci import loci
 from tfarm.loop.loop import band_of

@@ -14,7 +14,7 @@ from tests.report import plausible
 from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.arm import implausible
-from tfarm.case.card import margins_of
+from tfarm.assessment.card import margins_of
 from tfarm.dsp import Chain
 from tfarm.loop import loci as loci_room
 from tfarm.loop.locus import locus

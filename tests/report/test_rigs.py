@@ -13,7 +13,7 @@ from tests.plots.labels import complaints
 from tfarm import plots
 from tfarm.arm import Gauge, written_unit
 from tfarm.dsp import Chain
-from tfarm.dsp.crossings import sampled_map
+from tfarm.loop.circle_crossings import sampled_map
 from tfarm.plots.motion import sketch
 from tfarm.report.arm_section import arm_section, assumptions_section
 from tfarm.report.overview import summary

@@ -13,9 +13,11 @@ from PIL import Image
 import tfarm
 from tests.report.written import blocks_of, values_of
 from tfarm.arm import HubFeedback
+from tfarm.arm.chain import Converters, Sampling
 from tfarm.digits import kept_digits
-from tfarm.dsp import Chain, Simulator, sampled_loop, scenario, verdict
-from tfarm.dsp.chain import Converters, Sampling
+from tfarm.dsp import Chain, Simulator, scenario
+from tfarm.loop import sampled_verdict as verdict
+from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
 from tfarm.plots import regions
@@ -77,7 +79,7 @@ def test_the_map_of_both_regions_is_that_of_the_poles():
 
 def test_without_damping_the_layers_are_nested_and_name_their_number_of_modes(monkeypatch):
     monkeypatch.setattr("tfarm.plots.regions.OVERLAY_COLUMNS", 8)
-    monkeypatch.setattr("tfarm.dsp.crossings.MOST_COLUMNS", 0)
+    monkeypatch.setattr("tfarm.loop.circle_crossings.MOST_COLUMNS", 0)
     data = stable_regions(PAPER, GAINS, Chain())
     assert [layer.loop.plant.arm.damping for layer in data.sampled] == [1e-4, 1e-6, 0.0]
     assert data.sampled[-1].modes_used == 20
@@ -190,7 +192,7 @@ def test_a_loop_that_diverges_has_no_film():
 
 def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
     monkeypatch.setattr("tfarm.plots.regions.OVERLAY_COLUMNS", 8)
-    monkeypatch.setattr("tfarm.dsp.crossings.MOST_COLUMNS", 0)
+    monkeypatch.setattr("tfarm.loop.circle_crossings.MOST_COLUMNS", 0)
     section = sampled_section(Case(replace(LAB, payload=tfarm.Payload(mass=math.inf)), Chain()))
     assert "no slew" in section.words[-1]
     assert "sampled-overlay" in blocks_of(section)

@@ -31,9 +31,9 @@ from tests.report.written import (
     plain_cards,
     validated,
 )
-from tfarm.case.card import Graded, LoopCard
+from tfarm.assessment.card import Graded, LoopCard
 from tfarm.dsp import Chain, load_chain
-from tfarm.dsp.edges import LowerBound
+from tfarm.loop.edges import LowerBound
 from tfarm.plots.style import GOOD, LOW, MARGINAL, POOR, UNSTABLE
 from tfarm.report import overview, write, writing
 from tfarm.report.arm_section import arm_section

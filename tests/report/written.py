@@ -17,9 +17,9 @@ import tfarm
 from tests.hostile import LONG, NAME, PRINTED, Read
 from tfarm.arm import to_toml
 from tfarm.audit.published import validate
-from tfarm.dsp import crossings as sampled_regions
-from tfarm.dsp import modes as sampled_loci
+from tfarm.loop import circle_crossings as sampled_regions
 from tfarm.loop import loci
+from tfarm.loop import sampled_modes as sampled_loci
 from tfarm.plots import regions
 from tfarm.report import live, loop_section, overview, sampled_section, writing
 from tfarm.report.writing import PIECES

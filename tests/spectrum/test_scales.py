@@ -10,11 +10,12 @@ import tfarm
 from tests.shell import answer, run
 from tests.similar import INERTIA, Units
 from tfarm import Hub, HubFeedback, Payload
-from tfarm.dsp import Chain, stable_windows
-from tfarm.dsp.chain import Sampling
-from tfarm.dsp.sampled import sampled_loop
-from tfarm.dsp.verdict import sampled_verdict
+from tfarm.arm.chain import Sampling
+from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
+from tfarm.loop.circle_crossings import stable_windows
+from tfarm.loop.sampled import sampled_loop
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import stability
 from tfarm.spectrum.table import (
     DEFAULT_DIGITS,

@@ -10,9 +10,9 @@ import tfarm
 from tests import survey
 from tests.shared import sized, thinned
 from tests.studies.planted import confidence
+from tfarm.arm.chain import load_chain
 from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Chain
-from tfarm.dsp.chain import load_chain
 from tfarm.errors import ParameterError
 from tfarm.spectrum.table import default_gains
 from tfarm.studies import running
@@ -187,11 +187,11 @@ def test_values_are_those_of_the_card_and_no_more_is_computed(lab, monkeypatch):
         assert whole[f"{loop}.least_damping.mode"] == own.least_damping.mode
         names = [f"{loop}.stability", f"{loop}.certainty"]
         with monkeypatch.context() as patch:
-            patch.setattr("tfarm.case.card.margins_of", None)  # needed by no verdict
-            patch.setattr("tfarm.case.card.sampled_of", None)
+            patch.setattr("tfarm.assessment.card.margins_of", None)  # needed by no verdict
+            patch.setattr("tfarm.assessment.card.sampled_of", None)
             assert values_of(one, sources_of(names)) == {name: whole[name] for name in names} | {"failed": None}
     with monkeypatch.context() as patch:
-        patch.setattr("tfarm.case.card.margins_of", None)
+        patch.setattr("tfarm.assessment.card.margins_of", None)
         assert values_of(one, sources_of(["sampled.disk_margin"]))["sampled.disk_margin"] == card.sampled.disk_margin
 
 

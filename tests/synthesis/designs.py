@@ -20,8 +20,8 @@ from tests.survey import Finding, main, numbered
 from tests.synthesis.held_loop import HeldLoop
 from tfarm import ConvergenceError, ParameterError
 from tfarm.arm import as_law
+from tfarm.arm.chain import Sampling
 from tfarm.dsp import Chain
-from tfarm.dsp.chain import Sampling
 from tfarm.synthesis import design as room
 from tfarm.synthesis.judge import LOST, OBJECTIVES, RESERVE
 from tfarm.synthesis.structures import STRUCTURES

@@ -12,7 +12,7 @@ from tests.synthesis.held_loop import HeldLoop
 from tfarm import ConvergenceError, ParameterError
 from tfarm.arm import as_law
 from tfarm.arm.law_tables import load_law
-from tfarm.dsp import sampled_verdict
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import stability
 from tfarm.synthesis import search
 from tfarm.synthesis.design import design

@@ -21,9 +21,10 @@ from tests.synthesis.held_loop import HeldLoop
 from tests.synthesis.judged import judge_of
 from tfarm import ConvergenceError, HubFeedback, ParameterError, tuner
 from tfarm.arm import TWO_GAINS
-from tfarm.dsp import Chain, Slew, sampled_verdict
-from tfarm.dsp.chain import Sampling
+from tfarm.arm.chain import Sampling
+from tfarm.dsp import Chain, Slew
 from tfarm.dsp.results import simulated_run
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.reduced import modal_model
 from tfarm.schema import to_dict
 from tfarm.synthesis import search

@@ -14,9 +14,9 @@ from tests.synthesis.held_loop import HeldLoop
 from tests.synthesis.judged import judge_of
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.arm import as_law
+from tfarm.arm.chain import Converters
 from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Chain
-from tfarm.dsp.chain import Converters
 from tfarm.schema import text
 from tfarm.synthesis import judge, search
 from tfarm.synthesis.design import design

@@ -13,7 +13,8 @@ import pytest
 
 import tfarm
 from tests.odd_arms import odd_arms
-from tfarm.dsp import Chain, Sampling, sampled_loop
+from tfarm.dsp import Chain, Sampling
+from tfarm.loop.sampled import sampled_loop
 from tfarm.spectrum.table import default_gains
 from tfarm.tuner import (
     baselines,

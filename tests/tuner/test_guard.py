@@ -19,9 +19,10 @@ from tests.survey import tally
 from tests.tuner import bounded
 from tests.tuner.bounded import adversary
 from tfarm.arm import HubFeedback
-from tfarm.dsp import Chain, Sampling, sampled_loop
+from tfarm.dsp import Chain, Sampling
 from tfarm.errors import CertificationError
 from tfarm.exact.rationals import is_positive_definite
+from tfarm.loop.sampled import sampled_loop
 from tfarm.tuner import find_guard, guard, slew_trial
 from tfarm.tuner.guard import RADIUS_SHARE, MovingGain, _peak, common_lyapunov, upper_modes_are_quiet
 

@@ -13,8 +13,9 @@ import tfarm
 from tests.dsp.independent import aliased, aliased_loop
 from tests.shell import answer, refused
 from tfarm.arm import Hub, HubFeedback
-from tfarm.dsp import Chain, Converters, Sampling, Simulator, pulse_transfer, sampled_loop
+from tfarm.dsp import Chain, Converters, Sampling, Simulator, pulse_transfer
 from tfarm.errors import ParameterError
+from tfarm.loop.sampled import sampled_loop
 from tfarm.tuner import (
     Cost,
     Plan,

@@ -287,7 +287,7 @@ def load_driven_loop(
 
 def load_chain(arm: str, *, period: Period = None, delay_samples: Delay = None, dsp: DspFile = None) -> Any:
     """Return the sampled chain of a file, or of the arm's, with the period and the delay that are given instead."""
-    from tfarm.dsp.chain import load_chain as read
+    from tfarm.arm.chain import load_chain as read
 
     chain, typed = read(dsp or arm), {"period": period, "delay_samples": delay_samples}
     sampling = replace(chain.sampling, **{key: value for key, value in typed.items() if value is not None})

@@ -100,7 +100,7 @@ def new(
     force: replace the file
     """
     from tfarm.arm.starting import first_file
-    from tfarm.case.arm_check import with_damping
+    from tfarm.assessment.arm_check import with_damping
 
     require(file.suffix == ".toml", "FILE", str(file), "give a name that ends with .toml")
     require(force or not os.path.lexists(file), "FILE", str(file), "exists already; --force replaces it")
@@ -119,6 +119,6 @@ def new(
 @add_command("Arm", epilog="check my-arm.toml")
 def check(arm: ArmName, theory: TheoryName = None, json: Json = False) -> None:
     """Arm file as it is read: mass, inertia, first frequency, warnings, missing tables and their defaults."""
-    from tfarm.case.arm_check import check_arm
+    from tfarm.assessment.arm_check import check_arm
 
     emit(check_arm(arm, theory), json)

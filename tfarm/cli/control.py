@@ -213,8 +213,9 @@ def gain_map(
     vary: twice: two numbers of a law and their ranges; gain (a factor on the law), delay, SIGNAL, SIGNAL.num.N or
         SIGNAL.den.N
     """
-    from tfarm.dsp import crossings, verdict
     from tfarm.dsp.plant import driven
+    from tfarm.loop import circle_crossings as crossings
+    from tfarm.loop import sampled_verdict as verdict
     from tfarm.loop.plane import between, ranges_of
 
     subject, typed = load_arm(arm, theory), {RATE_GAIN: k1, MOMENT_GAIN: k2}

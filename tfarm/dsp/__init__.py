@@ -1,36 +1,45 @@
-"""The sampled loop of the exact arm: hold, delay, converters, verdicts and simulations at 10 ms or any other period."""
+"""The sampled chain in time: hold, delay, converters, discretisation and simulation at 10 ms or any other period."""
 
-from tfarm.dsp.chain import Actuator, Chain, Converters, Sampling, Slew, load_chain
-from tfarm.dsp.crossings import GainMap, sampled_map, stable_windows
-from tfarm.dsp.edges import delay_margin, required_damping
+import warnings
+from importlib import import_module
+
+from tfarm.arm.chain import Actuator, Chain, Converters, Sampling, Slew, load_chain
 from tfarm.dsp.plant import PulseTransfer, pulse_transfer
-from tfarm.dsp.sampled import Sampled, sampled_loop
 from tfarm.dsp.scenarios import Scenario, scenario
 from tfarm.dsp.simulate import Measurement, Simulation, Simulator
-from tfarm.dsp.verdict import Analysis, Verdict, sampled_verdict
 
 __all__ = [
     "Actuator",
-    "Analysis",
     "Chain",
     "Converters",
-    "GainMap",
     "Measurement",
     "PulseTransfer",
-    "Sampled",
     "Sampling",
     "Scenario",
     "Simulation",
     "Simulator",
     "Slew",
-    "Verdict",
-    "delay_margin",
     "load_chain",
     "pulse_transfer",
-    "required_damping",
-    "sampled_loop",
-    "sampled_map",
-    "sampled_verdict",
     "scenario",
-    "stable_windows",
 ]
+
+_MOVED = {  # names that this room had up to version 1.0, and their modules
+    "Analysis": "tfarm.loop.sampled_verdict",
+    "GainMap": "tfarm.loop.circle_crossings",
+    "Sampled": "tfarm.loop.sampled",
+    "Verdict": "tfarm.loop.sampled_verdict",
+    "delay_margin": "tfarm.loop.edges",
+    "required_damping": "tfarm.loop.edges",
+    "sampled_loop": "tfarm.loop.sampled",
+    "sampled_map": "tfarm.loop.circle_crossings",
+    "sampled_verdict": "tfarm.loop.sampled_verdict",
+    "stable_windows": "tfarm.loop.circle_crossings",
+}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _MOVED:
+        raise AttributeError(f"module 'tfarm.dsp' has no attribute {name!r}")
+    warnings.warn(f"tfarm.dsp.{name} has moved: import it from {_MOVED[name]}", DeprecationWarning, stacklevel=2)
+    return getattr(import_module(_MOVED[name]), name)

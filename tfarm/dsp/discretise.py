@@ -26,9 +26,9 @@ import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, AnyLaw, Arm, as_law, full_law, must_not_be_algebraic
 from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace
+from tfarm.arm.chain import MOST_DELAY, Chain
 from tfarm.arm.law import Law, Part, is_measured
 from tfarm.arrays import MACHINE_EPS, Complex, Real
-from tfarm.dsp.chain import MOST_DELAY, Chain
 from tfarm.errors import ParameterError, require
 from tfarm.exact.rationals import block_factors
 from tfarm.records import record

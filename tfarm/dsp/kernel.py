@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arm.chain import Sampling
 from tfarm.arrays import Complex, Real, Whole
-from tfarm.dsp.chain import Sampling
 from tfarm.dsp.plant import Plant, held_amplitude
 from tfarm.exact.compiled import compiled, inlined
 

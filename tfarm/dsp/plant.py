@@ -30,8 +30,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tfarm.arm import Arm, must_have_free_hub
+from tfarm.arm.chain import Chain, Sampling
 from tfarm.arrays import Complex, Real
-from tfarm.dsp.chain import Chain, Sampling
 from tfarm.errors import ConvergenceError, require
 from tfarm.exact.outputs import Output
 from tfarm.records import record

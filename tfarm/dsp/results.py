@@ -3,7 +3,7 @@
 The number of flexible modes follows from the signals with twice the modes.  Their largest change, relative to the
 largest value of each signal, is the error of half the modes, and mostly more than the error that is left.  It is no
 bound: without damping the moment after an impulse converges slowly (of 70 random arms one had nearly twice the change
-left).  Instability of high modes is decided by `dsp.verdict`.
+left).  Instability of high modes is decided by `loop.sampled_verdict`.
 """
 
 import math
@@ -15,8 +15,8 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 
 from tfarm.arm import AnyLaw, Arm, tracked
+from tfarm.arm.chain import Chain, Converters, chain_or_usual
 from tfarm.arrays import LEAST_SIZE, Real
-from tfarm.dsp.chain import Chain, Converters, chain_or_usual
 from tfarm.dsp.discretise import RULE, rule_in_words, with_all_gains
 from tfarm.dsp.plant import MODES_USED
 from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, described, scenario

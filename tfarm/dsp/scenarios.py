@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import AT_HUB, Arm, must_turn
+from tfarm.arm.chain import PERIOD, TIME_ROUNDING, Chain, Reading
 from tfarm.arm.checks import positive
 from tfarm.arrays import Real
-from tfarm.dsp.chain import PERIOD, TIME_ROUNDING, Chain, Reading
 from tfarm.dsp.plant import driven
 from tfarm.errors import must_be_known, require
 from tfarm.records import record

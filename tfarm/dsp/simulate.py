@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import ANGLE_GAIN, AT_HUB, RATE_GAIN, AnyLaw, Arm, HubFeedback
+from tfarm.arm.chain import TIME_ROUNDING, Chain
 from tfarm.arm.checks import whole
 from tfarm.arm.law import REFERENCE, Law
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import kernel
-from tfarm.dsp.chain import TIME_ROUNDING, Chain
 from tfarm.dsp.discretise import acting_law, with_all_gains
 from tfarm.dsp.plant import RECORDED, USUAL_MODES, Plant, sensed_plant, with_held_filter
 from tfarm.dsp.scenarios import Scenario

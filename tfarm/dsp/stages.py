@@ -10,8 +10,8 @@ from importlib.resources import files
 from typing import Any
 
 from tfarm.arm import Arm, must_be_arm
+from tfarm.arm.chain import Chain, chain_or_usual, stated
 from tfarm.arm.writing import arm_table
-from tfarm.dsp.chain import Chain, chain_or_usual, stated
 from tfarm.dsp.plant import driven
 from tfarm.errors import require
 

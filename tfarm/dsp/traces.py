@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tfarm.arm import Arm
+from tfarm.arm.chain import TIME_ROUNDING
 from tfarm.arrays import Real
-from tfarm.dsp.chain import TIME_ROUNDING
 from tfarm.dsp.plant import RECORDED
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator

@@ -19,15 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Law
+from tfarm.arm.chain import Chain
 from tfarm.arm.checks import positive
 from tfarm.arm.law import REFERENCE
 from tfarm.arrays import Real, Whole
-from tfarm.dsp.chain import Chain
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.kernel import DAC, estimate, product, quantise, rounded
-from tfarm.dsp.sampled import Sampled
 from tfarm.dsp.simulate import quantisers
-from tfarm.dsp.verdict import Analysis, sampled
 from tfarm.errors import ParameterError, must_be_known, require
 from tfarm.exact.compiled import compiled, inlined
 from tfarm.exact.outputs import OUTPUTS
@@ -50,6 +48,8 @@ from tfarm.exported.word_length import (
     with_system_matrix,
     word_of,
 )
+from tfarm.loop.sampled import Sampled
+from tfarm.loop.sampled_verdict import Analysis, sampled
 from tfarm.records import record
 from tfarm.schema import Quantity
 

@@ -12,14 +12,14 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 from tfarm.arm import AnyLaw, Arm, Law, arm_and_law, as_law, must_be_arm
-from tfarm.case.card import loop_card
+from tfarm.arm.chain import chain_or_usual, file_text
+from tfarm.assessment.card import loop_card
 from tfarm.dsp import Chain
-from tfarm.dsp.chain import chain_or_usual, file_text
 from tfarm.dsp.stages import admit
-from tfarm.dsp.verdict import Analysis, sampled
 from tfarm.errors import ConvergenceError, ParameterError, must_be_known, require
 from tfarm.exported.texts import facts_of
 from tfarm.files import move_into, place_in
+from tfarm.loop.sampled_verdict import Analysis, sampled
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import default_gains

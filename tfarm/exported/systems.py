@@ -4,7 +4,7 @@ With the references w and a feedforward r the sampled loop of the plant x and th
 
     u = r + c k + d [y; w],   k_next = a k + b [y; w],   x_next = A x + B u,   y = C x
 
-A quantity of the loop acts as in `tfarm.dsp.sampled`: delay, hold and analog filters are states of the plant, the
+A quantity of the loop acts as in `tfarm.loop.sampled`: delay, hold and analog filters are states of the plant, the
 estimate of a hub rate is one of the controller.  Quantisation and saturation are not linear and not in it.
 
 They are written as a MATLAB file with its script, whose variables are the entries of the first system, a structure for

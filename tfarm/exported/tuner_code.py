@@ -37,13 +37,14 @@ import numpy as np
 
 from tfarm.arm import HubFeedback
 from tfarm.arrays import Real, Whole
-from tfarm.dsp import Measurement, sampled_loop
+from tfarm.dsp import Measurement
 from tfarm.errors import MISSING, ParameterError, must_be_known, require
 from tfarm.exact.compiled import compiled, inlined
 from tfarm.exported.controller import INPUT_ERROR, OVERFLOW, REAL, Port, recorded
 from tfarm.exported.result import ANYWAY, Export, ExportTask, names_of
 from tfarm.exported.texts import literal, name_in_c, render
 from tfarm.exported.word_length import FEEDFORWARD, FLOATS
+from tfarm.loop.sampled import sampled_loop
 from tfarm.tuner.guard import sector_guard
 from tfarm.tuner.trial import TRIAL_MODES, SavedTuner, load_tuner
 

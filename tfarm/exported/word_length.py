@@ -37,8 +37,8 @@ from tfarm.arm.blocks import StateSpace
 from tfarm.arm.law import REFERENCE, Part
 from tfarm.arrays import Real
 from tfarm.dsp.discretise import with_estimate
-from tfarm.dsp.sampled import Sampled
 from tfarm.errors import ParameterError, require
+from tfarm.loop.sampled import Sampled
 from tfarm.schema import Quantity
 
 MOST_DOUBLINGS = 40  # of the samples that a sum has: 1e12 of them

@@ -38,10 +38,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import AnyLaw, Arm, tracked
+from tfarm.arm.chain import TIME_ROUNDING, Chain
 from tfarm.arm.reading import load_tables
 from tfarm.arm.schema import StrictTable, validated
 from tfarm.arrays import Complex, Real
-from tfarm.dsp.chain import TIME_ROUNDING, Chain
 from tfarm.dsp.results import enough_modes
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator

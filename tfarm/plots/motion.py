@@ -15,12 +15,13 @@ from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
 
 from tfarm.arm import MOMENT_GAIN, Arm
 from tfarm.arrays import Real
-from tfarm.case.step import Step
+from tfarm.assessment.step import Step
 from tfarm.digits import how_many, plain, significant, unit
-from tfarm.dsp import GainMap, Simulation, traces
+from tfarm.dsp import Simulation, traces
 from tfarm.dsp.results import Run
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.fitting.recording import RunComparison
+from tfarm.loop.circle_crossings import GainMap
 from tfarm.loop.plane import Plane
 from tfarm.schema import text
 from tfarm.spectrum import Modes

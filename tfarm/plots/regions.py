@@ -16,12 +16,12 @@ from scipy import ndimage
 
 from tfarm.arm import PLANE, Arm, HubFeedback
 from tfarm.arrays import Real, Whole
-from tfarm.case import Comparison
+from tfarm.assessment import Comparison
 from tfarm.crossing import Window, pieces
 from tfarm.digits import how_many, plain, scientific, significant
-from tfarm.dsp import Chain, GainMap, sampled_map, sampled_verdict
-from tfarm.dsp.crossings import ends_of_K1, rounded_map, with_both_sides, with_more
+from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
+from tfarm.loop.circle_crossings import GainMap, ends_of_K1, rounded_map, sampled_map, with_both_sides, with_more
 from tfarm.loop.plane import (
     INFINITE,
     LINEAR_SCALE,
@@ -34,6 +34,7 @@ from tfarm.loop.plane import (
     static_edges,
 )
 from tfarm.loop.plane import gain_map as counted
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.schema import Column
 from tfarm.spectrum.table import default_gains
 

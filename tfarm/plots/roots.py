@@ -9,10 +9,10 @@ from matplotlib.ticker import MaxNLocator
 
 from tfarm.arrays import Complex
 from tfarm.digits import kept_digits, plain, significant
-from tfarm.dsp.modes import DRAWN_RADIUS, RIM, SampledLoci, SampledLocus
 from tfarm.errors import one_line
 from tfarm.loop.loci import POLE_DIGITS, Loci, ReducedLocus, held_branches
 from tfarm.loop.locus import BranchCrossing, Locus, frame, origin_name, rounded, view
+from tfarm.loop.sampled_modes import DRAWN_RADIUS, RIM, SampledLoci, SampledLocus
 from tfarm.response.frequency import AXIS_SHARE
 
 from .style import (

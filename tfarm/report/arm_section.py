@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import tfarm
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, implausible, input_words, unit_of
+from tfarm.arm.chain import file_text
 from tfarm.arm.schema import file_key
 from tfarm.digits import plain, significant, unit
-from tfarm.dsp.chain import file_text
 from tfarm.plots.motion import sketch
 from tfarm.report.page import Case, Fact, PageSection, picture, prose, sheet
 from tfarm.schema import Quantity, Table, table

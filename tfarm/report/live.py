@@ -33,19 +33,30 @@ from tfarm.arm import (
 from tfarm.arm.blocks import Rational
 from tfarm.arm.writing import law_toml
 from tfarm.arrays import Complex
-from tfarm.case.card import GAIN_LIMITS, GRADED, PEAK_LIMITS, PERIOD_LIMITS, PHASE_LIMITS, UNDAMPED, reference_damping
+from tfarm.assessment.card import (
+    GAIN_LIMITS,
+    GRADED,
+    PEAK_LIMITS,
+    PERIOD_LIMITS,
+    PHASE_LIMITS,
+    UNDAMPED,
+    reference_damping,
+)
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits, scientific
-from tfarm.dsp import Chain, GainMap, PulseTransfer, Sampled, Simulator, sampled_verdict, scenario, traces
-from tfarm.dsp.edges import LONGEST_DELAY_SAMPLES
+from tfarm.dsp import Chain, PulseTransfer, Simulator, scenario, traces
 from tfarm.dsp.plant import Plant, sensed_plant
 from tfarm.dsp.results import enough_modes, ideal_chain
 from tfarm.dsp.simulate import FOLDED_UP, quantisers
 from tfarm.dsp.stages import admit
 from tfarm.errors import TfarmError, require
+from tfarm.loop.circle_crossings import GainMap
+from tfarm.loop.edges import LONGEST_DELAY_SAMPLES
 from tfarm.loop.loop import Loop, steep_places
 from tfarm.loop.panels import PANEL_SAMPLES, Sensor, loop_panels, positions, sensed_places
 from tfarm.loop.plane import gain_map, moment_axis, rate_axis, rate_columns
+from tfarm.loop.sampled import Sampled
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import band_of_family, stability
 from tfarm.loop.windows import windows_of
 from tfarm.plots.regions import BEYOND_PICTURE, sampled_region
@@ -300,7 +311,7 @@ def _samples(arm: Arm, laws: Sequence[Law], law: Law | None = None) -> tuple[dic
 
 
 def _graded(arm: Arm, laws: Sequence[Law], chain: Chain, law: AnyLaw, unit: Law | None = None) -> dict[str, Any]:
-    """The loop with whose damping an undamped arm is graded, and the words for that: `tfarm.case.card`."""
+    """The loop with whose damping an undamped arm is graded, and the words for that: `tfarm.assessment.card`."""
     C = reference_damping(arm)
     damped = arm.having(damping=C)
     sampled = sampled_verdict(damped, law, chain).full

@@ -12,14 +12,14 @@ from tfarm.arm import GAINS, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, cancell
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import REFERENCE, is_measured
 from tfarm.arrays import Real
-from tfarm.case.card import POOR, margins_of, result_card
-from tfarm.case.card import loop_function as loop_curves
+from tfarm.assessment.card import POOR, margins_of, result_card
+from tfarm.assessment.card import loop_function as loop_curves
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain
-from tfarm.dsp import GainMap as SampledMap
 from tfarm.dsp.discretise import rule_in_words
 from tfarm.errors import ConvergenceError, TfarmError
 from tfarm.loop import loci, loop, margins, nyquist, plane, poles, stability
+from tfarm.loop.circle_crossings import GainMap as SampledMap
 from tfarm.loop.curve import curve_of
 from tfarm.plots import loop_function, regions, roots, style
 from tfarm.plots.style import Axes

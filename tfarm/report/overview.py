@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from tfarm.case.card import ResultCard, result_card
+from tfarm.assessment.card import ResultCard, result_card
 from tfarm.errors import TfarmError
 from tfarm.plots.frequency import draw_card
 from tfarm.plots.style import save_figure

@@ -34,15 +34,16 @@ from tfarm.arm import (
     load,
     presets,
 )
+from tfarm.arm.chain import file_text
 from tfarm.arm.writing import law_toml
-from tfarm.case.card import LoopCard
+from tfarm.assessment.card import LoopCard
 from tfarm.digits import how_many, kept_digits, listed, plain, scientific, significant
-from tfarm.dsp import Chain, discretise, load_chain, verdict
-from tfarm.dsp.chain import file_text
+from tfarm.dsp import Chain, discretise, load_chain
 from tfarm.errors import ConvergenceError, ParameterError, one_line
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.fitting.recording import MeasuredRun
+from tfarm.loop import sampled_verdict as verdict
 from tfarm.loop.loop import Loop
 from tfarm.plots.style import Figure, drawn_for, gains_words, save_figure
 from tfarm.records import record

@@ -11,13 +11,16 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, shown_unit, tracked
-from tfarm.case.card import margins_of, sampled_of
-from tfarm.case.step import Step, step
+from tfarm.arm.chain import MOST_DELAY
+from tfarm.assessment.card import margins_of, sampled_of
+from tfarm.assessment.step import Step, step
 from tfarm.digits import plain, significant
-from tfarm.dsp import Analysis, Chain, Simulation, Simulator, modes, results, sampled_verdict, traces, verdict
-from tfarm.dsp.chain import MOST_DELAY
+from tfarm.dsp import Chain, Simulation, Simulator, results, traces
 from tfarm.errors import ParameterError
 from tfarm.fitting.recording import RunComparison, compare_run, overshoot
+from tfarm.loop import sampled_modes as modes
+from tfarm.loop import sampled_verdict as verdict
+from tfarm.loop.sampled_verdict import Analysis, sampled_verdict
 from tfarm.plots import animation, motion, regions, roots, style
 from tfarm.report.page import (
     Case,

@@ -20,11 +20,11 @@ from markupsafe import Markup, escape
 import tfarm
 from tfarm import audit
 from tfarm.arm import Arm, load, presets
+from tfarm.arm.chain import file_text
 from tfarm.audit import AuditRow, published
 from tfarm.audit.rows import is_zero
 from tfarm.digits import powers, scientific, significant, unit
 from tfarm.dsp import Chain
-from tfarm.dsp.chain import file_text
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.plots.style import gains_words

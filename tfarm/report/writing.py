@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tfarm.arm import Arm
-from tfarm.case import Comparison
+from tfarm.assessment import Comparison
 from tfarm.digits import how_many
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import driven

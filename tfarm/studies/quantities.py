@@ -22,12 +22,12 @@ import scipy  # whose statistics take half a second to load
 
 from tfarm.arm import PLANE, as_law
 from tfarm.arrays import Real
-from tfarm.case.card import LoopCard, loop_card, words_of, words_of_samples
-from tfarm.case.step import LoopResponse, step
-from tfarm.dsp.verdict import sampled
+from tfarm.assessment.card import LoopCard, loop_card, words_of, words_of_samples
+from tfarm.assessment.step import LoopResponse, step
 from tfarm.errors import ConvergenceError, TfarmError, must_be_known, require
 from tfarm.exact.system import system_of
 from tfarm.loop.poles import closed_loop_poles
+from tfarm.loop.sampled_verdict import sampled
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Interval, windows_of
 from tfarm.schema import Percent, Quantity, quantities

@@ -26,12 +26,12 @@ import numpy as np
 import scipy  # whose statistics take half a second to load
 
 from tfarm.arm import AnyLaw, Arm, as_law
+from tfarm.arm.chain import Chain, chain_or_usual, file_text, load_chain
 from tfarm.arm.checks import whole
 from tfarm.arm.law_tables import load_law
 from tfarm.arm.reading import arm_in, load_tables, presets
 from tfarm.arm.writing import LAW_DEFAULTS, law_toml, toml_tables, toml_text
 from tfarm.arrays import Real
-from tfarm.dsp.chain import Chain, chain_or_usual, file_text, load_chain
 from tfarm.errors import ParameterError, must_be_known, naming, require
 from tfarm.files import locked_folder, mat_content, write_file
 from tfarm.fitting.posterior import load_posterior

@@ -12,13 +12,13 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm, as_law, must_turn
+from tfarm.arm.chain import chain_or_usual
 from tfarm.dsp import Chain
-from tfarm.dsp.chain import chain_or_usual
-from tfarm.dsp.edges import most_modes
 from tfarm.dsp.stages import admit
-from tfarm.dsp.verdict import SampledBrief, sampled_brief, sampled_verdict
 from tfarm.errors import ConvergenceError, must_be_known, require
+from tfarm.loop.edges import most_modes
 from tfarm.loop.loop import Loop
+from tfarm.loop.sampled_verdict import SampledBrief, sampled_brief, sampled_verdict
 from tfarm.loop.stability import Stability, stability
 from tfarm.records import record
 from tfarm.schema import Quantity

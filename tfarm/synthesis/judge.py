@@ -27,13 +27,13 @@ import numpy as np
 from tfarm.arm import AnyLaw, Arm, as_law, tracked
 from tfarm.arm.blocks import Rational
 from tfarm.arrays import LEAST_SIZE, Complex, Real
-from tfarm.dsp import Chain, sampled_verdict
-from tfarm.dsp.edges import LowerBound, most_modes
+from tfarm.dsp import Chain
 from tfarm.dsp.plant import driven
 from tfarm.dsp.results import simulated
-from tfarm.dsp.verdict import UNDAMPED_MODES
 from tfarm.errors import ConvergenceError
+from tfarm.loop.edges import LowerBound, most_modes
 from tfarm.loop.margins import lowest
+from tfarm.loop.sampled_verdict import UNDAMPED_MODES, sampled_verdict
 from tfarm.loop.stability import stability
 from tfarm.records import record
 from tfarm.synthesis.models import Model, Slews, continuous_model, sampled_model, slew_and_after

@@ -35,11 +35,12 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from tfarm.arm import MOMENT_GAIN, Arm
+from tfarm.arm.chain import TIME_ROUNDING
 from tfarm.arrays import Real
-from tfarm.dsp import Chain, Converters, Sampled, Scenario, Simulation
-from tfarm.dsp.chain import TIME_ROUNDING
+from tfarm.dsp import Chain, Converters, Scenario, Simulation
 from tfarm.dsp.scenarios import torque_unit
 from tfarm.errors import ConvergenceError
+from tfarm.loop.sampled import Sampled
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import first_frequency
 from tfarm.tuner.guard import Guard, MovingGain, constant_windows

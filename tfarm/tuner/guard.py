@@ -46,13 +46,13 @@ from scipy.linalg import LinAlgError, solve_discrete_are, solve_triangular
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN
 from tfarm.arrays import Real
-from tfarm.dsp import Sampled, sampled_loop, stable_windows
-from tfarm.dsp.crossings import around
 from tfarm.dsp.plant import first_distinct, held_amplitude
 from tfarm.dsp.stages import not_covered
 from tfarm.errors import CertificationError, ConvergenceError, must_be_known
 from tfarm.exact.rationals import exact_matrix, falls, is_positive_definite
+from tfarm.loop.circle_crossings import around, stable_windows
 from tfarm.loop.margins import lowest
+from tfarm.loop.sampled import Sampled, sampled_loop
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.tuner.kernel import Limits

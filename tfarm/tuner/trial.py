@@ -30,16 +30,17 @@ import numpy as np
 from pydantic import Field
 
 from tfarm.arm import FED_BACK, Arm, HubFeedback, must_not_be_algebraic
+from tfarm.arm.chain import Reading
 from tfarm.arm.checks import check_fields, not_negative, number, positive
 from tfarm.arm.schema import StrictTable, validated_file
 from tfarm.arrays import Real
-from tfarm.dsp import Chain, Measurement, Sampled, Scenario, Simulation, Simulator, sampled_loop, scenario
-from tfarm.dsp.chain import Reading
+from tfarm.dsp import Chain, Measurement, Scenario, Simulation, Simulator, scenario
 from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
 from tfarm.dsp.simulate import FOLDED_UP
 from tfarm.dsp.stages import admit
 from tfarm.errors import must_be_known, naming, require
 from tfarm.files import write_file
+from tfarm.loop.sampled import Sampled, sampled_loop
 from tfarm.records import record
 from tfarm.spectrum.table import default_gains
 from tfarm.tuner import kernel

@@ -10,9 +10,9 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, must_be_arm
+from tfarm.arm.chain import Reading, chain_or_usual
 from tfarm.arrays import Real
 from tfarm.dsp import Chain, Simulator, scenario
-from tfarm.dsp.chain import Reading, chain_or_usual
 from tfarm.dsp.results import Run, enough_modes, ideal_chain
 from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, described, torque_unit
 from tfarm.dsp.simulate import RESIDUAL

@@ -47,7 +47,7 @@
     };
   }
 
-  // ---------------------------------------------------------------- the card: tfarm.case.card
+  // ---------------------------------------------------------------- the card: tfarm.assessment.card
 
   const grade = (size, [good, low]) => { const way = good > low ? 1 : -1; return way * size >= way * good ? "good" : way * size >= way * low ? "low" : "poor"; };
   const infinite = x => Number.isFinite(x) ? general(x, 4) : "no limit", decibels = factor => factor > 1e-9 && factor < 1e9 ? Math.abs(dB(factor)) : Infinity;

@@ -193,7 +193,7 @@ class SampledLoop {
     return side && off > 1e-6 ? Infinity : more;
   }
 
-  // The poles in s, each at the frequency nearest to that of the mode whose pole in z is nearest: tfarm.case.card
+  // The poles in s, each at the frequency nearest to that of the mode whose pole in z is nearest: tfarm.assessment.card
   unaliased(poles) {
     const oscillates = ([x, y]) => y > 1e-9 * Math.abs(x) || (x < 0 && y > 1e-9 * x); // a negative z at half the sampling rate
     return poles.filter(({ z }) => oscillates(z)).map(({ z, growth }) => {

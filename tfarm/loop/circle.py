@@ -49,8 +49,8 @@ from numpy.typing import NDArray
 
 from tfarm.arrays import MACHINE_EPS, Complex, Real
 from tfarm.dsp.plant import SLOW, phi
-from tfarm.dsp.sampled import Sampled, resized
 from tfarm.errors import ConvergenceError
+from tfarm.loop.sampled import Sampled, resized
 from tfarm.records import record
 from tfarm.spectrum import modes
 from tfarm.spectrum.box import TOWARD_SINGULAR, Box, winding_number

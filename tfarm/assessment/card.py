@@ -27,13 +27,14 @@ from numpy.typing import NDArray
 from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arrays import Complex
 from tfarm.digits import general
-from tfarm.dsp import Chain, Sampled
-from tfarm.dsp.crossings import CircleGrid, circle_grid
+from tfarm.dsp import Chain
 from tfarm.dsp.stages import admit, not_covered
-from tfarm.dsp.verdict import Analysis, Verdict, sampled
 from tfarm.errors import ConvergenceError
+from tfarm.loop.circle_crossings import CircleGrid, circle_grid
 from tfarm.loop.curve import LoopCurve, curve_of, gain_margin, lowest_drawn, refined
 from tfarm.loop.margins import LoopMargins, Margins, margins, margins_of_curve
+from tfarm.loop.sampled import Sampled
+from tfarm.loop.sampled_verdict import Analysis, Verdict, sampled
 from tfarm.loop.stability import SMALL_GAIN, Stability, stability
 from tfarm.records import record
 from tfarm.schema import Percent, Quantity, Table, Tabled, across, text

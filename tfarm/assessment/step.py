@@ -25,12 +25,12 @@ from typing import Annotated, Any
 import numpy as np
 
 from tfarm.arm import AT_HUB, AnyLaw, Arm, Law, as_law, tracked
+from tfarm.arm.chain import PERIOD, TIME_ROUNDING
 from tfarm.arm.checks import number
 from tfarm.arm.law import REFERENCE
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.digits import general
-from tfarm.dsp import Chain, sampled_verdict, traces
-from tfarm.dsp.chain import PERIOD, TIME_ROUNDING
+from tfarm.dsp import Chain, traces
 from tfarm.dsp.plant import sensed_plant
 from tfarm.dsp.results import ENOUGH_CHANGE, simulated
 from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, described, resting, scenario
@@ -39,6 +39,7 @@ from tfarm.dsp.stages import admit, not_covered
 from tfarm.errors import must_be_known, require
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import Poles
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import verdict_on
 from tfarm.loop.time_response import (
     ACTUATOR,

@@ -10,20 +10,20 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import PLANE, AnyLaw, Arm, HubFeedback, arm_and_law, as_law, must_be_arm, must_have_free_hub
+from tfarm.arm.chain import chain_or_usual
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
 from tfarm.crossing import Window
 from tfarm.dsp import Chain
-from tfarm.dsp.chain import chain_or_usual
-from tfarm.dsp.crossings import FACTOR, circle_grid, stable_windows
 from tfarm.dsp.plant import driven
-from tfarm.dsp.verdict import Analysis, SampledBrief, Verdict, brief_of, sampled_verdict
 from tfarm.errors import ConvergenceError, one_line, require
+from tfarm.loop.circle_crossings import FACTOR, circle_grid, stable_windows
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import Margins, dense
 from tfarm.loop.margins import margins as margins_of
 from tfarm.loop.plane import Plane, between, gain_map, plane, ranges_of
 from tfarm.loop.poles import closed_loop_poles
+from tfarm.loop.sampled_verdict import Analysis, SampledBrief, Verdict, brief_of, sampled_verdict
 from tfarm.records import record
 from tfarm.response.frequency import Bode, bode, resonant_band
 from tfarm.schema import Difference, Percent, Quantity

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
 from tfarm.arm import Arm, Theory, implausible
+from tfarm.arm.chain import PERIOD, chain_of_tables, load_chain
 from tfarm.arm.law_tables import load_law
 from tfarm.arm.reading import arm_in, load_tables
 from tfarm.arm.schema import arm_of_table
 from tfarm.dsp import Chain
-from tfarm.dsp.chain import PERIOD, chain_of_tables, load_chain
 from tfarm.errors import require
 from tfarm.schema import Percent, Quantity
 from tfarm.spectrum import modes

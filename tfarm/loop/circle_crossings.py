@@ -34,8 +34,8 @@ from tfarm.crossing import (
 )
 from tfarm.crossing.shown import PlaneOfCounts
 from tfarm.crossing.turning import loose_columns
-from tfarm.dsp.sampled import OfLoop, Sampled
 from tfarm.errors import ConvergenceError
+from tfarm.loop.sampled import OfLoop, Sampled
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import most_gain

@@ -7,13 +7,15 @@ from functools import cached_property
 from typing import Annotated, NamedTuple
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, AnyLaw, Arm, arm_and_law, as_law, cancelled
+from tfarm.arm.chain import Chain, Sampling
 from tfarm.arm.checks import whole
 from tfarm.crossing import Window
-from tfarm.dsp.chain import Chain, Sampling
-from tfarm.dsp.circle import Band, complete_band
-from tfarm.dsp.crossings import FACTOR, around, windows_of
 from tfarm.dsp.discretise import RULE, rule_in_words
-from tfarm.dsp.edges import (
+from tfarm.dsp.stages import admit, not_covered
+from tfarm.errors import ConvergenceError
+from tfarm.loop.circle import Band, complete_band
+from tfarm.loop.circle_crossings import FACTOR, around, windows_of
+from tfarm.loop.edges import (
     DelayMargin,
     Figure,
     Interval,
@@ -25,10 +27,8 @@ from tfarm.dsp.edges import (
     shown_windows,
     whole_loop,
 )
-from tfarm.dsp.modes import ModeTable, dominant, mode_table
-from tfarm.dsp.sampled import OfLoop, Sampled, resized, sampled_loop
-from tfarm.dsp.stages import admit, not_covered
-from tfarm.errors import ConvergenceError
+from tfarm.loop.sampled import OfLoop, Sampled, resized, sampled_loop
+from tfarm.loop.sampled_modes import ModeTable, dominant, mode_table
 from tfarm.records import record
 from tfarm.schema import Quantity
 
@@ -47,7 +47,7 @@ DEFAULT_PERIOD, LAWS_PERIOD = "tfarm's default period", "the controller's period
 class Verdict(OfLoop):
     """Whether a sampled loop is stable, without z = 1 of a free hub angle.
 
-    `band` is the part of the arm for which it is certified (`tfarm.dsp.circle`).  Without one, as at C = 0, the verdict
+    `band` is the part of the arm for which it is certified (`loop.circle`).  Without one, as at C = 0, the verdict
     holds for the first `modes_used` modes, those of `loop`, and high ones may grow by 1e-9 a sample.  It `is_converged`
     where that loop's count of unstable poles and largest radius are those of the loop with every mode searched.
     """

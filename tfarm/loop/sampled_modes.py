@@ -23,7 +23,7 @@ from scipy.optimize import linear_sum_assignment
 from tfarm.arm import PLANE, RATE_GAIN
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.crossing.turning import loose
-from tfarm.dsp.sampled import Sampled
+from tfarm.loop.sampled import Sampled
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes

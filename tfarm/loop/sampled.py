@@ -31,8 +31,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from tfarm.arm import FED_BACK, GAINS, AnyLaw, Arm, HubFeedback, Law, law_of
+from tfarm.arm.chain import Chain, Sampling, chain_or_usual
 from tfarm.arrays import LEAST_SIZE, MACHINE_EPS, Complex, Real, Whole
-from tfarm.dsp.chain import Chain, Sampling, chain_or_usual
 from tfarm.dsp.discretise import (
     LawInZ,
     acting_law,

@@ -10,10 +10,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, Literal
 
-from tfarm.arm import Arm, schema, to_toml
+from tfarm.arm import schema
 from tfarm.arm.checks import check_fields, extended, not_negative, number, positive, whole
 from tfarm.arm.reading import load_tables
+from tfarm.arm.records import Arm
 from tfarm.arm.schema import ArmTable, TomlTable, validated
+from tfarm.arm.writing import to_toml
 from tfarm.errors import ParameterError, must_be_known, naming, require, unknown_key
 from tfarm.schema import Quantity
 

@@ -19,13 +19,13 @@ import numpy as np
 from scipy.optimize import brentq
 
 from tfarm.arm import AnyLaw, Arm
+from tfarm.arm.chain import Chain
 from tfarm.digits import general
-from tfarm.dsp.chain import Chain
-from tfarm.dsp.circle import Band, complete_band
-from tfarm.dsp.crossings import stable_windows
 from tfarm.dsp.discretise import acting_law, with_all_gains
 from tfarm.dsp.plant import FORGOTTEN, OVERDAMPED, first_distinct, held_amplitude
-from tfarm.dsp.sampled import Sampled, resized, sampled_loop
+from tfarm.loop.circle import Band, complete_band
+from tfarm.loop.circle_crossings import stable_windows
+from tfarm.loop.sampled import Sampled, resized, sampled_loop
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes_below
