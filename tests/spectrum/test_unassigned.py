@@ -1,14 +1,12 @@
 """Damped modes of rigs that have eigenvalues of no mode: listed, named after what sets them, never refused."""
 
 import json
-import math
 import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import tfarm
 from tests.chain_elements import eigenvalues
@@ -20,7 +18,6 @@ from tfarm.cli.running import run
 from tfarm.errors import ConvergenceError
 from tfarm.loop.locus import open_poles
 from tfarm.report.response_sections import damped_tables, locked_table
-from tfarm.spectrum import damped as damped_module
 from tfarm.spectrum.damped import NOT_ASSIGNED, origins_of
 
 STIFF_FRICTION = Path("tests/data/reproductions/stiff-friction.toml")
@@ -76,27 +73,6 @@ def test_origins_are_those_of_closed_forms() -> None:
     assert origins_of(tfarm.modes(ringing, 1).system, np.array([pair])) == ["back-EMF and electrical pole"]
     mode = 1j * tfarm.modes(slow, 1).natural_frequency[-1:]
     assert origins_of(tfarm.modes(slow, 1).system, mode) == [NOT_ASSIGNED]
-
-
-def test_without_any_name_the_box_is_searched(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is followed otherwise: the same eigenvalues, those of lightly damped modes under their numbers."""
-    arm = tfarm.load("sasaki2012-lab").having(damping=1.23e-5)
-    heavy = tfarm.modes(arm.having(damping=1.23e-3), 8)
-    light, pairs = tfarm.damped_modes(tfarm.modes(arm, 4)), tfarm.damped_modes(heavy)
-
-    def lose(_: object, values: NDArray[np.float64], start: NDArray[np.complex128]) -> None:
-        raise ConvergenceError("lost", (values[0], start), False)
-
-    monkeypatch.setattr("tfarm.spectrum.naming.follow", lose)
-    found = damped_module._searched(light.undamped, math.inf, math.inf)
-    np.testing.assert_allclose(found.eigenvalues, light.eigenvalues, rtol=1e-10)
-    assert (found.unassigned, found.left_out) == ((), 0)
-    alone = damped_module._searched(heavy, math.inf, math.inf)
-    assert 0 < alone.is_assigned.sum() < len(alone.index)
-    every = np.r_[alone.eigenvalues[alone.is_assigned, 0], alone.unassigned_pairs[:, 0]]
-    inside = pairs.eigenvalues[1:].ravel()[alone.box.holds(pairs.eigenvalues[1:].ravel())]
-    assert all(abs(every / s - 1).min() < 1e-9 for s in inside[inside.imag >= 0])
-    assert alone.certify()
 
 
 @pytest.mark.parametrize("number", thinned([83, 28, 227], 3))

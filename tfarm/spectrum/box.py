@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from itertools import count, pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,30 +23,14 @@ from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 
-LONGEST_TURN = 0.6  # rad: a longer step of the phase along the contour is halved
 FORESEEN = 1.0  # so is one with a larger change of ln f at the rate of either end
 NEAREST_TO_ZERO = 1e-13  # a contour cannot be resolved closer to a zero than this share of |s|
-NARROW_BOX = 1e-8  # of a box: the least |s| of that resolution
-MOST_CONTOUR_POINTS = 200_000  # of a contour
 FIRST_POINTS = 40  # of each edge of a contour, before refinement
 MOST_CALLS = 30_000  # of the function in one search; the most that 300 random loops took is 4,100
 DEAD_ZONE = 1e-8  # of a box: nearer to s = 0 zeros of Newton's method are rejected, and a zero there forces cuts
-SAME_BOX_ZERO = 0.1  # of its size: distance within which a zero is a known one
-MOST_CUTS = 60  # cuts: then a box is 2^-30 of the first, below the resolution of float64
 REAL_SHARE = 1e-11  # of its size: a smaller imaginary part is rounding
 TRIED_HEIGHTS = (1.0, 1.0041, 1.0093, 1.0171, 1.0311, 1.0573, 1.113)  # of a box, where a zero lies on its edge
-NEWTON_STEPS = 60  # at most, of a start that has not converged
-FARTHEST_MOVE = 0.3  # of |s|: the longest step of Newton's method
-SETTLED_MOVE, LAST_MOVE = 1e-11, 1e-15  # of |s|: a start with a smaller step has converged; and ends
-SAME_POINT = 1e-9  # of its size: distance within which two starts have the same zero
-SHRINKING = 0.9  # ratio of two successive steps at a zero of order up to ten
-MOST_IDLE_STEPS = 6  # of Newton's method without a further zero, in a search
-STARTS_A_ZERO, MORE_STARTS = 2, 6  # starts of points that repel each other, for each missing zero and in addition
-MOST_STEPS_APART, NEXT_TO_ZERO = 15, 1e-6  # of these points, and their distance from a zero at the end, of its size
 SPLIT = 0.4871  # of a side, where a box is cut: off the axes, on which zeros often are
-UNEVEN = 8  # ratio of two edges on one side of 0, above which a box is cut near their geometric mean
-OF_CORNER, OF_OPPOSITE = (0.8, 0.55), (0.2, 0.45)  # weights of each corner and of its opposite: eight starts of a box
-POINT_BOX = 1e-6  # of |s|: size of a box in which one zero has the multiplicity of the count
 
 
 Function = Callable[[Complex], Analytic]
@@ -72,46 +56,49 @@ class Box(NamedTuple):
 
     @property
     def corners(self) -> Complex:
-        """The four corners, counter-clockwise, and the first again."""
+        """The four corners, counter-clockwise."""
         left, right, low, high = self
-        return np.array([left + 1j * low, right + 1j * low, right + 1j * high, left + 1j * high, left + 1j * low])
+        return np.array([left + 1j * low, right + 1j * low, right + 1j * high, left + 1j * high])
+
+    @property
+    def across(self) -> float:
+        """The length of its diagonal."""
+        return math.hypot(self.re_max - self.re_min, self.im_max - self.im_min)
 
     def halves(self) -> tuple[Box, Box]:
         """Return the box cut across its longer side, geometrically where that side spans decades."""
         left, right, low, high = self
-        if self.is_symmetric and high - low >= right - left:
-            cut = SPLIT * high
-            return Box(left, right, -cut, cut), Box(left, right, cut, high)
         if high - low >= right - left:
-            cut = _between(low, high)
-            return Box(left, right, low, cut), Box(left, right, cut, high)
+            cut = SPLIT * high if self.is_symmetric else _between(low, high)
+            return self._replace(im_min=-cut if self.is_symmetric else low, im_max=cut), self._replace(im_min=cut)
         cut = _between(left, right)
-        return Box(left, cut, low, high), Box(cut, right, low, high)
+        return self._replace(re_max=cut), self._replace(re_min=cut)
 
 
 def _between(low: float, high: float) -> float:
-    """Return the point at which a side is cut."""
-    if (low > 0 and high > UNEVEN * low) or (high < 0 and low < UNEVEN * high):
+    """Return the point at which a side is cut, near the geometric mean of two uneven edges on one side of 0."""
+    if (low > 0 and high > 8 * low) or (high < 0 and low < 8 * high):
         return math.copysign(abs(low) ** (1 - SPLIT) * abs(high) ** SPLIT, low)
     return low + SPLIT * (high - low)
 
 
 def winding_number(function: Function, box: Box, points: int = FIRST_POINTS) -> int:
-    """Return the number of zeros in the box, with multiplicity.
+    """Return the number of zeros in the box, with multiplicity, along its upper half where it is symmetric.
 
     Raises ConvergenceError where a zero is on the contour, within the resolution of float64.
     """
-    corners = box.corners
-    path = np.concatenate([np.linspace(a, b, points, endpoint=False) for a, b in pairwise(corners)])
-    across = abs(corners[2] - corners[0])
-    return round(turned(function, np.append(path, corners[-1]), across) / (2 * math.pi))
+    corners, turn = np.append(box.corners, box.corners[0]), 2 * math.pi
+    if box.is_symmetric:
+        corners, turn = np.array([box.re_max, *box.corners[2:], box.re_min]), math.pi
+    path = [np.linspace(a, b, points, endpoint=False) for a, b in pairwise(corners)]
+    return round(turned(function, np.append(path, corners[-1]), box.across) / turn)
 
 
 def turned(function: Function, path: Complex, across: float, nearest: float = NEAREST_TO_ZERO) -> float:
     """Return the change of the argument [rad] of a function along a path of points, which is refined.
 
-    Raises ConvergenceError where a zero is nearer to the path than the share `nearest` of |s|, with |s| between
-    `NARROW_BOX` and 1 times `across`.
+    A step is halved above 0.6 rad.  Raises ConvergenceError where a zero is nearer to the path than the share `nearest`
+    of |s|, with |s| between 1e-8 and 1 times `across`, and for more than 200,000 points.
     """
     phase, rate = _phase(function, path)
     start, end = np.array([path[:-1], phase[:-1], rate[:-1]]), np.array([path[1:], phase[1:], rate[1:]])
@@ -119,13 +106,13 @@ def turned(function: Function, path: Complex, across: float, nearest: float = NE
     while True:
         length, step = end[0] - start[0], np.angle(np.exp(1j * (end[1] - start[1]).real))
         foreseen = abs(length) * np.maximum(abs(start[2]), abs(end[2]))
-        smooth = (abs(step) <= LONGEST_TURN) & (foreseen <= FORESEEN)  # nan is not smooth
+        smooth = (abs(step) <= 0.6) & (foreseen <= FORESEEN)  # nan is not smooth
         angle += float(step[smooth].sum())
         start, end, length, step = start[:, ~smooth], end[:, ~smooth], length[~smooth], step[~smooth]
         if not length.size:
             return angle
-        smallest = nearest * np.clip(abs(start[0]), NARROW_BOX * across, across)
-        if seen > MOST_CONTOUR_POINTS or (abs(length) < smallest).any():
+        smallest = nearest * np.clip(abs(start[0]), 1e-8 * across, across)
+        if seen > 200_000 or (abs(length) < smallest).any():
             raise ConvergenceError(f"a zero lies on the contour near {start[0, 0]:.6g}", start[0, 0], step[0])
         halfway = (start[0] + end[0]) / 2
         middle = np.array([halfway, *_phase(function, halfway)])
@@ -146,37 +133,39 @@ def newton(
 ) -> Complex:
     """Return the zeros that Newton's method finds from the starts, each once.
 
-    A converged point continues while its steps shrink, down to rounding.  Where they are `listed` the others are left
-    out as soon as the list has the `expected` number, or has not grown for some steps.
+    A converged point continues while its steps shrink, down to rounding; at a zero of order up to ten by 0.9.  Where
+    they are `listed` the others are left out as soon as the list has the `expected` number, or has not grown for 6
+    steps.
     """
     s = np.array(starts, dtype=complex)
     settled, moving, last = np.zeros(s.size, bool), np.arange(s.size), np.full(s.size, np.inf)
     many = longest = since = 0
-    for step in range(NEWTON_STEPS):
+    for step in range(60):
         at = function(s[moving])
         with np.errstate(all="ignore"):  # a diverging start, or one at f' = 0, is dropped
             move: Complex = at.value / at.slope
         known = np.isfinite(move)
         settled[moving[~known]] = False
-        moving, move = moving[known], _shortened(move[known], s[moving[known]])
+        moving = moving[known]
+        move = _at_most(0.3 * abs(s[moving]), move[known])
         s[moving] -= move
         away, size = abs(move), abs(s[moving])
-        settled[moving] = away < SETTLED_MOVE * size
-        ended = (away <= LAST_MOVE * size) | (settled[moving] & (away > SHRINKING * last[moving]))
+        settled[moving] = away < 1e-11 * size
+        ended = (away <= 1e-15 * size) | (settled[moving] & (away > 0.9 * last[moving]))
         last[moving], moving = away, moving[~ended]
         if listed is not None and settled.sum() > many:
             many, length = settled.sum(), listed(s[settled]).size
             longest, since = (length, step) if length > longest else (longest, since)
-        if listed is not None and (longest >= expected or step - since > MOST_IDLE_STEPS):
+        if listed is not None and (longest >= expected or step - since > 6):
             moving = moving[settled[moving]]
         if not moving.size:
             break
     return distinct(s[settled & np.isfinite(s)])
 
 
-def _shortened(move: Complex, s: Complex) -> Complex:
-    """Return the steps of points s (n,), each of at most the share `FARTHEST_MOVE` of |s|."""
-    return np.asarray(move * np.minimum(1.0, FARTHEST_MOVE * abs(s) / np.maximum(abs(move), LEAST_SIZE)))
+def _at_most(length: Any, move: Complex) -> Any:
+    """Return the steps (n,), each shortened to a length."""
+    return move * np.minimum(1.0, length / np.maximum(abs(move), LEAST_SIZE))
 
 
 def repelled(function: Function, starts: Complex, zeros: Complex, box: Box, missing: int) -> Complex:
@@ -187,19 +176,20 @@ def repelled(function: Function, starts: Complex, zeros: Complex, box: Box, miss
     is large everywhere, as it grows.  Of the starts those with the shortest first step are used, each beyond the steps
     of the others.
     """
-    farthest = 0.1 * abs(box.corners[2] - box.corners[0])  # step, as points near 0 may have to go far
+    # as points near 0 may have to go far
+    farthest = 0.1 * box.across
     points, step, away = _apart(function, starts, zeros, starts[:0], farthest)
     chosen: list[complex] = []
-    while points.size and len(chosen) < STARTS_A_ZERO * missing + MORE_STARTS:
+    while points.size and len(chosen) < 2 * missing + 6:
         n = np.argmin(away)
         chosen.append(complex(points[n] - step[n]))
         is_far = abs(points - points[n]) > away[n]
         points, step, away = points[is_far], step[is_far], away[is_far]
     points, is_next = np.array(chosen, complex), np.zeros(len(chosen), bool)
-    for _ in range(MOST_STEPS_APART):
+    for _ in range(15):
         points, step, away = _apart(function, points, zeros, points, farthest)
         points = points - step
-        is_next = box.holds(points) & (away < NEXT_TO_ZERO * abs(points))
+        is_next = box.holds(points) & (away < 1e-6 * abs(points))
         if is_next.sum() >= missing:
             break
     return points[is_next]
@@ -220,16 +210,16 @@ def _apart(
         away = abs(1 / alone)
     known = np.isfinite(step)
     s, step, away = s[known], step[known], away[known]
-    return s, step * np.minimum(1.0, farthest / np.maximum(abs(step), LEAST_SIZE)), away
+    return s, _at_most(farthest, step), away
 
 
 def distinct(points: Complex) -> Complex:
-    """Return the points without those next to an earlier one; each is compared with those of nearly its size."""
+    """Return the points without those within 1e-9 of an earlier one; each is compared with those of nearly its size."""
     order = np.argsort(abs(points))
     ranked, again = points[order], np.zeros(points.size, bool)
     for n in range(1, points.size):
         larger, smaller = ranked[n:], ranked[:-n]
-        near = SAME_POINT * abs(larger)
+        near = 1e-9 * abs(larger)
         if not (abs(larger) - abs(smaller) <= near).any():
             break
         again[np.maximum(order[n:], order[:-n])[abs(larger - smaller) <= near]] = True
@@ -280,7 +270,7 @@ def complete(
 
 def _search(function: Function, box: Box, starts: Complex, known: Complex, found: Complex, depth: int) -> Complex:
     """Return all zeros in the box, by halves where some are missing; `found` are zeros of a larger box."""
-    expected, mirrored = _count(function, box), box.is_symmetric
+    expected, mirrored = winding_number(function, box), box.is_symmetric
     if not expected:
         return NOTHING_KNOWN
     width = max(box.re_max - box.re_min, box.im_max - box.im_min)
@@ -288,12 +278,13 @@ def _search(function: Function, box: Box, starts: Complex, known: Complex, found
     def listed(points: Complex) -> Complex:
         points = distinct(np.r_[points, points.conj()] if mirrored else points)
         points = points[box.holds(points) & (abs(points) > DEAD_ZONE * width)]  # deflation at s = 0 leaves noise there
-        again = (abs(points[:, None] - known) < SAME_BOX_ZERO * abs(known)).any(axis=1)
+        again = (abs(points[:, None] - known) < 0.1 * abs(known)).any(axis=1)
         return np.concatenate([known[box.holds(known)], points[~again]])
 
     inside = listed(found)
     if inside.size != expected:
-        grid = np.outer(box.corners[:4], OF_CORNER) + np.outer(box.corners[[2, 3, 0, 1]], OF_OPPOSITE)
+        # between each corner and its opposite
+        grid = np.outer(box.corners, (0.8, 0.55)) + np.outer(np.roll(box.corners, 2), (0.2, 0.45))
         starts_here = np.concatenate([starts[box.holds(starts)], grid.ravel()])
         starts_here = starts_here[starts_here.imag >= 0] if mirrored else starts_here
         if not depth or inside.size > expected:  # at first, and where rounding makes several points of one zero
@@ -309,9 +300,11 @@ def _search(function: Function, box: Box, starts: Complex, known: Complex, found
             inside = listed(found)
     if inside.size == expected:
         return inside
-    if inside.size == 1 and width < POINT_BOX * abs(inside[0]):
+    # one zero with the multiplicity of the count
+    if inside.size == 1 and width < 1e-6 * abs(inside[0]):
         return np.repeat(inside, expected)
-    if depth > MOST_CUTS:
+    # a box of 2^-30 of the first is below the resolution of float64
+    if depth > 60:
         where = f"{box.re_min:.3g} < Re s < {box.re_max:.3g}, {box.im_min:.3g} < Im s < {box.im_max:.3g}"
         raise ConvergenceError(f"only {inside.size} of {expected} zeros with {where} are separable", inside, expected)
     first, second = box.halves()
@@ -321,29 +314,15 @@ def _search(function: Function, box: Box, starts: Complex, known: Complex, found
     return np.concatenate(parts)
 
 
-def _count(function: Function, box: Box) -> int:
-    """Return the number of zeros in the box, along its upper half where it is symmetric."""
-    if not box.is_symmetric:
-        return winding_number(function, box)
-    left, right, _, high = box
-    side, top = np.linspace(0, high, FIRST_POINTS // 2, endpoint=False), np.linspace(right, left, FIRST_POINTS)
-    path = np.r_[right + 1j * side, top + 1j * high, left + 1j * side[::-1]]
-    return round(turned(function, path, abs(right - left + 2j * high)) / math.pi)
-
-
 TOWARD_SINGULAR = 0.8  # of -1/C, where real eigenvalues accumulate: the farthest left edge of a box
-LEFT_EDGES = (TOWARD_SINGULAR, 0.77, 0.74, 0.7)  # likewise: tried in turn, as a zero may be on the edge
 HEIGHTS_LEFT = 1.5  # width of a box left of the axis, in heights: zeros beyond are highly damped
 RIGHT_OF_AXIS = 0.1  # width of a box right of the axis, in heights: its edge is clear of zeros on the axis
 ABOVE_LAST = 1.05  # times the last known zero: a box may end half-way to that
-SAME_ZERO = 1e-7  # of its size: distance of one zero in two searches, next to another zero
-POINTS_A_ZERO = 8  # first points of a contour for each expected zero: time alone
 
 
 def is_among(zeros: Complex, others: Complex) -> NDArray[np.bool_]:
-    """Return which of the zeros are among the others, of another search."""
-    away = abs(zeros[..., None] - others)
-    return np.asarray((away < SAME_ZERO * abs(zeros)[..., None]).any(axis=-1))
+    """Return which of the zeros are among the others, of another search, to 1e-7 of their size."""
+    return np.asarray((abs(zeros[..., None] - others) < 1e-7 * abs(zeros)[..., None]).any(axis=-1))
 
 
 def complete_box(f: Function, listed: Complex, others: Complex, C: float) -> Box | None:
@@ -359,7 +338,8 @@ def complete_box(f: Function, listed: Complex, others: Complex, C: float) -> Box
         box = _box(float(heights[middle]), known, C)
         inside = int(box.holds(listed.ravel()).sum())
         try:
-            there = winding_number(f, box, points=FIRST_POINTS + POINTS_A_ZERO * inside)
+            # time alone
+            there = winding_number(f, box, points=FIRST_POINTS + 8 * inside)
         except ConvergenceError:
             return None
         if there < inside:
@@ -394,23 +374,18 @@ def is_right(zeros: Complex, C: float) -> NDArray[np.bool_]:
 
 def _heights(listed: Complex, others: Complex, C: float) -> Real:
     """Return heights between the zeros right of -1/C, ascending, below the first one that is not listed."""
-    known, mine = np.concatenate([listed, others])[:, 0], np.arange(len(listed) + len(others)) < len(listed)
-    right = is_right(known, C)
-    imag, mine = known.imag[right], mine[right]
-    order = np.argsort(imag)
-    imag, mine = imag[order], mine[order]
-    stop = int(np.argmin(mine)) if not mine.all() else mine.size
+    mine, theirs = (each.imag[is_right(each, C)] for each in (listed[:, 0], others[:, 0]))
+    imag = np.sort(np.r_[mine, theirs])
     tops = np.r_[imag, imag[-1] * ABOVE_LAST if imag.size else 1.0 / C]
-    bottoms = np.r_[0.0, imag]
-    heights = (0.5 * (bottoms + tops))[: stop + 1]
-    return heights[heights > 0]
+    heights = 0.5 * (np.r_[0.0, imag] + tops)
+    return heights[(heights > 0) & (heights < theirs.min(initial=np.inf))]
 
 
 def _box(height: float, known: Complex, C: float) -> Box:
     """Return a box of that height, its left edge right of -1/C and far from known zeros."""
     reach = HEIGHTS_LEFT * height
     if C and reach > TOWARD_SINGULAR / C:
-        edges = -np.array(LEFT_EDGES) / C
-        room = [abs(known.real[abs(known.imag) < height] - edge).min(initial=np.inf) for edge in edges]
-        reach = -float(edges[int(np.argmax(room))])
+        reaches = np.array([TOWARD_SINGULAR, 0.77, 0.74, 0.7]) / C
+        room = abs(known.real[abs(known.imag) < height] + reaches[:, None]).min(axis=1, initial=np.inf)
+        reach = float(reaches[np.argmax(room)])
     return Box(-reach, RIGHT_OF_AXIS * height, -height, height)

@@ -24,15 +24,8 @@ NEWTON_STEPS = 8  # from a close guess: others are followed in shorter steps
 SETTLED = 1e-10  # of its size: the largest last step of a converged zero
 LOST = complex(np.nan, np.nan)
 PAST = 4  # values of the predicting polynomials
-MOST_AHEAD = 64  # values predicted at once, at most: memory and time alone
-MOST_DISTANCES = 4_000_000  # between roots at these values: memory alone
 FIRST_STEP = 1e-4  # of the first step: the distance of the value that determines the first slopes
 PLAIN_MOVE = 0.1  # of the distance to the next root: largest distance from the prediction
-PLAIN_IN_COUPLE = 0.2  # the same, for two roots that meet or separate
-ENDS_BEFORE = 0.05  # of its size: distance of a singular point at which a real root right of it ends
-JUMP = 0.5  # of its size: a root found no nearer with the shortest step is lost
-SAME_ROOT = 1e-9  # of its size: distance of two copies of one root
-TURNED = 0.5  # cosine below which the two of a couple have met between two values
 
 
 def settled(function: Callable[..., Analytic], guess: Complex, *values: Real) -> Complex:
@@ -91,7 +84,9 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
     rows[0], past, span = start, [(float(values[0]), start)], abs(values[-1] - values[0])
     ahead = [(float(value), n) for n, value in enumerate(values)][:0:-1]
     ahead.append((past[0][0] + FIRST_STEP * (ahead[-1][0] - past[0][0]), 0))
-    many, halvings, most = 1, 0, max(1, min(MOST_AHEAD, MOST_DISTANCES // start.size**2))
+    many, halvings = 1, 0
+    # of values predicted at once: 64, with 4 million distances between roots
+    most = max(1, min(64, 4_000_000 // start.size**2))
     while ahead:
         block, (before, last) = ahead[-many:][::-1], past[-1]
         at = np.array([value for value, _ in block])
@@ -110,7 +105,8 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
                     raise ConvergenceError(f"branches are not separable beyond {before:.10g}", past[-1], stray)
             elif not good:
                 near, good = assigned(family, float(at[0]), guess[0]), 1
-                found = np.where((abs(near - last) > JUMP * abs(last)) & (last != 0), np.nan, near)[None]
+                # no root jumps by half its size
+                found = np.where((abs(near - last) > 0.5 * abs(last)) & (last != 0), np.nan, near)[None]
         many = min(2 * many, most) if good == len(block) else max(1, good)
         del ahead[len(ahead) - good :]
         for (value, n), row in zip(block[:good], found[:good], strict=True):
@@ -127,20 +123,14 @@ def are_alone(
 
     Raises ConvergenceError as `follow` where one of them is lost.
     """
-    stray = with_partners(stray, last)
+    partner = couples(last)
+    stray = stray | (last[:, None] == last[stray].conj()).any(axis=1)
+    stray[partner[stray & (partner >= 0)]] = True
     try:
         found[stray] = follow(family, np.array([before, value]), last[stray])[1]
     except ConvergenceError as lost:
         raise ConvergenceError(str(lost), (before, last), stray) from None
-    return not (nearest(found)[1] <= SAME_ROOT * abs(found)).any()
-
-
-def with_partners(stray: NDArray[np.bool_], last: Complex) -> NDArray[np.bool_]:
-    """Return these roots and the partners of each in a couple or conjugate pair."""
-    both, partner = stray.copy(), couples(last)
-    both[partner[stray & (partner >= 0)]] = True
-    mirrored = (last[:, None] == last[stray].conj()).any(axis=1)
-    return both | mirrored
+    return not (nearest(found)[1] <= 1e-9 * abs(found)).any()
 
 
 def between(family: Family, values: Real, rows: Complex, wanted: Real) -> Complex:
@@ -163,10 +153,11 @@ def between(family: Family, values: Real, rows: Complex, wanted: Real) -> Comple
 
 
 def is_over(family: Family, value: float, row: Complex) -> NDArray[np.bool_]:
-    """Return which of the roots (b,) are at a singular point, right of it."""
+    """Return which of the roots (b,) are at a singular point, right of it by less than 5 % of its size."""
     points = family.singular(np.array([value]))[0]
-    away = row.real[:, None] - points
-    return np.asarray((row.imag == 0) & ((away > 0) & (away < ENDS_BEFORE * abs(points))).any(axis=1))
+    share = (row.real[:, None] - points) / abs(points)
+    is_near: NDArray[np.bool_] = (share > 0) & (share < 0.05)
+    return (row.imag == 0) & is_near.any(axis=1)
 
 
 def assigned(family: Family, value: float, guess: Complex) -> Complex:
@@ -250,7 +241,8 @@ def _of_couple(weights: Any, first: Any, second: Any, base: Any, other: Any) -> 
         square += weights[k] * (half * half)
     root = np.sqrt(square)
     way = (root * apart.conjugate()).real
-    if abs(way) < TURNED * abs(root) * abs(apart):  # they have met: the first is the upper one, or the larger real one
+    # they have met: the first is the upper one, or the larger real one
+    if abs(way) < 0.5 * abs(root) * abs(apart):
         way = (root.real + root.imag) * (apart.real + apart.imag)
     middle = _of_one(weights, first, second, (base + other) / 2.0)
     return (middle - root, middle + root) if way < 0.0 else (middle + root, middle - root)
@@ -292,7 +284,8 @@ def which_plain(guess: Any, found: Any, base: Any, singular: Any, blur: float) -
             if alone[i]:
                 room = min(room, 2.0 * min(abs(here.imag), abs(base[i].imag)))
             same_side = np.sign(here.imag) == np.sign(guess[m, i].imag)
-            near = same_side and moved <= (PLAIN_IN_COUPLE if is_couple else PLAIN_MOVE) * away[i]
+            # of a couple the roots meet or separate
+            near = same_side and moved <= (2.0 * PLAIN_MOVE if is_couple else PLAIN_MOVE) * away[i]
             is_plain[m, i] |= moved <= blur or (
                 (near or guess[m, i] == 0.0 or here == 0.0) and moved <= PLAIN_MOVE * room
             )

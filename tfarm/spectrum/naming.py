@@ -6,7 +6,7 @@ meets the fast zero of the overdamped mode, and the two oscillate again, in shea
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,19 +17,15 @@ from tfarm.exact.characteristic import DIFFERENCE_STEP, has_slope, quick_charact
 from tfarm.exact.compiled import compiled
 from tfarm.exact.layout import Reading, readings
 from tfarm.exact.sweep import AXIS, fill_free
-from tfarm.exact.system import Spring, System
+from tfarm.exact.system import Segment, System
 from tfarm.records import read_only
 
 from .box import REAL_SHARE, Function, newton
-from .following import LOST, NEWTON_STEPS, SETTLED, follow, settled
+from .following import LOST, NEWTON_STEPS, SETTLED, follow
 from .table import Modes, modes
 
-FIRST_SHARE = 1e-3  # of all damping, at most: there an eigenvalue is close to its undamped value
-DECADES = 3  # of the share at a time, which scale the shortest step
 HALVINGS = (250, *[80] * 8)  # of steps, after which stray branches are lost and the others followed
-LATE_HALVINGS = 8  # after the steps that there are in all: roots that are stray are soon lost
 AROUND = np.array([1, 1.02, 0.98, 1 + 0.02j, 1 - 0.02j, 1.2, 0.8, 1 + 0.2j, 1 - 0.2j])  # starts next to a guess, of it
-NEAR_REAL = 1e-7  # of its size: the imaginary part of a double zero is rounding
 NO_OUTPUT = np.empty((0, len(Reading._fields)))  # the table of a layout
 
 
@@ -108,7 +104,8 @@ class Damping:
         """Return the roots next to the guesses (see `Family`)."""
         self.steps_left -= 1
         if self.steps_left < 0:
-            self.most_halvings = min(self.most_halvings, LATE_HALVINGS)
+            # after the steps that there are in all roots that are stray are soon lost
+            self.most_halvings = min(self.most_halvings, 8)
         units = (values * self.level)[:, None]
         found, (rows, of_rows), (ends, of_ends) = guess / units, self.rows, self.ends
         rows = read_only(rows + values[:, None, None] * of_rows)  # as those of a layout are
@@ -123,7 +120,8 @@ class Damping:
         starts = np.outer(wanted[wanted.imag >= 0] / unit, AROUND).ravel()
         with np.errstate(all="ignore"):
             found = newton(function_of(self.k.with_damping(value)), starts) * unit
-        found = np.where(abs(found.imag) < NEAR_REAL * abs(found), found.real, found)
+        # the imaginary part of a double zero is rounding
+        found = np.where(abs(found.imag) < 1e-7 * abs(found), found.real, found)
         upper, lower = found[found.imag > 0], wanted[wanted.imag < 0].conj()
         away = abs(upper[:, None] - lower).min(axis=1, initial=np.inf)
         return np.r_[found[found.imag >= 0], upper[away < abs(AROUND[-1] - 1) * abs(upper)].conj()]
@@ -141,12 +139,6 @@ def single_zeros(undamped: Modes, share: float = 1.0) -> list[float]:
     return turning + ([-1.0 / float(k.drive.lag)] if k.drive.lag else [])
 
 
-def has_other_damping(k: System) -> bool:
-    """Whether a part other than a segment dissipates."""
-    dashpots = any(each.damping for each in k.elements if isinstance(each, Spring))
-    return bool(dashpots or k.drive.friction or k.drive.back_emf)
-
-
 def named(undamped: Modes, count: int, steps: float) -> tuple[Complex, Complex]:
     """Return the eigenvalues of `single_zeros` (m,) and of the first `count` flexible modes (count, 2), NaN if lost.
 
@@ -154,18 +146,20 @@ def named(undamped: Modes, count: int, steps: float) -> tuple[Complex, Complex]:
     not plain are lost.
     """
     k = undamped.system
-    omega = modes(undamped.arm, count, theory=undamped.theory).natural_frequency[-count:]
+    omega = modes(undamped.arm, count, theory=undamped.theory).flexible
     alone = single_zeros(undamped)
     if k.is_undamped:
         return np.array(alone, complex), 1j * np.outer(omega, [1, -1])
     family = Damping(k, k.damping or 1.0, HALVINGS[0], steps)
-    sizes = [omega[-1] * k.damping, *(abs(each) / omega[0] for each in alone), *[1.0] * has_other_damping(k)]
-    share = min(1.0, FIRST_SHARE / max(sizes))
-    unit = share * family.level
-    (upper,) = family.near(np.array([share]), unit * np.r_[single_zeros(undamped, share), 1j * omega][None])
-    pairs = np.stack([upper[len(alone) :], upper[len(alone) :].conj()], axis=1)
-    start = np.r_[upper[: len(alone)], pairs.ravel()]
-    ends = np.geomspace(share, 1.0, 1 + math.ceil(-math.log10(share) / DECADES))[1:].tolist()
+    is_elastic = replace(k, elements=tuple(each for each in k.elements if not isinstance(each, Segment))).is_undamped
+    sizes = [omega[-1] * k.damping, *(abs(each) / omega[0] for each in alone), 0.0 if is_elastic else 1.0]
+    # so small that an eigenvalue is close to its undamped value
+    share = min(1.0, 1e-3 / max(sizes))
+    guess = share * family.level * np.r_[single_zeros(undamped, share), 1j * omega]
+    single, upper = np.split(family.near(np.array([share]), guess[None])[0], [len(alone)])
+    start = np.r_[single, np.stack([upper, upper.conj()], axis=1).ravel()]
+    # three decades at a time, which scale the shortest step
+    ends = np.geomspace(share, 1.0, 1 + math.ceil(-math.log10(share) / 3))[1:].tolist()
     for family.most_halvings in HALVINGS:
         try:
             while ends:
@@ -175,7 +169,7 @@ def named(undamped: Modes, count: int, steps: float) -> tuple[Complex, Complex]:
         except ConvergenceError as lost:
             (share, start), stray = lost.best, lost.residual
             start = np.where(stray, LOST, start)
-    found = np.full(start.size, LOST) if ends else settled(function_of(k), start / family.level)
+    found = family.near(np.ones(1), start[None])[0] / family.level if not ends else np.full(start.size, LOST)
     with np.errstate(invalid="ignore"):  # of lost ones
         found[~has_slope(k, found)] = LOST  # so far out that Newton's method converges anywhere
     again = np.triu(abs(found[:, None] - found) <= REAL_SHARE * abs(found), 1).any(axis=0)
@@ -201,6 +195,6 @@ def in_pairs(single: Complex, pairs: Complex) -> tuple[Complex, Complex]:
                 pairs[[min(n, m), max(n, m)]] = pairs[[m, n]]
             elif alone.any():
                 single[alone] = rest
-    upper, slower = pairs.imag > 0, abs(pairs[:, 0]) <= abs(pairs[:, 1])
-    first = np.where(upper.any(axis=1), upper[:, 0], slower | np.isnan(pairs[:, 1]))
+    slower = ~(abs(pairs[:, 0]) > abs(pairs[:, 1])) & ~np.isnan(pairs[:, 0])
+    first = np.where((pairs.imag > 0).any(axis=1), pairs[:, 0].imag > 0, slower)
     return single, np.where(first[:, None], pairs, pairs[:, ::-1])

@@ -13,7 +13,19 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import GAINS, THEORIES, Arm, HubFeedback, Theory, input_words, load, must_be_arm, written_unit
+from tfarm.arm import (
+    GAINS,
+    THEORIES,
+    Arm,
+    Hub,
+    HubFeedback,
+    Payload,
+    Section,
+    Theory,
+    input_words,
+    must_be_arm,
+    written_unit,
+)
 from tfarm.arm.checks import on_the_arm, whole
 from tfarm.arrays import Real, Whole
 from tfarm.digits import DOUBLE_DIGITS, general, singly
@@ -35,13 +47,7 @@ from .frequencies import ARMS_KEPT, count_below, natural_frequencies, refine
 from .proofs import Certificate, certify
 from .shapes import Shapes, sensitivities
 
-BEYOND_DOUBLE = 20  # digits of a bracket: 1e-4 of a float64's rounding
 MOST_TABLE_MODES = 10_000  # of one table
-FEWEST_LISTED = 12  # digits of a frequency as text
-NODE_POINTS, HALF_WAVES_BEYOND = 24, 3  # grid points for each half wave, of 3 more half waves than the mode has
-NEAREST_NODE, FIRST_EVEN, END_POINTS = 1e-9, 0.9, 40  # geometric points from an end to the first even one
-NO_DEFLECTION = 1e-13  # of the largest field of a mode: less is rounding
-NODE_STEPS = 6  # of Newton's method from a secant of that grid: from two digits to more than 64 bits
 
 
 @dataclass(frozen=True)
@@ -63,10 +69,9 @@ class Modes(Tabled):
     @property
     def finding(self) -> str:
         """The number of flexible modes and their range of frequencies, in words."""
-        flexible = self.natural_frequency[self._rigid :]
-        if not flexible.size:
+        if not self.flexible.size:
             return "no flexible mode"
-        return f"{flexible.size} flexible, {flexible[0]:.6g} to {flexible[-1]:.6g} rad/s"
+        return f"{self.flexible.size} flexible, {self.flexible[0]:.6g} to {self.flexible[-1]:.6g} rad/s"
 
     @property
     def table(self) -> Table:
@@ -84,6 +89,11 @@ class Modes(Tabled):
         return system_of(self.arm, self.theory)
 
     @property
+    def flexible(self) -> Real:
+        """Natural frequencies [rad/s] of the flexible modes."""
+        return self.natural_frequency[self._rigid :]
+
+    @property
     def natural_frequency_hz(self) -> Real:
         """Natural frequencies [Hz]."""
         return self.natural_frequency / (2 * math.pi)
@@ -96,8 +106,8 @@ class Modes(Tabled):
         """
         from tfarm.exact.appendix import roots_near  # here: mpmath takes a while to load
 
-        digits = max(digits, FEWEST_LISTED)
-        flexible = [refine(self._k, float(omega), digits) for omega in self.natural_frequency[self._rigid :]]
+        digits = max(digits, 12)
+        flexible = [refine(self._k, omega, digits) for omega in self.flexible.tolist()]
         for text in flexible if self.theory == "timoshenko" and self.arm.is_uniform else ():
             if not roots_near(self.arm, text, digits - 1):
                 raise ConvergenceError(f"Delta(s) of the appendix has no root at {text}i rad/s", text, digits)
@@ -113,13 +123,14 @@ class Modes(Tabled):
         if known_method(method) == "closed-form":
             return self.natural_frequency
         if method == "balls":
-            brackets = self.certify(BEYOND_DOUBLE).brackets
+            # 1e-4 of a float64's rounding
+            brackets = self.certify(20).brackets
             flexible = [float((Fraction(lower) + Fraction(upper)) / 2) for lower, upper in brackets]
         else:
             from tfarm.exact.appendix import natural_frequency  # here: mpmath takes a while to load
 
             must_be_of_appendix(self.arm, self.theory)
-            starts = self.natural_frequency[self._rigid :].tolist()
+            starts = self.flexible.tolist()
             flexible = [float(natural_frequency(self.arm, omega, APPENDIX_DIGITS)) for omega in starts]
         return np.r_[[0.0] * self._rigid, flexible]
 
@@ -137,7 +148,7 @@ class Modes(Tabled):
         """
         beyond = len(self) + 1
         above = float(natural_frequencies(self._k, beyond, beyond)[0])
-        return certify(self._k, self.natural_frequency[self._rigid :], above, digits, int(self._rigid))
+        return certify(self._k, self.flexible, above, digits, int(self._rigid))
 
     def __len__(self) -> int:
         return self.index.size
@@ -212,7 +223,7 @@ class Modes(Tabled):
 
     @cached_property
     def _shapes(self) -> Shapes:
-        return Shapes(self._k, self.natural_frequency[self._rigid :])
+        return Shapes(self._k, self.flexible)
 
     def _field(self, which: int, x: NDArray[np.float64] | float) -> Real:
         share = on_the_arm("x", x, float(self._k.length)) / float(self._k.length)
@@ -229,16 +240,19 @@ class Modes(Tabled):
 
         They are bracketed on a fine grid and refined by Newton's method, W' = Psi + sigma Q.
         """
-        even = NODE_POINTS * (last - 1 + HALF_WAVES_BEYOND)
-        ends = np.geomspace(NEAREST_NODE, FIRST_EVEN / even, END_POINTS)  # a heavy hub has a node close to it
+        # 24 points for each half wave, of two more half waves than the mode has
+        even = 24 * (last + 2)
+        # a heavy hub has a node close to it
+        ends = np.geomspace(1e-9, 0.9 / even, 40)
         grid = np.r_[ends, np.linspace(0.0, 1.0, even)[1:-1], 1.0 - ends[::-1]]
         W, Psi, *_ = shapes(grid)
-        least = NO_DEFLECTION * abs(np.hstack([W, Psi])).max(axis=1, keepdims=True)
-        W = np.where(abs(W) < least, 0.0, W)  # a cut-off mode has W = 0 throughout
+        # a cut-off mode has W = 0 throughout, to rounding
+        W[abs(W) < 1e-13 * abs(np.hstack([W, Psi])).max(axis=1, keepdims=True)] = 0.0
         mode, start = np.nonzero(W[:, :-1] * W[:, 1:] < 0)
         low, high = grid[start], grid[start + 1]
         before, x = low, low + (high - low) * W[mode, start] / (W[mode, start] - W[mode, start + 1])
-        for _ in range(NODE_STEPS):
+        # from two digits to more than 64 bits
+        for _ in range(6):
             if (abs(x - before) <= np.spacing(1.0)).all():
                 break
             at, slope, _, Q = shapes.at(mode, x)
@@ -304,15 +318,17 @@ def flexible_frequencies(arm: Arm, up_to: float) -> Real:
     """Return the flexible natural frequencies [rad/s] of the undamped arm below `up_to`."""
     if modes_below(arm, up_to) == 0:
         return np.empty(0)
-    table = modes(arm, up_to=up_to)
-    return table.natural_frequency[table.index > 0]
+    return modes(arm, up_to=up_to).flexible
 
 
 PAPER_GAINS = HubFeedback(K1=0.3, K2=0.3)  # of the paper's arms
 RATE_SHARE = 6.42e-3  # of J w1: K1 = 0.3 N m s/rad on the preset sasaki2012
 MOST_UNITS = 1e9  # of J w1, 1 and J w1^2: practically infinite, far from overflow
 DEFAULT_DIGITS = 3  # of a default K1
-OF_THE_PAPER = ("sasaki2012", "sasaki2012-lab", "sasaki2012-as-printed")  # presets
+# Section, hub and payload of the paper's arms, with density [kg/m^3] and C [s] as in their presets.
+PAPER_SECTION = Section.general(area=6e-4, second_moment=1.8e-9, shear_factor=5 / 6)
+PAPER_ENDS = Hub(inertia=0.1), Payload()
+PAPER_MATERIALS = ((2766.7, 0.0), (2766.7, 1e-4), (2.7667, 0.0))
 
 
 @lru_cache(maxsize=ARMS_KEPT)  # each loop of a search checks its gains
@@ -394,8 +410,9 @@ def first_frequency(arm: Arm) -> float:
     return float(modes(arm.elastic, 1).natural_frequency[-1])
 
 
-@lru_cache(maxsize=ARMS_KEPT)
 def _is_of_the_paper(arm: Arm) -> bool:
     """Whether link, hub and payload are those of one of the paper's presets."""
-    papers = (load(name) for name in OF_THE_PAPER)
-    return any((arm.link, arm.hub, arm.payload) == (each.link, each.hub, each.payload) for each in papers)
+    link = arm.link
+    is_material = (link.density, link.damping) in PAPER_MATERIALS
+    is_link = (link.length, link.youngs_modulus, link.shear_modulus) == (1.0, 6.8944e10, 2.6517e10)
+    return is_material and is_link and (link.section, arm.hub, arm.payload) == (PAPER_SECTION, *PAPER_ENDS)
