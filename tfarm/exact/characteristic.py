@@ -46,7 +46,6 @@ FED = tuple(OUTPUTS[gain.output] for gain in GAINS)
 assert all(each.place != "x" for each in FED)  # a gain is on an output with a place of its own
 NEXT_TO_REST = 1e-60  # 1/s, for s = 0: there D over a power of s is at its limit, and no power is 0
 DIFFERENCE_STEP = 1e-6  # of |s|, or of the way to -1/C, for differences
-LONGEST_DIFFERENCE = 1.0  # of ln abs(D) between two of these points: beyond, a difference is no slope
 
 
 class Analytic(NamedTuple):
@@ -99,7 +98,8 @@ def quick_characteristics(k: System, s: Complex, at_zero: int = 0) -> Analytic:
 def has_slope(k: System, s: Complex) -> NDArray[np.bool_]:
     """Return where D grows by less than a factor of e over the difference of a slope."""
     growth = loop_parts(k, np.array([s, s + difference_steps(k, s)])).scale.real
-    return np.asarray(abs(growth[1] - growth[0]) < LONGEST_DIFFERENCE)
+    # where ln abs(D) changes by more than 1 between two of these points a difference is no slope
+    return np.asarray(abs(growth[1] - growth[0]) < 1.0)
 
 
 def float_units(k: System) -> Real:
@@ -125,9 +125,6 @@ Polynomial = Any  # flint.fmpq_poly, which comes without types
 Series = Any  # flint.acb_series, which comes without types
 
 LONG_WAVE = 0.3  # |z| below which a wave is not separated from the others
-TAYLOR_TERMS = 4  # of D over a piece of a contour, the last one over the wide ball
-SLOW_WAVES = 6.0  # |z1| + |z2| below which power series are used
-WIDE_TERMS = 40  # of them at least: up to twice that argument the tail is below 1e-60; two more for each wave
 
 
 class InseparableError(Exception):
@@ -145,7 +142,8 @@ class WideSweep(Sweep):
         if not isinstance(element, Segment):
             return super()._inside(element, p)
         _, z_sum, z_product = self._sums(element)
-        if abs(z_sum[0]).mid() + 2 * abs(z_product[0]).mid().sqrt() < SLOW_WAVES:
+        # 6.0: |z1| + |z2| below which power series are used
+        if abs(z_sum[0]).mid() + 2 * abs(z_product[0]).mid().sqrt() < 6.0:
             return super()._inside(element, p)
         S, d = self.S, self.s * element.damping + 1
         pair = _waves(*element[:3], S, d, self._shortest)
@@ -172,7 +170,8 @@ class WideSweep(Sweep):
         |z1 z2|^(1/2).  The omitted terms below sum to less than twice the first of them.
         """
         q = _size(z_sum) + _size(z_product).sqrt()
-        count = WIDE_TERMS + 2 * math.isqrt(int(float(q)))
+        # 40 of them at least: up to twice that argument the tail is below 1e-60; two more for each wave
+        count = 40 + 2 * math.isqrt(int(float(q)))
         tail = (count + 1) * q**count * rational(Fraction(2, math.factorial(2 * count)))
         if not q < count**2:  # each term is less than half of the one before
             raise InseparableError
@@ -203,7 +202,8 @@ def characteristic_ball(k: System, s: Ball, law: Feedback | None = None) -> Ball
 
 def characteristic_over(k: System, s: Ball, law: Feedback | None = None) -> Ball:
     """Return D enclosed over the wide ball s, up to a positive factor that depends on its middle alone."""
-    middle, last = s.mid(), 0 if s.real.is_exact() and s.imag.is_exact() else TAYLOR_TERMS - 1
+    # the power of the last Taylor term, the one over the wide ball
+    middle, last = s.mid(), 0 if s.real.is_exact() and s.imag.is_exact() else 3
     try:
         here, scale = _by_waves(k, middle, law, None, LONG_WAVE, max(last, 1))
         value = _by_waves(k, s, law, scale, LONG_WAVE, last + 1)[0][last] if last else here[0]

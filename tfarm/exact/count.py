@@ -13,19 +13,15 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tfarm.arrays import Real
 from tfarm.records import read_only
 
 from .compiled import compiled, inlined
 from .layout import (
-    BENDING,
-    CHAIN_A,
-    CHAIN_G,
-    LENGTH,
     OF_ANGLE,
     OF_MOMENT,
-    ROW_KIND,
     SEGMENT,
     SPRING,
     Layout,
@@ -51,7 +47,7 @@ DOUBLINGS = 40  # of the estimate of a slender beam, a factor of 1e12: the end o
 FREE_MOTIONS = 12  # in the vector of ends: the number of free motions of the tip
 
 
-def rows_to_count(layout: Layout) -> tuple[Real, Real]:
+def rows_to_count(layout: Layout) -> tuple[NDArray[np.void], Real]:
     """Return rows and ends of a layout without damping, for `chain_count`, both read-only as those of a layout."""
     chain = layout.chain
     free = sum(not isinstance(end, float) for end in (chain.tip_mass, chain.tip_inertia))
@@ -72,12 +68,12 @@ def chain_count(omega: float, rows: Any, ends: Any) -> int:
     number, free = 0, int(ends[FREE_MOTIONS])
     for i in range(len(rows)):
         row = rows[i]
-        if row[ROW_KIND] == SEGMENT:
+        if row.kind == SEGMENT:
             number, p = _joined(number, omega, row, p, free)
             free = 2
         else:
-            p = inside(row[ROW_KIND], row, 0.0, S, p)
-        if row[ROW_KIND] == SPRING:
+            p = inside(row.kind, row, 0.0, S, p)
+        if row.kind == SPRING:
             number = _clamped(number, p[0], 1)
     if ends[OF_MOMENT] == 0.0:
         return number
@@ -94,14 +90,14 @@ def _joined(outside: int, omega: float, row: Any, plane: Plane, free: int) -> tu
     clamped = (0.0, 0.0, 0.0, 0.0, 1.0)  # W = Psi = 0
     (s, _, _), (z1, v1, t1, dt1), (z2, v2, t2, dt2) = dispersion(complex(0.0, omega), row)
     number = half_waves(z1, t1, dt1) + half_waves(z2, t2, dt2) + (z1.real < 0.0 and z2.real < 0.0)
-    S, z1, z2, l, EI = s.real, z1.real, z2.real, row[LENGTH], row[BENDING]
+    S, z1, z2, l, EI = s.real, z1.real, z2.real, row.length, row.stiffness
     if max(abs(z1), abs(z2)) < SERIES_RADIUS:
         F0, F1, F2, F3, _, _ = transition_series(z1 + z2, z1 * z2)
-        rows = transition_rows((F0 * (l * l * l), F1 * (l * l), F2 * l, F3), S, 1.0 / EI, row[CHAIN_A:])
+        rows = transition_rows((F0 * (l * l * l), F1 * (l * l), F2 * l, F3), S, 1.0 / EI, row.of_chain)
         q, r = across_rows(*rows, plane), across_rows(*rows, clamped)
     else:
         one, two = in_chain(real_wave(z1, v1.real, t1, dt1), l), in_chain(real_wave(z2, v2.real, t2, dt2), l)
-        gS, gap = row[CHAIN_G] * S, one[2] - two[2]
+        gS, gap = row.of_chain[2] * S, one[2] - two[2]
         unit = 1.0 / (gS * EI * gap * gap)
         q = scaled(across_waves(one, two, gS, EI, plane), unit)
         r = scaled(across_waves(one, two, gS, EI, clamped), unit)

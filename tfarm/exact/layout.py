@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tfarm.arrays import Real
 from tfarm.errors import require
@@ -33,12 +34,10 @@ from .system import (
 
 SEGMENT, OFFSET, SPRING, BODY, MARK = range(5)
 KINDS: Mapping[type, int] = {Segment: SEGMENT, Offset: OFFSET, Spring: SPRING, Body: BODY, Mark: MARK}
-REACH = 0  # of an offset's row of the kernel: its length
-STIFFNESS, COMPLIANCE, LOSS = range(3)  # of a spring's, in the order of `Spring`
-MASS, INERTIA, GROUND, TURNING_GROUND = range(4)  # of a body's, in the order of `Body`
+# A row of the kernel: kind and numbers of an element, with the names of its record; a, b, g are two doubles each.
+OF_ELEMENT = "kind a b g a_low b_low g_low sigma damping length stiffness compliance mass inertia rotational_stiffness"
+ROW = np.dtype([*((name, float) for name in OF_ELEMENT.split()), ("of_chain", float, 4)])
 AT_JOINT = 2.0**-50  # of the length: rounding of a place at a joint, a quotient of float64 numbers
-ROW_KIND, ROW_WIDTH = 8, 15  # the kind in a row of the kernel, after the numbers of a segment (`waves`), and its width
-LENGTH, BENDING, CHAIN_A, CHAIN_B, CHAIN_G, CHAIN_SIGMA = range(9, 15)  # of a segment, in the chain's units
 OF_ANGLE, OF_MOMENT = 6, 10  # in the vector of ends: after six numbers of the payload A_0..A_3, then B_0 and B_1
 LAYOUTS_KEPT = 256  # of one system: more places than those of a page
 
@@ -75,12 +74,11 @@ class Layout:
         self.chain, self.places, self.each = chain, places, each
         elements = list(placed(chain.elements))
         joints = [position for position, _, each in elements if isinstance(each, Segment)] + [ZERO]
-        ends = np.array([float(joint) for joint in joints])
         order = {"payload": PAYLOAD, "outer": OUTER, "inner": INNER}
         marks = []
         for place in places:
-            joint = joints[abs(ends - float(place.share)).argmin()]
-            share = joint if place.share not in joints and abs(place.share - joint) <= AT_JOINT else place.share
+            away = [abs(joint - place.share) for joint in joints]
+            share = joints[away.index(min(away))] if min(away) <= AT_JOINT else place.share
             marks.append((share, order[place.side], Mark(place)))
         self.elements = cut([*marks, *elements])
         self._numbers: dict[Any, list[Any]] = {}
@@ -105,15 +103,14 @@ class Layout:
         return end_condition(chain.tip_mass), end_condition(chain.tip_inertia), drive.of_angle, drive.of_moment
 
     @cached_property
-    def rows(self) -> Real:
-        """The elements for the kernel (elements, `ROW_WIDTH`)."""
-        rows = np.array([kernel_row(each) for each in self.elements]).reshape(-1, ROW_WIDTH)
-        return np.asarray(read_only(rows))
+    def rows(self) -> NDArray[np.void]:
+        """The elements for the kernel (elements,) of `ROW`."""
+        return np.asarray(read_only(np.concatenate([kernel_row(each) for each in self.elements])))
 
     @cached_property
     def ends(self) -> Real:
         """Payload and drive (12,)."""
-        return np.asarray(read_only(np.array([float(each) for part in self._conditions for each in part])))
+        return np.asarray(read_only(np.array(sum(self._conditions, ()), dtype=float)))
 
     @cached_property
     def marks(self) -> dict[Place | None, int]:
@@ -127,23 +124,18 @@ class Layout:
         return np.asarray(read_only(np.array(rows, dtype=float).reshape(-1, len(Reading._fields))))
 
 
-def kernel_row(element: Element) -> list[float]:
-    """Return the numbers of an element in a row of the kernel."""
-    kind = float(KINDS[type(element)])
+def kernel_row(element: Element) -> NDArray[np.void]:
+    """Return an element as a row of the kernel (1,) of `ROW`."""
+    row = np.zeros(1, ROW)
+    row["kind"] = KINDS[type(element)]
+    for name in set(element._fields) & set(ROW.fields or ()):
+        row[name] = float(getattr(element, name))
     if isinstance(element, Segment):
-        pairs = [*_two_doubles(element.a), *_two_doubles(element.b), *_two_doubles(element.g)]
-        in_chain = [float(each) for each in (element.length, element.stiffness, *element.of_chain)]
-        return [*pairs, float(element.sigma), element.damping, kind, *in_chain]
-    numbers: Sequence[Any] = () if isinstance(element, Mark) else element
-    zeros = [0.0] * ROW_WIDTH
-    return [*(float(each) for each in numbers), *zeros[len(numbers) : ROW_KIND], kind, *zeros[LENGTH:]]
-
-
-def _two_doubles(value: Fraction) -> tuple[float, float]:
-    """Return the nearest float64 and that of the rest."""
-    high = float(value)
-    p, q = high.as_integer_ratio()
-    return high, (value.numerator * q - p * value.denominator) / (value.denominator * q)
+        for name in "abg":
+            value = getattr(element, name)
+            row[f"{name}_low"] = float(value - Fraction(float(value)))
+        row["of_chain"] = [float(each) for each in element.of_chain]
+    return row
 
 
 def segment_at(chain: System, place: Place) -> Segment:

@@ -39,13 +39,14 @@ QUANTITY_UNITS = MappingProxyType({**_METRES, **_RADIANS, "M": "N m", "Q": "N", 
 class Output:
     """s^power times a quantity at a place; `gauge` divides by 1 + C s (a strain gauge has no part of the damping).
 
-    `unit` is its SI unit, `label` its words, `name` its identifier, by default the label's words joined by underscores.
+    `label` has its words, `name` its identifier, by default the label's words joined by underscores.  `unit` is its SI
+    unit, by default that of the quantity and the power.
     Raises ParameterError, naming the key and the remedy, for illegal values.
     """
 
     quantity: Quantity
     place: Place
-    unit: str
+    unit: str = ""
     power: int = 0
     gauge: bool = False
     side: Side = "outer"
@@ -66,8 +67,10 @@ class Output:
         is_gauge = isinstance(self.gauge, bool) and (not self.gauge or self.quantity in ("M", "strain"))
         remedy = "true or false, true for a moment only: a strain gauge measures E I phi' without its damping"
         require(is_gauge, "output.gauge", self.gauge, remedy)
-        unit = _unit(self.quantity, self.power)
-        require(self.unit == unit, "output.unit", self.unit, f'values are in SI units, here "{unit}"')
+        per_time = "" if self.power == 0 else "/s" if self.power == 1 else f"/s^{self.power}"
+        unit = QUANTITY_UNITS[self.quantity] + per_time
+        require(self.unit in ("", unit), "output.unit", self.unit, f'values are in SI units, here "{unit}"')
+        object.__setattr__(self, "unit", unit)
 
     @property
     def is_in_appendix(self) -> bool:
@@ -78,40 +81,34 @@ class Output:
     @property
     def base(self) -> Output:
         """The same quantity without its power of s."""
-        return replace(self, power=0, unit=QUANTITY_UNITS[self.quantity])
+        return replace(self, power=0, unit="")
 
     def share(self, x: float) -> float:
         """Return its place as a share of the length; x is that share for an output along the arm."""
         return {"root": 0.0, "tip": 1.0, "x": x}[self.place]
 
 
-def _unit(quantity: Quantity, power: int) -> str:
-    """Return the SI unit of a quantity times s^power."""
-    per_time = "" if power == 0 else "/s" if power == 1 else f"/s^{power}"
-    return QUANTITY_UNITS[quantity] + per_time
-
-
 OUTPUTS: Mapping[str, Output] = MappingProxyType({each.name: each for each in (
-    Output(name="hub_angle", quantity="theta", place="root", unit="rad", label="hub angle"),
-    Output(name="hub_rate", quantity="theta", place="root", unit="rad/s", power=1, label="hub rate"),
-    Output(name="tip_displacement", quantity="W", place="tip", unit="m", label="tip displacement"),
-    Output(name="tip_deflection", quantity="Y", place="tip", unit="m", label="tip deflection"),
-    Output(name="tip_acceleration", quantity="W", place="tip", unit="m/s^2", power=2, label="tip acceleration"),
-    Output(name="root_moment", quantity="M", place="root", unit="N m", gauge=True, label="root moment"),
-    Output(name="root_shear", quantity="Q", place="root", unit="N", label="root shear force"),
-    Output(name="motor_current", quantity="current", place="root", unit="A", label="motor current"),
-    Output(name="tip_rotation", quantity="Phi", place="tip", unit="rad", label="tip rotation"),
-    Output(name="tip_angle", quantity="Psi", place="tip", unit="rad", label="tip angle in space"),
-    Output(name="payload_displacement", quantity="centre", place="tip", unit="m", label="payload displacement"),
-    Output(name="displacement", quantity="W", place="x", unit="m", label="displacement at x"),
-    Output(name="velocity", quantity="W", place="x", unit="m/s", power=1, label="velocity at x"),
-    Output(name="acceleration", quantity="W", place="x", unit="m/s^2", power=2, label="acceleration at x"),
-    Output(name="deflection", quantity="Y", place="x", unit="m", label="deflection at x"),
-    Output(name="rotation", quantity="Phi", place="x", unit="rad", label="rotation at x"),
-    Output(name="moment", quantity="M", place="x", unit="N m", gauge=True, label="bending moment at x"),
-    Output(name="full_moment", quantity="M", place="x", unit="N m", label="bending moment with damping at x"),
-    Output(name="strain", quantity="strain", place="x", unit="1", gauge=True, label="bending strain at x"),
-    Output(name="shear", quantity="Q", place="x", unit="N", label="shear force at x"),
+    Output(quantity="theta", place="root", label="hub angle"),
+    Output(quantity="theta", place="root", power=1, label="hub rate"),
+    Output(quantity="W", place="tip", label="tip displacement"),
+    Output(quantity="Y", place="tip", label="tip deflection"),
+    Output(quantity="W", place="tip", power=2, label="tip acceleration"),
+    Output(quantity="M", place="root", gauge=True, label="root moment"),
+    Output(name="root_shear", quantity="Q", place="root", label="root shear force"),
+    Output(quantity="current", place="root", label="motor current"),
+    Output(quantity="Phi", place="tip", label="tip rotation"),
+    Output(name="tip_angle", quantity="Psi", place="tip", label="tip angle in space"),
+    Output(quantity="centre", place="tip", label="payload displacement"),
+    Output(name="displacement", quantity="W", place="x", label="displacement at x"),
+    Output(name="velocity", quantity="W", place="x", power=1, label="velocity at x"),
+    Output(name="acceleration", quantity="W", place="x", power=2, label="acceleration at x"),
+    Output(name="deflection", quantity="Y", place="x", label="deflection at x"),
+    Output(name="rotation", quantity="Phi", place="x", label="rotation at x"),
+    Output(name="moment", quantity="M", place="x", gauge=True, label="bending moment at x"),
+    Output(name="full_moment", quantity="M", place="x", label="bending moment with damping at x"),
+    Output(name="strain", quantity="strain", place="x", gauge=True, label="bending strain at x"),
+    Output(name="shear", quantity="Q", place="x", label="shear force at x"),
 )})  # fmt: skip
 
 

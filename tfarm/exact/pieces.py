@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 from tfarm.arrays import Complex
 
 from .compiled import inlined
-from .layout import BENDING, CHAIN_A, LENGTH
 from .waves import (
-    DAMPING,
     PARALLEL,
     Plane,
     Row,
@@ -148,7 +146,7 @@ def waves_at(row: Any, waves: Any, i: int) -> tuple[Wave, Wave, complex, complex
     """Return both waves of a point, g S and d, in the chain's units."""
     (z1, v1, _, _), (c1, s1, e1, _) = row_at(waves, ONE + i), row_at(waves, ONE + FUNCTIONS + i)
     (z2, v2, _, _), (c2, s2, e2, _) = row_at(waves, TWO + i), row_at(waves, TWO + FUNCTIONS + i)
-    (_, d, gS, _), l, EI = row_at(waves, S_SQUARED + i), row[LENGTH], row[BENDING]
+    (_, d, gS, _), l, EI = row_at(waves, S_SQUARED + i), row.length, row.stiffness
     one, two = in_chain((c1, s1, z1, v1, e1), l), in_chain((c2, s2, z2, v2, e2), l)
     return one, two, times(gS, EI / (l * l * l * l)), times(d, EI)
 
@@ -156,14 +154,14 @@ def waves_at(row: Any, waves: Any, i: int) -> tuple[Wave, Wave, complex, complex
 @inlined
 def rows_at(s: complex, row: Any, waves: Any, i: int) -> tuple[Row, Row, Row, Row]:
     """Return the transition matrix of a slow segment at a point from F0..F3 in the chain's units."""
-    over_d = times(reciprocal(1.0 + row[DAMPING] * s), 1.0 / row[BENDING])
-    return transition_rows(row_at(waves, SERIES + i), s * s, over_d, row[CHAIN_A:])
+    over_d = times(reciprocal(1.0 + row.damping * s), 1.0 / row.stiffness)
+    return transition_rows(row_at(waves, SERIES + i), s * s, over_d, row.of_chain)
 
 
 @inlined
 def _fill_series(points: Any, row: Any, waves: Any) -> None:
     """Compute F0..F3, F2 - 1 and F3 - 1 of a slow segment in the chain's units, at every point of a block."""
-    l = row[LENGTH]
+    l = row.length
     for i in range(BLOCK):
         _, _, z_sum, z_product = wave_sums(points[i], row)
         F0, F1, F2, F3, F2_less_1, F3_less_1 = transition_series(z_sum, z_product)

@@ -17,26 +17,13 @@ from tfarm.records import read_only
 
 from .compiled import compiled, inlined
 from .layout import (
-    BENDING,
     BODY,
-    CHAIN_A,
-    CHAIN_B,
-    COMPLIANCE,
-    GROUND,
-    INERTIA,
-    LENGTH,
-    LOSS,
     MARK,
-    MASS,
     OF_ANGLE,
     OF_MOMENT,
     OFFSET,
-    REACH,
-    ROW_KIND,
     SEGMENT,
     SPRING,
-    STIFFNESS,
-    TURNING_GROUND,
 )
 from .pieces import (
     BLOCK,
@@ -110,15 +97,15 @@ def _sweep(points: Any, rows: Any, ends: Any, work: Work, lost: Any) -> None:
         row, outer, inner = rows[j], work.planes[j], work.planes[j + 1]
         for i in range(BLOCK):
             work.powers[j, i] = 0
-        if row[ROW_KIND] == SEGMENT:
+        if row.kind == SEGMENT:
             cross(points, row, j, work, lost)
-        elif row[ROW_KIND] == MARK:
+        elif row.kind == MARK:
             for i in range(BLOCK):
                 put(inner, i, plane_at(outer, i))
             continue
         else:
             for i in range(BLOCK):
-                put(inner, i, inside(row[ROW_KIND], row, points[i], points[i] * points[i], plane_at(outer, i)))
+                put(inner, i, inside(row.kind, row, points[i], points[i] * points[i], plane_at(outer, i)))
         _brought_back(inner, 5, work.powers[j])
         for i in range(BLOCK):
             work.scale[i] += work.powers[j, i] * LN_2
@@ -128,11 +115,11 @@ def _sweep(points: Any, rows: Any, ends: Any, work: Work, lost: Any) -> None:
 def inside(kind: int, row: Any, s: Number, S: Number, p: Plane) -> Plane:
     """Return the plane inside an offset, a spring, a body or a mark."""
     if kind == OFFSET:
-        return inside_offset(row[REACH], p)
+        return inside_offset(row.length, p)
     if kind == SPRING:
-        return inside_spring(s * row[LOSS] + row[STIFFNESS], 0 * s + row[COMPLIANCE], p)
+        return inside_spring(s * row.damping + row.stiffness, 0 * s + row.compliance, p)
     if kind == BODY:
-        return inside_body(S * row[MASS] + row[GROUND], S * row[INERTIA] + row[TURNING_GROUND], p)
+        return inside_body(S * row.mass + row.stiffness, S * row.inertia + row.rotational_stiffness, p)
     return p
 
 
@@ -140,10 +127,10 @@ def inside(kind: int, row: Any, s: Number, S: Number, p: Plane) -> Plane:
 def beyond(kind: int, row: Any, s: Number, S: Number, f: Row) -> Row:
     """Return the condition beyond an offset, a spring or a body."""
     if kind == OFFSET:
-        return beyond_offset(row[REACH], f)
+        return beyond_offset(row.length, f)
     if kind == SPRING:
-        return beyond_spring(s * row[LOSS] + row[STIFFNESS], 0 * s + row[COMPLIANCE], f)
-    return beyond_body(S * row[MASS] + row[GROUND], S * row[INERTIA] + row[TURNING_GROUND], f)
+        return beyond_spring(s * row.damping + row.stiffness, 0 * s + row.compliance, f)
+    return beyond_body(S * row.mass + row.stiffness, S * row.inertia + row.rotational_stiffness, f)
 
 
 @inlined
@@ -179,21 +166,21 @@ def _go_back(points: Any, rows: Any, outermost: int, work: Work, differs: bool, 
         back[LIFT + i] = back[TURN + i] = 0.0  # W = 0 on the axis, of a mode also where another condition determines it
     for j in range(len(rows) - 1, outermost - 1, -1):
         row = rows[j]
-        if row[ROW_KIND] == MARK:
+        if row.kind == MARK:
             for i in range(BLOCK):
                 work.scales[j, i], work.shifts[j, i] = scale[i], shift[i]
             _meet(work.planes[j + 1], work, is_root, reach, shift)
             for i in range(BLOCK):
                 lost[i] = lost[i] or (work.watched[i] and not is_root)  # there W, M and Q may have lost digits
             continue
-        if row[ROW_KIND] == SEGMENT:
+        if row.kind == SEGMENT:
             if differs:
                 _beyond_segment(points, row, j, work, reach, shift)
             cross_back(points, row, j, work, scale)
-            reach, is_root = reach + row[LENGTH], False
+            reach, is_root = reach + row.length, False
         else:
             _beyond(points, row, work.planes[j + 1], back, shift)
-            reach += row[REACH] if row[ROW_KIND] == OFFSET else 0.0
+            reach += row.length if row.kind == OFFSET else 0.0
         for i in range(BLOCK):
             shift[i] -= work.powers[j, i]
         _brought_back(back, 4, shift)
@@ -217,14 +204,14 @@ def _meet(state: Any, work: Work, is_root: bool, reach: float, shift: Any) -> No
 @inlined
 def _beyond(points: Any, row: Any, inner: Any, back: Any, shift: Any) -> None:
     """Compute condition, W - r theta and Psi - theta beyond an offset, a spring or a body, in place."""
-    kind = row[ROW_KIND]
+    kind = row.kind
     for i in range(BLOCK):
         s, f = points[i], row_at(back, i)
         if kind == OFFSET:
-            back[LIFT + i] += row[REACH] * back[TURN + i]
+            back[LIFT + i] += row.length * back[TURN + i]
         elif kind == SPRING:
             moment = times(met(f, plane_at(inner, i))[2], math.ldexp(1.0, shift[i]))
-            back[TURN + i] += row[COMPLIANCE] * reciprocal(s * row[LOSS] + row[STIFFNESS]) * moment
+            back[TURN + i] += row.compliance * reciprocal(s * row.damping + row.stiffness) * moment
         put(back, i, beyond(kind, row, s, s * s, f))
 
 
@@ -244,9 +231,9 @@ def _beyond_segment(points: Any, row: Any, j: int, work: Work, reach: float, shi
         W, Psi = times(work.theta[i], reach) + lift, work.theta[i] + turn
         of_W, of_Psi, _, _ = rows_at(points[i], row, waves, i)
         S = points[i] * points[i]
-        even = waves[F3_LESS_1 + i] - row[CHAIN_A] * S * of_W[2]
-        odd = waves[F3_LESS_1 + i] - row[CHAIN_B] * S * waves[F1 + i]
-        lift += row[LENGTH] * turn
+        even = waves[F3_LESS_1 + i] - row.of_chain[0] * S * of_W[2]
+        odd = waves[F3_LESS_1 + i] - row.of_chain[1] * S * waves[F1 + i]
+        lift += row.length * turn
         back[LIFT + i] = lift + (even * W + waves[F2_LESS_1 + i] * Psi + of_W[2] * M - of_W[3] * Q)
         back[TURN + i] = turn + (odd * Psi - of_Psi[0] * W - of_Psi[2] * M + of_Psi[3] * Q)
 
@@ -260,7 +247,7 @@ def drive_at(s: complex, segment: Any, ends: Any, theta: complex, M: complex) ->
     A0, B0 = OF_ANGLE, OF_MOMENT
     of_angle = ends[A0] + s * (ends[A0 + 1] + s * (ends[A0 + 2] + s * ends[A0 + 3]))
     of_moment = ends[B0] + s * ends[B0 + 1]
-    waves = impedance(magnitude(s * s), segment) * segment[BENDING] / segment[LENGTH]
+    waves = impedance(magnitude(s * s), segment) * segment.stiffness / segment.length
     turned, bent = magnitude(theta) + magnitude(M) / max(waves, 1.0), magnitude(M) + magnitude(theta) * waves
     return of_angle * theta - of_moment * M, magnitude(of_angle) * turned + magnitude(of_moment) * bent
 
@@ -277,7 +264,7 @@ def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, l
     differs, outermost = False, 0
     for o in range(len(table)):
         differs = differs or (table[o, 0] >= 0.0 and table[o, 2] != 0.0)
-    while outermost < len(rows) and rows[outermost, ROW_KIND] != MARK:
+    while outermost < len(rows) and rows[outermost].kind != MARK:
         outermost += 1
     work, segment, values = _work(len(rows)), innermost(rows), np.empty((1 + len(table), BLOCK), np.complex128)
     points, lost_here = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.bool_)
@@ -306,7 +293,7 @@ def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, l
 def innermost(rows: Any) -> Any:
     """Return the row of the segment at the hub."""
     j = len(rows) - 1
-    while rows[j, ROW_KIND] != SEGMENT:
+    while rows[j].kind != SEGMENT:
         j -= 1
     return rows[j]
 

@@ -54,9 +54,6 @@ from .compiled import compiled, fma, inlined
 Number = Any  # float, complex, ndarray, series or ball
 Double = tuple[complex, complex]  # a number as a sum of two, the second below the last place of the first
 
-# The indices of a segment's row of the kernel: a, b, g as two doubles each, sigma and C (`layout.kernel_row`).
-A, A_LOW, B, B_LOW, G, G_LOW, SIGMA, DAMPING = range(8)
-
 SERIES_RADIUS = 6.0  # |z_j| below which the series are used
 SERIES_TERMS = 14  # the first term left out is below 15 * 6^14/28! = 4e-18
 INVERSE_FACTORIAL = np.array([1.0 / math.factorial(n) for n in range(2 * SERIES_TERMS + 2)])
@@ -125,13 +122,13 @@ def magnitude(z: complex) -> float:
 def dispersion(s: complex, k: Any) -> tuple[tuple[complex, complex, complex], Row, Row]:
     """Return S, d, g S, and for both waves z, v = z - b S, t with its correction dt:  e^{-t_j} = e^{-t} (1 - dt).
 
-    `k` is the row of a segment: a, b, g as double-doubles, then sigma and C.
+    `k` is the row of a segment (`layout.ROW`).
     """
     S = _two_product(s, s)
-    Cs, Cs_low = _times_real(k[DAMPING], s)
+    Cs, Cs_low = _times_real(k.damping, s)
     d, d_low = _two_sum(complex(1.0, 0.0), Cs)
     d_low = d_low + Cs_low
-    aS, bS, gS = _scaled(k[A], k[A_LOW], S), _scaled(k[B], k[B_LOW], S), _scaled(k[G], k[G_LOW], S)
+    aS, bS, gS = _scaled(k.a, k.a_low, S), _scaled(k.b, k.b_low, S), _scaled(k.g, k.g_low, S)
 
     over_d = reciprocal(d)
     bend, couple, shear = aS[0] * over_d, gS[0] * over_d, bS[0]
@@ -188,8 +185,8 @@ def wave_functions(z: complex, t: complex, dt: complex) -> Row:
 @inlined
 def wave_sums(s: complex, k: Any) -> tuple[complex, complex, complex, complex]:
     """Return S = s^2, 1/d, z_1 + z_2 and z_1 z_2 of a segment."""
-    S, over_d = s * s, reciprocal(1.0 + k[DAMPING] * s)
-    return S, over_d, S * (k[B] + k[A] * over_d), S * (k[A] * k[B] * S + k[G]) * over_d
+    S, over_d = s * s, reciprocal(1.0 + k.damping * s)
+    return S, over_d, S * (k.b + k.a * over_d), S * (k.a * k.b * S + k.g) * over_d
 
 
 @inlined
@@ -245,8 +242,8 @@ def tip_conditions(ends: Any, S: Number) -> Row:
 @inlined
 def impedance(S: float, k: Any) -> float:
     """Return the scale of M0/theta for a free tip, in the segment's units: inertia if slow, one wave number if fast."""
-    inertia = k[G] * S
-    return min(inertia, math.sqrt(math.sqrt(inertia)) + math.sqrt(S * (k[A] + k[B])))
+    inertia = k.g * S
+    return min(inertia, math.sqrt(math.sqrt(inertia)) + math.sqrt(S * (k.a + k.b)))
 
 
 Wave = tuple[Number, Number, Number, Number, Number]  # c, s, z, v, e: c and s are scaled by e = e^{-t}

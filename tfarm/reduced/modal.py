@@ -42,7 +42,6 @@ from .partial_fractions import PartialFractions
 CORNER_RATIOS = 1 + np.geomspace(0.02, 30.0, 14)  # c_j C, and below s C of the fit: tuned by hand on the lab arm
 SLOW_PAIRS = CORNER_RATIOS.size // 2  # the corners, two a pair
 FITTED_AT = np.geomspace(0.02, 5.0, 60)  # s C at which they are fitted: tuned with CORNER_RATIOS
-RANK_CUTOFF = 1e-12  # of the largest singular value
 SLOW_POLES_FROM = 1.2  # C w of the last mode, at least: below, the omitted modes are not overdamped
 
 
@@ -53,23 +52,20 @@ def slow_remainder(C: float, missing: Callable[[Complex], Complex]) -> tuple[Rea
     """
     basis = 1 / (1 + FITTED_AT[:, None] / CORNER_RATIOS) - 1
     left = missing((FITTED_AT / C).astype(complex)).real
-    shares: Real = np.linalg.lstsq(basis, left.T, rcond=RANK_CUTOFF)[0].T.astype(float)
+    # 1e-12 of the largest singular value
+    shares: Real = np.linalg.lstsq(basis, left.T, rcond=1e-12)[0].T.astype(float)
     return CORNER_RATIOS / C, shares
 
 
-CLOSE_FREQUENCIES = 1e-6  # relative gap under which only shapes separate two modes
 UNIT_CIRCLE = np.exp(
     2j * np.pi * np.arange(32) / 32
 )  # of Cauchy's integral: a pole 4 radii away adds 4^-32 of its residue
-POLES_AWAY = 4  # radii of its circle: the least distance of another pole
-RADII_TRIED, RADIUS_FALLS = 9, 3  # circles after the first, each a third of the one before
 OF_SHAPES = ("theta", "W", "Y", "Phi", "M", "Q")  # quantities of a table of modes
 AT_HUB = (  # moment and shear force of the link at the hub, and the hub's angle
-    Output(quantity="M", place="root", unit="N m", label="moment at the root"),
+    Output(quantity="M", place="root", label="moment at the root"),
     OUTPUTS["root_shear"],
     OUTPUTS["hub_angle"],
 )
-RADII_AGREE = 1e-11  # of the largest value on the circle: the largest difference of two radii
 
 
 def undamped_residues(table: Modes, wanted: Sequence[Output], k: System, x: float) -> Real:
@@ -81,7 +77,8 @@ def undamped_residues(table: Modes, wanted: Sequence[Output], k: System, x: floa
     omega, powers = table.natural_frequency[table.index > 0], np.array([[each.power] for each in wanted])
     residues, doubtful = end_residues(k, wanted, 1j * omega, x)
     products: Real = (residues * 2j * omega / (1j * omega) ** powers).real
-    close = np.r_[False, np.diff(omega) < CLOSE_FREQUENCIES * omega[1:], False]
+    # 1e-6: relative gap under which only shapes separate two modes
+    close = np.r_[False, np.diff(omega) < 1e-6 * omega[1:], False]
     by_shapes = close[:-1] | close[1:] | doubtful
     if by_shapes.any() and all(each.quantity in OF_SHAPES and each.side == "outer" for each in wanted):
         products[:, by_shapes] = _from_shapes(table, wanted, k, x)[:, by_shapes]
@@ -122,13 +119,16 @@ def contour_residues(k: System, wanted: Sequence[Output], p: Complex, x: float) 
     """
     apart = abs(p[:, None] - p) + np.where(np.eye(p.size, dtype=bool), np.inf, 0.0)
     away = [apart.min(axis=1, initial=np.inf), abs(p), *(abs(p - point) for point in k.singular)]
-    radius = np.min(away, axis=0) / POLES_AWAY
-    falls = float(RADIUS_FALLS) ** -np.arange(RADII_TRIED + 1)
+    # another pole is at least 4 radii away
+    radius = np.min(away, axis=0) / 4
+    # ten circles, each a third of the one before
+    falls = 3.0 ** -np.arange(10)
     arrow = falls[:, None, None] * radius[:, None] * UNIT_CIRCLE
     values = evaluate_outputs(k, wanted, (p[:, None] + arrow).ravel(), x).reshape(len(wanted), *arrow.shape) * arrow
     residues, size = values.mean(axis=-1), abs(values).max(axis=-1)  # (outputs, radii, p)
     larger = np.maximum(size[:, 1:], size[:, :-1])
-    agree = (abs(np.diff(residues, axis=1)) <= RADII_AGREE * larger).all(axis=0)
+    # 1e-11 of the largest value on the circle: the largest difference of two radii
+    agree = (abs(np.diff(residues, axis=1)) <= 1e-11 * larger).all(axis=0)
     for worst in p[~agree.any(axis=0)].tolist():
         raise ConvergenceError(f"no residue at the eigenvalue {worst:.10g} 1/s: another one is too close", worst, 0.0)
     return residues[:, agree.argmax(axis=0), np.arange(p.size)]
@@ -150,7 +150,6 @@ def _from_shapes(table: Modes, wanted: Sequence[Output], k: System, x: float) ->
 
 
 MOST_MODELLED = 1000  # of a model: its matrices of 2000 states take 32 MB
-MOST_PROPER = 2  # power of s: r s^2/(s^2 + w^2) of a mode is bounded, and with s^3 it is not
 LARGE_MODEL, NAMING_STEPS = 40, 1_000  # modes from which on a model has no need of all names, and steps: time alone
 NEXT_TO_REST = 1e-3  # of the first frequency: a pole nearer to 0 leaves 1e-15 of itself five terms on
 
@@ -176,7 +175,8 @@ def modal_model(
         remedy = "a power of s times the input, which no state space has; choose another output"
         require(not (each.power and constant_of(k, each, share)), "outputs", each.name, remedy)
         remedy = f"s^{each.power} makes it improper, which no state space is; choose a lower derivative"
-        require(each.power <= MOST_PROPER, "outputs", each.name, remedy)
+        # r s^2/(s^2 + w^2) of a mode is bounded, and with s^3 it is not
+        require(each.power <= 2, "outputs", each.name, remedy)
     table = modes(arm, max(1, int(count)))
     collocated = OUTPUTS["root_moment" if arm.is_locked else "hub_angle"]
     index, p, single = _eigenvalues(arm, table, reach)

@@ -29,9 +29,6 @@ if TYPE_CHECKING:
     import control
 
 
-TERMS_AT_ONCE = 1 << 18  # entries of (poles, s) in memory
-
-
 @dataclass(frozen=True, kw_only=True)
 @record
 class PartialFractions:
@@ -100,7 +97,8 @@ class PartialFractions:
     def __call__(self, s: ArrayLike) -> Complex:
         """Return values (outputs, *s.shape) at complex s [1/s].  Raises ParameterError at a pole of the model."""
         points = np.asarray(s, dtype=complex)
-        parts = np.array_split(points.ravel(), 1 + points.size * self.index.size // TERMS_AT_ONCE)
+        # 2^18 entries of (poles, s) in memory at once
+        parts = np.array_split(points.ravel(), 1 + (points.size * self.index.size >> 18))
         values = np.concatenate([self._sum(part, np.asarray) for part in parts], axis=1)
         return values.reshape(len(self.outputs), *points.shape)
 
@@ -194,12 +192,8 @@ EXACT_ROUNDING = 1e-14  # error of the exact values in the same norm
 TERM_ROUNDING = 4 * float(np.finfo(float).eps)  # of a model's terms, which cancel where G is small, in their sum
 CLEAR_OF_POLES = 1e-12  # of a frequency: the least distance of a sample from a pole
 POLE_DISTANCES = 10.0 ** -np.arange(1, 8)  # of samples from a pole, as shares of its frequency
-SAMPLES_PER_DECADE = 60  # of the even grid; peaks between are refined
 LEAST_SAMPLES, EVEN_SAMPLES, BETWEEN_POLES = 200, 400, 24  # more of these, in even steps, and between two poles
-DIP_POINTS = 8  # around each dip of |G| or |G'|
 POLES_BEYOND = 1.5  # times the end of the range: samples keep clear of poles up to there
-MOST_PEAKS = 12  # local maxima of the error that are refined, the highest first
-HIGH_PEAK = 0.2  # of the highest: lower ones are not refined
 REFINEMENTS, REFINED_POINTS = 3, 17  # of such a peak, each to an eighth of its width
 
 
@@ -241,8 +235,10 @@ class Ruler:
     def _brackets(self, error: Real) -> tuple[Real, Real]:
         """Return the samples on either side of each high local maximum."""
         padded = np.r_[-1.0, error, -1.0]
-        (peaks,) = np.nonzero((error >= padded[:-2]) & (error >= padded[2:]) & (error >= HIGH_PEAK * error.max()))
-        peaks = peaks[np.argsort(-error[peaks])][:MOST_PEAKS]
+        # 0.2 of the highest: lower ones are not refined
+        (peaks,) = np.nonzero((error >= padded[:-2]) & (error >= padded[2:]) & (error >= 0.2 * error.max()))
+        # 12: local maxima of the error that are refined, the highest first
+        peaks = peaks[np.argsort(-error[peaks])][:12]
         return self.w[np.maximum(peaks - 1, 0)], self.w[np.minimum(peaks + 1, self.w.size - 1)]
 
     def _dips(self, w: Real) -> Real:
@@ -252,7 +248,8 @@ class Ruler:
             for size in abs(np.concatenate([self.G(1j * w), self.G.derivative(1j * w)]))
         ]
         where = np.unique(np.concatenate(dips))
-        return np.linspace(w[where - 1], w[where + 1], DIP_POINTS).ravel()
+        # 8: around each dip of |G| or |G'|
+        return np.linspace(w[where - 1], w[where + 1], 8).ravel()
 
     def _is_clear(self, w: Real) -> NDArray[np.bool_]:
         return distance(w, self._poles) > CLEAR_OF_POLES * w
@@ -279,7 +276,8 @@ def frequencies_around(arm: Arm, high: float) -> Real:
 
 def _samples(low: float, high: float, poles: Real) -> Real:
     """Return frequencies in even and in geometric steps, more between neighbouring poles and around each."""
-    count = LEAST_SAMPLES + int(SAMPLES_PER_DECADE * np.log10(high / low))
+    # 60 of the even grid; peaks between are refined
+    count = LEAST_SAMPLES + int(60 * np.log10(high / low))
     crowd = np.concatenate([poles[:, None] * (1 - POLE_DISTANCES), poles[:, None] * (1 + POLE_DISTANCES)]).ravel()
     knots = np.r_[low, poles[(poles > low) & (poles < high)], high]
     share = (1 - np.cos(np.linspace(0, np.pi, BETWEEN_POLES + 2)[1:-1])) / 2

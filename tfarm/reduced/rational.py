@@ -26,16 +26,8 @@ from tfarm.spectrum import modes_below
 from .modal import MOST_MODELLED, modal_model
 from .partial_fractions import PartialFractions, distance, frequencies_around, values_and_norm
 
-BEYOND_BAND = 1.02  # times the end of the range: up to there modes are exact
-REMAINDER_POINTS = 300  # of the range, denser towards its end, where poles above have most effect
-REMAINDER_FROM = 0.01  # of the end of the range: below, the point S = 0 is enough
 OFF_POLE = 1e-9  # of its frequency: the least distance of a sample from a pole of the arm
-INFINITE_BELOW = 1e-13  # of the numerator: an eigenvalue with a smaller denominator is infinite
-SHARING_ROUNDS = 4  # in which unused pairs of AAA become modes
-REAL_SQUARE = 1e-10  # relative; a pole whose imaginary part is below it is real
 PATIENCE = 3  # degrees without progress before the search ends
-ERRORS_ALIKE = 5e-14  # errors below this are equal
-ERROR_FLOOR = 1e-14  # a weighted error below this is rounding; more poles would fit noise
 
 
 @dataclass(frozen=True)
@@ -55,7 +47,8 @@ class _Remainders:
 
 def modes_in(arm: Arm, high: float) -> int:
     """Return the number of exact modes of a model up to `high` [rad/s].  Raises ParameterError over 1000."""
-    count = modes_below(arm, BEYOND_BAND * high)
+    # 1.02 times the end of the range: up to there modes are exact
+    count = modes_below(arm, 1.02 * high)
     require(count <= MOST_MODELLED, "band", high, f"{count} modes lie below it, over {MOST_MODELLED}; lower it")
     return count
 
@@ -80,11 +73,13 @@ def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float 
     G = transfer(arm, (hub, *rows), x=x)
     frequencies = frequencies_around(arm, high)
     best = np.inf, 0
-    for _ in range(SHARING_ROUNDS):  # first with all poles, then with the used ones
+    # four times, first with all poles, then with the used ones: unused pairs of AAA become modes
+    for _ in range(4):
         inside = modal_model(arm, G.rows, exact, x)
         rest = _remainders(G, inside, high, frequencies)
         poles, shares, error = _best_poles(rest, pairs - exact)
-        rank = max(error, ERRORS_ALIKE), -exact - poles.size
+        # 5e-14: errors below this are equal
+        rank = max(error, 5e-14), -exact - poles.size
         if rank < best:
             best, model = rank, _assembled(inside, rest, poles, shares)
         if exact + poles.size == pairs:
@@ -95,7 +90,8 @@ def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float 
 
 def _remainders(G: TransferFunction, inside: PartialFractions, high: float, frequencies: Real) -> _Remainders:
     """Return the remainders at samples of the range."""
-    w = high * np.sin(np.linspace(REMAINDER_FROM, np.pi / 2, REMAINDER_POINTS))
+    # denser towards the end of the range, where poles above have most effect; below 1 % of it S = 0 is enough
+    w = high * np.sin(np.linspace(0.01, np.pi / 2, 300))
     w = w[distance(w, frequencies) > OFF_POLE * w]
     S, power = -(w**2), np.array([[each.power] for each in G.rows])
     bases = [each.base for each in G.rows]
@@ -129,7 +125,8 @@ def _best_poles(rest: _Remainders, most: int) -> tuple[Real, Real, float]:
         idle += 1
         if error < least:
             best, least, idle = (np.sqrt(square), shares), error, 0
-        if least < ERROR_FLOOR or idle == PATIENCE:
+        # 1e-14: a weighted error below this is rounding; more poles would fit noise
+        if least < 1e-14 or idle == PATIENCE:
             break
     return *best, least
 
@@ -175,9 +172,11 @@ def aaa_poles(S: Real, F: Real, weight: Real, degree: int) -> Iterator[Real]:
         arrow, mass = np.diag(np.r_[0.0, S[support]]), np.diag(np.r_[0.0, np.ones(len(support))])
         arrow[0, 1:], arrow[1:, 0] = w, 1.0  # its finite eigenvalues are the zeros of sum w_j/(S - S_j)
         numerator, denominator = scipy.linalg.eigvals(arrow, mass, homogeneous_eigvals=True)
-        finite = abs(denominator) > INFINITE_BELOW * abs(numerator)
+        # 1e-13 of the numerator: an eigenvalue with a smaller denominator is infinite
+        finite = abs(denominator) > 1e-13 * abs(numerator)
         poles = -numerator[finite] / denominator[finite] * unit
-        yield np.sort(poles.real[(abs(poles.imag) <= REAL_SQUARE * abs(poles)) & (poles.real > 0)])
+        # 1e-10: relative; a pole whose imaginary part is below it is real
+        yield np.sort(poles.real[(abs(poles.imag) <= 1e-10 * abs(poles)) & (poles.real > 0)])
 
 
 def _assembled(inside: PartialFractions, rest: _Remainders, poles: Real, shares: Real) -> PartialFractions:

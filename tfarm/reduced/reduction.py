@@ -42,11 +42,7 @@ BAND = (0.1, 1000.0)  # rad/s, by default
 NORM = "|dG| / (|G| + |w dG/dw|)"  # of the printed errors
 MOST_STATES = 400  # of a model within an error
 MOST_TAILS = 12  # pairs of poles above the range: more would fit rounding
-LEAST_FALL = 0.5  # decrease of the error with 2.25 times the modes, at least, even for 1/n; less is its floor
-COUNTS_TRIED = 3  # numbers of modes, from that of the rough error on, whose error is computed in full
 REDUCTION_BAND = "two frequencies in rad/s, 0 < low < high, such as 0.1,1000"  # the expected form
-WIDEST_BAND = 1e12  # the largest ratio of its ends
-POLE_IS_MODE = 1e-6  # relative gap within which a pole of the model is a mode of the arm
 
 
 class Channel(NamedTuple):
@@ -188,7 +184,8 @@ def reduce(
     """
     rows = transfer(arm, outputs, x=x).rows
     names = tuple(each.name for each in rows)
-    band = known_band(band, REDUCTION_BAND, WIDEST_BAND)
+    # 1e12: the largest ratio of its ends
+    band = known_band(band, REDUCTION_BAND, 1e12)
     require(len(set(names)) == len(names), "outputs", names, "name each output once")
     is_known = method is None or method in get_args(Reduction)
     require(is_known, "method", method, "modal or aaa, or leave it out for the better one")
@@ -276,7 +273,8 @@ class _Bench:
         try:
             while (size := rough(good)) > error:
                 sizes += [size] * (good > self.inside)
-                if good == most or (len(sizes) > 2 and sizes[-1] > LEAST_FALL * sizes[-3]):
+                # 0.5: decrease of the error with 2.25 times the modes, at least, even for 1/n; less is its floor
+                if good == most or (len(sizes) > 2 and sizes[-1] > 0.5 * sizes[-3]):
                     return []
                 good, bad = min(good + max(good // 2, 2), most), good
         except ConvergenceError:  # at C > 0 no more damped modes can be separated
@@ -284,7 +282,8 @@ class _Bench:
         while good - bad > 1:
             middle = (good + bad) // 2
             good, bad = (middle, bad) if rough(middle) <= error else (good, middle)
-        counts = range(good, min(good + COUNTS_TRIED, most + 1))
+        # 3: numbers of modes, from that of the rough error on, whose error is computed in full
+        counts = range(good, min(good + 3, most + 1))
         return self._first_within(error, (make(self.arm, self.rows, count, self.x) for count in counts), "modal")
 
     def _measured(self, model: PartialFractions, method: Reduction, note: str = "") -> ReducedModel:
@@ -305,6 +304,7 @@ def first_mode_lacking(model: PartialFractions) -> tuple[int, float]:
     """Return the number and undamped frequency [rad/s] of the arm's first flexible mode that the model lacks."""
     table = modes(model.arm, model.index.size + 1)
     omega = table.natural_frequency[table.index > 0]
-    has = (abs(model.natural_frequency[:, None] - omega) <= POLE_IS_MODE * omega).any(axis=0)
+    # 1e-6: relative gap within which a pole of the model is a mode of the arm
+    has = (abs(model.natural_frequency[:, None] - omega) <= 1e-6 * omega).any(axis=0)
     first = int(np.argmin(has))
     return first + 1, float(omega[first])

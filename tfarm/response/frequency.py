@@ -36,7 +36,6 @@ from tfarm.spectrum import modes
 from .transfer import TransferFunction, transfer
 
 BAND_POINTS = 100  # of the error, even in ln w
-RIGHT_DIGITS = 30  # of the reference value: twice those of float64
 
 
 def worst_error(arm: Arm, output: str, band: tuple[float, float]) -> float | None:
@@ -52,14 +51,14 @@ def worst_error(arm: Arm, output: str, band: tuple[float, float]) -> float | Non
     errors = []
     for point, value, slope in zip(s, values, slopes, strict=True):
         with suppress(CertificationError, ConvergenceError):  # a zero of G, without a relative error
-            parts = zip(G.digits(complex(point), RIGHT_DIGITS), (value.real, value.imag), strict=True)
+            # 30 of the reference value: twice those of float64
+            parts = zip(G.digits(complex(point), 30), (value.real, value.imag), strict=True)
             off = complex(*(float(Fraction(exact) - Fraction(float(part))) for exact, part in parts))
             errors.append(float(abs(off) / (abs(value) + abs(point * slope))))
     return max(errors, default=None)
 
 
 HERTZ = 2 * math.pi  # rad/s
-ZERO_ON_AXIS = 1e-13  # of |s|: rounding of Re s of a zero on the axis, for an elastic link
 LEAST = 1e-9  # of |G|: the least rise and fall of a peak, above rounding
 ROUNDING = 1e-14  # relative error of a value, over |s/(s - p)| of the nearest pole or zero p
 HALVINGS = 40  # of an interval of the grid, at most: to the spacing of float64 numbers
@@ -169,10 +168,8 @@ ZEROS_IN = Quantity(
 BODE_BAND = "two frequencies in rad/s, the lower first, at most 30 decades apart: (1.0, 1000.0)"  # the expected form
 RESONANCES_SHOWN = 10  # flexible modes in the range, by default
 EVEN_PER_DECADE = 120  # points of the even grid
-PER_ROOT_DECADE = 12  # points for each decade of distance, on each side of a pole or zero
 NEAREST = 1e-6  # relative distance of the nearest point to a root on the axis
 AXIS_SHARE = 1e-12  # |Re s|/|s| below which a root is on the imaginary axis
-COINCIDE = 1e-9  # relative distance below which a pole and a zero cancel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -232,7 +229,8 @@ class Bode:
         """The zeros of the upper half-plane, without rounding of Re s on the axis."""
         zeros = self.zeros
         if self.arm.has_elastic_link:
-            zeros = np.where(abs(zeros.real) < ZERO_ON_AXIS * abs(zeros), 1j * zeros.imag, zeros)
+            # 1e-13 of |s|: rounding of Re s of a zero on the axis, for an elastic link
+            zeros = np.where(abs(zeros.real) < 1e-13 * abs(zeros), 1j * zeros.imag, zeros)
         return list(map(self._root, itertools.repeat("zero"), zeros.tolist(), self.at_zeros.tolist()))
 
     def _root(self, kind: str, s: complex, size: float) -> Root:
@@ -369,7 +367,8 @@ def without_cancelled(poles: Complex, zeros: Complex) -> tuple[Complex, Complex]
     """Return poles and zeros without the pairs that cancel."""
     kept_poles, kept_zeros = list(poles), list(zeros)
     for pole in poles:
-        for zero in [zero for zero in kept_zeros if abs(zero - pole) <= COINCIDE * abs(pole)][:1]:
+        # 1e-9: relative distance below which a pole and a zero cancel
+        for zero in [zero for zero in kept_zeros if abs(zero - pole) <= 1e-9 * abs(pole)][:1]:
             kept_poles.remove(pole)
             kept_zeros.remove(zero)
     return np.array(kept_poles, complex), np.array(kept_zeros, complex)
@@ -395,7 +394,8 @@ def _around(root: complex) -> Real:
     nearest = NEAREST * centre if on_axis else abs(root.real) / 20
     if nearest >= reach:
         return np.array([centre])
-    count = 2 + math.ceil(PER_ROOT_DECADE * math.log10(reach / nearest))
+    # 12 points for each decade of distance, on each side of a pole or zero
+    count = 2 + math.ceil(12 * math.log10(reach / nearest))
     steps = np.geomspace(nearest, reach, count)
     sides = np.r_[centre - steps, centre + steps]
     return sides if on_axis else np.r_[sides, centre]

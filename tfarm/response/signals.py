@@ -24,8 +24,6 @@ from tfarm.exact.values import free_outputs
 from tfarm.records import read_only, record
 from tfarm.schema import Quantity
 
-GRIDS_KEPT = 24  # sets of points whose values are cached
-
 
 @dataclass(frozen=True)
 @record
@@ -66,7 +64,8 @@ class Signals:
         key, kept = (s.shape, s.tobytes()), self._kept
         found = kept.pop(key, None) or read_only(self.parts(s))
         kept[key] = found  # the last one is the latest
-        if len(kept) > GRIDS_KEPT:
+        # 24: sets of points whose values are cached
+        if len(kept) > 24:
             del kept[next(iter(kept))]
         return found
 

@@ -36,7 +36,6 @@ from .table import Modes, first_frequency, modes
 
 COMPANY = 6  # modes named beyond the list: a box may end below them
 MOST_MODES = 300  # of a damped table
-OFF_DISC = 1e-12  # largest distance of a listed eigenvalue from its disc, of its size (more near its partner)
 SLOWEST, REAL_POINTS = 1e-6, 300  # of the lowest frequency, and number: points of the negative real axis
 DRIVE_PARTS = {
     "friction": "hub friction",
@@ -44,9 +43,7 @@ DRIVE_PARTS = {
     "lag": "electrical pole",
 }  # parts that may determine a zero
 NOT_ASSIGNED = "not assigned"
-LEAST_INFLUENCE = 0.3  # |d ln s/d ln p| of the part p of an eigenvalue's origin: 1/2 for two parts
 PART_STEP = Fraction(1, 10_000)  # of a part, for differences: float64 has D to 1e-15 of its terms
-PLAIN_SHARE = 0.2  # largest distance of an eigenvalue from its frequency, in distances to the next one
 
 
 class Unassigned(NamedTuple):
@@ -119,7 +116,8 @@ class DampedModes:
             for zero, disc in zip(wanted.tolist(), discs[-1], strict=True):
                 apart = max(abs(pair[0] - pair[-1]) if np.isfinite(pair[-1]) else abs(zero), LEAST_SIZE)
                 away = abs(complex(float(disc.re), float(disc.im)) - zero)
-                if away > float(disc.radius) + OFF_DISC * abs(zero) * max(1.0, abs(zero) / apart):
+                # 1e-12: largest distance of a listed eigenvalue from its disc, of its size (more near its partner)
+                if away > float(disc.radius) + 1e-12 * abs(zero) * max(1.0, abs(zero) / apart):
                     raise CertificationError(
                         f"next to {zero:.12g} 1/s lies {disc.re} + {disc.im}i, not the eigenvalue listed"
                     )
@@ -257,7 +255,8 @@ def _plainly(omega: Real, mode: int, found: Complex, free: Complex) -> complex |
     start, near = 1j * omega[mode], complex(ringing[np.argmin(abs(ringing - 1j * omega[mode]))])
     rest = found[found != near]
     apart = [*abs(np.delete(omega, mode) - omega[mode]), *abs(rest - near), *abs(rest - start)]
-    return near if abs(near - start) < PLAIN_SHARE * min(apart) else None
+    # 0.2: largest distance of an eigenvalue from its frequency, in distances to the next one
+    return near if abs(near - start) < 0.2 * min(apart) else None
 
 
 def origins_of(k: System, s: Complex) -> list[str]:
@@ -276,7 +275,8 @@ def origins_of(k: System, s: Complex) -> list[str]:
             larger = k.drive._replace(**{part: getattr(k.drive, part) * (1 + PART_STEP)})
             there = function_of(replace(k, drive=larger))(s)
             change = there.value * np.exp(there.scale - here.scale) - here.value
-            is_large = abs(change / (here.slope * s)) > LEAST_INFLUENCE * PART_STEP
+            # 0.3: |d ln s/d ln p| of the part p of an eigenvalue's origin: 1/2 for two parts
+            is_large = abs(change / (here.slope * s)) > 0.3 * PART_STEP
             for n in np.flatnonzero(is_large).tolist():
                 found[n].append(DRIVE_PARTS[part])
     return [" and ".join(names) or NOT_ASSIGNED for names in found]

@@ -43,10 +43,6 @@ class Counter:
 
 
 MOST_AXIS_BITS = 40_000  # of working precision: a root that needs more is double
-BITS_A_DIGIT, SPARE_BITS = 3.33, 80  # log2 10, rounded up; and beyond the digits, for cancellation
-SECOND_START = 50  # equal bits of the two first points of a secant
-CLOSE_BY = 36  # equal bits of a root and its start: a simple root in float64 has more
-AXIS_STEPS = 40  # of the secant, at most: each has 1.6 times the digits
 
 
 def real_waves(a: Ball, b: Ball, g: Ball, S: Ball) -> tuple[tuple[Ball, ...], tuple[Ball, ...]]:
@@ -171,10 +167,13 @@ class RealAxis:
 
 def secant(axis: RealAxis, omega: float, digits: int) -> Ball | None:
     """Return the root next to omega by the secant method on midpoints; None if it does not converge there."""
-    before, now = flint.arb(omega), flint.arb(omega) * (1 + flint.arb(2) ** -SECOND_START)
+    # 50: equal bits of the two first points of a secant
+    before, now = flint.arb(omega), flint.arb(omega) * (1 + flint.arb(2) ** -50)
     value_before = axis.drive(before).mid()
-    small, near = now * flint.arb(10) ** -(digits + 2), now * flint.arb(2) ** -CLOSE_BY
-    for _ in range(AXIS_STEPS):
+    # 36: equal bits of a root and its start: a simple root in float64 has more
+    small, near = now * flint.arb(10) ** -(digits + 2), now * flint.arb(2) ** -36
+    # 40 of the secant, at most: each has 1.6 times the digits
+    for _ in range(40):
         value = axis.drive(now).mid()
         if value == value_before:
             return now
@@ -189,15 +188,14 @@ def secant(axis: RealAxis, omega: float, digits: int) -> Ball | None:
 
 def axis_precisions(digits: int) -> Iterator[int]:
     """Yield working precisions [bits] for a number of digits, each twice the one before."""
-    bits = int(BITS_A_DIGIT * digits) + SPARE_BITS
+    # 3.33 and 80: log2 10, rounded up; and beyond the digits, for cancellation
+    bits = int(3.33 * digits) + 80
     while bits < MOST_AXIS_BITS:
         yield bits
         bits *= 2
 
 
-CLOSE_SHARE = 1e-3  # of the mean spacing: above it rounding moves neither root by more than a few last units
 PAIR_REACH = 4e-6  # relative width around each of a close pair in float64
-PAIR_BITS = 256  # of working precision, for a double frequency to its last float64 digit
 LISTS_KEPT = 32  # lists of modes in a cache
 ARMS_KEPT = 64  # arms whose single numbers are in the cache
 
@@ -232,7 +230,8 @@ def list_frequencies(systems: Sequence[System], first: int, last: int) -> None:
     found = np.full((len(systems), number.size), np.nan)
     stacked = read_only(np.concatenate(rows)), starts, read_only(np.array(ends))
     list_steps(lowest, last + 1, *stacked, estimate, found)
-    close, near = np.diff(found) * number[1:] < CLOSE_SHARE * found[:, 1:], np.zeros(found.shape, bool)
+    # 1e-3 of the mean spacing: above it rounding moves neither root by more than a few last units
+    close, near = np.diff(found) * number[1:] < 1e-3 * found[:, 1:], np.zeros(found.shape, bool)
     near[:, 1:] = close
     near[:, :-1] |= close
     for j, i in np.argwhere(near):
@@ -247,7 +246,8 @@ def list_frequencies(systems: Sequence[System], first: int, last: int) -> None:
 def _separated(k: System, omega: float, number: int) -> float:
     """Return the frequency of that number next to omega, close to another, by the count in balls."""
     low, high = omega * (1 - PAIR_REACH), omega * (1 + PAIR_REACH)
-    with precision(PAIR_BITS):
+    # 256 of working precision, for a double frequency to its last float64 digit
+    with precision(256):
         axis, count = RealAxis(k), Counter(k)
         while low < (middle := 0.5 * (low + high)) < high:
             below = axis.count(rational(middle))

@@ -15,7 +15,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import DIFFERENCE_STEP, has_slope, quick_characteristics
 from tfarm.exact.compiled import compiled
-from tfarm.exact.layout import Reading, readings
+from tfarm.exact.layout import OF_ELEMENT, ROW, Reading, readings
 from tfarm.exact.sweep import AXIS, fill_free
 from tfarm.exact.system import Segment, System
 from tfarm.records import read_only
@@ -96,7 +96,8 @@ class Damping:
     def __post_init__(self) -> None:
         """Lay the system out without its damping, and the difference that the whole of it makes."""
         still, layout = (readings(k, (), 0.0) for k in (self.k.with_damping(0.0), self.k))
-        self.rows = still.rows, layout.rows - still.rows
+        rows, whole = (each.rows.view((float, len(OF_ELEMENT.split()) + 4)) for each in (still, layout))
+        self.rows = rows, whole - rows
         self.ends = still.ends, layout.ends - still.ends
         self.at_rest, self.points = self.k.at_rest, np.array(self.k.singular)
 
@@ -108,7 +109,7 @@ class Damping:
             self.most_halvings = min(self.most_halvings, 8)
         units = (values * self.level)[:, None]
         found, (rows, of_rows), (ends, of_ends) = guess / units, self.rows, self.ends
-        rows = read_only(rows + values[:, None, None] * of_rows)  # as those of a layout are
+        rows = read_only((rows + values[:, None, None] * of_rows).view(ROW)[..., 0])  # as those of a layout are
         ends = read_only(ends + values[:, None] * of_ends)
         for n, here in enumerate(found):
             _newton(here, rows[n], ends[n], self.at_rest, self.points / values[n])

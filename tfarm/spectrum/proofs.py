@@ -116,13 +116,7 @@ def _text(value: Fraction) -> str:
         return f"{Decimal(value.numerator) / value.denominator:f}"
 
 
-SHORTEST_PIECE = 2.0**-26  # share of a side of the contour: a shorter piece means a zero on it
 MOST_PIECES = 6000  # of one side of a contour, some 10 s of CPU time; the presets need up to 2,000
-CONTOUR_BITS = 96  # of working precision along a contour
-STEP_GROWTH = 1.125  # of a step after a good one; tuned: with 2 every second step was too long
-FIRST_PIECE = 1 / 32  # of a side of the contour, before adaptation: time alone
-BALL_STEPS = 40  # of Newton's method on middles of balls, at most: each doubles the digits
-DIGITS_BEYOND = 3  # digits of its convergence beyond those of the disc
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +143,8 @@ def proven_count(k: System, box: Box, law: Feedback | None = None) -> int:
         raise CertificationError(f"a box from {box.re_min:g} 1/s on contains the accumulation point -1/C")
     right, left, top = box.re_max, box.re_min, box.im_max
     corners = [complex(right, 0), complex(right, top), complex(left, top), complex(left, 0)]
-    with precision(CONTOUR_BITS):
+    # 96 of working precision along a contour
+    with precision(96):
         turned = flint.arb(0)
         for a, b in pairwise(corners):
             turned += _turning(k, law, point(a), point(b))
@@ -161,7 +156,8 @@ def proven_count(k: System, box: Box, law: Feedback | None = None) -> int:
 
 def _turning(k: System, law: Feedback | None, a: Ball, b: Ball) -> Ball:
     """Return the change of arg D along the side from a to b."""
-    total, start, step, pieces = flint.arb(0), 0.0, FIRST_PIECE, 0
+    # 1 / 32 of a side of the contour, before adaptation: time alone
+    total, start, step, pieces = flint.arb(0), 0.0, 1 / 32, 0
     here, value = a, characteristic_over(k, a, law)
     while start < 1:
         end = min(start + step, 1.0)
@@ -174,12 +170,14 @@ def _turning(k: System, law: Feedback | None, a: Ball, b: Ball) -> Ball:
             )
         if not over.is_finite() or over.contains(0):
             step /= 2
-            if step < SHORTEST_PIECE:
+            # 2.0 ** (-26): share of a side of the contour: a shorter piece means a zero on it
+            if step < 2.0 ** (-26):
                 raise CertificationError(f"a zero lies on the edge of the box, near {complex(here):.6g}")
             continue
         end_value = characteristic_over(k, there, law)
         total += (end_value / value).log().imag
-        start, here, value, step = end, there, end_value, STEP_GROWTH * step
+        # 1.125 of a step after a good one; tuned: with 2 every second step was too long
+        start, here, value, step = end, there, end_value, 1.125 * step
     return total
 
 
@@ -208,14 +206,16 @@ def enclosed(k: System, near: complex, digits: int, law: Feedback | None = None)
 def _newton(k: System, law: Feedback | None, near: complex, digits: int) -> Ball | None:
     """Return the zero by Newton's method on the middles of balls, or None; real starts stay real."""
     s = point(near)
-    for _ in range(BALL_STEPS):
+    # 40 of Newton's method on middles of balls, at most: each doubles the digits
+    for _ in range(40):
         parts = tangent(k, s, flint.arb(0), law)
         if parts is None or parts[1].contains(0):
             return None
         move = (parts[0] / parts[1]).mid()
         s = (s - move).mid()
         s = flint.acb(s.real) if near.imag == 0 else s
-        if abs(move) < abs(s) * rational(Fraction(1, 10 ** (digits + DIGITS_BEYOND))):
+        # 3 digits of its convergence beyond those of the disc
+        if abs(move) < abs(s) * rational(Fraction(1, 10 ** (digits + 3))):
             return s
     return None
 

@@ -51,13 +51,9 @@ from tfarm.records import read_only
 
 _rows, _series = python_of(transition_rows), python_of(transition_series)
 
-GAUSS_POINTS = 16  # of a panel; exact for products of waves over a few radians
-PANEL_WAVES = 4.0  # rad of the fastest wave in a panel, integrated to the last digit
-LEAST_PANELS = 2  # of a segment with slow waves
 DOUBLE = 1e-15  # relative gap under which two frequencies are one, with two modes
 CLOSE_MODES = 1e-5  # relative gap under which rounding would leave two modes not quite orthogonal
 PANELS_AT_ONCE = 2**13  # times modes, each of 4 kB: memory alone
-FIRST_BLOCK = 4  # modes; each next block has twice as many: time alone
 NO_MOTION = 1e-9  # of another motion of the tip or hub: a smaller one is rounding
 AT_HUB, AT_TIP = Place(Fraction(0), "inner"), Place(Fraction(1))
 
@@ -119,7 +115,8 @@ class Shapes:
         """Yield blocks of neighbouring modes with at most `PANELS_AT_ONCE` panels."""
         first = 0
         while first < self.omega.size:
-            last = min(2 * first + FIRST_BLOCK, self.omega.size)
+            # 4 modes; each next block has twice as many: time alone
+            last = min(2 * first + 4, self.omega.size)
             while last > first + 1 and (last - first) * sum(self.part(slice(first, last))._counts) > PANELS_AT_ONCE:
                 last = (first + last) // 2
             yield self.part(slice(first, last))
@@ -161,7 +158,8 @@ class Shapes:
 
     def panels(self) -> Iterator[tuple[Segment, Real, Real]]:
         """Yield each segment, weights of its Gauss points as shares of the whole length, and W, Psi, M, Q there."""
-        nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+        # 16 of a panel; exact for products of waves over a few radians
+        nodes, weights = np.polynomial.legendre.leggauss(16)
         for number, (each, count) in enumerate(zip(self._segments, self._counts, strict=True)):
             shares = ((np.arange(count)[:, None] + (nodes + 1) / 2) / count).ravel()
             yield each, np.tile(weights / 2 / count, count) * float(each.length), self._along(number, shares)
@@ -181,7 +179,9 @@ class Shapes:
         """Numbers of panels of the segments, short against every wave of these modes."""
         S = self.omega.max() ** 2
         waves = [(float(each.g) * S) ** 0.25 + math.sqrt(S * float(each.a + each.b)) for each in self._segments]
-        return [LEAST_PANELS + math.ceil(each / PANEL_WAVES) for each in waves]
+        # 4.0 rad of the fastest wave in a panel, integrated to the last digit
+        # 2 of a segment with slow waves
+        return [2 + math.ceil(each / 4.0) for each in waves]
 
     def _at_axis(self, axis: Real) -> Real:
         """Return Psi, M and Q (3, modes) on the axis, of the state with a condition at each frequency."""
@@ -263,7 +263,7 @@ class Shapes:
 def _of_segment(segment: Segment, omega: Real, ends: Real, x: Real) -> Real:
     """Return W, Psi, M, Q (4, modes, n) at the shares x (modes, n) from the states (4, modes, 2) at both ends."""
     numbers, result = np.empty((2, 3, omega.size), complex), np.empty((4, *x.shape))
-    fill_wave_numbers(1j * omega, read_only(np.array(kernel_row(segment))), numbers)
+    fill_wave_numbers(1j * omega, read_only(kernel_row(segment))[0], numbers)
     units = [float(each) for each in segment.units]
     own = np.array([units[0], 1.0, *units[1:]])[:, None]
     inner, outer = ends[..., 0] * own, ends[..., 1] * own
