@@ -213,50 +213,64 @@ def _searched_once(arm: Arm, theory: Theory, count: int, steps: float, reach: fl
 
 def _searched(undamped: Modes, steps: float, reach: float) -> DampedModes:
     """Return all eigenvalues in a box, assigned to their modes where that is certain."""
-    k, count, function = undamped.system, int(undamped.index.max()), function_of(undamped.system)
-    beyond = modes(undamped.arm, count + COMPANY, theory=undamped.theory).natural_frequency[-COMPANY:]
+    k, arm, theory = undamped.system, undamped.arm, undamped.theory
+    count = int(undamped.index.max())
+    beyond = modes(arm, count + COMPANY, theory=theory).flexible[count:]
     single, every = named(undamped, count + int((k.damping * beyond < reach).sum()), steps)
     pairs, company = every[:count], every[count:]
-    listed = np.concatenate([np.stack([single, np.full(single.size, LOST)], axis=1), pairs])
-    box = complete_box(function, listed, company, k.damping) if np.isfinite(listed[:, 0]).all() else None
-    inside, free = int(box.holds(listed).sum()) if box else 0, single[single.imag != 0]
     lost = np.flatnonzero(np.isnan(pairs[:, 0]))
+    free = single[single.imag != 0]
+    listed = np.concatenate([np.stack([single, np.full(single.size, LOST)], axis=1), pairs])
+    box = None
+    if np.isfinite(listed[:, 0]).all():
+        box = complete_box(function_of(k), listed, company, k.damping)
     if box is None:
-        omega = modes(undamped.arm, count + 1, theory=undamped.theory).natural_frequency[-count - 1 :]
-        starts = np.r_[listed.ravel(), company.ravel(), damped_starts(undamped.arm, omega)]
-        below = listed if not lost.size else listed[:0]  # unknown ones may be above known ones
-        box, found = filled_box(function, below, company, float(omega[-2:].mean()), starts, k.damping)
+        omega = modes(arm, count + 1, theory=theory).flexible
+        starts = np.r_[listed.ravel(), company.ravel(), damped_starts(arm, omega)]
+        # unknown ones may be above known ones
+        below = listed[:0] if lost.size else listed
+        box, found = filled_box(function_of(k), below, company, float(omega[-2:].mean()), starts, k.damping)
         for zeros in (single, pairs):
             zeros[box.holds(zeros) & ~is_among(zeros, found)] = LOST
-        more = found[(found.imag >= 0) & ~is_among(found, np.r_[single, pairs.ravel()])]
-        inside, free = found.size, np.r_[free, more]
-    if free.size:  # zeros of the drive may be in the place of modes
+        free = np.r_[free, found[(found.imag >= 0) & ~is_among(found, np.r_[single, pairs.ravel()])]]
+        inside = found.size
+    else:
+        inside = int(box.holds(listed).sum())
+    # zeros of the drive may be in the place of modes
+    if free.size:
         of_drive = np.reshape([each != NOT_ASSIGNED for each in origins_of(k, pairs.ravel())], pairs.shape).any(axis=1)
-        free, pairs[of_drive] = np.r_[free, pairs[of_drive].ravel()], LOST
+        free = np.r_[free, pairs[of_drive].ravel()]
+        pairs[of_drive] = LOST
     for row in lost.tolist():
-        if (near := _plainly(omega, row, found, free)) is not None:
-            pairs[row], free = [near, near.conjugate()], free[free != near]
-    single = np.where(single.imag == 0, single.real, np.nan)
-    slow = int(bool(single.size) and k.at_rest == 1)
+        near = _plainly(omega, row, found, free)
+        if near is not None:
+            pairs[row] = near, near.conjugate()
+            free = free[free != near]
+    real = single[single.imag == 0].real
     rigid = np.zeros((undamped.index.size - count, 2), complex)
-    rigid[:, 1] = single[0] if slow else 0.0
-    others = tuple(each for each in single[slow:].tolist() if np.isfinite(each))
-    upper = sorted(free[np.isfinite(free) & (free.imag >= 0)].tolist(), key=abs)
-    unassigned = tuple(map(Unassigned, origins_of(k, np.array(upper, complex)), upper))
-    eigenvalues = np.concatenate([rigid, pairs])
-    return DampedModes(undamped, eigenvalues, box, inside + k.at_rest, others=others, unassigned=unassigned)
+    if single.size and k.at_rest == 1:
+        rigid[:, 1] = np.where(single[0].imag == 0, single[0].real, np.nan)
+        real = real[int(single[0].imag == 0) :]
+    upper = sorted(free[free.imag >= 0].tolist(), key=abs)
+    return DampedModes(
+        undamped,
+        np.concatenate([rigid, pairs]),
+        box,
+        inside + k.at_rest,
+        others=tuple(real.tolist()),
+        unassigned=tuple(map(Unassigned, origins_of(k, np.array(upper, complex)), upper)),
+    )
 
 
 def _plainly(omega: Real, mode: int, found: Complex, free: Complex) -> complex | None:
     """Return the free zero of a frequency whose distance is small compared with those to all others, else None."""
-    ringing = free[free.imag > 0]
-    if not ringing.size:
+    start = 1j * omega[mode]
+    near = min(free[free.imag > 0].tolist(), key=lambda zero: abs(zero - start), default=None)
+    if near is None:
         return None
-    start, near = 1j * omega[mode], complex(ringing[np.argmin(abs(ringing - 1j * omega[mode]))])
     rest = found[found != near]
-    apart = [*abs(np.delete(omega, mode) - omega[mode]), *abs(rest - near), *abs(rest - start)]
-    # 0.2: largest distance of an eigenvalue from its frequency, in distances to the next one
-    return near if abs(near - start) < 0.2 * min(apart) else None
+    apart = np.r_[abs(np.delete(omega, mode) - omega[mode]), abs(rest - near), abs(rest - start)]
+    return near if abs(near - start) < 0.2 * apart.min() else None
 
 
 def origins_of(k: System, s: Complex) -> list[str]:

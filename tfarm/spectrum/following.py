@@ -24,7 +24,6 @@ NEWTON_STEPS = 8  # from a close guess: others are followed in shorter steps
 SETTLED = 1e-10  # of its size: the largest last step of a converged zero
 LOST = complex(np.nan, np.nan)
 PAST = 4  # values of the predicting polynomials
-FIRST_STEP = 1e-4  # of the first step: the distance of the value that determines the first slopes
 PLAIN_MOVE = 0.1  # of the distance to the next root: largest distance from the prediction
 
 
@@ -81,16 +80,22 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
     """
     start = start.copy()  # kernels are compiled anew for read-only arrays
     rows = np.full((values.size, start.size), np.nan, complex)
-    rows[0], past, span = start, [(float(values[0]), start)], abs(values[-1] - values[0])
+    rows[0] = start
+    # known values and roots, and the values to come, the next one last, each with its row in the result or 0
+    past = [(float(values[0]), start)]
     ahead = [(float(value), n) for n, value in enumerate(values)][:0:-1]
-    ahead.append((past[0][0] + FIRST_STEP * (ahead[-1][0] - past[0][0]), 0))
-    many, halvings = 1, 0
+    # the distance of the value that determines the first slopes is a small share of the first step
+    ahead.append((float(values[0] + 1e-4 * (values[1] - values[0])), 0))
+    many = 1
+    halvings = 0
     # of values predicted at once: 64, with 4 million distances between roots
     most = max(1, min(64, 4_000_000 // start.size**2))
     while ahead:
-        block, (before, last) = ahead[-many:][::-1], past[-1]
+        block = ahead[-many:][::-1]
+        before, last = past[-1]
         at = np.array([value for value, _ in block])
-        guess = predicted(np.array([value for value, _ in past]), np.array([row for _, row in past]), at, last)
+        known, roots = map(np.array, zip(*past, strict=True))
+        guess = predicted(known, roots, at, last)
         found = corrected(family, at, guess, last)
         are_plain = which_plain(guess, found, last, family.singular(at), family.blur)
         good = int(np.argmin(np.r_[are_plain.all(axis=1), False]))
@@ -98,13 +103,14 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
             stray = ~are_plain[0]
             if stray.mean() <= family.alone:
                 good = int(are_alone(family, before, float(at[0]), last, found[0], stray))
-            if not good and abs(at[0] - before) > family.least_step * span:
+            if not good and abs(at[0] - before) > family.least_step * abs(values[-1] - values[0]):
                 ahead.append(((before + float(at[0])) / 2, 0))
                 halvings += 1
                 if halvings > family.most_halvings:
                     raise ConvergenceError(f"branches are not separable beyond {before:.10g}", past[-1], stray)
             elif not good:
-                near, good = assigned(family, float(at[0]), guess[0]), 1
+                good = 1
+                near = assigned(family, float(at[0]), guess[0])
                 # no root jumps by half its size
                 found = np.where((abs(near - last) > 0.5 * abs(last)) & (last != 0), np.nan, near)[None]
         many = min(2 * many, most) if good == len(block) else max(1, good)
