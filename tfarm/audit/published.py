@@ -148,11 +148,10 @@ def computed(case: Case) -> NDArray[np.float64]:
     """The exact solution's numbers for a column, in its quantity."""
     link, count = case.arm.link, len(case.printed)
     table = modes(case.arm, count, theory=case.theory)
-    omega, hertz = table.natural_frequency[-count:], table.natural_frequency_hz[-count:]
-    reduced = omega * link.length**2 * np.sqrt(link.rhoA / link.EI)
+    reduced = table.flexible * link.length**2 * np.sqrt(link.rhoA / link.EI)
     return {
-        "frequency [Hz]": hertz,
-        "frequency [rad/s]": omega,
+        "frequency [Hz]": table.natural_frequency_hz[-count:],
+        "frequency [rad/s]": table.flexible,
         "w L^2 (rhoA/EI)^(1/2)": reduced,
         "L (w^2 rhoA/EI)^(1/4)": np.sqrt(reduced),
     }[case.quantity]

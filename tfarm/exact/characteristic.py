@@ -155,13 +155,13 @@ class WideSweep(Sweep):
 
     def _at_mark(self, p: Plane) -> Plane:
         grown = self.phase.exp()
-        return p[0] * grown, p[1] * grown, p[2] * grown, p[3] * grown, p[4] * grown
+        return tuple(each * grown for each in p)
 
     @cached_property
     def states(self) -> dict[Place, Row]:
         """W, Psi, M and Q at each mark, in the scale of the plane at the axis."""
         shrunk, full = (-self.phase).exp(), super().states
-        return {n: (W * shrunk, Psi * shrunk, M * shrunk, Q * shrunk) for n, (W, Psi, M, Q) in full.items()}
+        return {place: tuple(each * shrunk for each in state) for place, state in full.items()}
 
     def _functions(self, z_sum: Series, z_product: Series) -> tuple[Series, ...]:
         """Return F0..F3 as truncated power series, with the tail as a ball in every coefficient.
@@ -251,8 +251,8 @@ def _fed_back(sweep: Sweep, law: Feedback | None) -> Any:
         reduce(lambda value, each: value * s + flint.arb(each), reversed(polynomial.coeffs()), 0 * s)
         for polynomial in (law.whole, *law.entries)
     )
-    parts = [p * sweep.output(one) for p, one in zip(entries, law.read.each, strict=True)]
-    return sweep.input * whole + (s * rational(-law.delay)).exp() * sum(parts, 0 * s)
+    fed = sum((p * sweep.output(one) for p, one in zip(entries, law.read.each, strict=True)), 0 * s)
+    return sweep.input * whole + (s * rational(-law.delay)).exp() * fed
 
 
 def feedback(k: System, law: Law, outputs: Sequence[Output], shares: Sequence[float]) -> Feedback:

@@ -27,7 +27,6 @@ from .waves import Row, met
 
 _met = python_of(met)
 LOAD_KINDS = {"force": ("N", Q, (1,)), "moment_pair": ("N m", M, (-1, 1))}  # unit, entry of the state, its jumps
-LOAD_PATTERN = re.compile(r"(force|moment_pair)@([^,]+)(?:,([^,]+))?")
 
 
 class Load(NamedTuple):
@@ -52,7 +51,7 @@ def is_load(text: str) -> bool:
 
 def load_of(text: str, length: float) -> Load:
     """Return the load of force@X or moment_pair@X1,X2, X [m] from the clamp.  Raises ParameterError for others."""
-    found = LOAD_PATTERN.fullmatch(text.replace(" ", ""))
+    found = re.fullmatch(r"(force|moment_pair)@([^,]+)(?:,([^,]+))?", text.replace(" ", ""))
     remedy = "force@X or moment_pair@X1,X2, with X in m from the clamp, such as force@0.3"
     try:
         places = [float(each) for each in found.groups()[1:] if each] if found else []
@@ -75,9 +74,8 @@ def loaded_value(chain: System, load: Load, wanted: Output, s: complex, x: float
     layouts = [Layout(chain, tuple(dict.fromkeys((at, one.place or at)))) for at in loads]
 
     def attempt() -> Ball | None:
-        sweeps = [_Loaded(layout, point(s)) for layout in layouts]
-        found = [sweep.quantity(one, at, jump) for sweep, at in zip(sweeps, loads, strict=True)]
-        value = sum(sign * part for sign, part in zip(signs, found, strict=True))
+        parts = zip(signs, layouts, loads, strict=True)
+        value = sum(sign * _Loaded(layout, point(s)).quantity(one, at, jump) for sign, layout, at in parts)
         value = value * point(s) ** one.power / (1 + rational(one.C) * point(s))
         value = value * rational(one.unit * chain.drive.unit * unit)
         return known(value, PROVEN_BITS) if value.is_finite() else None
@@ -93,7 +91,7 @@ class _Loaded(Sweep):
         f = super()._beyond(element, f)
         if isinstance(element, Spring):
             stiffness = self.s * element.damping + element.stiffness
-            return f[0] / stiffness, f[1] / stiffness, f[2] / stiffness, f[3] / stiffness
+            return tuple(each / stiffness for each in f)
         return f
 
     def quantity(self, one: Reading, load: Place, jump: int) -> Ball:

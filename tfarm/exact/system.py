@@ -23,8 +23,8 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Arm, Attachment, Link, RotarySpring, Theory
-from tfarm.arrays import Real
+from tfarm.arm import THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Arm, Link, RotarySpring, Theory
+from tfarm.arrays import Complex, Real
 from tfarm.errors import must_be_known
 from tfarm.records import record
 
@@ -144,6 +144,10 @@ class Drive(NamedTuple):
         """B_0 and B_1."""
         return Fraction(self.turns), self.lag * self.turns
 
+    def at(self, s: Complex) -> tuple[Complex, Complex]:
+        """Return the sums of A_n s^n and of B_n s^n."""
+        return tuple(np.polyval(np.array(each[::-1], float), s) for each in (self.of_angle, self.of_moment))  # type: ignore[return-value]
+
 
 @lru_cache(maxsize=64)  # a proof needs the same three at every step of its contour
 def end_condition(inertia: Inertia) -> tuple[Fraction, Fraction, Fraction]:
@@ -200,11 +204,6 @@ def ratio(above: Iterable[float], below: Iterable[float] = ()) -> Fraction:
 def stiffness_of(link: Link) -> Fraction:
     """Return E I [N m^2] of a link, exact."""
     return ratio((link.youngs_modulus, link.section.second_moment))
-
-
-def scaled_inertia(value: float, unit: Fraction) -> Inertia:
-    """Return a mass or inertia in that unit, or inf."""
-    return math.inf if math.isinf(value) else Fraction(value) * unit
 
 
 SYSTEMS_KEPT = 64  # arms whose exact numbers are cached: one page needs those of one arm some thousand times
@@ -335,14 +334,18 @@ def system_of(arm: Arm, theory: Theory | None = None) -> System:
     at_clamp += _springs(arm.joint, rotation)
     bodies = []
     for each in reversed(arm.attachments):
-        body = _body(each, translation, rotation)
-        if not (each.x or arm.hub.radius):  # on the axis, which is fixed, a spring has no effect
-            body = body._replace(stiffness=ZERO)
+        body = Body(
+            mass=Fraction(each.mass) * translation,
+            inertia=Fraction(each.inertia) * rotation,
+            # on the axis, which is fixed, a spring has no effect
+            stiffness=Fraction(each.stiffness if each.x or arm.hub.radius else 0) * translation,
+            rotational_stiffness=Fraction(each.rotational_stiffness) * rotation,
+        )
         bodies.append((min(Fraction(each.x) / unit_length, ONE), BODY, body))
     return System(
         elements=cut([*placed([*at_tip, *map(segment, reversed(arm.links)), *at_clamp]), *bodies]),
-        tip_mass=scaled_inertia(arm.payload.mass, translation),
-        tip_inertia=scaled_inertia(arm.payload.inertia, rotation),
+        tip_mass=_inertia(arm.payload.mass, translation),
+        tip_inertia=_inertia(arm.payload.inertia, rotation),
         drive=hub_drive(arm, rotation),
         radius=Fraction(arm.hub.radius) / unit_length,
         offset=Fraction(arm.payload.offset) / unit_length,
@@ -378,14 +381,9 @@ def hub_drive(arm: Arm, rotation: Fraction) -> Drive:
     return drive
 
 
-def _body(each: Attachment, translation: Fraction, rotation: Fraction) -> Body:
-    """Return an attachment as an element."""
-    return Body(
-        mass=Fraction(each.mass) * translation,
-        inertia=Fraction(each.inertia) * rotation,
-        stiffness=Fraction(each.stiffness) * translation,
-        rotational_stiffness=Fraction(each.rotational_stiffness) * rotation,
-    )
+def _inertia(value: float, unit: Fraction) -> Inertia:
+    """Return a mass or inertia in that unit, or inf."""
+    return value if math.isinf(value) else Fraction(value) * unit
 
 
 def _springs(spring: RotarySpring, rotation: Fraction) -> list[Element]:
@@ -398,7 +396,5 @@ def _springs(spring: RotarySpring, rotation: Fraction) -> list[Element]:
 
 def shear_flexibility(k: System, x: Real) -> Real:
     """Return E I/(kappa G A L^2) at the shares x (1-D), E I and L those of the chain: W' = Psi + that Q."""
-    inner = list(reversed(k.segments))
-    edges = np.cumsum([float(each.length) for each in inner])[:-1]
-    own = np.array([float(each.of_chain[3]) for each in inner])
-    return np.asarray(own[np.searchsorted(edges, x, side="right")])
+    lengths, own = np.array([(each.length, each.of_chain[3]) for each in reversed(k.segments)], float).T
+    return np.asarray(own[np.searchsorted(np.cumsum(lengths)[:-1], x, side="right")])

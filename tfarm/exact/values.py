@@ -30,7 +30,7 @@ from .layout import Layout, Reading, readings
 from .outputs import Output
 from .series import constant_of, expansion_at_zero
 from .sweep import AXIS, fill_free
-from .system import Place, System
+from .system import ONE, ZERO, Place, System
 
 AT_A_POLE = 4 * float(np.finfo(float).eps)  # of |s|: the distance of a pole within which no digit is right
 _Found = TypeVar("_Found")
@@ -78,8 +78,8 @@ def free_slopes(chain: System, wanted: Sequence[Output], s: Complex, x: float) -
     layout = readings(chain, tuple(wanted), x)
     here = free_of(layout, s)
     radius = SLOPE_RADIUS * np.maximum(abs(s), 1e-150) / np.maximum(1.0, abs(here.scale))
-    for C in {each.damping for each in chain.segments if each.damping}:
-        radius = np.minimum(radius, CLEAR_OF_SINGULAR * abs(s + 1.0 / C))
+    for each in chain.singular:
+        radius = np.minimum(radius, CLEAR_OF_SINGULAR * abs(s - each))
     circle = free_of(layout, (s[:, None] + radius[:, None] * SLOPE_CIRCLE).ravel())
     scales = circle.scale.reshape(-1, SLOPE_CIRCLE.size)
     here = here._replace(scale=np.where(np.isfinite(here.scale), here.scale, scales[:, 0]))
@@ -109,10 +109,8 @@ def free_fields(
     """
     places = tuple(places)
     if places not in chain.kept:
-        zero, one = Fraction(0), Fraction(1)
-        each = [Reading(place, field, zero, 0, one) for place in places for field in range(4)]
-        layout = Layout(chain, tuple(dict.fromkeys(places)), (*each, Reading(None, -1, one, 0, one)))
-        chain.kept[places] = layout
+        each = [Reading(place, field, ZERO, 0, ONE) for place in places for field in range(4)]
+        chain.kept[places] = Layout(chain, tuple(dict.fromkeys(places)), (*each, Reading(None, -1, ONE, 0, ONE)))
     found, _ = _filled(chain.kept[places], s, np.asarray(read_only(np.ascontiguousarray(axis))))
     return found[2:-1].reshape(len(places), 4, s.size).transpose(1, 2, 0), found[-1], found[1]
 
@@ -128,7 +126,7 @@ def evaluate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float =
     with np.errstate(all="ignore"):
         free = free_outputs(k, wanted, s, x)
         values: Complex = free.outputs / free.drive
-    return _with_care(k, wanted, s, x, values, free.lost, of_slope=False)
+    return _with_care(k, wanted, s, x, values, free.lost)
 
 
 def differentiate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float = 0.0) -> Complex:
@@ -140,7 +138,13 @@ def differentiate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: fl
 
 
 def _with_care(
-    k: System, wanted: Sequence[Output], s: Complex, x: float, values: Complex, lost: NDArray[np.bool_], of_slope: bool
+    k: System,
+    wanted: Sequence[Output],
+    s: Complex,
+    x: float,
+    values: Complex,
+    lost: NDArray[np.bool_],
+    of_slope: bool = False,
 ) -> Complex:
     """Return values, those with lost digits by `value_with_care`."""
     for i in np.flatnonzero(lost | ~np.isfinite(values).all(axis=0)):
@@ -156,7 +160,7 @@ def value_with_care(k: System, wanted: Output, s: complex, x: float = 0.0, *, of
     _refuse_pole(k, wanted, s, x)
     if s == 0:
         return complex(expansion_at_zero(k, wanted, x)[2 + of_slope])
-    value = nearest_float(slope(k, wanted, s, x=x) if of_slope else enclose(k, wanted, s, bits=PROVEN_BITS, x=x))
+    value = nearest_float(slope(k, wanted, s, x) if of_slope else enclose(k, wanted, s, bits=PROVEN_BITS, x=x))
     require(np.isfinite(value), "s", s, f"{wanted.name} is larger than any float64 there; choose another s")
     return value
 
@@ -202,19 +206,19 @@ def enclose(k: System, wanted: Output, s: complex, *, bits: int, x: float = 0.0)
     return certified(bits, lambda: known(output_ball(k, wanted, point(s), x), bits), f"{bits} bits", s)
 
 
-def slope(k: System, wanted: Output, s: complex, *, bits: int = 60, x: float = 0.0) -> Ball:
-    """Return dG/ds at s, by a difference with an error below 2^-bits of the larger of G/s and dG/ds."""
-    step = rational(Fraction(1, 1 << (2 * bits)))
+def slope(k: System, wanted: Output, s: complex, x: float = 0.0) -> Ball:
+    """Return dG/ds at s, by a difference with `PROVEN_BITS` of the larger of G/s and dG/ds."""
+    step = rational(Fraction(1, 1 << (2 * PROVEN_BITS)))
 
     def attempt() -> Ball | None:
         value, beyond = (output_ball(k, wanted, at, x) for at in (point(s), point(s) * (1 + step)))
         if value is None or beyond is None:
             return None
         difference = (beyond - value) / (step * point(s))
-        is_known = (difference + value / point(s)).rel_accuracy_bits() >= bits or value.is_zero()
+        is_known = (difference + value / point(s)).rel_accuracy_bits() >= PROVEN_BITS or value.is_zero()
         return difference if is_known else None
 
-    return certified(4 * bits, attempt, "derivative", s)
+    return certified(4 * PROVEN_BITS, attempt, "derivative", s)
 
 
 def digits_of(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0) -> tuple[str, str]:

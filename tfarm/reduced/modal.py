@@ -74,7 +74,7 @@ def undamped_residues(table: Modes, wanted: Sequence[Output], k: System, x: floa
     c b, with c the output of the mode and b its hub participation (its root moment where the hub is locked).
     `x` is a share of the length.
     """
-    omega, powers = table.natural_frequency[table.index > 0], np.array([[each.power] for each in wanted])
+    omega, powers = table.flexible, np.array([[each.power] for each in wanted])
     residues, doubtful = end_residues(k, wanted, 1j * omega, x)
     products: Real = (residues * 2j * omega / (1j * omega) ** powers).real
     # 1e-6: relative gap under which only shapes separate two modes
@@ -96,7 +96,7 @@ def end_residues(k: System, wanted: Sequence[Output], p: Complex, x: float = 0.0
         moment, shear, theta = (
             row / float(unit_scale(each, k)) for row, each in zip(here.outputs[-3:], AT_HUB, strict=True)
         )
-        A, B = (np.polyval([float(c) for c in reversed(each)], p) for each in (k.drive.of_angle, k.drive.of_moment))
+        A, B = k.drive.at(p)
         heavy = abs(A) > abs(B)
         balanced = {
             "theta": np.where(heavy, (moment + float(k.radius) * shear) * B / A, theta),
@@ -184,13 +184,12 @@ def modal_model(
     if count == 0:
         index, p, r = index[:0], p[:0], r[:, :0]
     expansion, kept = _at_rest(G, single, table)
-    omega = table.natural_frequency[table.index > 0]
     return ModalModel(
         arm=arm,
         rows=G.rows,
         x=G.x,
         index=index,
-        natural_frequency=np.where(index > 0, omega[index - 1], abs(p[:, 0])),
+        natural_frequency=np.where(index > 0, table.flexible[index - 1], abs(p[:, 0])),
         eigenvalues=p,
         residues=r[:-1],
         rigid=expansion[:, :2],
@@ -241,8 +240,7 @@ def _at_rest(G: TransferFunction, single: Real, table: Modes) -> tuple[Real, NDA
     """
     expansion, kept = G.expansion, np.ones(single.size, np.bool_)
     slowest = abs(single).min(initial=math.inf)
-    first = table.natural_frequency[table.index > 0][0]
-    if G.arm.has_rigid_mode and slowest < NEXT_TO_REST * first:
+    if G.arm.has_rigid_mode and slowest < NEXT_TO_REST * table.flexible[0]:
         expansion = np.c_[expansion[:, :2], without_slow_pole(G.system, G.rows, G.share)]
         kept = abs(single) > slowest
     return expansion, kept
@@ -254,7 +252,7 @@ def _eigenvalues(arm: Arm, table: Modes, reach: float) -> tuple[NDArray[np.int64
     if arm.is_undamped:
         return (
             table.index[flexible],
-            1j * np.outer(table.natural_frequency[flexible], [1, -1]),
+            1j * np.outer(table.flexible, [1, -1]),
             np.array(single_zeros(table)),
         )
     damped = damped_modes(table, steps=NAMING_STEPS if len(table) > LARGE_MODEL else math.inf, reach=reach)

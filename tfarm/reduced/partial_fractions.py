@@ -270,8 +270,7 @@ def distance(w: Real, poles: Real) -> Real:
 
 def frequencies_around(arm: Arm, high: float) -> Real:
     """Return the flexible natural frequencies [rad/s] below `POLES_BEYOND` times `high`, and the next one."""
-    table = modes(arm, modes_below(arm, POLES_BEYOND * high) + 1)
-    return table.natural_frequency[table.index > 0]
+    return modes(arm, modes_below(arm, POLES_BEYOND * high) + 1).flexible
 
 
 def _samples(low: float, high: float, poles: Real) -> Real:

@@ -286,11 +286,10 @@ class Bode:
 def resonant_band(arm: Arm, resonances: int = RESONANCES_SHOWN) -> tuple[float, float]:
     """Return the range [rad/s] from far below the first flexible mode to midway from the last to the next."""
     table = modes(arm, resonances + 1)
-    natural_frequency = table.natural_frequency[table.index > 0]
-    low = natural_frequency[0] / 20
+    low = table.flexible[0] / 20
     decade = 10.0 ** math.floor(math.log10(low))
     start = max(step for step in (decade, 2 * decade, 5 * decade) if step <= low * (1 + 1e-12))
-    return float(start), float(math.sqrt(natural_frequency[-2] * natural_frequency[-1]))
+    return float(start), float(math.sqrt(table.flexible[-2] * table.flexible[-1]))
 
 
 def bode(

@@ -17,11 +17,6 @@ from .damped import MOST_MODES, DampedModes, Unassigned, damped_modes
 from .proofs import Certificate, Disc
 from .table import Modes, compare_theories, hub_locked
 
-LESS_DAMPED = "their damping decreases with frequency, as no segment has damping (C = 0)"
-OF_SHEAR = "shear is undamped in this model, so lightly damped modes exist at ever higher frequency"
-OF_ELASTIC = "segments without damping have lightly damped modes at ever higher frequency"
-OF_BENDING = "in this theory, which leaves out shear, all of them are overdamped from some frequency on"
-ACCUMULATE = "the slow real eigenvalues of overdamped bending modes accumulate at -1/C"
 LOCKED_NOTE = (
     "frequencies with a locked hub, as dry friction mostly locks it after a slew; a measured frequency "
     "near this column indicates a hub at rest"
@@ -195,13 +190,13 @@ def _rows(
     discs: Sequence[Sequence[Disc]] | None,
 ) -> Iterator[ListedMode]:
     """Yield a row for each mode."""
-    locked, rigid = hub_locked(found), int(np.sum(found.index == 0))
-    flexible = int((locked.index > 0).sum())
-    omega: list[Any] = found.frequencies(method).tolist()
-    hertz = (found.frequencies(method) / (2 * math.pi)).tolist()
-    still: list[Any] = locked.natural_frequency[locked.index > 0].tolist()
+    locked, rigid = hub_locked(found), len(found) - found.flexible.size
+    frequencies = found.frequencies(method)
+    omega: list[Any] = frequencies.tolist()
+    hertz = (frequencies / (2 * math.pi)).tolist()
+    still: list[Any] = locked.flexible.tolist()
     if digits is not None and digits > DOUBLE_DIGITS:
-        omega, still = found.digits(digits), locked.digits(digits)[-flexible:]
+        omega, still = found.digits(digits), locked.digits(digits)[-locked.flexible.size :]
     brackets = [(None, None)] * len(found) if proof is None else [*[(None, None)] * rigid, *proof.brackets]
     theories, sensitivity = compare_theories(found), found.sensitivity
     enclosures = _discs_by_row(found, damped, discs)
@@ -233,21 +228,26 @@ def _discs_by_row(
     found: Modes, damped: DampedModes | None, discs: Sequence[Sequence[Disc]] | None
 ) -> list[tuple[Disc, ...] | None]:
     """Return the discs of each mode, also of the rigid body with friction."""
-    rigid = int(np.sum(found.index == 0))
     if damped is None or discs is None:
         return [None] * len(found)
+    each: list[tuple[Disc, ...] | None] = list(map(tuple, discs))
     flexible = int(np.sum(damped.index > 0))
-    alone = [tuple(each) for each in discs[flexible : flexible + damped.single.size - len(damped.others)]]
-    rows: list[tuple[Disc, ...] | None] = [*alone] if alone else [None] * rigid
-    rows += [tuple(each) for each in discs[:flexible]]
+    alone = each[flexible : flexible + damped.single.size - len(damped.others)]
+    rows = (alone or [None] * (len(found) - found.flexible.size)) + each[:flexible]
     return rows + [None] * (len(found) - len(rows))
 
 
 def beyond_the_box(arm: Arm) -> str:
     """Return a description of the eigenvalues of a damped arm beyond any box."""
     if arm.has_elastic_link:
-        return LESS_DAMPED
+        return "their damping decreases with frequency, as no segment has damping (C = 0)"
     dampings = {link.damping for link in arm.links}
-    light = OF_SHEAR if arm.theory in WITH_SHEAR else OF_BENDING if all(dampings) else OF_ELASTIC
     most = " of the most damped segment" * (len(dampings) > 1)
-    return f"{light}, and {ACCUMULATE}{most}, {-1 / arm.damping:.6g} 1/s"
+    if arm.theory in WITH_SHEAR:
+        light = "shear is undamped in this model, so lightly damped modes exist at ever higher frequency"
+    elif all(dampings):
+        light = "in this theory, which leaves out shear, all of them are overdamped from some frequency on"
+    else:
+        light = "segments without damping have lightly damped modes at ever higher frequency"
+    slow = f"the slow real eigenvalues of overdamped bending modes accumulate at -1/C{most}, {-1 / arm.damping:.6g} 1/s"
+    return f"{light}, and {slow}"

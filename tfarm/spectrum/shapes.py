@@ -332,11 +332,10 @@ def mode_field(k: System, s: complex, quantity: str, x: NDArray[np.float64]) -> 
     fields, theta = fields * back, complex((angle * back)[0])
     _, _, M, Q = fields[:, 0, -1]
     M = M + float(k.radius) * Q
-    lag = 1.0 + float(k.drive.lag) * s
-    A = np.polyval([float(each) for each in reversed(k.drive.of_angle)], s)
-    if k.drive.turns and abs(A) > abs(lag):  # the balance of a heavy hub, for the digits of M
-        theta = M * lag / A
-    product = complex(slope * (theta / lag if k.drive.turns else M))
+    A, B = k.drive.at(at)[0][0], k.drive.at(at)[1][0]
+    if abs(A) > abs(B) > 0:  # the balance of a heavy hub, for the digits of M
+        theta = M * B / A
+    product = complex(slope * (theta / B if k.drive.turns else M))
     if product == 0 or not np.isfinite(product):
         raise ConvergenceError(f"the mode at {s:.6g} 1/s is double, or the hub is at a node of it", s, slope)
     values = fields[("W", "Psi", "M").index(quantity), 0, :-1]
