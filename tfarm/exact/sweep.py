@@ -253,13 +253,14 @@ def drive_at(s: complex, segment: Any, ends: Any, theta: complex, M: complex) ->
 
 
 @compiled
-def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, lost: Any) -> None:
+def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, lost: Any, per_input: bool) -> None:
     """Compute drive, scale and each output of the free response at s (1-D), rows of `found`; mark lost digits.
 
     It satisfies axis . (W, Psi, M, Q) = 0 on the hub's axis, W = 0 for `AXIS`; `axis` (4, n) has one column, or one for
-    each point.  A row of `table` is an output (`layout.Reading`): the row of its place (or -1), its field, weight of
-    theta, power of s, unit, C, weights of s theta and of the drive.  Digits are lost where two waves of a segment are
-    nearly one, where an output is a small difference of fast waves, and where the drive is one, near a pole.
+    each point.  Outputs are those of a unit input with `per_input`, else times e^{-scale}.  A row of `table` is an
+    output (`layout.Reading`): the row of its place (or -1), its field, weight of theta, power of s, unit, C, weights of
+    s theta and of the drive.  Digits are lost where two waves of a segment are nearly one, where an output is a small
+    difference of fast waves, and where the drive is one, near a pole.
     """
     differs, outermost = False, 0
     for o in range(len(table)):
@@ -267,7 +268,8 @@ def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, l
     while outermost < len(rows) and rows[outermost].kind != MARK:
         outermost += 1
     work, segment, values = _work(len(rows)), innermost(rows), np.empty((1 + len(table), BLOCK), np.complex128)
-    points, lost_here = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.bool_)
+    points, over, lost_here = np.empty(BLOCK, np.complex128), np.ones(BLOCK, np.complex128), np.empty(BLOCK, np.bool_)
+    small = 1.0 / max(1.0, ends[OF_ANGLE + 1], ends[OF_ANGLE + 2])  # against overflow of squares of a heavy hub's drive
     for first in range(0, s.size, BLOCK):
         n = min(BLOCK, s.size - first)
         for i in range(BLOCK):
@@ -278,10 +280,13 @@ def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, l
             for j in range(4):
                 work.back[BLOCK * j + i] = axis[j, at]
         _drive(points, segment, ends, work.planes[len(rows)], values[0], lost_here)
+        if per_input:
+            for i in range(BLOCK):
+                over[i] = times(reciprocal(times(values[0, i], small)), small)
         if len(table):
             _go_back(points, rows, outermost, work, differs, lost_here)
         for o in range(len(table)):
-            _output(points, table[o], work, values[0], values[1 + o], lost_here)
+            _output(points, table[o], work, values[0], over, values[1 + o], lost_here)
         for i in range(n):
             found[0, first + i], found[1, first + i] = values[0, i], work.scale[i]
             lost[first + i] = lost_here[i]
@@ -307,7 +312,7 @@ def _drive(points: Any, segment: Any, ends: Any, plane: Any, drive: Any, lost: A
 
 
 @inlined
-def _output(points: Any, want: Any, work: Work, drive: Any, value: Any, lost: Any) -> None:
+def _output(points: Any, want: Any, work: Work, drive: Any, over: Any, value: Any, lost: Any) -> None:
     """Compute an output of the table at every point of a block; digits are lost where it is a small difference.
 
     Until its power of s it is times 2^100: at the tip W would underflow where s^2 W does not.
@@ -336,4 +341,6 @@ def _output(points: Any, want: Any, work: Work, drive: Any, value: Any, lost: An
                     value[i] = times(states[LIFT + field + i], lift)
                 else:
                     lost[i] = lost[i] or magnitude(value[i]) < SMALL_DIFFERENCE * size
+    for i in range(BLOCK):
+        value[i] *= over[i]
     finish(points, value, int(want[3]), want[4] / lift, want[5], value)

@@ -66,10 +66,13 @@ def free_of(layout: Layout, s: Complex) -> Free:
     return Free(found[0], found[2:], found[1], lost)
 
 
-def _filled(layout: Layout, s: Complex, axis: Real = AXIS) -> tuple[Complex, NDArray[np.bool_]]:
-    """Return drive, scale and outputs (rows), and where digits are lost."""
+def _filled(
+    layout: Layout, s: Complex, axis: Real = AXIS, *, per_input: bool = False
+) -> tuple[Complex, NDArray[np.bool_]]:
+    """Return drive, scale and outputs (rows), for a unit input if `per_input`, and where digits are lost."""
     found, lost = np.empty((2 + len(layout.each), s.size), complex), np.empty(s.size, bool)
-    fill_free(np.ascontiguousarray(s, dtype=complex), layout.rows, layout.ends, axis, layout.table, found, lost)
+    s = np.ascontiguousarray(s, dtype=complex)
+    fill_free(s, layout.rows, layout.ends, axis, layout.table, found, lost, per_input)
     return found, lost
 
 
@@ -124,9 +127,11 @@ def evaluate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float =
     Raises ParameterError at a pole, naming it.
     """
     with np.errstate(all="ignore"):
-        free = free_outputs(k, wanted, s, x)
-        values: Complex = free.outputs / free.drive
-    return _with_care(k, wanted, s, x, values, free.lost)
+        # of a chain by NumPy's division, which leaves no imaginary part where there is none but for rounding
+        is_link = len(k.elements) == 1
+        found, lost = _filled(readings(k, tuple(wanted), x), s, per_input=is_link)
+        values: Complex = found[2:] if is_link else found[2:] / found[0]
+    return _with_care(k, wanted, s, x, values, lost)
 
 
 def differentiate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float = 0.0) -> Complex:

@@ -21,7 +21,7 @@ from tfarm.exact.system import Segment, System
 from tfarm.records import read_only
 
 from .box import REAL_SHARE, Function, newton
-from .following import LOST, NEWTON_STEPS, SETTLED, follow
+from .following import LOST, NEWTON_STEPS, SETTLED, follow, settled
 from .table import Modes, modes
 
 HALVINGS = (250, *[80] * 8)  # of steps, after which stray branches are lost and the others followed
@@ -52,7 +52,7 @@ def _newton(s: Any, rows: Any, ends: Any, at_rest: int, singular: Any) -> None:
                 near = min(near, abs(1.0 - here / each))
             h[i] = DIFFERENCE_STEP * max(abs(here) * near, 1e-300)
             at[3 * i], at[3 * i + 1], at[3 * i + 2] = here, here + h[i], here - h[i]
-        fill_free(at[: 3 * count], rows, ends, AXIS, NO_OUTPUT, found, lost)
+        fill_free(at[: 3 * count], rows, ends, AXIS, NO_OUTPUT, found, lost, False)
         kept = 0
         for i in range(count):
             n, j = moving[i], 3 * i
@@ -170,7 +170,7 @@ def named(undamped: Modes, count: int, steps: float) -> tuple[Complex, Complex]:
         except ConvergenceError as lost:
             (share, start), stray = lost.best, lost.residual
             start = np.where(stray, LOST, start)
-    found = family.near(np.ones(1), start[None])[0] / family.level if not ends else np.full(start.size, LOST)
+    found = np.full(start.size, LOST) if ends else settled(function_of(k), start / family.level)
     with np.errstate(invalid="ignore"):  # of lost ones
         found[~has_slope(k, found)] = LOST  # so far out that Newton's method converges anywhere
     again = np.triu(abs(found[:, None] - found) <= REAL_SHARE * abs(found), 1).any(axis=0)
