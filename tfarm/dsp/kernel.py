@@ -10,9 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm.chain import Sampling
+from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.dsp.plant import Plant, held_amplitude
 from tfarm.exact.compiled import compiled, inlined
+
+CONSUMER = Consumer(
+    "simulate",
+    acts=(
+        "reference", "anti-alias filter", "encoder", "hub rate", "amplifier steps", "amplifier range", "law",
+        "arithmetic", "DAC steps", "DAC range", "torque limit", "hold", "delay", "hub damping", "plant", "volts",
+    ),
+)  # fmt: skip
 
 ANGLE, RATE, MOMENT = 0, 1, 2  # of the outputs, which begin with what is fed back (`tfarm.arm.FED_BACK`)
 ENCODER, AMPLIFIER, DAC = 0, 1, 2  # rows of the quantisers, and places in `saturated`
@@ -102,46 +111,44 @@ class Electronics(NamedTuple):
 
 
 @inlined
-def reading(o: int, rates: Any, weights: Any, amplitude: Any, rigid: Any) -> float:
+def reading(o: int, model: Any, state: Any) -> float:
     """Output o without its static remainder."""
-    value = rates[o, DOUBLY] * rigid[DOUBLY] + rates[o, ONCE] * rigid[ONCE]
-    for i in range(amplitude.size):
-        value += weights[o, i].real * amplitude[i].real - weights[o, i].imag * amplitude[i].imag
+    value = model.rates[o, DOUBLY] * state.rigid[DOUBLY] + model.rates[o, ONCE] * state.rigid[ONCE]
+    for i in range(state.amplitude.size):
+        weight, amplitude = model.weights[o, i], state.amplitude[i]
+        value += weight.real * amplitude.real - weight.imag * amplitude.imag
     return value
 
 
 @compiled
-def read_outputs(weights: Any, rates: Any, static: Any, amplitude: Any, rigid: Any, torque: float, out: Any) -> None:
+def read_outputs(model: Any, state: Any, torque: float, out: Any) -> None:
     """The outputs under the torque that acts now."""
     for o in range(out.size):
-        out[o] = reading(o, rates, weights, amplitude, rigid) + static[o] * torque
+        out[o] = reading(o, model, state) + model.static[o] * torque
 
 
 @compiled
-def advance(
-    turn: Any, push: Any, piece: Any, weights: Any, rates: Any, static: Any, hub: int, amplitude: Any, rigid: Any,
-    work: Any, fine: Any, old: float, new: float, push_on: float,
-) -> None:  # fmt: skip
-    """Advance by one sample: `old` torque up to the switch, `new` after it, `push_on` (a disturbance) throughout.
+def advance(k: int, model: Any, state: Any, old: float, new: float, push_on: float) -> None:
+    """Advance by sample k: `old` torque up to the switch, `new` after it, `push_on` (a disturbance) throughout.
 
-    The first are those of a `Model`.  Fills a row of `fine` at each record, and adds to the work.
+    Fills a row of `fine` at each record, and adds to the work.
     """
     row = 0
-    before = reading(hub, rates, weights, amplitude, rigid)
-    for s in range(piece.shape[0]):
-        torque = (new if piece[s, IS_NEW] > YES else old) + push_on
-        dt = piece[s, DURATION]
-        for i in range(amplitude.size):
-            amplitude[i] = turn[s, i] * amplitude[i] + push[s, i] * torque
-        rigid[DOUBLY] += dt * rigid[ONCE] + 0.5 * dt * dt * torque
-        rigid[ONCE] += dt * torque
-        after = reading(hub, rates, weights, amplitude, rigid)
+    before = reading(model.hub, model, state)
+    for s in range(model.piece.shape[0]):
+        torque = (new if model.piece[s, IS_NEW] > YES else old) + push_on
+        dt = model.piece[s, DURATION]
+        for i in range(state.amplitude.size):
+            state.amplitude[i] = model.turn[s, i] * state.amplitude[i] + model.push[s, i] * torque
+        state.rigid[DOUBLY] += dt * state.rigid[ONCE] + 0.5 * dt * dt * torque
+        state.rigid[ONCE] += dt * torque
+        after = reading(model.hub, model, state)
         done = torque * (after - before)
-        work[DONE] += done
-        work[MOVED] += abs(done)
+        state.work[DONE] += done
+        state.work[MOVED] += abs(done)
         before = after
-        if piece[s, IS_RECORD] > YES and row < fine.shape[0]:
-            read_outputs(weights, rates, static, amplitude, rigid, torque, fine[row])
+        if model.piece[s, IS_RECORD] > YES and row < state.fine.shape[1]:
+            read_outputs(model, state, torque, state.fine[k, row])
             row += 1
 
 
@@ -176,9 +183,8 @@ def converted(record: Any, saturated: Any, memory: Any, of: Any) -> Any:
 
 def before(k: int, model: Any, state: Any, forcing: Any, of: Any) -> bool:
     """Read the outputs just before sample k; return whether the root moment is within its bound."""
-    torque, rigid = state.held[(k - of.delay - 1) % state.held.size], state.rigid
-    torque += forcing.disturbance[k - 1] if k > 0 else 0.0
-    read_outputs(model.weights, model.rates, model.static, state.amplitude, rigid, torque, state.record[k])
+    torque = state.held[(k - of.delay - 1) % state.held.size] + (forcing.disturbance[k - 1] if k > 0 else 0.0)
+    read_outputs(model, state, torque, state.record[k])
     return abs(state.record[k, MOMENT]) <= of.bound
 
 
@@ -191,11 +197,7 @@ def after(k: int, u: float, model: Any, state: Any, forcing: Any, of: Any) -> No
         for i in range(state.amplitude.size):
             state.amplitude[i] += forcing.impulse
         state.rigid[ONCE] += forcing.impulse
-    advance(
-        model.turn, model.push, model.piece, model.weights, model.rates, model.static, model.hub,
-        state.amplitude, state.rigid, state.work, state.fine[k], old, state.held[(k - of.delay) % ring],
-        forcing.disturbance[k],
-    )  # fmt: skip
+    advance(k, model, state, old, state.held[(k - of.delay) % ring], forcing.disturbance[k])
 
 
 _before, _converted, _after = inlined(before), inlined(converted), inlined(after)  # those of Python loops are plain

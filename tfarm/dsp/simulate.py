@@ -244,7 +244,7 @@ class Simulator:
     ) -> None:
         remedy = f"a whole number of records between two samples, 0 to {MOST_BETWEEN}"
         between = whole("between", between, 0, MOST_BETWEEN, remedy)
-        admit("simulate", arm, chain)
+        admit(kernel.CONSUMER, arm, chain)
         given = with_all_gains(arm, law)
         self.gains = given.gains if given.references == AT_HUB else None
         self.law, self.chain = acting_law(arm, given, chain)

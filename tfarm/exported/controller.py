@@ -22,6 +22,7 @@ from tfarm.arm import Law
 from tfarm.arm.chain import Chain
 from tfarm.arm.checks import positive
 from tfarm.arm.law import REFERENCE
+from tfarm.arm.stages import Consumer
 from tfarm.arrays import Real, Whole
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.kernel import DAC, estimate, product, quantise, rounded
@@ -52,6 +53,17 @@ from tfarm.loop.sampled import Sampled
 from tfarm.loop.sampled_verdict import Analysis, sampled
 from tfarm.records import record
 from tfarm.schema import Quantity
+
+CONSUMER = Consumer(
+    "export c",
+    acts=(
+        "anti-alias filter", "hub rate", "law", "DAC steps", "DAC range", "torque limit", "hold", "delay",
+        "hub damping", "plant",
+    ),
+    named=("encoder", "amplifier steps", "arithmetic"),
+    partly=("amplifier range",),
+    none=("reference", "volts"),
+)  # fmt: skip
 
 NAME = "controller"  # of identifiers in C
 FILES = ("controller.h", "controller.c", "self_test.c", "example.c")

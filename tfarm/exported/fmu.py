@@ -23,6 +23,7 @@ import numpy as np
 
 from tfarm.arm import Law, tracked
 from tfarm.arm.law import REFERENCE
+from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex, Real
 from tfarm.dsp import Simulator, scenario
 from tfarm.dsp.plant import MODES_USED, RECORDED
@@ -37,6 +38,15 @@ from tfarm.exported.word_length import FEEDFORWARD, FIXED
 from tfarm.files import temporary_folder
 from tfarm.records import record
 from tfarm.schema import Quantity
+
+CONSUMER = Consumer(
+    "export fmu",
+    acts=(
+        "anti-alias filter", "encoder", "hub rate", "amplifier steps", "amplifier range", "law", "arithmetic",
+        "DAC steps", "DAC range", "torque limit", "hold", "delay", "hub damping", "plant",
+    ),
+    none=("reference", "volts"),
+)  # fmt: skip
 
 COMPILERS = ("cc", "gcc", "clang")
 OPTIONS = ("-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")  # no fused operation

@@ -36,6 +36,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tfarm.arm import HubFeedback
+from tfarm.arm.stages import Consumer
 from tfarm.arrays import Real, Whole
 from tfarm.dsp import Measurement
 from tfarm.errors import MISSING, ParameterError, must_be_known, require
@@ -47,6 +48,13 @@ from tfarm.exported.word_length import FEEDFORWARD, FLOATS
 from tfarm.loop.sampled import sampled_loop
 from tfarm.tuner.guard import sector_guard
 from tfarm.tuner.trial import TRIAL_MODES, SavedTuner, load_tuner
+
+CONSUMER = Consumer(
+    "export c of a tuner",
+    acts=("anti-alias filter", "hub rate", "law", "hold", "delay", "hub damping", "plant"),
+    named=("encoder", "amplifier steps", "amplifier range", "DAC steps", "DAC range", "torque limit", "arithmetic"),
+    none=("reference", "volts"),
+)
 
 ULPS = {"exp": 1.5, "log": 2.0}  # bounds of the errors: of e^x, x from `lowest` to 0, and of ln(1 + y), y from 0 to 1
 LN_2 = Fraction(math.log(2.0)) + Fraction(2319046813846299558, 10**35)  # 35 digits: math.log(2) and its remainder

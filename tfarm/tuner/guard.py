@@ -55,7 +55,7 @@ from tfarm.loop.margins import lowest
 from tfarm.loop.sampled import Sampled, sampled_loop
 from tfarm.records import record
 from tfarm.schema import Quantity
-from tfarm.tuner.kernel import Limits
+from tfarm.tuner.kernel import CONSUMER, Limits
 
 SLACKS = (1e-3, 1e-5, 1e-7, 1e-9)  # of the inequality, in balanced states
 BITS_OF_P = 60  # bits that P is rounded to before the proof
@@ -297,7 +297,7 @@ def _frozen(loops: list[Sampled], best_constant: float) -> Guard | None:
     edge = (1 - RADIUS_SHARE) * (high - low)
     if high - low < NARROWEST_SECTOR:
         return None
-    omitted, count = not_covered("tune", loops[0].chain), loops[-1].plant.count
+    omitted, count = not_covered(CONSUMER, loops[0].chain), loops[-1].plant.count
     is_settled = _settled(loops, found)
     return Guard("frozen", low + edge * (low > 0), high - edge, count, is_settled, omitted=omitted)
 
@@ -328,7 +328,7 @@ def _certified(models: list[MovingGain], lo: float, hi: float, middle: float) ->
         return None
     widest = [(middle - radius, middle + radius) for radius in (model.radius(middle) for model in models)]
     loops = [model.loop for model in models]
-    omitted = not_covered("tune", loops[0].chain)
+    omitted = not_covered(CONSUMER, loops[0].chain)
     return Guard("time-varying", lo, hi, loops[-1].plant.count, _settled(loops, widest), proven, omitted)
 
 

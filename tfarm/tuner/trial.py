@@ -45,7 +45,7 @@ from tfarm.records import record
 from tfarm.spectrum.table import default_gains
 from tfarm.tuner import kernel
 from tfarm.tuner.guard import GuardKind
-from tfarm.tuner.kernel import PAPER_INPUTS, Limits, Network
+from tfarm.tuner.kernel import CONSUMER, PAPER_INPUTS, Limits, Network
 
 SILENT = Network(np.zeros((1, PAPER_INPUTS)), np.zeros(1), np.ones(PAPER_INPUTS))  # for a guard of one gain
 TRIAL_MODES = 6  # flexible modes of a trial, by default
@@ -187,7 +187,7 @@ def slew_trial(
     """
     must_be_known("signals", signals, get_args(Reading))
     Kp = not_negative("Kp", Kp, ANGLE_REMEDY)
-    arm, chain = admit("tune", arm, chain)
+    arm, chain = admit(CONSUMER, arm, chain)
     K1 = usual_rate_gain(arm, Kp) if K1 is None else K1
     rate_gain = number("K1", K1, "the hub rate gain is a finite number of N m s/rad")
     length = positive("duration", duration, "a trial lasts a positive number of seconds")
