@@ -36,11 +36,14 @@ YES = 0.5  # a number above it is true among floats
 class Model(NamedTuple):
     """The arm between the samples: outputs = Re(weights amplitude) + rates rigid + static torque.
 
+    Under a held torque an amplitude circles its rest position, -`rest` torque, `rest` (m,) being 1/p.
+
     `turn`, `push` (pieces, m) are e^{p dt} and (e^{p dt} - 1)/p of each piece of a sample between two switches or
     records, `piece` (pieces, 3) its properties; `weights` (outputs, m), `rates` (outputs, 2), `static` (outputs,);
     `hub` is the row of the hub angle.
     """
 
+    rest: Complex
     turn: Complex
     push: Complex
     piece: Real
@@ -57,6 +60,7 @@ def model_of(plant: Plant, kept: Whole, sampling: Sampling, between: int, hub: i
     ends = np.unique(np.r_[records, [f * T] if f else [], T])
     starts = np.r_[0.0, ends[:-1]]
     return Model(
+        rest=1 / p,
         turn=np.exp(p * (ends - starts)[:, None]),
         push=np.array([held_amplitude(p, float(each)) for each in ends - starts]),
         piece=np.c_[ends - starts, starts >= f * T, np.isin(ends, records)].astype(float),
@@ -71,14 +75,16 @@ class State(NamedTuple):
     """State and record of a simulation.
 
     `amplitude` (m,) one a pole with Im p > 0 or real, a' = p a + u; `rigid` (2,) double integral and integral of the
-    torque; `held` a ring of the last delay + 2 torques; `work` (2,) [J].  Filled sample by sample: `record`
-    (n, outputs), `torque` (n,), `fine` (n, records, outputs) and `saturated` (n, 3).
+    torque; `held` a ring of the last delay + 2 torques; `work` (2,) [J]; `circle` (m,) the square of the largest circle
+    of each amplitude.  Filled sample by sample: `record` (n, outputs), `torque` (n,), `fine` (n, records, outputs) and
+    `saturated` (n, 3).
     """
 
     amplitude: Complex
     rigid: Real
     held: Real
     work: Real
+    circle: Real
     record: Real
     torque: Real
     fine: Real
@@ -139,6 +145,8 @@ def advance(k: int, model: Any, state: Any, old: float, new: float, push_on: flo
         torque = (new if model.piece[s, IS_NEW] > YES else old) + push_on
         dt = model.piece[s, DURATION]
         for i in range(state.amplitude.size):
+            about = state.amplitude[i] + model.rest[i] * torque
+            state.circle[i] = max(state.circle[i], about.real * about.real + about.imag * about.imag)
             state.amplitude[i] = model.turn[s, i] * state.amplitude[i] + model.push[s, i] * torque
         state.rigid[DOUBLY] += dt * state.rigid[ONCE] + 0.5 * dt * dt * torque
         state.rigid[ONCE] += dt * torque

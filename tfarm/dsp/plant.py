@@ -478,7 +478,7 @@ def held_amplitude(p: Complex, duration: float) -> Complex:
 Made = TypeVar("Made")
 
 
-def first_distinct(make: Callable[[float], Made], candidates: Sequence[float]) -> Made:
+def first_distinct(make: Callable[[Any], Made], candidates: Sequence[Any]) -> Made:
     """What is made of the first of some candidates at which no two damped modes are one; the error of the last one."""
     *others, last = candidates
     for each in others:

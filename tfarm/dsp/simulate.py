@@ -155,7 +155,8 @@ class Simulation:
 
     `torque` [N m] is the output of the DAC at each sample, `gain` that on the root moment there (None of a controller
     without one), `measured` (n, 3) hub angle, hub rate and root moment behind the analog filters.  `saturated_at`
-    (n, 3): whether the encoder, the strain amplifier and the torque were clipped at each sample.
+    (n, 3): whether the encoder, the strain amplifier and the torque were clipped at each sample.  `rings` are frequency
+    (m,) [rad/s] and largest amplitude in `RECORDED` (4, m) of the modes that ring, with Im p > -Re p.
     `energy_error` is |energy gained - work done| over initial energy and total work, for an arm without damping; None
     with damping.  Moments of the figures are those before the anti-alias filter.
     """
@@ -168,6 +169,7 @@ class Simulation:
     torque: Real
     gain: Real | None
     saturated_at: NDArray[np.bool_]
+    rings: tuple[Real, Real]
     energy_error: Annotated[float | None, Quantity(
             help="energy gained less work done, over initial energy and work, without damping")]  # fmt: skip
     stopped: Stop | None
@@ -323,14 +325,6 @@ class Simulator:
         vars(other).pop("model", None)
         return other
 
-    def modal(self) -> tuple[Complex, Complex]:
-        """Poles (m,) [1/s] with Im p >= 0, and their weights in hub angle, rate, moment and tip (4, m)."""
-        return self.plant.poles[self.kept], self.model.weights[len(self.measured) :][: len(RECORDED)]
-
-    def first_amplitudes(self) -> Complex:
-        """The modal amplitudes (m,) after the sample at t = 0 and the impulse."""
-        return self._at_first() + self.scenario.impulse
-
     # ------------------------------------------------------------ inside
 
     @cached_property
@@ -367,6 +361,7 @@ class Simulator:
             rigid=np.zeros(2),
             held=np.zeros(self.chain.sampling.whole_delay + 2),
             work=np.zeros(2),
+            circle=np.zeros(self.kept.size),
             record=np.zeros((n, outputs)),
             torque=np.zeros(n),
             fine=np.zeros((n, self.between, outputs)),
@@ -406,9 +401,12 @@ class Simulator:
             of_root = np.nan_to_num(abs(self.plant.residues[kernel.MOMENT, self.kept] * state.amplitude), nan=np.inf)
             stopped = Stop(done * self.scenario.period, int(self.plant.mode[self.kept][int(np.argmax(of_root))]))
         elif self.plant.arm.is_undamped and not self.chain.actuator.hub_damping > 0:
-            before = self._energy(self.first_amplitudes(), self.scenario.impulse)
+            before = self._energy(self._at_first() + self.scenario.impulse, self.scenario.impulse)
             after, (work, moved) = self._energy(state.amplitude, state.rigid[kernel.ONCE]), state.work
             error = float(abs(after - before - work) / max(before + moved, LEAST_SIZE))
+        p, weights = self.plant.poles[self.kept], self.model.weights[len(self.measured) :][: len(RECORDED)]
+        is_ringing = p.imag > -p.real
+        size = abs(weights[:, is_ringing]) * np.sqrt(state.circle[is_ringing])
         T, m, between = self.scenario.period, self.between, None
         if m:
             at = T * (np.arange(done)[:, None] + (np.arange(m) + 1) / (m + 1))
@@ -422,6 +420,7 @@ class Simulator:
             torque=state.torque[:done],
             gain=None if gain is None else gain[:done],
             saturated_at=state.saturated[:done],
+            rings=(np.asarray(p.imag[is_ringing]), np.asarray(size)),
             energy_error=error,
             stopped=stopped,
         )

@@ -27,7 +27,7 @@ from tfarm.arrays import Real, Whole
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.kernel import DAC, estimate, product, quantise, rounded
 from tfarm.dsp.simulate import quantisers
-from tfarm.errors import ParameterError, must_be_known, require
+from tfarm.errors import must_be_known, require
 from tfarm.exact.compiled import compiled, inlined
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.exported.result import Export, ExportTask, Name, is_certified, names_of
@@ -42,14 +42,11 @@ from tfarm.exported.word_length import (
     RATE,
     NoiseGain,
     Word,
-    around,
-    coefficient,
     least_noise,
     system_matrix,
     with_system_matrix,
     word_of,
 )
-from tfarm.loop.sampled import Sampled
 from tfarm.loop.sampled_verdict import Analysis, sampled
 from tfarm.records import record
 from tfarm.schema import Quantity
@@ -170,7 +167,7 @@ def c_controller(task: ExportTask) -> Export:
     law, name, gains = least_noise(in_z(task.law, task.chain), exact.verdict.loop)
     controller = controller_of(law, task)
     word = controller.word
-    found = judged(task, word, exact.verdict.loop)
+    found = judged(task, word)
     details = word_length(controller, name, gains, word.limit_cycle(found.verdict.loop))
     bounds = dict(facts_of(details)) | ({} if details.samples else {"samples of these bounds": "all"})
     contents, names = source_files(task, controller, [*task.facts(word.rounded, found).items()], [*bounds.items()])
@@ -256,24 +253,15 @@ def largest_state(precision: str) -> float:
     return 1.0 if precision == FIXED else float(np.finfo(FLOATS[precision][0]).max)
 
 
-def judged(task: ExportTask, word: Word, loop: Sampled) -> Analysis:
+def judged(task: ExportTask, word: Word) -> Analysis:
     """The sampled loop with the coefficients as exported.
 
-    Raises ParameterError where it is not certified stable, unless it is exported anyway, naming the coefficient whose
-    rounding moves the poles most.
+    Raises ParameterError where it is not certified stable, unless it is exported anyway.
     """
     found = sampled(task.arm, word.rounded, task.chain)
-    if task.anyway or is_certified(found):
-        return found
-    exact, rounded, radius = system_matrix(word.law), system_matrix(word.rounded), {}
-    for place in np.ndindex(exact.shape):
-        table = exact.copy()
-        table[place] = rounded[place]
-        matrix = around(with_system_matrix(word.law, table), loop).matrix
-        radius[place] = float(abs(np.linalg.eigvals(matrix)).max())
-    worst = max(radius, key=radius.__getitem__)
     remedy = f"rounded to {task.precision} the loop is not certified stable: {found.verdict.sentence}; take more digits"
-    raise ParameterError(key=coefficient(worst), value=float(exact[worst]), remedy=remedy)
+    require(task.anyway or is_certified(found), "precision", task.precision, remedy)
+    return found
 
 
 # ------------------------------------------------------------ its arithmetic, that of C and of a simulation

@@ -25,7 +25,6 @@ A DAC adds half of its step to the rounding of u.  Limits of u keep every bound,
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple
 
@@ -38,6 +37,7 @@ from tfarm.arm.law import REFERENCE, Part
 from tfarm.arrays import Real
 from tfarm.dsp.discretise import with_estimate
 from tfarm.errors import ParameterError, require
+from tfarm.exact.rationals import exact_matrix
 from tfarm.loop.sampled import Sampled
 from tfarm.schema import Quantity
 
@@ -175,15 +175,11 @@ def candidates(law: Law, loop: Sampled) -> list[tuple[NoiseGain, Real]]:
 
 
 def similar(S: Real, T: Real) -> Real:
-    """[A B; C D] of the states T^-1 x, each coefficient rounded once: whole numbers of 256 digits."""
-    n, bits = len(T), 256
-    given = S, block_diag(T, np.eye(S.shape[1] - n)), block_diag(np.linalg.inv(T), np.eye(1))
-    tables = [[[int(Fraction(x) * 2**bits) for x in row] for row in each.tolist()] for each in given]
-    own, change, back = (np.array(each, dtype=object) for each in tables)
-    for _ in range(6):  # Newton's iteration doubles the digits of an inverse
-        error = (change[: n + 1, : n + 1] @ back >> bits) - 2**bits * np.eye(n + 1, dtype=object)
-        back = back - (back @ error >> bits)
-    return np.asarray((back @ own @ change >> 2 * bits) / 2**bits, dtype=float)
+    """[A B; C D] of the states T^-1 x, each coefficient rounded once: rational numbers."""
+    change = exact_matrix(block_diag(T, np.eye(S.shape[1] - len(T))))
+    back = exact_matrix(block_diag(T, np.eye(1))).inv()
+    exact = back * exact_matrix(S) * change
+    return np.array([[int(each.p) / int(each.q) for each in row] for row in exact.tolist()])
 
 
 def least_noise(law: Law, loop: Sampled) -> tuple[Law, str, list[NoiseGain]]:
