@@ -226,31 +226,34 @@ def product(row: Any, values: Any, start: float, single: bool) -> float:
     return total
 
 
+@inlined
+def law_step(table: Any, z: Any, feedforward: float, single: bool, out: Any) -> None:
+    """out = table z of z = [x; e]: the next states, and the output, which begins with the feedforward."""
+    for i in range(out.size):
+        out[i] = product(table[i], z, feedforward if i == out.size - 1 else 0.0, single)
+
+
 @compiled
-def run(model: Any, state: Any, forcing: Any, electronics: Any, matrices: Any, sources: Any, references: Any) -> int:
+def run(model: Any, state: Any, forcing: Any, electronics: Any, table: Any, sources: Any, references: Any) -> int:
     """Run a law over all samples; return their number before the root moment passes its bound.
 
-    u = r + C x + D e, x_{k+1} = A x + B e of the errors e = reference - signal, `references` (n, columns); D has a row,
-    or one for each sample.  `sources` (columns,) are the outputs of the columns, hub angle, hub rate and root moment
-    through their converters, or -1 for a reference alone.
+    [x_{k+1}; u - r] = table [x; e] of the errors e = reference - signal, `references` (n, columns).  `sources`
+    (columns,) are the outputs of the columns, hub angle, hub rate and root moment through their converters, or -1 for a
+    reference alone.
     """
-    A, B, C, D = matrices
-    n, single, memory, known = state.torque.size, electronics.is_single, np.zeros(3), np.zeros(3)
-    x, following, e = np.zeros(A.shape[0]), np.zeros(A.shape[0]), np.zeros(B.shape[1])
-    for k in range(n):
+    single, order, memory, known = electronics.is_single, table.shape[0] - 1, np.zeros(3), np.zeros(3)
+    z, following = np.zeros(table.shape[1]), np.zeros(order + 1)
+    for k in range(state.torque.size):
         if not _before(k, model, state, forcing, electronics):
             return k
         record = state.record[k]
         known[ANGLE], known[RATE], known[MOMENT] = _converted(record, state.saturated[k], memory, electronics)
-        for j in range(e.size):
+        for j in range(sources.size):
             source = sources[j]
             value = 0.0 if source < 0 else known[source] if source < known.size else record[source]
-            e[j] = rounded(rounded(references[k, j], single) - rounded(value, single), single)
-        u = rounded(forcing.feedforward[k], single)
-        u = product(D[min(k, D.shape[0] - 1)], e, product(C[0], x, u, single), single)
-        for i in range(x.size):
-            following[i] = product(B[i], e, product(A[i], x, 0.0, single), single)
-        for i in range(x.size):
-            x[i] = following[i]
-        _after(k, u, model, state, forcing, electronics)
-    return n
+            z[order + j] = rounded(rounded(references[k, j], single) - rounded(value, single), single)
+        law_step(table, z, rounded(forcing.feedforward[k], single), single, following)
+        for i in range(order):
+            z[i] = following[i]
+        _after(k, following[order], model, state, forcing, electronics)
+    return state.torque.size

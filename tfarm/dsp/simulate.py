@@ -24,7 +24,7 @@ from tfarm.arm.checks import whole
 from tfarm.arm.law import REFERENCE, Law
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import kernel
-from tfarm.dsp.discretise import acting_law, with_all_gains
+from tfarm.dsp.discretise import acting_law, system_matrix, with_all_gains
 from tfarm.dsp.plant import RECORDED, USUAL_MODES, Plant, sensed_plant, with_held_filter
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.stages import admit
@@ -251,13 +251,14 @@ class Simulator:
         self.gains = given.gains if given.references == AT_HUB else None
         self.law, self.chain = acting_law(arm, given, chain)
         references_of(self.law, scenario)  # raises for one that is missing
-        self.scenario, self.between, self._released = scenario, between, dict[int, complex]()
+        self.scenario, self.between = scenario, between
         self.others = tuple(dict.fromkeys(name for name in outputs if name not in RECORDED))
         self.measured = tuple(dict.fromkeys((*AT_HUB, *self.law.signals)))
         sensed = sensed_plant(arm, chain, self.measured, count)
         self.plant = sensed.together
         for names in filter(None, (RECORDED, self.others)):
             self.plant = self.plant.joined(sensed_plant(arm, chain, names, count).unfiltered)
+        self._first: Complex = np.zeros(self.plant.poles.size, complex)
         if scenario.tip_offset:
             self._release(sensed.unfiltered, scenario.tip_offset)
         self.kept = np.nonzero(self.plant.poles.imag >= 0)[0]
@@ -275,34 +276,24 @@ class Simulator:
 
     def run(self) -> Simulation:
         """Simulate the law over the scenario, from its start."""
-        n, gains = self.scenario.feedforward.size, self.gains
-        return self._driven(self.law, None if gains is None else np.full(n, gains.K2))
+        return self._driven(self.law, self.gains)
 
-    def linear(self, gains: HubFeedback, K2: Real | None = None) -> Simulation:
-        """Simulate u = r + gains . (wanted - measured) instead of the simulator's own law; `K2` (n,) may vary.
+    def linear(self, gains: HubFeedback) -> Simulation:
+        """Simulate u = r + gains . (wanted - measured) instead of the simulator's own law.
 
-        Raises ParameterError for I_h = 0 with moment feedback, and for gains that are not one finite number a sample.
+        Raises ParameterError for I_h = 0 with moment feedback.
         """
-        n = self.scenario.feedforward.size
-        gain = np.full(n, gains.K2) if K2 is None else np.array(K2, dtype=float)
-        is_row = gain.shape == (n,) and np.isfinite(gain).all()
-        require(is_row, "K2", gain.shape, f"one finite gain a sample, {n} in all")
-        return self._driven(with_all_gains(self.plant.arm, gains), gain)
+        return self._driven(with_all_gains(self.plant.arm, gains), gains)
 
-    def _driven(self, law: Law, gain: Real | None) -> Simulation:
-        """A law in z over the scenario; `gain` is that on the root moment, sample by sample."""
+    def _driven(self, law: Law, gains: HubFeedback | None) -> Simulation:
+        """A law in z over the scenario, and its gains at the hub, if it is of these."""
         columns = (*law.signals, *law.wanted)
-        A, B, C, D = law.matrices(columns)
-        if gain is not None:
-            D = np.repeat(D, gain.size, axis=0)
-            D[:, columns.index("root_moment")] = gain
-        matrices = tuple(np.ascontiguousarray(each) for each in (A, B, C, D))
-        if self.electronics.is_single:
-            matrices = tuple(each.astype(np.float32).astype(float) for each in matrices)
+        kind = np.float32 if self.electronics.is_single else float
+        table = system_matrix(law).astype(kind).astype(float)
         sources = np.array([self.measured.index(name) if name in self.measured else -1 for name in columns])
         references, state = references_of(law, self.scenario), self._start()
-        done = kernel.run(self.model, state, self._forcing, self.electronics, matrices, sources, references)
-        return self._result(state, int(done), gain)
+        done = kernel.run(self.model, state, self._forcing, self.electronics, table, sources, references)
+        return self._result(state, int(done), None if gains is None else np.full(state.torque.size, gains.K2))
 
     def controller(self, controller: Controller) -> Simulation:
         """Simulate a callable from a `Measurement` to a torque [N m]; its numbers are float32 if the arithmetic is."""
@@ -357,7 +348,7 @@ class Simulator:
     def _start(self) -> kernel.State:
         n, outputs = self.scenario.feedforward.size, len(self.plant.outputs)
         return kernel.State(
-            amplitude=self._at_first(),
+            amplitude=self._first[self.kept],
             rigid=np.zeros(2),
             held=np.zeros(self.chain.sampling.whole_delay + 2),
             work=np.zeros(2),
@@ -374,19 +365,10 @@ class Simulator:
         `unfiltered` are the measured signals ahead of the filters.
         """
         first, amplitude = first_mode(self.plant, offset)
-        self._released, held = {first: amplitude}, np.zeros(len(self.plant.outputs))
-        n = len(self.measured)
+        self._first[first], held, n = amplitude, np.zeros(len(self.plant.outputs)), len(self.measured)
         held[:n] = 2 * ((unfiltered.residues[:, first] - self.plant.residues[:n, first]) * amplitude).real
         if held.any():
-            self.plant = with_held_filter(self.plant, held)
-            self._released[self.plant.poles.size - 1] = 1.0
-
-    def _at_first(self) -> Complex:
-        """The modal amplitudes (m,) at t = 0: 0, or those of a displaced tip."""
-        amplitude: Complex = np.zeros(self.plant.poles.size, complex)
-        for pole, value in self._released.items():
-            amplitude[pole] = value
-        return amplitude[self.kept]
+            self.plant, self._first = with_held_filter(self.plant, held), np.r_[self._first, 1.0]
 
     def _energy(self, amplitude: Complex, rate: float) -> float:
         """Energy of an undamped arm [J]: b^2 |a|^2/2 a mode, b^2 twice the residue of the hub rate, and rigid."""
@@ -401,7 +383,7 @@ class Simulator:
             of_root = np.nan_to_num(abs(self.plant.residues[kernel.MOMENT, self.kept] * state.amplitude), nan=np.inf)
             stopped = Stop(done * self.scenario.period, int(self.plant.mode[self.kept][int(np.argmax(of_root))]))
         elif self.plant.arm.is_undamped and not self.chain.actuator.hub_damping > 0:
-            before = self._energy(self._at_first() + self.scenario.impulse, self.scenario.impulse)
+            before = self._energy(self._first[self.kept] + self.scenario.impulse, self.scenario.impulse)
             after, (work, moved) = self._energy(state.amplitude, state.rigid[kernel.ONCE]), state.work
             error = float(abs(after - before - work) / max(before + moved, LEAST_SIZE))
         p, weights = self.plant.poles[self.kept], self.model.weights[len(self.measured) :][: len(RECORDED)]
@@ -427,7 +409,7 @@ class Simulator:
 
     def _trace(self, t: Real, record: Real) -> Trace:
         """The recorded outputs."""
-        angle, rate, moment, tip, *more = (np.ascontiguousarray(column) for column in record[:, len(self.measured) :].T)
+        angle, rate, moment, tip, *more = np.ascontiguousarray(record[:, len(self.measured) :].T)
         return Trace(t, angle, rate, moment, tip, dict(zip(self.others, more, strict=True)))
 
 

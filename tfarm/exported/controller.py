@@ -24,8 +24,8 @@ from tfarm.arm.checks import positive
 from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import Real, Whole
-from tfarm.dsp.discretise import discretised
-from tfarm.dsp.kernel import DAC, estimate, product, quantise, rounded
+from tfarm.dsp.discretise import discretised, system_matrix
+from tfarm.dsp.kernel import DAC, estimate, law_step, quantise, rounded
 from tfarm.dsp.simulate import quantisers
 from tfarm.errors import must_be_known, require
 from tfarm.exact.compiled import compiled, inlined
@@ -43,7 +43,6 @@ from tfarm.exported.word_length import (
     NoiseGain,
     Word,
     least_noise,
-    system_matrix,
     with_system_matrix,
     word_of,
 )
@@ -65,7 +64,6 @@ CONSUMER = Consumer(
 NAME = "controller"  # of identifiers in C
 FILES = ("controller.h", "controller.c", "self_test.c", "example.c")
 RECORDED, REFUSED, SEED = 1000, 500, 1  # samples of the self-test, the one with a NaN, its first random number
-WHOLE_SAMPLE = 1e-9  # of a sample: rounding of a delay
 REAL = {"double": ("double", "", "DBL_MAX"), "float": ("float", "f", "FLT_MAX"), FIXED: ("int32_t", "", "")}  # in C
 INPUT_ERROR, OVERFLOW, SATURATED, STATE_SATURATED = 1, 2, 3, 4  # status of a step, 0 of one without an event
 MINUEND, SUBTRAHEND = 0, 1  # columns of a plan
@@ -219,7 +217,7 @@ def in_z(law: Law, chain: Chain) -> Law:
     """
     samples = law.delay / chain.sampling.period
     remedy = f"is {samples:.6g} samples: C code has a delay of whole samples; write another one into the law's states"
-    require(abs(samples - round(samples)) <= WHOLE_SAMPLE, "law.delay", law.delay, remedy)
+    require(abs(samples - round(samples)) <= 1e-9, "law.delay", law.delay, remedy)
     law = discretised(law, chain.sampling.period)
     return with_system_matrix(law, system_matrix(law))
 
@@ -286,8 +284,7 @@ def run_real(table: Any, plan: Any, inputs: Any, dac: Any, hub: Any, single: boo
                 known[-2] = rounded(estimate(known[int(hub[0])], 0.0, memory, True, hub[1], hub[2]), single)
             for j in range(plan.shape[0]):
                 z[n + j] = rounded(known[plan[j, MINUEND]] - known[plan[j, SUBTRAHEND]], single)
-            for i in range(n + 1):
-                following[i] = product(table[i], z, known[forward] if i == n else 0.0, single)
+            law_step(table, z, known[forward], single, following)
             if np.isfinite(following).all():
                 z[:n] = following[:n]
                 outputs[k] = rounded(quantise(following[n], dac, clipped, DAC), single)
