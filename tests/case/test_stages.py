@@ -141,6 +141,10 @@ def test_a_controller_in_python(stages):
     assert not step or abs(np.array(asked) / step % 1 - 0.5).min() > TIE
     assert_equal(found.torque, on_steps(np.array(asked), chain, DAC), step)
     assert_equal(found.torque, truth.torque, step)
+    for values, row in ((truth.measured[:, 0], ENCODER), (truth.measured[:, 2], AMPLIFIER), (np.array(asked), DAC)):
+        size, low, high = quantisers(chain)[row]
+        near = np.rint(values / size) * size if size else values
+        assert (truth.saturated_at[:, row] == ((near > high) | (near < low))).all()
 
 
 @vectors(fmu.CONSUMER, 3)

@@ -25,7 +25,6 @@ from tfarm.dsp import Simulator, scenario
 from tfarm.dsp.results import simulated_run
 from tfarm.exported import fmu as module
 
-QUICK = ("late", "single", "impulse", "pulse")
 MODES = 4
 EQUAL = 1e-12  # of the largest value of a signal: roundings in another order
 LATE = replace(REAL, sampling=replace(REAL.sampling, delay_samples=1.3, antialias_corner=400.0))
@@ -52,7 +51,6 @@ LOOPS = {
 }
 
 
-OTHERS = [name for name in LOOPS if name not in (*QUICK, "unstable")]
 FOLDER = TemporaryDirectory(prefix="units-")
 EXPORTED = {}
 
@@ -91,8 +89,10 @@ def assert_equal(found, truth, name=""):
     np.testing.assert_allclose(found, truth, rtol=0, atol=EQUAL * abs(truth).max(), err_msg=name)
 
 
-@pytest.mark.parametrize("case", [*QUICK, *(pytest.param(case, marks=pytest.mark.survey) for case in OTHERS)])
+@pytest.mark.parametrize("case", ["single", "impulse", "pulse", *thinned(["reference", "rig"], 2)])
 def test_a_loop_is_that_of_the_simulation(case):
+    """Laws with states and of another input, references, an impulse and a disturbance; `tests.case.test_stages` has
+    gains under every stage of a chain."""
     arm, law, chain, name = LOOPS[case]
     unit, exported = made("loop", case)
     truth = simulated_run(arm, law, chain, name, 1.5, count=MODES).simulation

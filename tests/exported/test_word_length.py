@@ -71,22 +71,6 @@ def test_noise_gains_are_those_of_lyapunov_equations():
             assert abs(K - np.diag(np.diag(K))).max() <= 1e-9 * abs(K).max()
 
 
-def test_the_variance_of_roundings_is_that_of_a_simulated_loop():
-    """White noise added to each state of the realised law, of the size of its standard deviation under the signals."""
-    given, loop = exact_loop(SERVO)
-    of = around(given, loop)
-    K, _ = gramians(of)
-    rng, steps = np.random.default_rng(5), 200_000
-    x, u = np.zeros(len(of.matrix)), np.empty(steps)
-    push = of.of_rounding[:, :-1] * np.sqrt(np.diag(K))
-    noise = rng.normal(size=(steps, push.shape[1])) @ push.T
-    for k in range(steps):
-        u[k] = of.output @ x
-        x = of.matrix @ x + noise[k]
-    ((gain, _), *_) = candidates(given, loop)
-    assert u.var() == pytest.approx(gain.gain, rel=0.1)  # 200,000 samples of a time constant of some 60
-
-
 def test_the_bound_of_a_sum_holds_and_is_near():
     """Complex pairs near the circle, where single terms are small by chance; an integrator has none for all samples."""
     rng = np.random.default_rng(2)
