@@ -16,7 +16,7 @@ import tfarm
 from tests.exported.cases import realised, task_of
 from tests.exported.compilers import needed, pumped, run, stepped
 from tests.exported.tuners import exported, some_tuner
-from tests.exported.units import Unit, modes_of_units
+from tests.exported.units import Unit, driven, inputs_of, modes_of_units
 from tests.shared import thinned
 from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import STAGES
@@ -155,16 +155,8 @@ def test_the_functional_mock_up_unit(stages, tmp_path):
     with modes_of_units(MODES):
         tfarm.export(ARM, LAW, what="loop", form="fmu", folder=tmp_path, chain=chain, anyway=True)
     unit = Unit(tmp_path / "loop.fmu", tmp_path / "unpacked")
-    names = ["measured:hub_angle", "measured:hub_rate", "measured:root_moment", *truth.at_samples.names, "torque"]
-    inputs = {f"{REFERENCE}{name}": values for name, values in truth.scenario.references.items()}
-    inputs["feedforward"], rows = truth.scenario.feedforward, []
     unit.start()
-    for k in range(truth.t.size):
-        rows.append(unit.get(names))
-        unit.set({name: values[k] for name, values in inputs.items()})
-        unit.step()
-    rows.append(unit.get(names))
-    found = dict(zip(names, np.array(rows).T, strict=True))
+    found = driven(unit, inputs_of(truth.scenario), truth.t.size)
     steps = quantisers(chain)[:, 0]
     assert_equal(found["torque"][1:], truth.torque, steps[DAC])
     for (name, values), step in zip(readings(truth).items(), (steps[ENCODER], 0.0, steps[AMPLIFIER]), strict=True):

@@ -14,13 +14,22 @@ import pytest
 import tfarm
 from tests.exported.cases import CASES, GAINS, IDEAL, LAB, REAL, hinf
 from tests.exported.compilers import COMPILERS, STRICT, needed, run
-from tests.exported.units import DISCARD, DRIVER, ERROR, LAST_SUCCESSFUL_TIME, TERMINATED, Unit, modes_of_units
+from tests.exported.units import (
+    DISCARD,
+    DRIVER,
+    ERROR,
+    LAST_SUCCESSFUL_TIME,
+    TERMINATED,
+    Unit,
+    driven,
+    inputs_of,
+    modes_of_units,
+)
 from tests.hostile import C_TEXTS, NAME
 from tests.odd_arms import odd_arms
 from tests.shared import thinned
 from tests.shell import refused
 from tfarm import Law, ParameterError
-from tfarm.arm.law import REFERENCE
 from tfarm.dsp import Simulator, scenario
 from tfarm.dsp.results import simulated_run
 from tfarm.exported import fmu as module
@@ -66,23 +75,6 @@ def made(what, case="gains", **how):
             EXPORTED[key] = folder, tfarm.export(arm, law, what=what, form="fmu", folder=folder, chain=chain, **options)
     folder, found = EXPORTED[key]
     return Unit(folder / f"{what}.fmu", folder / "unpacked"), found
-
-
-def inputs_of(task):
-    """The inputs of a loop at each sample, by name."""
-    references = {f"{REFERENCE}{name}": values for name, values in task.references.items()}
-    return references | {"feedforward": task.feedforward, "disturbance": task.disturbance}
-
-
-def driven(unit, inputs, n):
-    """Outputs (n, outputs) at each sample by name, just before it, of inputs at each sample."""
-    outputs, rows = [each for each in unit.at if unit.causality[each] == "output"], []
-    for k in range(n):
-        rows.append(unit.get(outputs))
-        unit.set({name: values[k] for name, values in inputs.items() if name in unit.at})
-        unit.step()
-    rows.append(unit.get(outputs))
-    return dict(zip(outputs, np.array(rows).T, strict=True))
 
 
 def assert_equal(found, truth, name=""):

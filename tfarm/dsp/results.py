@@ -290,13 +290,15 @@ def simulated(
     count: int | None = None,
     between: int = 0,
     outputs: Sequence[str] = (),
+    run: Callable[[Simulator], Simulation] = Simulator.run,
 ) -> tuple[Simulation, Enough]:
-    """Simulate with `count` modes, or enough, and return that number too.
+    """Simulate with `count` modes, or enough, and return that number too; `run` is what a simulator does.
 
     Gains at the hub follow the references of all their signals.
     """
-    used = enough_modes(lambda n: Simulator(arm, ideal_chain(chain), task, law, count=n, outputs=outputs).run(), count)
-    return Simulator(arm, chain, task, law, count=used.modes, between=between, outputs=outputs).run(), used
+    ideal = ideal_chain(chain)
+    used = enough_modes(lambda n: run(Simulator(arm, ideal, task, law, count=n, outputs=outputs)), count)
+    return run(Simulator(arm, chain, task, law, count=used.modes, between=between, outputs=outputs)), used
 
 
 def simulated_run(

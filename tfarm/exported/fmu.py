@@ -131,10 +131,8 @@ def fmu(task: ExportTask) -> Export:
     binary, compiler = binary_of(sources, own[name])
     files = {f"sources/{name}": content for name, content in sources.items()} | binary
     files["modelDescription.xml"] = model_description(sources, own[name], **head)
-    return Export(
-        what=task.what, form=task.form, contents={f"{task.what}.fmu": archive_of(files)}, names=names_of(own),
-        verdict=verdict, details=Unit(variables, modes, compiler), sha256=task.sha256,
-    )  # fmt: skip
+    content = {f"{task.what}.fmu": archive_of(files)}
+    return task.exported(content, names_of(own), verdict, Unit(variables, modes, compiler))
 
 
 def law_code(task: ExportTask, law: Law, variables: Sequence[Variable]) -> LawCode:

@@ -217,10 +217,7 @@ def linear(task: ExportTask) -> Linear:
 def mat(task: ExportTask) -> Export:
     """Return the MATLAB file of a task and its script."""
     found = linear(task)
-    return Export(
-        what=task.what, form=task.form, contents=mat_files(f"{task.what}.mat", found), names=[],
-        verdict=found.verdict, sha256=task.sha256,
-    )  # fmt: skip
+    return task.exported(mat_files(f"{task.what}.mat", found), [], found.verdict)
 
 
 def mat_files(name: str, of: Linear) -> dict[str, bytes]:
@@ -282,10 +279,7 @@ def py(task: ExportTask) -> Export:
     content = render("systems.txt", of=found, listed=listed)
     every = [name for each in found.systems.values() for name in (*each.inputs, *each.outputs)]
     changed = {name: new for name, new in zip(every, plain(every), strict=True) if new != name}
-    return Export(
-        what=task.what, form=task.form, contents={f"{task.what}.py": content}, names=names_of(changed),
-        verdict=found.verdict, sha256=task.sha256,
-    )  # fmt: skip
+    return task.exported({f"{task.what}.py": content}, names_of(changed), found.verdict)
 
 
 def plain(names: Iterable[str]) -> list[str]:
