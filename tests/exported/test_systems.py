@@ -1,7 +1,6 @@
 """The exported state spaces against the analysis, the simulator, python-control's interconnection and aliasing."""
 
 import math
-from dataclasses import replace
 
 import control
 import numpy as np
@@ -154,10 +153,3 @@ def test_references_of_gains_are_those_of_their_signals():
     assert controller.inputs == (*AT_HUB, *(f"reference:{name}" for name in AT_HUB))
     assert loop.outputs[-1] == "hub_torque"
     assert controller.matrices[3][0] == pytest.approx([-0.5, -0.3, -0.3, 0.5, 0.3, 0.3])
-
-
-def test_a_system_without_finite_numbers_is_refused():
-    plant, controller, _ = systems(*CASES["gains"])
-    A, *others = plant.matrices
-    with pytest.raises(tfarm.ParameterError, match="not finite"):
-        loop_system(replace(plant, matrices=(A + np.inf, *others)), controller)

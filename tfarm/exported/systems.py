@@ -68,12 +68,6 @@ class NamedSystem:
     period: float = 0.0
     facts: Mapping[str, Any] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        is_finite = all(np.isfinite(each).all() for each in self.matrices)
-        require(
-            is_finite, "export", self.name, "a matrix has entries that are not finite; change the arm or the period"
-        )
-
     @property
     def title(self) -> str:
         """Name, kind and order of the system, with its worst error, if it is an approximation."""
