@@ -13,14 +13,13 @@
 or `matrices = "file.mat"` with A, B, C, D and `signals = [...]`, a name for each column of B.
 """
 
-import os
 from pathlib import Path
 from typing import Any
 
 from pydantic import Field
 
 from tfarm.arm.law import Law
-from tfarm.arm.reading import load_tables
+from tfarm.arm.reading import AnyFile, load_tables
 from tfarm.arm.schema import StrictTable, validated
 from tfarm.errors import MISSING, ParameterError, close_to, listed, must_be_known, naming, require
 from tfarm.files import read_mat
@@ -67,7 +66,7 @@ class SignalTable(StrictTable):
         return {"zeros": self.zeros or (), "poles": self.poles or (), "gain": self.gain}
 
 
-def load_law(name_or_path: str | os.PathLike[str]) -> Law | None:
+def load_law(name_or_path: AnyFile) -> Law | None:
     """Return the law of a file's [law] table, None where it has none.
 
     Raises ParameterError, naming the file, for an unknown key, a wrong type or an illegal value.

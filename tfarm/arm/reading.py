@@ -10,7 +10,7 @@ import tomllib
 from collections.abc import Iterator
 from functools import cache
 from importlib.resources import files
-from typing import Any
+from typing import Any, NamedTuple
 
 from tfarm.arm.parts import Link
 from tfarm.arm.records import Arm
@@ -32,21 +32,29 @@ def presets() -> tuple[str, ...]:
     return tuple(sorted(p.name.removesuffix(".toml") for p in PRESETS.iterdir() if p.name.endswith(".toml")))
 
 
-def load(name_or_path: str | os.PathLike[str]) -> Arm:
+class ArmFile(NamedTuple):
+    """The tables of a TOML file, read and parsed once, and the file's name."""
+
+    tables: dict[str, Any]
+    name: str
+
+
+AnyFile = str | os.PathLike[str] | ArmFile  # a preset's name, a path, or what was read of either
+
+
+def load(name_or_path: AnyFile) -> Arm:
     """Return the arm of a preset's name or of a TOML file's path.  Raises ParameterError, naming the file."""
-    return arm_in(*load_tables(name_or_path))
-
-
-def arm_in(table: dict[str, Any], file: str) -> Arm:
-    """Return the arm of the parsed TOML of a file of that name."""
     from tfarm.arm.schema import arm_of_table  # here, as the import of pydantic is slow
 
-    with naming(file):
-        return arm_of_table(table)
+    tables, name = load_tables(name_or_path)
+    with naming(name):
+        return arm_of_table(tables)
 
 
-def load_tables(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], str]:
-    """Return the parsed TOML of a preset's name or a path, and the file's name."""
+def load_tables(name_or_path: AnyFile) -> ArmFile:
+    """Return the tables of a preset's name or a path; those of a file that was read already as they are."""
+    if isinstance(name_or_path, ArmFile):
+        return name_or_path
     is_named = not isinstance(name_or_path, os.PathLike)
     name: Any = name_or_path if is_named else os.fspath(name_or_path)
     is_text = isinstance(name, str) and bool(name.strip()) and "\0" not in name
@@ -59,7 +67,7 @@ def load_tables(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], s
     else:
         data = read_file(name, MOST_ARM_BYTES, key="arm", what="a .toml file")
     with naming(name):
-        return _table_of(data), name
+        return ArmFile(_table_of(data), name)
 
 
 def decoded(data: bytes, remedy: str) -> str:

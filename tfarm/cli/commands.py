@@ -12,12 +12,8 @@ import typer
 import tfarm
 from tfarm.cli.app import (
     ArmName,
-    Csv,
     File,
-    Gains,
     InputName,
-    Json,
-    LawFile,
     Place,
     Png,
     SideName,
@@ -26,9 +22,11 @@ from tfarm.cli.app import (
     advance,
     emit,
     emit_loop,
+    emit_record,
     interval,
     load_arm,
     load_chain,
+    load_loop,
     named,
     numbers,
     outputs_on,
@@ -92,17 +90,20 @@ class Presets:
 
 
 @command(epilog="presets")
-def presets(json: Json = False) -> None:
+def presets(*, show: Any = emit_record) -> None:
     """List the arms that come with tfarm, with their assumptions."""
-    emit(Presets([
-        Preset(arm.name, arm.length, arm.damping, arm.hub.inertia, arm.payload.mass, arm.payload.inertia,
-               arm.assumptions)
-        for arm in map(tfarm.load, tfarm.presets())
-    ]), json)  # fmt: skip
+    rows = []
+    for arm in map(tfarm.load, tfarm.presets()):
+        payload = arm.payload
+        rows.append(
+            Preset(arm.name, arm.length, arm.damping, arm.hub.inertia, payload.mass, payload.inertia, arm.assumptions)
+        )
+    show(Presets(rows))
 
 
 @command(epilog="modes sasaki2012-lab --count 5")
 def modes(
+    *,
     arm: ArmName,
     count: Annotated[int, typer.Option(min=1, max=1000)] = 10,
     digits: DigitCount = None,
@@ -110,7 +111,7 @@ def modes(
     method: MethodName = "closed-form",
     compare: Compare = False,
     theory: TheoryName = None,
-    json: Json = False,
+    show: Any = emit_record,
 ) -> None:
     """Natural frequencies, damping ratios and modes, complete by construction.
 
@@ -125,10 +126,10 @@ def modes(
     check_method(method, len(found), digits, compare)
     if compare:
         refuse({"--certify": certify}, OWN_TABLE)
-        emit(ByMethods(found.arm.name, "natural_frequency", "rad/s", found.index.tolist(), found.by_methods()), json)
+        show(ByMethods(found.arm.name, "natural_frequency", "rad/s", found.index.tolist(), found.by_methods()))
         return
     listed = listed_modes(found, digits, certify, cast("Any", method))
-    emit(listed, json)
+    show(listed)
     if listed.damped_failure:
         print_line(listed.damped_failure)
         raise typer.Exit(3)  # as where nothing could be solved
@@ -136,6 +137,7 @@ def modes(
 
 @command(epilog="response sasaki2012-lab --from 1 --to 100 --csv root.csv")
 def response(
+    *,
     arm: ArmName,
     output: str | None = None,
     s: ComplexPoints = None,
@@ -149,11 +151,9 @@ def response(
     digits: DigitCount = None,
     method: MethodName = "closed-form",
     compare: Compare = False,
-    csv: Csv = None,
     measured: Annotated[str | None, typer.Option(metavar="OUTPUT/INPUT=FILE")] = None,
-    png: Png = None,
     theory: TheoryName = None,
-    json: Json = False,
+    show: Any = emit,
 ) -> None:
     """Exact frequency response to the arm's input, or its values at points s.
 
@@ -176,20 +176,20 @@ def response(
             {"--s": s, "--omega": omega, "--output": output, "--x": x, "--side": side, "--digits": digits},
             "a measured response has its own outputs and frequencies; leave this out",
         )
-        emit(tfarm.overlay(load_arm(arm, theory), data_of(measured, "--measured")), json, csv=csv, png=png)
+        show(tfarm.overlay(load_arm(arm, theory), data_of(measured, "--measured")))
         return
-    refuse({"--png": png}, "a picture needs --measured; tfarm bode draws the exact response")
+    refuse({"--png": show.keywords["png"]}, "a picture needs --measured; tfarm bode draws the exact response")
     from tfarm.response.transfer import ByMethods, values_at
 
-    (wanted,) = outputs_on(["root_moment" if output is None else output], side)
+    (wanted,) = outputs_on([output or "root_moment"], side)
     G = tfarm.transfer(load_arm(arm, theory, driven), wanted, x=x, method=cast("Any", method), input=driven)
     at = places_of(s, omega, (start, stop), points)
     check_method(method, at.size, digits, compare)
     if compare:
-        refuse({"--csv": csv, "--input": driven if G.load else None}, OWN_TABLE)
-        emit(ByMethods(G.arm.name, G.outputs[0], G.units[0], at.tolist(), G.by_methods(at)), json)
+        refuse({"--csv": show.keywords["csv"], "--input": driven if G.load else None}, OWN_TABLE)
+        show(ByMethods(G.arm.name, G.outputs[0], G.units[0], at.tolist(), G.by_methods(at)))
         return
-    emit(values_at(G, at, digits), json, csv=csv, rows=True)
+    show(values_at(G, at, digits), rows=True)
 
 
 def places_of(s: Any, omega: Any, limits: tuple[float, float], points: int) -> Any:
@@ -221,6 +221,7 @@ def check_range(start: float, stop: float) -> None:
 
 @command(epilog="bode sasaki2012-lab --output tip_displacement --png bode.png")
 def bode(
+    *,
     arm: ArmName,
     output: str | None = None,
     start: Annotated[float | None, typer.Option("--from")] = None,
@@ -229,14 +230,9 @@ def bode(
     side: SideName = None,
     driven: InputName = None,
     loop: bool = False,
-    png: Png = None,
-    csv: Csv = None,
-    law: LawFile = None,
+    under: Any = load_loop,
     chain: Any = load_chain,
-    theory: TheoryName = None,
-    json: Json = False,
-    *,
-    gains: Gains,
+    show: Any = emit,
 ) -> None:
     """Bode plot of the exact response to the arm's input, with the poles and zeros of that output.
 
@@ -254,21 +250,24 @@ def bode(
             {"--output": output, "--from": start, "--to": stop, "--x": x, "--side": side, "--input": driven},
             "the loop function has no output and its own frequencies; leave this out",
         )
-        emit_loop("loop", arm, theory, gains, law, chain, json, csv=csv, png=png)
+        emit_loop("loop", arm, under, chain, show)
         return
-    of_loop = {f"--{name}": value for name, value in {**gains, "law": law, **chain.keywords}.items()}
-    refuse({key.replace("_", "-"): value for key, value in of_loop.items()}, "the loop function: give --loop too")
     from tfarm.response.frequency import resonant_band
 
-    subject, (wanted,) = load_arm(arm, theory, driven), outputs_on(["root_moment" if output is None else output], side)
+    of_loop = {**under.keywords["gains"], "law": under.keywords["law"], **chain.keywords}
+    for name, value in of_loop.items():
+        refuse({f"--{name.replace('_', '-')}": value}, "the loop function: give --loop too")
+    subject = load_arm(arm, under.keywords["theory"], driven)
+    (wanted,) = outputs_on([output or "root_moment"], side)
     low, high = resonant_band(tfarm.transfer(subject, wanted, x=x, input=driven).arm)
     band = low if start is None else start, high if stop is None else stop
     check_range(*band)
-    emit(tfarm.bode(subject, wanted, band, x=x, input=driven), json, csv=csv, png=png)
+    show(tfarm.bode(subject, wanted, band, x=x, input=driven))
 
 
 @command(epilog="reduce sasaki2012 --outputs root_moment,hub_rate --order 14")
 def reduce(
+    *,
     arm: ArmName,
     outputs: str = "root_moment,hub_rate",
     order: Annotated[int | None, typer.Option(min=0)] = None,
@@ -279,7 +278,7 @@ def reduce(
     side: SideName = None,
     mat: File = None,
     theory: TheoryName = None,
-    json: Json = False,
+    show: Any = emit_record,
 ) -> None:
     """Reduced state-space model, with its largest error against the exact arm over a frequency range.
 
@@ -297,13 +296,14 @@ def reduce(
         load_arm(arm, theory), outputs_on([name.strip() for name in outputs.split(",")], side),
         order=order, error=error, method=cast("Any", method), band=band, x=x,
     )  # fmt: skip
-    emit(reduced, json, also=() if mat is None else save_mat(reduced, mat, key="--mat"))
+    show(reduced, also=() if mat is None else save_mat(reduced, mat, key="--mat"))
 
 
 @measuring_command(
     epilog="fit rig.toml --data tip_acceleration/hub_angle=sweep.csv --free link.youngs_modulus,delay --json"
 )
 def fit(
+    *,
     arm: ArmName,
     data: Annotated[list[str] | None, typer.Option(metavar="OUTPUT/INPUT=FILE")] = None,
     free: Annotated[str, typer.Option(metavar="KEY,KEY")] = "",
@@ -319,7 +319,7 @@ def fit(
     report: bool = False,
     out: Annotated[Path, typer.Option(metavar="FOLDER")] = Path("reports"),
     theory: TheoryName = None,
-    json: Json = False,
+    show: Any = emit_record,
 ) -> None:
     """Fit of an arm's numbers to measured responses and ring-downs, with confidence intervals.
 
@@ -353,13 +353,14 @@ def fit(
         from tfarm.report import write
 
         page = write([found.arm], out, fits=[found], progress=advance, notice=print_line)
-    emit(found, json, png=png, also=(save, page))
+    emit(found, png=png, also=(save, page), **show.keywords)
     if not found.converged or found.misses:
         raise typer.Exit(3)
 
 
 @measuring_command(epilog="frf record.csv --input hub_torque --output tip_acceleration=acc1 --save measured.csv")
 def frf(
+    *,
     record: RecordName,
     input: str,
     output: str,
@@ -368,7 +369,7 @@ def frf(
     segment: float | None = None,
     overlap: float | None = None,
     csv: Annotated[Path | None, typer.Option("--save", "--csv", metavar="FILE")] = None,
-    json: Json = False,
+    show: Any = emit_record,
 ) -> None:
     """Frequency response of a record over time, by averaged cross-spectra, with coherence.
 
@@ -392,19 +393,20 @@ def frf(
         recording.read_recording(record), signal, driven, columns=(column or signal, driven_column or driven),
         estimator=cast("Any", estimator), window=cast("Any", window), segment=segment, overlap=overlap,
     )  # fmt: skip
-    emit(found, json, csv=csv, rows=True)
+    emit(found, csv=csv, rows=True, **show.keywords)
     if found.note:
         print_line(found.note)
 
 
 @measuring_command(epilog="ring record.csv --signal root_strain --from 2.5")
 def ring(
+    *,
     record: RecordName,
     signal: str,
     start: Annotated[float | None, typer.Option("--from")] = None,
     stop: Annotated[float | None, typer.Option("--to")] = None,
     modes: Annotated[int, typer.Option(min=1)] = 1,
-    json: Json = False,
+    show: Any = emit_record,
 ) -> None:
     """Frequencies and damping ratios of a decay, with confidence intervals.
 
@@ -416,4 +418,4 @@ def ring(
     """
     from tfarm.fitting import recording, resonances
 
-    emit(resonances.ring(recording.read_recording(record), signal, start=start, stop=stop, modes=modes), json)
+    show(resonances.ring(recording.read_recording(record), signal, start=start, stop=stop, modes=modes))
