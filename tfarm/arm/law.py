@@ -78,12 +78,7 @@ class Law:
         require(len(known) <= 1, "period", sorted(known), "the parts of a law have one sampling period in common")
         object.__setattr__(self, "period", known.pop() if known else None)
         object.__setattr__(self, "references", tuple(self.references))
-        require(
-            self.sign in (-1, 1) and self.sign is not True,
-            "sign",
-            self.sign,
-            "-1 (v = -C y, the default) or 1 (v = C y)",
-        )
+        require(self.sign in (-1, 1), "sign", self.sign, "-1 (v = -C y, the default) or 1 (v = C y)")
         if self.input is not None:
             must_be_known("input", self.input, INPUTS)
         must_be_known("rule", self.rule, SAMPLING_RULES)
@@ -254,13 +249,11 @@ class Law:
         """
         from scipy.linalg import block_diag
 
-        columns = self.signals if columns is None else tuple(columns)
-        blocks = [part.block.matrices() for part in self.parts]
-        chosen = [np.array([[name == each for each in columns] for name in part.signals], float) for part in self.parts]
-        pairs = list(zip(blocks, chosen, strict=True))
-        A, C = block_diag(*(a for a, *_ in blocks)), np.hstack([c for _, _, c, _ in blocks])
-        B, D = np.vstack([b @ own for (_, b, _, _), own in pairs]), sum(d @ own for (*_, d), own in pairs)
-        return A, B, -self.sign * C, -self.sign * D
+        names = [name for part in self.parts for name in part.signals]
+        chosen = np.array([[name == each for each in columns or self.signals] for name in names], float)
+        A, B, C, D = (block_diag(*each) for each in zip(*(part.block.matrices() for part in self.parts), strict=True))
+        C, D = (-self.sign * each.sum(axis=0, keepdims=True) for each in (C, D))
+        return A, B @ chosen, C, D @ chosen
 
     # ------------------------------------------------------------ other laws
 

@@ -30,7 +30,7 @@ from tfarm.arm.chain import Chain, chain_or_usual, file_text, load_chain
 from tfarm.arm.checks import whole
 from tfarm.arm.law_tables import load_law
 from tfarm.arm.reading import AnyFile, load, load_tables, presets
-from tfarm.arm.writing import LAW_DEFAULTS, law_toml, toml_tables, toml_text
+from tfarm.arm.writing import law_head, law_toml, toml_tables, toml_text
 from tfarm.arrays import Real
 from tfarm.errors import ParameterError, must_be_known, naming, require
 from tfarm.files import locked_folder, mat_content, write_file
@@ -324,8 +324,7 @@ def files_of(arm: Arm, law: AnyLaw, chain: Chain, declared: Mapping[str, Any]) -
     except ParameterError:  # of a state space: it has no text
         columns = (*own.signals, *own.wanted)
         files[MATRICES] = mat_content(dict(zip("ABCD", own.matrices(columns), strict=True)), "column")
-        head = {key: getattr(own, key) for key, usual in LAW_DEFAULTS.items() if getattr(own, key) != usual}
-        table = {"name": own.name, **head, "sign": -1, "matrices": MATRICES, "signals": columns}
+        table = {**law_head(own), "sign": -1, "matrices": MATRICES, "signals": columns}
         text = toml_text(toml_tables(table, "law"))
     places = {key: declared[key] and os.path.abspath(declared[key]) for key in PATHS}
     over = {key: {kind: tuple(numbers) for kind, numbers in entry.items()} for key, entry in declared["over"].items()}
