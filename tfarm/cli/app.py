@@ -22,14 +22,14 @@ from tfarm.arm import ANGLE_GAIN, LISTED, MOMENT_GAIN, RATE_GAIN, AnyLaw, Arm, T
 from tfarm.arm.reading import ArmFile, load_tables
 from tfarm.errors import one_line, require
 from tfarm.files import is_standard_output, write_file
-from tfarm.schema import as_csv, curve_table, to_dict, to_json
+from tfarm.schema import Table, as_csv, curve_table, to_dict, to_json
 
 if TYPE_CHECKING:
     from tfarm.arm.chain import Chain
 
 app = typer.Typer(name="tfarm", rich_markup_mode="rich", pretty_exceptions_enable=False)
 GROUPS = ("Arm", "Loop", "Sampled loop", "Design", "Measurement", "Report")  # of commands in the help, in its order
-PROGRESS_AFTER, PROGRESS_EVERY = 2.0, 4.0  # seconds to the first line of progress, and from one to the next
+PROGRESS_AFTER = 2.0  # seconds to the first line of progress
 
 
 @cache  # some 35 ms, which a process with several commands need not spend on each
@@ -143,8 +143,6 @@ ArmNames = Annotated[
     ),
 ]
 TheoryName = Annotated[Theory | None, typer.Option("--theory", help="beam theory; by default that of the arm's file")]
-Json = Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")]
-Csv = Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="write the table to this file")]
 Png = Annotated[
     Path | None,
     typer.Option("--figure", "--png", metavar="FILE", callback=check_figure,
@@ -170,19 +168,6 @@ LawFiles = Annotated[
     typer.Option("--law", metavar="FILE", exists=True, help="TOML file with a [law]; may be repeated",
                  rich_help_panel=CONTROLLER),
 ]  # fmt: skip
-Period = Annotated[
-    float | None,
-    typer.Option("--period", help="sampling period [s]; by default the file's, or 0.01", rich_help_panel=SAMPLING),
-]
-Delay = Annotated[
-    float | None,
-    typer.Option("--delay-samples", help="computational delay in samples, any fraction", rich_help_panel=SAMPLING),
-]
-DspFile = Annotated[
-    str | None,
-    typer.Option("--dsp", metavar="FILE", rich_help_panel=SAMPLING,
-                 help="TOML file with [sampling], [converters], [actuator], [slew]; by default that of the arm"),
-]  # fmt: skip
 Gains = dict[str, float | None]  # by name; None where not given
 DEFAULT_GAINS = {
     RATE_GAIN: "hub rate gain [N m s/rad, V s/rad or A s/rad]; by default 0.00642 J w1 (0.3 on the paper's arm)",
@@ -196,12 +181,11 @@ def gain_option(name: str, text: str, kind: Any = float | None) -> Any:
 
 
 AngleGain = gain_option(ANGLE_GAIN, "hub angle gain", float)
-GAIN_OPTIONS = [
-    Parameter(gain.name, Parameter.KEYWORD_ONLY, default=None, annotation=gain_option(
-        gain.name, DEFAULT_GAINS.get(gain.name, f"{gain.output.replace('_', ' ')} gain [{gain.unit}]; by default 0")
-    ))
-    for gain in LISTED
-]  # fmt: skip
+GAIN_OPTIONS = []
+for each in LISTED:
+    words = DEFAULT_GAINS.get(each.name, f"{each.output.replace('_', ' ')} gain [{each.unit}]; by default 0")
+    kind = gain_option(each.name, words)
+    GAIN_OPTIONS.append(Parameter(each.name, Parameter.KEYWORD_ONLY, default=None, annotation=kind))
 
 
 def add_command(group: str, **how: Any) -> Callable[[Callable[..., None]], Callable[..., None]]:
@@ -324,18 +308,34 @@ def load_loop(
     return arm, *load_law(file, arm, gains, law)
 
 
-def load_driven_loop(
-    file: ArmFile, *, law: LawFile = None, theory: TheoryName = None, gains: Gains
-) -> tuple[Arm, AnyLaw, dict[str, Any]]:
+def load_driven_loop(file: ArmFile, *, loop: Any = load_loop) -> tuple[Arm, AnyLaw, dict[str, Any]]:
     """Return the same of a command without sampling, the arm with the analog damping that its file states."""
     from tfarm.dsp.plant import driven
 
-    arm, controller, defaults = load_loop(file, law=law, theory=theory, gains=gains)
+    arm, controller, defaults = loop(file)
     return driven(arm, load_chain(file))[0], controller, defaults
 
 
 def load_chain(
-    file: str | ArmFile, *, period: Period = None, delay_samples: Delay = None, dsp: DspFile = None
+    file: str | ArmFile,
+    *,
+    period: Annotated[
+        float | None,
+        typer.Option("--period", help="sampling period [s]; by default the file's, or 0.01", rich_help_panel=SAMPLING),
+    ] = None,
+    delay_samples: Annotated[
+        float | None,
+        typer.Option("--delay-samples", help="computational delay in samples, any fraction", rich_help_panel=SAMPLING),
+    ] = None,
+    dsp: Annotated[
+        str | None,
+        typer.Option(
+            "--dsp",
+            metavar="FILE",
+            rich_help_panel=SAMPLING,
+            help="TOML file with [sampling], [converters], [actuator], [slew]; by default that of the arm",
+        ),
+    ] = None,
 ) -> "Chain":
     """Return the sampled chain of a file, or of the arm's, with the period and the delay that are given instead."""
     from tfarm.arm.chain import load_chain as read
@@ -362,32 +362,22 @@ def refuse(others: Mapping[str, Any], remedy: str) -> None:
 # ----------------------------------------------------------------------------------------------------------- outputs
 
 
-def emit(
+def emit_record(
     record: Any,
     defaults: Mapping[str, Any] | None = None,
     also: Sequence[Path | None] = (),
-    rows: bool = False,
+    rows: Table | None = None,
     summary: Any = None,
-    picture: str | None = None,
     *,
-    json: Json = False,
-    csv: Csv = None,
-    png: Png = None,
+    json: Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")] = False,
 ) -> None:
-    """Write the curves or rows of a record to CSV and its `picture` to a file, then print it as JSON or as text.
+    """Print a record as JSON or as text.
 
     `defaults` is what JSON has of default gains; `also` are files that are written already.  The text ends with the
-    `rows` of the CSV file where they are wanted and not written, and begins with the result card `summary`, as the
-    "summary" of JSON.  Nothing is printed where standard output is one of the files.
+    `rows` of a table, and begins with the result card `summary`, as the "summary" of JSON.  Nothing is printed where
+    standard output is one of the files.
     """
-    if csv is not None:
-        write_file(csv, as_csv(curve_table(record), units=True).encode(), key="--csv")
-    if png is not None:
-        from tfarm import plots  # every picture is registered once they are loaded
-
-        draw = getattr(plots, picture).figure if picture else plots.style.FIGURES[type(record)]
-        plots.style.save_picture(draw, record, png)
-    written = [path for path in (*also, csv, png) if path is not None]
+    written = [path for path in also if path is not None]
     if any(map(is_standard_output, written)):
         return
     for path in written:
@@ -403,19 +393,32 @@ def emit(
         show_text("\n".join(summary.notes))
         print()
     words = f"by default {defaults['default_gains_in_words']}" if defaults and defaults["default_gains"] else ""
-    show(record, curve_table(record) if rows and csv is None else None, words)
+    show(record, rows, words)
 
 
-def emit_record(
+def emit(
     record: Any,
     defaults: Mapping[str, Any] | None = None,
     also: Sequence[Path | None] = (),
-    summary: Any = None,
+    rows: bool = False,
+    picture: str | None = None,
     *,
-    json: Json = False,
+    show: Any = emit_record,
+    csv: Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="write the table to this file")] = None,
+    png: Png = None,
 ) -> None:
-    """Emit a record without curves and picture."""
-    emit(record, defaults, also, summary=summary, json=json)
+    """Write the curves or rows of a record to CSV and its `picture` to a file, then print it.
+
+    The `rows` of the CSV file are printed where they are wanted and not written.
+    """
+    if csv is not None:
+        write_file(csv, as_csv(curve_table(record), units=True).encode(), key="--csv")
+    if png is not None:
+        from tfarm import plots  # every picture is registered once they are loaded
+
+        draw = getattr(plots, picture).figure if picture else plots.style.FIGURES[type(record)]
+        plots.style.save_picture(draw, record, png)
+    show(record, defaults, (*also, csv, png), curve_table(record) if rows and csv is None else None)
 
 
 def emit_loop(picture: str, file: ArmFile, loop: Any, chain: Any, show: Any) -> None:
@@ -449,7 +452,9 @@ def progress() -> Iterator[Callable[[int, int, str], None]]:
     _state[0], over, began = "running", Event(), time.monotonic()
 
     def speak() -> None:
-        while not over.wait(PROGRESS_EVERY if time.monotonic() - began > PROGRESS_AFTER else PROGRESS_AFTER):
+        pause = PROGRESS_AFTER
+        while not over.wait(pause):
+            pause = 4.0
             if _state[0]:  # none between a question and its answer
                 print_line(f"{_state[0]} ({time.monotonic() - began:.0f} s)")
 

@@ -33,6 +33,7 @@ from tfarm.cli.app import (
     print_line,
     refuse,
 )
+from tfarm.errors import require
 from tfarm.schema import Quantity
 
 command = partial(add_command, "Arm")
@@ -45,17 +46,8 @@ Compare = Annotated[bool, typer.Option("--compare", help="all three methods and 
 DigitCount = Annotated[
     int | None, typer.Option("--digits", min=1, max=1000, help="certified digits; texts in JSON above 15")
 ]
-ComplexPoints = Annotated[
-    Any,
-    typer.Option(
-        metavar="S,S",
-        parser=numbers("numbers in 1/s such as 0.3+57.1j,10j", kind=lambda text: complex(text.replace("i", "j"))),
-    ),
-]
-Frequencies = Annotated[Any, typer.Option(metavar="W,W", parser=numbers("frequencies in rad/s such as 1,10,100"))]
 pair = named(numbers("KEY=NUMBER,NUMBER", 2))
 OWN_TABLE = "--compare prints a table of its own: ask for one of them"
-MOST_SLOW = 2000  # points by balls or by the appendix, at some milliseconds each
 
 
 @dataclass(frozen=True)
@@ -140,8 +132,14 @@ def response(
     *,
     arm: ArmName,
     output: str | None = None,
-    s: ComplexPoints = None,
-    omega: Frequencies = None,
+    s: Annotated[
+        Any,
+        typer.Option(
+            metavar="S,S",
+            parser=numbers("numbers in 1/s such as 0.3+57.1j,10j", kind=lambda text: complex(text.replace("i", "j"))),
+        ),
+    ] = None,
+    omega: Annotated[Any, typer.Option(metavar="W,W", parser=numbers("frequencies in rad/s such as 1,10,100"))] = None,
     start: Annotated[float, typer.Option("--from")] = 0.1,
     stop: Annotated[float, typer.Option("--to")] = 1000.0,
     points: Annotated[int, typer.Option(min=2, max=1_000_000)] = 500,
@@ -207,16 +205,14 @@ def check_method(method: str, number: int, digits: int | None, compare: bool) ->
     """Raise ParameterError for digits, or too many points, by one of the slow methods."""
     if method != "closed-form" or compare:
         refuse({"--digits": digits}, "they are certified by balls in any case: leave --method and --compare out")
-        refuse(
-            {"points": number if number > MOST_SLOW else None},
-            f"at most {MOST_SLOW} by balls or the appendix, which take milliseconds for each",
-        )
+        remedy = "at most 2000 by balls or the appendix, which take milliseconds for each"
+        require(number <= 2000, "points", number, remedy)
 
 
 def check_range(start: float, stop: float) -> None:
     """Raise ParameterError for what is no frequency range [rad/s]."""
-    refuse({"--from": None if 0 < start < math.inf else start}, "a positive frequency in rad/s")
-    refuse({"--to": None if start < stop < math.inf else stop}, f"a frequency above --from, {start:g} rad/s")
+    require(0 < start < math.inf, "--from", start, "a positive frequency in rad/s")
+    require(start < stop < math.inf, "--to", stop, f"a frequency above --from, {start:g} rad/s")
 
 
 @command(epilog="bode sasaki2012-lab --output tip_displacement --png bode.png")
@@ -353,7 +349,7 @@ def fit(
         from tfarm.report import write
 
         page = write([found.arm], out, fits=[found], progress=advance, notice=print_line)
-    emit(found, png=png, also=(save, page), **show.keywords)
+    emit(found, png=png, also=(save, page), show=show)
     if not found.converged or found.misses:
         raise typer.Exit(3)
 
@@ -384,16 +380,22 @@ def frf(
     """
     from tfarm.fitting import recording
 
-    refuse(
-        {"signal": next((text for text in (output, input) if text.endswith("=")), None)},
-        "write NAME=COLUMN, such as tip_acceleration=acc1",
-    )
-    (signal, column), (driven, driven_column) = (text.partition("=")[::2] for text in (output, input))
+    names, columns = [], []
+    for text in (output, input):
+        name, sign, column = text.partition("=")
+        require(column or not sign, "signal", text, "write NAME=COLUMN, such as tip_acceleration=acc1")
+        names.append(name)
+        columns.append(column or name)
     found = recording.frequency_response(
-        recording.read_recording(record), signal, driven, columns=(column or signal, driven_column or driven),
-        estimator=cast("Any", estimator), window=cast("Any", window), segment=segment, overlap=overlap,
-    )  # fmt: skip
-    emit(found, csv=csv, rows=True, **show.keywords)
+        recording.read_recording(record),
+        *names,
+        columns=tuple(columns),
+        estimator=cast("Any", estimator),
+        window=cast("Any", window),
+        segment=segment,
+        overlap=overlap,
+    )
+    emit(found, csv=csv, rows=True, show=show)
     if found.note:
         print_line(found.note)
 

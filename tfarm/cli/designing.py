@@ -289,7 +289,7 @@ def compare(
         from tfarm.report.writing import write_comparison
 
         page = write_comparison(found, out)
-    emit(found, png=png, also=(page,), **show.keywords)
+    emit(found, png=png, also=(page,), show=show)
 
 
 # ------------------------------------------------------------ studies of uncertain arms
@@ -300,13 +300,6 @@ def varied(text: str) -> dict[str, list[float]]:
     kind, _, values = text.partition(":")
     form = "KIND:NUMBERS, such as uniform:0,0.2, normal:0.1,0.01, grid:0,1,11 or values:0.1,0.2"
     return {kind: list(numbers(form)(values))}
-
-
-Over = Annotated[
-    list[Any] | None,
-    typer.Option("--over", metavar="KEY=KIND:NUMBERS", parser=named(varied), help=""),
-]
-Words = Annotated[str | None, typer.Option("--ask", metavar="QUANTITY,...")]
 
 
 def announce(done: int, total: int, text: str) -> None:
@@ -338,8 +331,8 @@ def study(
     *,
     arm: ArmName,
     out: Annotated[Path, typer.Option(metavar="DIR", show_default=False)],
-    over: Over = None,
-    ask: Words = None,
+    over: Annotated[list[Any] | None, typer.Option(metavar="KEY=KIND:NUMBERS", parser=named(varied))] = None,
+    ask: Annotated[str | None, typer.Option(metavar="QUANTITY,...")] = None,
     draws: int | None = None,
     seed: int | None = None,
     rows: Annotated[Path | None, typer.Option("--list", metavar="FILE", exists=True)] = None,
