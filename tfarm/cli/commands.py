@@ -389,7 +389,7 @@ def frf(
     found = recording.frequency_response(
         recording.read_recording(record),
         *names,
-        columns=tuple(columns),
+        columns=cast("Any", columns),
         estimator=cast("Any", estimator),
         window=cast("Any", window),
         segment=segment,

@@ -84,16 +84,15 @@ def check_words(arguments: list[str]) -> None:
     files = [text for option, text in options if option in WRITTEN and text != STANDARD_OUTPUT]
     for option, text in options:
         if option not in PATHS:
-            # to Python alone: 5_0, or other digits
-            is_odd = re.search(r"[\d.]_\d|(?=\d)[^\x00-\x7f]", text)
+            # numbers to Python alone: 5_0, or other digits
+            number = re.compile(r"(?=.*(_|[^\x00-\x7f]))[-+.\d_eEij]*\d[-+.\d_eEij]*")
+            is_odd = any(map(number.fullmatch, re.split("[,=]", text)))
             require(not is_odd, option, text, "write numbers as 50, 0.5 or 5e1")
         else:
             require(text.strip(), option, text, "give a path")
         if text == STANDARD_OUTPUT:
-            names = ", ".join(STREAMED)
-            require(
-                option in STREAMED, option, text, f"- is standard output, and only {names} may go there: give a name"
-            )
+            remedy = f"- is standard output, and only {', '.join(STREAMED)} may go there: give a name"
+            require(option in STREAMED, option, text, remedy)
             require(len(takers) == 1, option, text, "standard output takes one thing at a time: name a file")
         if option in WRITTEN:
             require(files.count(text) <= 1, option, text, "two results in one file: name another")
