@@ -86,11 +86,6 @@ def test_what_is_optional():
     assert accepted(short + "[payload]\nmass = 2\n").payload == Payload(mass=2.0)
 
 
-def test_poissons_ratio_instead_of_the_shear_modulus():
-    link = accepted(edited("shear_modulus = 2.6517e10", "poissons_ratio = 0.25")).link
-    assert link.shear_modulus == 6.8944e10 / 2.5
-
-
 def test_whole_numbers_infinities_and_foreign_line_ends(tmp_path):
     assert accepted(edited("length = 1.0 ", "length = 1 ")).link.length == 1.0
     assert accepted(edited("inertia = 0.1", "inertia = inf")).is_locked
@@ -171,16 +166,6 @@ def test_what_is_no_regular_file(tmp_path):
     assert "cannot be read (No such file or directory)" in refusal(tmp_path / "none.toml")
     assert "cannot be read (No such file or directory)" in refusal("two\nlines.toml")
     assert "cannot be read (File name too long)" in refusal("x" * 5000 + ".toml")
-
-
-def test_a_file_without_permission(tmp_path, monkeypatch):
-    def denied(*_):
-        raise PermissionError(13, "Permission denied")
-
-    path = tmp_path / "arm.toml"
-    path.write_text(EXAMPLE)
-    monkeypatch.setattr("builtins.open", denied)
-    assert "cannot be read (Permission denied); check the path and its permissions" in refusal(path)
 
 
 def test_a_file_needs_no_ending_and_a_preset_precedes_a_file_of_its_name(tmp_path, monkeypatch):

@@ -55,6 +55,11 @@ class Rational:
         return len(self.den) - 1
 
     @property
+    def is_constant(self) -> bool:
+        """Whether it is a number."""
+        return len(self.num) == len(self.den) == 1
+
+    @property
     def excess(self) -> int:
         """Degree of the numerator minus that of the denominator: above 0 it differentiates."""
         return len(self.num) - len(self.den)
@@ -110,6 +115,7 @@ class StateSpace:
     B: Real
     C: Real
     D: Real
+    is_constant = False  # a name of Rational's, though without states it may be
 
     def __post_init__(self) -> None:
         for name in "ABCD":

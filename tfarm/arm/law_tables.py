@@ -106,22 +106,21 @@ def law_of_table(table: Any, folder: Path) -> Law:
 
 def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:
     """Return the law of a .mat file with A, B, C and D, or of its structure named `system`."""
-    import numpy as np
-
     signals = head.signals or []
     require(signals, "signals", MISSING, "name a signal for each column of B")
     found, _ = read_mat(folder / str(head.matrices), MOST_MAT_BYTES, key="matrices")
+    place = ""
     if head.system is not None:
         must_be_known("system", head.system, dict.fromkeys(name.split(".")[0] for name in found if "." in name))
-    place = "" if head.system is None else f"{head.system}."
+        place = f"{head.system}."
     missing = [name for name in "ABCD" if f"{place}{name}" not in found]
     remedy = f"holds no {', '.join(missing)}; it has {listed(found, 300)} (system = names a structure)"
     require(not missing, "matrices", head.matrices, remedy)
-    try:
-        A, B, C, D = (np.atleast_2d(np.asarray(found[f"{place}{name}"], dtype=float)) for name in "ABCD")
-    except (TypeError, ValueError):
-        raise ParameterError(key="matrices", value=head.matrices, remedy="A, B, C and D hold numbers") from None
-    if head.scales is not None:
-        require(len(head.scales) == len(signals), "scales", head.scales, "one number for each signal")
-        B, D = B * head.scales, D * head.scales
-    return Law.of_matrices(A, B, C, D, signals, **common)
+    A, B, C, D = (found[f"{place}{name}"] for name in "ABCD")
+    law = Law.of_matrices(A, B, C, D, signals, **common)
+    if head.scales is None:
+        return law
+    require(len(head.scales) == len(signals), "scales", head.scales, "one number for each signal")
+    (part,) = law.parts
+    A, B, C, D = part.block.matrices()  # of finite numbers now
+    return Law.of_matrices(A, B * head.scales, C, D * head.scales, signals, **common)

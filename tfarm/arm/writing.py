@@ -93,7 +93,7 @@ def _signal_table(part: Part) -> dict[str, Any]:
     if not isinstance(block, Rational) or len(part.signals) > 1:
         remedy = "save a state space as a .mat file: scipy.io.savemat(file, {'A': ..}), matrices = file in [law]"
         raise ParameterError(key="law", value=part.signals[0], remedy=remedy)
-    is_gain = len(block.num) == 1 and block.den == (1.0,)
+    is_gain = block.is_constant and block.den == (1.0,)
     return {"gain": block.num[0]} if is_gain else {"num": block.num, "den": block.den}
 
 
