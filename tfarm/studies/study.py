@@ -29,8 +29,8 @@ from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arm.chain import Chain, chain_or_usual, file_text, load_chain
 from tfarm.arm.checks import whole
 from tfarm.arm.law_tables import load_law
-from tfarm.arm.reading import arm_in, load_tables, presets
-from tfarm.arm.writing import LAW_DEFAULTS, law_toml, toml_tables, toml_text
+from tfarm.arm.reading import AnyFile, load, load_tables, presets
+from tfarm.arm.writing import law_head, law_toml, toml_tables, toml_text
 from tfarm.arrays import Real
 from tfarm.errors import ParameterError, must_be_known, naming, require
 from tfarm.files import locked_folder, mat_content, write_file
@@ -290,7 +290,7 @@ def usual_workers(client: Any) -> int:
 # ------------------------------------------------------------------------------------------------------------ file
 
 
-def load_study(name_or_path: str) -> dict[str, Any]:
+def load_study(name_or_path: AnyFile) -> dict[str, Any]:
     """Return the arguments of `study` that a file declares; its paths are relative to its folder.
 
     Raises ParameterError, naming the file.
@@ -304,12 +304,12 @@ def load_study(name_or_path: str) -> dict[str, Any]:
             require(type(value) is kind, key, value, f"give {KIND_WORDS[kind]}")
         for word in tables.get("ask", []):
             require(isinstance(word, str), "ask", word, "give names of quantities")
-    arm = tables["arm"] if tables["arm"] in presets() else str(folder / tables["arm"])
+    arm = load_tables(tables["arm"] if tables["arm"] in presets() else str(folder / tables["arm"]))
     law = load_law(folder / tables["law"] if "law" in tables else arm)
     gains = None if law is None else law.gains
     same = gains if gains and as_law(gains) == law else law  # as gains, of which one of 0 can be varied
     own = {key: folder / value if key in PATHS else value for key, value in tables.items()}
-    return {**own, "arm": arm_in(*load_tables(arm)), "law": same, "chain": load_chain(arm)}
+    return {**own, "arm": load(arm), "law": same, "chain": load_chain(arm)}
 
 
 def files_of(arm: Arm, law: AnyLaw, chain: Chain, declared: Mapping[str, Any]) -> dict[str, bytes]:
@@ -324,8 +324,7 @@ def files_of(arm: Arm, law: AnyLaw, chain: Chain, declared: Mapping[str, Any]) -
     except ParameterError:  # of a state space: it has no text
         columns = (*own.signals, *own.wanted)
         files[MATRICES] = mat_content(dict(zip("ABCD", own.matrices(columns), strict=True)), "column")
-        head = {key: getattr(own, key) for key, usual in LAW_DEFAULTS.items() if getattr(own, key) != usual}
-        table = {"name": own.name, **head, "sign": -1, "matrices": MATRICES, "signals": columns}
+        table = {**law_head(own), "sign": -1, "matrices": MATRICES, "signals": columns}
         text = toml_text(toml_tables(table, "law"))
     places = {key: declared[key] and os.path.abspath(declared[key]) for key in PATHS}
     over = {key: {kind: tuple(numbers) for kind, numbers in entry.items()} for key, entry in declared["over"].items()}
