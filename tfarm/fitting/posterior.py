@@ -104,8 +104,7 @@ def posterior_of(found: Solution, fitted: Sequence[Fitted], not_determined: Sequ
     known = sizes >= 1.0 / OPEN_DEVIATION
     spread = axes[known].T * np.maximum(1.0 / sizes[known], LEAST_DEVIATION)
     numbers = [
-        PosteriorNumber(key=each.key, value=each.value, low=each.low, high=each.high,
-                        size=0.0 if of.by_logarithm else of.size)
+        PosteriorNumber(key=each.key, value=each.value, low=each.low, high=each.high, size=of.size)
         for each, of in zip(fitted, own, strict=False)
     ]  # fmt: skip
     return Posterior(format="tfarm posterior 1", arm=arm, numbers=numbers, covariance=(spread @ spread.T).tolist(),

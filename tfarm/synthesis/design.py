@@ -291,7 +291,7 @@ class _Task:
             value=OBJECTIVES[self.objective].worst([each.value for each in on_arms]), verdict=on_arms[0].verdict,
             bounds={each.name: each.bounds for each in own.free}, flat=flat_part(choice.worst, own, x, choice.score),
             modes=self.modes, at_bound=tuple(own.names[place] for place, _ in at_ends),
-            at_limit=tuple(own.names[place] for place, end in at_ends if own.is_physical(place, end)),
+            at_limit=tuple(own.names[place] for place, end in at_ends if (place, end) in own.ends(physical=True)),
             widened=choice.search.widened, loop=self.loop, chain=self.chain, sampled=on_arms[0].sampled, arms=on_arms,
             starts=choice.search.starts, agreed=choice.search.agreed, worst_case=case,
         )  # fmt: skip

@@ -38,7 +38,6 @@ GROWTH_OF_MODEL = 1e-6  # of |s|: a smaller growth may be an error of the model
 AT_NYQUIST = 1e-12  # of z = -1, where Tustin's s is infinite
 POLE_OFFSETS = np.geomspace(1e-9, 0.5, 40)  # rad, to either side of the open loop's poles
 EVEN_ANGLES = 400  # points of the circle at equal distances
-LOST_GROWTH = 1e6  # of a matrix that is not finite
 RANK_LOST = 1e-11  # of the largest singular value: rounding of the signals of a slew
 OF_ROOT = 1.3  # the root of the number of samples by the length of a block, at least
 
@@ -67,23 +66,26 @@ class Model:
 
     # ------------------------------------------------------------ laws in states
 
-    def states(self, entries: Sequence[Entry]) -> tuple[Real, Real, Real, Real]:
+    def states(self, entries: Sequence[Entry]) -> Matrices:
         """A (laws, k, k), B (laws, k, signals), C (laws, 1, k), D (laws, 1, signals) of laws."""
         number = max(each.num.shape[1] for each in entries)
-        order, signals = sum(len(each.den) - 1 for each in entries), len(self.signals)
+        order = sum(len(each.den) - 1 for each in entries)
+        signals = len(self.signals)
         A, B = np.zeros((number, order, order)), np.zeros((number, order, signals))
         C, D = np.zeros((number, 1, order)), np.zeros((number, 1, signals))
         first = 0
         for signal, num, den in entries:
             n, column = len(den) - 1, self.signals.index(signal)
             scale = self.speed ** np.arange(n, -1.0, -1.0)[:, None]
-            num = np.concatenate([np.zeros((n + 1 - len(num), num.shape[1])), num]) * scale
-            num, den = num / (den[0] * scale[0]), den * scale / (den[0] * scale[0])
+            lead = den[0] * scale[0]
+            num = np.pad(num, ((n + 1 - len(num), 0), (0, 0))) * scale / lead
+            den = den * scale / lead
             D[:, 0, column] += num[0]
             if n:
                 own = slice(first, first + n)
-                A[:, first, own], B[:, first, column] = -den[1:].T, 1.0
-                A[:, np.arange(first + 1, first + n), np.arange(first, first + n - 1)] = 1.0
+                A[:, own, own] = np.eye(n, k=-1)
+                A[:, first, own] = -den[1:].T
+                B[:, first, column] = 1.0
                 C[:, 0, own] = (num[1:] - num[0] * den[1:]).T
             first += n
         if self.period is None:
@@ -92,31 +94,34 @@ class Model:
         within = np.asarray(np.linalg.inv(unit - A), dtype=float)
         return within @ (unit + A), 2 * within @ B, C @ within, D + C @ within @ B
 
-    def closed(self, entries: Sequence[Entry], share: float = 1.0) -> Real:
-        """Closed-loop matrices (laws, n, n) with a factor `share` on the law, the plant's states first.
+    def feedback(self, law: Matrices, share: float = 1.0) -> tuple[Real, Real]:
+        """The row (laws, 1, n) of the input by all states, with a factor on the law, and 1 + D_k D (nan for 0)."""
+        _, _, C, D = self.plant
+        _, _, Ck, Dk = law
+        through = 1.0 + share * (Dk @ D)
+        through = np.where(abs(through) < ALGEBRAIC, np.nan, through)
+        return -share * np.concatenate([Dk @ C, Ck], axis=2) / through, through
 
-        They are nan of algebraic loops.
-        """
+    def closed(self, law: Matrices, share: float = 1.0) -> Real:
+        """Closed-loop matrices (laws, n, n), the plant's states first; nan of algebraic loops."""
         A, B, C, D = self.plant
-        Ak, Bk, Ck, Dk = self.states(entries)
-        whole = 1.0 + share * (Dk @ D)
-        whole = np.where(abs(whole) < ALGEBRAIC, np.nan, whole)
-        number, n, k = len(Ak), len(A), Ak.shape[1]
-        v = -share * np.concatenate([Dk @ C, Ck], axis=2) / whole
-        y = np.concatenate([np.broadcast_to(C, (number, *C.shape)), np.zeros((number, len(C), k))], axis=2) + D @ v
-        found = np.zeros((number, n + k, n + k))
+        Ak, Bk, *_ = law
+        row, _ = self.feedback(law, share)
+        read, n = D @ row, len(A)
+        read[:, :, :n] += C
+        found = np.zeros((len(Ak), *row.shape[-1:] * 2))
         found[:, :n, :n], found[:, n:, n:] = A, Ak
-        found[:, :n] += B @ v
-        found[:, n:] += Bk @ y
+        found[:, :n] += B @ row
+        found[:, n:] += Bk @ read
         return found
 
     # ------------------------------------------------------------ poles
 
     def poles(self, entries: Sequence[Entry], share: float = 1.0) -> Complex:
         """Closed-loop poles (laws, n), of a matrix that is not finite far outside."""
-        found = self.closed(entries, share)
-        bad = ~np.isfinite(found).all(axis=(1, 2))
-        found[bad] = LOST_GROWTH * np.eye(found.shape[1])
+        found = self.closed(self.states(entries), share)
+        growth = 1e6
+        found[~np.isfinite(found).all(axis=(1, 2))] = growth * np.eye(found.shape[1])
         return np.linalg.eigvals(found).astype(complex)
 
     def growth(self, poles: Complex) -> Real:
@@ -171,21 +176,21 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
     Poles of higher modes, which alias into the same angles, are those nearest to the open-loop ones: a held torque
     moves a pole less the higher its mode.
     """
-    T, by_difference = chain.sampling.period, "hub_rate" in signals and chain.converters.hub_rate == "difference"
-    read = (*signals, *(("hub_angle",) if by_difference and "hub_angle" not in signals else ()))
+    T = chain.sampling.period
+    by_difference = "hub_rate" in signals and chain.converters.hub_rate == "difference"
+    read = tuple(dict.fromkeys((*signals, *("hub_angle",) * by_difference)))
     sensed = sensed_plant(arm, chain, read, count)
     pulse = PulseTransfer(sensed.together, chain.sampling).folded()
     A, B, C = pulse.matrices()
     own = sensed.own_moment(chain.sampling) if "root_moment" in signals else 0.0 * C[0]
-    first = pulse.integrals_at
-    damped, turns = bool(sensed.read.arm.rate_loss), arm.has_rigid_mode
-    gone = [first] if damped or not turns else []
-    gone += [] if turns else [first + 1]
-    angle = first + damped
+    # of the two states of the rigid body those that the loop does not have; of an arm that turns the angle is the last
+    first, damped, turns = pulse.integrals_at, bool(sensed.read.arm.rate_loss), arm.has_rigid_mode
+    gone = range(first, first + (damped + ("hub_angle" not in signals) if turns else 2))
     response: Callable[[Complex], Complex] = pulse
     if by_difference:
-        a, n, row = float(np.exp(-chain.converters.rate_filter * T)), read.index("hub_angle"), signals.index("hub_rate")
-        A, B, C = differenced(A, B, C, (n, row), (a, T), angle if turns else None)
+        a = float(np.exp(-chain.converters.rate_filter * T))
+        n, row = read.index("hub_angle"), signals.index("hub_rate")
+        A, B, C = differenced(A, B, C, (n, row), (a, T), first + damped if turns else None)
         own = np.append(own, 0.0)
 
         def response(z: Complex) -> Complex:
@@ -193,8 +198,6 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
             found[row] = (1 - a) / T * (z - 1) / (z - a) * found[n]
             return found
 
-    if turns and "hub_angle" not in signals:
-        gone.append(angle)
     A, B, C = np.delete(np.delete(A, gone, 0), gone, 1), np.delete(B, gone), np.delete(C, gone, 1)[: len(signals)]
     beyond = np.nonzero((pulse.mode > modes) & (pulse.poles.imag >= 0))[0]
     higher = pulse.multipliers[beyond[np.argsort(-pulse.mode[beyond], kind="stable")]]  # the highest come first
@@ -323,20 +326,20 @@ class Slews:
     def residual(self, entries: Sequence[Entry]) -> Real:
         """Root mean square [N m] of the arm's own moment less the rigid arm's (laws,)."""
         if self.model.period is None:
-            return np.sqrt((self._left_in_time(entries) ** 2).mean(axis=0))
-        A, B = self._driven(entries, 1)
-        C, D = np.zeros((len(A), 1, A.shape[1])), np.zeros((len(A), 1, B.shape[2]))
-        C[:, 0, : self.model.own_moment.size], D[:, 0, -1] = self.model.own_moment, -1.0
+            return np.sqrt(self._mean_square_in_time(entries))
+        A, B, C, D = self._driven(entries, 1)
+        D[:, 0, -1] -= 1.0
         return np.sqrt(squares(A, B, C, D, self._after) / self._after.counted)
 
     def cost(self, entries: Sequence[Entry]) -> Real:
         """T sum of (a x^2 + b e^2)/2 (laws,)."""
-        model, n = self.model, len(self.model.plant[0])
-        A, B = self._driven(entries, 2)
+        model = self.model
+        A, B, *_ = self._driven(entries, 2)
         C, D = np.zeros((len(A), 2, A.shape[1])), np.zeros((len(A), 2, B.shape[2]))
-        C[:, 0, :n], D[:, 0, -2] = model.plant[2][model.signals.index("root_moment")], -1.0
-        C[:, 1], D[:, 1] = A[:, model.last], B[:, model.last]
-        D[:, 1, -1] = -1.0
+        read = model.plant[2][model.signals.index("root_moment")]
+        C[:, 0, : read.size], C[:, 1] = read, A[:, model.last]
+        D[:, 1] = B[:, model.last]
+        D[:, (0, 1), (-2, -1)] = -1.0
         weights = np.sqrt(np.array(trial_weights(self.known, self.chain)) * self.chain.sampling.period / 2)[:, None]
         return squares(A, B, weights * C, weights * D, self._trial)
 
@@ -358,49 +361,49 @@ class Slews:
         references = (task.references.get(name, 0.0 * task.t) for name in self.model.signals)
         return np.array([task.feedforward, *references, *wanted])
 
-    def _driven(self, entries: Sequence[Entry], wanted: int) -> tuple[Real, Real]:
-        """A and B of the closed loop with these signals."""
-        model, n = self.model, len(self.model.plant[0])
-        A, (_, Bk, _, Dk) = model.closed(entries), model.states(entries)
-        B = np.zeros((*A.shape[:2], 1 + len(model.signals) + wanted))
-        B[:, :n, :1], B[:, :n, 1:-wanted], B[:, n:, 1:-wanted] = model.plant[1], model.plant[1] @ Dk, -Bk
-        return A, B
+    def _driven(self, entries: Sequence[Entry], wanted: int) -> Matrices:
+        """The closed loop from the feed-forward, the references and signals that are wanted to the arm's own moment."""
+        model = self.model
+        _, B, _, D = model.plant
+        law = model.states(entries)
+        _, Bk, _, Dk = law
+        row, through = model.feedback(law)
+        push = np.concatenate([np.ones_like(Dk[..., :1]), Dk], axis=2) / through
+        push = np.pad(push, ((0, 0), (0, 0), (0, wanted)))
+        error = D @ push
+        error[:, :, 1:] -= np.eye(len(D), push.shape[2] - 1)
+        own = D[model.signals.index("root_moment")]
+        C = own * row
+        C[..., : len(B)] += model.own_moment
+        return model.closed(law), np.concatenate([B @ push, Bk @ error], axis=1), C, own * push
 
-    # ------------------------------------------------------------ in continuous time
+    def _mean_square_in_time(self, entries: Sequence[Entry]) -> Real:
+        """The mean square (laws,) of the moment over the first mode's period after the slew.
 
-    def _left_in_time(self, entries: Sequence[Entry]) -> Real:
-        """The moment at points of the first mode's period after the slew, where the rigid arm's is 0.
-
-        Angle and rate have references here, the moment has none.
+        The rigid arm's is 0 then.  Angle and rate have references here, the moment has none.  Of the reference angle,
+        rate and acceleration are states of their own: the acceleration is constant over each half of the slew.
         """
-        model, slew = self.model, self.chain.slew
-        A, (_, Bk, Ck, Dk) = model.closed(entries), model.states(entries)
-        _, B, C, D = model.plant
-        number, n = len(A), len(B)
-        states = np.zeros((len(model.signals), 3))  # references of angle, rate, acceleration
+        names, slew = self.model.signals, self.chain.slew
+        A, B, C, D = self._driven(entries, 0)
+        signals = np.zeros((1 + len(names), 3))
+        signals[0, 1:] = self.known.rate_loss, self.known.turned_inertia
         for column, name in enumerate(("hub_angle", "hub_rate")):
-            if name in model.signals:
-                states[model.signals.index(name), column] = 1.0
-        through = 1.0 + Dk @ D
-        push = (np.array([0.0, self.known.rate_loss, self.known.turned_inertia]) + Dk @ states) / through
-        whole = np.zeros((number, A.shape[1] + 3, A.shape[1] + 3))
+            if name in names:
+                signals[1 + names.index(name), column] = 1.0
         size = A.shape[1]
-        whole[:, :size, :size] = A
-        whole[:, :n, size:], whole[:, n:size, size:] = B @ push, Bk @ (D @ push) - Bk @ states
-        whole[:, size, size + 1] = whole[:, size + 1, size + 2] = 1.0
+        whole = np.zeros((len(A), size + 3, size + 3))
+        whole[:, :size, :size], whole[:, :size, size:] = A, B @ signals
+        whole[:, size:, size:] = np.eye(3, k=1)
         half = expm(whole * slew.rise_time / 2)
-        x = np.zeros((number, size + 3, 1))
-        peak = slew.acceleration(self.known.reach)
-        for acceleration in (peak, -peak):
-            x[:, -1] = acceleration
+        x = np.zeros((len(A), size + 3, 1))
+        for way in (1, -1):
+            x[:, -1] = way * slew.acceleration(self.known.reach)
             x = half @ x
         x[:, -2:] = 0.0
         step = expm(whole * (2 * np.pi / first_frequency(self.arm) / PERIOD_POINTS))
-        row, at = model.own_moment, model.signals.index("root_moment")
-        passed = D[at, 0] * np.concatenate([-(Dk @ C) / through, -Ck / through, push], axis=2)
-        sense = passed + np.r_[row, np.zeros(size + 3 - n)]
-        left = np.zeros((PERIOD_POINTS, number))
-        for k in range(PERIOD_POINTS):
-            left[k] = (sense @ x)[:, 0, 0]
+        sense = np.concatenate([C, D @ signals], axis=2)
+        total = np.zeros(len(A))
+        for _ in range(PERIOD_POINTS):
+            total += (sense @ x)[:, 0, 0] ** 2
             x = step @ x
-        return left
+        return total / PERIOD_POINTS

@@ -90,17 +90,17 @@ class Worst:
     @property
     def work(self) -> float:
         """The work of a law, relative to that of one arm and its first model."""
-        return (
-            sum((4 if judge.is_sampled else 1) * len(judge.model.plant[0]) ** 2 for judge in self.judges) / USUAL_WORK
-        )
+        squares = sum((4 if judge.is_sampled else 1) * len(judge.model.plant[0]) ** 2 for judge in self.judges)
+        # models times squared states of one arm's first model: with twice as much half the runs
+        return squares / (4 * 20**2)
 
     def scores(self, form: Structure, x: Real, limits: Real | None = None) -> Real:
         """The function to be minimised, at points x (n, laws), any value above the limit of a law (see `scores_of`)."""
         limits = np.full(x.shape[1], np.inf) if limits is None else limits
-        parts = [slice(i, i + LAWS_AT_ONCE) for i in range(0, x.shape[1], LAWS_AT_ONCE)]
-        entries = [form.entries(form.coefficients(x[:, part])) for part in parts]
+        at_once = 256  # a limit of memory
+        parts = (slice(i, i + at_once) for i in range(0, x.shape[1], at_once))
         return np.concatenate(
-            [scores_of(self.judges, each, limits[part]) for each, part in zip(entries, parts, strict=True)]
+            [scores_of(self.judges, form.entries(form.coefficients(x[:, part])), limits[part]) for part in parts]
         )
 
 
@@ -109,21 +109,20 @@ def search(judge: Worst, form: Structure, tell: Tell, near: Real | None = None, 
 
     `near` (n,) is the best point of a judge with fewer arms, with which the first run begins.
     """
-    given = [each.name in form.given for each in form.free]
-    ends = [(place, end) for place in range(form.size) for end in (0, 1)]
-    places = [each for each in ends if not (given[each[0]] or form.is_physical(*each))]
-    region = form.wider(places, BEYOND)
+    movable = form.ends(physical=False)
+    region = form.wider(movable, BEYOND)
     (x, scores), of_runs = minimised(partial(judge.scores, region), form, region.box, judge.work, tell, near, effort)
-    for place, end in (each for each in ends if region.is_physical(*each)):  # there if the score is as good
+    for place, end in region.ends(physical=True):
         moved = x[:, :1].copy()
         moved[place] = region.box[end][place]
-        if judge.scores(region, moved)[0] <= scores[0] + AS_GOOD * abs(scores[0]):
+        # a coefficient is at its physical end if the score there is as good
+        if judge.scores(region, moved)[0] <= scores[0] + 1e-4 * abs(scores[0]):
             x[:, :1] = moved
-    best = x[:, 0]
-    beyond = [each for each in places if (form.box[0] > best, form.box[1] < best)[each[1]][each[0]]]
+    beyond = [(place, end) for place, end in movable if (2 * end - 1) * (x[place, 0] - form.box[end][place]) > 0]
     widened = tuple(dict.fromkeys(form.names[place] for place, _ in beyond))
-    found = [(float(scores[n]), x[:, n]) for n in _apart(region, x, scores, CANDIDATES)]
-    agreed = sum(each <= scores[0] + AGREES * abs(scores[0]) for each in of_runs)
+    found = [(float(scores[n]), x[:, n]) for n in _apart(region, x, scores)]
+    # a run agrees if its score is worse than the best by less
+    agreed = sum(each <= scores[0] + 5e-3 * abs(scores[0]) for each in of_runs)
     return Search(form.wider(beyond, BEYOND), found, len(of_runs), agreed, widened)
 
 
@@ -212,16 +211,14 @@ def sobol(low: Real, high: Real, number: int, seed: int) -> Real:
     return np.asarray((low + qmc.Sobol(low.size, rng=seed).random(number) * (high - low)).T)
 
 
-def _apart(form: Structure, points: Real, scores: Real, most: int) -> list[int]:
-    """Indices of the best points, at a distance from each other."""
+def _apart(form: Structure, points: Real, scores: Real, most: int = 4, least: float = 0.02) -> list[int]:
+    """Indices of the best points for the exact verdicts, at a least distance from each other, of the range of x."""
     low, high = form.box
     found: list[int] = []
     for n in np.argsort(scores, kind="stable").tolist():
-        if (abs(points[:, [n]] - points[:, found]) > APART * (high - low)[:, None]).any(axis=0).all():
+        if (abs(points[:, [n]] - points[:, found]) > least * (high - low)[:, None]).any(axis=0).all():
             found.append(n)
-        if len(found) == most:
-            break
-    return found
+    return found[:most]
 
 
 def flat_part(judge: Worst, form: Structure, x: Real, score: float) -> dict[str, Bounds]:
