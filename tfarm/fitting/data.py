@@ -42,7 +42,9 @@ from tfarm.schema import Column, Quantity, Table
 CONFIDENCE = 0.95  # of every interval of a fit: the usual one
 LEAST_SHARE = 1e-5  # of |H|: no measured response is better known than that, whatever its coherence
 SCATTER_NEIGHBOURS = 2  # neighbours on each side that a value is compared with
-SIX, NINE = singly(general, 6), singly(general, 9)  # digits of what was measured, and of the frequencies of its lines
+# digits of what was measured, and of the frequencies of its lines
+SIX = singly(general, 6)
+NINE = singly(general, 9)
 TYPICAL = 1.17741  # the median of |x + i y| of normal x and y of deviation 1: sqrt(2 ln 2)
 
 
@@ -87,7 +89,9 @@ class Measured:
                     array.shape,
                     f"one for each of the {self.omega.size} frequencies",
                 )
-        w, one, nothing = self.omega, np.ones(self.omega.size), "0 everywhere: nothing was measured"
+        w = self.omega
+        one = np.ones(self.omega.size)
+        nothing = "0 everywhere: nothing was measured"
         sigma, coherence = (one if each is None else each for each in (self.sigma, self.coherence))
         ordered = "repeated or not in ascending order; sort the rows, and average those of one frequency"
         require_all("frequency", w, (w > 0) & np.isfinite(w), "positive and finite; leave other rows out")
@@ -189,7 +193,8 @@ def noise_of(data: Measured) -> Noise:
         return Noise(sigma=data.sigma, is_known=True, source="sigma of the file")
     if data.coherence is None:
         return Noise(sigma=_scatter(data.values), is_known=False, source="scatter of the values")
-    g, size = data.coherence, abs(data.values)
+    g = data.coherence
+    size = abs(data.values)
     with np.errstate(divide="ignore"):
         share = np.maximum(np.sqrt((1.0 - g) / (2.0 * (data.averages or 1) * g)), LEAST_SHARE)
     sigma = np.where((g == 0) | (size == 0), np.inf, size * share)  # a share of nothing is no deviation
@@ -223,7 +228,6 @@ MOST_RECORD_BYTES = 256 * 1024 * 1024  # of a record; an hour of two signals at 
 FREQUENCIES = {"hz": ("Hz", 2 * np.pi), "rad_s": ("rad/s", 1.0)}  # its unit, and rad/s in one
 VALUE_PAIRS = (("re", "im"), ("abs", "deg"), ("db", "deg"))
 KNOWN_COLUMNS = (*FREQUENCIES, "re", "im", "abs", "db", "deg", "coherence", "sigma", "averages")
-DATA_FORM = "OUTPUT/INPUT=FILE, such as tip_acceleration/hub_angle=sweep.csv"
 UFF = r"\.uff|\.unv|\.uf"  # ends of its names
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"  # as it is written in a cell or an option
 
@@ -313,7 +317,7 @@ def data_of(text: str, key: str = "--data") -> Measured:
     """
     names, _, path = text.partition("=")
     output, slash, input = (part.strip() for part in names.partition("/"))
-    require(slash and path.strip(), key, text, f"write {DATA_FORM}")
+    require(slash and path.strip(), key, text, "write OUTPUT/INPUT=FILE, such as tip_acceleration/hub_angle=sweep.csv")
     return read_measured(path.strip(), output, input)
 
 
@@ -330,7 +334,9 @@ def read_measured(path: str | os.PathLike[str], output: str, input: str) -> Meas
         return _of_uff(uff[1], uff[2] or "", output, input)
     sheet = read_sheet(path, key=f"{output}/{input}")
     with naming(name):
-        omega, values, averages = _frequencies(sheet), _values(sheet), sheet.columns.get("averages")
+        omega = _frequencies(sheet)
+        values = _values(sheet)
+        averages = sheet.columns.get("averages")
         if averages is not None:
             wrong = (averages != averages[0]) | (averages < 1) | (averages != np.round(averages))
             sheet.refuse("averages", wrong, "a whole number of averages, the same in every row")
@@ -352,7 +358,8 @@ def check_signal(name: str, key: str) -> None:
 
     Its place along the link, and whether the arm has it, are checked when the arm is known.
     """
-    plain, known = name.partition("@")[0], tuple(dict.fromkeys((*OUTPUTS, *INPUTS)))
+    plain = name.partition("@")[0]
+    known = tuple(dict.fromkeys((*OUTPUTS, *INPUTS)))
     require(plain in known, key, name, did_you_mean(plain, known))
 
 
@@ -363,8 +370,10 @@ def _frequencies(sheet: Sheet) -> Real:
         require(name in KNOWN_COLUMNS, "header", name, did_you_mean(name.lower(), KNOWN_COLUMNS))
     found = [name for name in FREQUENCIES if name in sheet.columns]
     require(len(found) == 1, "header", [*sheet.columns], "one column of frequencies: hz or rad_s")
-    name, (unit, scale) = found[0], FREQUENCIES[found[0]]
-    own, frequency = sheet.units[name], sheet.columns[name]
+    name = found[0]
+    (unit, scale) = FREQUENCIES[found[0]]
+    own = sheet.units[name]
+    frequency = sheet.columns[name]
     require(own.lower() in ("", unit.lower()), f"unit of {name}", own, f"{name} is in {unit}")
     sheet.refuse(name, ~(frequency > 0), "a frequency is positive; leave the row out")
     back = np.r_[False, np.diff(frequency) <= 0]
@@ -384,7 +393,7 @@ def _values(sheet: Sheet) -> Complex:
     )
     first, second = (sheet.columns[name] for name in pair)
     if pair == ("re", "im"):
-        return np.asarray(first + 1j * second)
+        return first + 1j * second
     if pair == ("abs", "deg"):
         sheet.refuse("abs", first < 0, "a magnitude is not negative; is it db?")
     with np.errstate(over="ignore"):
@@ -418,7 +427,8 @@ def _of_uff(path: str, number: str, output: str, input: str) -> Measured:
         omega = 2 * np.pi * np.asarray(found[f"x{place - 1}"], dtype=float)
         values: NDArray[Any] = np.asarray(found[f"data{place - 1}"], dtype=complex)
         kept = slice(int(omega.size > 0 and omega[0] == 0), None)  # the line at 0 Hz that spectra begin with
-        digest, source = hashlib.sha256(data).hexdigest(), f"{path}#{number}" if number else path
+        digest = hashlib.sha256(data).hexdigest()
+        source = f"{path}#{number}" if number else path
         return Measured(
             output=output, input=input, omega=omega[kept], values=values[kept], source=source, digest=digest
         )

@@ -35,7 +35,7 @@ from tfarm.spectrum.table import first_frequency
 
 from .data import NUMBER, Measured, Noise, in_parts
 
-REACH = math.log(1e4)  # of ln p from the start: beyond, a search has lost its way, or the data say nothing
+FARTHEST_FROM_START = 1e4  # times or a part of it: beyond, a search has lost its way, or the data say nothing
 COORDINATE_STEP = 2.0**-20  # of a derivative by differences: the rounding of a float over it is 1e-10, its square below
 
 
@@ -71,14 +71,14 @@ class Parameter:
         """Of the coordinate."""
         if self.size:
             return self.coordinate(self.low), self.coordinate(self.high)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            low, high = np.clip(np.log(np.array([self.low, self.high]) / self.start), -REACH, REACH).tolist()
-        return min(low, high), max(low, high)
+        shares = np.clip([self.low / self.start, self.high / self.start], 1 / FARTHEST_FROM_START, FARTHEST_FROM_START)
+        return math.log(shares.min()), math.log(shares.max())
 
     def ends(self, coordinates: Sequence[float]) -> list[float | None]:
         """The numbers at the ends of an interval, the lower first; None where only the reach of the search ended it."""
         # a search that comes nearer to its reach has ended there
-        found = [self.value(each) if self.size or abs(each) < REACH - 1e-6 else None for each in coordinates]
+        farthest = math.inf if self.size else math.log(FARTHEST_FROM_START) - 1e-6
+        found = [self.value(each) if abs(each) < farthest else None for each in coordinates]
         return found if self.start > 0 or self.size else found[::-1]
 
 
@@ -98,9 +98,12 @@ def parameters(
     for known, what in ((start, "start"), (bounds, "bounds"), (priors, "prior")):
         for key in known:
             require(key in keys, what, key, f"is not free; {did_you_mean(key, keys)}")
-    family, found = KeyedArms(arm, keys), []
+    family = KeyedArms(arm, keys)
+    found = []
     for key in family.keys:
-        name, own, prior = key.split(".")[-1], family.value(key), priors.get(key)
+        name = key.split(".")[-1]
+        own = family.value(key)
+        prior = priors.get(key)
         usual = own if key in start or (own and math.isfinite(own)) else _typical(arm, key, own)
         at = start.get(key, usual)
         is_signed = name == "offset"
@@ -124,7 +127,9 @@ def _typical(arm: Arm, key: str, own: float) -> float:
     """A hundredth of a typical value, for a number that is 0, or a hundred times it for one that is infinite."""
     w1 = first_frequency(arm)
     inertia = arm.turned_inertia if math.isfinite(arm.turned_inertia) else arm.carried_inertia
-    EI, length, name = arm.link.EI, arm.length, key.split(".")[-1]
+    EI = arm.link.EI
+    length = arm.length
+    name = key.split(".")[-1]
     of_the_arm = {
         "mass": arm.own_mass,
         "inertia": inertia,
@@ -210,14 +215,18 @@ def eigenvalue(arm: Arm, number: int) -> complex:
         (value,), _, (scale,) = read.parts(np.array([s]))
         return complex(value * np.exp(scale - reference))
 
-    s, of = newton(drive, start, x1=start * (1 + 1e-6), tol=1e-12 * abs(start), maxiter=30, full_output=True, disp=False)
+    s, of = cast("Any", newton)(
+        drive, start, x1=start * (1 + 1e-6), tol=1e-12 * abs(start), maxiter=30, full_output=True, disp=False
+    )
     if not (of.converged and s.imag > 0):
         words = f"mode {number} of {arm.name} does not ring near its undamped frequency"
         raise ConvergenceError(words, s, abs(drive(s)))
     return complex(s)
 
 
-SENSOR_GAIN, SENSOR_DELAY = "gain", "delay"  # of a sensor, as `Response` has them: free like the arm's numbers
+# of a sensor, as `Response` has them: free like the arm's numbers
+SENSOR_GAIN = "gain"
+SENSOR_DELAY = "delay"
 
 
 @dataclass(frozen=True)
@@ -293,7 +302,7 @@ class Problem:
 
     def computed(self, point: Real) -> list[Complex]:
         """Each response at its own frequencies."""
-        return [np.asarray(each.N / each.D) for each in self.fractions(point)]
+        return [(each.N / each.D) for each in self.fractions(point)]
 
     def fractions(self, point: Real, share: float = 0.0) -> list[Fraction]:
         """Each response at s = (i + share) w; those of one grid of frequencies and one drive are computed together."""
@@ -306,7 +315,9 @@ class Problem:
             grid = each.data.omega.tobytes(), each.data.input if is_driven else arm.input
             grids.setdefault(grid, {})[n] = each.data
         for (_, driven), own in grids.items():
-            names = tuple(dict.fromkeys(name for of in own.values() for name in (of.output, of.input) if name != driven))
+            names = tuple(
+                dict.fromkeys(name for of in own.values() for name in (of.output, of.input) if name != driven)
+            )
             under_drive = arm if arm.input == driven else replace(arm, input=cast("Input", driven))
             s = (1j + share) * next(iter(own.values())).omega
             drive, numerators, scale = Signals(under_drive, names).parts(s)
@@ -320,11 +331,12 @@ class Problem:
         one = self.responses[n]
         gain = 1.0 if one.gain is None else self.parameters[one.gain].value(float(point[one.gain]))
         delay = 0.0 if one.delay is None else self.parameters[one.delay].value(float(point[one.delay]))
-        return np.asarray(gain * np.exp(-1j * delay * one.data.omega))
+        return gain * np.exp(-1j * delay * one.data.omega)
 
     def with_sensors(self, free: Sequence[str]) -> Problem:
         """The problem with "gain" or "delay" of each sensor free, too."""
-        own, responses = [*self.parameters], []
+        own = [*self.parameters]
+        responses = []
         for n, each in enumerate(self.responses, start=1):
             places: dict[str, Any] = {}
             which = "" if len(self.responses) == 1 else f":{n}"
@@ -355,7 +367,8 @@ class Problem:
 
     def _slope(self, here: tuple[list[Fraction], Real], point: Real, step: Real) -> Real:
         """The derivatives along one coordinate; from the arm itself where there is none on one side."""
-        sides, width = [here, here], 0.0
+        sides = [here, here]
+        width = 0.0
         for side, to in enumerate((point - step, point + step)):
             with suppress(ParameterError):
                 sides[side] = self._terms(to)
@@ -363,8 +376,10 @@ class Problem:
         (below, low), (above, high) = sides
         slopes = []
         for (N, D, scale), down, up, one in zip(here[0], below, above, self.responses, strict=True):
-            lower, upper = np.exp(down.scale - scale), np.exp(up.scale - scale)
-            dN, dD = up.N * upper - down.N * lower, up.D * upper - down.D * lower
+            lower = np.exp(down.scale - scale)
+            upper = np.exp(up.scale - scale)
+            dN = up.N * upper - down.N * lower
+            dD = up.D * upper - down.D * lower
             slopes.append(one.over_deviation((dN - N / D * dD) / D))
         return np.concatenate([*slopes, high - low]) / max(width, COORDINATE_STEP)
 

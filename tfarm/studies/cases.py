@@ -29,15 +29,15 @@ from .running import Chunk, Plan, Progress, chunk
 from .space import Distribution, Space
 
 STUDIED_MODES = 4  # flexible modes, by default
-AREA = 6.0e-4  # m^2, the paper's
 DEPTHS = (0.002, 0.003, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.030, 0.040, 0.060)  # m, for that area
 INERTIAS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # kg m^2, about the value assumed for the paper's hub
-HELD = "area, shear factor and all else held: I = A depth^2/12, so one per cent of depth counts twice"
-LIMIT, LIMIT_IS = f"{INTERVAL}.{MOMENT_GAIN}.high", f"{INTERVAL}.{MOMENT_GAIN}.high_is"
+LIMIT = f"{INTERVAL}.{MOMENT_GAIN}.high"
+LIMIT_IS = f"{INTERVAL}.{MOMENT_GAIN}.high_is"
 OWN_VALUE = 1e-9  # relative: a candidate nearer to the arm's own value is that value
 MOST_SEEDS = 10_000
-THREADS = 2  # compiled loops let other threads run; a report uses no more cores
-FINAL, ZERO, STOPPED = "tuner.cost", "tuner.is_zero", "tuner.stopped"
+FINAL = "tuner.cost"
+ZERO = "tuner.is_zero"
+STOPPED = "tuner.stopped"
 
 
 def results(plan: Plan, first: int, last: int) -> Chunk:
@@ -176,14 +176,24 @@ def section_study(arm: Arm, count: int = STUDIED_MODES) -> Candidates:
     Depths are 2 to 60 mm for the paper's area, scaled with the root of the area to two digits, and that of the
     rectangle with the arm's own second moment.  The shear factor is the arm's own throughout.
     """
-    area, own = arm.link.section.area, math.sqrt(12.0) * arm.link.section.radius_of_gyration
-    depths = _with_own([float(f"{each * math.sqrt(area / AREA):.2g}") for each in DEPTHS], own)
+    area = arm.link.section.area
+    own = math.sqrt(12.0) * arm.link.section.radius_of_gyration
+    # the paper's area [m^2]
+    depths = _with_own([float(f"{each * math.sqrt(area / 6.0e-4):.2g}") for each in DEPTHS], own)
     known = {"depth": depths, "width": [area / depth for depth in depths],
              "second_moment": [area * depth**2 / 12 for depth in depths]}  # fmt: skip
     plain = Section.general(area=area, second_moment=area * own**2 / 12, shear_factor=arm.link.shear_factor)
     general = replace(arm, link=replace(arm.link, section=plain))  # whose file has a second moment
     rows = _candidates(general, count, "link.section.second_moment", depths.index(own), known)
-    return Candidates(arm, HELD, np.empty(0), np.empty(0), area, arm.link.shear_factor, rows)
+    return Candidates(
+        arm,
+        "area, shear factor and all else held: I = A depth^2/12, so one per cent of depth counts twice",
+        np.empty(0),
+        np.empty(0),
+        area,
+        arm.link.shear_factor,
+        rows,
+    )
 
 
 def hub_study(arm: Arm, count: int = STUDIED_MODES) -> Candidates:
@@ -239,8 +249,10 @@ def learning_curves(
     seeds = whole("seeds", seeds, 1, MOST_SEEDS, f"a whole number of seeds from 1 to {MOST_SEEDS}")
     costs = [f"{TRIAL_COST}.{n}" for n in range(1, plan.trials + 1)]
     space = over_values("tuner.seed", range(plan.seed, plan.seed + seeds))
-    own, tables = Plan(arm, HubFeedback(), chain, space, (FINAL, ZERO, STOPPED, *costs), plan), list[dict[str, Any]]()
-    with ThreadPoolExecutor(THREADS) as pool:
+    own = Plan(arm, HubFeedback(), chain, space, (FINAL, ZERO, STOPPED, *costs), plan)
+    tables = list[dict[str, Any]]()
+    # compiled loops let other threads run; a report uses no more cores
+    with ThreadPoolExecutor(2) as pool:
         for table in pool.map(lambda n: results(own, n, n + 1), range(seeds)):
             tables.append({name: np.inf if value is None else value for name, (value,) in table.items()})
             progress(len(tables), seeds, "learning curves")

@@ -40,20 +40,22 @@ from .space import Subject
 
 FAILED = "failed"  # column of the reason of a missing result
 LISTED = 5  # modes and poles of a row
-LOOPS = ("continuous", "sampled")
-SCENARIO = "slew"  # of the time response
-CARD = "card"  # the result card of both loops
 NO_PARENT = Quantity()
-FREQUENCY, RATIO = "modes.natural_frequency_rad_s", "damped_modes.damping_ratio"
-SENSITIVITY, INTERVAL, STABILITY, TRIAL_COST = "sensitivity", "interval", "interval.verdict", "tuner.trial_cost"
-UNSTABLE, REAL, IMAGINARY = "poles.unstable", "poles.re_1_s", "poles.im_rad_s"
+LOOPS = ("continuous", "sampled")
+CARD = "card"  # the result card of both loops
+FREQUENCY = "modes.natural_frequency_rad_s"
+RATIO = "damped_modes.damping_ratio"
+SENSITIVITY = "sensitivity"
+INTERVAL = "interval"
+STABILITY = "interval.verdict"
+TRIAL_COST = "tuner.trial_cost"
+UNSTABLE = "poles.unstable"
+REAL = "poles.re_1_s"
+IMAGINARY = "poles.im_rad_s"
 
 
 CONFIDENCE = 0.95
 QUANTILES = {"least": 0.0, "low": 0.05, "median": 0.5, "high": 0.95, "largest": 1.0}
-SIGNIFICANT = 0.05  # of a rank correlation: a larger probability of chance names no driver
-FEWEST_RANKED = 10  # rows of a rank correlation
-CERTAINTIES = ("exact", "certified", "converged", "approximate", "not determined")
 STABLE = "stable"
 Values = Callable[[Subject, Set[str]], Mapping[str, Any]]  # of an arm, in these columns
 Asked = tuple[Mapping[str, Quantity], Values]  # columns, and their values
@@ -91,10 +93,13 @@ def entries_of(kind: Any, value: Any, under: str, parent: Quantity = NO_PARENT) 
     The first entry without a label (the value of a graded margin) has the name and the quantity of its parent.
     """
     for name, of in quantities(kind).items():
-        kinds, own = _kinds(kind)[name], None if value is None else getattr(value, name)
-        place, column = f"{under}.{of.key}", replace(of, label=f"{parent.label} {of.label}".strip() * bool(of.label))
+        kinds = _kinds(kind)[name]
+        own = None if value is None else getattr(value, name)
+        place = f"{under}.{of.key}"
+        column = replace(of, label=f"{parent.label} {of.label}".strip() * bool(of.label))
         if issubclass(kind, tuple) and name == kind._fields[0]:
-            place, column = under, replace(parent, help=parent.help or of.help)
+            place = under
+            column = replace(parent, help=parent.help or of.help)
         inner = next(filter(quantities, kinds), None)
         if inner is not None:
             yield from entries_of(inner, own, place, column)
@@ -132,7 +137,7 @@ def _card_of(loop: str) -> Asked:
 
 
 def _step_of(one: Subject, _: Set[str]) -> dict[str, Any]:
-    found = step(one.arm, one.law, one.chain, SCENARIO)
+    found = step(one.arm, one.law, one.chain, "slew")
     return {name: value for loop in LOOPS
             for name, _, value in entries_of(LoopResponse, getattr(found, loop), f"step.{loop}")}  # fmt: skip
 
@@ -285,7 +290,8 @@ def sources_of(names: Sequence[str]) -> list[tuple[Set[str], Values]]:
 
 def values_of(one: Subject, sources: Sequence[tuple[Set[str], Values]]) -> dict[str, Any]:
     """Return the values of columns (`sources_of`) for an arm, and under `FAILED` the reason of missing ones."""
-    found, reasons = dict[str, Any](), []
+    found = dict[str, Any]()
+    reasons = []
     for own, values in sources:
         try:
             found |= values(one, own)
@@ -359,12 +365,15 @@ def shares_of(table: Mapping[str, Any], names: Sequence[str], is_independent: bo
     found = []
     for loop in [each for each in LOOPS if f"{each}.stability" in names]:
         words = table[f"{loop}.stability"]
-        stable, open_, count = int((words == STABLE).sum()), int((words == "").sum()), len(words)
+        stable = int((words == STABLE).sum())
+        open_ = int((words == "").sum())
+        count = len(words)
         texts = table.get(f"{loop}.certainty", np.full(count, ""))[words == STABLE].tolist()
         known = [text.partition(" ")[0].rstrip(",") for text in texts]
+        weakest = ["exact", "certified", "converged", "approximate", "not determined", ""]
         found.append(StableShare(
             loop=loop.replace("continuous", "continuous-time"), stable=stable, open=open_, other=count - stable - open_,
-            certainty=max(known, key=(*CERTAINTIES, "").index, default=""),
+            certainty=max(known, key=weakest.index, default=""),
             at_least=Percent(least_share(stable, count)) if is_independent else None,
         ))  # fmt: skip
     return tuple(found)
@@ -387,8 +396,9 @@ def spreads_of(table: Mapping[str, Any], names: Sequence[str], keys: Sequence[st
 def _driver(inputs: Mapping[str, Real], values: Real) -> tuple[str | None, float | None]:
     """Return the varied number of the largest significant rank correlation, and that."""
     known = {key: scipy.stats.spearmanr(column, values) for key, column in inputs.items()
-             if len(values) >= FEWEST_RANKED and np.ptp(column) > 0 and np.ptp(values) > 0}  # fmt: skip
-    level = SIGNIFICANT / max(1, len(inputs))  # Bonferroni: of several numbers one is often near it by chance
+             if len(values) >= 10 and np.ptp(column) > 0 and np.ptp(values) > 0}  # fmt: skip
+    # Bonferroni: of several numbers one is often near it by chance
+    level = 0.05 / max(1, len(inputs))  # Bonferroni: of several numbers one is often near it by chance
     found = {key: float(of.statistic) for key, of in known.items() if of.pvalue < level}
     return max(found.items(), key=lambda each: abs(each[1]), default=(None, None))
 

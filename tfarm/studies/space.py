@@ -34,15 +34,14 @@ from tfarm.fitting.posterior import Posterior
 from tfarm.foreign import read_by_child
 from tfarm.tuner import tuning
 
-LAW, TUNER = "law.", "tuner."  # prefixes of the numbers of the controller and of the tuner
+# prefixes of the numbers of the controller and of the tuner
+LAW = "law."
+TUNER = "tuner."
 MOST_ROWS = 10_000_000  # of one study
-MOST_BYTES = 4 << 30  # of a list: these rows, of twenty numbers
 LONGEST_LINE = 1 << 20  # characters, of some ten thousand numbers
 LIST = "a CSV or Parquet file with a column a key"
 MOST_SEED = 2**63
 ENDS = 2.0**-54, 1 - 2.0**-53  # of uniform numbers: at 0 and 1 the inverse of a normal distribution is infinite
-LEAST_PYARROW = (14, 0, 1)  # older ones unpickle what they read (CVE-2023-47248)
-PLAIN_NUMBER = re.compile(r" *[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)? *", re.ASCII)
 FORMS: dict[str, tuple[str, Callable[..., Any]]] = {  # kind of a distribution: its numbers in words, and SciPy's
     "uniform": ("LOW, HIGH", lambda low, high: low < high and scipy.stats.uniform(low, high - low)),
     "loguniform": ("LOW, HIGH, above 0", lambda low, high: 0 < low < high and scipy.stats.loguniform(low, high)),
@@ -96,7 +95,8 @@ class Listing(NamedTuple):
 
     def blocks(self, ends: Sequence[tuple[int, int]]) -> Iterator[Real]:
         """Yield the rows of each range (first, last), which ascend."""
-        lines, at = islice(lines_of(self.path), 1, None), 0
+        lines = islice(lines_of(self.path), 1, None)
+        at = 0
         for first, last in ends:
             yield np.array(list(islice(lines, first - at, last - at)))
             at = last
@@ -197,7 +197,8 @@ def _distribution(place: str, entry: Any) -> Distribution:
     require(isinstance(entry, Mapping) and len(entry) == 1, place, entry, remedy)
     ((kind, numbers),) = entry.items()
     must_be_known(place, kind, KINDS)
-    remedy, is_finite = f"{kind} needs finite numbers in order: {KINDS[kind][0]}", False
+    remedy = f"{kind} needs finite numbers in order: {KINDS[kind][0]}"
+    is_finite = False
     with suppress(TypeError), np.errstate(all="ignore"):  # TypeError: no list, or another count of numbers
         found = Distribution(kind, tuple(number(place, each, remedy) for each in numbers))
         made = all(map(math.isfinite, found.numbers)) and found.frozen
@@ -245,7 +246,9 @@ class Subjects:
 
     def at(self, row: Sequence[float]) -> Subject:
         """Return the arm and loop of a row.  Raises ParameterError for an illegal value."""
-        values, chain, law = dict(zip(self.keys, row, strict=True)), self.chain, self.law
+        values = dict(zip(self.keys, row, strict=True))
+        chain = self.chain
+        law = self.law
         for key, (table, name) in self._of_chain.items():
             chain = replace(chain, **{table: replace(getattr(chain, table), **{name: values[key]})})
         for key in self.keys:
@@ -280,14 +283,17 @@ def lines_of(path: Path) -> Iterator[Any]:
         for n, row in enumerate(lines):  # from 0, as in the results
             require(len(row) == len(names), f"row {n}", len(row), f"{len(names)} values, one a column")
             for name, cell in zip(names, row, strict=True):
-                is_finite = PLAIN_NUMBER.fullmatch(cell) and math.isfinite(float(cell))
+                is_finite = re.compile(r" *[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)? *", re.ASCII).fullmatch(
+                    cell
+                ) and math.isfinite(float(cell))
                 require(is_finite, f"row {n}, column {name}", cell, "every cell is a finite number")
             yield list(map(float, row))
 
 
 def _cells(path: Path) -> Iterator[Sequence[str]]:
     """Yield names and rows of a CSV file, or of a Parquet one by another process, a few in memory at a time."""
-    with open_file(path, MOST_BYTES, key="list", what=LIST) as file:
+    # of these rows, of twenty numbers
+    with open_file(path, (4 << 30), key="list", what=LIST) as file:
         is_parquet = path.suffix == ".parquet" and parquet("list", str(path))
         try:
             child = partial(read_by_child, "parquet", path, key="list", remedy=f"cannot be read; give {LIST}")
@@ -303,7 +309,8 @@ def parquet(key: str, value: str) -> Any:
     """Return the module of pyarrow for Parquet.  Raises ParameterError where it is missing or old."""
     module = extra("pyarrow.parquet", "study", key, value)
     version = tuple(int(part) for part in import_module("pyarrow").__version__.split(".")[:3])
-    require(version >= LEAST_PYARROW, key, value, "needs pyarrow 14.0.1 or newer: pip install 'tfarm[study]'")
+    # older ones unpickle what they read (CVE-2023-47248)
+    require(version >= (14, 0, 1), key, value, "needs pyarrow 14.0.1 or newer: pip install 'tfarm[study]'")
     return module
 
 

@@ -75,17 +75,16 @@ from .space import ENDS, MOST_SEED, listing_of, space_of
 SHARES = "stable arms (confidence one-sided, Clopper-Pearson)"
 FILE_KEYS = {"arm": str, "law": str, "rows": str, "posterior": str, "over": dict, "ask": list, "draws": int,
              "seed": int, "worst": str, "sobol": int}  # fmt: skip
-KIND_WORDS = {str: "a text", dict: "a table", list: "a list", int: "a whole number"}
 PATHS = "rows", "posterior"
-WORST_FILE, ARM_FILE, MATRICES = "worst.toml", "arm.toml", "law.mat"
-STEPS_A_NUMBER, LEAST_STEPS = 20, 20  # evaluations of the search of the worst arm
+ARM_FILE = "arm.toml"
+MATRICES = "law.mat"
+# evaluations of the search of the worst arm
 FIRST_STEP = 0.05  # of that search, in the probability of each number
 BEYOND = 1e9  # in the order of worse arms: above each value of a stable loop
 LARGER_IS_WORSE = (
     "peak", "settling_time_s", "overshoot", "time_constant_s", "residual_rms", "steady_state_error", "cost", "unstable",
     "minimum_damping_s", "rise_time_s", "re_1_s",
 )  # fmt: skip
-SIGNED = "peak", "steady_state_error"  # of these by their size
 BOOTSTRAP = "95 % bootstrap interval; none without any influence"
 
 
@@ -254,7 +253,8 @@ def study(
     ConvergenceError
         Where a worker process or the scheduler was killed; another run goes on.
     """
-    chain, law = chain_or_usual(chain), default_gains(arm) if law is None else law
+    chain = chain_or_usual(chain)
+    law = default_gains(arm) if law is None else law
     workers = usual_workers(client) if workers is None else workers
     for key, value in {"draws": draws, "seed": seed, "workers": workers, "part": 1 if part is None else part}.items():
         whole(key, value, int(key != "seed"), MOST_SEED, f"a whole number from {int(key != 'seed')}")
@@ -301,7 +301,8 @@ def load_study(name_or_path: str) -> dict[str, Any]:
         for key, value in tables.items():
             must_be_known("study", key, FILE_KEYS)
             kind = FILE_KEYS[key]
-            require(type(value) is kind, key, value, f"give {KIND_WORDS[kind]}")
+            words = {str: "a text", dict: "a table", list: "a list", int: "a whole number"}
+            require(type(value) is kind, key, value, f"give {words[kind]}")
         for word in tables.get("ask", []):
             require(isinstance(word, str), "ask", word, "give names of quantities")
     arm = tables["arm"] if tables["arm"] in presets() else str(folder / tables["arm"])
@@ -318,7 +319,8 @@ def files_of(arm: Arm, law: AnyLaw, chain: Chain, declared: Mapping[str, Any]) -
     These are the study, the arm with its chain and its [law], and the matrices of a law.  A list and a posterior keep
     their places.
     """
-    own, files = as_law(law), dict[str, bytes]()
+    own = as_law(law)
+    files = dict[str, bytes]()
     try:
         text = law_toml(own)
     except ParameterError:  # of a state space: it has no text
@@ -347,7 +349,8 @@ def badness(order: Sequence[str], values: Mapping[str, Any]) -> float:
         return BEYOND
     if value is None or math.isnan(value):
         return -math.inf
-    size = abs(value) if any(name in order[0] for name in SIGNED) else value
+    # of these by their size
+    size = abs(value) if any(name in order[0] for name in ("peak", "steady_state_error")) else value
     return min(max(size if any(name in order[0] for name in LARGER_IS_WORSE) else -size, -BEYOND), BEYOND / 2)
 
 
@@ -357,19 +360,22 @@ def worst_arm(study: Study, order: Sequence[str], deadline: float) -> WorstArm |
     The search stays within the range of a bounded distribution of n draws, else within its quantiles 1/(2 n) and
     1 - 1/(2 n).  None where it has no end before the deadline [s].
     """
-    plan, space, table = study.parts.plan, study.parts.plan.space, study.table()
+    plan = study.parts.plan
+    space = study.parts.plan.space
+    table = study.table()
     columns = {name: table[name].tolist() for name in order}
     ranks = [badness(order, {name: of[n] for name, of in columns.items()}) for n in range(study.done)]
     first = int(np.argmax(ranks))
     require(ranks[first] > -math.inf, "worst", order[0], "no arm has a value of it")
-    drawn, seen = {name: of[first] for name, of in table.items()}, list[Row]()
+    drawn = {name: of[first] for name, of in table.items()}
+    seen = list[Row]()
     if space.is_independent:
         start = space.uniform(first)
         with np.errstate(all="ignore"):
             is_bounded = np.isfinite(space.values(np.array([0 * start, 0 * start + 1]))).all(axis=0)
         edge = np.minimum(np.where(is_bounded, 0.0, 0.5 / space.draws), np.minimum(start, 1 - start))
         steps = np.diag(np.where(start < 0.5, FIRST_STEP, -FIRST_STEP))
-        most = LEAST_STEPS + STEPS_A_NUMBER * len(start)
+        most = 20 + 20 * len(start)
 
         def search(result: Callable[[Real], Row]) -> None:
             scipy.optimize.minimize(  # type: ignore[call-overload]  # bounds as an array
@@ -384,7 +390,8 @@ def worst_arm(study: Study, order: Sequence[str], deadline: float) -> WorstArm |
         seen = found
     worst = max([*seen, *[drawn] * (not seen)], key=partial(badness, order))
     numbers = {key: float(worst[key]) for key in space.keys}
-    file, subject = study.parts.folder / WORST_FILE, plan.subjects.at([*numbers.values()])
+    file = study.parts.folder / "worst.toml"
+    subject = plan.subjects.at([*numbers.values()])
     text = file_text(replace(subject.arm, name=f"{plan.arm.name}-worst"), subject.chain)
     with suppress(ParameterError):  # of a state space, which has no table
         text = f"{text}\n{law_toml(as_law(subject.law))}"
@@ -408,7 +415,8 @@ def sobol_indices(
     The first progress has their number and time.  A quantity without a finite value on each arm has no indices.  None
     where the sample is not complete before the deadline [s].
     """
-    plan, keys = study.plan, study.plan.space.keys
+    plan = study.plan
+    keys = study.plan.space.keys
     names = [name for name in plan.names if quantity_of(name).is_number and quantity_of(name).label]
     A, B = np.hsplit(scipy.stats.qmc.Sobol(2 * len(keys), rng=np.random.default_rng(plan.space.seed)).random(size), 2)
     pages = [np.where(np.arange(len(keys)) == n, B, A) for n in range(len(keys))]  # A with one column of B
@@ -434,7 +442,8 @@ def _indices(name: str, keys: Sequence[str], values: Real) -> Iterator[SobolInde
     no_interval: Any = scipy.stats.DegenerateDataWarning  # of an index that does not vary
     with warnings.catch_warnings(action="ignore", category=no_interval), np.errstate(all="ignore"):
         ends = found.bootstrap(confidence_level=CONFIDENCE)
-    first, total = ends.first_order.confidence_interval, ends.total_order.confidence_interval
+    first = ends.first_order.confidence_interval
+    total = ends.total_order.confidence_interval
     columns = found.first_order, first.low, first.high, found.total_order, total.low, total.high
     for key, S, S_low, S_high, T, T_low, T_high in zip(keys, *(np.ravel(of).tolist() for of in columns), strict=True):
         yield SobolIndex(quantity=name, key=key, first=S, first_interval=(S_low, S_high), total=T,

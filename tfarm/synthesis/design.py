@@ -146,7 +146,8 @@ class Design:
         self,
     ) -> Annotated[float | None, Quantity("record of the slew", "s", 6, "duration over which the objective is taken")]:
         """Length of the record of a residual or a cost, for `tfarm simulate --duration`; None of others."""
-        arm, chain = self.verdict.loop.arm, self.chain
+        arm = self.verdict.loop.arm
+        chain = self.chain
         if self.loop == "continuous":
             return None
         tasks = {"residual": lambda: slew_and_after(arm, arm, chain), "cost": lambda: trial_slew(arm, chain)}
@@ -212,7 +213,8 @@ def design(
         must_turn(arm)
     ends = {key: (float(low), float(high)) for key, (low, high) in (ranges or {}).items()}
     box = ArmBox(arm, ends) if ends else None
-    arms, chain = arms_of(arm, also, box), chain_or_usual(chain)
+    arms = arms_of(arm, also, box)
+    chain = chain_or_usual(chain)
     for each in arms:
         admit("design", each.arm, chain)
     same_input(arms)
@@ -278,7 +280,9 @@ class _Task:
 
     def design(self, choice: _Choice, named: Sequence[NamedArm], case: WorstCase) -> Design:
         """The record of a law for these arms."""
-        law, x, own = choice.law, choice.x, choice.search.form
+        law = choice.law
+        x = choice.x
+        own = choice.search.form
         on_arms = tuple(
             OnArm(each.name, each.numbers, judge.value(law), stability(judge.arm, law),
                   sampled_brief(judge.arm, law, judge.chain))

@@ -50,7 +50,9 @@ def damping_of(model: Model, poles: Complex) -> Real:
 
     One of each pair counts.  The poles nearest to those of `higher` modes are left out.
     """
-    s, counted, rows = model.in_s(poles), poles.imag >= 0, np.arange(len(poles))
+    s = model.in_s(poles)
+    counted = poles.imag >= 0
+    rows = np.arange(len(poles))
     for own in model.higher:
         gap = np.where(counted, abs(poles - own), np.inf)
         # up to four times the least distance a pole may be this one too
@@ -63,7 +65,7 @@ def damping_of(model: Model, poles: Complex) -> Real:
 
 def disk_of(L: Complex) -> Real:
     """2 |1 + L|/|1 - L|."""
-    return np.asarray(2 * abs(1 + L) / np.maximum(abs(1 - L), LEAST_SIZE))
+    return 2 * abs(1 + L) / np.maximum(abs(1 - L), LEAST_SIZE)
 
 
 def delay(model: Model, L: Complex) -> Real:
@@ -82,10 +84,12 @@ def longest_delay(model: Model) -> float:
 
 def _passing_delay(model: Model, L: Complex) -> Real:
     """That delay [s] by the passages between points of the grid alone, at most the longest."""
-    q, around = model.angles, 2 * np.pi
+    q = model.angles
+    around = 2 * np.pi
     size = np.log(np.maximum(abs(L), LEAST_SIZE))
     turn = np.mod(np.pi + np.unwrap(np.angle(L)), around)
-    here, change = size[:, :-1], np.diff(size)
+    here = size[:, :-1]
+    change = np.diff(size)
     passes = (size[:, 1:] * here <= 0) & (change != 0)
     share = here / np.where(passes, -change, 1.0)
     step = np.mod(np.diff(turn) + np.pi, around) - np.pi
@@ -160,7 +164,8 @@ class Judge:
                 return np.nan_to_num(self.objective.scores(self, entries, None), nan=np.inf)
         poles = self.model.poles(entries)
         growth = self.model.growth(poles).max(axis=1)
-        scores, stable = lost(1, growth), growth < 0
+        scores = lost(1, growth)
+        stable = growth < 0
         if stable.any():
             scores[stable] = self.objective.scores(self, chosen(entries, stable), poles[stable])
         return scores
@@ -291,7 +296,8 @@ def scores_of(judges: Sequence[Judge], entries: Sequence[Entry], limits: Real) -
     A law whose score is above its one of the `limits` (laws,) may have any value above it.  Where the limit is the
     score of a stable law, the objective is first: most laws have lost by it.
     """
-    scores, of_stable = np.full(limits.size, -np.inf), limits < LOST
+    scores = np.full(limits.size, -np.inf)
+    of_stable = limits < LOST
     _add_aims(judges, entries, of_stable, scores, limits)
     left = np.flatnonzero(scores <= limits)
     conditions = [each for judge in judges for each in judge.conditions]

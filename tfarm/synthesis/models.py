@@ -34,12 +34,8 @@ from tfarm.response.signals import Signals
 from tfarm.spectrum.table import first_frequency
 from tfarm.synthesis.structures import Entry
 
-GROWTH_OF_MODEL = 1e-6  # of |s|: a smaller growth may be an error of the model
 AT_NYQUIST = 1e-12  # of z = -1, where Tustin's s is infinite
 POLE_OFFSETS = np.geomspace(1e-9, 0.5, 40)  # rad, to either side of the open loop's poles
-EVEN_ANGLES = 400  # points of the circle at equal distances
-RANK_LOST = 1e-11  # of the largest singular value: rounding of the signals of a slew
-OF_ROOT = 1.3  # the root of the number of samples by the length of a block, at least
 
 
 @dataclass(frozen=True)
@@ -71,11 +67,14 @@ class Model:
         number = max(each.num.shape[1] for each in entries)
         order = sum(len(each.den) - 1 for each in entries)
         signals = len(self.signals)
-        A, B = np.zeros((number, order, order)), np.zeros((number, order, signals))
-        C, D = np.zeros((number, 1, order)), np.zeros((number, 1, signals))
+        A = np.zeros((number, order, order))
+        B = np.zeros((number, order, signals))
+        C = np.zeros((number, 1, order))
+        D = np.zeros((number, 1, signals))
         first = 0
         for signal, num, den in entries:
-            n, column = len(den) - 1, self.signals.index(signal)
+            n = len(den) - 1
+            column = self.signals.index(signal)
             scale = self.speed ** np.arange(n, -1.0, -1.0)[:, None]
             lead = den[0] * scale[0]
             num = np.pad(num, ((n + 1 - len(num), 0), (0, 0))) * scale / lead
@@ -107,7 +106,8 @@ class Model:
         A, B, C, D = self.plant
         Ak, Bk, *_ = law
         row, _ = self.feedback(law, share)
-        read, n = D @ row, len(A)
+        read = D @ row
+        n = len(A)
         read[:, :, :n] += C
         found = np.zeros((len(Ak), *row.shape[-1:] * 2))
         found[:, :n, :n], found[:, n:, n:] = A, Ak
@@ -127,7 +127,8 @@ class Model:
     def growth(self, poles: Complex) -> Real:
         """ln |z| of poles, or Re s/|s| less the error of the model: below 0 if stable."""
         size = np.maximum(abs(poles), LEAST_SIZE)
-        return np.log(size) if self.period is not None else poles.real / size - GROWTH_OF_MODEL
+        # a smaller growth may be an error of the model
+        return np.log(size) if self.period is not None else poles.real / size - 1e-6
 
     def in_s(self, poles: Complex) -> Complex:
         """s of poles, times the period of a sampled loop; 1 of poles at z = 0."""
@@ -138,7 +139,7 @@ class Model:
     @cached_property
     def angles(self) -> Real:
         """The grid (m,)."""
-        return np.asarray(self.grid())
+        return self.grid()
 
     @cached_property
     def responses(self) -> Complex:
@@ -148,8 +149,10 @@ class Model:
     def loop(self, entries: Sequence[Entry], angles: Real | None = None) -> Complex:
         """L (laws, m) at the model's own angles, or at others."""
         q = self.angles if angles is None else np.asarray(angles)
-        response, total = self.responses if angles is None else self.response(q), 0.0
-        s, z = 1j * q, np.exp(1j * q)
+        response = self.responses if angles is None else self.response(q)
+        total = 0.0
+        s = 1j * q
+        z = np.exp(1j * q)
         if self.period is not None:
             s = self.speed * (z - 1) / np.where(abs(z + 1) < AT_NYQUIST, AT_NYQUIST, z + 1)
         for signal, num, den in entries:
@@ -162,8 +165,11 @@ def continuous_model(arm: Arm, signals: tuple[str, ...], modes: int, count: int,
     """The continuous-time loop of `count` flexible modes; its response is that of the exact arm."""
     A, B, C, D = sensed_model(arm, signals, count)
     if arm.has_rigid_mode and "hub_angle" not in signals:  # an angle without feedback is no state of the loop
-        A, B, C = A[1:, 1:], B[1:], C[:, 1:]
-    read, top = Signals(arm, signals), band_of(arm, modes)
+        A = A[1:, 1:]
+        B = B[1:]
+        C = C[:, 1:]
+    read = Signals(arm, signals)
+    top = band_of(arm, modes)
     moment = C[signals.index("root_moment")] if "root_moment" in signals else np.zeros(len(A))
     return Model(
         (A, B, C, D), signals, speed, None, lambda: grid(arm, top), lambda w: read.values(1j * w), top, (), 0, moment
@@ -184,12 +190,15 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
     A, B, C = pulse.matrices()
     own = sensed.own_moment(chain.sampling) if "root_moment" in signals else 0.0 * C[0]
     # of the two states of the rigid body those that the loop does not have; of an arm that turns the angle is the last
-    first, damped, turns = pulse.integrals_at, bool(sensed.read.arm.rate_loss), arm.has_rigid_mode
+    first = pulse.integrals_at
+    damped = bool(sensed.read.arm.rate_loss)
+    turns = arm.has_rigid_mode
     gone = range(first, first + (damped + ("hub_angle" not in signals) if turns else 2))
     response: Callable[[Complex], Complex] = pulse
     if by_difference:
         a = float(np.exp(-chain.converters.rate_filter * T))
-        n, row = read.index("hub_angle"), signals.index("hub_rate")
+        n = read.index("hub_angle")
+        row = signals.index("hub_rate")
         A, B, C = differenced(A, B, C, (n, row), (a, T), first + damped if turns else None)
         own = np.append(own, 0.0)
 
@@ -198,7 +207,9 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
             found[row] = (1 - a) / T * (z - 1) / (z - a) * found[n]
             return found
 
-    A, B, C = np.delete(np.delete(A, gone, 0), gone, 1), np.delete(B, gone), np.delete(C, gone, 1)[: len(signals)]
+    A = np.delete(np.delete(A, gone, 0), gone, 1)
+    B = np.delete(B, gone)
+    C = np.delete(C, gone, 1)[: len(signals)]
     beyond = np.nonzero((pulse.mode > modes) & (pulse.poles.imag >= 0))[0]
     higher = pulse.multipliers[beyond[np.argsort(-pulse.mode[beyond], kind="stable")]]  # the highest come first
     return Model(
@@ -216,8 +227,12 @@ def differenced(
     It has one more state g, a g + theta of the next sample, less its share of the turning state.  `rows` are those of
     angle and rate; only the angle depends on the state `angle` then.
     """
-    (n, row), (a, T), size = rows, numbers, len(A)
-    A, B, C = np.pad(A, (0, 1)), np.append(B, 0.0), np.pad(C, ((0, 0), (0, 1)))
+    (n, row) = rows
+    (a, T) = numbers
+    size = len(A)
+    A = np.pad(A, (0, 1))
+    B = np.append(B, 0.0)
+    C = np.pad(C, ((0, 0), (0, 1)))
     A[size, :size], A[size, size] = C[n, :size], a
     C[row] = (1 - a) / T * C[n]
     C[row, size] = -((1 - a) ** 2) / T
@@ -225,7 +240,9 @@ def differenced(
         turned = np.eye(size + 1)
         turned[size, angle] = -C[n, angle] / (1 - a)
         back = 2 * np.eye(size + 1) - turned
-        A, B, C = turned @ A @ back, turned @ B, C @ back
+        A = turned @ A @ back
+        B = turned @ B
+        C = C @ back
     return A, B, C
 
 
@@ -233,7 +250,7 @@ def circle_angles(pulse: PulseTransfer) -> Real:
     """Angles (0, pi] of the circle, dense near the poles of the open loop."""
     angle = abs(np.angle(pulse.multipliers))
     close = (angle[:, None] + np.r_[-POLE_OFFSETS, POLE_OFFSETS]).ravel()
-    return np.unique(np.r_[np.linspace(0, np.pi, EVEN_ANGLES + 1)[1:], close[(close > 0) & (close <= np.pi)]])
+    return np.unique(np.r_[np.linspace(0, np.pi, 400 + 1)[1:], close[(close > 0) & (close <= np.pi)]])
 
 
 class Blocks(NamedTuple):
@@ -255,13 +272,14 @@ def in_blocks(signals: Real, first: int) -> Blocks:
     Those of a slew are polynomials over each half: the blocks have a low rank, whatever their number.
     """
     inputs, number = signals.shape
-    size = 2 ** max(int(np.log2(number**0.5 / OF_ROOT)), 0)
+    size = 2 ** max(int(np.log2(number**0.5 / 1.3)), 0)
     before = -first % size
     after = -(before + number) % size
     scale = np.maximum(abs(signals).max(axis=1), LEAST_SIZE)[:, None, None]
     r = np.pad(signals, ((0, 0), (before, after))).reshape(inputs, -1, size) / scale
     basis, weights, shares = np.linalg.svd(np.moveaxis(r, 1, 2).reshape(inputs * size, -1), full_matrices=False)
-    rank = int((weights > RANK_LOST * weights[0]).sum())
+    # of the largest singular value: rounding of the signals of a slew
+    rank = int((weights > 1e-11 * weights[0]).sum())
     basis = (basis * weights)[:, :rank].reshape(inputs, size, rank) * scale
     return Blocks(basis, shares[:rank], (before + first) // size, size - after, number - first)
 
@@ -272,8 +290,12 @@ def squares(A: Real, B: Real, C: Real, D: Real, signals: Blocks) -> Real:
     The outputs of a block are one product with its first state and the shares of its signals; of many rows a
     triangular factor has the same sum.
     """
-    (laws, n, inputs), seen, (_, size, rank) = B.shape, C.shape[1], signals.basis.shape
-    rows, columns, power = C, B, A
+    (laws, n, inputs) = B.shape
+    seen = C.shape[1]
+    (_, size, rank) = signals.basis.shape
+    rows = C
+    columns = B
+    power = A
     while rows.shape[1] < size * seen:  # C, C A, ...; ..., A B, B
         rows = np.concatenate([rows, rows @ power], axis=1)
         columns = np.concatenate([power @ columns, columns], axis=2)
@@ -295,16 +317,16 @@ def squares(A: Real, B: Real, C: Real, D: Real, signals: Blocks) -> Real:
     if size * seen > n + rank:
         together = np.asarray(np.linalg.qr(together, mode="r"))
     whole = together @ x[:, :, signals.first : -1]
-    return np.asarray((whole**2).sum(axis=(1, 2)) + (last**2).sum(axis=(1, 2)))
+    return (whole**2).sum(axis=(1, 2)) + (last**2).sum(axis=(1, 2))
 
 
-SAMPLES_LEFT = 16  # of the record after the slew, where a period of the first mode has fewer
 PERIOD_POINTS = 64  # of the period after the slew, in continuous time
 
 
 def slew_and_after(arm: Arm, known: Arm, chain: Chain) -> Scenario:
     """The slew for the arm `known`, and a period of the first mode of the moving arm."""
-    left = max(2 * np.pi / first_frequency(arm), SAMPLES_LEFT * chain.sampling.period)
+    # where a period of the first mode has fewer samples
+    left = max(2 * np.pi / first_frequency(arm), 16 * chain.sampling.period)
     return scenario("slew", known, chain, chain.slew.rise_time + left)
 
 
@@ -335,7 +357,8 @@ class Slews:
         """T sum of (a x^2 + b e^2)/2 (laws,)."""
         model = self.model
         A, B, *_ = self._driven(entries, 2)
-        C, D = np.zeros((len(A), 2, A.shape[1])), np.zeros((len(A), 2, B.shape[2]))
+        C = np.zeros((len(A), 2, A.shape[1]))
+        D = np.zeros((len(A), 2, B.shape[2]))
         read = model.plant[2][model.signals.index("root_moment")]
         C[:, 0, : read.size], C[:, 1] = read, A[:, model.last]
         D[:, 1] = B[:, model.last]
@@ -383,7 +406,8 @@ class Slews:
         The rigid arm's is 0 then.  Angle and rate have references here, the moment has none.  Of the reference angle,
         rate and acceleration are states of their own: the acceleration is constant over each half of the slew.
         """
-        names, slew = self.model.signals, self.chain.slew
+        names = self.model.signals
+        slew = self.chain.slew
         A, B, C, D = self._driven(entries, 0)
         signals = np.zeros((1 + len(names), 3))
         signals[0, 1:] = self.known.rate_loss, self.known.turned_inertia

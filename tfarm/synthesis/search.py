@@ -25,26 +25,21 @@ from tfarm.synthesis.judge import LOST, Judge, scores_of
 from tfarm.synthesis.structures import Bounds, Structure
 from tfarm.synthesis.worst_case import Effort, Tell
 
-FEWEST_RUNS, MOST_RUNS = 2, 8  # one more than coefficients within these: some minima are found by one of five alone
+# one more than coefficients within these: some minima are found by one of five alone
+MOST_RUNS = 8
 USUAL_WORK = 4 * 20**2  # models times squared states of one arm's first model: with twice as much half the runs
-FEWEST_POINTS, POINTS_EACH = 32, 15  # of a run, at least, and for each coefficient: the next power of two
+# of a run, at least, and for each coefficient: the next power of two
 LAWS_AT_ONCE = 256  # a limit of memory
-LAWS_EACH, MOST_LAWS = 800, 4000  # of a run for each coefficient, and at most; twice as many from the best points
+# of a run for each coefficient, and at most; twice as many from the best points
 STRATEGIES = (("best1bin", 0.7), ("currenttobest1bin", 0.9))  # in turn, and the share of coefficients changed at once
-AROUND = 0.5  # of x: the spread of the points of a run around the best, half as wide in each one after
-MOST_REFINED, WORTH = 5, 2e-3  # such runs, and the relative gain of one after which another follows
+# such runs, and the relative gain of one after which another follows
 CONVERGED = 1e-9  # of the scores: the spread of a run's points at which it ends
-SIMPLEX = 0.005  # of the region: the first edges of the simplex
-STEPS_EACH = 100  # of the simplex, for each coefficient
 CANDIDATES = 4  # laws for the exact verdicts, the best first
 BEYOND = 4.0  # of x: reach of a search beyond its bounds, a factor e^4 of a coefficient far above its unit
 APART = 0.02  # of the range of x: least distance of two candidates
 AS_GOOD = 1e-4  # relative: a coefficient is at its physical end if the score there is worse by less
 AGREES = 5e-3  # relative: a run agrees if its score is worse than the best by less
 FLAT_WITHIN = 0.01  # laws whose score is worse by less than this share bound the flat part
-FLAT_STEPS = 60  # of the way to the bounds, each 1.4 times the one before
-AT_ORIGIN = 1e-9  # of that way: the first step
-FLAT_HALVINGS = 30  # of the step that leaves the flat part
 
 
 Score = Callable[..., Real]  # of points (n, k), and of limits
@@ -136,9 +131,11 @@ def minimised(
     the best, and are more where no loop is stable yet: the end of a sketch.  Then follow one with the best points of
     all, not of a search near a point, some near the best as long as that gains, and a simplex at the best of all.
     """
-    runs = min(max(int((form.size + 1) / max(1.0, work)), FEWEST_RUNS), MOST_RUNS) if effort == "whole" else 1
-    number = 1 << (max(FEWEST_POINTS, POINTS_EACH * form.size) - 1).bit_length()
-    rounds = min(LAWS_EACH * form.size, MOST_LAWS) // number
+    # one run more than coefficients: some minima are found by one of five alone
+    runs = min(max(int((form.size + 1) / max(1.0, work)), 2), MOST_RUNS) if effort == "whole" else 1
+    # points of a run: a power of two
+    number = 1 << (max(32, 15 * form.size) - 1).bit_length()
+    rounds = min(800 * form.size, 4000) // number
     ended: list[Points] = []
 
     def run(points: Real, rounds: int) -> None:
@@ -156,11 +153,14 @@ def minimised(
     if effort == "whole":
         run(Points.of(ended).x[:, :number], 2 * rounds)
     if form.size > len(PLANE) and effort != "sketch":
-        for n in range(MOST_REFINED):
-            (best, *_), (least, *_) = Points.of(ended).x.T, Points.of(ended).scores
-            spread = AROUND / 2**n * np.random.default_rng(runs + n).standard_normal((number, form.size))
+        for n in range(5):
+            (best, *_) = Points.of(ended).x.T
+            (least, *_) = Points.of(ended).scores
+            # the spread of the points of a run around the best, half as wide in each one after
+            spread = 0.5 / 2**n * np.random.default_rng(runs + n).standard_normal((number, form.size))
             run(np.clip(best + spread, *box).T, rounds)
-            if not ended[-1].scores[0] < least - WORTH * abs(least):
+            # another run follows one with a gain
+            if not ended[-1].scores[0] < least - 2e-3 * abs(least):
                 break
     if effort != "sketch":
         ended.append(simplex(score, box, Points.of(ended)))
@@ -187,11 +187,14 @@ def evolved(score: Score, box: tuple[Real, Real], points: Real, rounds: int, see
 
 def simplex(score: Score, box: tuple[Real, Real], found: Points) -> Points:
     """The last point of a simplex of Nelder and Mead that begins at the best point found."""
-    (low, high), start, limit = box, found.x[:, 0], found.scores[:1]
-    step = SIMPLEX * (high - low)
+    (low, high) = box
+    start = found.x[:, 0]
+    limit = found.scores[:1]
+    # of the region: the first edges of the simplex
+    step = 0.005 * (high - low)
     corners = start + np.vstack([np.zeros(start.size), np.diag(np.where(start + step > high, -step, step))])
     options = {
-        "initial_simplex": corners, "maxfev": STEPS_EACH * start.size, "adaptive": start.size > 1,
+        "initial_simplex": corners, "maxfev": 100 * start.size, "adaptive": start.size > 1,
         "xatol": CONVERGED * (high - low).max(), "fatol": CONVERGED * abs(limit[0]),
     }  # fmt: skip
     done = cast("Any", minimize)(
@@ -208,7 +211,7 @@ def sobol(low: Real, high: Real, number: int, seed: int) -> Real:
     """Points (n, number) of Sobol's sequence in a box, scrambled by a seed; a power of two has no gap."""
     from scipy.stats import qmc  # here, because it takes half a second to load
 
-    return np.asarray((low + qmc.Sobol(low.size, rng=seed).random(number) * (high - low)).T)
+    return (low + qmc.Sobol(low.size, rng=seed).random(number) * (high - low)).T
 
 
 def _apart(form: Structure, points: Real, scores: Real, most: int = 4, least: float = 0.02) -> list[int]:
@@ -226,7 +229,8 @@ def flat_part(judge: Worst, form: Structure, x: Real, score: float) -> dict[str,
 
     The search goes outwards in growing steps, then by halving: narrow ranges are found as well as wide ones.
     """
-    n, limit = form.size, score + FLAT_WITHIN * abs(score)
+    n = form.size
+    limit = score + FLAT_WITHIN * abs(score)
     ways = np.concatenate([np.diag(end - x) for end in form.box]).T
 
     def is_within(shares: Real) -> Any:
@@ -234,15 +238,19 @@ def flat_part(judge: Worst, form: Structure, x: Real, score: float) -> dict[str,
         points = (x[:, None, None] + ways[:, :, None] * shares).reshape(n, -1)
         return (judge.scores(form, points, np.full(shares.size, limit)) <= limit).reshape(shares.shape)
 
-    outwards = np.geomspace(AT_ORIGIN, 1.0, FLAT_STEPS)
+    # each 1.4 times the one before
+    outwards = np.geomspace(1e-9, 1.0, 60)
     is_beyond = ~is_within(np.tile(outwards, (2 * n, 1)))
     first = is_beyond.argmax(axis=1)
-    low, high = np.where(first > 0, outwards[first - 1], 0.0), outwards[first]
-    for _ in range(FLAT_HALVINGS):
+    low = np.where(first > 0, outwards[first - 1], 0.0)
+    high = outwards[first]
+    for _ in range(30):
         middle = (low + high) / 2
         inside = is_within(middle[:, None])[:, 0]
-        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
-    ends, found = form.coefficients(x[:, None] + ways * low), {}
+        low = np.where(inside, middle, low)
+        high = np.where(inside, high, middle)
+    ends = form.coefficients(x[:, None] + ways * low)
+    found = {}
     for place, each in enumerate(form.free):
         least, largest = (
             float(ends[place, side]) if is_beyond[side].any() else bound

@@ -114,11 +114,11 @@ class Structure:
 
     def at(self, coefficients: Any) -> Real:
         """x of these coefficients (n,)."""
-        return np.asarray(np.arcsinh(np.asarray(coefficients) / self.units))
+        return np.arcsinh(np.asarray(coefficients) / self.units)
 
     def coefficients(self, x: Real) -> Real:
         """The coefficients at x (n, laws)."""
-        return np.asarray((self.units * np.sinh(x.T)).T)
+        return (self.units * np.sinh(x.T)).T
 
     def record_at(self, x: Real) -> AnyLaw:
         """The law at x (n,), as a record."""
@@ -319,7 +319,8 @@ def _pid(arm: Arm, Kp: float, modes: int, period: float) -> Built:
 )
 def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     def entries(c: Real) -> tuple[Entry, ...]:
-        num, den = np.zeros((1, c.shape[1])), ONE
+        num = np.zeros((1, c.shape[1]))
+        den = ONE
         for g, w, zeta in c[1:].reshape(modes, 3, -1):
             own = _second_order(w, zeta)
             num = product(num, own)
