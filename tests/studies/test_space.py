@@ -14,7 +14,7 @@ from tests.rigs import some_rig
 from tfarm.arm import to_toml
 from tfarm.arm.schema import arm_of_table
 from tfarm.arm.writing import numbers_of
-from tfarm.dsp import Chain
+from tfarm.case import Case
 from tfarm.errors import ParameterError
 from tfarm.fitting.posterior import Posterior, PosteriorNumber
 from tfarm.studies import space
@@ -170,7 +170,7 @@ def test_a_key_has_one_place(lab):
     law = tfarm.Law({"hub_rate": 0.3, "root_moment": 0.3})
     for pair in (("law.K1", "law.hub_rate"), ("law.hub_rate", "law.hub_rate.gain")):
         with pytest.raises(ParameterError, match="two keys are one number"):
-            Subjects(lab, law, Chain(), pair)
+            Subjects(Case(lab, law), pair)
 
 
 UNKNOWN_KEYS = [
@@ -188,7 +188,7 @@ UNKNOWN_KEYS = [
 def test_an_unknown_key_is_refused_before_any_arm(lab, key, named, remedy):
     for law in (GAINS, tfarm.Law({"hub_rate": 0.3})):
         with pytest.raises(ParameterError, match=remedy) as caught:
-            Subjects(lab, law, Chain(), (key,))
+            Subjects(Case(lab, law), (key,))
         assert caught.value.key == named
         assert "\n" not in str(caught.value)
 
@@ -196,14 +196,14 @@ def test_an_unknown_key_is_refused_before_any_arm(lab, key, named, remedy):
 def test_values_reach_arm_chain_controller_and_tuner(lab):
     keys = ("payload.mass", "link.youngs_modulus", "sampling.period", "sampling.delay_samples", "law.K2", "tuner.seed",
             "actuator.hub_damping")  # fmt: skip
-    one = Subjects(lab, GAINS, Chain(), keys).at((0.1, 7e10, 0.005, 1.5, 0.25, 3.0, 0.01))
-    assert (one.arm.payload.mass, one.arm.link.youngs_modulus) == (0.1, 7e10)
-    assert one.arm.link.shear_modulus == lab.link.shear_modulus
-    assert (one.chain.sampling.period, one.chain.sampling.delay_samples) == (0.005, 1.5)
-    assert one.chain.actuator.hub_damping == 0.01
-    assert (one.law, one.tuner) == (tfarm.HubFeedback(K1=0.3, K2=0.25), {"seed": 3.0})
-    by_block = Subjects(lab, tfarm.Law({"hub_rate": ([1.0], [0.1, 1.0])}), Chain(), ("law.hub_rate.den.0",)).at((0.2,))
-    assert by_block.law == tfarm.Law({"hub_rate": ([1.0], [0.2, 1.0])})
+    one = Subjects(Case(lab, GAINS), keys).at((0.1, 7e10, 0.005, 1.5, 0.25, 3.0, 0.01))
+    arm, chain = one.case.arm, one.case.chain
+    assert (arm.payload.mass, arm.link.youngs_modulus) == (0.1, 7e10)
+    assert arm.link.shear_modulus == lab.link.shear_modulus
+    assert (chain.sampling.period, chain.sampling.delay_samples, chain.actuator.hub_damping) == (0.005, 1.5, 0.01)
+    assert (one.case.gains, one.tuner) == (tfarm.HubFeedback(K1=0.3, K2=0.25), {"seed": 3.0})
+    by_block = Subjects(Case(lab, tfarm.Law({"hub_rate": ([1.0], [0.1, 1.0])})), ("law.hub_rate.den.0",)).at((0.2,))
+    assert by_block.case.law == tfarm.Law({"hub_rate": ([1.0], [0.2, 1.0])})
 
 
 RIG_KEYS = ("link.2.length", "link.1.density", "attachment.1.mass", "hub.inertia", "payload.mass")
@@ -216,7 +216,7 @@ def test_an_arm_with_other_numbers_is_that_of_the_edited_file(seed):
     table = tomllib.loads(to_toml(arm))
     keys = [key for key in RIG_KEYS if key in numbers_of(arm)]
     values = {key: 1.1 * numbers_of(arm)[key] for key in keys}
-    subjects = Subjects(arm, GAINS, Chain(), keys)
+    subjects = Subjects(Case(arm, GAINS), keys)
     for key, value in [*values.items(), (keys[-1], -1.0), (keys[-1], 1e-60)]:
         place, *rest = key.split(".")
         *numbers, name = rest
@@ -224,7 +224,7 @@ def test_an_arm_with_other_numbers_is_that_of_the_edited_file(seed):
         (here[int(numbers[0]) - 1] if numbers else here)[name] = value
         values[key] = value
         if key == keys[-1]:
-            assert _built(lambda: subjects.at([*values.values()]).arm) == _built(lambda: arm_of_table(table))
+            assert _built(lambda: subjects.at([*values.values()]).case.arm) == _built(lambda: arm_of_table(table))
 
 
 def _built(make):
@@ -241,15 +241,15 @@ def test_a_stated_shear_modulus_stays_and_one_by_poissons_ratio_follows(lab):
     steel = tfarm.load("stocky-steel")
     for arm in (steel, arm_of_table(tomllib.loads(to_toml(steel)))):
         for modulus in (1.9e11, 2.2e11):
-            one = Subjects(arm, GAINS, Chain(), (E,)).at((modulus,)).arm
+            one = Subjects(Case(arm, GAINS), (E,)).at((modulus,)).case.arm
             assert one.link.shear_modulus == modulus / 2.6  # the file: Poisson's ratio 0.3
-        assert Subjects(arm, GAINS, Chain(), (E,)).notes == [f"{E}: G changes with it, at a constant Poisson's ratio"]
-    both = Subjects(steel, GAINS, Chain(), (E, "link.shear_modulus"))
-    assert both.at((1.9e11, 7e10)).arm.link.shear_modulus == 7e10
-    stated = Subjects(lab, GAINS, Chain(), (E,))
+        assert Subjects(Case(arm, GAINS), (E,)).notes == [f"{E}: G changes with it, at a constant Poisson's ratio"]
+    both = Subjects(Case(steel, GAINS), (E, "link.shear_modulus"))
+    assert both.at((1.9e11, 7e10)).case.arm.link.shear_modulus == 7e10
+    stated = Subjects(Case(lab, GAINS), (E,))
     assert stated.notes == both.notes == [f"{E}: G as it is stated or varied itself"]
-    assert stated.at((8e10,)).arm.link.shear_modulus == lab.link.shear_modulus
-    fitted = Subjects(lab, GAINS, Chain(), (E,), fitted=(E,)).at((8e10,)).arm.link
+    assert stated.at((8e10,)).case.arm.link.shear_modulus == lab.link.shear_modulus
+    fitted = Subjects(Case(lab, GAINS), (E,), fitted=(E,)).at((8e10,)).case.arm.link
     assert fitted.poissons_ratio == pytest.approx(lab.link.poissons_ratio, rel=1e-14)
     changed = dataclasses.replace(steel.link, youngs_modulus=1.9e11)  # which states its shear modulus
     assert (changed.stated_ratio, changed.shear_modulus) == (None, steel.link.shear_modulus)
@@ -262,7 +262,7 @@ def test_laws_that_differ_in_the_last_bit_are_other_studies(lab):
         tfarm.Law.of_matrices(np.array([[-1.0]]), [[gain]], [[1.0]], [[0.0]], ["hub_rate"])
         for gain in (1.0, math.nextafter(1, 2))
     ]
-    files = [files_of(lab, law, Chain(), declared) for law in laws]
+    files = [files_of(Case(lab, law), declared) for law in laws]
     assert len({(each["arm.toml"], each.get("law.mat")) for each in files}) == 4
 
 

@@ -20,7 +20,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import numpy as np
 import scipy  # whose statistics take half a second to load
 
-from tfarm.arm import PLANE, as_law
+from tfarm.arm import PLANE
 from tfarm.arrays import Real
 from tfarm.assessment.card import LoopCard, loop_card, words_of, words_of_samples
 from tfarm.assessment.step import LoopResponse, step
@@ -121,15 +121,15 @@ def _card_of(loop: str) -> Asked:
     """Return the entries of the card of a loop, of which stability and its certainty need the verdict alone."""
 
     def values(one: Subject, names: Set[str]) -> dict[str, Any]:
-        law = as_law(one.law)
-        if loop == "continuous" and law.is_discrete:
+        case = one.case
+        if loop == "continuous" and case.law.is_discrete:
             return {}
         if not names <= {f"{loop}.stability", f"{loop}.certainty"}:
-            card = loop_card(loop, one.arm, law, one.chain)
+            card = loop_card(loop, case.arm, case.law, case.chain)
             return {name: value for name, _, value in entries_of(LoopCard, card, loop)}
         known = (
-            words_of(stability(one.driven_arm, law), one.chain) if loop == "continuous"
-            else words_of_samples(sampled(one.arm, law, one.chain).verdict)
+            words_of(stability(one.driven_arm, case.law), case.chain) if loop == "continuous"
+            else words_of_samples(sampled(case.arm, case.law, case.chain).verdict)
         )  # fmt: skip
         return {f"{loop}.{key}": text for key, text in known.items()}
 
@@ -137,14 +137,14 @@ def _card_of(loop: str) -> Asked:
 
 
 def _step_of(one: Subject, _: Set[str]) -> dict[str, Any]:
-    found = step(one.arm, one.law, one.chain, "slew")
+    found = step(one.case.arm, one.case.law, one.case.chain, "slew")
     return {name: value for loop in LOOPS
             for name, _, value in entries_of(LoopResponse, getattr(found, loop), f"step.{loop}")}  # fmt: skip
 
 
 def _modes_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
     count = _most(names)
-    return _numbered(FREQUENCY, modes(one.arm, count).natural_frequency[-count:])
+    return _numbered(FREQUENCY, modes(one.case.arm, count).natural_frequency[-count:])
 
 
 def prepare(subjects: Sequence[Subject], names: Sequence[str]) -> None:
@@ -155,14 +155,14 @@ def prepare(subjects: Sequence[Subject], names: Sequence[str]) -> None:
     numbers = {name for name in names if first_of(name) == f"{FREQUENCY}.1"}
     alike = defaultdict(list)
     for one in subjects if numbers else ():
-        alike[one.arm.has_rigid_mode].append(system_of(one.arm, one.arm.theory).undamped)
+        alike[one.case.arm.has_rigid_mode].append(system_of(one.case.arm, one.case.arm.theory).undamped)
     for rigid, systems in alike.items():
         list_frequencies(systems, rigid + 1, rigid + _most(numbers))
 
 
 def _sensitivities_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
     count = _most(names)
-    return {name: value for parameter, values in modes(one.arm, count).sensitivity.items()
+    return {name: value for parameter, values in modes(one.case.arm, count).sensitivity.items()
             for name, value in _numbered(f"{SENSITIVITY}.{parameter}", values[-count:] + 0.0).items()}  # fmt: skip
 
 
@@ -170,7 +170,7 @@ def _intervals_of(one: Subject, names: Set[str]) -> dict[str, Any]:
     """Stability and intervals of gains at the hub; undecided, without intervals, where poles cannot be counted."""
     found: dict[str, Any] = {STABILITY: "undecided"}
     with suppress(ConvergenceError):
-        verdict = stability(one.driven_arm, one.law)
+        verdict = stability(one.driven_arm, one.case.law)
         gains = [gain for gain in PLANE if gain in verdict.loop.numbers and any(f".{gain}." in name for name in names)]
         for gain, of in windows_of(verdict, gains).items():
             found |= {f"{INTERVAL}.{gain}.{name}": getattr(of.interval, name, None) for name in Interval._fields}
@@ -179,13 +179,13 @@ def _intervals_of(one: Subject, names: Set[str]) -> dict[str, Any]:
 
 
 def _damped_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
-    found = damped_modes(modes(one.arm, _most(names)))
+    found = damped_modes(modes(one.case.arm, _most(names)))
     s = found.eigenvalues[found.index > 0, 0]
     return _numbered(RATIO, -s.real / abs(s))
 
 
 def _poles_of(one: Subject, _: Set[str]) -> dict[str, float | None]:
-    found = closed_loop_poles(one.driven_arm, one.law)
+    found = closed_loop_poles(one.driven_arm, one.case.law)
     s = found.values
     return {UNSTABLE: float(found.unstable), **_numbered(REAL, s.real), **_numbered(IMAGINARY, s.imag)}
 
@@ -201,7 +201,7 @@ def _columns(name: str, label: str, unit: str, meaning: str) -> dict[str, Quanti
 
 
 def _tuner_of(one: Subject, _: Set[str]) -> dict[str, Any]:
-    tuning = tuned(one.arm, one.chain, one.plan, **one.tuner)
+    tuning = tuned(one.case.arm, one.case.chain, one.plan, **one.tuner)
     training = tuning.training
     return {
         **_numbered(TRIAL_COST, training.costs),

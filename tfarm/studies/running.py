@@ -22,10 +22,9 @@ from typing import Any
 
 import numpy as np
 
-from tfarm.arm import AnyLaw, Arm
 from tfarm.arm.schema import StrictTable, validated_file
 from tfarm.arrays import Real
-from tfarm.dsp import Chain
+from tfarm.case import Case
 from tfarm.errors import ConvergenceError, ParameterError, TfarmError, one_line, require
 from tfarm.files import write_file
 from tfarm.tuner import Plan as TunerPlan
@@ -59,11 +58,9 @@ PACKAGES = ("tfarm", "numpy", "scipy", "numba")  # versions that all workers hav
 
 @dataclass(frozen=True)
 class Plan:
-    """A study: arm, controller and chain, their varied numbers and the columns that are asked for."""
+    """A study: a case, its varied numbers and the columns that are asked for."""
 
-    arm: Arm
-    law: AnyLaw
-    chain: Chain
+    case: Case
     space: Space
     names: tuple[str, ...]
     tuner: TunerPlan | None = None  # the usual one of each arm by default
@@ -87,7 +84,7 @@ class Plan:
     def subjects(self) -> Subjects:
         """The arms and loops of the rows."""
         fitted = self.space.posterior.keys if self.space.posterior else ()
-        return Subjects(self.arm, self.law, self.chain, self.space.keys, self.tuner, fitted)
+        return Subjects(self.case, self.space.keys, self.tuner, fitted)
 
 
 def chunk(plan: Plan, first: int, last: int, listed: Real | None = None) -> Chunk:

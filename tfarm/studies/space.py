@@ -21,12 +21,12 @@ from typing import Any, NamedTuple, get_args
 import numpy as np
 import scipy  # whose statistics take half a second to load, and do so where they are used
 
-from tfarm.arm import AnyLaw, Arm
+from tfarm.arm import Arm
 from tfarm.arm.checks import number
 from tfarm.arm.feedback import OUTPUT_OF
 from tfarm.arm.writing import KeyedArms, numbers_of
 from tfarm.arrays import Real
-from tfarm.dsp import Chain
+from tfarm.case import Case
 from tfarm.dsp.plant import driven
 from tfarm.errors import ParameterError, must_be_known, naming, require
 from tfarm.files import open_file
@@ -72,18 +72,16 @@ class Distribution(NamedTuple):
 
 
 class Subject(NamedTuple):
-    """One arm of a study with its controller, its sampled chain, and numbers and plan of the tuner."""
+    """One case of a study, with numbers and plan of the tuner."""
 
-    arm: Arm
-    law: AnyLaw
-    chain: Chain
+    case: Case
     tuner: dict[str, float]
     plan: tuning.Plan | None = None
 
     @property
     def driven_arm(self) -> Arm:
         """The arm of its continuous-time loop: the analog damping of the chain's actuator is friction of its hub."""
-        return driven(self.arm, self.chain)[0]
+        return driven(self.case.arm, self.case.chain)[0]
 
 
 class Listing(NamedTuple):
@@ -216,27 +214,31 @@ class Subjects:
     """
 
     def __init__(
-        self, arm: Arm, law: AnyLaw, chain: Chain, keys: Sequence[str], plan: tuning.Plan | None = None,
-        fitted: Collection[str] = (),
-    ) -> None:  # fmt: skip
-        self.law, self.chain, self.keys, self.plan = law, chain, keys, plan
+        self, case: Case, keys: Sequence[str], plan: tuning.Plan | None = None, fitted: Collection[str] = ()
+    ) -> None:
+        self.case = case
+        self.keys = keys
+        self.plan = plan
+        chain = case.chain
         numbers = {
             f"{table.name}.{each.name}": (table.name, each.name)
             for table in fields(chain) if table.name != "period_from"
             for each in fields(getattr(chain, table.name)) if float in (each.type, *get_args(each.type))
         }  # fmt: skip
         self._of_chain = {key: numbers[key] for key in keys if key in numbers}
-        of_law, of_tuner = ([key.removeprefix(name) for key in keys if key.startswith(name)] for name in (LAW, TUNER))
-        for name in of_law:
-            law.having(name, 1.0)
-        signals = [OUTPUT_OF.get(name, name).removesuffix(".gain") for name in of_law]
-        require(len(set(signals)) == len(signals), "over", of_law, "two keys are one number of the controller")
-        for name in of_tuner:
-            must_be_known("tuner", name, (*tuning.NUMBERS, *tuning.NUMBERS_OF_LEARNING))
+        self._of_law = [key for key in keys if key.startswith(LAW)]
+        signals = []
+        for name in (key.removeprefix(LAW) for key in self._of_law):
+            case.feedback.having(name, 1.0)
+            signals.append(OUTPUT_OF.get(name, name).removesuffix(".gain"))
+        require(len(set(signals)) == len(signals), "over", self._of_law, "two keys are one number of the controller")
+        self._of_tuner = [key for key in keys if key.startswith(TUNER)]
+        for key in self._of_tuner:
+            must_be_known("tuner", key.removeprefix(TUNER), (*tuning.NUMBERS, *tuning.NUMBERS_OF_LEARNING))
         own = [key for key in keys if not key.startswith((LAW, TUNER)) and key not in numbers]
         for key in own:
-            must_be_known("over", key, [*numbers_of(arm), *numbers, f"{LAW}NUMBER", f"{TUNER}NUMBER"])
-        self._arms = KeyedArms(arm, own, "over", alone={*own} - {*fitted})
+            must_be_known("over", key, [*numbers_of(case.arm), *numbers, f"{LAW}NUMBER", f"{TUNER}NUMBER"])
+        self._arms = KeyedArms(case.arm, own, "over", alone={*own} - {*fitted})
 
     @property
     def notes(self) -> list[str]:
@@ -245,17 +247,17 @@ class Subjects:
         return [f"{key}: {words[self._arms.is_shear_scaled(key)]}" for key in self._arms.keys if "youngs" in key]
 
     def at(self, row: Sequence[float]) -> Subject:
-        """Return the arm and loop of a row.  Raises ParameterError for an illegal value."""
+        """Return the case of a row.  Raises ParameterError for an illegal value."""
         values = dict(zip(self.keys, row, strict=True))
-        chain = self.chain
-        law = self.law
+        arm = self._arms.at({key: values[key] for key in self._arms.keys}) if self._arms.keys else self._arms.arm
+        law = self.case.feedback
+        for key in self._of_law:
+            law = law.having(key.removeprefix(LAW), values[key])
+        chain = self.case.chain
         for key, (table, name) in self._of_chain.items():
             chain = replace(chain, **{table: replace(getattr(chain, table), **{name: values[key]})})
-        for key in self.keys:
-            law = law.having(key.removeprefix(LAW), values[key]) if key.startswith(LAW) else law
-        own = {key: values[key] for key in self._arms.keys}
-        tuner = {key.removeprefix(TUNER): value for key, value in values.items() if key.startswith(TUNER)}
-        return Subject(self._arms.at(own) if own else self._arms.arm, law, chain, tuner, self.plan)
+        tuner = {key.removeprefix(TUNER): values[key] for key in self._of_tuner}
+        return Subject(Case(arm, law, chain), tuner, self.plan)
 
 
 # ------------------------------------------------------------------------------------------------------------ lists
