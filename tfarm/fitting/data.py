@@ -219,8 +219,8 @@ def _scatter(values: NDArray[Any]) -> Real:
     away = np.convolve(values, weights, mode="valid") / np.sqrt((weights**2).sum())
     inside = size[SCATTER_NEIGHBOURS:-SCATTER_NEIGHBOURS]
     relative = abs(away[inside > 0]) / inside[inside > 0]
-    typical = float(np.median(relative)) / TYPICAL if relative.size else 1.0
-    least = max(1e-3 * float(np.median(size)), 1e-6 * float(size.max()))  # which a value of 0 is taken for
+    typical = np.median(relative) / TYPICAL if relative.size else 1.0
+    least = max(1e-3 * np.median(size), 1e-6 * size.max())  # which a value of 0 is taken for
     return np.maximum(size, least) * max(typical, LEAST_SHARE)
 
 

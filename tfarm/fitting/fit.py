@@ -359,7 +359,6 @@ def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: An
 
 
 ARMS = 40  # that a report draws
-DRAWS_EACH = 10  # draws for each arm wanted, at most
 DRAWS = 40  # of records
 
 
@@ -374,21 +373,20 @@ def arms_drawn(fit: Fit, count: int) -> tuple[Arm, ...]:
     of_sensors = -np.linalg.pinv(J[:, len(own) :]) @ J[:, : len(own)]
     if fit.misses:
         raise ConvergenceError("the fitted curve misses the data", [], 0)
-    normal = np.random.default_rng(FIT_SEED).standard_normal((DRAWS_EACH * count, len(own)))
+    each_time = 10  # draws for each arm wanted, at most
+    normal = np.random.default_rng(FIT_SEED).standard_normal((each_time * count, len(own)))
     # of draws of a normal distribution: one whose sum of squares is larger is none of them
-    most = fit.chi_squared + 2.0 * float(gammaincinv(len(own) / 2, 0.999))  # the quantile of chi squared
+    most = fit.chi_squared + 2.0 * gammaincinv(len(own) / 2, 0.999)  # the quantile of chi squared
     kept: list[Arm] = []
     for values in fit.posterior.with_all_determined.draws({}, normal).tolist():
         x = np.array([each.coordinate(value) for each, value in zip(own, values, strict=True)]) - fit.point[: len(own)]
         point = fit.problem.inside(fit.point + np.r_[x, of_sensors @ x])
-        kept += [fit.problem.arm(point)] * (sum_of_squares(fit.problem, point) <= most)
+        if sum_of_squares(fit.problem, point) <= most:
+            kept.append(fit.problem.arm(point))
         if len(kept) == count:
             return tuple(kept)
-    raise ConvergenceError(
-        f"only {len(kept)} of {DRAWS_EACH * count} arms drawn explain the data: their likelihood is not normal",
-        kept,
-        len(kept),
-    )
+    words = f"only {len(kept)} of {len(normal)} arms drawn explain the data: their likelihood is not normal"
+    raise ConvergenceError(words, kept, len(kept))
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,7 @@ def _miss(one: Response, computed: Complex) -> Miss | None:
     away = np.log(ratio)
     step = np.log(ratio[1:] / ratio[:-1])
     # a difference of less than a fifth is no miss
-    limit = max(math.log(1.2), 3 * float(np.median(abs(step))))
+    limit = max(math.log(1.2), 3 * np.median(abs(step)))
     # pairs of lines that both miss, the second on the branch of the first: a sign alone is +180 or -180 degrees
     both = np.flatnonzero((abs(away[:-1]) > limit) & (abs(away[:-1] + step) > limit))
     alike = both[abs(step[both]) < abs(away[both]) / 2]

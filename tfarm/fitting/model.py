@@ -208,7 +208,7 @@ def eigenvalue(arm: Arm, number: int) -> complex:
     It starts from the undamped natural frequency; ConvergenceError where a damped mode does not ring near that.
     """
     read = Signals(arm, ("hub_angle",))
-    start = 1j * float(modes(arm, number).natural_frequency[-1])
+    start = 1j * modes(arm, number).natural_frequency[-1]
     reference = read.parts(np.array([start]))[2][0]
 
     def drive(s: complex) -> complex:
@@ -241,7 +241,7 @@ class Response:
     @property
     def size(self) -> int:
         """How many real residuals it has: two a frequency at which something was measured."""
-        return 2 * int(np.isfinite(self.noise.sigma).sum())
+        return 2 * np.isfinite(self.noise.sigma).sum()
 
     def over_deviation(self, values: Complex) -> Real:
         """Values at its frequencies over their deviations: real parts, then imaginary ones, of what was measured."""
@@ -329,8 +329,8 @@ class Problem:
     def _sensor(self, n: int, point: Real) -> Complex:
         """Gain and delay of the sensor of a response, at its frequencies."""
         one = self.responses[n]
-        gain = 1.0 if one.gain is None else self.parameters[one.gain].value(float(point[one.gain]))
-        delay = 0.0 if one.delay is None else self.parameters[one.delay].value(float(point[one.delay]))
+        gain = 1.0 if one.gain is None else self.parameters[one.gain].value(point[one.gain])
+        delay = 0.0 if one.delay is None else self.parameters[one.delay].value(point[one.delay])
         return gain * np.exp(-1j * delay * one.data.omega)
 
     def with_sensors(self, free: Sequence[str]) -> Problem:
@@ -393,7 +393,7 @@ class Problem:
 def walled(residuals: Callable[[Real], Real], first: Real) -> Callable[[Real], Real]:
     """The residuals, and where there is no arm (a mass beyond the tip) a wall, so high that no search goes on there."""
     near = residuals(first)
-    wall = np.full(near.size, 10.0 * max(float(abs(near).max(initial=0.0)), 1.0))
+    wall = np.full(near.size, 10.0 * max(abs(near).max(initial=0.0), 1.0))
 
     def found(x: Real) -> Real:
         try:

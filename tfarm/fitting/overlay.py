@@ -181,10 +181,10 @@ class Counterpart:
     """
 
     pole: complex
-    peak: float | None
-    measured: Resonance | None
-    frequency_ratio: float | None
-    level: complex | None
+    peak: float | None = None
+    measured: Resonance | None = None
+    frequency_ratio: float | None = None
+    level: complex | None = None
     mode: Annotated[
         int | None,
         Quantity("mode", help="number of the arm's mode; none where the poles of the response are no modes of the arm"),
@@ -193,15 +193,15 @@ class Counterpart:
     frequency: Annotated[
         float | None,
         Quantity("measured", "Hz", 7, "abs(s) of the pole fitted to the peak, or the peak itself", "measured_hz"),
-    ]
+    ] = None
     frequency_std: Annotated[
         float | None,
         Quantity("deviation", "Hz", 2, key="measured_std_hz", help="standard deviation of the fitted pole's frequency"),
-    ]
+    ] = None
     off: Annotated[
         float | None,
         Quantity("difference", "%", 3, "measured over exact frequency, less one", "frequency_residual_percent"),
-    ]
+    ] = None
     measured_damping: Annotated[
         float | None,
         Quantity(
@@ -210,7 +210,7 @@ class Counterpart:
             key="measured_damping_ratio",
             help="of the pole fitted to the measured peak",
         ),
-    ]
+    ] = None
     damping_std: Annotated[
         float | None,
         Quantity(
@@ -219,16 +219,16 @@ class Counterpart:
             key="measured_damping_ratio_std",
             help="standard deviation of the measured damping ratio",
         ),
-    ]
+    ] = None
     level_db: Annotated[
         float | None,
         Quantity("residue, measured over exact", "dB", 3, "gain error of the sensor and shift of the mode shape"),
-    ]
+    ] = None
     level_degrees: Annotated[
         float | None,
         Quantity("turned", "deg", 3, "phase of the residue; 180 deg is a reversed sign", "level_degrees"),
-    ]
-    is_peak_only: Annotated[bool, Quantity(help="whether the lines around the peak determine no pole")]
+    ] = None
+    is_peak_only: Annotated[bool, Quantity(help="whether the lines around the peak determine no pole")] = False
     damping_ratio: Annotated[
         float,
         Quantity("exact damping ratio", digits=4, key="exact_damping_ratio", help="of the pole of the exact response"),
@@ -342,7 +342,7 @@ class Overlay:
         found = []
         for name, slopes in table.sensitivity.items():
             for mode, ratio in ratios.items():
-                slope = float(slopes[table.index == mode][0])
+                slope = slopes[table.index == mode][0]
                 # a number with a smaller d ln w/d ln p does not move the mode
                 exponent = math.log(ratio) / slope if abs(slope) > 1e-3 else math.inf
                 if abs(exponent) <= math.log(LARGEST_FACTOR):
@@ -367,7 +367,7 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
     own = own[abs(own) >= low / PARTNERS_BEYOND]
     is_inside = (abs(own) >= low) & (abs(own) <= high)
     pairs, _ = matched_peaks(measured.omega[places], abs(own), measured.band)
-    if len(pairs) < max(places.size, int(is_inside.sum())):
+    if len(pairs) < max(places.size, is_inside.sum()):
         check_unit(arm, measured)
     at = {j: int(places[i]) for i, j in pairs}
     shown = [(pole, at.get(j)) for j, pole in enumerate(own.tolist()) if j in at or is_inside[j]]
@@ -399,37 +399,36 @@ def _counterparts(
     table = modes_of(ratio.driven, up_to=up_to) if are_modes else None
     found = []
     for pole, place in shown:
-        mode = None
+        mode = 0
         size = abs(pole)
         if table is not None:
             away = abs(table.natural_frequency / size - 1)
-            mode = int(table.index[np.argmin(away)]) if away.min() < SAME_MODE else None
-        peak = None if place is None else float(measured.omega[place])
-        own = None if place is None else resonance_at(measured, noise.sigma, place)
-        residue = ratio.residue(pole, roots)
-        at = abs(own.pole) if own is not None else peak
-        level = own.residue / residue if own is not None and residue else None
-        found.append(
-            Counterpart(
-                pole=pole,
-                peak=peak,
-                measured=own,
-                frequency_ratio=None if at is None else at / size,
-                level=level,
-                mode=mode or None,
-                exact=size / HERTZ,
-                frequency=None if at is None else at / HERTZ,
-                frequency_std=None if own is None else float(own.std[1]) / HERTZ,
-                off=None if at is None else 100 * (at / size - 1),
-                measured_damping=None if own is None else own.damping_ratio,
-                damping_std=None if own is None else float(own.std[0]) / abs(own.pole),
-                level_db=20 * math.log10(abs(level)) if level else None,
-                level_degrees=math.degrees(np.angle(level)) if level else None,
-                is_peak_only=peak is not None and own is None,
-                damping_ratio=-pole.real / size + 0.0,
-            )
-        )
+            mode = int(table.index[np.argmin(away)]) if away.min() < SAME_MODE else 0
+        row = Counterpart(pole=pole, mode=mode or None, exact=size / HERTZ, damping_ratio=-pole.real / size + 0.0)
+        found.append(row if place is None else _seen(row, ratio.residue(pole, roots), measured, noise, place))
     return tuple(found)
+
+
+def _seen(row: Counterpart, residue: complex, measured: Measured, noise: Noise, place: int) -> Counterpart:
+    """The row of a pole with its measured peak, and the pole that is fitted there."""
+    own = resonance_at(measured, noise.sigma, place)
+    peak = float(measured.omega[place])
+    at = peak if own is None else abs(own.pole)
+    share = at / abs(row.pole)
+    row = replace(
+        row, peak=peak, frequency=at / HERTZ, frequency_ratio=share, off=100 * (share - 1), is_peak_only=own is None
+    )
+    if own is None:
+        return row
+    of_damping, of_frequency = own.std.tolist()
+    row = replace(
+        row, measured=own, frequency_std=of_frequency / HERTZ, measured_damping=own.damping_ratio,
+        damping_std=of_damping / at,
+    )  # fmt: skip
+    if not residue or not own.residue:
+        return row
+    level = own.residue / residue
+    return replace(row, level=level, level_db=20 * math.log10(abs(level)), level_degrees=math.degrees(np.angle(level)))
 
 
 class ResonanceShift(NamedTuple):
@@ -477,7 +476,7 @@ def check_unit(arm: Arm, measured: Measured) -> None:
     """
     ratio = ratio_of(arm, measured)
     with suppress(ConvergenceError):
-        poles = ratio.poles(PARTNERS_BEYOND * HERTZ * float(measured.omega[-1])).values
+        poles = ratio.poles(PARTNERS_BEYOND * HERTZ * measured.omega[-1]).values
         must_be_in_unit(measured, noise_of(measured).sigma, poles)
 
 

@@ -72,7 +72,7 @@ class Posterior(StrictTable):
         rest = [n for n, key in enumerate(self.keys) if key not in ranged]
         sizes, axes = np.linalg.eigh(self.information[np.ix_(rest, rest)])
         for axis in axes.T[sizes < 0.5 / OPEN_DEVIATION**2]:  # 0 or at least 1/OPEN_DEVIATION^2
-            key = self.keys[rest[int(abs(axis).argmax())]]
+            key = self.keys[rest[abs(axis).argmax()]]
             require(False, "posterior", key, "the data do not determine it: give a range of its own, "
                     f"--over {key}=uniform:LOW,HIGH")  # fmt: skip
 

@@ -29,7 +29,7 @@ Pereyra 1973), so that only the poles are searched for.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -51,10 +51,7 @@ if TYPE_CHECKING:
 
 UNPAIRED = 0.3  # of ln w: what a peak or a pole in the band costs without a partner; so partners are 1.8 apart at most
 PARTNERS_BEYOND = 1.8  # times the ends of the range: partners are looked for up to there
-MOST_RINGING = 20  # of one decay
 NOT_WHITE = 1e-3  # probability below which residuals are called correlated
-RARE = 1e-9  # a probability below which it is printed as a bound
-RING_ROUNDING = 1e-9  # of the signal and of w: smaller differences are rounding
 MOST_ROWS = 160  # of the Hankel matrix of the start; slower oscillations are looked for in means of several samples
 EACH = 4  # parameters of a mode: sigma, w, a, b; the constant c is the last
 
@@ -125,24 +122,26 @@ def must_be_in_unit(data: Measured, sigma: Real, poles: Complex) -> None:
     own = abs(peaks_among(poles))
     if not peaks.size or not own.size:
         return
+    # three peaks have a spacing that distinguishes one match from another; fewer, farther than that of ln w from every
+    # pole, have nothing to do with one
+    has_spacing = peaks.size >= 3
+    is_lonely = (abs(np.log(peaks[:, None] / own)).min(axis=1) > math.log(2.0)).all()
     _, cost = matched_peaks(peaks, own, data.band)
-    # a peak that is farther from every pole, of ln w, has nothing to do with one
-    lonely = bool((abs(np.log(peaks[:, None] / own)).min(axis=1) > math.log(2.0)).all())
     for factor, words in ((1 / HERTZ, "are rad/s given as Hz?"), (HERTZ, "are Hz given as rad/s?")):
-        there, fitting = matched_peaks(peaks * factor, own, (data.band[0] * factor, data.band[1] * factor))
-        # three peaks have a spacing that distinguishes one match from another
-        better = cost - fitting > UNPAIRED if peaks.size >= 3 else lonely
+        low, high = data.band
+        there, fitting = matched_peaks(peaks * factor, own, (low * factor, high * factor))
+        is_better = cost - fitting > UNPAIRED if has_spacing else is_lonely
         away = np.array([math.log(peaks[i] * factor / own[j]) for i, j in there])
         # of ln w: how well the peaks fit in the other unit, in the mean and in what they differ by
         fits = away.size == peaks.size and abs(away.mean()) < 0.3 and np.ptp(away) < 0.15
         remedy = f"its peaks are {1 / factor:.3g} times the arm's frequencies: {words}"
-        require(not (better and fits), f"{data.name} first peak", f"{peaks[0] / HERTZ:.4g} Hz", remedy, data.source)
+        require(not (is_better and fits), f"{data.name} first peak", f"{peaks[0] / HERTZ:.4g} Hz", remedy, data.source)
 
 
 def project(columns: Real, y: Real) -> tuple[Real, Real]:
     """The linear numbers of the least squares, and the residuals."""
     linear = np.asarray(np.linalg.lstsq(columns, y, rcond=None)[0], dtype=float)
-    return linear, (y - columns @ linear)
+    return linear, y - columns @ linear
 
 
 def least_projected(columns: Callable[[Real], Real], y: Real, start: Real, **how: Any) -> Any:
@@ -159,31 +158,29 @@ def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
     """The pole and residue of the peak at a place; None where its lines do not determine them."""
     kept = _around(data, place)
     omega = data.omega[kept]
-    values = data.values[kept]
-    weight = 1 / sigma[kept]
     # the number of coefficients c
     background = min(5, 2 * omega.size - 6)
     if background < 1:
         return None
     s = 1j * omega
-    w = float(data.omega[place])
+    w = data.omega[place]
     powers = [(s / w) ** n for n in range(background)]
-    y = in_parts(values * weight)
 
     def columns(x: Real) -> Real:
         """Those of Re r, Im r and the c."""
         up = 1 / (s + x[0] - 1j * x[1])
         down = 1 / (s + x[0] + 1j * x[1])
         terms: Complex = np.array([up + down, 1j * (up - down), *powers], dtype=np.complex128)
-        return in_parts(terms * weight).T
+        return in_parts(terms / sigma[kept]).T
 
+    y = in_parts(data.values[kept] / sigma[kept])
     half = max(_half_width(data, place), (omega[-1] - omega[0]) / (4 * omega.size))
     found = least_projected(columns, y, np.array([half, w]))
     sigma_p, w_p = found.x.tolist()
     if not found.success or not omega[0] < w_p < omega[-1] or abs(sigma_p) > w_p:
         return None
     (re, im, *_), e = project(columns(found.x), y)
-    spread = np.linalg.pinv(found.jac.T @ found.jac) * max(1.0, float(e @ e) / (2 * omega.size - 4 - background))
+    spread = np.linalg.pinv(found.jac.T @ found.jac) * max(1.0, (e @ e) / (2 * omega.size - 4 - background))
     return Resonance(pole=complex(-sigma_p, w_p), residue=complex(re, im), std=np.sqrt(np.diag(spread)))
 
 
@@ -299,39 +296,59 @@ def ring(
     Raises ParameterError for a signal or times that are not there and for too few samples, ConvergenceError where the
     oscillations are not found.
     """
-    t, y = _part(recording, name, start, stop, modes)
-    poles = starting_poles(t - t[0], y, modes)
-    found = nearest_sum(t - t[0], y, poles) if poles.size == modes else None
+    y = recording.signal(name, "--signal")
+    times = recording.times
+    low = times[0] if start is None else start
+    high = times[-1] if stop is None else stop
+    rounding = recording.period / 2 * 1e-6
+    kept = (times >= low - rounding) & (times <= high + rounding)
+    most, least = 20, 4 * (EACH * modes + 1)
+    require(1 <= modes <= most, "--modes", modes, f"a whole number from 1 to {most}")
+    found = f"{kept.sum()} samples from {low:g} to {high:g} s; {modes} modes take {least}"
+    remedy = f"{found} (the record goes from {times[0]:g} to {times[-1]:g} s)"
+    require(kept.sum() >= least, "--from", float(low), remedy, recording.source)
+    require(np.ptp(y[kept]) > 0, "--signal", name, "does not move there", recording.source)
+    return ring_of(recording, name, times[kept], y[kept], modes)
+
+
+def ring_of(recording: Recording, name: str, times: Real, y: Real, modes: int) -> Ring:
+    """The modes of a decay of samples y at some of the times of a record."""
+    t = times - times[0]
+    poles = starting_poles(t, y, modes)
+    found = nearest_sum(t, y, poles) if poles.size == modes else None
     if found is None:
         word = "oscillation" if modes == 1 else f"{modes} oscillations"
         raise ConvergenceError(f"no {word} found in the decay: choose other times, or fewer modes", None, None)
     squares = float(found.e @ found.e)
-    is_rounding = squares <= y.size * (RING_ROUNDING * abs(y).max()) ** 2
-    white = 1.0 if is_rounding else whiteness(found.e)
+    rounding = 1e-9  # of the signal and of w: smaller differences are rounding
+    white = 1.0 if squares <= y.size * (rounding * abs(y).max()) ** 2 else whiteness(found.e)
     notes = [recording.note] if recording.note else []
     if white < NOT_WHITE:
-        chance = f"{white:.1g}" if white > RARE else f"below {RARE:g}"
+        rare = 1e-9
+        chance = f"{white:.1g}" if white > rare else f"below {rare:g}"
         notes.append(
             f"the residuals are correlated (probability {chance} if they were white noise): intervals are "
             "by their autocovariance, and may be too narrow, above all if the residuals are no noise"
         )
     spread = found.covariance(is_white=white >= NOT_WHITE)
-    early, late, apart = _halves(t - t[0], y, found.poles)
+    (early, of_early), (late, of_late) = (by_part(t[part], y[part], found.poles) for part in halves(t.size))
     rows = []
     for number, n in enumerate(np.argsort(-found.energy, kind="stable").tolist(), start=1):
-        halves = (float(early[n]) / HERTZ, float(late[n]) / HERTZ) if np.isfinite(apart[n]) else None
-        rows.append(found.mode(n, number, spread, halves))
-        # standard deviations
-        if abs(early[n] - late[n]) > 4.0 * apart[n] + RING_ROUNDING * found.poles[n].imag:
+        first, second = early[n] / HERTZ, late[n] / HERTZ
+        apart = math.sqrt(of_early[n] + of_late[n])
+        both = (first, second) if math.isfinite(apart) else (None, None)
+        rows.append(found.mode(n, number, spread, both))
+        # by more than four standard deviations
+        if abs(early[n] - late[n]) > 4.0 * apart + rounding * found.poles[n].imag:
             notes.append(
-                f"mode {number} rings at {early[n] / HERTZ:.4g} Hz in its first half, {late[n] / HERTZ:.4g} Hz in its "
+                f"mode {number} rings at {first:.4g} Hz in its first half, {second:.4g} Hz in its "
                 "second: no linear decay, or friction, or another mode"
             )
     return Ring(
         signal=name,
         source=recording.source,
-        start=float(t[0]),
-        stop=float(t[-1]),
+        start=float(times[0]),
+        stop=float(times[-1]),
         samples=y.size,
         residual=math.sqrt(squares / found.freedom),
         white=white,
@@ -340,51 +357,26 @@ def ring(
     )
 
 
-def _part(recording: Recording, name: str, start: float | None, stop: float | None, modes: int) -> tuple[Real, Real]:
-    """Times and samples between two times, refused where they are too few for the modes."""
-    y = recording.signal(name, "--signal")
-    t = recording.times
-    low = t[0] if start is None else start
-    high = t[-1] if stop is None else stop
-    rounding = recording.period / 2 * 1e-6
-    least = 4 * (EACH * modes + 1)
-    kept = (t >= low - rounding) & (t <= high + rounding)
-    require(1 <= modes <= MOST_RINGING, "--modes", modes, f"a whole number from 1 to {MOST_RINGING}")
-    span = f"the record goes from {t[0]:g} to {t[-1]:g} s"
-    require(
-        kept.sum() >= least,
-        "--from",
-        float(low),
-        f"{kept.sum()} samples from {low:g} to {high:g} s; {modes} modes take {least} ({span})",
-        recording.source,
-    )
-    require(np.ptp(y[kept]) > 0, "--signal", name, "does not move there", recording.source)
-    return t[kept], y[kept]
+def halves(size: int) -> tuple[slice, slice]:
+    """Both halves of a number of samples."""
+    return slice(size // 2), slice(size // 2, None)
 
 
-def _halves(t: Real, y: Real, poles: Complex) -> tuple[Real, Real, Real]:
-    """w by each half of the record, from the whole's poles on, and the deviation of their difference.
+def by_part(t: Real, y: Real, poles: Complex) -> tuple[list[float], list[float]]:
+    """w by a part of the record, from the whole's poles on, and its variance.
 
-    Where a half does not determine it, w of the whole and an infinite deviation.
+    Where the part does not determine it, w of the whole and an infinite variance.
     """
-    middle = t.size // 2
-    count = poles.size
-    pairs = []
-    for part in (slice(None, middle), slice(middle, None)):
-        w = poles.imag
-        variance = np.full(count, np.inf)
-        is_long = y[part].size > 2 * (EACH * count + 1)
-        found = nearest_sum(t[part] - t[part][0], y[part], poles) if is_long else None
-        if found is not None:
-            spread = found.covariance(is_white=whiteness(found.e) >= NOT_WHITE)
-            _, of_w, of_a, of_b = np.diag(spread)[:-1].reshape(EACH, count)
-            # deviations of its amplitude in a half of a record that determines an oscillation: noise has 4
-            is_clear = found.amplitude**2 > 8.0**2 * (of_a + of_b) / 2
-            w = found.poles.imag
-            variance = np.where(is_clear, of_w, np.inf)
-        pairs.append((w, variance))
-    (early, one), (late, other) = pairs
-    return np.asarray(early), np.asarray(late), np.sqrt(one + other)
+    w = poles.imag
+    variance = np.full(w.size, np.inf)
+    found = nearest_sum(t - t[0], y, poles) if y.size > 2 * (EACH * w.size + 1) else None
+    if found is not None:
+        spread = found.covariance(is_white=whiteness(found.e) >= NOT_WHITE)
+        _, of_w, of_a, of_b = np.diag(spread)[:-1].reshape(EACH, w.size)
+        # deviations of the amplitude of an oscillation that is determined: noise has 4
+        variance = np.where(found.amplitude**2 > 8.0**2 * (of_a + of_b) / 2, of_w, np.inf)
+        w = found.poles.imag
+    return w.tolist(), variance.tolist()
 
 
 def basis(poles: Complex, t: Real) -> Real:
@@ -440,7 +432,7 @@ class DampedSum:
         meat = J.T @ J * (e @ e) / self.freedom if is_white else _meat(J, e) * e.size / self.freedom
         return bread @ meat @ bread / np.outer(scale, scale)
 
-    def mode(self, n: int, number: int, covariance: Real, halves: tuple[float, float] | None) -> DecayMode:
+    def mode(self, n: int, number: int, covariance: Real, halves: Sequence[float | None]) -> DecayMode:
         """Mode n by its number, with intervals (Student's t); d zeta = (w^2 d sigma - sigma w d w)/|s|^3."""
         s = complex(self.poles[n])
         places = [n, n + self.poles.size]
@@ -454,7 +446,7 @@ class DampedSum:
         damping = f",{z:.6g}~{dz:.3g}" if 0 < z < 1 and dz > 0 else ""  # `tfarm fit --mode` takes positive ones alone
         return DecayMode(
             number, f, f - reach * df, f + reach * df, df, abs(s) / HERTZ, z, z - reach * dz, z + reach * dz, dz,
-            float(self.amplitude[n]), f"{f:.8g}hz~{df:.3g}{damping}", *(halves or (None, None)),
+            float(self.amplitude[n]), f"{f:.8g}hz~{df:.3g}{damping}", *halves,
         )  # fmt: skip
 
 
@@ -497,7 +489,7 @@ def starting_poles(t: Real, y: Real, modes: int) -> Complex:
     chosen = s[:0]
     while chosen.size < min(modes, np.unique(s).size):
         tried = [np.r_[chosen, each] for each in s if each not in chosen]
-        chosen = min(tried, key=lambda poles: float((project(basis(poles, t), y)[1] ** 2).sum()))
+        chosen = min(tried, key=lambda poles: (project(basis(poles, t), y)[1] ** 2).sum())
     return chosen
 
 
@@ -507,7 +499,7 @@ def _meat(J: Real, e: Real) -> Real:
     most = max(2, e.size // 3)
     # deviations, 1/sqrt(n), of an autocorrelation of white noise
     (clear,) = np.nonzero(abs(r[:most]) > 2.5 * r[0] / math.sqrt(e.size))
-    lags = min(most, 2 * int(clear.max(initial=0)) + 1)
+    lags = min(most, 2 * clear.max(initial=0) + 1)
     tapered = r[:lags] * (1 - np.arange(lags) / lags)
     return J.T @ np.apply_along_axis(np.convolve, 0, J, np.r_[tapered[:0:-1], tapered], "same")
 

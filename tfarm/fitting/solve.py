@@ -103,7 +103,7 @@ def with_gains(problem: Problem, point: Real) -> tuple[Problem, Real]:
             own = parameters[each.gain]
             if np.median(ratio.real / abs(ratio)) < 0:
                 parameters[each.gain] = replace(own, start=-own.start)
-            point[each.gain] += float(np.median(np.log(abs(ratio))))
+            point[each.gain] += np.median(np.log(abs(ratio)))
     return replace(problem, parameters=tuple(parameters)), point
 
 
@@ -190,7 +190,7 @@ class Solution:
     def misfit(self) -> float:
         """Minus ln of the likelihood, but for a constant: with the noise, where that is from the residuals."""
         sigmas = (each.noise.sigma for each in self.problem.responses)
-        return self.chi_squared / 2 + sum(2 * float(np.log(sigma[np.isfinite(sigma)]).sum()) for sigma in sigmas)
+        return self.chi_squared / 2 + sum(2 * np.log(sigma[np.isfinite(sigma)]).sum() for sigma in sigmas)
 
     @property
     def quantile(self) -> float:
@@ -302,7 +302,7 @@ def _rescaled(found: Solution) -> Solution:
         responses = []
         share = found.residuals.size / max(found.freedom, 1)
         for each, own in zip(found.problem.responses, found.parts, strict=True):
-            factor = 1.0 if each.noise.is_known else math.sqrt(float(own @ own) / own.size * share)
+            factor = 1.0 if each.noise.is_known else math.sqrt((own @ own) / own.size * share)
             responses.append(replace(each, noise=replace(each.noise, sigma=each.noise.sigma * max(factor, 1e-12))))
         found = nearest_minimum(replace(found.problem, responses=tuple(responses)), found.point)
     return found
@@ -408,7 +408,7 @@ def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float | None, 
         return sum_of_squares(found.problem, point) - found.chi_squared - quantile**2
 
     def end(way: int) -> float | None:
-        steps = (float(found.point[n]) + way * reach for reach in REACHES)
+        steps = (found.point[n] + way * reach for reach in REACHES)
         beyond = next((at for at in steps if low <= at <= high and excess(at) > 0), None)
         return None if beyond is None else each.value(float(brentq(excess, found.point[n], beyond, xtol=1e-4)))
 
@@ -428,12 +428,12 @@ def _end(found: Solution, n: int, way: int, deviation: float, quantile: float, h
     slope = np.zeros(found.point.size)  # of the others where n is held elsewhere
     slope[rest] = -np.linalg.lstsq(found.jacobian[:, rest], found.jacobian[:, n], rcond=None)[0]
     slope[n] = 1.0
-    near = float(found.point[n])
+    near = found.point[n]
     root_near = 0.0
     at = near + way * quantile * deviation
     # three steps do but in a crooked valley
     for _ in range(12):
-        at = float(np.clip(at, low, high))
+        at = np.clip(at, low, high)
         start = found.point + slope * (at - found.point[n])
         there = nearest_minimum(found.problem, start, held | {n: at})
         growth = there.chi_squared - found.chi_squared
@@ -445,7 +445,7 @@ def _end(found: Solution, n: int, way: int, deviation: float, quantile: float, h
         if abs(root - quantile) < 0.01 or (at in (low, high) and root < quantile):
             return at
         step = (quantile - root) * (at - near) / (root - root_near) if root != root_near else 2 * (at - near)
-        near, root_near, at = at, root, at + float(np.clip(step, -3 * abs(at - near), 3 * abs(at - near)))
+        near, root_near, at = at, root, at + np.clip(step, -3 * abs(at - near), 3 * abs(at - near))
     return at
 
 

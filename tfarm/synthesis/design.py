@@ -311,7 +311,7 @@ def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Cha
     if chain is None:
         return f"{text}: widen the bounds"
     verdict = max((sampled_verdict(each.arm, law, chain) for each in arms), key=lambda each: each.log_radius)
-    growth = float(np.expm1(verdict.log_radius))
+    growth = np.expm1(verdict.log_radius)
     nearest = f"{verdict.slowest} grows by {growth:.2g} a sample" if growth > 0 else "there is no reserve"
     text = (
         f"{text} when sampled: under the nearest law {nearest}; widen the bounds, or try another {ANGLE_GAIN} or period"

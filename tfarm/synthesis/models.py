@@ -196,7 +196,7 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
     gone = range(first, first + (damped + ("hub_angle" not in signals) if turns else 2))
     response: Callable[[Complex], Complex] = pulse
     if by_difference:
-        a = float(np.exp(-chain.converters.rate_filter * T))
+        a = np.exp(-chain.converters.rate_filter * T)
         n = read.index("hub_angle")
         row = signals.index("hub_rate")
         A, B, C = differenced(A, B, C, (n, row), (a, T), first + damped if turns else None)
@@ -272,14 +272,14 @@ def in_blocks(signals: Real, first: int) -> Blocks:
     Those of a slew are polynomials over each half: the blocks have a low rank, whatever their number.
     """
     inputs, number = signals.shape
-    size = 2 ** max(int(np.log2(number**0.5 / 1.3)), 0)
+    size = 2 ** max(np.log2(number**0.5 / 1.3), 0)
     before = -first % size
     after = -(before + number) % size
     scale = np.maximum(abs(signals).max(axis=1), LEAST_SIZE)[:, None, None]
     r = np.pad(signals, ((0, 0), (before, after))).reshape(inputs, -1, size) / scale
     basis, weights, shares = np.linalg.svd(np.moveaxis(r, 1, 2).reshape(inputs * size, -1), full_matrices=False)
     # of the largest singular value: rounding of the signals of a slew
-    rank = int((weights > 1e-11 * weights[0]).sum())
+    rank = (weights > 1e-11 * weights[0]).sum()
     basis = (basis * weights)[:, :rank].reshape(inputs, size, rank) * scale
     return Blocks(basis, shares[:rank], (before + first) // size, size - after, number - first)
 

@@ -198,7 +198,7 @@ def simplex(score: Score, box: tuple[Real, Real], found: Points) -> Points:
         "xatol": CONVERGED * (high - low).max(), "fatol": CONVERGED * abs(limit[0]),
     }  # fmt: skip
     done = cast("Any", minimize)(
-        lambda x: float(score(x[:, None], limit)[0]),
+        lambda x: score(x[:, None], limit)[0],
         start,
         method="Nelder-Mead",
         bounds=list(zip(low, high, strict=True)),
