@@ -34,9 +34,6 @@ from tfarm.response.signals import Signals
 from tfarm.spectrum.table import first_frequency
 from tfarm.synthesis.structures import Entry
 
-AT_NYQUIST = 1e-12  # of z = -1, where Tustin's s is infinite
-POLE_OFFSETS = np.geomspace(1e-9, 0.5, 40)  # rad, to either side of the open loop's poles
-
 
 @dataclass(frozen=True)
 @record
@@ -150,11 +147,12 @@ class Model:
         """L (laws, m) at the model's own angles, or at others."""
         q = self.angles if angles is None else np.asarray(angles)
         response = self.responses if angles is None else self.response(q)
-        total = 0.0
         s = 1j * q
-        z = np.exp(1j * q)
         if self.period is not None:
-            s = self.speed * (z - 1) / np.where(abs(z + 1) < AT_NYQUIST, AT_NYQUIST, z + 1)
+            z = np.exp(s)
+            # at z = -1 Tustin's s is infinite
+            s = self.speed * (z - 1) / np.where(abs(z + 1) < 1e-12, 1e-12, z + 1)
+        total = 0.0
         for signal, num, den in entries:
             through = np.polyval(num[:, :, None], s) / np.polyval(den[:, :, None], s)  # (laws, m)
             total = total + through * response[self.signals.index(signal)]
@@ -199,7 +197,7 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
         a = np.exp(-chain.converters.rate_filter * T)
         n = read.index("hub_angle")
         row = signals.index("hub_rate")
-        A, B, C = differenced(A, B, C, (n, row), (a, T), first + damped if turns else None)
+        A, B, C = differenced(A, B, C, n, row, a, T, first + damped if turns else None)
         own = np.append(own, 0.0)
 
         def response(z: Complex) -> Complex:
@@ -220,26 +218,26 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
 
 
 def differenced(
-    A: Real, B: Real, C: Real, rows: tuple[int, int], numbers: tuple[float, float], angle: int | None
+    A: Real, B: Real, C: Real, angle: int, rate: int, a: float, T: float, state: int | None
 ) -> tuple[Real, Real, Real]:
-    """The plant with the rate as the filtered difference of the angle, (1 - a)/T (z - 1)/(z - a); numbers a and T.
+    """The plant with the rate as the filtered difference of the angle, (1 - a)/T (z - 1)/(z - a).
 
-    It has one more state g, a g + theta of the next sample, less its share of the turning state.  `rows` are those of
-    angle and rate; only the angle depends on the state `angle` then.
+    It has one more state g, a g + theta of the next sample, less its share of the turning `state`.  `angle` and `rate`
+    are rows; only the angle depends on that state then.
     """
-    (n, row) = rows
-    (a, T) = numbers
     size = len(A)
     A = np.pad(A, (0, 1))
     B = np.append(B, 0.0)
     C = np.pad(C, ((0, 0), (0, 1)))
-    A[size, :size], A[size, size] = C[n, :size], a
-    C[row] = (1 - a) / T * C[n]
-    C[row, size] = -((1 - a) ** 2) / T
-    if angle is not None:
+    A[size] = C[angle]
+    A[size, size] = a
+    C[rate] = (1 - a) / T * C[angle]
+    C[rate, size] = -((1 - a) ** 2) / T
+    if state is not None:
         turned = np.eye(size + 1)
-        turned[size, angle] = -C[n, angle] / (1 - a)
-        back = 2 * np.eye(size + 1) - turned
+        back = np.eye(size + 1)
+        turned[size, state] = -C[angle, state] / (1 - a)
+        back[size, state] = -turned[size, state]
         A = turned @ A @ back
         B = turned @ B
         C = C @ back
@@ -249,8 +247,9 @@ def differenced(
 def circle_angles(pulse: PulseTransfer) -> Real:
     """Angles (0, pi] of the circle, dense near the poles of the open loop."""
     angle = abs(np.angle(pulse.multipliers))
-    close = (angle[:, None] + np.r_[-POLE_OFFSETS, POLE_OFFSETS]).ravel()
-    return np.unique(np.r_[np.linspace(0, np.pi, 400 + 1)[1:], close[(close > 0) & (close <= np.pi)]])
+    away = np.geomspace(1e-9, 0.5, 40)
+    close = (angle[:, None] + np.r_[-away, away]).ravel()
+    return np.unique(np.r_[np.linspace(0, np.pi, 401)[1:], close[(close > 0) & (close <= np.pi)]])
 
 
 class Blocks(NamedTuple):
@@ -272,7 +271,7 @@ def in_blocks(signals: Real, first: int) -> Blocks:
     Those of a slew are polynomials over each half: the blocks have a low rank, whatever their number.
     """
     inputs, number = signals.shape
-    size = 2 ** max(np.log2(number**0.5 / 1.3), 0)
+    size = 2 ** max(int(np.log2(number**0.5 / 1.3)), 0)
     before = -first % size
     after = -(before + number) % size
     scale = np.maximum(abs(signals).max(axis=1), LEAST_SIZE)[:, None, None]
@@ -287,12 +286,11 @@ def in_blocks(signals: Real, first: int) -> Blocks:
 def squares(A: Real, B: Real, C: Real, D: Real, signals: Blocks) -> Real:
     """The sum of squares (laws,) of C x_k + D r_k over the counted samples, x_{k+1} = A x_k + B r_k from x = 0.
 
-    The outputs of a block are one product with its first state and the shares of its signals; of many rows a
-    triangular factor has the same sum.
+    The outputs of a block are one product with its first state and the shares of its signals.
     """
-    (laws, n, inputs) = B.shape
+    laws, _, inputs = B.shape
     seen = C.shape[1]
-    (_, size, rank) = signals.basis.shape
+    _, size, rank = signals.basis.shape
     rows = C
     columns = B
     power = A
@@ -310,14 +308,11 @@ def squares(A: Real, B: Real, C: Real, D: Real, signals: Blocks) -> Real:
     x = np.zeros_like(push)
     for k in range(1, len(x)):
         x[k] = power @ x[k - 1] + push[k - 1]
-    x = np.concatenate(
-        [np.moveaxis(x[..., 0], 0, 2), np.broadcast_to(signals.shares, (laws, *signals.shares.shape))], axis=1
-    )
-    last = together[:, : signals.tail * seen] @ x[:, :, -1:]
-    if size * seen > n + rank:
-        together = np.asarray(np.linalg.qr(together, mode="r"))
-    whole = together @ x[:, :, signals.first : -1]
-    return (whole**2).sum(axis=(1, 2)) + (last**2).sum(axis=(1, 2))
+    shares = np.broadcast_to(signals.shares, (laws, *signals.shares.shape))
+    x = np.concatenate([np.moveaxis(x[..., 0], 0, 2), shares], axis=1)
+    outputs = together @ x[:, :, signals.first :]
+    outputs[:, signals.tail * seen :, -1] = 0.0
+    return (outputs**2).sum(axis=(1, 2))
 
 
 PERIOD_POINTS = 64  # of the period after the slew, in continuous time

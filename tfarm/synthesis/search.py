@@ -25,21 +25,10 @@ from tfarm.synthesis.judge import LOST, Judge, scores_of
 from tfarm.synthesis.structures import Bounds, Structure
 from tfarm.synthesis.worst_case import Effort, Tell
 
-# one more than coefficients within these: some minima are found by one of five alone
 MOST_RUNS = 8
-USUAL_WORK = 4 * 20**2  # models times squared states of one arm's first model: with twice as much half the runs
-# of a run, at least, and for each coefficient: the next power of two
-LAWS_AT_ONCE = 256  # a limit of memory
-# of a run for each coefficient, and at most; twice as many from the best points
 STRATEGIES = (("best1bin", 0.7), ("currenttobest1bin", 0.9))  # in turn, and the share of coefficients changed at once
-# such runs, and the relative gain of one after which another follows
 CONVERGED = 1e-9  # of the scores: the spread of a run's points at which it ends
-CANDIDATES = 4  # laws for the exact verdicts, the best first
 BEYOND = 4.0  # of x: reach of a search beyond its bounds, a factor e^4 of a coefficient far above its unit
-APART = 0.02  # of the range of x: least distance of two candidates
-AS_GOOD = 1e-4  # relative: a coefficient is at its physical end if the score there is worse by less
-AGREES = 5e-3  # relative: a run agrees if its score is worse than the best by less
-FLAT_WITHIN = 0.01  # laws whose score is worse by less than this share bound the flat part
 
 
 Score = Callable[..., Real]  # of points (n, k), and of limits
@@ -154,11 +143,11 @@ def minimised(
         run(Points.of(ended).x[:, :number], 2 * rounds)
     if form.size > len(PLANE) and effort != "sketch":
         for n in range(5):
-            (best, *_) = Points.of(ended).x.T
-            (least, *_) = Points.of(ended).scores
+            found = Points.of(ended)
+            least = found.scores[0]
             # the spread of the points of a run around the best, half as wide in each one after
             spread = 0.5 / 2**n * np.random.default_rng(runs + n).standard_normal((number, form.size))
-            run(np.clip(best + spread, *box).T, rounds)
+            run(np.clip(found.x[:, 0] + spread, *box).T, rounds)
             # another run follows one with a gain
             if not ended[-1].scores[0] < least - 2e-3 * abs(least):
                 break
@@ -178,7 +167,7 @@ def evolved(score: Score, box: tuple[Real, Real], points: Real, rounds: int, see
         limits[:] = intermediate_result.population_energies
 
     done = cast("Any", differential_evolution)(
-        lambda x: score(x.reshape(len(points), -1), limits), list(zip(*box, strict=True)), init=points.T,
+        lambda x: score(x.reshape(len(points), -1), limits), np.transpose(box), init=points.T,
         strategy=strategy, recombination=recombination, maxiter=rounds, tol=CONVERGED, rng=seed, polish=False,
         vectorized=True, updating="deferred", callback=after,
     )  # fmt: skip
@@ -187,22 +176,18 @@ def evolved(score: Score, box: tuple[Real, Real], points: Real, rounds: int, see
 
 def simplex(score: Score, box: tuple[Real, Real], found: Points) -> Points:
     """The last point of a simplex of Nelder and Mead that begins at the best point found."""
-    (low, high) = box
+    low, high = box
     start = found.x[:, 0]
     limit = found.scores[:1]
     # of the region: the first edges of the simplex
     step = 0.005 * (high - low)
-    corners = start + np.vstack([np.zeros(start.size), np.diag(np.where(start + step > high, -step, step))])
+    edges = np.diag(np.where(start + step > high, -step, step))
     options = {
-        "initial_simplex": corners, "maxfev": 100 * start.size, "adaptive": start.size > 1,
+        "initial_simplex": [start, *(start + edges)], "maxfev": 100 * start.size, "adaptive": start.size > 1,
         "xatol": CONVERGED * (high - low).max(), "fatol": CONVERGED * abs(limit[0]),
     }  # fmt: skip
     done = cast("Any", minimize)(
-        lambda x: score(x[:, None], limit)[0],
-        start,
-        method="Nelder-Mead",
-        bounds=list(zip(low, high, strict=True)),
-        options=options,
+        lambda x: score(x[:, None], limit)[0], start, method="Nelder-Mead", bounds=np.transpose(box), options=options
     )
     return Points(done.x[:, None], np.array([done.fun]))
 
@@ -225,12 +210,12 @@ def _apart(form: Structure, points: Real, scores: Real, most: int = 4, least: fl
 
 
 def flat_part(judge: Worst, form: Structure, x: Real, score: float) -> dict[str, Bounds]:
-    """Range of each coefficient in which the score is within `FLAT_WITHIN` of the best, the others constant.
+    """Range of each coefficient in which the score is within one per cent of the best, the others constant.
 
     The search goes outwards in growing steps, then by halving: narrow ranges are found as well as wide ones.
     """
     n = form.size
-    limit = score + FLAT_WITHIN * abs(score)
+    limit = score + 0.01 * abs(score)
     ways = np.concatenate([np.diag(end - x) for end in form.box]).T
 
     def is_within(shares: Real) -> Any:
@@ -239,10 +224,10 @@ def flat_part(judge: Worst, form: Structure, x: Real, score: float) -> dict[str,
         return (judge.scores(form, points, np.full(shares.size, limit)) <= limit).reshape(shares.shape)
 
     # each 1.4 times the one before
-    outwards = np.geomspace(1e-9, 1.0, 60)
+    outwards = np.r_[0.0, np.geomspace(1e-9, 1.0, 60)]
     is_beyond = ~is_within(np.tile(outwards, (2 * n, 1)))
     first = is_beyond.argmax(axis=1)
-    low = np.where(first > 0, outwards[first - 1], 0.0)
+    low = outwards[first - 1]
     high = outwards[first]
     for _ in range(30):
         middle = (low + high) / 2
@@ -250,11 +235,6 @@ def flat_part(judge: Worst, form: Structure, x: Real, score: float) -> dict[str,
         low = np.where(inside, middle, low)
         high = np.where(inside, high, middle)
     ends = form.coefficients(x[:, None] + ways * low)
-    found = {}
-    for place, each in enumerate(form.free):
-        least, largest = (
-            float(ends[place, side]) if is_beyond[side].any() else bound
-            for side, bound in zip((place, n + place), each.bounds, strict=True)
-        )
-        found[each.name] = (least, largest)
-    return found
+    bounds = np.transpose([each.bounds for each in form.free])
+    reached = np.where(first.reshape(2, n), [ends[:, :n].diagonal(), ends[:, n:].diagonal()], bounds)
+    return {name: (least, most) for name, (least, most) in zip(form.names, reached.T.tolist(), strict=True)}
