@@ -16,7 +16,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from scipy.special import gammaincinv
@@ -52,8 +52,7 @@ from .solve import (
 LONGEST_NAME = 200  # characters of a file in an assumption
 
 
-@dataclass(frozen=True, slots=True)
-class FittedResponse:
+class FittedResponse(NamedTuple):
     """A response of the fit."""
 
     name: Annotated[str, Quantity(help="output/input as on the command line")]

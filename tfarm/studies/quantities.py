@@ -13,9 +13,9 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
 import scipy  # whose statistics take half a second to load
@@ -304,8 +304,7 @@ def values_of(one: Subject, sources: Sequence[tuple[Set[str], Values]]) -> dict[
 # ------------------------------------------------------------------------------------------------------------ findings
 
 
-@dataclass(frozen=True, kw_only=True)
-class StableShare:
+class StableShare(NamedTuple):
     """Stable arms of one loop."""
 
     loop: Annotated[str, Quantity("loop", help="continuous-time or sampled")]
@@ -328,8 +327,7 @@ class StableShare:
         return f"{text}: at least {percent:g} % of all with {100 * CONFIDENCE:g} % confidence"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Spread:
+class Spread(NamedTuple):
     """Distribution of a quantity over the arms."""
 
     name: Annotated[str, Quantity(help="column of the table")]
@@ -345,8 +343,7 @@ class Spread:
     correlation: Annotated[float | None, Quantity("rank correlation", "", 2, help="Spearman's, of that number")]
 
 
-@dataclass(frozen=True)
-class Failure:
+class Failure(NamedTuple):
     """A reason of missing results."""
 
     reason: Annotated[str, Quantity("reason", help="error of the first of these arms, without its numbers")]

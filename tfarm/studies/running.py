@@ -182,10 +182,8 @@ class Parts:
             module = parquet("out", "Parquet")
             arrow = importlib.import_module("pyarrow")
             binary = io.BytesIO()
-            texts = self.plan.texts
-            kinds = (arrow.float64(), arrow.string())
-            arrays = {name: arrow.array(values, kinds[name in texts]) for name, values in table.items()}
-            module.write_table(arrow.table(arrays), binary)
+            kinds = {name: arrow.string() if name in self.plan.texts else arrow.float64() for name in table}
+            module.write_table(arrow.table({name: arrow.array(of, kinds[name]) for name, of in table.items()}), binary)
             content = binary.getvalue()
         else:
             stream = io.StringIO()
@@ -205,10 +203,13 @@ class Parts:
             with path.open(newline="", encoding="utf-8") as file:
                 rows = list(csv.DictReader(file))
             table = {name: [row[name] for row in rows] for name in names}
-        texts = {*names} & self.plan.texts
-        found = {name: np.array([each or "" for each in table[name]], object) for name in texts}
-        return found | {name: np.array([math.nan if each in ("", None) else float(each) for each in table[name]], float)
-                        for name in names if name not in texts}  # fmt: skip
+        found = {}
+        for name in names:
+            is_text = name in self.plan.texts
+            empty = "" if is_text else math.nan
+            cells = [empty if each in ("", None) else each for each in table[name]]
+            found[name] = np.array(cells, object if is_text else float)
+        return found
 
 
 class StudyRecord(StrictTable):
@@ -234,7 +235,7 @@ def opened(folder: Path, plan: Plan, files: Mapping[str, bytes], workers: int, s
     }))  # fmt: skip
     if file.exists():
         known = validated_file(
-            StudyRecord, file, (1 << 20), key=OUT, what=f"a {FILE} of tfarm study; choose another folder"
+            StudyRecord, file, 1 << 20, key=OUT, what=f"a {FILE} of tfarm study; choose another folder"
         )
         other = sorted(key for key in {*inputs, *known.inputs} if known.inputs.get(key) != inputs.get(key))
         require(

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import scipy  # whose statistics take half a second to load
@@ -102,8 +102,7 @@ class WorstArm:
     file: Annotated[str, Quantity("arm file", help="file of that arm, with its chain")]
 
 
-@dataclass(frozen=True, kw_only=True)
-class SobolIndex:
+class SobolIndex(NamedTuple):
     """Shares of the variance of a quantity by one varied number (Sobol', 1993; Saltelli et al., 2010)."""
 
     quantity: Annotated[str, Quantity("quantity", help="column of the table")]

@@ -223,7 +223,7 @@ def design(
         Loop(each.arm, as_law(form.record_at(form.origin)))
         check_bounds(form, each.arm)
     tell = progress or (lambda text: None)
-    task = _Task(arm, objective, form, modes, chain, "continuous" if continuous else "sampled", tell)
+    task = _Task(arm, objective, form, modes, chain, continuous, tell)
     return task.design(*for_the_worst(arms, box, task.find, task.score_on, tell))
 
 
@@ -237,24 +237,24 @@ class _Task:
     form: Structure
     modes: int
     chain: Chain
-    loop: LoopKind
+    continuous: bool
     tell: Tell
 
     def sizes(self, on: Arm) -> list[int]:
         """Numbers of modes of the models of an arm, in turn."""
-        return model_sizes(on, self.chain, self.modes, continuous=self.loop == "continuous")
+        return model_sizes(on, self.chain, self.modes, continuous=self.continuous)
 
     def judge(self, on: Arm, count: int) -> Judge:
         """The judge of laws on an arm, by a model of `count` modes."""
         return judge_of(on, self.arm, self.chain, self.objective, self.form.signals, self.modes, count,
-                        continuous=self.loop == "continuous")  # fmt: skip
+                        continuous=self.continuous)  # fmt: skip
 
     def find(self, named: Sequence[NamedArm], before: _Choice | None, effort: Effort) -> _Choice:
         """Return the best law that is stable on all arms, near the one found `before`, if any.
 
         A sketch has the first models, and no exact verdict.  Raises ConvergenceError where none is found.
         """
-        nearest: tuple[float, Any] | None = None
+        nearest: tuple[float, Any] = (np.inf, None)
         sizes = [self.sizes(each.arm) for each in named]
         near = None if before is None else before.x
         for step in range(max(map(len, sizes))):
@@ -263,15 +263,15 @@ class _Task:
             )
             last_first = Worst(several[::-1])  # corners, and what was worst inside the box: most laws are lost there
             found = search(last_first, self.form, self.tell, near, effort)
-            nearest = min([*([nearest] if nearest else []), found.found[0]], key=itemgetter(0))
+            nearest = min(nearest, found.found[0], key=itemgetter(0))
             for score, x in found.found:
                 law = found.form.record_at(x)
                 if effort == "sketch" or (score < LOST and all(judge.holds(law) for judge in several)):
                     return _Choice(Worst(several), found, score, x, law)
-        assert nearest is not None  # there is at least one judge
-        law = self.form.record_at(nearest[1])
-        chain = self.chain if self.loop == "sampled" else None
-        raise ConvergenceError(_why_none(named, self.form, law, chain, max(map(max, sizes))), law, nearest[0])
+        score, x = nearest
+        law = self.form.record_at(x)
+        chain = None if self.continuous else self.chain
+        raise ConvergenceError(_why_none(named, self.form, law, chain, max(map(max, sizes))), law, score)
 
     def score_on(self, choice: _Choice, on: Arm) -> float:
         """The score of a law on another arm; inf where the loop is unstable."""
@@ -296,8 +296,9 @@ class _Task:
             bounds={each.name: each.bounds for each in own.free}, flat=flat_part(choice.worst, own, x, choice.score),
             modes=self.modes, at_bound=tuple(own.names[place] for place, _ in at_ends),
             at_limit=tuple(own.names[place] for place, end in at_ends if (place, end) in own.ends(physical=True)),
-            widened=choice.search.widened, loop=self.loop, chain=self.chain, sampled=on_arms[0].sampled, arms=on_arms,
-            starts=choice.search.starts, agreed=choice.search.agreed, worst_case=case,
+            widened=choice.search.widened, loop="continuous" if self.continuous else "sampled", chain=self.chain,
+            sampled=on_arms[0].sampled, arms=on_arms, starts=choice.search.starts, agreed=choice.search.agreed,
+            worst_case=case,
         )  # fmt: skip
 
 
