@@ -52,7 +52,6 @@ from tfarm.schema import Quantity, Table
 
 from .data import MOST_RECORD_BYTES, Measured, check_signal, read_sheet
 
-TIMES = ("t", "time")  # names of the column of times
 REFERENCE_COLUMN = "reference:hub_angle"
 ANGLE_COLUMN = "hub_angle"
 MOMENT_COLUMN = "root_moment"
@@ -118,11 +117,10 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
         units = sheet.units
         digest = sheet.digest
     with naming(name):
-        columns = _columns(held, next((held[each].size for each in TIMES if each in held), 0))
-        of_times = next((each for each in TIMES if each in columns), "")
-        require(
-            of_times, "t", MISSING, f"a record has a column t, in seconds; this one has {listed(held, 300) or 'none'}"
-        )
+        of_times = next((each for each in ("t", "time") if each in held), "")
+        columns = _columns(held, held[of_times].size) if of_times else {}
+        remedy = f"a record has a column t, in seconds; this one has {listed(held, 300) or 'none'}"
+        require(of_times in columns, "t", MISSING, remedy)
         require(units[of_times] in ("", "s"), f"unit of {of_times}", units[of_times], "times are in seconds")
         start, period, jitter = _timing(columns.pop(of_times))
         require(columns, "signals", MISSING, "a column of times and no other")
@@ -396,8 +394,8 @@ def _cut(recording: Recording, segment: float | None, overlap: float) -> tuple[i
     require(0 <= overlap < 1, "--overlap", overlap, "a share of a segment from 0 to below 1, such as 0.5")
     whole = recording.count * recording.period
     least = LEAST_SAMPLES * recording.period
-    # by default 15 segments: 8 lengths, half overlapped
-    wanted = 2 * whole / (15 + 1) if segment is None else segment
+    # by default 15 segments, half overlapped
+    wanted = whole / 8 if segment is None else segment
     require(
         least <= wanted <= whole / 2 * (1 + 1e-9),
         "--segment",
