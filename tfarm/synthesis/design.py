@@ -192,9 +192,9 @@ def design(
 ) -> Design:  # fmt: skip
     """Return the law of a structure with the best value of an objective in the sampled loop of a chain (default 10 ms).
 
-    Structures are "K1-K2", gains of rate and moment, within the bounds `K1` and `K2` where given, "PD", "PD+notch",
-    "lead", "PI" and "PID" (with a filtered derivative) of the hub angle, "PPF" of the first `modes` modes and
-    "strain-rate"; `Kp` is chosen where it is 0, but of "K1-K2".
+    Structures are those of `tfarm.synthesis.structures`: "K1-K2", gains of rate and moment, within the bounds `K1` and
+    `K2` where given, "PD", "PD+notch" and others; `modes` is the number of filters, `Kp` is chosen where it is 0, but
+    of "K1-K2".
     Objectives are "damping" of the first `modes` modes, "margin", "sensitivity", "delay", "residual" and "cost" (see
     `objectives`).  The law is stable when sampled, with all gains a quarter larger or smaller, and in continuous time.
     `continuous`: for the continuous-time loop instead; its best law may be unstable when sampled.
