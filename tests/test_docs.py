@@ -50,7 +50,7 @@ def test_every_json_key_of_every_record_is_in_its_section(conf):
     sections = dict(re.findall(r"^## (\S+ \(\w+\))$(.*?)(?=^## |\Z)", conf.json_page(), re.MULTILINE | re.DOTALL))
     records = list(declared_records())
     assert len(sections) == len(records)
-    assert {"Margins (loop)", "ModeList (spectrum)", "Verdict (dsp)"} <= sections.keys()
+    assert {"Margins (loop)", "ModeList (spectrum)", "Verdict (loop)"} <= sections.keys()
     for kind, declared in records:
         section = sections[f"{kind.__name__} ({kind.__module__.split('.')[1]})"]
         assert all(f"| `{of.key}` | {of.label} |" in section.replace(r"\|", "|") for of in declared.values()), kind

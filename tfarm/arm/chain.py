@@ -5,14 +5,13 @@ By default everything is ideal.  Frozen records, checked once, SI units.
 
 import json
 import math
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, Literal
 
 from tfarm.arm import schema
 from tfarm.arm.checks import check_fields, extended, not_negative, number, positive, whole
-from tfarm.arm.reading import load_tables
+from tfarm.arm.reading import AnyFile, load_tables
 from tfarm.arm.records import Arm
 from tfarm.arm.schema import ArmTable, TomlTable, validated
 from tfarm.arm.stages import are_linear
@@ -202,7 +201,7 @@ CHAIN_TABLES: dict[str, type[TomlTable]] = {
 }
 
 
-def load_chain(name_or_path: str | os.PathLike[str]) -> Chain:
+def load_chain(name_or_path: AnyFile) -> Chain:
     """Read the chain of an arm's file (or preset, or a file of its own); ideal without these tables.
 
     Raises ParameterError for an unknown key, a wrong type or an invalid value.

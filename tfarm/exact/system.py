@@ -243,11 +243,6 @@ class System:
         return tuple(each for each in self.elements if isinstance(each, Segment))
 
     @property
-    def is_uniform(self) -> bool:
-        """Whether it is one uniform link on a hub, with the payload centred on the tip."""
-        return len(self.elements) == 1
-
-    @property
     def reads_hub_moment(self) -> bool:
         """Whether the root moment acts on the hub: a clamp on the axis, without a body there."""
         inside = takewhile(lambda each: not isinstance(each, Segment), reversed(self.elements))
