@@ -5,7 +5,6 @@ steps of a quantiser.  Signals agree to 1e-12 of their largest value, and every 
 """
 
 import json
-import math
 from dataclasses import asdict, replace
 from functools import cache
 
@@ -13,7 +12,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.exported.cases import realised, task_of
+from tests.exported.cases import on_steps, readings, realised, task_of
 from tests.exported.compilers import needed, pumped, run, stepped
 from tests.exported.tuners import exported, some_tuner
 from tests.exported.units import Unit, driven, inputs_of, modes_of_units
@@ -83,26 +82,6 @@ def vector(chain, count=MODES):
         if (step := quantisers(chain)[row, 0]) > 0:
             assert abs(value / step % 1 - 0.5).min() > TIE
     return truth
-
-
-def on_steps(values, chain, row):
-    """Values on the steps and in the range of a quantiser."""
-    step, low, high = quantisers(chain)[row]
-    near = np.rint(values / step) * step if step else values
-    return np.clip(near, low, high)
-
-
-def readings(truth):
-    """Hub angle, hub rate and root moment behind the converters (n,)."""
-    chain = truth.chain
-    angle, rate, moment = truth.measured.T
-    angle, moment = on_steps(angle, chain, ENCODER), on_steps(moment, chain, AMPLIFIER)
-    if chain.converters.hub_rate == "difference":
-        T, a, found = chain.sampling.period, math.exp(-100.0 * chain.sampling.period), [0.0]
-        for step in np.diff(angle) / T:
-            found.append(a * found[-1] + (1 - a) * step)
-        rate = np.array(found)
-    return {"hub_angle": angle, "hub_rate": rate, "root_moment": moment}
 
 
 def assert_equal(found, truth, step=0.0, name=""):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.exported.cases import CASES, GAINS, IDEAL, LAB, realised, task_of
+from tests.exported.cases import CASES, GAINS, IDEAL, LAB, readings, realised, task_of
 from tests.exported.compilers import build, needed, random_inputs, run, stepped
 from tests.shared import thinned
 from tfarm.dsp.scenarios import scenario
@@ -79,13 +79,7 @@ def test_the_code_is_the_simulation(case, precision):
     slew = scenario("slew", arm, chain, 1.5)
     own = Simulator(arm, chain, slew, controller.word.rounded, count=6)
     done = own.run()
-    angle, rate, moment = done.measured.T
-    if chain.converters.encoder_counts:
-        step = 2 * math.pi / chain.converters.encoder_counts
-        angle = np.rint(angle / step) * step
-        step = 2 * chain.converters.moment_range / 2**chain.converters.moment_bits
-        moment = np.clip(np.rint(moment / step) * step, -2.0, 2.0 - step)
-    signals = {"hub_angle": angle, "hub_rate": rate, "root_moment": moment}
+    signals = readings(done)
     columns = [signals[name] for name in controller.signals]
     columns += [slew.references[name] for name in controller.references]
     kind = np.float64 if precision == "double" else np.float32
