@@ -212,6 +212,7 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
     loop with ideal converters (`ideal`) has decayed further, or is unstable where signals are clipped.
     """
     n = simulation.t.size
+    # a shorter record shows no limit cycle
     if simulation.stopped or simulation.chain.is_linear or n < 40:
         return None
     last, before = slice(n - n // 4, n), slice(n - n // 2, n - n // 4)
@@ -223,6 +224,7 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
     # fewer turns of the moment about its mean are a drift and no vibration
     is_transient = is_clipped and (earlier < CYCLE_LASTS * size or turns < 1)
     is_unstable = ideal.stopped is not None or _left(ideal, last) > GROWS * _left(ideal, before)
+    # twice the vibration of an ideal chain at that time
     is_own = (is_clipped and is_unstable) or size > 2 * _left(ideal, last)
     if size == 0.0 or size < CYCLE_LASTS * earlier or is_transient or not is_own:
         return None

@@ -221,6 +221,7 @@ def in_z(law: Law, chain: Chain) -> Law:
     """
     samples = law.delay / chain.sampling.period
     remedy = f"is {samples:.6g} samples: C code has a delay of whole samples; write another one into the law's states"
+    # but for the rounding of a delay
     require(abs(samples - round(samples)) <= 1e-9, "law.delay", law.delay, remedy)
     law = discretised(law, chain.sampling.period)
     return with_system_matrix(law, system_matrix(law))
