@@ -28,7 +28,6 @@ from tests.exported.units import (
 from tests.hostile import C_TEXTS, NAME
 from tests.odd_arms import odd_arms
 from tests.shared import thinned
-from tests.shell import refused
 from tfarm import Law, ParameterError
 from tfarm.dsp import Simulator, scenario
 from tfarm.dsp.results import simulated_run
@@ -389,20 +388,6 @@ def test_names_of_a_user_reach_c_and_xml_as_text(tmp_path, text, monkeypatch):
     assert head[1].endswith("nor Python. */")
     assert head[2] == "#include <stdlib.h>"
     run(needed("cc"), "-std=c99", "-fsyntax-only", "-Wall", "-Werror", tmp_path / "sources" / "fmu.c")
-
-
-@pytest.mark.parametrize(
-    ("options", "error"),
-    [
-        (("--what", "loop", "--precision", "q31"), "precision = 'q31': a functional mock-up unit has a controller in"),
-        (("--what", "loop", "--K1", "-3"), "the sampled loop is not certified stable: unstable ("),
-        (("--what", "tuner"), "as = 'fmu': a tuner is exported as: c"),
-    ],
-)  # fmt: skip
-def test_a_refused_export_leaves_nothing_behind(capsys, tmp_path, options, error):
-    words = ("export", "sasaki2012-lab", "--as", "fmu", "--out", str(tmp_path / "new"))
-    assert error in refused(capsys, *words, *options)
-    assert not (tmp_path / "new").exists()
 
 
 def test_without_a_compiler_there_is_the_source(tmp_path, monkeypatch):
