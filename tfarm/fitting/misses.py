@@ -8,14 +8,13 @@ first two alone; their steps are larger than that, six times out of seven.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Annotated
+from dataclasses import replace
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from tfarm.arrays import Complex
 from tfarm.digits import listed
-from tfarm.records import record
 from tfarm.response.frequency import HERTZ
 from tfarm.schema import Quantity
 
@@ -23,9 +22,7 @@ from .model import SENSOR_DELAY, SENSOR_GAIN, Problem, Response, parameters
 from .solve import EXCLUDED, Solution, best_solution, is_explained
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
-class Miss:
+class Miss(NamedTuple):
     """A response that the curve misses: by what factor and angle (root mean squares), and in which range."""
 
     response: Annotated[str, Quantity("response missed", help="output/input of a response that the curve misses")]
@@ -41,9 +38,7 @@ class Miss:
         return f"{self.response} misses the data by {by} between {self.low:.4g} and {self.high:.4g} Hz"
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
-class Remedy:
+class Remedy(NamedTuple):
     """A single change of the search that was tried on a curve that misses."""
 
     change: Annotated[str, Quantity("remedy tried", help="change of the search that was tried alone")]

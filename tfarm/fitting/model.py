@@ -147,9 +147,7 @@ def _typical(arm: Arm, key: str, own: float) -> float:
     return (0.01 if own == 0 else 100) * of_the_arm[name]
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
-class RingMode:
+class RingMode(NamedTuple):
     """A decay in one mode: its `number` among the flexible ones, and `frequency` w = Im s [rad/s], `ratio` -Re s/|s|.
 
     Each with its standard deviation; a ratio that is None was not measured.

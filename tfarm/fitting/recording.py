@@ -37,14 +37,15 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import AnyLaw, Arm, tracked
+from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arm.chain import TIME_ROUNDING, Chain
 from tfarm.arm.reading import load_tables
 from tfarm.arm.schema import StrictTable, validated
 from tfarm.arrays import Complex, Real
-from tfarm.dsp.results import enough_modes
+from tfarm.case import Case
+from tfarm.dsp.results import simulated
 from tfarm.dsp.scenarios import Scenario
-from tfarm.dsp.simulate import Simulation, Simulator
+from tfarm.dsp.simulate import Simulation
 from tfarm.errors import MISSING, did_you_mean, listed, must_be_known, naming, require
 from tfarm.files import read_mat
 from tfarm.records import record
@@ -224,10 +225,9 @@ def compare_run(arm: Arm, law: AnyLaw, chain: Chain, measured: MeasuredRun) -> R
 
     Raises ParameterError as `simulate` does.
     """
-    arm, law = tracked(arm, law)
-    task = measured.scenario(chain.sampling.period)
-    used = enough_modes(lambda n: Simulator(arm, chain, task, law, count=n).run())
-    return RunComparison(measured, Simulator(arm, chain, task, law, count=used.modes).run())
+    case = Case(arm, as_law(law), chain)
+    run, _ = simulated(case.arm, case.law, case.chain, measured.scenario(chain.sampling.period))
+    return RunComparison(measured, run)
 
 
 def overshoot(angle: Real, step: float, end: float) -> float:

@@ -85,7 +85,7 @@ def equation_errors(problem: Problem, point: Real, share: float) -> Real:
         D = each.data.values
         W = (abs(smooth_N) + (abs(D) + each.noise.sigma) * abs(smooth_P)) * np.exp(there - here)
         errors.append(in_parts((N - D * P) / W))
-    frequencies = [replace(each, frequency_deviation=each.frequency, ratio=None) for each in problem.rings]
+    frequencies = [each._replace(frequency_deviation=each.frequency, ratio=None) for each in problem.rings]
     return np.concatenate([*errors, ring_residuals(problem.arm(point), frequencies)])
 
 
@@ -443,10 +443,10 @@ def _end(found: Solution, n: int, way: int, deviation: float, quantile: float, h
         root = math.sqrt(max(growth, 0.0))
         # of a deviation: there the profile has reached its level
         if abs(root - quantile) < 0.01 or (at in (low, high) and root < quantile):
-            return at
+            return float(at)
         step = (quantile - root) * (at - near) / (root - root_near) if root != root_near else 2 * (at - near)
         near, root_near, at = at, root, at + np.clip(step, -3 * abs(at - near), 3 * abs(at - near))
-    return at
+    return float(at)
 
 
 def _undetermined(axis: Real, keys: Sequence[str]) -> str:

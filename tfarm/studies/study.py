@@ -86,9 +86,7 @@ LARGER_IS_WORSE = (
 BOOTSTRAP = "95 % bootstrap interval; none without any influence"
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
-class WorstArm:
+class WorstArm(NamedTuple):
     """The worst arm of a study in one quantity: that drawn, and that of a search from there within the ranges."""
 
     quantity: Annotated[str, Quantity("quantity", help="column of the table")]

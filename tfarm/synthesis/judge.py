@@ -24,9 +24,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import AnyLaw, Arm, as_law, tracked
+from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arm.blocks import Rational
 from tfarm.arrays import LEAST_SIZE, Complex, Real
+from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import driven
 from tfarm.dsp.results import simulated
@@ -210,7 +211,8 @@ class Judge:
         """The residual of `tfarm simulate` after the slew [N m], with the converters; inf where it stops."""
         if not self.is_sampled:
             return self.score(law)
-        run, _ = simulated(*tracked(self.arm, law), self.chain, slew_and_after(self.arm, self.known, self.chain))
+        case = Case(self.arm, as_law(law), self.chain)
+        run, _ = simulated(case.arm, case.law, case.chain, slew_and_after(case.arm, self.known, case.chain))
         return np.inf if run.residual_moment is None else run.residual_moment
 
     def holds(self, law: AnyLaw) -> bool:

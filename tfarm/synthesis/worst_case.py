@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal, TypeVar
+from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -33,9 +33,7 @@ ARMS_TRIED = 24  # arms at random inside the box
 MUCH_WORSE = 0.01  # of a score: an arm inside is added if it is worse by more
 
 
-@dataclass(frozen=True)
-@record
-class NamedArm:
+class NamedArm(NamedTuple):
     """An arm, its name in the results, and its `numbers` of a box, by key."""
 
     name: str
@@ -128,9 +126,7 @@ def arms_of(arm: Arm, also: Sequence[Arm], box: ArmBox | None) -> list[NamedArm]
     return [*(NamedArm(each.name, each, {}) for each in (arm, *also)), *corners]
 
 
-@dataclass(frozen=True)
-@record
-class WorstCase:
+class WorstCase(NamedTuple):
     """Choice of the arms of a design: the `ranges` of the box, and the number of arms `tried` inside it.
 
     `worse` names an arm inside on which the law is still worse, where the exchange ended before there was none.
