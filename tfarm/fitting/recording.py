@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arm.chain import TIME_ROUNDING, Chain
-from tfarm.arm.reading import load_tables
+from tfarm.arm.reading import AnyFile, load_tables
 from tfarm.arm.schema import StrictTable, validated
 from tfarm.arrays import Complex, Real
 from tfarm.case import Case
@@ -235,7 +235,7 @@ def overshoot(angle: Real, step: float, end: float) -> float:
     return float(np.max((angle - end) * np.sign(step)) / abs(step)) if step else 0.0
 
 
-def load_run(name_or_path: str | os.PathLike[str]) -> MeasuredRun | None:
+def load_run(name_or_path: AnyFile) -> MeasuredRun | None:
     """The run of a file's [measured] table, None where it has none.
 
     Raises ParameterError for an unknown key, and for a record without these signals or that is none, naming the file.

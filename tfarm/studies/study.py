@@ -29,9 +29,9 @@ from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arm.chain import Chain, chain_or_usual, file_text, load_chain
 from tfarm.arm.checks import whole
 from tfarm.arm.law_tables import load_law
-from tfarm.arm.reading import arm_in, load_tables, presets
+from tfarm.arm.reading import AnyFile, load, load_tables, presets
 from tfarm.arm.schema import StrictTable, validated
-from tfarm.arm.writing import LAW_DEFAULTS, law_toml, toml_tables, toml_text
+from tfarm.arm.writing import law_head, law_toml, toml_tables, toml_text
 from tfarm.arrays import Real
 from tfarm.case import Case
 from tfarm.errors import ParameterError, naming, require
@@ -299,7 +299,7 @@ class StudyFile(StrictTable):
     sobol: int = 0
 
 
-def load_study(name_or_path: str) -> dict[str, Any]:
+def load_study(name_or_path: AnyFile) -> dict[str, Any]:
     """Return the arguments of `study` that a file declares; its paths are relative to its folder.
 
     Raises ParameterError, naming the file.
@@ -308,10 +308,10 @@ def load_study(name_or_path: str) -> dict[str, Any]:
     folder = Path(file).parent
     with naming(file):
         declared = validated(StudyFile, tables, "").model_dump(exclude_unset=True)
-    arm = declared["arm"] if declared["arm"] in presets() else str(folder / declared["arm"])
+    arm = load_tables(declared["arm"] if declared["arm"] in presets() else str(folder / declared["arm"]))
     law = load_law(folder / declared["law"] if "law" in declared else arm)
     own = {key: folder / value if key in PATHS else value for key, value in declared.items()}
-    return {**own, "arm": arm_in(*load_tables(arm)), "law": law, "chain": load_chain(arm)}
+    return {**own, "arm": load(arm), "law": law, "chain": load_chain(arm)}
 
 
 def files_of(case: Case, declared: Mapping[str, Any]) -> dict[str, bytes]:
@@ -327,8 +327,7 @@ def files_of(case: Case, declared: Mapping[str, Any]) -> dict[str, bytes]:
     except ParameterError:  # of a state space: it has no text
         columns = (*own.signals, *own.wanted)
         files[MATRICES] = mat_content(dict(zip("ABCD", own.matrices(columns), strict=True)), "column")
-        head = {key: getattr(own, key) for key, usual in LAW_DEFAULTS.items() if getattr(own, key) != usual}
-        table = {"name": own.name, **head, "sign": -1, "matrices": MATRICES, "signals": columns}
+        table = {**law_head(own), "sign": -1, "matrices": MATRICES, "signals": columns}
         text = toml_text(toml_tables(table, "law"))
     places = {key: declared[key] and os.path.abspath(declared[key]) for key in PATHS}
     over = {key: {kind: tuple(numbers) for kind, numbers in entry.items()} for key, entry in declared["over"].items()}

@@ -13,6 +13,7 @@ import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm, as_law, must_turn
 from tfarm.arm.chain import chain_or_usual
+from tfarm.arm.stages import Consumer
 from tfarm.dsp import Chain
 from tfarm.dsp.stages import admit
 from tfarm.errors import ConvergenceError, must_be_known, require
@@ -28,6 +29,12 @@ from tfarm.synthesis.search import Search, Worst, flat_part, search
 from tfarm.synthesis.structures import Bounds, Structure, check_bounds, structure_of
 from tfarm.synthesis.worst_case import ArmBox, Effort, NamedArm, Tell, WorstCase, arms_of, for_the_worst, same_input
 
+CONSUMER = Consumer(
+    "design",
+    acts=("reference", "anti-alias filter", "hub rate", "law", "hold", "delay", "hub damping", "plant"),
+    partly=("encoder", "amplifier steps", "amplifier range", "DAC steps", "DAC range", "torque limit", "arithmetic"),
+    none=("volts",),
+)
 LoopKind = Literal["sampled", "continuous"]
 
 
@@ -216,7 +223,7 @@ def design(
     arms = arms_of(arm, also, box)
     chain = chain_or_usual(chain)
     for each in arms:
-        admit("design", each.arm, chain)
+        admit(CONSUMER, each.arm, chain)
     same_input(arms)
     form = structure_of(structure, arm, Kp=Kp, modes=modes, period=chain.sampling.period, bounds={"K1": K1, "K2": K2})
     for each in arms:
