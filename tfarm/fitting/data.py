@@ -145,6 +145,11 @@ def in_parts(values: Complex) -> Real:
     return np.concatenate([values.real, values.imag], axis=-1)
 
 
+def rms(values: NDArray[Any]) -> float:
+    """The root mean square."""
+    return float(np.sqrt((abs(values) ** 2).mean()))
+
+
 def must_be_measured(measured: object) -> None:
     """Raise ParameterError for a path or anything else in the place of a measured response."""
     require(

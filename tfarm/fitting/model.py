@@ -296,6 +296,10 @@ class Problem:
             {each.key: each.value(x) for each, x in zip(self.of_the_arm, point.tolist(), strict=False)}
         )
 
+    def value(self, point: Real, place: int) -> float:
+        """The number of that place in the vector at a point."""
+        return self.parameters[place].value(float(point[place]))
+
     # ------------------------------------------------------------ responses
 
     def computed(self, point: Real) -> list[Complex]:
@@ -327,8 +331,8 @@ class Problem:
     def _sensor(self, n: int, point: Real) -> Complex:
         """Gain and delay of the sensor of a response, at its frequencies."""
         one = self.responses[n]
-        gain = 1.0 if one.gain is None else self.parameters[one.gain].value(point[one.gain])
-        delay = 0.0 if one.delay is None else self.parameters[one.delay].value(point[one.delay])
+        gain = 1.0 if one.gain is None else self.value(point, one.gain)
+        delay = 0.0 if one.delay is None else self.value(point, one.delay)
         return gain * np.exp(-1j * delay * one.data.omega)
 
     def with_sensors(self, free: Sequence[str]) -> Problem:

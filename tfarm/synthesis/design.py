@@ -153,12 +153,12 @@ class Design:
         self,
     ) -> Annotated[float | None, Quantity("record of the slew", "s", 6, "duration over which the objective is taken")]:
         """Length of the record of a residual or a cost, for `tfarm simulate --duration`; None of others."""
-        arm = self.verdict.loop.arm
-        chain = self.chain
-        if self.loop == "continuous":
+        of_residual = self.objective == "residual"
+        if self.loop == "continuous" or not (of_residual or self.objective == "cost"):
             return None
-        tasks = {"residual": lambda: slew_and_after(arm, arm, chain), "cost": lambda: trial_slew(arm, chain)}
-        return float(tasks[self.objective]().t[-1]) if self.objective in tasks else None
+        arm = self.verdict.loop.arm
+        task = slew_and_after(arm, arm, self.chain) if of_residual else trial_slew(arm, self.chain)
+        return float(task.t[-1])
 
     @property
     def worst_arm(self) -> Annotated[str, Quantity("worst arm", help="the arm that limits the objective")]:
