@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.shell import answer
 from tests.synthesis.held_loop import HeldLoop
 from tfarm import ConvergenceError, ParameterError
 from tfarm.arm import TWO_GAINS, as_law
-from tfarm.arm.law_tables import load_law
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import stability
 from tfarm.synthesis import search
@@ -94,16 +92,6 @@ def test_pi_needs_friction(monkeypatch):
         assert np.roots([LAB.total_inertia, rough.hub.friction, Kp, Ki]).real.max() * (-1) ** is_stable > 0
         law = form.record_at(form.at([Ki]))
         assert stability(rough, law).is_stable == is_stable
-
-
-def test_a_pi_law_of_a_motor_with_back_emf_is_saved_and_read_back(capsys, monkeypatch, tmp_path):
-    monkeypatch.setattr(search, "MOST_RUNS", 1)
-    file = tmp_path / "pi.toml"
-    found = answer(capsys, "design", "quanser-flexlink", "--structure", "PI", "--save", str(file))
-    values = {row["name"]: row["value"] for row in found["coefficients"]}
-    (part,) = load_law(file).parts
-    assert (part.block.num, part.block.den) == ((values["Kp"], values["Ki"]), (1.0, 0.0))
-    assert answer(capsys, "sampled", "quanser-flexlink", "--law", str(file))["stable"] is True
 
 
 def test_a_pinned_tip_has_laws_of_all_structures_and_a_locked_hub_none():
