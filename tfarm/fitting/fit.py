@@ -13,7 +13,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -28,7 +28,7 @@ from tfarm.arrays import Real
 from tfarm.digits import listed
 from tfarm.errors import ConvergenceError, one_line, require
 from tfarm.files import is_standard_output, write_file
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 
 from .data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of, rms
@@ -69,8 +69,7 @@ class FittedResponse(NamedTuple):
     ]
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class Fit(Solution):
     """The best point of the search with intervals: an arm fitted to measured responses.
 
@@ -389,8 +388,7 @@ def arms_drawn(fit: Fit, count: int) -> tuple[Arm, ...]:
     raise ConvergenceError(words, kept, len(kept))
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Repeats:
     """The fitted numbers by each record of `response` alone, `each` [SI], and by draws of records.
 

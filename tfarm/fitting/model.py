@@ -28,7 +28,7 @@ from tfarm.arm.writing import KeyedArms
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError, did_you_mean, require
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response.signals import Signals
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import first_frequency
@@ -39,8 +39,7 @@ FARTHEST_FROM_START = 1e4  # times or a part of it: beyond, a search has lost it
 COORDINATE_STEP = 2.0**-20  # of a derivative by differences: the rounding of a float over it is 1e-10, its square below
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Parameter:
     """A free number: its key, where the search starts, its bounds, all in SI units, and a prior (mean, deviation).
 

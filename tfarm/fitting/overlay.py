@@ -23,7 +23,7 @@ from tfarm.arm import INPUTS, Arm, Input, must_be_arm
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError, require
 from tfarm.exact.outputs import unit_over
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response import TransferFunction, transfer
 from tfarm.response.frequency import HERTZ, refined_grid, without_cancelled
 from tfarm.response.signals import Signals
@@ -45,8 +45,7 @@ from .resonances import (
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-@record
+@frozen(slots=True, kw_only=True)
 class RatioRoots:
     """Poles and zeros [1/s] of a ratio with 0 <= Im s <= `up_to` [rad/s], none at s = 0: complete in this range.
 
@@ -170,8 +169,7 @@ SAME_MODE = 0.1  # of its frequency: how near a pole of a damped arm is to that 
 LARGEST_FACTOR = 3.0  # the factor on a number beyond which it is no explanation
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class Counterpart:
     """A pole of the exact response and the resonance that was measured in its place, if one was.
 
@@ -247,8 +245,7 @@ class RequiredChange(NamedTuple):
     ]
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class Overlay:
     """A measured response of an arm and the exact one.
 

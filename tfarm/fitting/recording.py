@@ -30,7 +30,6 @@ its sweep, "boxcar" and no overlap, and no window leaks.  A resonance narrower t
 import hashlib
 import math
 import os
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -48,7 +47,7 @@ from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation
 from tfarm.errors import MISSING, did_you_mean, listed, must_be_known, naming, require
 from tfarm.files import read_mat
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity, Table
 
 from .data import MOST_RECORD_BYTES, Measured, check_signal, read_sheet
@@ -60,8 +59,7 @@ MOST_SAMPLE = 1e70  # of a signal: the fourth power is a number, as spectra are 
 LEAST_SAMPLES = 8  # of a record and of a segment
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-@record
+@frozen(slots=True, kw_only=True)
 class Recording:
     """Signals (n,) by name, sampled every `period` [s] from `start` [s] on.
 
@@ -175,8 +173,7 @@ class RunTable(StrictTable):
     source: str = ""
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class MeasuredRun:
     """A measured run: `t` (n,) [s] from 0 on, the `reference` (n,) [rad] of the hub's angle, and what was read.
 
@@ -206,8 +203,7 @@ class MeasuredRun:
         return float(self.reference[-1] - self.reference[0])
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class RunComparison:
     """A measured run and that of the exact sampled loop under the same reference; `run` is relative to the start."""
 
@@ -257,8 +253,7 @@ def load_run(name_or_path: AnyFile) -> MeasuredRun | None:
     return MeasuredRun(found.times - found.start, reference, angle, moment, table.source)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-@record
+@frozen(slots=True, kw_only=True)
 class Estimate:
     """A response with what it was estimated by: `segments` of `segment` [s], `overlap` as a share of one.
 

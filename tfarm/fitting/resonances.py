@@ -30,7 +30,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -40,7 +39,7 @@ from scipy.special import chdtrc, stdtrit
 
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, require
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response.frequency import HERTZ
 from tfarm.schema import Quantity
 
@@ -56,8 +55,7 @@ MOST_ROWS = 160  # of the Hankel matrix of the start; slower oscillations are lo
 EACH = 4  # parameters of a mode: sigma, w, a, b; the constant c is the last
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-@record
+@frozen(slots=True, kw_only=True)
 class Resonance:
     """A peak of a measured response: its `pole` [1/s] and `residue`; `std` (2,) of -Re and of Im of the pole [1/s]."""
 
@@ -240,8 +238,7 @@ class DecayMode(NamedTuple):
     ]
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class Ring:
     """Modes of a decay, that of most energy first; intervals hold the true value in 95 of 100 records.
 
@@ -385,8 +382,7 @@ def basis(poles: Complex, t: Real) -> Real:
     return np.c_[waves.real, waves.imag, np.ones(t.size)]
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class DampedSum:
     """A sum with `poles` (n,), `linear` (2 n + 1,), a, b and c, at times t, and its residuals e (samples,)."""
 

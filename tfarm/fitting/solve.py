@@ -19,7 +19,7 @@ Intervals are by the covariance or by the profile of the likelihood; some number
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Annotated
 
@@ -30,7 +30,7 @@ from scipy.special import chdtrc, ndtri, stdtrit
 from tfarm.arm.schema import file_key
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 
 from .data import CONFIDENCE, in_parts
@@ -139,8 +139,7 @@ SAME_SUM = 0.1  # of a sum of squares: a smaller difference is none
 EXCLUDED = 16.0  # of a sum of squares: noise alone makes up an effect of four deviations once in 15,000 fits
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Solution:
     """The best point found, with residuals, their Jacobian, and whether the search ended there in good order."""
 
@@ -314,8 +313,7 @@ TAKES_PART = 0.1  # of a unit vector: a smaller component has no part in it
 REACHES = (0.5, 1.0, 2.0, 4.0, 6.0, 9.0)  # of ln p: where a number that does not matter is tried
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class Fitted:
     """A fitted number: `value` in SI units, the ends of its 95 % interval, its standard deviation by the covariance.
 

@@ -20,7 +20,7 @@ from tfarm.arrays import Real
 from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError, require
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import default_gains
@@ -87,8 +87,7 @@ class Candidate:
     ] = False
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Candidates:
     """Candidates of one assumed parameter, and the limits of every frequency where it is the hub's inertia."""
 

@@ -15,7 +15,7 @@ positive one, far above its unit, is searched by decades, and one of either sign
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ from tfarm.arm import ANGLE_GAIN, PLANE, TWO_GAINS, AnyLaw, Arm, HubFeedback, La
 from tfarm.arrays import Real
 from tfarm.errors import must_be_known, require
 from tfarm.loop.loop import band_of
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.spectrum import modes as natural_modes
 from tfarm.spectrum.table import check_gains, first_frequency, rate_unit, turning_inertia
 
@@ -65,8 +65,7 @@ def signed(name: str, size: float) -> Coefficient:
     return Coefficient(name, size, (-REACH * size, REACH * size), (-np.inf, np.inf), 0.0)
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Structure:
     """A law with `free` coefficients, and `fixed` ones, which are not searched.
 

@@ -9,7 +9,6 @@ That is no proof over the box: between the arms of the list nothing is certain.
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Literal, NamedTuple, TypeVar
 
@@ -20,7 +19,7 @@ from tfarm.arm.records import ADJUSTABLE
 from tfarm.arm.writing import KeyedArms
 from tfarm.arrays import Real
 from tfarm.errors import ConvergenceError, require
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.synthesis.structures import Bounds
 
 _Found = TypeVar("_Found")
@@ -52,8 +51,7 @@ def varied(arm: Arm, key: str, value: float) -> Arm:
     return KeyedArms(arm, (key,), "range").at({key: value})
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class ArmBox:
     """The arms with numbers in `ranges` (key: its ends), and all other numbers of `arm`.
 
