@@ -18,9 +18,9 @@ import tfarm
 from tests.shared import refusal
 from tests.shell import answer, run
 from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.fitting.decays import ring, whiteness
 from tfarm.fitting.model import mode_of
 from tfarm.fitting.recording import Recording, read_recording
-from tfarm.fitting.resonances import ring, whiteness
 
 T = 0.01
 t = T * np.arange(150)

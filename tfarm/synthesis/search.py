@@ -200,7 +200,9 @@ def _apart(form: Structure, points: Real, scores: Real, most: int = 4, least: fl
     for n in np.argsort(scores, kind="stable").tolist():
         if (abs(points[:, [n]] - points[:, found]) > least * (high - low)[:, None]).any(axis=0).all():
             found.append(n)
-    return found[:most]
+        if len(found) == most:
+            break
+    return found
 
 
 def flat_part(judge: Worst, form: Structure, x: Real, score: float) -> dict[str, Bounds]:
