@@ -19,7 +19,7 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.spectrum.table import default_gains
 from tfarm.studies import quantities as room
 from tfarm.studies import running
-from tfarm.studies.cases import learning_curves
+from tfarm.studies.candidates import learning_curves
 from tfarm.studies.quantities import (
     COLUMNS,
     column_names,
