@@ -230,7 +230,7 @@ class DampedSum:
         by_time = self.t[:, None]
         cosines = columns[:, :n]
         sines = columns[:, n:-1]
-        (a, b) = self.linear[:-1].reshape(2, n)
+        a, b = self.linear[:-1].reshape(2, n)
         return np.c_[-by_time * (a * cosines + b * sines), by_time * (b * cosines - a * sines), columns]
 
     @property

@@ -101,22 +101,19 @@ def parameters(
     found = []
     for key in family.keys:
         name = key.split(".")[-1]
-        own = family.value(key)
-        prior = priors.get(key)
-        usual = own if key in start or (own and math.isfinite(own)) else _typical(arm, key, own)
-        at = start.get(key, usual)
         is_signed = name == "offset"
+        at = start.get(key, family.value(key))
+        if key not in start and (at == 0 or not math.isfinite(at)):
+            at = _typical(arm, key, at)
         most = {"x": arm.length, "gear_efficiency": 1.0, "poissons_ratio": 0.5}.get(name, math.inf)
         low, high = bounds.get(key, (-math.inf if is_signed else 0.0, most))
-        require(
-            low <= at <= high and low < high,
-            f"bounds of {key}",
-            (low, high),
-            f"starts at {at:g}; give bounds low,high around it, or another start",
-        )
+        remedy = f"starts at {at:g}; give bounds low,high around it, or another start"
+        require(low <= at <= high and low < high, f"bounds of {key}", (low, high), remedy)
         require(is_signed or at > 0, f"start of {key}", at, "a positive number in SI units")
-        is_prior = prior is None or (math.isfinite(prior[0]) and prior[1] > 0)
-        require(is_prior, f"prior of {key}", prior, "mean,deviation with a deviation above 0")
+        prior = priors.get(key)
+        if prior is not None:
+            is_legal = math.isfinite(prior[0]) and prior[1] > 0
+            require(is_legal, f"prior of {key}", prior, "mean,deviation with a deviation above 0")
         size = max(abs(at), 0.1 * arm.length) if is_signed else 0.0
         found.append(Parameter(key, at, low, high, size, prior))
     return family, tuple(found)
@@ -168,24 +165,20 @@ def mode_of(text: str) -> RingMode:
     spread = rf"(?:~\s*{some})?"
     form = rf"\s*(\d{{1,3}})\s*=\s*{some}(?:hz|rad_s)\s*{spread}(?:,\s*{some}{spread})?"
     found = re.fullmatch(form, text, re.IGNORECASE | re.ASCII)
-    number, *numbers = found.groups("nan") if found else ("0",) * 5
-    w, dw, ratio, dratio = map(float, numbers)
+    number, w, dw, ratio, spread_of_ratio = found.groups() if found else ("0",) * 5
     unit = 2 * math.pi if "hz" in text.lower() else 1.0
+    frequency = float(w) * unit
     mode = RingMode(
         number=int(number),
-        frequency=w * unit,
-        frequency_deviation=2e-3 * w * unit if math.isnan(dw) else dw * unit,
-        ratio=None if math.isnan(ratio) else ratio,
-        ratio_deviation=0.1 * ratio if math.isnan(dratio) else dratio,
+        frequency=frequency,
+        frequency_deviation=float(dw) * unit if dw else 2e-3 * frequency,
+        ratio=float(ratio) if ratio else None,
+        ratio_deviation=float(spread_of_ratio or 0.1 * float(ratio or math.inf)),
     )
     is_ratio = mode.ratio is None or (0 < mode.ratio < 1 and mode.ratio_deviation > 0)
-    is_frequency = mode.frequency_deviation > 0 and 0 < mode.frequency * mode.frequency_deviation < math.inf
-    require(
-        1 <= mode.number <= 100 and is_frequency and is_ratio,
-        "--mode",
-        text,
-        "write N=FREQUENCY,RATIO such as 1=2.52hz,0.006 (hz or rad_s; a deviation after ~: 2.52hz~0.01)",
-    )
+    is_frequency = mode.frequency_deviation > 0 and 0 < frequency * mode.frequency_deviation < math.inf
+    remedy = "write N=FREQUENCY,RATIO such as 1=2.52hz,0.006 (hz or rad_s; a deviation after ~: 2.52hz~0.01)"
+    require(1 <= mode.number <= 100 and is_frequency and is_ratio, "--mode", text, remedy)
     return mode
 
 

@@ -358,7 +358,7 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
     must_be_measured(measured)
     ratio = ratio_of(arm, measured)
     noise = noise_of(measured)
-    (low, high) = measured.band
+    low, high = measured.band
     roots = ratio.roots(PARTNERS_BEYOND * high)
     places = peaks_of(measured, noise.sigma)
     own = peaks_among(roots.poles)

@@ -372,7 +372,7 @@ def confidence_intervals(
         if not part[:, n].any():
             ends = [_end(found, n, way, own, quantile, held) if profile else point + way * quantile * own
                     for way in (-1, 1)]  # fmt: skip
-            (low, high) = each.ends(ends)
+            low, high = each.ends(ends)
             deviation = own * each.per_coordinate(each.value(point))
         elif n in alone:
             low, high = _one_sided(found, n, quantile)
@@ -395,10 +395,9 @@ def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float | None, 
     is neither.  The others are held: with them free the bound is farther by no more than a factor.
     """
     each = found.problem.parameters[n]
-    low = found.problem.bounds[0][n]
-    high = found.problem.bounds[1][n]
     if each.size:
         return None, None
+    low, high = (each[n] for each in found.problem.bounds)
 
     def excess(at: float) -> float:
         point = found.point.copy()
@@ -420,8 +419,7 @@ def _end(found: Solution, n: int, way: int, deviation: float, quantile: float, h
 
     The root of that growth is nearly linear in the coordinate, so a secant finds it in two or three steps.
     """
-    low = found.problem.bounds[0][n]
-    high = found.problem.bounds[1][n]
+    low, high = (each[n] for each in found.problem.bounds)
     rest = [m for m in range(found.point.size) if m != n and m not in held]
     slope = np.zeros(found.point.size)  # of the others where n is held elsewhere
     slope[rest] = -np.linalg.lstsq(found.jacobian[:, rest], found.jacobian[:, n], rcond=None)[0]
