@@ -13,7 +13,7 @@ numbers that would explain them.
 import math
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple, cast
 
@@ -74,7 +74,7 @@ def _upper(roots: Complex) -> Complex:
     return upper[np.argsort(abs(upper), kind="stable")]
 
 
-@dataclass(frozen=True)
+@frozen
 class Ratio:
     """The response `output`/`input` of an arm, exact.  Raises ParameterError for signals that the arm does not have."""
 

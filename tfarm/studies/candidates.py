@@ -8,7 +8,7 @@ at a time, everything else being the arm's own.  Both rest on the exact solution
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -39,7 +39,7 @@ OWN_VALUE = 1e-9  # relative: a candidate nearer to the arm's own value is that 
 # ------------------------------------------------------------ sections and hubs
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@frozen(kw_only=True)
 class Candidate:
     """One candidate section or hub inertia, and the loop under the default gains of the arm itself.
 
@@ -118,7 +118,7 @@ class Candidates:
     ]
 
 
-@dataclass(frozen=True)
+@frozen
 class Assumptions:
     """The effect of the assumed section and hub; no hub where that has no inertia to choose."""
 
