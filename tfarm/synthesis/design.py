@@ -274,7 +274,10 @@ class _Task:
         score, x = nearest
         law = self.form.record_at(x)
         chain = None if self.continuous else self.chain
-        raise ConvergenceError(_why_none(named, self.form, law, chain, max(map(max, sizes))), law, score)
+        words = _why_none(named, self.form, law, chain, max(map(max, sizes)))
+        if len(named) > 1:
+            words = f"{words}; for {len(named)} arms at once: {'; '.join(each.name for each in named)}"
+        raise ConvergenceError(words, law, score)
 
     def score_on(self, choice: _Choice, on: Arm) -> float:
         """The score of a law on another arm; inf where the loop is unstable."""

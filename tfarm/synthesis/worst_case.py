@@ -158,40 +158,30 @@ def for_the_worst(
     that is stable on all arms, or where it stays unstable on one inside the box.
     """
     named = list(arms)
-    tried = 0
+    if box is None:
+        return find(named, None, "whole"), named, WorstCase({}, 0)
+    tried = added = 0
     found = None
-    added = 0
-    effort: Effort = "sketch" if box else "whole"
+    effort: Effort = "sketch"
     while True:
-        try:
-            found = find(named, found, effort)
-        except ConvergenceError as error:
-            if len(named) == 1:
-                raise
-            raise ConvergenceError(
-                f"{error.message}; for {len(named)} arms at once: {'; '.join(each.name for each in named)}",
-                error.best,
-                error.residual,
-            ) from None
-        if box is None:
-            return found, named, WorstCase({}, 0)
+        found = find(named, found, effort)
         limit = max(score_on(found, each.arm) for each in named)
         worst, score, number = worst_inside(box, partial(score_on, found))
         tried += number
         is_worse = score > limit + MUCH_WORSE * abs(limit)
-        if effort != "sketch" and not is_worse:
-            return found, named, WorstCase(box.ranges, tried)
-        if effort != "sketch" and added == 4:
-            if math.isinf(score):
+        if effort != "sketch":
+            if not is_worse:
+                return found, named, WorstCase(box.ranges, tried)
+            if added == 4 and math.isinf(score):
                 raise ConvergenceError(f"no law found is stable on {worst.name}: narrow the ranges", None, None)
-            return found, named, WorstCase(box.ranges, tried, worst.name)
+            if added == 4:
+                return found, named, WorstCase(box.ranges, tried, worst.name)
+            effort = "near"
         if is_worse:
             tell(f"{worst.name} is worse than the other {len(named)} arms, and added")
             named.append(worst)
             added += 1
-        if effort != "sketch":
-            effort = "near"
-        elif not is_worse or added == 2:
+        if effort == "sketch" and (not is_worse or added == 2):
             effort = "whole"
             added = 0
 
