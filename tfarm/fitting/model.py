@@ -381,7 +381,11 @@ class Problem:
         """The responses, and what decays and priors leave."""
         coordinates = zip(self.parameters, point.tolist(), strict=True)
         priors = [(each.value(x) - each.prior[0]) / each.prior[1] for each, x in coordinates if each.prior is not None]
-        return self.fractions(point), np.r_[ring_residuals(self.arm(point), self.rings), priors]
+        return self.fractions(point), np.r_[self.decays(point, self.rings), priors]
+
+    def decays(self, point: Real, rings: Sequence[RingMode]) -> Real:
+        """What decays leave: the arm is made for them alone."""
+        return ring_residuals(self.arm(point), rings) if rings else np.empty(0)
 
 
 def walled(residuals: Callable[[Real], Real], first: Real) -> Callable[[Real], Real]:

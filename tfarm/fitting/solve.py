@@ -34,7 +34,7 @@ from tfarm.records import frozen
 from tfarm.schema import Quantity
 
 from .data import CONFIDENCE, in_parts
-from .model import Problem, ring_residuals, walled
+from .model import Problem, walled
 
 DRAWS = 300  # points about one that the equation errors lead to
 STARTS = ((0, (0.1,)), (DRAWS, (0.1,)), (DRAWS, (1.0, 0.3, 0.1)))  # draws, and shares of w one after another
@@ -86,7 +86,7 @@ def equation_errors(problem: Problem, point: Real, share: float) -> Real:
         W = (abs(smooth_N) + (abs(D) + each.noise.sigma) * abs(smooth_P)) * np.exp(there - here)
         errors.append(in_parts((N - D * P) / W))
     frequencies = [each._replace(frequency_deviation=each.frequency, ratio=None) for each in problem.rings]
-    return np.concatenate([*errors, ring_residuals(problem.arm(point), frequencies)])
+    return np.concatenate([*errors, problem.decays(point, frequencies)])
 
 
 def with_gains(problem: Problem, point: Real) -> tuple[Problem, Real]:
