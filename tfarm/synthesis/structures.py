@@ -204,21 +204,21 @@ ONE = np.ones((1, 1))
 Built = tuple[Sequence[Coefficient], Callable[[Real], tuple[Entry, ...]]]  # free coefficients, and their entries
 
 
-class Declared(NamedTuple):
+class Declaration(NamedTuple):
     """A structure: its formula in LaTeX, and its coefficients and entries of arm, Kp, number of modes, and period."""
 
     formula: str
     of: Callable[[Arm, float, int, float], Built]
 
 
-STRUCTURES: dict[str, Declared] = {}
+STRUCTURES: dict[str, Declaration] = {}
 
 
 def structure(name: str, formula: str) -> Callable[[Callable[[Arm, float, int, float], Built]], None]:
     """Declare a structure: `tfarm design`, its documentation and its tests have it from here."""
 
     def declare(of: Callable[[Arm, float, int, float], Built]) -> None:
-        STRUCTURES[name] = Declared(formula, of)
+        STRUCTURES[name] = Declaration(formula, of)
 
     return declare
 
