@@ -222,7 +222,7 @@ def compare_run(arm: Arm, law: AnyLaw, chain: Chain, measured: MeasuredRun) -> R
     Raises ParameterError as `simulate` does.
     """
     case = Case(arm, as_law(law), chain)
-    run, _ = simulated(case.arm, case.law, case.chain, measured.scenario(chain.sampling.period))
+    run, _ = simulated(case, measured.scenario(chain.sampling.period))
     return RunComparison(measured, run)
 
 
