@@ -45,7 +45,6 @@ from tfarm.spectrum.frequencies import LISTS_KEPT
 if TYPE_CHECKING:
     import control
 
-AMPLIFIED = ("M", "Q", "strain", "current")  # quantities of strain gauges, load cells and shunts
 RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")  # of a simulation, not filtered
 MODES_USED = Quantity("flexible modes", help="number of flexible modes of the arm in the model of the sampled loop")
 USUAL_MODES = 20  # flexible, of a sampled loop or a simulation by default
@@ -92,6 +91,15 @@ class Plant:
             residues=np.r_[self.residues, np.pad(more.residues, ((0, 0), (0, lacking)))],
             rigid=np.r_[self.rigid, more.rigid],
             static=np.r_[self.static, more.static],
+        )
+
+    def with_poles(self, poles: Any, residues: Any) -> Plant:
+        """The plant with further poles, which are of no mode."""
+        return replace(
+            self,
+            poles=np.r_[self.poles, poles],
+            residues=np.c_[self.residues, residues],
+            mode=np.r_[self.mode, np.zeros(np.size(poles), np.int64)],
         )
 
     @property
@@ -141,22 +149,15 @@ def undelayed_plant(arm: Arm, outputs: Sequence[str], count: int, x: float | Non
 def with_modes(model: ModalModel, count: int) -> Plant:
     """The plant with the first `count` modes of a model, and slow real poles for all others where C is large."""
     some, C = model.first(count), model.arm.damping
-    poles, mode = some.eigenvalues.ravel(), np.repeat(some.index, 2)
-    residues = some.residues.reshape(len(some.outputs), poles.size)
-    poles, residues = np.r_[poles, some.single], np.c_[residues, some.single_residues]
-    mode = np.r_[mode, np.zeros(some.single.size, np.int64)]
+    poles = some.eigenvalues.ravel()
+    residues, mode = some.residues.reshape(len(some.outputs), poles.size), np.repeat(some.index, 2)
     plant = Plant(some.arm, some.outputs, poles, residues, some.rigid, some.static, mode, model)
+    plant = plant.with_poles(some.single, some.single_residues)
     if C * some.natural_frequency.max(initial=0.0) < SLOW_POLES_FROM:
         return plant
     exact = transfer(model.arm, model.outputs, x=model.x)
     corners, shares = slow_remainder(C, lambda s: exact(s) - np.array([plant(each) for each in s]).T)
-    return replace(
-        plant,
-        poles=np.r_[plant.poles, -corners],
-        residues=np.c_[plant.residues, shares * corners],
-        static=plant.static - shares.sum(axis=1),
-        mode=np.r_[plant.mode, np.zeros(corners.size, np.int64)],
-    )
+    return replace(plant, static=plant.static - shares.sum(axis=1)).with_poles(-corners, shares * corners)
 
 
 def is_analog(wanted: Output, chain: Chain) -> bool:
@@ -166,27 +167,20 @@ def is_analog(wanted: Output, chain: Chain) -> bool:
     displacements do not, nor does the hub's rate where it is the difference of an encoder.
     """
     is_encoder = wanted.quantity == "theta" and chain.converters.hub_rate == "difference"
-    return wanted.quantity in AMPLIFIED or (wanted.power > 0 and not is_encoder)
+    # quantities of strain gauges, load cells and shunts
+    is_amplified = wanted.quantity in ("M", "Q", "strain", "current")
+    return is_amplified or (wanted.power > 0 and not is_encoder)
 
 
 def with_filter(plant: Plant, rows: Sequence[int], corner: float) -> Plant:
     """The plant with wc/(s + wc) after some outputs: a pole at -wc, with the residue wc G(-wc).
 
-    Raises ParameterError for an output with the double integral of the torque, an angle or a displacement: encoders
-    are digital and have no analog filter.
+    None of these has the double integral of the torque, as angles and displacements do (`is_analog`).
     """
-    turning = [plant.outputs[row] for row in rows if plant.rigid[row, 0] != 0.0]
-    remedy = "it turns with the hub; an analog filter is for the gauge and the tachometer"
-    require(not turning, "filtered output", ", ".join(turning), remedy)
     is_filtered = np.isin(np.arange(len(plant.outputs)), rows)
     lag = np.where(is_filtered[:, None], corner / (plant.poles + corner), 1.0)
-    return replace(
-        plant,
-        poles=np.r_[plant.poles, -corner],
-        residues=np.c_[plant.residues * lag, np.where(is_filtered, corner * plant(-corner).real, 0.0)],
-        static=np.where(is_filtered, 0.0, plant.static),
-        mode=np.r_[plant.mode, 0],
-    )
+    late = replace(plant, residues=plant.residues * lag, static=np.where(is_filtered, 0.0, plant.static))
+    return late.with_poles(-corner, np.where(is_filtered, corner * plant(-corner).real, 0.0))
 
 
 def with_held_filter(plant: Plant, held: Real) -> Plant:
@@ -197,9 +191,7 @@ def with_held_filter(plant: Plant, held: Real) -> Plant:
     """
     residues = plant.residues.copy()
     residues[:, -1] -= held
-    return replace(
-        plant, poles=np.r_[plant.poles, plant.poles[-1]], residues=np.c_[residues, held], mode=np.r_[plant.mode, 0]
-    )
+    return replace(plant, residues=residues).with_poles(plant.poles[-1], held)
 
 
 @dataclass(frozen=True)
@@ -478,7 +470,7 @@ def held_amplitude(p: Complex, duration: float) -> Complex:
 Made = TypeVar("Made")
 
 
-def first_distinct(make: Callable[[float], Made], candidates: Sequence[float]) -> Made:
+def first_distinct(make: Callable[[Any], Made], candidates: Sequence[Any]) -> Made:
     """What is made of the first of some candidates at which no two damped modes are one; the error of the last one."""
     *others, last = candidates
     for each in others:

@@ -14,10 +14,11 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import AnyLaw, Arm, tracked
+from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arm.chain import Chain, Converters, chain_or_usual
 from tfarm.arrays import LEAST_SIZE, Real
-from tfarm.dsp.discretise import RULE, rule_in_words, with_all_gains
+from tfarm.case import Case
+from tfarm.dsp.discretise import RULE, rule_in_words
 from tfarm.dsp.plant import MODES_USED
 from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, described, scenario
 from tfarm.dsp.simulate import Simulation, Simulator, Trace
@@ -30,10 +31,7 @@ from tfarm.schema import Column, Quantity, Table
 MODE_COUNTS = (10, 20, 40)  # flexible modes; 80 would take a heavily damped arm 8 s of CPU time
 ENOUGH_CHANGE = 1e-4  # of each signal's largest value: the digits of a table of a simulation
 CYCLE_LASTS = 0.7  # a limit cycle keeps at least this much of its amplitude over a quarter of the record
-BEYOND_IDEAL = 2.0  # and is this much larger than the vibration of an ideal chain at that time
 GROWS = 1.02  # in a quarter of the record, of an unstable ideal loop: a smaller change may be one of sampled peaks
-FEWEST_TURNS = 1.0  # of the moment about its mean in a quarter of the record: fewer are a drift and no vibration
-FEWEST_SAMPLES = 40  # samples of a record with limit cycles
 
 
 class Enough(NamedTuple):
@@ -99,8 +97,7 @@ class LimitCycle:
 class Run:
     """A simulated scenario: its signals, and figures of these."""
 
-    arm: Arm
-    law: AnyLaw
+    case: Case
     simulation: Annotated[Simulation, Quantity(flat=True, help="figures of the signals")]
     used: Annotated[Enough, Quantity(flat=True, help="flexible modes of the simulation")]
     scenario_in_words: Annotated[str, Quantity("scenario", key="scenario_in_words",
@@ -110,17 +107,22 @@ class Run:
     @property
     def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller."""
-        return controller(with_all_gains(self.arm, self.law), self.arm)
+        return controller(self.case.feedback, self.arm)
+
+    @property
+    def arm(self) -> Arm:
+        """The arm with the input of the controller."""
+        return self.case.arm
 
     @property
     def references(self) -> Annotated[list[str], Quantity(help="signals that follow a reference")]:
         """Signals that follow a reference."""
-        return list(with_all_gains(self.arm, self.law).references)
+        return list(self.case.feedback.references)
 
     @property
     def rule(self) -> Annotated[str, RULE]:
         """The discretisation of the law."""
-        return rule_in_words(with_all_gains(self.arm, self.law))
+        return rule_in_words(self.case.feedback)
 
     @property
     def reading(self) -> Annotated[str, Quantity(
@@ -160,7 +162,7 @@ class Run:
         run = self.simulation
         if run.chain.is_linear or self.tuner is not None:
             return None
-        law = replace(with_all_gains(self.arm, self.law), delay=0.0)  # that is in the chain of the run
+        law = replace(self.case.feedback, delay=0.0)  # that is in the chain of the run
         ideal = Simulator(self.arm, ideal_chain(run.chain), run.scenario, law, count=self.used.modes)
         return limit_cycle(run, ideal.run())
 
@@ -210,7 +212,8 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
     loop with ideal converters (`ideal`) has decayed further, or is unstable where signals are clipped.
     """
     n = simulation.t.size
-    if simulation.stopped or simulation.chain.is_linear or n < FEWEST_SAMPLES:
+    # a shorter record shows no limit cycle
+    if simulation.stopped or simulation.chain.is_linear or n < 40:
         return None
     last, before = slice(n - n // 4, n), slice(n - n // 2, n - n // 4)
     moment = simulation.at_samples.root_moment
@@ -218,9 +221,11 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
     about = moment[last] - moment[last].mean()
     turns = np.count_nonzero(np.diff(np.signbit(about))) / 2
     is_clipped = bool(simulation.saturated_at[last].any())
-    is_transient = is_clipped and (earlier < CYCLE_LASTS * size or turns < FEWEST_TURNS)
+    # fewer turns of the moment about its mean are a drift and no vibration
+    is_transient = is_clipped and (earlier < CYCLE_LASTS * size or turns < 1)
     is_unstable = ideal.stopped is not None or _left(ideal, last) > GROWS * _left(ideal, before)
-    is_own = (is_clipped and is_unstable) or size > BEYOND_IDEAL * _left(ideal, last)
+    # twice the vibration of an ideal chain at that time
+    is_own = (is_clipped and is_unstable) or size > 2 * _left(ideal, last)
     if size == 0.0 or size < CYCLE_LASTS * earlier or is_transient or not is_own:
         return None
     return LimitCycle(
@@ -265,40 +270,45 @@ def simulate(
     `outputs` are recorded in addition, as "tip_rotation" or "strain@0.05".  Raises ParameterError for a locked hub, an
     algebraic loop, an unknown signal, a law in z whose period is not the chain's, and as `scenario` does.
     """
-    arm, law, chain = *tracked(arm, law), chain_or_usual(chain)
-    return simulated(arm, law, chain, scenario(scenario_name, arm, chain, duration), count, between, outputs)[0]
+    return simulated_run(
+        arm, law, chain, scenario_name, duration, count=count, between=between, outputs=outputs
+    ).simulation
 
 
 def drawn(arm: Arm, law: AnyLaw, chain: Chain, scenario_name: str, duration: float) -> Simulation:
     """Simulate the same for a picture: 20 records in each period of the fastest visible mode (`traces.resolved`)."""
-    arm, law = tracked(arm, law)
-    task = scenario(scenario_name, arm, chain, duration)
-    used = enough_modes(lambda n: Simulator(arm, ideal_chain(chain), task, law, count=n).run())
-    (found,) = resolved(Simulator(arm, chain, task, law, count=used.modes), arm, Simulator.run)
-    return found
+    case = Case(arm, as_law(law), chain)
+    task = scenario(scenario_name, case.arm, chain, duration)
+    used = enough_modes(lambda n: simulator(case.through(ideal_chain(chain)), task, count=n).run())
+    return resolved(simulator(case, task, count=used.modes), case.arm, Simulator.run)[0]
+
+
+def simulator(case: Case, task: Scenario, **how: Any) -> Simulator:
+    """The simulator of a case."""
+    return Simulator(case.arm, case.chain, task, case.law, **how)
 
 
 def simulated(
-    arm: Arm,
-    law: AnyLaw,
-    chain: Chain,
+    case: Case,
     task: Scenario,
     count: int | None = None,
     between: int = 0,
     outputs: Sequence[str] = (),
+    run: Callable[[Simulator], Simulation] = Simulator.run,
 ) -> tuple[Simulation, Enough]:
-    """Simulate with `count` modes, or enough, and return that number too.
+    """Simulate with `count` modes, or enough, and return that number too; `run` is what a simulator does.
 
     Gains at the hub follow the references of all their signals.
     """
-    used = enough_modes(lambda n: Simulator(arm, ideal_chain(chain), task, law, count=n, outputs=outputs).run(), count)
-    return Simulator(arm, chain, task, law, count=used.modes, between=between, outputs=outputs).run(), used
+    ideal = case.through(ideal_chain(case.chain))
+    used = enough_modes(lambda n: run(simulator(ideal, task, count=n, outputs=outputs)), count)
+    return run(simulator(case, task, count=used.modes, between=between, outputs=outputs)), used
 
 
 def simulated_run(
     arm: Arm,
     law: AnyLaw,
-    chain: Chain,
+    chain: Chain | None,
     name: str,
     duration: float,
     *,
@@ -310,7 +320,6 @@ def simulated_run(
 
     Raises ParameterError as `simulate` does.
     """
-    arm, law = tracked(arm, law)
-    task = scenario(name, arm, chain, duration)
-    simulation, used = simulated(arm, law, chain, task, count, between, outputs)
-    return Run(arm, law, simulation, used, described(task, arm, chain))
+    case = Case(arm, as_law(law), chain_or_usual(chain))
+    task = scenario(name, case.arm, case.chain, duration)
+    return Run(case, *simulated(case, task, count, between, outputs), described(task, case.arm, case.chain))

@@ -24,6 +24,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from tfarm.arm import THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Arm, Link, RotarySpring, Theory
+from tfarm.arm.stages import Consumer
+from tfarm.arm.writing import arm_table
 from tfarm.arrays import Complex, Real
 from tfarm.errors import must_be_known
 from tfarm.records import record
@@ -206,6 +208,7 @@ def stiffness_of(link: Link) -> Fraction:
     return ratio((link.youngs_modulus, link.section.second_moment))
 
 
+CONSUMER = Consumer("exact solution", acts=("plant",))
 SYSTEMS_KEPT = 64  # arms whose exact numbers are cached: one page needs those of one arm some thousand times
 
 
@@ -307,9 +310,13 @@ class System:
 
 @lru_cache(maxsize=SYSTEMS_KEPT)
 def system_of(arm: Arm, theory: Theory | None = None) -> System:
-    """Return the system of an arm under its own theory, or another.  Raises ParameterError for an unknown one."""
+    """Return the system of an arm under its own theory, or another.
+
+    Raises ParameterError for an unknown theory, and for a part of the arm that is not in the equations.
+    """
     theory = theory or arm.theory
     must_be_known("theory", theory, THEORIES)
+    CONSUMER.refuse_others(arm_table(arm))
     unit_length, EI = sum((Fraction(link.length) for link in arm.links), ZERO), stiffness_of(arm.link)
     rotation = unit_length / EI
     translation = rotation * unit_length * unit_length

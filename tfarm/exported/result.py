@@ -1,5 +1,7 @@
 """The task of an export, the facts that its files begin with, and the record of the files."""
 
+from __future__ import annotations
+
 import hashlib
 import json
 from collections.abc import Mapping
@@ -82,6 +84,13 @@ class ExportTask:
             remedy = f"the sampled loop is not certified stable: {found.verdict.sentence}; --anyway exports it"
             raise ParameterError(key="law", value=self.law.name, remedy=remedy)
         return found
+
+    def exported(
+        self, contents: Mapping[str, bytes], names: list[Name], verdict: str, details: object = None
+    ) -> Export:
+        """The record of the files of this task."""
+        own = {"what": self.what, "form": self.form, "sha256": self.sha256}
+        return Export(contents=contents, names=names, verdict=verdict, details=details, **own)
 
     def facts(self, law: AnyLaw, found: Analysis) -> dict[str, str]:
         """The facts that a file begins with, by label: arm, law, stability and margins of the sampled loop, version."""
@@ -211,7 +220,9 @@ def export(
         forms = ", ".join(each for of, each in WRITERS if of == what)
         raise ParameterError(key="as", value=form, remedy=f"a {what} is exported as: {forms}")
     chain = chain_or_usual(chain)
-    admit(f"export {form}", arm, chain)
+    module, _, function = WRITERS[what, form].partition(":")
+    writer = import_module(f"tfarm.exported.{module}")
+    admit(writer.CONSUMER, arm, chain)
     remedy = f"the code is in {precision}: take precision float, or leave this key out"
     is_other = form == "c" and chain.converters.is_single and precision != "float"
     require(not is_other, "converters.arithmetic", "float32", remedy)
@@ -220,7 +231,6 @@ def export(
         what=what, form=form, tuned=None if tuned is None else Path(tuned), precision=precision,
         ranges=dict(ranges or {}), name=name, anyway=anyway,
     )  # fmt: skip
-    module, _, function = WRITERS[what, form].partition(":")
-    found: Export = getattr(import_module(f"tfarm.exported.{module}"), function)(task)
+    found: Export = getattr(writer, function)(task)
     write_into(Path(folder), found.contents)
     return found

@@ -13,10 +13,10 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from scipy.special import gammaincinv
@@ -28,10 +28,10 @@ from tfarm.arrays import Real
 from tfarm.digits import listed
 from tfarm.errors import ConvergenceError, one_line, require
 from tfarm.files import is_standard_output, write_file
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 
-from .data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of
+from .data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of, rms
 from .misses import Miss, Remedy, misses_of, remedies_of
 from .model import SENSOR_DELAY, SENSOR_GAIN, Problem, Response, RingMode, parameters
 from .overlay import ResonanceShift, ratio_of, resonance_shifts
@@ -50,12 +50,9 @@ from .solve import (
 )
 
 LONGEST_NAME = 200  # characters of a file in an assumption
-LONGEST_SYMBOL = 3  # characters at the end of a label: I_h, Kt
-MOST_RESTARTS = 4  # times that a profile may find a lower sum of squares than the search did
 
 
-@dataclass(frozen=True, slots=True)
-class FittedResponse:
+class FittedResponse(NamedTuple):
     """A response of the fit."""
 
     name: Annotated[str, Quantity(help="output/input as on the command line")]
@@ -72,8 +69,7 @@ class FittedResponse:
     ]
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class Fit(Solution):
     """The best point of the search with intervals: an arm fitted to measured responses.
 
@@ -123,12 +119,14 @@ class Fit(Solution):
         Quantity("responses", key="responses", help="measured responses with their noise and residuals"),
     ]:
         """A row a response."""
-        pairs = zip(self.problem.responses, self.parts, self.responses, strict=True)
-        return [
-            FittedResponse(of.name, of.label, of.unit, of.source, of.digest, of.points, *of.range_hz,
-                           one.noise.source, float(residuals @ residuals))
-            for one, residuals, of in pairs
-        ]  # fmt: skip
+        rows = []
+        for one, residuals in zip(self.problem.responses, self.parts, strict=True):
+            of = one.data
+            chi_squared = float(residuals @ residuals)
+            rows.append(FittedResponse(
+                of.name, of.label, of.unit, of.source, of.digest, of.points, *of.range_hz, one.noise.source, chi_squared
+            ))  # fmt: skip
+        return rows
 
     @cached_property
     def resonances(
@@ -138,8 +136,7 @@ class Fit(Solution):
         Quantity("resonances", help="measured peaks with the poles of the arm before and after the fit"),
     ]:
         """A row a measured peak."""
-        responses = [(each.data, each.noise) for each in self.problem.responses]
-        return resonance_shifts(self.before, self.arm, responses)
+        return resonance_shifts(self.before, self.arm, self.problem.responses)
 
     @property
     def unexplained(
@@ -182,7 +179,7 @@ class Fit(Solution):
         computed = self.problem.computed(self.point)
         pairs = zip(computed, self.responses, strict=True)
         away = np.concatenate([np.log(H / each.values)[each.values != 0] for H, each in pairs])
-        return float(np.sqrt((abs(away) ** 2).mean()))
+        return rms(away)
 
     @property
     def is_explained(
@@ -289,7 +286,8 @@ def fit(
     """
     subject = _problem(arm, data, free, start, bounds, priors, rings)
     found = best_solution(subject)
-    for _ in range(MOST_RESTARTS):
+    # a profile may find a lower sum of squares than the search did, a few times
+    for _ in range(4):
         try:
             fitted, unknown = confidence_intervals(found, profile=profile, progress=progress)
             break
@@ -331,7 +329,8 @@ def is_named(key: str, value: float, text: str) -> bool:
     """Whether a text names a number of an arm: by its label, by its symbol (I_h =), or by its value and unit."""
     of = file_key(key)
     *words, last = of.label.split()
-    symbol = last if len(last) <= LONGEST_SYMBOL else ""
+    # a symbol ends a label: I_h, Kt
+    symbol = last if len(last) <= 3 else ""
     label = " ".join(words) if symbol else of.label
     patterns = [rf"(?i:\b{re.escape(label)}\b)", *([rf"(?<!\d )\b{symbol}(?=,| and | of | =)"] if symbol else [])]
     values = re.findall(rf"({NUMBER}) {re.escape(of.unit)}(?![\w^/]| m\^)", text) if of.unit else []
@@ -359,11 +358,7 @@ def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: An
 
 
 ARMS = 40  # that a report draws
-DRAWS_KEPT = 0.999  # of the draws of a normal distribution: one whose sum of squares is larger is none of them
-DRAWS_EACH = 10  # draws for each arm wanted, at most
-FEWEST_RECORDS = 3  # records of one response, for a scatter
 DRAWS = 40  # of records
-WIDER = 1.5  # times the deviation by the noise: a wider scatter is named
 
 
 def arms_drawn(fit: Fit, count: int) -> tuple[Arm, ...]:
@@ -372,28 +367,28 @@ def arms_drawn(fit: Fit, count: int) -> tuple[Arm, ...]:
     Numbers of sensors follow by the linearised residuals.  Raises ConvergenceError where the curve misses the
     data, or the sum of squares is so far from a parabola that draws of one are none of it.
     """
-    own, J = fit.problem.of_the_arm, fit.jacobian
+    own = fit.problem.of_the_arm
+    J = fit.jacobian
     of_sensors = -np.linalg.pinv(J[:, len(own) :]) @ J[:, : len(own)]
     if fit.misses:
         raise ConvergenceError("the fitted curve misses the data", [], 0)
-    normal = np.random.default_rng(FIT_SEED).standard_normal((DRAWS_EACH * count, len(own)))
-    most = fit.chi_squared + 2.0 * float(gammaincinv(len(own) / 2, DRAWS_KEPT))  # the quantile of chi squared
+    each_time = 10  # draws for each arm wanted, at most
+    normal = np.random.default_rng(FIT_SEED).standard_normal((each_time * count, len(own)))
+    # of draws of a normal distribution: one whose sum of squares is larger is none of them
+    most = fit.chi_squared + 2.0 * gammaincinv(len(own) / 2, 0.999)  # the quantile of chi squared
     kept: list[Arm] = []
     for values in fit.posterior.with_all_determined.draws({}, normal).tolist():
         x = np.array([each.coordinate(value) for each, value in zip(own, values, strict=True)]) - fit.point[: len(own)]
         point = fit.problem.inside(fit.point + np.r_[x, of_sensors @ x])
-        kept += [fit.problem.arm(point)] * (sum_of_squares(fit.problem, point) <= most)
+        if sum_of_squares(fit.problem, point) <= most:
+            kept.append(fit.problem.arm(point))
         if len(kept) == count:
             return tuple(kept)
-    raise ConvergenceError(
-        f"only {len(kept)} of {DRAWS_EACH * count} arms drawn explain the data: their likelihood is not normal",
-        kept,
-        len(kept),
-    )
+    words = f"only {len(kept)} of {len(normal)} arms drawn explain the data: their likelihood is not normal"
+    raise ConvergenceError(words, kept, len(kept))
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Repeats:
     """The fitted numbers by each record of `response` alone, `each` [SI], and by draws of records.
 
@@ -425,7 +420,8 @@ class Repeats:
         str, Quantity("finding", key="in_words", help="numbers whose scatter exceeds what the noise explains")
     ]:
         """The numbers whose scatter is larger than the noise explains."""
-        larger = [f"{key} {times:.3g} times" for key, times in self.times_wider.items() if times > WIDER]
+        # a scatter that is 1.5 times that by the noise is named
+        larger = [f"{key} {times:.3g} times" for key, times in self.times_wider.items() if times > 1.5]
         return f"larger than the noise explains: {listed(larger)}" if larger else "as the noise explains"
 
 
@@ -441,33 +437,34 @@ def repeats(fit: Fit, draws: int = DRAWS) -> Repeats | None:
     names = [each.data.label for each in own.responses]
     most = max(names, key=names.count, default="")
     records = [n for n, name in enumerate(names) if name == most]
-    if len(records) < FEWEST_RECORDS:
+    if len(records) < 3:
         return None
     others = [n for n, name in enumerate(names) if name != most]
     identified = {n: each for n, each in enumerate(fit.parameters) if each.identified}
     # a key with a colon is of one record's sensor, which others do not know
     known = {n: each for n, each in identified.items() if each.deviation and ":" not in each.key}
-    keys, start = [each.key for each in known.values()], fit.point
 
     def numbers(chosen: Sequence[int]) -> Real:
         some = replace(own, responses=tuple(own.responses[n] for n in (*chosen, *others)))
         sensors = {place for each in some.responses for place in (each.gain, each.delay)}
         used = identified.keys() & (sensors | set(range(len(own.of_the_arm))))
-        held = {n: float(x) for n, x in enumerate(start) if n not in used}
-        point = nearest_minimum(some, start, held).point
-        return np.array([own.parameters[n].value(float(point[n])) for n in known])
+        held = {n: float(x) for n, x in enumerate(fit.point) if n not in used}
+        point = nearest_minimum(some, fit.point, held).point
+        return np.array([own.value(point, n) for n in known])
 
     drawn = bootstrap(
         (records,), numbers, n_resamples=draws, vectorized=False, method="percentile", confidence_level=CONFIDENCE,
         rng=FIT_SEED,
     )  # fmt: skip
-    ends = np.array(drawn.confidence_interval).T
-    wider = drawn.standard_error / np.array([each.deviation for each in known.values()])
+
+    def by_key(values: Real) -> dict[str, Any]:
+        return dict(zip([each.key for each in known.values()], values.tolist(), strict=True))
+
     return Repeats(
         response=most,
-        each=[dict(zip(keys, numbers([n]).tolist(), strict=True)) for n in records],
-        intervals=dict(zip(keys, ends.tolist(), strict=True)),
-        times_wider=dict(zip(keys, wider.tolist(), strict=True)),
+        each=[by_key(numbers([n])) for n in records],
+        intervals=by_key(np.array(drawn.confidence_interval).T),
+        times_wider=by_key(drawn.standard_error / np.array([each.deviation for each in known.values()])),
     )
 
 

@@ -8,27 +8,22 @@ first two alone; their steps are larger than that, six times out of seven.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Annotated
+from dataclasses import replace
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from tfarm.arrays import Complex
 from tfarm.digits import listed
-from tfarm.records import record
 from tfarm.response.frequency import HERTZ
 from tfarm.schema import Quantity
 
+from .data import rms
 from .model import SENSOR_DELAY, SENSOR_GAIN, Problem, Response, parameters
 from .solve import EXCLUDED, Solution, best_solution, is_explained
 
-TOLERATED = math.log(1.2)  # of ln(computed/measured): a smaller difference is no miss
-AT_BOUND = 0.01  # of a coordinate: a search that ends so near to a bound has ended there
 
-
-@dataclass(frozen=True, kw_only=True)
-@record
-class Miss:
+class Miss(NamedTuple):
     """A response that the curve misses: by what factor and angle (root mean squares), and in which range."""
 
     response: Annotated[str, Quantity("response missed", help="output/input of a response that the curve misses")]
@@ -44,9 +39,7 @@ class Miss:
         return f"{self.response} misses the data by {by} between {self.low:.4g} and {self.high:.4g} Hz"
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
-class Remedy:
+class Remedy(NamedTuple):
     """A single change of the search that was tried on a curve that misses."""
 
     change: Annotated[str, Quantity("remedy tried", help="change of the search that was tried alone")]
@@ -74,23 +67,25 @@ def misses_of(found: Solution) -> tuple[Miss, ...]:
 def _miss(one: Response, computed: Complex) -> Miss | None:
     """Return how one response is missed, None where it is not."""
     kept = np.isfinite(one.noise.sigma) & (one.data.values != 0)
-    omega, ratio = one.data.omega[kept], computed[kept] / one.data.values[kept]
+    omega = one.data.omega[kept]
+    ratio = computed[kept] / one.data.values[kept]
     if omega.size < 2:
         return None
     away = np.log(ratio)
     step = np.log(ratio[1:] / ratio[:-1])
-    limit = max(TOLERATED, 3 * float(np.median(abs(step))))
+    # a difference of less than a fifth is no miss
+    limit = max(math.log(1.2), 3 * np.median(abs(step)))
     # pairs of lines that both miss, the second on the branch of the first: a sign alone is +180 or -180 degrees
     both = np.flatnonzero((abs(away[:-1]) > limit) & (abs(away[:-1] + step) > limit))
     alike = both[abs(step[both]) < abs(away[both]) / 2]
     is_chance = 2 * alike.size - both.size <= 2 * math.sqrt(both.size)
-    if is_chance or np.sqrt((abs(away) ** 2).mean()) <= limit:
+    if is_chance or rms(away) <= limit:
         return None
     off = away[abs(away) > limit]
     return Miss(
         response=one.data.name,
-        factor=math.exp(np.sqrt((off.real**2).mean())),
-        degrees=math.degrees(np.sqrt((off.imag**2).mean())),
+        factor=math.exp(rms(off.real)),
+        degrees=math.degrees(rms(off.imag)),
         low=float(omega[alike[0]]) / HERTZ,
         high=float(omega[alike[-1] + 1]) / HERTZ,
     )
@@ -123,23 +118,26 @@ def _tries(found: Solution) -> Iterator[tuple[str, Solution]]:
         if problem.with_sensors((key,)) == problem:
             continue
         there = _searched(problem.with_sensors((key,)))
-        places = [getattr(each, key) for each in there.problem.responses]
-        values = [there.problem.parameters[place].value(float(there.point[place])) for place in places]
+        values = [there.problem.value(there.point, getattr(each, key)) for each in there.problem.responses]
         yield f"a free {key} (--free {key}): {listed([f'{each:.4g}{unit}' for each in values])}", there
         if min(values) < 0 and key == SENSOR_GAIN:
-            responses = [
-                replace(each, data=replace(each.data, values=each.data.values * math.copysign(1, value)))
-                for each, value in zip(problem.responses, values, strict=True)
-            ]
-            names = [each.data.name for each, value in zip(problem.responses, values, strict=True) if value < 0]
+            responses, names = [], []
+            for each, value in zip(problem.responses, values, strict=True):
+                data = each.data
+                if value < 0:
+                    names.append(data.name)
+                    data = replace(data, values=-data.values)
+                responses.append(replace(each, data=data))
             yield f"the other sign of {listed(names)}", _searched(replace(problem, responses=tuple(responses)))
     yield from _beyond_bounds(found)
 
 
 def _beyond_bounds(found: Solution) -> Iterator[tuple[str, Solution]]:
     """Yield the solution without the bounds of those of the arm's numbers that were given some or ended at one."""
-    problem, (low, high) = found.problem, found.problem.bounds
-    is_at_end = np.minimum(found.point - low, high - found.point) < AT_BOUND
+    problem = found.problem
+    low, high = problem.bounds
+    # of a coordinate: a search that ends so near to a bound has ended there
+    is_at_end = np.minimum(found.point - low, high - found.point) < 0.01
     _, unbound = parameters(problem.arm(found.point), problem.family.keys, start={}, bounds={}, priors={})
     numbers = [
         replace(free, prior=each.prior) if at_end or (each.low, each.high) != (free.low, free.high) else each

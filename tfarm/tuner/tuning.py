@@ -9,11 +9,12 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, must_be_arm
+from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, as_law, must_be_arm
 from tfarm.arm.chain import Reading, chain_or_usual
 from tfarm.arrays import Real
-from tfarm.dsp import Chain, Simulator, scenario
-from tfarm.dsp.results import Run, enough_modes, ideal_chain
+from tfarm.case import Case
+from tfarm.dsp import Chain, scenario
+from tfarm.dsp.results import Run, simulated
 from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, described, torque_unit
 from tfarm.dsp.simulate import RESIDUAL
 from tfarm.errors import require
@@ -41,11 +42,6 @@ NUMBERS: dict[str, Callable[[float], float]] = {  # of a plan, by which studies 
     "trials": int, "seed": int, "K1": float, "Kp": float, "duration": float, "hidden": int, "scale": float,
 }  # fmt: skip
 NUMBERS_OF_LEARNING = ("eta", "alpha", "clip", "enough")
-SHAPED_NOTE = "no moment feedback; cost of the shaped slew, which arrives later: cost_lq_bound is no bound of it"
-BOUND_NOTES = {
-    "vibration": "the least cost of any control signal e on this slew, with full state and preview",
-    "total": "the least cost of any torque: under this reading it is that of an arm at rest",
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,11 +207,8 @@ class SlewEnd(NamedTuple):
         """The end of the trial of a tuning."""
         simulator, gain = tuning.trial.simulator(), tuning.gain()
         runs = gain.run(simulator), simulator.linear(tuning.constant), simulator.linear(gain.servo)
-        tuned, _, without = runs
-        return cls(
-            tuned.residual_moment, tuned.residual_raw, without.residual_moment,
-            *(tip_off(run, tuning.trial) for run in runs),
-        )  # fmt: skip
+        residuals = runs[0].residual_moment, runs[0].residual_raw, runs[-1].residual_moment
+        return cls(*residuals, *(tip_off(run, tuning.trial) for run in runs))
 
 
 @dataclass(frozen=True)
@@ -276,16 +269,20 @@ class TuningResult:
     def numbers(self) -> Annotated[dict[str, Any], Quantity(flat=True, help="costs of tuner and baselines")]:
         """The same numbers by name."""
         tuning, shaped = self.tuning, self.tuning.shaped
+        bound = "the least cost of any control signal e on this slew, with full state and preview"
+        if tuning.plan.signals == "total":
+            bound = "the least cost of any torque: under this reading it is that of an arm at rest"
         return {
             "cost_tuned": tuning.training.result.cost,
             "cost_without": tuning.without.cost,
             "cost_best_constant": tuning.best_constant.cost,
             "best_constant_gain": tuning.best_constant.gain,
             "cost_lq_bound": tuning.bound.cost,
-            "lq_bound_note": BOUND_NOTES[tuning.plan.signals],
+            "lq_bound_note": bound,
             "cost_shaped": min(each.cost for each in shaped.values()),
             "shaped": {kind: {"cost": each.cost, "arrives_later_by_s": each.later} for kind, each in shaped.items()},
-            "shaped_note": SHAPED_NOTE,
+            "shaped_note": "no moment feedback; cost of the shaped slew, which arrives later: cost_lq_bound is no "
+            "bound of it",
         }
 
     @property
@@ -300,7 +297,7 @@ class TuningResult:
         tuple[float, float], Quantity("moment gain", digits=4, help="least and largest during the tuned slew")
     ]:
         """The least and the largest moment gain."""
-        K = self.tuning.training.result.K
+        K = self.gain["K"]
         return float(K.min()), float(K.max())
 
     @cached_property
@@ -351,12 +348,11 @@ def controlled_run(
     """
     chain, gain = with_signals(chain, saved.signals), saved.gain()
     task = scenario(name, arm, chain, duration)
-    ideal = ideal_chain(chain)
-    used = enough_modes(lambda n: gain.run(Simulator(arm, ideal, task, count=n, outputs=outputs)), count)
-    run = gain.run(Simulator(arm, chain, task, count=used.modes, between=between, outputs=outputs))
+    case = Case(arm, as_law(gain.servo), chain)
+    run, used = simulated(case, task, count, between, outputs, gain.run)
     trained = {
         "trained_on": saved.arm, "guard_kind": saved.guard_kind, "guard": list(gain.guard), "K1": saved.K1,
         "Kp": saved.Kp, "signals": saved.signals, "period_s": saved.period, "a": saved.a, "b": saved.b,
         "cost_unit_N_m": saved.scales[0],
     }  # fmt: skip
-    return Run(arm, gain.servo, run, used, described(task, arm, chain), tuner=trained)
+    return Run(case, run, used, described(task, arm, chain), tuner=trained)
