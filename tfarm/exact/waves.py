@@ -161,10 +161,10 @@ def _corrected(z: complex, damper: Double, aS: Double, bS: Double, gS: Double) -
 
 
 @compiled
-def fill_wave_numbers(s: Any, k: Any, found: Any) -> None:
-    """Compute z, v and t of both waves at s (1-D), the larger z first: `found` (2, 3, n)."""
+def fill_wave_numbers(s: Any, rows: Any, found: Any) -> None:
+    """Compute z, v and t of both waves of a segment, one row, at s (1-D), the larger z first: `found` (2, 3, n)."""
     for i in range(s.size):
-        _, one, two = dispersion(s[i], k)
+        _, one, two = dispersion(s[i], rows[0])
         for n, (z, v, t, dt) in enumerate((one, two)):
             found[n, 0, i], found[n, 1, i], found[n, 2, i] = z, v, t + dt
 

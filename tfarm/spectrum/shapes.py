@@ -263,7 +263,7 @@ class Shapes:
 def _of_segment(segment: Segment, omega: Real, ends: Real, x: Real) -> Real:
     """Return W, Psi, M, Q (4, modes, n) at the shares x (modes, n) from the states (4, modes, 2) at both ends."""
     numbers, result = np.empty((2, 3, omega.size), complex), np.empty((4, *x.shape))
-    fill_wave_numbers(1j * omega, read_only(kernel_row(segment))[0], numbers)
+    fill_wave_numbers(1j * omega, read_only(kernel_row(segment)), numbers)
     units = [float(each) for each in segment.units]
     own = np.array([units[0], 1.0, *units[1:]])[:, None]
     inner, outer = ends[..., 0] * own, ends[..., 1] * own
