@@ -29,7 +29,7 @@ from tfarm.exact.characteristic import LoopParts
 from tfarm.spectrum.box import FIRST_POINTS, NEAREST_TO_ZERO, TRIED_HEIGHTS, turned
 from tfarm.spectrum.table import first_frequency
 
-from .loop import FAR_RIGHT, SLOWEST, Loop, grid
+from .continuous import FAR_RIGHT, SLOWEST, ContinuousLoop, grid
 from .poles import box_of
 from .stability import MARGIN_OF_ZERO, is_known_without
 
@@ -140,18 +140,18 @@ def parts_of(law: Law, rig: LoopParts, s: Complex) -> Parts:
     return Parts(s, rig.drive, np.array(q), np.array(f), np.array(first))
 
 
-def _parts_at(loop: Loop, s: Complex) -> Parts:
+def _parts_at(loop: ContinuousLoop, s: Complex) -> Parts:
     """The parts of the law of a loop at places s."""
     return parts_of(loop.law, loop.signals.parts(s), s)
 
 
-def along(loop: Loop, names: Iterable[str]) -> Family:
+def along(loop: ContinuousLoop, names: Iterable[str]) -> Family:
     """The lines of loops along each of some numbers of a law, the others constant, at places s."""
     table = [np.array(column) for column in zip(*(place_of(loop.law, name) for name in names), strict=True)]
     return lambda line, s: _parts_at(loop, s).line(Place._make(column[line] for column in table))
 
 
-def columns(loop: Loop, names: tuple[str, str], x: Real, reach: float) -> Family:
+def columns(loop: ContinuousLoop, names: tuple[str, str], x: Real, reach: float) -> Family:
     """The lines of loops along the second of two numbers, one for each value x of the first, at places s.
 
     D is affine in the first too, found at 0 and at `reach`; a delay x is a factor e^{-s x} on the law.
@@ -171,7 +171,7 @@ def columns(loop: Loop, names: tuple[str, str], x: Real, reach: float) -> Family
 class Line(NamedTuple):
     """The loops along one number of a law between two limits; `member` makes one of them."""
 
-    member: Callable[[], Loop]
+    member: Callable[[], ContinuousLoop]
     name: str
     low: float
     high: float
@@ -207,7 +207,7 @@ def _with_real_poles(line: Line, found: list[Crossing], N: Complex, P: Complex, 
     return Crossings.of(e._replace(t=0.0) if abs(e.t) <= ROUNDED * (high - low) else e for e in found)
 
 
-def line_crossings(loop: Loop, name: str, low: float, high: float, band: float) -> Crossings:
+def line_crossings(loop: ContinuousLoop, name: str, low: float, high: float, band: float) -> Crossings:
     """Return the crossings of the axis up to a band [rad/s] along one number of a loop's law between two values.
 
     Raises ConvergenceError where poles meet at s = 0 that cannot be counted.
@@ -259,7 +259,7 @@ def through_infinity(N: Complex, P: Complex) -> Crossing | None:
     return Crossing(float(third + last * last / (before - last)), math.inf, 1 if before < 0 else -1)
 
 
-def unstable_below(loop: Loop, band: float) -> int:
+def unstable_below(loop: ContinuousLoop, band: float) -> int:
     """Return the number of poles right of the axis with |Im s| < band, from the turns of D around that region.
 
     The next of `TRIED_HEIGHTS` is taken where a pole is on its upper edge.  Raises ConvergenceError where one is on the
@@ -286,12 +286,12 @@ def critical(name: str, limits: Window) -> tuple[float, ...]:
     return (low, 0.0, high) if name.endswith(LEADING) and low < 0 < high else limits
 
 
-def turns_over(loop: Loop, name: str, limits: Window) -> bool:
+def turns_over(loop: ContinuousLoop, name: str, limits: Window) -> bool:
     """Whether a leading coefficient passes through 0 between these values, where without it high modes are driven."""
     return 0.0 in critical(name, limits)[1:-1] and not is_known_without(loop, name)
 
 
-def static_edge(loop: Loop, name: str, limits: Window) -> Crossing | None:
+def static_edge(loop: ContinuousLoop, name: str, limits: Window) -> Crossing | None:
     """The value of a number at which a real pole passes through s = 0, if there is one."""
     near = SLOWEST * first_frequency(loop.arm) * np.array(NEAR_ORIGIN) + 0j
     A, B = along(loop, [name])(np.zeros(1, int), near)
