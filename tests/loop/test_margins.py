@@ -18,7 +18,7 @@ from tests.shared import thinned
 from tests.transition import response as transition
 from tfarm import Hub, HubFeedback
 from tfarm.loop.continuous import ContinuousLoop, grid
-from tfarm.loop.margins import lowest
+from tfarm.loop.loop_margins import lowest
 from tfarm.loop.stability import stability
 from tfarm.reduced import relaxed_model
 from tfarm.schema import to_dict

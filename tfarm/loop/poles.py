@@ -7,10 +7,12 @@ their number (`spectrum.box`).  Where it disagrees the others are searched for, 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arm.blocks import Matrices
@@ -51,6 +53,7 @@ STARTS_REACH = 1.3  # heights of the box: modes of the arm up to there, as a law
 REAL_POINTS, REAL_SPAN, REAL_REACH = 300, 1e10, 1.4  # on either side of 0: their number, from 1e-10 to 1.4 heights
 DELAY_STEPS = 3  # of the equation of a delay alone
 LEAST_START = 1e-100  # 1/s: zeros at 0 are divided out
+HUB = 0  # the number of the pole below the first mode that no mode of the link is near
 PADE = 8  # order of the approximation of a delay in a model
 SHRUNK_HEIGHTS = tuple(1 / factor for factor in TRIED_HEIGHTS)  # of a box that may not reach above the shear cut-off
 
@@ -271,6 +274,23 @@ def real_starts(loop: ContinuousLoop, up_to: float) -> Complex:
     (n,) = np.nonzero(np.sign(D[1:]) * np.sign(D[:-1]) < 0)
     share = abs(D[n]) / (abs(D[n]) + abs(D[n + 1]))
     return (line[n] + share * (line[n + 1] - line[n])).astype(complex)
+
+
+def poles_by_mode(poles: Complex, open_loop: Mapping[int, complex]) -> dict[int, complex]:
+    """Return the poles s, Im s > 0, by the mode whose open-loop pole p is theirs; a single one below these is `HUB`.
+
+    One a mode, by the least sum of |ln s - ln p|.  By more than 1, a factor e of its frequency or 57 deg, no controller
+    moves a mode here: such a pole belongs to none.
+    """
+    farthest = 1.0
+    modes, own = list(open_loop), np.array(list(open_loop.values()))
+    apart = np.minimum(abs(np.log(poles)[:, None] - np.log(own)), farthest)
+    rows, columns = linear_sum_assignment(apart)
+    near = apart[rows, columns] < farthest
+    found = {modes[column]: complex(poles[row]) for row, column in zip(rows[near], columns[near], strict=True)}
+    others = np.delete(poles, rows[near])
+    below = others[abs(others) < min((abs(s) for s in found.values()), default=0.0)]
+    return dict(sorted([*found.items(), *([(HUB, complex(below[0]))] if below.size == 1 else [])]))
 
 
 def poles_of_model(loop: ContinuousLoop, plant: Matrices) -> Complex:
