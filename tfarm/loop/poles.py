@@ -17,7 +17,7 @@ from scipy.optimize import linear_sum_assignment
 from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
-from tfarm.arrays import LEAST_SIZE, Complex
+from tfarm.arrays import Complex
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, require
 from tfarm.records import record
@@ -35,10 +35,7 @@ from .theorem import CONSERVES, GIVES, theorem_of
 MOST_POLES = 1000  # that may be asked for
 USUAL_POLES = 10  # poles listed where no count is asked for
 MOST_BOX_MODES = 4000  # flexible, below the highest box that is searched for as many poles as are asked for
-SLOW_SHARE = 1e-6  # of a box's height: poles nearer to 0 are the rigid arm's, and known beforehand
-SLOW_STEPS = 4  # of Newton's method from there
-AT_REST = 1e-12  # of these: so near 0 the slope there is read
-NEAR_RIGID = 0.01  # of its size: largest distance of a slow pole from the rigid arm's
+SLOW_SHARE = 1e-6  # of a box's height: poles nearer to 0 are known beforehand
 LEAST_REAL_PART = -0.5  # of L, so that 1 + L has no zero
 RIGHT_OF_EDGE = (2.0, 5.0, 20.0)  # times the right edge of a box, where L is evaluated again
 FAR_RIGHT, BEYOND_CORNER = 1e5, 10.0  # times that edge, and a law's fastest corner: the end of a search of real poles
@@ -226,25 +223,23 @@ def quiet_edge(loop: ContinuousLoop, right: float, height: float) -> float:
 
 
 def slow_poles(loop: ContinuousLoop, below: float) -> Complex:
-    """Poles [1/s] but 0 of size up to `below`: of the turning arm under small gains zeros of J s^2 + b s + c.
+    """Return poles [1/s] but 0 of size up to `below`, from the power series of D at 0, corrected on D.
 
-    These are from `Loop.at_rest`, corrected on the characteristic function, and one zero next to 0 from its slope.
+    D is evaluated on a circle that is small beside the first frequency, 1/C and 1/delay: there the series converges.
     """
-    at = loop.function(np.array([below * AT_REST + 0j]))
-    with np.errstate(all="ignore"):  # an even function has no slope there, and no zero
-        alone = below * AT_REST - (at.value / at.slope).real
-    c, b, J = loop.at_rest or (0.0, 0.0, 1.0)
-    unit = max(abs(b), math.sqrt(abs(c * J)), LEAST_SIZE)  # b and sqrt(c J) alike
-    with np.errstate(over="ignore"):
-        roots = unit * np.roots([J, b / unit, c / unit / unit]).astype(complex)
-    slow = np.r_[roots, alone[[(abs(roots - alone) > NEAR_RIGID * abs(alone)).all()]]]
-    slow = slow[(slow != 0) & (abs(slow) <= below)]
-    exact = slow.copy()
-    for _ in range(SLOW_STEPS if slow.size else 0):
+    radius = 0.2 / (1 / first_frequency(loop.arm) + loop.arm.damping + loop.law.delay)
+    points = 32
+    circle = loop.function(radius * np.exp(2j * np.pi * np.arange(points) / points))
+    series = np.fft.fft(circle.value * np.exp(circle.scale - circle.scale[0])).real[: points // 4]
+    slow = radius * np.roots(series[::-1]).astype(complex)
+    slow = slow[(abs(slow) <= min(below, radius / 2)) & (slow != 0)]
+    step = slow
+    for _ in range(6 if slow.size else 0):
         with np.errstate(all="ignore"):  # a start whose slope is rounding diverges, and is left out
-            at = loop.function(exact)
-            exact = exact - at.value / at.slope
-    return exact[abs(exact - slow) <= NEAR_RIGID * abs(slow)]
+            at = loop.function(slow)
+            step = at.value / at.slope
+            slow = slow - step
+    return slow[(abs(step) <= 1e-9 * abs(slow)) & (abs(slow) <= below)]
 
 
 def starting_points(loop: ContinuousLoop, up_to: float) -> Complex:
