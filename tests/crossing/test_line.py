@@ -7,6 +7,8 @@ import pytest
 
 from tfarm.crossing import (
     Crossings,
+    Grid,
+    Line,
     brackets,
     confirmed,
     counts_over,
@@ -195,7 +197,8 @@ def of(h):
 
 def found(grid, parts, with_dips=True):
     """Gain, place and change of all crossings, dips searched too."""
-    (line,) = crossings(lambda _, w: parts(w), 1, grid, with_dips=with_dips)
+    curve, line = Grid(grid, lambda at: np.array(parts(at))), Line(np.array([1, 0]), np.array([0, 1]), -np.inf, np.inf)
+    (line,) = crossings(curve, [line], with_dips=with_dips)
     return np.array(sorted(line, key=lambda each: each.at)).T
 
 

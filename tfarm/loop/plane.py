@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, AnyLaw, Arm, HubFeedback, Law, as_law
 from tfarm.arm.feedback import ON
 from tfarm.arrays import Real
-from tfarm.crossing import Crossings, Window, ascending, counts_over, intervals
+from tfarm.crossing import Crossings, Window, ascending, counts_over
 from tfarm.crossing.shown import PlaneOfCounts
 from tfarm.errors import ConvergenceError, ParameterError, require
 from tfarm.records import record
@@ -39,9 +39,8 @@ from tfarm.spectrum.table import PAPER_GAINS, default_gains, hub_locked, rate_un
 
 from .lines import (
     ROUNDED,
-    Line,
-    along,
-    columns,
+    Along,
+    LawTerms,
     critical,
     crossed,
     line_crossings,
@@ -118,11 +117,6 @@ class Plane(PlaneOfCounts):
         )]  # fmt: skip
 
     @property
-    def finding(self) -> Annotated[str, Quantity("stability region", help="points of the grid without unstable pole")]:
-        """Number of points of the grid at which the loop is stable."""
-        return f"stable at {int(self.stable.sum())} of {self.stable.size} points"
-
-    @property
     def is_of_gains(self) -> bool:
         """Whether it is the plane of K1 and K2."""
         return self.vary == PLANE and self.law.gains is not None
@@ -144,23 +138,22 @@ class Plane(PlaneOfCounts):
 
     @property
     def stable_intervals(self) -> list[list[Window]]:
-        """For each x the stability intervals of y, cut to the map: the region with exact edges.
+        """For each x the stability intervals of y, cut to the map.
 
         Where a theorem decides they are the same for every K1 > `upright`, and none for others.
         """
+        if not self.is_known:
+            return super().stable_intervals
         limits = float(self.y[0]), float(self.y[-1])
-        if self.is_known:
-            loop = Loop(self.arm, self.law.having(RATE_GAIN, self.upright + default_gains(self.arm).K1))
-            stable = theorem_windows(loop, MOMENT_GAIN, limits, theorem_edges(loop, MOMENT_GAIN, limits))
-            return [stable if self.upright < K1 else [] for K1 in self.x]
-        first = self.unstable[0].tolist()
-        return [intervals(found, *limits, limits[0], count) for found, count in zip(self.crossings, first, strict=True)]
+        loop = Loop(self.arm, self.law.having(RATE_GAIN, self.upright + default_gains(self.arm).K1))
+        stable = theorem_windows(loop, MOMENT_GAIN, limits, theorem_edges(loop, MOMENT_GAIN, limits))
+        return [stable if self.upright < K1 else [] for K1 in self.x]
 
     @property
     def stable(self) -> NDArray[np.bool_]:
         """Points without unstable pole, double pole of the free hub angle at 0 (K1 = Kp = 0), or undamped modes."""
         if not self.is_of_gains:
-            return np.asarray(self.unstable == 0)
+            return super().stable
         arm = self.arm
         drifts = (self.x == 0) & arm.has_rigid_mode & (self.Kp == 0)
         swings = (self.upright == self.x) & arm.loses_at_hub_alone
@@ -212,19 +205,38 @@ def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real) -> Plane:
         turned = plane(loop, (vary[1], vary[0]), y, x)
         return replace(turned, vary=vary, x=x, y=y, unstable=turned.unstable.T.copy(), crossings=[])
     band, is_quiet = band_of_family(corners)
-    omega = np.asarray(grid(loop.arm, band))
-    lines = [Line(partial(loop.having, vary[0], value), vary[1], *up) for value in x.tolist()]
-    family = columns(loop, vary, x, max(map(abs, across)))
-    found = [column() for column in crossed(loop.arm, family, lines, omega)]
+    found = _columns(loop, vary, x, up, band)
     crossing = np.concatenate([y[:0], *(each.gain for each in found)])
     at = 0.0 if vary == PLANE else float(y[_farthest(y, crossing)])  # at K2 = 0 the hub is passive
     there = _counts_across(loop.having(vary[1], at), vary[0], x, band, one_by_one=is_counted)
     unstable = counts_over(y, found, at, there).T.copy()
-    edge = boundary(loop, omega) if vary == PLANE and loop.gains is not None else np.empty((0, 3))
+    edge = np.empty((0, 3))
+    if vary == PLANE and loop.gains is not None:
+        edge = boundary(loop, np.asarray(grid(loop.arm, band)))
     done = Plane(loop.arm, loop.law, vary, x, y, unstable, edge, band, found)
+
+    def counted(*point: float) -> int | None:
+        try:
+            return unstable_below(_at(loop, vary, point), band)
+        except ConvergenceError:  # a pole on the axis to working precision, which is on either side
+            return None
+
+    # poles may enter or leave the band through its top, between the corners
     if not is_quiet or any(part in name for part in NOT_AFFINE for name in vary):
-        _must_hold_at_corners(loop, done)
+        remedy = f"some cross the end of the frequency range, {band:.4g} rad/s; ask for a smaller range of values"
+        done.must_agree(counted, remedy)
     return done
+
+
+def _columns(loop: Loop, vary: tuple[str, str], x: Real, up: Window, band: float) -> list[Crossings]:
+    """The crossings along the second number at each value of the first; of gains of parts all at once."""
+    terms = LawTerms(loop.signals, loop.law, [])
+    if None in map(terms.part, vary):
+        return [line_crossings(loop.having(vary[0], value), vary[1], *up, band) for value in x.tolist()]
+    lines = [terms.having(vary[0], value).line(vary[1], *up) for value in x.tolist()]
+    members = (partial(loop.having, vary[0], value) for value in x.tolist())
+    loops = [Along(member, vary[1], line) for member, line in zip(members, lines, strict=True)]
+    return [column() for column in crossed(loop.arm, terms, band, loops)]
 
 
 def _at(loop: Loop, vary: tuple[str, str], point: tuple[float, ...]) -> Loop:
@@ -256,9 +268,7 @@ def _counts_across(row: Loop, name: str, x: Real, band: float, *, one_by_one: bo
     if one_by_one:
         return np.array([unstable_below(row.having(name, value), band) for value in x.tolist()])
     across = line_crossings(row, name, float(x[0]), float(x[-1]), band)
-    start = float(x[-1] if name == RATE_GAIN else x[x.size // 2])
-    if row.having(name, start).resting_zeros:
-        start = float(x[_farthest(x, across.gain)])
+    start = float(x[_farthest(x, across.gain)])
     return unstable_below(row.having(name, start), band) + across.passed(x) - across.passed(start)
 
 
@@ -267,27 +277,15 @@ def _farthest(values: Real, at: Real) -> int:
     return int(np.argmax(abs(values[:, None] - at).min(axis=1))) if at.size else values.size // 2
 
 
-def _must_hold_at_corners(loop: Loop, found: Plane) -> None:
-    """Raise ConvergenceError for a map where poles entered or left the band through its top, between the corners."""
-    for i, j in ((0, 0), (0, -1), (-1, 0), (-1, -1)):
-        at = (float(found.x[i]), float(found.y[j]))
-        try:
-            count = unstable_below(_at(loop, found.vary, at), found.band)
-        except ConvergenceError:  # a pole on the axis to working precision, which is on either side
-            continue
-        if count != found.unstable[j, i]:
-            where = ", ".join(f"{name} = {value:.6g}" for name, value in zip(found.vary, at, strict=True))
-            why = f"at {where} {count} poles below {found.band:.4g} rad/s are unstable, not {found.unstable[j, i]}"
-            remedy = "some crossed the end of the frequency range: ask for a smaller range of values"
-            raise ConvergenceError(f"{why}; {remedy}", found, abs(count - int(found.unstable[j, i])))
-
-
 def boundary(loop: Loop, omega: Real) -> Real:
     """K1 and K2 with poles at +-i w, the other gains those of the loop, and w: (n, 3), in the order of omega."""
     if loop.arm.loses_at_hub_alone:
         return np.empty((0, 3))  # both equations are one
     apart = loop.under(with_numbers(loop.law, dict.fromkeys(PLANE, 0.0)))
-    (N, _), (a, b) = along(apart, PLANE)(np.arange(2)[:, None], 1j * omega[None])
+    terms = LawTerms(apart.signals, apart.law, [])
+    rows = terms.at(1j * omega)
+    N = terms.weights @ rows
+    a, b = (terms.line(name).alone @ rows for name in PLANE)
     determinant = (a * b.conj()).imag
     with np.errstate(all="ignore"):  # where both equations are one, the point is far away
         K1 = -(N * b.conj()).imag / determinant

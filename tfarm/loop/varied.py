@@ -17,6 +17,7 @@ import numpy as np
 
 from tfarm.arm import LISTED, NAMES, RATE_GAIN, AnyLaw, Arm, Law, arm_and_law, full_law, unit_of
 from tfarm.arrays import Complex, Real, Whole
+from tfarm.crossing import Line
 from tfarm.errors import ConvergenceError, require
 from tfarm.exact.characteristic import Analytic, LoopParts
 from tfarm.exact.outputs import OUTPUTS
@@ -25,7 +26,7 @@ from tfarm.spectrum.box import Box, winding_number, zeros_in_box
 from tfarm.spectrum.following import settled
 from tfarm.spectrum.table import first_frequency
 
-from .lines import Place, parts_of, place_of
+from .lines import LawTerms
 from .loop import NEAREST_TO_ORIGIN, ORDER_READ_AT, Loop, band_of, by_differences
 from .poles import SLOW_SHARE, box_of, slow_poles, starting_points
 
@@ -139,9 +140,11 @@ class Varied:
         return self.start, self.start + (self.stop - self.start) / math.e, self.stop
 
     @cached_property
-    def place(self) -> Place:
-        """The place of the number in the law."""
-        return place_of(self.full, "gain" if self.vary == "all" else self.vary)
+    def terms(self) -> tuple[LawTerms, Line]:
+        """The terms of D, and their weights along the number of the law."""
+        name = "gain" if self.vary in ("all", "delay") else self.vary
+        terms = LawTerms(self.first.signals, self.full, [name])
+        return terms, terms.line(name)
 
     def function(self, s: Complex, values: Real) -> Analytic:
         """D/s^n at s (n,), each at a value of its own (n,), n = `pinned`, with slopes from differences."""
@@ -156,11 +159,11 @@ class Varied:
                 here = values == value
                 found[:, :, here] = self.at(float(value)).characteristic(s[:, here])
             return found[0], found[1]
-        rig = self.first.signals.parts(s)
-        parts = parts_of(self.full, rig, s)
-        if self.vary == "delay":
-            return parts._replace(f=parts.f * np.exp(-s * (values - self.full.delay))).whole, rig.scale
-        return parts.having(self.place, values).whole, rig.scale
+        (terms, line), rig = self.terms, self.first.signals.parts(s)
+        rows = terms.of(s, rig)
+        others, alone = (np.tensordot(each, rows, 1) for each in (line.others, line.alone))
+        share = np.exp(-s * (values - self.full.delay)) if self.vary == "delay" else values
+        return others + share * alone, rig.scale
 
     @cached_property
     def frequency(self) -> float:
@@ -196,7 +199,9 @@ class Varied:
         turn = np.exp(1j * scale.imag)
         drive, numerators = (drive * turn).real + 0j, numerators * turn
         numerators = np.where(odd, 1j * numerators.imag, numerators.real)
-        return parts_of(self.full, LoopParts(drive, numerators, scale), s).line(self.place)
+        terms, line = self.terms
+        rows = terms.of(s, LoopParts(drive, numerators, scale))
+        return line.others @ rows, line.alone @ rows
 
     # ------------------------------------------------------------ interface of `spectrum.following`
 

@@ -19,8 +19,8 @@ from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import first_frequency, gain_unit, most_gain
 
-from .lines import LEADING, Line, along, critical, crossed, static_edge, unstable_below
-from .loop import Loop, grid
+from .lines import LEADING, Along, LawTerms, critical, crossed, static_edge, unstable_below
+from .loop import Loop
 from .stability import Stability, band_of_family, is_known_without, verdict_on
 from .theorem import TAKES, absorbed, theorem_of
 
@@ -155,9 +155,9 @@ def _lines(verdict: Stability, ranges: dict[str, Window]) -> tuple[dict[str, Cal
     if verdict.is_known_beyond or loop.gains is not None:
         ends = (loop.having(name, end) for name, pair in ranges.items() for end in critical(name, pair))
         band = max(band, band_of_family(ends)[0])
-    lines = [Line(lambda: loop, name, *pair) for name, pair in ranges.items()]
-    found = crossed(loop.arm, along(loop, ranges), lines, np.asarray(grid(loop.arm, band)))
-    return dict(zip(ranges, found, strict=True)), band
+    terms = LawTerms(loop.signals, loop.law, ranges)
+    lines = [Along(lambda: loop, name, terms.line(name, *pair)) for name, pair in ranges.items()]
+    return dict(zip(ranges, crossed(loop.arm, terms, band, lines), strict=True)), band
 
 
 def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, band: float) -> list[Window]:
