@@ -43,7 +43,7 @@ def continuous_model(arm, law, _):
 def sampled_model(arm, law, chain):
     """L(z) by python-control: states of arm and law without feedback, and the row that closes the loop."""
     loop = sampled_verdict(arm, law, chain).full
-    (A, b), closed = loop.frame, loop.matrix()
+    (A, b), closed = loop.rig.frame, loop.matrix()
     row = np.linalg.lstsq(b[:, None], A - closed, rcond=None)[0]
     return control.StateSpace(A, b[:, None], row, [[0.0]], chain.sampling.period)
 

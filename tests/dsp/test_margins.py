@@ -42,7 +42,7 @@ def test_a_static_crossing_torn_by_rounding_hides_no_window(period):
     low, high = around(stable_windows(loop, "K2"), 0.3)
     assert high == pytest.approx(1.0, rel=1e-9)
     for K2, is_stable in ((low - 1e-6, False), (low + 1e-6, True), (0.999, True), (1.001, False)):
-        assert loop.having(K1=0.0374, K2=K2).poles.is_stable == is_stable
+        assert loop.having("K1", 0.0374).having("K2", K2).poles.is_stable == is_stable
 
 
 def test_where_the_feedback_outweighs_no_fast_modes_damping_all_delays_are_looked_through(lab):
@@ -62,11 +62,11 @@ def test_where_the_feedback_outweighs_no_fast_modes_damping_all_delays_are_looke
 def test_a_long_delay_hides_no_crossing_between_two_points_of_the_grid(lab):
     """Sixty samples turn the loop's phase sixty times round the circle; a grid ten times coarser loses a pair."""
     loop = sampled_loop(lab, GAINS, Chain(sampling=Sampling(delay_samples=60.0)), count=6)
-    found = crossings_of(loop.having(K1=0.0, K2=0.3), "K1")
+    found = crossings_of(loop.having("K1", 0.0).having("K2", 0.3), "K1")
     gaps = np.nonzero(np.diff(found.gain) > 1e-6)[0]
     middles = np.r_[found.gain[0] - 1, (found.gain[gaps + 1] + found.gain[gaps]) / 2, found.gain[-1] + 1]
     passed = np.r_[0, np.cumsum(found.change)][np.searchsorted(found.gain, middles)]
-    counts = [growing(loop.having(K1=middle, K2=0.3)) for middle in middles]
+    counts = [growing(loop.having("K1", middle).having("K2", 0.3)) for middle in middles]
     np.testing.assert_array_equal(counts - passed, counts[0])
 
 
@@ -122,7 +122,10 @@ def test_the_region_is_upright_where_intervals_of_the_rate_gain_end(lab):
     assert (ends > 0).all()
     for end in ends.tolist():
         sides = [
-            [abs(loop.having(K1=end * share, K2=K2).eigenvalues).max() < 1 for share in (1 - 1e-5, 1 + 1e-5)]
+            [
+                abs(loop.having("K1", end * share).having("K2", K2).eigenvalues).max() < 1
+                for share in (1 - 1e-5, 1 + 1e-5)
+            ]
             for K2 in ENDS_AT
         ]
         assert [True, False] in sides or [False, True] in sides
@@ -186,7 +189,7 @@ def test_windows_of_the_rate_gain_of_a_damped_hub_begin_where_its_losses_are_tak
     ((low, high),) = stable_windows(loop, "K1")
     assert low == pytest.approx(-friction, rel=1e-13)
     sides = -1.005 * friction, -0.995 * friction, 0.99 * high, 1.01 * high
-    assert [loop.having(K1=K1).poles.is_stable for K1 in sides] == [False, True, True, False]
+    assert [loop.having("K1", K1).poles.is_stable for K1 in sides] == [False, True, True, False]
 
 
 STILL_RIG = (6, 28)  # held by a spring near its root: the hub's rate next to z = 1 is rounding
@@ -243,9 +246,9 @@ def test_an_arm_that_something_holds_has_its_whole_window():
     loop = sampled_loop(arm, law, chain, count=6)
     ((low, high),) = stable_windows(loop, "K1")
     inside = low + (high - low) * np.array([1e-6, 0.1, 0.35, 0.6, 0.9, 1 - 1e-6])
-    assert all(loop.having(K1=float(K1)).poles.is_stable for K1 in inside)
+    assert all(loop.having("K1", float(K1)).poles.is_stable for K1 in inside)
     for K1 in (low - 1e-6 * (high - low), high + 1e-6 * (high - low)):
-        assert not loop.having(K1=float(K1)).poles.is_stable
+        assert not loop.having("K1", float(K1)).poles.is_stable
 
 
 LAB = tfarm.load("sasaki2012-lab")

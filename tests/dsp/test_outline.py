@@ -17,5 +17,5 @@ def test_every_column_that_refines_an_outline_counts_as_eigenvalues_do():
     assert fresh.size > 10
     for i in fresh[:: fresh.size // 5]:
         for j, K2 in enumerate(fine.y):
-            assert fine.unstable[i, j] == loop.having(K1=float(fine.x[i]), K2=float(K2)).poles.unstable
+            assert fine.unstable[i, j] == loop.having("K1", float(fine.x[i])).having("K2", float(K2)).poles.unstable
     assert len(np.unique(fine.unstable[fresh])) > 1

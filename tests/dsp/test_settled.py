@@ -111,7 +111,7 @@ def test_the_count_does_not_depend_on_the_arcs_to_begin_with(lab, coarser, monke
     loop = sampled_loop(slightly, HubFeedback(K1=0.3, K2=0.3), count=14)
     circle = complete_band(loop).circle
     for K2 in (0.3, -0.05, 1.3):
-        other = loop.having(K1=0.3, K2=K2)
+        other = loop.having("K1", 0.3).having("K2", K2)
         assert circle.count(other.weights) == (other.poles.log_radius > 0).sum()
 
 
@@ -166,7 +166,7 @@ def test_what_is_left_of_the_line_is_bounded_by_the_integrals_of_both_edges():
     row = FED_BACK.index("root_moment")
 
     def size(s):
-        filtered = G(s) * 200.0 / (s + 200.0) if loop.analog[row] else G(s)
+        filtered = G(s) * 200.0 / (s + 200.0) if loop.rig.analog[row] else G(s)
         return abs(filtered / s) * math.exp(s.real * remaining) / (1 - math.exp(s.real * T))
 
     up, _ = quad(lambda w: size(complex(-line, w)), 0.0, top, limit=400)

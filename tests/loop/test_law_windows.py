@@ -13,8 +13,8 @@ from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Part
 from tfarm.arm.law_tables import load_law
 from tfarm.loop import lines as lines_module
+from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.lines import unstable_below
-from tfarm.loop.loop import Loop
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
 from tfarm.response.signals import Signals
@@ -102,7 +102,7 @@ def test_below_a_band_through_whose_top_poles_pass_each_interval_is_counted(name
     found = windows_of(stability(LAB, law, band), [name])[name]
     for value in np.linspace(*found.looked_at, 8)[1:-1].tolist():
         is_inside = any(low < value < high for low, high in found.all)
-        assert is_inside == (unstable_below(Loop(LAB, law.having(name, value)), found.band) == 0)
+        assert is_inside == (unstable_below(ContinuousLoop(LAB, law.having(name, value)), found.band) == 0)
 
 
 def test_no_number_of_a_signal_in_two_parts_has_a_window():
@@ -181,7 +181,7 @@ def test_a_count_next_to_a_law_s_slow_poles_is_right():
     """Three within a millionth of the lowest frequency, and a hub that turns freely: all in one step of a grid."""
     slow = 1e-6 * tfarm.modes(LAB, 1).natural_frequency[-1]
     law = Law({"hub_rate": {"zeros": [0.0] * 3, "poles": [slow, slow * (1 + 1j), slow * (1 - 1j)], "gain": 0.3}})
-    loop = Loop(LAB, law)
+    loop = ContinuousLoop(LAB, law)
     near = loop.law.times(1e-9)  # as good as no feedback: its own poles, three of them right of the axis
     assert unstable_below(loop.under(near), 300.0) == 3
 
@@ -203,7 +203,7 @@ def test_integrators_of_two_signals_leave_the_third_its_zeros_at_rest():
         "root_moment": ([0.3, 5.0], [1.0, 0.0]),
         "tip_acceleration": ([0.3, 5.0], [1.0, 7.0, 0.0]),
     })  # fmt: skip
-    loop = Loop(LAB, law)
+    loop = ContinuousLoop(LAB, law)
     assert loop.zeros_at_origin == 2
     at = loop.function(1e-5 * np.array([1j, 0.5j]))
     farther, nearer = at.value * np.exp(at.scale)

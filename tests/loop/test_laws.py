@@ -17,8 +17,8 @@ from tests.loop.law_counts import judge, some_delay, some_law
 from tests.shared import remember, sized, thinned
 from tests.shell import run
 from tfarm import ConvergenceError, HubFeedback, Law, ParameterError
+from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.lines import through_infinity, unstable_below, with_numbers
-from tfarm.loop.loop import Loop
 from tfarm.loop.margins import loop_margins
 from tfarm.loop.plane import between, plane
 from tfarm.loop.poles import poles_below
@@ -76,7 +76,7 @@ def test_poles_of_a_delayed_integrator_are_those_of_the_lambert_function():
     J = 1e6
     arm = replace(LAB, hub=replace(LAB.hub, inertia=J))
     K, tau = 1.5 * J, 2.0
-    poles = poles_below(Loop(arm, Law({"hub_rate": K}, delay=tau)), 12.0).moving
+    poles = poles_below(ContinuousLoop(arm, Law({"hub_rate": K}, delay=tau)), 12.0).moving
     expected = np.array([lambertw(-K * tau / J, n) / tau for n in range(-4, 5)])
     for pole in poles:
         assert abs(expected - pole).min() < 1e-5 * abs(pole)  # the link's share of the inertia: 1e-6 of it
@@ -171,13 +171,13 @@ def test_signs_of_polynomials_are_those_of_their_roots():
 )
 def test_no_loop_is_refused_by_its_key(entries, others, key):
     with pytest.raises(ParameterError) as error:
-        Loop(LAB, Law(entries, **others))
+        ContinuousLoop(LAB, Law(entries, **others))
     assert error.value.key == key
 
 
 def test_an_unstable_cancellation_in_the_law_is_reported():
     law = Law({"hub_angle": {"zeros": [2.0], "poles": [2.0, -5.0], "gain": 1.0}, "hub_rate": 0.3})
-    (words,) = Loop(LAB, law).warnings
+    (words,) = ContinuousLoop(LAB, law).warnings
     assert "cancels its own unstable pole" in words
     assert stability(LAB, law).unstable_roots == 1
 
@@ -321,7 +321,7 @@ LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], 
 )
 @pytest.mark.parametrize("points", sized(2, 4))
 def test_counts_are_those_of_full_searches(vary, x, y, points):
-    found = plane(Loop(LAB, LAW), vary, between(*x, 8), between(*y, 10))
+    found = plane(ContinuousLoop(LAB, LAW), vary, between(*x, 8), between(*y, 10))
     assert len(np.unique(found.unstable)) > 2
     for i, j in np.random.default_rng(1).integers((8, 10), size=(points, 2)):
         law = with_numbers(LAW, dict(zip(vary, (found.x[i], found.y[j]), strict=True)))
@@ -333,9 +333,9 @@ def test_where_a_filter_turns_over_a_pole_has_passed_infinity(vary):
     """With T < 0 in T s + 1 a pole is unstable that no crossing of the axis brought there."""
     ranges = {"hub_angle.den.0": [-0.1, -0.01, 0.03], "gain": [-1.0, 1.0, 20.0]}
     x, y = (np.array(ranges[each]) for each in vary)
-    found = plane(Loop(LAB, LAW), vary, x, y)
+    found = plane(ContinuousLoop(LAB, LAW), vary, x, y)
     for i, j in np.ndindex(x.size, y.size):
-        loop = Loop(LAB, LAW.having(vary[0], x[i]).having(vary[1], y[j]))
+        loop = ContinuousLoop(LAB, LAW.having(vary[0], x[i]).having(vary[1], y[j]))
         assert unstable_below(loop, found.band) == found.unstable[j, i]
 
 
@@ -343,7 +343,7 @@ def test_the_impedance_matching_gain_of_a_massless_hub_moves_a_pole_to_infinity(
     """At C = 0 a hub without inertia feels the impedance of an endless beam far right: I sqrt(E rho)."""
     arm = BARE.having(hub_inertia=0.0)
     far = np.array([1e6, 1e7, 1e8], complex) * tfarm.modes(arm, 1).natural_frequency[1]
-    drive, (_, rate, _), _ = Loop(arm, Law({"hub_rate": 1.0})).signals.parts(far)
+    drive, (_, rate, _), _ = ContinuousLoop(arm, Law({"hub_rate": 1.0})).signals.parts(far)
     impedance = arm.link.section.second_moment * np.sqrt(arm.link.youngs_modulus * arm.link.density)
     found = through_infinity(drive, rate)
     assert (found.at, found.change) == (np.inf, -1)  # right of the axis at smaller gains alone, farther right
@@ -356,7 +356,7 @@ def test_the_impedance_matching_gain_of_a_massless_hub_moves_a_pole_to_infinity(
 )
 def test_what_is_no_pair_of_numbers_is_refused(vary, key):
     with pytest.raises(ParameterError) as error:
-        plane(Loop(LAB, LAW), vary, between(0, 1, 3), between(0, 1, 3))
+        plane(ContinuousLoop(LAB, LAW), vary, between(0, 1, 3), between(0, 1, 3))
     assert error.value.key == key
 
 
@@ -365,14 +365,14 @@ def test_a_map_around_a_law_s_own_resonance_counts_as_the_verdict_does():
     law = Law({"hub_angle": 1.0, "hub_rate": 0.3, "tip_deflection": ([-100.0], [1.0, 2 * 0.02 * 39.487, 39.487**2])})
     lab, values = tfarm.load("sasaki2012-lab"), np.linspace(0.9, 1.1, 3)
     assert stability(lab, law).is_stable
-    assert plane(Loop(lab, law), ("hub_angle", "tip_deflection.num.0"), values, values).stable.all()
+    assert plane(ContinuousLoop(lab, law), ("hub_angle", "tip_deflection.num.0"), values, values).stable.all()
 
 
 def test_a_map_whose_counts_do_not_hold_at_its_corners_is_refused():
     """As if a pair had come into the band through its top, on the way to the last corner; one that rests is open."""
     law = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])})
     vary, across, up = ("gain", "hub_angle.den.1"), np.array([1.0, 5.0, 20.0]), np.array([0.5, 1.0, 3.0])
-    found = plane(Loop(LAB, law), vary, across, up)
+    found = plane(ContinuousLoop(LAB, law), vary, across, up)
     found.must_agree(lambda x, y: None if x == 20.0 else 0, "")
     with pytest.raises(ConvergenceError, match=r"at gain = 20, hub_angle.den.1 = 3 2 poles .* not 0: ask for less"):
         found.must_agree(lambda x, y: 2 * (x == 20.0 and y == 3.0), "ask for less")

@@ -17,7 +17,7 @@ from tests.odd_arms import odd_arms
 from tests.shared import thinned
 from tests.transition import response as transition
 from tfarm import Hub, HubFeedback
-from tfarm.loop.loop import Loop, grid
+from tfarm.loop.continuous import ContinuousLoop, grid
 from tfarm.loop.margins import lowest
 from tfarm.loop.stability import stability
 from tfarm.reduced import relaxed_model
@@ -110,7 +110,7 @@ def turns(function, path) -> int:
 
 def unstable(arm, law, delay, height) -> int:
     """Zeros right of the axis of 1 + L e^{-s delay}: its turns around a half-disc, L's own poles at 0 left out."""
-    loop, small = Loop(arm, law), 1e-7 * height
+    loop, small = ContinuousLoop(arm, law), 1e-7 * height
     omega = np.asarray(grid(arm, height))
     axis = 1j * omega[omega > small]
     corners = [1j * height, (1 + 1j) * height, (1 - 1j) * height, -1j * height]
@@ -140,7 +140,7 @@ def test_what_nothing_bounds_beyond_the_band_is_not_called_exact() -> None:
     link = arm.link
     omega = (law.K1 / link.section.second_moment) ** 2 / (link.density * link.youngs_modulus * link.damping)
     assert omega > found.in_band.band
-    L = Loop(arm, law).loop_function(1j * omega * np.array([0.5, 2.0]))
+    L = ContinuousLoop(arm, law).loop_function(1j * omega * np.array([0.5, 2.0]))
     assert abs(L[0]) > 1 > abs(L[1])
     assert np.mod(np.angle(-L), 2 * np.pi) == pytest.approx([0.75 * np.pi] * 2, abs=0.2)
     assert 0.75 * np.pi / (0.5 * omega) < 0.5 * found.in_band.delay
@@ -248,7 +248,7 @@ def test_where_an_angle_is_held_alone_L_settles_nowhere_at_rest(Kp) -> None:
     law = HubFeedback(K1=0.3, K2=0.3, Kp=Kp)
     for w, factor in margins(LAB, law).in_band.phase_crossovers:
         assert w > 0
-        assert abs(1 + factor * Loop(LAB, law).loop_function(np.array([1j * w]))[0]) < 1e-6
+        assert abs(1 + factor * ContinuousLoop(LAB, law).loop_function(np.array([1j * w]))[0]) < 1e-6
 
 
 @pytest.mark.parametrize("share", [1e-3, 1e-5])

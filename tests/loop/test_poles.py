@@ -12,7 +12,7 @@ from tests.shared import thinned
 from tests.spectrum.independent import newton_step
 from tfarm import Hub, HubFeedback, Law, ParameterError
 from tfarm.errors import ConvergenceError
-from tfarm.loop.loop import Loop
+from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
 
@@ -105,7 +105,7 @@ def test_a_spring_far_too_weak_for_the_flexible_arm_swings_the_rigid_one() -> No
 
 def test_a_gain_without_all_its_digits_is_refused() -> None:
     with pytest.raises(ParameterError, match="0, or at least"):
-        Loop(LAB, HubFeedback(K1=5e-324))
+        ContinuousLoop(LAB, HubFeedback(K1=5e-324))
 
 
 BARE = tfarm.load("sasaki2012")

@@ -14,7 +14,7 @@ from tests.loop.test_lossless import RIGS
 from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.errors import ParameterError
-from tfarm.loop.loop import Loop
+from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.plane import INFINITE, LINEAR_SCALE, Axis, between, edge, gain_map, ranges_of, static_edges
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import stability
@@ -37,10 +37,8 @@ def test_counts_of_the_lab_arm_are_those_of_an_independent_model(Kp) -> None:
     K1, K2 = between(-1, 3, 5), between(-2, 2.5, 6)
     found = gain_map(LAB, K1, K2, Kp)
     there = model_counts(LAB, K1, K2, Kp, 10)
-    low = np.array([
-        [poles_below(Loop(LAB, HubFeedback(K1=float(a), K2=float(b), Kp=Kp)), found.band).unstable for a in K1]
-        for b in K2
-    ])  # fmt: skip
+    loops = [[ContinuousLoop(LAB, HubFeedback(K1=float(a), K2=float(b), Kp=Kp)) for a in K1] for b in K2]
+    low = np.array([[poles_below(each, found.band).unstable for each in row] for row in loops])
     np.testing.assert_array_equal(found.unstable, low)
     np.testing.assert_array_equal(found.stable, there == 0)
 
@@ -175,8 +173,11 @@ def test_the_edge_between_the_grids_frequencies_is_that_of_the_law_with_its_angl
     for K1, K2, omega in new[:: len(new) // 5]:
         law = HubFeedback(K1=K1, K2=K2, Kp=Kp)
         s = np.array([1j * omega])
-        parts = [abs(Loop(LAB, HubFeedback(**{name: law[name]})).loop_function(s)[0]) for name in ("K1", "K2", "Kp")]
-        assert abs(1 + Loop(LAB, law).loop_function(s)[0]) < 2000 * EPS * (1 + sum(parts))
+        parts = [
+            abs(ContinuousLoop(LAB, HubFeedback(**{name: law[name]})).loop_function(s)[0])
+            for name in ("K1", "K2", "Kp")
+        ]
+        assert abs(1 + ContinuousLoop(LAB, law).loop_function(s)[0]) < 2000 * EPS * (1 + sum(parts))
 
 
 @pytest.mark.parametrize(("name", "K1", "K2"), [("free", 0.0, None), ("held", None, 1.0)])

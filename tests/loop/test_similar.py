@@ -12,7 +12,7 @@ from tests.rigs import some_rig
 from tests.shared import thinned
 from tests.similar import EITHER
 from tfarm import HubFeedback, Law
-from tfarm.loop.loop import Loop
+from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.margins import dense, margins
 from tfarm.loop.plane import gain_map
 from tfarm.spectrum.table import default_gains
@@ -134,5 +134,5 @@ def test_margins_look_at_what_is_narrow_in_the_law_itself():
     w, ratio = 40.0, 1e-7
     law = Law({"hub_rate": ([0.3, 0.0, 0.3 * w * w], [1.0, 2 * ratio * w, w * w])})
     poles = SimpleNamespace(values=np.empty(0, complex), moving=np.empty(0, complex))
-    omega = dense(SimpleNamespace(loop=Loop(LAB, law), band=100.0, poles=poles))
+    omega = dense(SimpleNamespace(loop=ContinuousLoop(LAB, law), band=100.0, poles=poles))
     assert (abs(omega - w) <= 2 * ratio * w).sum() > 5

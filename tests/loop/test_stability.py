@@ -15,7 +15,7 @@ from tests.shared import thinned
 from tfarm import Arm, Hub, HubFeedback, Law, Link, Payload, Section
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
-from tfarm.loop.loop import Loop
+from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import band_of_loop, hub_shares, is_controllable, is_quiet, stability
 from tfarm.loop.theorem import lyapunov
@@ -127,7 +127,7 @@ def test_beyond_the_band_the_loop_is_quiet_far_up_between_shear_resonances_too()
     rng = np.random.default_rng(8)
     for arm in (LAB, window_arm(), some_free_arm(rng, True), some_free_arm(rng, True)):
         inertia, omega = hub_units(arm)
-        loop = Loop(arm, HubFeedback(K1=inertia * omega, K2=-7.0))
+        loop = ContinuousLoop(arm, HubFeedback(K1=inertia * omega, K2=-7.0))
         band, quiet = band_of_loop(loop)
         assert quiet
         shear = math.pi / arm.link.length * math.sqrt(arm.link.kGA / arm.link.rhoA)

@@ -14,8 +14,8 @@ from tests.loop.arms import window_arm
 from tests.rigs import some_rig
 from tfarm import HubFeedback, Law
 from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.loop.continuous import ContinuousLoop, band_of
 from tfarm.loop.locus import BranchCrossing, Locus
-from tfarm.loop.loop import Loop, band_of
 from tfarm.loop.nyquist import compressed, poles_on_axis
 from tfarm.loop.panels import CHEBYSHEV, Positions, loop_panels, positions, sensed_places
 from tfarm.loop.plane import Axis, moment_axis, rate_axis, stable_edge
@@ -29,7 +29,7 @@ LAB, STOCKY = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
 
 def listed(*values):
     box = Box(-50.0, 10.0, -60.0, 60.0)
-    return Poles(Loop(LAB, HubFeedback(K1=0.3)), np.array(values, complex), box)
+    return Poles(ContinuousLoop(LAB, HubFeedback(K1=0.3)), np.array(values, complex), box)
 
 
 def test_a_shorter_list_has_a_lower_box_between_its_last_pole_and_the_next():
@@ -70,7 +70,7 @@ LAWS = {
 @pytest.mark.parametrize("name", LAWS)
 def test_the_slope_of_the_function_is_its_difference_quotient(name):
     """Of higher order and wider: by the values of the function alone, its zeros at 0 divided out."""
-    loop = Loop(LAB, LAWS[name])
+    loop = ContinuousLoop(LAB, LAWS[name])
     for s in (0.3 + 2j, -5 + 40j, 2.0 + 0j, 1e-3 + 1e-2j):
         h = 1e-3 * abs(s)
         at = loop.function(s + h * np.array([0, -2, -1, 1, 2]))
@@ -150,7 +150,7 @@ def test_between_its_samples_a_panel_is_the_loop_function_too(arm, modes, monkey
         d, theta, m = (BarycentricInterpolator(CHEBYSHEV[order], part[order])(inside) for part in values)
         s = 1j * ((low + high) / 2 + (high - low) / 2 * inside)
         fed_back = (law.Kp + law.K1 * s) * theta + law.K2 * m * s**2
-        whole = Loop(arm, law).loop_function(s)
+        whole = ContinuousLoop(arm, law).loop_function(s)
         np.testing.assert_allclose(fed_back / (d * s**found.order), whole, rtol=1e-6 * (1 + abs(whole).max()))
     if arm is WIDE:
         width = np.diff(found.high)[1:4]  # of the panel that was halved, and its first half again
@@ -163,11 +163,11 @@ def test_between_its_samples_a_panel_is_the_loop_function_too(arm, modes, monkey
 def test_a_contour_passes_the_poles_of_a_law_on_the_axis_below_its_band():
     """Where it rings without damping, and its integrator if the rig has no zero there."""
     slow, fast = ([1.0, 0.0, w**2] for w in (30.0, 900.0))
-    loop = Loop(LAB, Law({"hub_rate": ([1.0], slow), "root_moment": ([1.0], fast)}))
+    loop = ContinuousLoop(LAB, Law({"hub_rate": ([1.0], slow), "root_moment": ([1.0], fast)}))
     np.testing.assert_allclose(poles_on_axis(loop, 400.0), [0.0, 30.0], rtol=1e-9)
     np.testing.assert_allclose(poles_on_axis(loop, 1000.0), [0.0, 30.0, 900.0], rtol=1e-9)
     np.testing.assert_allclose(poles_on_axis(loop, 10.0), [0.0])
-    bare = Loop(BARE, Law({"root_moment": ([1.0], slow)}))  # finite at rest, where the arm turns
+    bare = ContinuousLoop(BARE, Law({"root_moment": ([1.0], slow)}))  # finite at rest, where the arm turns
     omega = tfarm.modes(BARE, 3).natural_frequency[1:]
     expected = np.sort([30.0, *omega[omega < 400.0]])
     np.testing.assert_allclose(poles_on_axis(bare, 400.0), expected, rtol=1e-9)
@@ -252,14 +252,14 @@ def test_each_real_pole_right_of_the_singular_point_has_a_real_start(law):
     values = tfarm.closed_loop_poles(LAB, law, 12).values
     real = values[(values.imag == 0) & (values != 0)].real
     assert real.size == (1 if law.Kp == 0 else 2)
-    starts = real_starts(Loop(LAB, law), 300.0).real
+    starts = real_starts(ContinuousLoop(LAB, law), 300.0).real
     starts = starts[abs(starts) > 1e-12]  # the pole at rest, to rounding
     np.testing.assert_allclose(np.sort(starts), np.sort(real), rtol=0.01)
 
 
 def test_poles_of_a_long_delay_have_starts_next_to_them():
     """A delay of half a second has a pole every 2 pi/delay; three of four starts are within a hundredth of that."""
-    loop = Loop(LAB, Law({"hub_rate": 30.0}, delay=0.5))
+    loop = ContinuousLoop(LAB, Law({"hub_rate": 30.0}, delay=0.5))
     poles, starts = poles_below(loop, 300.0).values, starting_points(loop, 300.0)
     upper = poles[poles.imag > 0]
     away = np.abs(upper[:, None] - starts).min(axis=1)

@@ -12,8 +12,8 @@ from tests.loop.agreement import some_free_arm, some_gains
 from tests.loop.arms import window_arm
 from tests.loop.ritz_loop import RitzLoop
 from tfarm import Hub, HubFeedback, ParameterError, Payload
+from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.lines import line_crossings
-from tfarm.loop.loop import Loop
 from tfarm.loop.margins import margins
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import stability
@@ -106,7 +106,7 @@ def test_an_end_of_the_search_is_no_edge() -> None:
     found = windows(LAB, HubFeedback(K1=0.3, K2=0.3), "K2")
     assert [found.end(value) for value in found.around] == ["search bound", "edge"]
     for value in found.around:
-        poles = poles_below(Loop(LAB, HubFeedback(K1=0.3, K2=value)), 2e3).moving
+        poles = poles_below(ContinuousLoop(LAB, HubFeedback(K1=0.3, K2=value)), 2e3).moving
         assert (abs(poles.real / abs(poles)).min() < 1e-12) == (found.end(value) == "edge")
     assert [windows(BARE, HubFeedback(K1=0.3), "K1").end(value) for value in (0.0, math.inf)] == ["edge", "no limit"]
 
@@ -132,7 +132,7 @@ def test_behind_an_inductance_the_lowest_K2_is_that_of_its_band():
     band = found.windows["K2"].band
     assert math.isfinite(band)
     low = found.windows["K2"].around[0]
-    higher = line_crossings(Loop(arm, law), "K2", 2 * low, 0.0, 4 * band).gain
+    higher = line_crossings(ContinuousLoop(arm, law), "K2", 2 * low, 0.0, 4 * band).gain
     assert 0.5 * low < higher[higher < 0].max() < 0
 
 
@@ -150,5 +150,5 @@ def test_exact_intervals_have_no_note(name, reach):
 )
 def test_where_there_is_no_loop(inertia: float, law, words: str) -> None:
     with pytest.raises(ParameterError, match=words) as refused:
-        Loop(replace(BARE, hub=Hub(inertia=inertia)), law)
+        ContinuousLoop(replace(BARE, hub=Hub(inertia=inertia)), law)
     assert "\n" not in str(refused.value)

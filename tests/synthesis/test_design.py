@@ -13,7 +13,7 @@ from tests.shared import sized
 from tests.synthesis.judged import judge_of
 from tfarm import HubFeedback
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.loop.loop import band_of
+from tfarm.loop.continuous import band_of
 from tfarm.loop.margins import loop_margins
 from tfarm.loop.stability import stability
 from tfarm.synthesis.design import design

@@ -18,19 +18,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import AnyLaw, Arm, as_law
-from tfarm.arrays import Complex
 from tfarm.digits import general
 from tfarm.dsp import Chain
 from tfarm.dsp.stages import admit, not_covered
 from tfarm.errors import ConvergenceError
-from tfarm.loop.circle_crossings import CircleGrid, circle_grid
 from tfarm.loop.curve import LoopCurve, curve_of, gain_margin, lowest_drawn, refined
 from tfarm.loop.margins import LoopMargins, Margins, margins, margins_of_curve
 from tfarm.loop.sampled import Sampled
@@ -261,7 +258,7 @@ def sampled_card(found: Analysis) -> LoopCard:
     verdict, loop, band = found.verdict, found.verdict.full, None
     arm, T = loop.plant.arm, loop.chain.sampling.period
     if verdict.is_stable:
-        band = sampled_margins(SampledCurve(loop))
+        band = sampled_margins(loop)
     is_small = arm.least_damping < reference_damping(arm)
     needed = found.damping_limit if is_small else None
     return LoopCard(
@@ -271,36 +268,6 @@ def sampled_card(found: Analysis) -> LoopCard:
         time_constant=verdict.time_constant if verdict.is_stable else None,
         minimum_damping=None if needed is None else needed.value,
     )
-
-
-@dataclass(frozen=True)
-class SampledCurve:
-    """L(e^{i w T}) of a sampled loop as a function of s = i w."""
-
-    loop: Sampled
-
-    @cached_property
-    def grid(self) -> CircleGrid:
-        """Angles w T that resolve L."""
-        return circle_grid(self.loop)
-
-    @property
-    def feeds_back(self) -> bool:
-        """Whether a gain of the law is other than 0."""
-        return any(self.loop.weights)
-
-    def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
-        """Denominator and numerator of L at s = i w."""
-        q = np.ravel(np.imag(s)) * self.loop.chain.sampling.period
-        base = self.grid.base[np.minimum(np.searchsorted(self.grid.q, q), self.grid.q.size - 1)]
-        own, *rows = self.grid.at(base, q - self.grid.angles[base])
-        fed_back = np.asarray(np.array(self.loop.weights) @ np.array(rows), dtype=np.complex128)
-        return own.reshape(np.shape(s)), fed_back.reshape(np.shape(s))
-
-    def loop_function(self, s: NDArray[Any]) -> Complex:
-        """L at s = i w."""
-        own, fed_back = self.parts(s)
-        return np.asarray(np.divide(fed_back, own, out=np.full(own.shape, np.inf + 0j), where=own != 0))
 
 
 def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurve:
@@ -347,21 +314,20 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
 def sampled_curve(found: Analysis) -> LoopCurve:
     """The curve of a sampled loop."""
     loop, band, T = found.verdict.full, None, found.verdict.full.chain.sampling.period
-    curve = SampledCurve(loop)
     if found.verdict.is_stable:
-        own = sampled_margins(curve)
+        own = sampled_margins(loop)
         band = replace(own, gain=found.gain_factors or own.gain)
-    omega = curve.grid.q / T
-    omega, L = refined(curve.loop_function, omega[omega >= lowest_drawn(loop.plant.arm, band)])
+    omega = loop.rig.grid.q / T
+    omega, L = refined(loop.loop_function, omega[omega >= lowest_drawn(loop.plant.arm, band)])
     return LoopCurve(
-        arm=loop.plant.arm, law=loop.given, stability=found.verdict.word, period=T, omega=omega, L=L, margins=band
+        arm=loop.plant.arm, law=loop.law, stability=found.verdict.word, period=T, omega=omega, L=L, margins=band
     )
 
 
-def sampled_margins(curve: SampledCurve) -> LoopMargins:
+def sampled_margins(loop: Sampled) -> LoopMargins:
     """The margins of a stable sampled loop up to half its sampling rate."""
-    T = curve.loop.chain.sampling.period
-    return margins_of_curve(curve, curve.grid.q / T, math.pi / T)
+    T = loop.chain.sampling.period
+    return margins_of_curve(loop, loop.rig.grid.q / T, math.pi / T)
 
 
 def unaliased_poles(loop: Sampled) -> dict[int, complex]:

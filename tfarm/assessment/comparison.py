@@ -17,8 +17,8 @@ from tfarm.crossing import Window
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import driven
 from tfarm.errors import ConvergenceError, one_line, require
-from tfarm.loop.circle_crossings import FACTOR, circle_grid, stable_windows
-from tfarm.loop.loop import Loop
+from tfarm.loop.circle_crossings import FACTOR, stable_windows
+from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.margins import Margins, dense
 from tfarm.loop.margins import margins as margins_of
 from tfarm.loop.plane import Plane, between, gain_map, plane, ranges_of
@@ -110,7 +110,7 @@ class ComparedSide:
         L(e^{iwT}), up to half the sample rate, of a sampled loop.
         """
         if isinstance(self.loop, Analysis):
-            loop, grid = self.loop.loop, circle_grid(self.loop.loop)
+            loop, grid = self.loop.loop, self.loop.loop.rig.grid
             omega = grid.q / loop.chain.sampling.period
             with np.errstate(all="ignore"):
                 L = np.asarray(loop.weights @ grid.terms[1:] / grid.terms[0], dtype=np.complex128)
@@ -143,7 +143,7 @@ class ComparedSide:
             sampling, late = self.loop.loop.chain.sampling, self.loop.loop.with_delay
             now = [late(sampling.delay_samples + more) for more in (delay / sampling.period).tolist()]
             return [stable_windows(each, FACTOR) for each in now]
-        loop, factors = Loop(self.arm, as_law(self.law)), between(0.0, MOST_FACTOR, FACTORS)
+        loop, factors = ContinuousLoop(self.arm, as_law(self.law)), between(0.0, MOST_FACTOR, FACTORS)
         return [*plane(loop, ("delay", "gain"), loop.law.delay + delay, factors).stable_intervals]
 
 

@@ -356,7 +356,7 @@ def _highest(loop: Sampled, line: float) -> float | None:
 
 def _left_of(loop: Sampled, line: float, top: float) -> Real | None:
     """The bound on all poles of the band left of the line; None where the integral does not converge."""
-    sampling, exact, analog = loop.chain.sampling, loop.exact, np.array(loop.analog)[:, None]
+    sampling, exact, analog = loop.chain.sampling, loop.rig.exact, np.array(loop.rig.analog)[:, None]
     T, remaining = sampling.period, sampling.period * (1 - sampling.fraction)
 
     def sizes(s: Complex) -> Real:
@@ -390,10 +390,10 @@ def _of_the_filter(loop: Sampled, line: float) -> Real:
     """The bound on the error of the filter's own pole, whose residue has the model's value at -wc, not the arm's."""
     sampling, plant = loop.chain.sampling, loop.plant
     corner = sampling.antialias_corner
-    if corner >= line or not any(loop.analog):  # then none of the kept poles is it, and the integral has it right
-        return np.zeros(len(loop.analog))
+    if corner >= line or not any(loop.rig.analog):  # then none of the kept poles is it, and the integral has it right
+        return np.zeros(len(loop.rig.analog))
     own = plant.mode.size - 1
-    arm = loop.exact(np.array([-corner + 0j]))[:, 0]
+    arm = loop.rig.exact(np.array([-corner + 0j]))[:, 0]
     wrong = np.where(plant.residues[:, own] == 0, 0.0, abs(plant.residues[:, own] / corner - arm))
     left = sampling.period * corner
     return wrong * np.exp(-left * (1 - sampling.fraction)) * 2 / (1 + np.exp(-left))

@@ -9,9 +9,8 @@ z = -1 a single pole crosses (see also Ackermann, Robust Control, 1993, ch. 4).
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
@@ -19,12 +18,11 @@ from numpy.typing import NDArray
 
 from tfarm.arm import NAMES, PLANE
 from tfarm.arm.feedback import ON
-from tfarm.arrays import Complex, Real, Whole
+from tfarm.arrays import Complex, Real
 from tfarm.crossing import (
     Crossing,
     Crossings,
     Line,
-    Steps,
     Window,
     ascending,
     confirmed,
@@ -35,18 +33,12 @@ from tfarm.crossing import (
 from tfarm.crossing.shown import PlaneOfCounts
 from tfarm.crossing.turning import loose_columns
 from tfarm.loop.sampled import OfLoop, Sampled
+from tfarm.loop.sampled_rig import CircleGrid
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import most_gain
 
-A_DECADE = 48  # grid points a decade of the distance to a pole
-NARROWEST_WIDTH = 1e-17  # rad, of a pole: closer to it angles are not distinct
-WIDTH_SHARE = 1e-2  # of the distance of a pole from the circle: the grid begins so near to it
-BRIGHT = 1e-2  # poles and roots nearer to z = 0 have no narrow feature on the circle
 NO_EFFECT = 1e-12  # of the terms without a gain: smaller terms of the gain are rounding
-COARSEST = 2000  # points of the uniform grid over the half circle
-STILL = 1e-8  # of the way from z = 1 to the nearest pole of a held arm: nearer than that the rate of the arm is
-# rounding, and a gain on it would have to be 1e8 times too large to move a pole
 FACTOR = "gain"  # the name of a factor on the whole law
 LEAST_FACTOR = 1e-9  # on a law, of those searched: with less it is none
 MOST_FACTOR = 1e9  # with more its gain is beyond any number
@@ -57,89 +49,6 @@ OUTLINE_ROUNDS = 12  # of halving where its outline bends
 OFF_EDGE = 1e-9  # relative: distance to either side of such an edge at which a region is cut
 CLEAR_OF_CIRCLE = 1e-9  # of ln|z|: a pole nearer to the circle may be counted on either side
 GOLDEN = 0.6180339887498949  # of a range: a place on no rounded number and no grid
-
-
-@dataclass(frozen=True)
-@record
-class CircleGrid:
-    """Points z = e^{iq}, 0 < q < pi, each as a pole `base` and an angle `shift` from it."""
-
-    loop: Sampled
-    base: Whole
-    shift: Real
-
-    @cached_property
-    def angles(self) -> Real:
-        """The angle of each open-loop pole on the circle."""
-        return np.angle(self.loop.pulse.multipliers).astype(np.float64)
-
-    @cached_property
-    def q(self) -> Real:
-        """The angle of each point."""
-        return self.angles[self.base] + self.shift
-
-    @cached_property
-    def terms(self) -> Complex:
-        """The loop's `terms` (1 + parts, n), each times the offset of the point from its pole."""
-        return self.at(self.base, self.shift)
-
-    def steps(self, number: Whole) -> Steps:
-        """The steps from the points of these numbers to the next, as angles from the pole of each."""
-        base = self.base[number]  # where the next point has another pole, both are as far away
-        is_own = base == self.base[number + 1]
-        high = np.where(is_own, self.shift[number + 1], self.q[number + 1] - self.angles[base])
-        return Steps(self.shift[number], high, lambda shift: self.at(base, shift), self.angles[base])
-
-    def at(self, base: Whole, shift: Real) -> Complex:
-        """`terms` at other points."""
-        pulse = self.loop.pulse
-        decay = pulse.poles.real[base] * pulse.sampling.period
-        offset = pulse.multipliers[base] * np.expm1(-decay + 1j * shift)
-        return self.loop.terms(np.exp(1j * (self.angles[base] + shift)), base, offset)
-
-
-def circle_grid(loop: Sampled) -> CircleGrid:
-    """The grid that resolves every pole of the plant and every pole and zero of the law, for any weights."""
-    pulse = loop.pulse
-    angles = np.angle(pulse.multipliers)
-    felt = pulse.residues.any(axis=0) | (np.arange(angles.size) == angles.size - 1)
-    bases = np.nonzero((angles >= 0) & (abs(pulse.multipliers) > BRIGHT) & felt)[0]
-    bases = bases[np.argsort(angles[bases], kind="stable")]
-    seams = np.r_[0.0, (angles[bases][1:] + angles[bases][:-1]) / 2, np.pi]
-    base, shift = [], []
-    for pole, low, high in zip(bases, seams[:-1], seams[1:], strict=True):
-        width = max(abs(pulse.poles.real[pole]) * pulse.sampling.period * WIDTH_SHARE, NARROWEST_WIDTH)
-        for edge in (low - angles[pole], high - angles[pole]):
-            shift.append(geometric(abs(edge), width) * np.sign(edge))
-            base.append(np.full(shift[-1].size, pole))
-    near = [*_next_to_roots(1 + np.concatenate([loop.in_z.poles, *(zeros for *_, zeros in loop.in_z.columns)]))]
-    extra = np.unique(np.concatenate([np.empty(0), *near]))
-    base.append(bases[np.searchsorted(seams[1:-1], extra)])
-    shift.append(extra - angles[base[-1]])
-    whole = CircleGrid(loop, np.concatenate(base), np.concatenate(shift))
-    order = np.lexsort((whole.shift, np.searchsorted(seams, whole.q, side="left"), whole.q))
-    away = abs(1 - pulse.multipliers[bases])  # 0 of the last, the pole of an arm that drifts
-    lowest = 0.0 if loop.plant.rigid.any() else STILL * away[away > 0].min(initial=1.0)
-    inside = order[(whole.q[order] >= lowest) & (whole.q[order] < np.pi)]
-    return CircleGrid(loop, whole.base[inside], whole.shift[inside])
-
-
-def _next_to_roots(roots: Complex) -> Iterator[Real]:
-    """Angles on the upper half of the circle at geometric distances from some roots."""
-    for root in roots[(abs(roots) > BRIGHT) & (roots.imag >= 0)]:  # the upper of each pair
-        near = geometric(math.pi, max(WIDTH_SHARE * abs(1 - abs(root)), NARROWEST_WIDTH))
-        q = abs(np.angle(root)) + np.r_[-near, near]
-        yield q[(q > 0) & (q < math.pi)]
-
-
-def geometric(edge: float, width: float) -> Real:
-    """Distances from a pole, from a hundredth of its width to the seam with its neighbour."""
-    if edge <= width:
-        return np.array([edge / 2])[: int(edge > 0)]
-    decades = np.log10(edge / width)
-    near = np.geomspace(width, edge, max(2, int(A_DECADE * decades)), endpoint=False)
-    even = np.arange(1, int(edge * COARSEST / np.pi) + 1) * (np.pi / COARSEST)
-    return np.union1d(near, even[even < edge])
 
 
 def line_of(loop: Sampled, name: str) -> Line:
@@ -163,12 +72,12 @@ def crossings_along(grid: CircleGrid, lines: Sequence[Line]) -> list[Crossings]:
     vanishes: it falls towards that end where it is positive just before.
     """
     found = []
-    (first, last), at_end = grid.terms[:, [0, -1]].T, grid.loop.terms(np.array([-1.0 + 0j]), None, np.ones(1))[:, 0]
+    (first, last), at_end = grid.terms[:, [0, -1]].T, grid.rig.terms(np.array([-1.0 + 0j]), None, np.ones(1))[:, 0]
     for line, here in zip(lines, crossings(grid, lines), strict=True):
         others, alone, low, high = line
         ways = [1 if ((others @ rows) * (alone @ rows).conj()).imag >= 0 else -1 for rows in (first, last)]
         here.append(Crossing(_real_gain(others @ at_end, alone @ at_end), math.pi, ways[1]))
-        (lowest, at_one), (least, moving) = (_lowest(grid.loop.near_one(each)) for each in (others, alone))
+        (lowest, at_one), (least, moving) = (_lowest(grid.rig.near_one(each)) for each in (others, alone))
         if least <= lowest:  # A and B are of the same order in x = 1 - 1/z, or A is of a higher one: it crosses at 0
             static = _real_gain(at_one, moving) if least == lowest else 0.0
             here.append(Crossing(static, 0.0, -ways[0]))
@@ -178,7 +87,7 @@ def crossings_along(grid: CircleGrid, lines: Sequence[Line]) -> list[Crossings]:
 
 def crossings_of(loop: Sampled, name: str) -> Crossings:
     """Return the crossings of the circle along one number of the law, or along `FACTOR`."""
-    (found,) = crossings_along(circle_grid(loop), [line_of(loop, name)])
+    (found,) = crossings_along(loop.rig.grid, [line_of(loop, name)])
     return found
 
 
@@ -199,7 +108,7 @@ def _real_gain(A: Any, B: Any) -> float:
 def windows_of(loop: Sampled, names: Sequence[str]) -> dict[str, list[Window]]:
     """Return every stability interval of some numbers of the law, the others constant, confirmed by the poles."""
     lines, windows = [line_of(loop, name) for name in names], []
-    for name, line, found in zip(names, lines, crossings_along(circle_grid(loop), lines), strict=True):
+    for name, line, found in zip(names, lines, crossings_along(loop.rig.grid, lines), strict=True):
 
         def is_stable(value: float, line: Line = line) -> bool:
             return loop.weighted((line.others + value * line.alone)[1:].tolist()).is_stable
@@ -261,12 +170,12 @@ def sampled_map(
     if across is not None:
         turned = sampled_map(loop, y, x, (vary[1], vary[0]))
         return GainMap(loop, vary, turned.y, turned.x, turned.unstable.T, [])
-    loops = [loop.under(loop.given.having(vary[0], value)) for value in x.tolist()]
+    loops = [loop.under(loop.law.having(vary[0], value)) for value in x.tolist()]
     if up is None:
-        points = [[each.under(each.given.having(vary[1], value)) for value in y.tolist()] for each in loops]
+        points = [[each.under(each.law.having(vary[1], value)) for value in y.tolist()] for each in loops]
         return GainMap(loop, vary, x, y, np.array([[each.poles.unstable for each in row] for row in points]), [])
     at = _off_the_edge(y)
-    there = np.array([each.having(**{vary[1]: at}).poles.unstable for each in loops])
+    there = np.array([each.having(vary[1], at).poles.unstable for each in loops])
     found = [crossings_of(each, vary[1]) for each in loops]
     return GainMap(loop, vary, x, y, counts_over(y, found, at, there), found)
 
@@ -278,9 +187,9 @@ def _map_of_gains(loop: Sampled, x: Real, y: Real, vary: tuple[str, str]) -> Gai
     """
 
     def at(first: float, second: float) -> Sampled:
-        return loop.having(**{vary[0]: first, vary[1]: second})
+        return loop.having(vary[0], first).having(vary[1], second)
 
-    across, up, grid = _off_the_edge(x), _off_the_edge(y), circle_grid(loop)
+    across, up, grid = _off_the_edge(x), _off_the_edge(y), loop.rig.grid
     start = at(across, up)
     (row,) = crossings_along(grid, [line_of(start, vary[0])])
     there = start.poles.unstable + row.passed(x) - row.passed(across)
@@ -324,7 +233,7 @@ def with_more(plane: GainMap, x: Real) -> GainMap:
 def ends_of_K1(loop: Sampled) -> Real:
     """Ends of stability intervals of K1 at a few K2, without 0: upright edges of the region."""
     unit = loop.plant.arm.input_per_torque
-    found = [window for K2 in ENDS_AT for window in stable_windows(loop.having(K2=unit * K2), "K1")]
+    found = [window for K2 in ENDS_AT for window in stable_windows(loop.having("K2", unit * K2), "K1")]
     return np.array(sorted({end for window in found for end in window if math.isfinite(end) and end}))
 
 

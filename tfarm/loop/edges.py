@@ -265,13 +265,13 @@ def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[Interval]
     """Return the stability intervals of a number, with more and more modes until all digits are certified."""
 
     def proof(value: float) -> Proof:
-        return _proof(band, loop.having(**{name: value}))
+        return _proof(band, loop.having(name, value))
 
     def found(loop: Sampled) -> list[tuple[Limit, Limit]]:
         other, modes = _with_others(loop), loop.plant.count
 
         def confirmed(value: float) -> Proof:
-            return other().having(**{name: value}).is_stable, math.inf
+            return other().having(name, value).is_stable, math.inf
 
         def edge(value: float, opposite: float, *, below: bool) -> Limit:
             spare = DISTINCT_FROM_ZERO * (abs(opposite) if opposite and math.isfinite(opposite) else 1.0)
@@ -350,7 +350,7 @@ def delay_limit(loop: Sampled, band: Band | None) -> Figure | Limit:
 def damping_limit(loop: Sampled, count: int) -> Figure | Limit:
     """Return the damping [s] from which on a loop is stable, by a search with `count` modes."""
     count = min(count, MOST_EDGE_MODES)
-    bare, law = loop.on(loop.plant.arm.elastic, count), replace(loop.given, delay=0.0)  # that is in the chain
+    bare, law = loop.on(loop.plant.arm.elastic, count), replace(loop.law, delay=0.0)  # that is in the chain
     C = damping_edge(bare)
     if C == 0.0:
         return Figure(C, OTHER_DIGITS, None, count)

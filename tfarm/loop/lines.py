@@ -28,7 +28,7 @@ from tfarm.response.signals import Signals
 from tfarm.spectrum.box import FIRST_POINTS, NEAREST_TO_ZERO, TRIED_HEIGHTS, turned
 from tfarm.spectrum.table import first_frequency
 
-from .loop import FAR_RIGHT, LONG_PATH, SLOWEST, Loop, grid
+from .continuous import FAR_RIGHT, LONG_PATH, SLOWEST, ContinuousLoop, grid
 from .poles import box_of
 from .stability import MARGIN_OF_ZERO, is_known_without
 
@@ -136,7 +136,7 @@ def _key(name: str) -> str:
 class Along(NamedTuple):
     """The loops along one number of a law; `member` makes one of them."""
 
-    member: Callable[[], Loop]
+    member: Callable[[], ContinuousLoop]
     name: str
     line: Line
 
@@ -173,7 +173,7 @@ def _with_real_poles(along: Along, found: list[Crossing], N: Complex, P: Complex
     return Crossings.of(e._replace(t=0.0) if abs(e.t) <= ROUNDED * (high - low) else e for e in found)
 
 
-def line_crossings(loop: Loop, name: str, low: float, high: float, band: float) -> Crossings:
+def line_crossings(loop: ContinuousLoop, name: str, low: float, high: float, band: float) -> Crossings:
     """Return the crossings of the axis up to a band [rad/s] along one number of a loop's law between two values.
 
     Raises ConvergenceError where poles meet at s = 0 that cannot be counted.
@@ -225,7 +225,7 @@ def through_infinity(N: Complex, P: Complex) -> Crossing | None:
     return Crossing(float(third + last * last / (before - last)), math.inf, 1 if before < 0 else -1)
 
 
-def unstable_below(loop: Loop, band: float) -> int:
+def unstable_below(loop: ContinuousLoop, band: float) -> int:
     """Return the number of poles right of the axis with |Im s| < band, from the turns of D around that region.
 
     The next of `TRIED_HEIGHTS` is taken where a pole is on its upper edge.  Raises ConvergenceError where one is on the
@@ -252,12 +252,12 @@ def critical(name: str, limits: Window) -> tuple[float, ...]:
     return (low, 0.0, high) if name.endswith(LEADING) and low < 0 < high else limits
 
 
-def turns_over(loop: Loop, name: str, limits: Window) -> bool:
+def turns_over(loop: ContinuousLoop, name: str, limits: Window) -> bool:
     """Whether a leading coefficient passes through 0 between these values, where without it high modes are driven."""
     return 0.0 in critical(name, limits)[1:-1] and not is_known_without(loop, name)
 
 
-def static_edge(loop: Loop, name: str, limits: Window) -> Crossing | None:
+def static_edge(loop: ContinuousLoop, name: str, limits: Window) -> Crossing | None:
     """The value of a number at which a real pole passes through s = 0, if there is one."""
     near = SLOWEST * first_frequency(loop.arm) * np.array(NEAR_ORIGIN) + 0j
     terms = LawTerms(loop.signals, loop.law, [name])

@@ -35,8 +35,8 @@ from tfarm.spectrum.box import Box
 from tfarm.spectrum.following import assigned, between, follow
 from tfarm.spectrum.naming import single_zeros
 
+from .continuous import ContinuousLoop, grid
 from .lines import line_crossings
-from .loop import Loop, grid
 from .varied import ARM_PARAMETERS, OF_THE_LAW, Title, Varied
 
 LOCUS_VALUES, LAW_LOCUS_VALUES = 500, 100  # values of a locus by default: of gains, of any other law
@@ -259,7 +259,7 @@ def named(family: Varied, number: int) -> tuple[Complex, Whole]:
     return row[~np.isnan(row)], origin[~np.isnan(row)]
 
 
-def at_origin(loop: Loop) -> Whole:
+def at_origin(loop: ContinuousLoop) -> Whole:
     """Origins of the poles at s = 0 of a loop: those of the rig first."""
     return np.where(np.arange(loop.zeros_at_origin) < loop.k.at_rest, RIGID, CONTROLLER)
 

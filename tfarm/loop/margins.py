@@ -27,7 +27,7 @@ from tfarm.crossing import brackets, crossed, zeros_between
 from tfarm.records import record
 from tfarm.schema import At, Quantity
 
-from .loop import Loop, grid
+from .continuous import ContinuousLoop, grid
 from .stability import BAND, Stability, is_quiet, stability
 from .theorem import Lyapunov, Signs, lyapunov, signs_of_loop, theorem_of
 from .windows import Windows, reach_words, windows_of
@@ -393,7 +393,7 @@ def dense(verdict: Stability) -> Real:
     return np.unique(np.r_[omega, close[(close > 0) & (close < omega[-1])], slow])
 
 
-def gain_edges(loop: Loop, by_phase: tuple[PhaseCrossover, ...]) -> list[float]:
+def gain_edges(loop: ContinuousLoop, by_phase: tuple[PhaseCrossover, ...]) -> list[float]:
     """Factors on all of a law at which a pole reaches the axis, from where L < 0.
 
     Without damping all modes may reach it at one factor, where rounding alone decides whether L < 0.  There the factor

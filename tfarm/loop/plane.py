@@ -37,6 +37,7 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import PAPER_GAINS, default_gains, hub_locked, rate_unit
 
+from .continuous import ContinuousLoop, grid
 from .lines import (
     ROUNDED,
     Along,
@@ -49,7 +50,6 @@ from .lines import (
     unstable_below,
     with_numbers,
 )
-from .loop import Loop, grid
 from .stability import band_of_family, verdict_on
 from .windows import theorem_edges, theorem_windows
 
@@ -145,7 +145,7 @@ class Plane(PlaneOfCounts):
         if not self.is_known:
             return super().stable_intervals
         limits = float(self.y[0]), float(self.y[-1])
-        loop = Loop(self.arm, self.law.having(RATE_GAIN, self.upright + default_gains(self.arm).K1))
+        loop = ContinuousLoop(self.arm, self.law.having(RATE_GAIN, self.upright + default_gains(self.arm).K1))
         stable = theorem_windows(loop, MOMENT_GAIN, limits, theorem_edges(loop, MOMENT_GAIN, limits))
         return [stable if self.upright < K1 else [] for K1 in self.x]
 
@@ -174,8 +174,8 @@ def gain_map(
     """
     if law is None:
         require(vary is None, "law", None, "give the HubFeedback or Law whose numbers vary names")
-        return plane(Loop(arm, as_law(HubFeedback(Kp=Kp))), PLANE, K1, K2)
-    loop = Loop(arm, as_law(law))
+        return plane(ContinuousLoop(arm, as_law(HubFeedback(Kp=Kp))), PLANE, K1, K2)
+    loop = ContinuousLoop(arm, as_law(law))
     require(not Kp, ANGLE_GAIN, Kp, "give Kp in the law, or no law")
     vary = PLANE if vary is None and loop.gains is not None else vary
     match vary:
@@ -184,7 +184,7 @@ def gain_map(
     raise ParameterError(key="vary", value=vary, remedy='two numbers of the law, such as ("gain", "delay")')
 
 
-def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real) -> Plane:
+def plane(loop: ContinuousLoop, vary: tuple[str, str], x: Real, y: Real) -> Plane:
     """Return the map over two numbers of the law of a loop, x and y (1-D, ascending), the others constant.
 
     Raises ParameterError for an unknown number, an invalid loop or range; ConvergenceError where poles cannot be
@@ -228,7 +228,7 @@ def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real) -> Plane:
     return done
 
 
-def _columns(loop: Loop, vary: tuple[str, str], x: Real, up: Window, band: float) -> list[Crossings]:
+def _columns(loop: ContinuousLoop, vary: tuple[str, str], x: Real, up: Window, band: float) -> list[Crossings]:
     """The crossings along the second number at each value of the first; of gains of parts all at once."""
     terms = LawTerms(loop.signals, loop.law, [])
     if None in map(terms.part, vary):
@@ -239,7 +239,7 @@ def _columns(loop: Loop, vary: tuple[str, str], x: Real, up: Window, band: float
     return [column() for column in crossed(loop.arm, terms, band, loops)]
 
 
-def _at(loop: Loop, vary: tuple[str, str], point: tuple[float, ...]) -> Loop:
+def _at(loop: ContinuousLoop, vary: tuple[str, str], point: tuple[float, ...]) -> ContinuousLoop:
     """The loop at a point of the plane of two numbers of its law."""
     return loop.under(with_numbers(loop.law, dict(zip(vary, point, strict=True))))
 
@@ -249,7 +249,7 @@ def _is_known_everywhere(arm: Arm) -> bool:
     return arm.loses_at_hub_alone and arm.reads_hub_moment and not arm.input_lags
 
 
-def _known_counts(loop: Loop, K1: Real, K2: Real) -> NDArray[np.int64]:
+def _known_counts(loop: ContinuousLoop, K1: Real, K2: Real) -> NDArray[np.int64]:
     """Unstable poles without damping: one count for each side of each line on which modes meet the axis."""
     limits = float(K2[0]), float(K2[-1])
     static = static_edge(loop.having(RATE_GAIN, default_gains(loop.arm).K1), MOMENT_GAIN, limits)
@@ -263,7 +263,7 @@ def _known_counts(loop: Loop, K1: Real, K2: Real) -> NDArray[np.int64]:
     return unstable
 
 
-def _counts_across(row: Loop, name: str, x: Real, band: float, *, one_by_one: bool) -> NDArray[np.int64]:
+def _counts_across(row: ContinuousLoop, name: str, x: Real, band: float, *, one_by_one: bool) -> NDArray[np.int64]:
     """Unstable poles at each x along a row, from one count at the value farthest from its crossings, or one by one."""
     if one_by_one:
         return np.array([unstable_below(row.having(name, value), band) for value in x.tolist()])
@@ -277,7 +277,7 @@ def _farthest(values: Real, at: Real) -> int:
     return int(np.argmax(abs(values[:, None] - at).min(axis=1))) if at.size else values.size // 2
 
 
-def boundary(loop: Loop, omega: Real) -> Real:
+def boundary(loop: ContinuousLoop, omega: Real) -> Real:
     """K1 and K2 with poles at +-i w, the other gains those of the loop, and w: (n, 3), in the order of omega."""
     if loop.arm.loses_at_hub_alone:
         return np.empty((0, 3))  # both equations are one
@@ -384,7 +384,7 @@ def moment_axis(arm: Arm, x: Axis) -> Axis:
 
 def edge(found: Plane, x: Axis, y: Axis) -> Real:
     """The boundary in the picture, refined where it is coarse, with a row of nan after each of its parts."""
-    points, loop = found.boundary, Loop(found.arm, found.law)
+    points, loop = found.boundary, ContinuousLoop(found.arm, found.law)
     if not points.size:
         return points
     for _ in range(EDGE_ROUNDS):
@@ -431,7 +431,7 @@ def resting_frequencies(found: Plane, count: int) -> Real:
 
 def static_edges(found: Plane) -> tuple[float | None, float | None]:
     """The gains at which a real pole passes through 0: an upright line of the boundary, and a level one."""
-    loop, (across, up) = Loop(found.arm, found.law), (abs(values).max() for values in found.axes)
+    loop, (across, up) = ContinuousLoop(found.arm, found.law), (abs(values).max() for values in found.axes)
     upright = static_edge(loop.having(MOMENT_GAIN, 0.0), RATE_GAIN, (-across, across))
     level = static_edge(loop.having(RATE_GAIN, 1.0), MOMENT_GAIN, (-up, up))
     return None if upright is None else upright.t, None if level is None else level.t

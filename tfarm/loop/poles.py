@@ -27,7 +27,7 @@ from tfarm.spectrum.proofs import Disc, disjoint, enclosed, proven_count
 from tfarm.spectrum.starts import damped_starts
 from tfarm.spectrum.table import first_frequency
 
-from .loop import UNDISPERSED, Loop, band_of, steep_places
+from .continuous import UNDISPERSED, ContinuousLoop, band_of, steep_places
 from .theorem import CONSERVES, GIVES, theorem_of
 
 MOST_POLES = 1000  # that may be asked for
@@ -74,7 +74,7 @@ class Poles:
     sqrt(kappa G A/(rho I)), since no more poles lie below it: those above are shear modes, damped by bending alone.
     """
 
-    loop: Annotated[Loop, Quantity(flat=True)]
+    loop: Annotated[ContinuousLoop, Quantity(flat=True)]
     values: Annotated[Complex, Quantity("s", "1/s", 12, "closed-loop poles with Im s >= 0", key="poles")]
     box: Annotated[Box, Quantity("box: Re s from, to, Im s from, to", help="searched, and complete")]
     ends_at_shear_cutoff: Annotated[bool, ENDS_AT_SHEAR] = False
@@ -145,7 +145,7 @@ def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles:
     """
     if count is not None:
         count = whole("count", count, 1, MOST_POLES, f"a whole number from 1 to {MOST_POLES}")
-    loop = Loop(arm, as_law(law))
+    loop = ContinuousLoop(arm, as_law(law))
     wanted, limit = (USUAL_POLES, loop.arm.shear_cutoff) if count is None else (count, math.inf)
     number = wanted + 2
     while True:
@@ -165,7 +165,9 @@ def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles:
         number *= 2
 
 
-def poles_below(loop: Loop, height: float, late: float = LATE, factors: tuple[float, ...] = TRIED_HEIGHTS) -> Poles:
+def poles_below(
+    loop: ContinuousLoop, height: float, late: float = LATE, factors: tuple[float, ...] = TRIED_HEIGHTS
+) -> Poles:
     """Return all closed-loop poles with |Im s| <= height [rad/s] in a box that reaches right of every unstable one.
 
     Left it reaches to about -1.5 heights, -0.8/C or -late/delay.  Where a zero lies on the edge of the box the next of
@@ -182,7 +184,7 @@ def poles_below(loop: Loop, height: float, late: float = LATE, factors: tuple[fl
     return Poles(loop, np.r_[np.zeros(loop.zeros_at_origin, complex), upper], box)
 
 
-def box_of(loop: Loop, height: float, late: float = LATE) -> Box:
+def box_of(loop: ContinuousLoop, height: float, late: float = LATE) -> Box:
     """A box of that height, right of the law's poles and until |L| is small; left short of -1/C and -late/delay."""
     own, C = loop.law.poles, loop.arm.damping
     if own.real.max(initial=0.0) > UNDISPERSED * first_frequency(loop.arm):
@@ -198,7 +200,7 @@ def box_of(loop: Loop, height: float, late: float = LATE) -> Box:
     return Box(-float(left), right, -height, height)
 
 
-def quiet_edge(loop: Loop, right: float, height: float) -> float:
+def quiet_edge(loop: ContinuousLoop, right: float, height: float) -> float:
     """The right edge [1/s] of a box of that height, from `right` on: where 1 + L has no zero, or `MOST_HEIGHTS_RIGHT`.
 
     There Re L > -1/2, on the edge and at a few places beyond; L > 0 may be large, as on a hub without inertia.  On the
@@ -220,7 +222,7 @@ def quiet_edge(loop: Loop, right: float, height: float) -> float:
     return float(far[turns[-1] + 1] if turns.size else right)
 
 
-def slow_poles(loop: Loop, below: float) -> Complex:
+def slow_poles(loop: ContinuousLoop, below: float) -> Complex:
     """Poles [1/s] but 0 of size up to `below`: of the turning arm under small gains zeros of J s^2 + b s + c.
 
     These are from `Loop.at_rest`, corrected on the characteristic function, and one zero next to 0 from its slope.
@@ -242,7 +244,7 @@ def slow_poles(loop: Loop, below: float) -> Complex:
     return exact[abs(exact - slow) <= NEAR_RIGID * abs(slow)]
 
 
-def starting_points(loop: Loop, up_to: float) -> Complex:
+def starting_points(loop: ContinuousLoop, up_to: float) -> Complex:
     """Starts of Newton's method: poles of the damped arm and of the law, real ones, and those of its delay.
 
     A delay alone would have the poles  s = (ln(-L e^{s delay}) + 2 pi i n)/delay,  where L e^{s delay} changes little.
@@ -258,7 +260,7 @@ def starting_points(loop: Loop, up_to: float) -> Complex:
     return starts[np.isfinite(starts) & (abs(starts) > LEAST_START)]
 
 
-def real_starts(loop: Loop, up_to: float) -> Complex:
+def real_starts(loop: ContinuousLoop, up_to: float) -> Complex:
     """Real points next to which D changes its sign, right of -1/C."""
     line = np.geomspace(up_to / REAL_SPAN, REAL_REACH * up_to, REAL_POINTS)
     line = np.r_[-line[::-1], line]
@@ -271,7 +273,7 @@ def real_starts(loop: Loop, up_to: float) -> Complex:
     return (line[n] + share * (line[n + 1] - line[n])).astype(complex)
 
 
-def poles_of_model(loop: Loop, plant: Matrices) -> Complex:
+def poles_of_model(loop: ContinuousLoop, plant: Matrices) -> Complex:
     """Poles of a model of the rig, from its input to the law's signals, under the law; a delay is a Pade fraction."""
     law = loop.law.matrices()
     if loop.law.delay:

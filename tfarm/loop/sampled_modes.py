@@ -80,7 +80,7 @@ class ModeTable:
 def first_order(loop: Sampled, poles: Whole) -> Real:
     """Change of ln|z| (parts, poles) to first order by each part of the law alone, at open-loop poles by number."""
     z = loop.pulse.multipliers[poles]
-    _, *rows = loop.terms(z, poles, np.zeros(z.size))
+    _, *rows = loop.rig.terms(z, poles, np.zeros(z.size))
     whole = (loop.pulse.shifts[poles][:, None] - loop.in_z.poles).prod(axis=1)
     return np.asarray(-(np.array(loop.weights)[:, None] * rows / (z * whole)).real) + 0.0  # -0.0 where a weight is 0
 
@@ -215,7 +215,7 @@ def sampled_locus(loop: Sampled, gain: str, values: Real) -> SampledLocus:
     """Return the locus of a number at these values, at that of the loop, and between where a branch turns."""
 
     def poles(value: float) -> Complex:
-        z = loop.having(**{gain: value}).poles.z
+        z = loop.having(gain, value).poles.z
         return np.where(abs(z.imag) <= IMAGINARY_ROUNDING, z.real, z)
 
     known: dict[float, Complex] = {}
@@ -229,7 +229,7 @@ def sampled_locus(loop: Sampled, gain: str, values: Real) -> SampledLocus:
         if not bent.any():
             break
         wanted = (values[:-1] + values[1:])[bent] / 2
-    first = loop.having(**{gain: float(values[0])})
+    first = loop.having(gain, float(values[0]))
     origin = origins(first)
     modes = np.r_[loop.pulse.mode, np.zeros(loop.in_z.poles.size, np.int64)]
     mode = np.where(origin < 0, 0, modes[origin])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, NamedTuple
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, AnyLaw, Arm, arm_and_law, as_law, cancelled
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, AnyLaw, Arm, arm_and_law, as_law
 from tfarm.arm.chain import Chain, Sampling
 from tfarm.arm.checks import whole
 from tfarm.crossing import Window
@@ -59,7 +59,7 @@ class Verdict(OfLoop):
     @property
     def rule(self) -> Annotated[str, RULE]:
         """The discretisation of the law."""
-        return rule_in_words(self.loop.given)
+        return rule_in_words(self.loop.law)
 
     @property
     def is_settled(self) -> Annotated[bool, Quantity(key="certified",
@@ -235,7 +235,7 @@ class Analysis:
     def unfiltered_signals(self) -> Annotated[list[str], Quantity(
             help="signals of the controller without an analog anti-alias filter")]:  # fmt: skip
         """Signals without an anti-alias filter."""
-        return [name for name, analog in zip(self.loop.in_z.signals, self.loop.analog, strict=True) if not analog]
+        return [name for name, analog in zip(self.loop.in_z.signals, self.loop.rig.analog, strict=True) if not analog]
 
     @property
     def loop(self) -> Sampled:
@@ -308,7 +308,7 @@ class Analysis:
     def plain_windows(self) -> Mapping[str, list[Window]]:
         """Stability intervals with the modes of the verdict: of a factor on the law, and of the numbers of no gains."""
         loop = self.loop
-        numbers = () if loop.is_of_gains else (name for name in loop.law.part_gains if loop.number(name))
+        numbers = () if loop.is_of_gains else (name for name in loop.unit_law.part_gains if loop.number(name))
         return windows_of(loop, [*numbers, FACTOR])
 
     @property
@@ -332,7 +332,7 @@ class Analysis:
     def warnings(self) -> Annotated[tuple[str, ...], Quantity("warnings",
             help="unstable poles of the controller that its own zeros cancel")]:  # fmt: skip
         """Unstable poles of the law that its own zeros cancel."""
-        return cancelled(self.loop.given)
+        return self.loop.warnings
 
 
 def sampled(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | None = None) -> Analysis:

@@ -35,7 +35,7 @@ from tfarm.reduced.modal import modal_model, sensed_model
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes, modes_below
 
-from .loop import MOST_BAND_MODES, QUIET_REACH, Loop, band_of, quiet_places
+from .continuous import MOST_BAND_MODES, QUIET_REACH, ContinuousLoop, band_of, quiet_places
 from .poles import Poles, box_of, poles_below, poles_of_model
 from .theorem import GIVES, TAKES, Theorem, theorem_of
 
@@ -74,7 +74,7 @@ class Stability:
     Where `is_known_beyond` is false the verdict is that of the band alone.
     """
 
-    loop: Annotated[Loop, Quantity(flat=True)]
+    loop: Annotated[ContinuousLoop, Quantity(flat=True)]
     verdict: Annotated[str, Quantity("stability", help="stable, marginal or unstable; the pole of a free hub left out")]
     unstable_roots: Annotated[int, Quantity("unstable poles", help="in the frequency range")]
     unstable_roots_infinite: Annotated[bool, Quantity(help="infinitely many poles beyond the range are unstable")]
@@ -105,10 +105,10 @@ def stability(arm: Arm, law: AnyLaw, band: float | None = None) -> Stability:
     Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted, and where with damping
     one is on the axis to working precision.
     """
-    return verdict_on(Loop(arm, as_law(law)), band)
+    return verdict_on(ContinuousLoop(arm, as_law(law)), band)
 
 
-def verdict_on(loop: Loop, band: float | None = None) -> Stability:
+def verdict_on(loop: ContinuousLoop, band: float | None = None) -> Stability:
     """Return the verdict on a loop, as `stability`."""
     theorem = theorem_of(loop)
     height, quiet = (band, False) if band is not None else band_of_loop(loop, theorem)
@@ -162,7 +162,7 @@ def hub_shares(arm: Arm, up_to: float) -> Real:
     return np.array([b * scale / k, b * arm.hub_side_inertia * omega**2 * scale / (EI * k**2)])
 
 
-def band_of_loop(loop: Loop, theorem: Theorem | None = None) -> tuple[float, bool]:
+def band_of_loop(loop: ContinuousLoop, theorem: Theorem | None = None) -> tuple[float, bool]:
     """The band [rad/s] in which poles are computed, and whether small gain holds beyond it (never without damping)."""
     theorem, arm, own = theorem or theorem_of(loop), loop.arm, loop.law.poles
     ringing = own[own.real > -DULL * abs(own)]
@@ -179,13 +179,13 @@ def band_of_loop(loop: Loop, theorem: Theorem | None = None) -> tuple[float, boo
     return max(least, band / WIDENED) if loop.law.is_static else least, False
 
 
-def band_of_family(loops: Iterable[Loop]) -> tuple[float, bool]:
+def band_of_family(loops: Iterable[ContinuousLoop]) -> tuple[float, bool]:
     """A band [rad/s] for all these loops, and whether small gain holds beyond it for all."""
     bands, quiet = zip(*map(band_of_loop, loops), strict=True)
     return max(bands), all(quiet)
 
 
-def is_quiet(loop: Loop, band: float) -> bool:
+def is_quiet(loop: ContinuousLoop, band: float) -> bool:
     """Whether small gain decides every pole beyond a band.
 
     Not determined for a rig with an elastic segment: its resonances become ever narrower, and pass between any points
@@ -194,7 +194,7 @@ def is_quiet(loop: Loop, band: float) -> bool:
     return loop.arm.least_damping > 0 and has_fallen(loop, band)
 
 
-def has_fallen(loop: Loop, band: float) -> bool:
+def has_fallen(loop: ContinuousLoop, band: float) -> bool:
     """Whether 1 + L has no zero with Im s > band right of the axis, by |L| < 1/2 on the edges of that region.
 
     L is evaluated on two decades of the axis, where |L| falls, with the natural frequencies between, and on the upper
@@ -209,7 +209,7 @@ def has_fallen(loop: Loop, band: float) -> bool:
     return bool(abs(loop.loop_function(edge)).max() < QUIET)
 
 
-def is_known_without(loop: Loop, name: str) -> bool:
+def is_known_without(loop: ContinuousLoop, name: str) -> bool:
     """Whether poles beyond some band are known of this law, and of any nearer to it, once a leading coefficient is 0.
 
     Else high modes become unstable as it goes to 0, and their poles come to a band from above: the counts on one side
@@ -324,7 +324,7 @@ def spill(arm: Arm, law: AnyLaw, most: int = USUAL_SPILL_MODES) -> Spill:
     return Spill(verdict, numbers, np.array(unstable), np.array(rightmost))
 
 
-def _bare_models(loop: Loop, most: int) -> list[Matrices]:
+def _bare_models(loop: ContinuousLoop, most: int) -> list[Matrices]:
     """Models of 1 to `most` flexible modes without static remainder, each with the poles of its modes alone.
 
     They are cut from the largest.  A search of more modes of a strongly damped arm may leave poles without a mode,

@@ -26,8 +26,8 @@ from tfarm.spectrum.box import Box, winding_number, zeros_in_box
 from tfarm.spectrum.following import settled
 from tfarm.spectrum.table import first_frequency
 
+from .continuous import NEAREST_TO_ORIGIN, ORDER_READ_AT, ContinuousLoop, band_of, by_differences
 from .lines import LawTerms
-from .loop import NEAREST_TO_ORIGIN, ORDER_READ_AT, Loop, band_of, by_differences
 from .poles import SLOW_SHARE, box_of, slow_poles, starting_points
 
 OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}  # units, as of the arm's below
@@ -110,24 +110,24 @@ class Varied:
         """The law where the number has that value."""
         return self.full if self.is_of_arm else self.full.having("gain" if self.vary == "all" else self.vary, value)
 
-    def at(self, value: float) -> Loop:
+    def at(self, value: float) -> ContinuousLoop:
         """The loop where the number has that value."""
         return self._of_arm(value) if self.is_of_arm else self.first.under(self.law_at(value))
 
     @cached_property
-    def _of_arm(self) -> Callable[[float], Loop]:
+    def _of_arm(self) -> Callable[[float], ContinuousLoop]:
         """The same of a number of the arm: of the last values it is kept."""
 
         @lru_cache(ARMS_KEPT)
-        def of_arm(value: float) -> Loop:
-            return Loop(arm_and_law(self.arm.having(**{self.vary: value}), self.law)[0], self.full)
+        def of_arm(value: float) -> ContinuousLoop:
+            return ContinuousLoop(arm_and_law(self.arm.having(**{self.vary: value}), self.law)[0], self.full)
 
         return of_arm
 
     @cached_property
-    def first(self) -> Loop:
+    def first(self) -> ContinuousLoop:
         """The loop at the first value."""
-        return self.at(self.start) if self.is_of_arm else Loop(self.arm, self.law_at(self.start))
+        return self.at(self.start) if self.is_of_arm else ContinuousLoop(self.arm, self.law_at(self.start))
 
     @cached_property
     def pinned(self) -> int:

@@ -19,8 +19,8 @@ from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import first_frequency, gain_unit, most_gain
 
+from .continuous import ContinuousLoop
 from .lines import LEADING, Along, LawTerms, critical, crossed, static_edge, unstable_below
-from .loop import Loop
 from .stability import Stability, band_of_family, is_known_without, verdict_on
 from .theorem import TAKES, absorbed, theorem_of
 
@@ -126,7 +126,7 @@ def windows_of(verdict: Stability, names: Iterable[str] | None = None) -> dict[s
     return done
 
 
-def looked_at(loop: Loop, name: str) -> Window:
+def looked_at(loop: ContinuousLoop, name: str) -> Window:
     """The search range of a number: well beyond values that matter to the first mode, or ten times its value.
 
     Of a leading coefficient without which high modes are unstable: from a tenth of its value on, with its sign.
@@ -193,7 +193,7 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
     return stable
 
 
-def _without_rounding(loop: Loop, gains: HubFeedback, name: str, found: Crossings) -> Crossings:
+def _without_rounding(loop: ContinuousLoop, gains: HubFeedback, name: str, found: Crossings) -> Crossings:
     """The crossings along a gain without losses, where D is even in s but for the part of the rate gain.
 
     Poles are on the axis where that part vanishes, for all values of the other gains.
@@ -208,14 +208,14 @@ def _without_rounding(loop: Loop, gains: HubFeedback, name: str, found: Crossing
 # ------------------------------------------------------------ without damping, by a theorem
 
 
-def is_decided_along(loop: Loop, name: str) -> bool:
+def is_decided_along(loop: ContinuousLoop, name: str) -> bool:
     """Whether a theorem without losses decides the stability of the loop for every value of this gain."""
     if loop.gains is None or not loop.arm.loses_at_hub_alone or loop.arm.input_lags:
         return False
     return loop.arm.reads_hub_moment or (name != MOMENT_GAIN and loop.gains.K2 == 0)
 
 
-def theorem_edges(loop: Loop, name: str, limits: Window) -> Crossings:
+def theorem_edges(loop: ContinuousLoop, name: str, limits: Window) -> Crossings:
     """The values of such a gain at which all modes at once, or a real pole, may cross."""
     found = [] if (static := static_edge(loop, name, limits)) is None else [static]
     at = {MOMENT_GAIN: loop.arm.input_per_torque, RATE_GAIN: 0.0 - loop.arm.rate_loss}.get(name)
@@ -224,12 +224,12 @@ def theorem_edges(loop: Loop, name: str, limits: Window) -> Crossings:
     return Crossings.of(found).within(*limits)
 
 
-def theorem_windows(loop: Loop, name: str, limits: Window, edges: Crossings) -> list[Window]:
+def theorem_windows(loop: ContinuousLoop, name: str, limits: Window, edges: Crossings) -> list[Window]:
     """The stability intervals of such a gain: there every mode is damped, and the static stiffness is positive."""
     return joined([pair for pair in edges.spans(*limits) if is_held(loop.having(name, sum(pair) / 2))])
 
 
-def is_held(loop: Loop) -> bool:
+def is_held(loop: ContinuousLoop) -> bool:
     """Whether a theorem excludes unstable poles: every mode is damped, and the static stiffness is positive."""
     parts = absorbed(loop.arm, loop.law)
     if parts is None or not parts[0] < 1 or theorem_of(loop).energy != TAKES:
@@ -238,7 +238,7 @@ def is_held(loop: Loop) -> bool:
     return bool((1 + loop.loop_function(small)[0]).real > 0)
 
 
-def _with_proven_ends(loop: Loop, name: str, pair: Window, limits: Window) -> Window:
+def _with_proven_ends(loop: ContinuousLoop, name: str, pair: Window, limits: Window) -> Window:
     """The interval with ends of the search replaced by infinity where a theorem holds beyond them."""
     low, high = pair
     if loop.gains is None:

@@ -131,7 +131,7 @@ def extra_insensitive(z: complex) -> Real:
 def shaper(loop: Sampled, kind: Shaper, modes: int = SHAPED_MODES) -> Real:
     """Impulses for the first modes below half the sample rate, at the poles of the loop without moment feedback."""
     impulses, build = np.ones(1), zero_vibration if kind == "ZV" else extra_insensitive
-    poles: Any = loop.having(**{MOMENT_GAIN: 0.0}).poles
+    poles: Any = loop.having(MOMENT_GAIN, 0.0).poles
     for mode in range(1, modes + 1):
         own = loop.plant.poles[(loop.plant.mode == mode) & (loop.plant.poles.imag > 0)]
         upper = poles.z[(poles.mode == mode) & (poles.z.imag > 0)]

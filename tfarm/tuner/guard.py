@@ -139,12 +139,12 @@ class MovingGain:
     @cached_property
     def open(self) -> Real:
         """The matrix with rate feedback alone."""
-        return self.loop.having(**{MOMENT_GAIN: 0.0}).reduced_matrix()
+        return self.loop.having(MOMENT_GAIN, 0.0).reduced_matrix()
 
     @cached_property
     def _fed_back(self) -> Real:
         """drive sense^T: the change of the matrix by a gain of -1."""
-        return self.open - self.loop.having(**{MOMENT_GAIN: 1.0}).reduced_matrix()
+        return self.open - self.loop.having(MOMENT_GAIN, 1.0).reduced_matrix()
 
     @cached_property
     def sense(self) -> Real:
@@ -370,7 +370,7 @@ def _settled(loops: list[Sampled], found: list[tuple[float, float]]) -> bool:
 def upper_modes_are_quiet(loop: Sampled, highest: float) -> bool:
     """Whether the own decay of the upper half of the modes exceeds the bound on the push of the feedback."""
     plant, T = loop.plant, loop.chain.sampling.period
-    fed_back = loop.having(**{MOMENT_GAIN: highest}).push
+    fed_back = loop.having(MOMENT_GAIN, highest).push
     push = 2 * fed_back * abs(held_amplitude(plant.poles, T))
     upper = (plant.mode > plant.count // 2) & (plant.poles.imag > 0)
     return bool((push[upper] < -plant.poles.real[upper] * T).all())

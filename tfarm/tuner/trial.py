@@ -110,11 +110,11 @@ class Trial:
     @cached_property
     def model(self) -> kernel.Model:
         """The loop from sample to sample, open at the torque, and the rows of the servo and the moment."""
-        A = self.loop.having(Kp=0.0, K1=0.0, K2=0.0).matrix()
+        A = self.loop.times(0.0).matrix()
         last = self.loop.pulse.integrals_at + 2  # the state with the torque of the last sample: B is 1 there
-        servo = -self.loop.having(K2=0.0).matrix()[last]
-        moment = -self.loop.having(Kp=0.0, K1=0.0, K2=1.0).matrix()[last]
-        drive, own = self.loop.pulse.matrices()[1], self.loop.sensed.own_moment(self.loop.chain.sampling)
+        servo = -self.loop.having("K2", 0.0).matrix()[last]
+        moment = -self.loop.times(0.0).having("K2", 1.0).matrix()[last]
+        drive, own = self.loop.pulse.matrices()[1], self.loop.rig.sensed.own_moment(self.loop.chain.sampling)
         drive, own = (np.pad(of, (0, len(A) - of.size)) for of in (drive, own))
         return kernel.Model(*(np.ascontiguousarray(each) for each in (A.T, A, drive, servo, moment, own)))
 
