@@ -20,7 +20,7 @@ import numpy as np
 
 from tfarm.arm import Arm, Law
 from tfarm.arm.feedback import OUTPUT_OF
-from tfarm.arrays import Complex
+from tfarm.arrays import Complex, Real
 from tfarm.crossing import Crossing, Crossings, Grid, Line, Window, crossings
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import LoopParts
@@ -75,7 +75,17 @@ class LawTerms:
 
     def at(self, s: Complex) -> Complex:
         """The terms (rows, n) at places s (n,)."""
-        return self.of(s, (self.signals.kept if s.size >= LONG_PATH else self.signals.parts)(s))
+        return self.of(s, self.signals.parts(s))
+
+    def on_axis(self, omega: Real) -> Complex:
+        """The terms at s = i omega (n,), of a rig without losses without rounding: even in s they are real there."""
+        s = 1j * omega
+        drive, numerators, scale = (self.signals.kept if s.size >= LONG_PATH else self.signals.parts)(s)
+        if self.signals.system.is_real_on_axis:
+            turn, odd = np.exp(1j * scale.imag), [[each.power % 2] for each in self.signals.outputs]
+            numerators = np.where(odd, 1j * (numerators * turn).imag, (numerators * turn).real)
+            drive = (drive * turn).real + 0j
+        return self.of(s, LoopParts(drive, numerators, scale))
 
     def of(self, s: Complex, rig: LoopParts) -> Complex:
         """The same from the parts of the signals there."""
@@ -147,7 +157,7 @@ def crossed(arm: Arm, terms: LawTerms, band: float, loops: Sequence[Along]) -> I
     It raises ConvergenceError where poles meet at s = 0 that cannot be counted.
     """
     with_dips = bool(arm.least_damping)  # else h is rounding where modes rest
-    curve = Grid(np.asarray(grid(arm, band)), lambda w: terms.at(1j * w))
+    curve = Grid(np.asarray(grid(arm, band)), terms.on_axis)
     found = crossings(curve, [each.line for each in loops], with_dips=with_dips)
     s = np.r_[curve.places[0] * np.array(NEAR_ORIGIN), first_frequency(arm) * np.array([*ORDER_READ_AT, *FAR_RIGHT])]
     rows = terms.at(s + 0j)

@@ -23,7 +23,7 @@ from scipy.optimize import brentq
 from tfarm.arm import FED_BACK, NAMES, PLANE, AnyLaw, Arm, HubFeedback, arm_and_law, as_law
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real, Whole
-from tfarm.crossing import Crossing, crossed
+from tfarm.crossing import Crossing
 from tfarm.crossing.turning import loose
 from tfarm.errors import ConvergenceError, must_be_known, require
 from tfarm.records import record
@@ -35,9 +35,10 @@ from tfarm.spectrum.box import Box
 from tfarm.spectrum.following import assigned, between, follow
 from tfarm.spectrum.naming import single_zeros
 
-from .continuous import ContinuousLoop, grid
+from .continuous import ContinuousLoop
 from .lines import line_crossings
 from .varied import ARM_PARAMETERS, OF_THE_LAW, Title, Varied
+from .windows import without_losses
 
 LOCUS_VALUES, LAW_LOCUS_VALUES = 500, 100  # values of a locus by default: of gains, of any other law
 MOST_LOCUS_POINTS = 100_000  # values, those between that make it round among them
@@ -52,7 +53,6 @@ SAME_CROSSING = 1e-3  # of the highest frequency: largest distance of a crossing
 AT_END = 1e-9  # of the range: a crossing so near to an end is at the end, and not between
 GAIN_KNOWN = 1e-15  # of the larger end of a step: the value at which a branch crosses
 JUST_ABOVE = 1.01  # times the highest frequency of a branch: between two values it may be higher
-STEP = 1e-6  # of a frequency, for a difference
 CROSSINGS_SHOWN = 3  # of a locus, in its finding
 RIGID, CONTROLLER, OTHER = 0, -1, -2  # origin of a branch of no flexible mode
 ORIGINS = {RIGID: "rigid body", CONTROLLER: "controller", OTHER: "other"}
@@ -364,11 +364,12 @@ def branch_crossings(
     known: list[Crossing] = []
     if (changes or is_damped) and not (family.is_of_arm or family.vary == "delay"):
         loop, name = family.first.under(family.full), "gain" if family.vary == "all" else family.vary
-        if is_damped:
-            known = list(line_crossings(loop, name, float(gain.min()), float(gain.max()), band))
-        else:
-            gains, places, changed = crossed(np.asarray(grid(loop.arm, band)), family.on_axis)
-            known = [*map(Crossing, _corrected(family, gains, places), places, changed)]
+        try:
+            on_line = line_crossings(loop, name, float(gain.min()), float(gain.max()), band)
+            known = list(without_losses(loop, name, on_line))
+        except ConvergenceError:  # two poles meet at s = 0, and those of modes that rest are on the axis throughout
+            if is_damped:
+                raise
 
     def crossing(at: float, omega: float, branch: int | None, *, grows: bool) -> BranchCrossing:
         of = None if branch is None else origin_name(int(origin[branch]))
@@ -385,17 +386,6 @@ def branch_crossings(
         if is_between and not top < each.at < math.inf and (each.t, each.at) not in seen:
             found.append(crossing(each.t, each.at, None, grows=sign * each.change > 0))
     return tuple(sorted(found, key=lambda own: (sign * own.gain, own.omega)))
-
-
-def _corrected(family: Varied, t: Real, at: Real) -> Real:
-    """Gains corrected for the rounding of the frequency, by a step of Newton's method for both.
-
-    Of D + B dt + D' dw = 0 the part across D' is an equation for dt alone.
-    """
-    (A, B), (after, by_after), (before, by_before) = (family.on_axis(at * (1 + d)) for d in (0.0, STEP, -STEP))
-    slope = (after + t * by_after) - (before + t * by_before)
-    with np.errstate(all="ignore"):
-        return np.asarray(t - ((A + t * B) * slope.conj()).imag / (B * slope.conj()).imag)
 
 
 def _changes(branches: Complex) -> list[tuple[int, int, int]]:

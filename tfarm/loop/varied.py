@@ -19,7 +19,7 @@ from tfarm.arm import LISTED, NAMES, RATE_GAIN, AnyLaw, Arm, Law, arm_and_law, f
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.crossing import Line
 from tfarm.errors import ConvergenceError, require
-from tfarm.exact.characteristic import Analytic, LoopParts
+from tfarm.exact.characteristic import Analytic
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
 from tfarm.spectrum.box import Box, winding_number, zeros_in_box
@@ -188,20 +188,6 @@ class Varied:
         s = NEAREST_TO_ORIGIN * self.frequency * np.array([1.0, -1.0]) + 0j
         found = self.function(s, np.full(2, value))
         return float((found.value * np.exp(1j * found.scale.imag)).real.mean())
-
-    def on_axis(self, omega: Real) -> tuple[Complex, Complex]:
-        """A and B of D = A + t B at s = i omega (n,), of a rig without losses, where D is linear in the number.
-
-        There drive and numerators are real, or imaginary with an odd power of s: the other part is rounding, and 0.
-        """
-        s, odd = 1j * omega, np.array([[each.power % 2] for each in self.first.signals.outputs])
-        drive, numerators, scale = self.first.signals.parts(s)
-        turn = np.exp(1j * scale.imag)
-        drive, numerators = (drive * turn).real + 0j, numerators * turn
-        numerators = np.where(odd, 1j * numerators.imag, numerators.real)
-        terms, line = self.terms
-        rows = terms.of(s, LoopParts(drive, numerators, scale))
-        return line.others @ rows, line.alone @ rows
 
     # ------------------------------------------------------------ interface of `spectrum.following`
 

@@ -12,7 +12,7 @@ from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, RATE_GAIN, HubFeedback, shown_unit
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN, shown_unit
 from tfarm.crossing import Crossing, Crossings, Window, intervals, joined
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
@@ -167,8 +167,7 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
     the count at an end differs.
     """
     loop, value = verdict.loop, verdict.loop.numbers[name]
-    if loop.gains is not None and loop.arm.loses_at_hub_alone:
-        found = _without_rounding(loop, loop.gains, name, found)
+    found = without_losses(loop, name, found)
     pairs, count, at = found.spans(*limits), verdict.unstable_roots, value
     resting = [each.change for each in found if each.t == value and each.at == 0]
     is_known = verdict.verdict != "marginal"
@@ -193,16 +192,24 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
     return stable
 
 
-def _without_rounding(loop: ContinuousLoop, gains: HubFeedback, name: str, found: Crossings) -> Crossings:
-    """The crossings along a gain without losses, where D is even in s but for the part of the rate gain.
+def without_losses(loop: ContinuousLoop, name: str, found: Crossings) -> Crossings:
+    """The crossings along a gain; of a rig that loses at its hub alone all modes are at the gain that cancels the loss.
 
-    Poles are on the axis where that part vanishes, for all values of the other gains.
+    There D is even in s but for the part of the rate gain: poles are on the axis where that part vanishes, for all
+    values of the other gains.  Elsewhere they reach it where K2 cancels the whole moment on the hub.
     """
-    at = 0.0 - loop.arm.rate_loss
-    if name != RATE_GAIN:
-        return found if at != gains.K1 else Crossings.of([])
-    unit = gain_unit(loop.arm, name)
-    return Crossings.of(each._replace(t=at) if abs(each.t - at) < unit else each for each in found)
+    gains, arm = loop.gains, loop.arm
+    if gains is None or not arm.loses_at_hub_alone:
+        return found
+    at, reach = 0.0 - arm.rate_loss, 1.0
+    if name != RATE_GAIN and at == gains.K1:
+        return Crossings.of([])
+    if name == MOMENT_GAIN and is_decided_along(loop, name):
+        at, reach = arm.input_per_torque, 1e-9
+    elif name != RATE_GAIN:
+        return found
+    near = reach * gain_unit(arm, name)
+    return Crossings.of(each._replace(t=at) if abs(each.t - at) < near else each for each in found)
 
 
 # ------------------------------------------------------------ without damping, by a theorem
