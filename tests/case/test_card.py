@@ -14,7 +14,7 @@ from tests.shell import answer, run
 from tfarm.assessment import card
 from tfarm.dsp import Chain, Sampling, load_chain
 from tfarm.loop import edges
-from tfarm.loop.sampled_verdict import sampled_verdict
+from tfarm.loop.sampled_verdict import sampled_verdict, unaliased_poles
 from tfarm.schema.terminal import table_lines
 
 BARE, LAB = tfarm.load("sasaki2012"), tfarm.load("sasaki2012-lab")
@@ -196,7 +196,7 @@ def test_a_negative_real_pole_oscillates_at_half_the_sampling_rate(K1, K2):
     found = tfarm.sampled(LAB, law).verdict.full
     z = found.poles.z
     (n,) = np.flatnonzero((z.real < -1) & (abs(z.imag) < 1e-9))
-    own = card.unaliased_poles(found)[int(found.poles.mode[n])]
+    own = unaliased_poles(found)[int(found.poles.mode[n])]
     assert own.real == pytest.approx(math.log(abs(z[n])) / 0.01, rel=1e-9)
     assert own.imag % (2 * math.pi / 0.01) == pytest.approx(math.pi / 0.01, rel=1e-6)
 

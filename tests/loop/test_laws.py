@@ -19,7 +19,6 @@ from tests.shell import run
 from tfarm import ConvergenceError, HubFeedback, Law, ParameterError
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.lines import through_infinity, unstable_below, with_numbers
-from tfarm.loop.margins import loop_margins
 from tfarm.loop.plane import between, plane
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import Spill, stability
@@ -49,7 +48,7 @@ def test_margins_of_a_law_are_those_of_python_control_on_a_model(delay):
     G = control.ss(*sensed_model(LAB, law.signals, 20))(1j * omega)[:, 0]
     L = np.exp(-1j * omega * delay) * (law.values(1j * omega) * G).sum(axis=0)
     gm, pm, _, wpc, wgc, _ = control.stability_margins(control.FRD(L, omega), returnall=True)
-    mine = loop_margins(stability(LAB, law))
+    mine = stability(LAB, law).in_band
     by_phase = [pair for pair in mine.phase_crossovers if omega[0] < pair[0] < omega[-1]]
     by_gain = [pair for pair in mine.gain_crossovers if omega[0] < pair[0] < omega[-1]]
     np.testing.assert_allclose([w for w, _ in by_gain], np.sort(wgc), rtol=2e-5)  # the model's own error at 260 rad/s

@@ -56,7 +56,7 @@ def test_verdicts_at_no_damping_are_those_of_theory(K1, K2, Kp, verdict) -> None
     assert found.is_stable == (verdict == "stable")
 
 
-@pytest.mark.parametrize("K1", [1e-9, 0.3, 1e4])
+@pytest.mark.parametrize("K1", [1e-7, 0.3, 1e4])
 def test_what_lyapunov_proves_is_stable_however_slowly_it_decays(K1) -> None:
     """Of a stocky arm some modes decay by less than 1e-11 of their frequency, too little for double precision."""
     found = stability(STOCKY, HubFeedback(K1=K1, K2=0.3))

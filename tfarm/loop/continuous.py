@@ -43,13 +43,12 @@ from tfarm.response.signals import Controller, Signals, controller
 from tfarm.schema import Quantity
 from tfarm.spectrum import flexible_frequencies, modes, modes_below
 from tfarm.spectrum.frequencies import ARMS_KEPT
-from tfarm.spectrum.table import check_gains, first_frequency
+from tfarm.spectrum.table import LEAST_UNITS, check_gains, first_frequency
 
 FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: far right, where L of an improper law must fall, and poles come from infinity
 UNDISPERSED = 1e11  # of w1: where waves are no longer dispersed
 FALL_FACTOR = 0.5  # L must fall by this there, from one to the next
 SOMEWHERE = 0.31 + 0.71j  # of w1: where a signal is tested for being fed back at all; no law has its zero there
-LEAST_GAIN = 1e-100  # N m s/rad, N m/rad or pure: poles of a smaller gain have squares below the smallest double
 NEAREST_TO_ORIGIN = 1e-12  # of w1: where a function, its zeros at 0 divided out, is taken for its value at 0
 ROUNDING_AT_REST = 1e-13  # of the terms of D: less is left by their rounding where they cancel at s = 0
 ORDER_READ_AT = (2e-5, 1e-5)  # of w1: where the order of a zero at s = 0 is read off
@@ -70,7 +69,7 @@ MOST_BAND_MODES = 150  # flexible: in a band; beyond, poles are not determined w
 class ContinuousLoop(Loop):
     """A rig under a law in s, gains at the hub among them; `signals` are those fed back, made unless given.
 
-    Raises ParameterError for a locked hub, a law in z, an algebraic loop, and gains that are denormal numbers or far
+    Raises ParameterError for a locked hub, a law in z, an algebraic loop, and gains that are far too small or
     too large for the arm.
     """
 
@@ -91,7 +90,8 @@ class ContinuousLoop(Loop):
         if given is None or given.names != self.law.signals or given.arm != self.arm:
             object.__setattr__(self, "signals", Signals(self.arm, self.law.signals))
         if self.gains is not None:
-            _must_be_possible(self.arm, self.gains)
+            # searches under other laws may come to values next to 0
+            _must_be_possible(self.arm, self.gains, LEAST_UNITS if given is None else 0.0)
         _must_not_be_algebraic(self)
 
     @property
@@ -129,17 +129,6 @@ class ContinuousLoop(Loop):
             and self.law.is_static
             and not (odd @ abs(self.law.polynomials(np.ones(1, complex))[0])).any()
         )
-
-    @cached_property
-    def at_rest(self) -> tuple[float, float, float] | None:
-        """c, b and J of  D/theta = c + b s + J s^2 + ...  for gains at the hub of an arm that turns; else None."""
-        if self.gains is None or not self.arm.has_rigid_mode:
-            return None
-        arm, gains = self.arm, self.gains
-        J = arm.turned_inertia - gains.K2 * arm.gauged_inertia
-        if arm.is_uniform:  # to the last digit: I_h and (1 - K2) (J - I_h) may cancel
-            J = arm.hub_inertia + (1.0 - gains.K2) * arm.carried_inertia
-        return gains.Kp, gains.K1 + arm.rate_loss, J
 
     @property
     def k(self) -> System:
@@ -242,16 +231,12 @@ def _must_not_be_algebraic(loop: ContinuousLoop) -> None:
     require(falls, f"law.{worst.signals[0]}.num", worst.block.excess, remedy)
 
 
-def _must_be_possible(arm: Arm, gains: HubFeedback) -> None:
-    """Raise ParameterError for gains without a loop, and for gains beyond the range of doubles."""
+def _must_be_possible(arm: Arm, gains: HubFeedback, least: float) -> None:
+    """Raise ParameterError for gains without a loop, and for gains too small or too large for the arm."""
     is_possible = not arm.is_undamped or arm.hub_side_inertia or arm.reads_hub_moment
     remedy = "with hub.inertia = 0 and no damping K2 moves poles through infinity; use K2 = 0 or some inertia"
     require(not gains.K2 or is_possible, "K2", gains.K2, remedy)
-    least = LEAST_GAIN * max(1.0, arm.total_inertia if arm.has_rigid_mode else 1.0)
-    remedy = f"0, or at least {least:.1e} in size: the square of a slower pole is below the smallest double"
-    for name, value in gains.by_name.items():
-        require(not 0 < abs(value) < least, name, value, remedy)
-    check_gains(arm, gains)
+    check_gains(arm, gains, least)
 
 
 @lru_cache(maxsize=ARMS_KEPT)

@@ -29,6 +29,11 @@ class Loop(ABC):
     law: Law
 
     @property
+    def period(self) -> float | None:
+        """The sampling period [s]; None in continuous time."""
+        return None
+
+    @property
     def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller."""
         return controller(self.law, self.arm)

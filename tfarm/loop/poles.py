@@ -7,15 +7,17 @@ their number (`spectrum.box`).  Where it disagrees the others are searched for, 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
-from tfarm.arrays import LEAST_SIZE, Complex
+from tfarm.arrays import Complex
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, require
 from tfarm.records import record
@@ -33,10 +35,7 @@ from .theorem import CONSERVES, GIVES, theorem_of
 MOST_POLES = 1000  # that may be asked for
 USUAL_POLES = 10  # poles listed where no count is asked for
 MOST_BOX_MODES = 4000  # flexible, below the highest box that is searched for as many poles as are asked for
-SLOW_SHARE = 1e-6  # of a box's height: poles nearer to 0 are the rigid arm's, and known beforehand
-SLOW_STEPS = 4  # of Newton's method from there
-AT_REST = 1e-12  # of these: so near 0 the slope there is read
-NEAR_RIGID = 0.01  # of its size: largest distance of a slow pole from the rigid arm's
+SLOW_SHARE = 1e-6  # of a box's height: poles nearer to 0 are known beforehand
 LEAST_REAL_PART = -0.5  # of L, so that 1 + L has no zero
 RIGHT_OF_EDGE = (2.0, 5.0, 20.0)  # times the right edge of a box, where L is evaluated again
 FAR_RIGHT, BEYOND_CORNER = 1e5, 10.0  # times that edge, and a law's fastest corner: the end of a search of real poles
@@ -51,6 +50,7 @@ STARTS_REACH = 1.3  # heights of the box: modes of the arm up to there, as a law
 REAL_POINTS, REAL_SPAN, REAL_REACH = 300, 1e10, 1.4  # on either side of 0: their number, from 1e-10 to 1.4 heights
 DELAY_STEPS = 3  # of the equation of a delay alone
 LEAST_START = 1e-100  # 1/s: zeros at 0 are divided out
+HUB = 0  # the number of the pole below the first mode that no mode of the link is near
 PADE = 8  # order of the approximation of a delay in a model
 SHRUNK_HEIGHTS = tuple(1 / factor for factor in TRIED_HEIGHTS)  # of a box that may not reach above the shear cut-off
 
@@ -223,25 +223,23 @@ def quiet_edge(loop: ContinuousLoop, right: float, height: float) -> float:
 
 
 def slow_poles(loop: ContinuousLoop, below: float) -> Complex:
-    """Poles [1/s] but 0 of size up to `below`: of the turning arm under small gains zeros of J s^2 + b s + c.
+    """Return poles [1/s] but 0 of size up to `below`, from the power series of D at 0, corrected on D.
 
-    These are from `Loop.at_rest`, corrected on the characteristic function, and one zero next to 0 from its slope.
+    D is evaluated on a circle that is small beside the first frequency, 1/C and 1/delay: there the series converges.
     """
-    at = loop.function(np.array([below * AT_REST + 0j]))
-    with np.errstate(all="ignore"):  # an even function has no slope there, and no zero
-        alone = below * AT_REST - (at.value / at.slope).real
-    c, b, J = loop.at_rest or (0.0, 0.0, 1.0)
-    unit = max(abs(b), math.sqrt(abs(c * J)), LEAST_SIZE)  # b and sqrt(c J) alike
-    with np.errstate(over="ignore"):
-        roots = unit * np.roots([J, b / unit, c / unit / unit]).astype(complex)
-    slow = np.r_[roots, alone[[(abs(roots - alone) > NEAR_RIGID * abs(alone)).all()]]]
-    slow = slow[(slow != 0) & (abs(slow) <= below)]
-    exact = slow.copy()
-    for _ in range(SLOW_STEPS if slow.size else 0):
+    radius = 0.2 / (1 / first_frequency(loop.arm) + loop.arm.damping + loop.law.delay)
+    points = 32
+    circle = loop.function(radius * np.exp(2j * np.pi * np.arange(points) / points))
+    series = np.fft.fft(circle.value * np.exp(circle.scale - circle.scale[0])).real[: points // 4]
+    slow = radius * np.roots(series[::-1]).astype(complex)
+    slow = slow[(abs(slow) <= min(below, radius / 2)) & (slow != 0)]
+    step = slow
+    for _ in range(6 if slow.size else 0):
         with np.errstate(all="ignore"):  # a start whose slope is rounding diverges, and is left out
-            at = loop.function(exact)
-            exact = exact - at.value / at.slope
-    return exact[abs(exact - slow) <= NEAR_RIGID * abs(slow)]
+            at = loop.function(slow)
+            step = at.value / at.slope
+            slow = slow - step
+    return slow[(abs(step) <= 1e-9 * abs(slow)) & (abs(slow) <= below)]
 
 
 def starting_points(loop: ContinuousLoop, up_to: float) -> Complex:
@@ -271,6 +269,23 @@ def real_starts(loop: ContinuousLoop, up_to: float) -> Complex:
     (n,) = np.nonzero(np.sign(D[1:]) * np.sign(D[:-1]) < 0)
     share = abs(D[n]) / (abs(D[n]) + abs(D[n + 1]))
     return (line[n] + share * (line[n + 1] - line[n])).astype(complex)
+
+
+def poles_by_mode(poles: Complex, open_loop: Mapping[int, complex]) -> dict[int, complex]:
+    """Return the poles s, Im s > 0, by the mode whose open-loop pole p is theirs; a single one below these is `HUB`.
+
+    One a mode, by the least sum of |ln s - ln p|.  By more than 1, a factor e of its frequency or 57 deg, no controller
+    moves a mode here: such a pole belongs to none.
+    """
+    farthest = 1.0
+    modes, own = list(open_loop), np.array(list(open_loop.values()))
+    apart = np.minimum(abs(np.log(poles)[:, None] - np.log(own)), farthest)
+    rows, columns = linear_sum_assignment(apart)
+    near = apart[rows, columns] < farthest
+    found = {modes[column]: complex(poles[row]) for row, column in zip(rows[near], columns[near], strict=True)}
+    others = np.delete(poles, rows[near])
+    below = others[abs(others) < min((abs(s) for s in found.values()), default=0.0)]
+    return dict(sorted([*found.items(), *([(HUB, complex(below[0]))] if below.size == 1 else [])]))
 
 
 def poles_of_model(loop: ContinuousLoop, plant: Matrices) -> Complex:

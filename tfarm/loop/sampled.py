@@ -122,6 +122,11 @@ class Sampled(Loop):
         return self.rig.chain
 
     @property
+    def period(self) -> float:
+        """The sampling period [s]."""
+        return self.chain.sampling.period
+
+    @property
     def in_z(self) -> LawInZ:
         """The parts of `unit_law` in z."""
         return self.rig.in_z

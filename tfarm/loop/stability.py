@@ -20,6 +20,7 @@ Spillover: a law is designed on a model of a few modes, and may destabilise a mo
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -35,8 +36,10 @@ from tfarm.reduced.modal import modal_model, sensed_model
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes, modes_below
 
-from .continuous import MOST_BAND_MODES, QUIET_REACH, ContinuousLoop, band_of, quiet_places
-from .poles import Poles, box_of, poles_below, poles_of_model
+from .continuous import MOST_BAND_MODES, QUIET_REACH, ContinuousLoop, band_of, grid, quiet_places
+from .curve import LoopVerdict, next_limits
+from .loop_margins import PhaseCrossover
+from .poles import HUB, Poles, box_of, poles_below, poles_by_mode, poles_of_model
 from .theorem import GIVES, TAKES, Theorem, theorem_of
 
 LEAST_BAND_MODES = 12  # flexible modes in the band at C = 0, and at least
@@ -68,7 +71,7 @@ KNOWN_BEYOND = Quantity(
 
 @dataclass(frozen=True)
 @record
-class Stability:
+class Stability(LoopVerdict):
     """Verdict on a loop, "stable", "marginal" or "unstable", its poles in the band, and its stability beyond (`tail`).
 
     Where `is_known_beyond` is false the verdict is that of the band alone.
@@ -82,6 +85,8 @@ class Stability:
     tail: Annotated[str, Quantity("beyond the range", key="beyond", help="what decides the poles of higher frequency")]
     poles: Poles
     is_known_beyond: Annotated[bool, KNOWN_BEYOND] = True
+
+    answer = "continuous-time column"
 
     @property
     def spectral_abscissa(self) -> Annotated[float, Quantity("spectral abscissa", "1/s", 6, "largest Re s in range")]:
@@ -97,6 +102,69 @@ class Stability:
     def is_stable(self) -> Annotated[bool, Quantity(key="stable", help="whether the verdict is stable")]:
         """Whether every pole but that of the free hub angle lies left of the axis."""
         return self.verdict == "stable"
+
+    @property
+    def full(self) -> ContinuousLoop:
+        """The loop, which has every mode."""
+        return self.loop
+
+    @property
+    def word(self) -> str:
+        """The verdict."""
+        return self.verdict
+
+    @property
+    def range_words(self) -> str:
+        """The range in which poles are counted, and what is known beyond."""
+        known = ", small gain beyond" if self.tail == SMALL_GAIN else ", theorem beyond" if self.is_known_beyond else ""
+        return f"converged to {self.band:.4g} rad/s{known}"
+
+    @property
+    def time_constant(self) -> float | None:
+        """Time constant [s] of the rightmost pole in range."""
+        return -1 / self.spectral_abscissa if self.spectral_abscissa else None
+
+    @property
+    def ringing(self) -> list[tuple[int, complex]]:
+        """The oscillating poles by mode."""
+        moving, table = self.poles.moving, modes(self.loop.arm, up_to=self.band)
+        own = dict(zip(table.index.tolist(), (1j * table.natural_frequency).tolist(), strict=True))
+        oscillating = moving[moving.imag > 0]
+        by_mode = poles_by_mode(oscillating, {n: s for n, s in own.items() if n})
+        others = oscillating[~np.isin(oscillating, list(by_mode.values()))]
+        return [*by_mode.items(), *((HUB, s) for s in others.tolist())]
+
+    @property
+    def margins_end(self) -> float:
+        """The end of the verdict's range."""
+        return self.band
+
+    @cached_property
+    def frequencies(self) -> Real:
+        """The grid of the arm, and points about every pole of the loop and of its law at its distance from the axis.
+
+        |1 + L| dips there, and not where the arm's own functions are steep; the less damping, the narrower the dip.
+        """
+        omega, poles = np.asarray(grid(self.loop.arm, self.band)), np.r_[self.poles.values, self.loop.law.poles]
+        near = np.geomspace(0.05, 20.0, 12)
+        close = poles.imag[:, None] + abs(poles.real[:, None]) * np.r_[-near, 0.0, near]
+        # |L| may cross 1 down to a twentieth of the slowest pole
+        slowest = abs(self.poles.moving).min(initial=omega[0])
+        slow = np.geomspace(0.05 * slowest, omega[0], 400) if slowest < omega[0] else omega[:0]
+        return np.unique(np.r_[omega, close[(close > 0) & (close < omega[-1])], slow])
+
+    def gain_limits(self, by_phase: tuple[PhaseCrossover, ...]) -> tuple[float, float]:
+        """Return the factors on all of the law at which a pole reaches the axis, from where L < 0.
+
+        Without damping all modes may reach it at one factor, where rounding alone decides whether L < 0.  There the
+        factor follows from a theorem.
+        """
+        gains, arm = self.loop.gains, self.loop.arm
+        if gains is None or not arm.loses_at_hub_alone or theorem_of(self.loop).energy is None:
+            return next_limits(t for _, t in by_phase)
+        found = [t for w, t in by_phase if w == 0]
+        found += [arm.input_per_torque / gains.K2] if gains.K2 else []
+        return next_limits(found + ([-arm.rate_loss / gains.K1] if gains.K1 and arm.rate_loss else []))
 
 
 def stability(arm: Arm, law: AnyLaw, band: float | None = None) -> Stability:

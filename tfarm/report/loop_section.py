@@ -20,7 +20,6 @@ from tfarm.dsp.discretise import rule_in_words
 from tfarm.errors import ConvergenceError, TfarmError
 from tfarm.loop import continuous, loci, margins, nyquist, plane, poles, stability
 from tfarm.loop.circle_crossings import GainMap as SampledMap
-from tfarm.loop.curve import curve_of
 from tfarm.plots import loop_function, regions, roots, style
 from tfarm.plots.style import Axes
 from tfarm.records import record
@@ -90,7 +89,7 @@ def _bode_picture(each: Controller, found: margins.Margins, chain: Chain) -> Pic
     try:
         curve = loop_curves(each.arm, each.law, chain)
     except ConvergenceError:
-        curve = curve_of(found)
+        curve = found.curve
     rows = (
         (own.period or 0.0, *row) for own in curve.sides for row in zip(own.omega, own.L.real, own.L.imag, strict=True)
     )

@@ -22,7 +22,7 @@ import scipy  # whose statistics take half a second to load
 
 from tfarm.arm import PLANE, as_law
 from tfarm.arrays import Real
-from tfarm.assessment.card import LoopCard, loop_card, words_of, words_of_samples
+from tfarm.assessment.card import LoopCard, loop_card, words_of
 from tfarm.assessment.step import LoopResponse, step
 from tfarm.errors import ConvergenceError, TfarmError, must_be_known, require
 from tfarm.exact.system import system_of
@@ -122,11 +122,9 @@ def _card_of(loop: str) -> Asked:
         if not names <= {f"{loop}.stability", f"{loop}.certainty"}:
             card = loop_card(loop, one.arm, law, one.chain)
             return {name: value for name, _, value in entries_of(LoopCard, card, loop)}
-        known = (
-            words_of(stability(one.driven_arm, law), one.chain) if loop == "continuous"
-            else words_of_samples(sampled(one.arm, law, one.chain).verdict)
-        )  # fmt: skip
-        return {f"{loop}.{key}": text for key, text in known.items()}
+        is_continuous = loop == "continuous"
+        verdict = stability(one.driven_arm, law) if is_continuous else sampled(one.arm, law, one.chain).verdict
+        return {f"{loop}.{key}": text for key, text in words_of(verdict, one.chain).items()}
 
     return {name: column for name, column, _ in entries_of(LoopCard, None, loop)}, values
 

@@ -51,7 +51,7 @@ from tfarm.dsp.stages import not_covered
 from tfarm.errors import CertificationError, ConvergenceError, must_be_known
 from tfarm.exact.rationals import exact_matrix, falls, is_positive_definite
 from tfarm.loop.circle_crossings import around, stable_windows
-from tfarm.loop.margins import lowest
+from tfarm.loop.loop_margins import lowest
 from tfarm.loop.sampled import Sampled, sampled_loop
 from tfarm.records import record
 from tfarm.schema import Quantity
