@@ -51,8 +51,6 @@ LEAST_WIDTH, LEAST_HEIGHT = 1e-12, 1e-9  # of a picture, of the size of its pole
 AT_ORIGIN = 1e-9  # of the largest of its branch: a pole so near to 0 is there but for the last step of its correction
 SAME_CROSSING = 1e-3  # of the highest frequency: largest distance of a crossing from where the points of its branch are
 AT_END = 1e-9  # of the range: a crossing so near to an end is at the end, and not between
-GAIN_KNOWN = 1e-15  # of the larger end of a step: the value at which a branch crosses
-JUST_ABOVE = 1.01  # times the highest frequency of a branch: between two values it may be higher
 CROSSINGS_SHOWN = 3  # of a locus, in its finding
 RIGID, CONTROLLER, OTHER = 0, -1, -2  # origin of a branch of no flexible mode
 ORIGINS = {RIGID: "rigid body", CONTROLLER: "controller", OTHER: "other"}
@@ -358,34 +356,35 @@ def branch_crossings(
     Of a damped rig along a number of its law those of poles on no branch too, up to `top` [rad/s].  Where D is linear
     in the number they are those of D-decomposition.
     """
-    sign, span = float(np.sign(gain[-1] - gain[0])), abs(float(gain[-1] - gain[0]))
+    way, (low, high) = float(np.sign(gain[-1] - gain[0])), sorted(gain[[0, -1]].tolist())
     changes, is_damped = _changes(branches), not family.is_reactive
-    band = max(top, JUST_ABOVE * float(np.nanmax(branches.imag, initial=0.0)))
     known: list[Crossing] = []
     if (changes or is_damped) and not (family.is_of_arm or family.vary == "delay"):
         loop, name = family.first.under(family.full), "gain" if family.vary == "all" else family.vary
+        # between two values a branch may be higher
+        band = max(top, 1.01 * float(np.nanmax(branches.imag, initial=0.0)))
         try:
-            on_line = line_crossings(loop, name, float(gain.min()), float(gain.max()), band)
-            known = list(without_losses(loop, name, on_line))
+            known = list(without_losses(loop, name, line_crossings(loop, name, low, high, band)))
         except ConvergenceError:  # two poles meet at s = 0, and those of modes that rest are on the axis throughout
             if is_damped:
                 raise
 
-    def crossing(at: float, omega: float, branch: int | None, *, grows: bool) -> BranchCrossing:
+    def crossing(at: float, omega: float, change: float, branch: int | None = None) -> BranchCrossing:
         of = None if branch is None else origin_name(int(origin[branch]))
-        return BranchCrossing(at, omega, branch, "unstable" if grows else "stable", of, family.title)
+        return BranchCrossing(at, omega, branch, "unstable" if way * change > 0 else "stable", of, family.title)
 
     found = []
-    for number, low, high in changes:
-        ends, points = gain[[low, high]], branches[number, [low, high]]
-        at, omega = _crossed(family, ends, points, known, top)
-        found.append(crossing(at, omega, number, grows=points[1].real > points[0].real))
-    seen = {(own.gain, own.omega) for own in found}
+    for number, *step in changes:
+        step.sort(key=lambda n: gain[n])
+        points = branches[number, step]
+        at, omega = _crossed(family, gain[step], points, known, top)
+        found.append(crossing(at, omega, points[1].real - points[0].real, number))
+    seen, at_end = {(own.gain, own.omega) for own in found}, AT_END * (high - low)
     for each in known if is_damped else ():
-        is_between = AT_END * span < sign * (each.t - float(gain[0])) < (1 - AT_END) * span
+        is_between = low + at_end < each.t < high - at_end
         if is_between and not top < each.at < math.inf and (each.t, each.at) not in seen:
-            found.append(crossing(each.t, each.at, None, grows=sign * each.change > 0))
-    return tuple(sorted(found, key=lambda own: (sign * own.gain, own.omega)))
+            found.append(crossing(*each))
+    return tuple(sorted(found, key=lambda own: (way * own.gain, own.omega)))
 
 
 def _changes(branches: Complex) -> list[tuple[int, int, int]]:
@@ -395,37 +394,36 @@ def _changes(branches: Complex) -> list[tuple[int, int, int]]:
     images are not listed.
     """
     size = abs(branches)
-    largest = np.nanmax(np.where(np.isnan(size), 0.0, size), axis=1)[:, None]
+    largest = np.fmax.reduce(size, axis=1, initial=0.0)[:, None]
     on_axis = (abs(branches.real) <= AXIS_SHARE * size) | (size <= AT_ORIGIN * largest)
     side = np.where(on_axis | np.isnan(branches), 0, np.sign(branches.real)).astype(int)
+    becomes_real = (branches[:, :-1].imag > 0) & (branches[:, 1:].imag == 0)
+    leaves = becomes_real & (side[:, :-1] == 0) & (side[:, 1:] != 0)
     found = []
     for number, (sides, poles) in enumerate(zip(side, branches, strict=True)):
         pairs = {(a, b) for a, b in pairwise(np.flatnonzero(sides).tolist()) if sides[a] != sides[b]}
-        left = np.flatnonzero((sides[:-1] == 0) & (sides[1:] != 0) & (poles[:-1].imag > 0) & (poles[1:].imag == 0))
-        listed = sorted(pairs | {(n, n + 1) for n in left.tolist()})
-        found += [
-            (number, a, b) for a, b in listed if (poles[[a, b]].imag >= 0).all() and np.isfinite(poles[a:b]).all()
-        ]
+        pairs |= {(n, n + 1) for n in np.flatnonzero(leaves[number]).tolist()}
+        is_upper = poles.imag >= 0
+        found += [(number, a, b) for a, b in sorted(pairs) if is_upper[[a, b]].all() and np.isfinite(poles[a:b]).all()]
     return found
 
 
 def _crossed(family: Varied, ends: Real, points: Complex, known: Sequence[Crossing], top: float) -> tuple[float, float]:
-    """The value between two at which a branch is on the axis, and the frequency there."""
-    low, high = sorted(ends.tolist())
-    omegas = sorted(abs(points.imag).tolist())
-    wide = SAME_CROSSING * top + (omegas[1] - omegas[0])
-    near = [each for each in known if low <= each.t <= high and omegas[0] - wide <= each.at <= omegas[1] + wide]
+    """The value between two (ascending) at which a branch is on the axis, and the frequency there."""
+    (low, high), (slow, fast) = ends.tolist(), sorted(abs(points.imag).tolist())
+    wide = SAME_CROSSING * top + fast - slow
+    near = [each for each in known if low <= each.t <= high and slow - wide <= each.at <= fast + wide]
     if near:
-        share = points.real[0] / (points.real[0] - points.real[1])
-        best = min(near, key=lambda each: abs(each.at - abs((points[0] + share * (points[1] - points[0])).imag)))
+        order = np.argsort(points.real)
+        there = np.interp(0.0, points.real[order], abs(points.imag[order]))
+        best = min(near, key=lambda each: abs(each.at - there))
         return best.t, best.at
-    tolerance = GAIN_KNOWN * max(abs(low), abs(high))
+    tolerance = 1e-15 * max(abs(low), abs(high))
     if not points.imag.all() and family.at_rest(low) * family.at_rest(high) <= 0:
         return float(brentq(family.at_rest, low, high, xtol=tolerance)), 0.0
 
     def pole(value: float) -> complex:
-        share = (value - ends[0]) / (ends[1] - ends[0])
-        found = family.near(np.array([value]), np.array([[points[0] + share * (points[1] - points[0])]]))[0, 0]
+        found = family.near(np.array([value]), np.array([[np.interp(value, ends, points)]]))[0, 0]
         if np.isnan(found):
             text = f"a crossing of the imaginary axis near {family.vary} = {value:.6g} was not found"
             raise ConvergenceError(text, value, found)

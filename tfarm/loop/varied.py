@@ -22,13 +22,13 @@ from tfarm.errors import ConvergenceError, require
 from tfarm.exact.characteristic import Analytic
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
-from tfarm.spectrum.box import Box, winding_number, zeros_in_box
+from tfarm.spectrum.box import Box, winding_number
 from tfarm.spectrum.following import settled
 from tfarm.spectrum.table import first_frequency
 
 from .continuous import NEAREST_TO_ORIGIN, ORDER_READ_AT, ContinuousLoop, band_of, by_differences
 from .lines import LawTerms
-from .poles import SLOW_SHARE, box_of, slow_poles, starting_points
+from .poles import box_of, poles_below, slow_poles
 
 OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}  # units, as of the arm's below
 ARM_PARAMETERS = {
@@ -36,8 +36,6 @@ ARM_PARAMETERS = {
 }  # fmt: skip
 HEIGHTS = (1.0, 1.013, 1.031, 1.057, 0.985, 1.09)  # of the box, until no pole is on its edge at the first value
 
-SERIES_RADIUS, SERIES_POINTS = 0.2, 16  # of the first frequency: where a power series next to 0 is read off
-NO_PART = 1e-9  # of a pole's size: a smaller imaginary part is rounding
 EMPTY = Box(0.0, 0.0, 0.0, 0.0)
 FACTORS = {"all": "factor on all gains", "gain": "factor on the controller"}  # labels of these numbers
 Title = tuple[str, str]  # label and unit
@@ -206,26 +204,20 @@ class Varied:
         return found
 
     def slow(self, value: float, count: int) -> Complex:
-        """The `count` poles nearest to 0 at a value, from the power series of D there; the upper, or larger, first."""
-        circle = SERIES_RADIUS * self.frequency * np.exp(2j * np.pi * np.arange(SERIES_POINTS) / SERIES_POINTS)
-        D, scale = (each[0] for each in self._characteristic(circle[None], np.full(circle.size, value)))
-        series = np.fft.fft(D * np.exp(scale - scale[0]) / circle**self.pinned).real[: SERIES_POINTS // 2]
-        roots = SERIES_RADIUS * self.frequency * np.roots(series[::-1]).astype(complex)
-        nearest = roots[np.argsort(abs(roots))[:count]]
-        return np.asarray(nearest[np.lexsort((-nearest.real, -nearest.imag))], dtype=complex)
+        """The `count` poles next to 0 at a value, the upper, or larger, first; NaN for missing ones."""
+        found = slow_poles(self.at(value), self.frequency)
+        nearest = found[np.argsort(abs(found))[:count]]
+        nearest = nearest[np.lexsort((-nearest.real, -nearest.imag))]
+        return np.r_[nearest, np.full(count - nearest.size, np.nan)]
 
     def complete(self, value: float, guess: Complex) -> Complex:
         """All poles in the box at one value, both of each pair, and those next to the guesses that lie outside it."""
-        loop, height = self.at(value), self.box.im_max
         near = self.near(np.array([value]), np.where(guess.imag < 0, np.nan, guess)[None])[0]
-        near = near[~np.isnan(near) & (near != 0)]
-        near = np.r_[near, near[near.imag > 0].conj()]
-        starts, slow = np.r_[near, starting_points(loop, height)], slow_poles(loop, SLOW_SHARE * height)
-        found = zeros_in_box(loop.function, self.box, starts, slow)
-        found = np.where(abs(found.imag) < NO_PART * abs(found), found.real, found)
-        upper, rests = found[found.imag > 0], np.zeros(loop.zeros_at_origin - self.pinned, complex)
-        every = np.r_[rests, found[found.imag == 0], upper, upper.conj(), near[~self.box.holds(near)]]
-        return every.astype(complex)
+        near = near[~np.isnan(near) & (near != 0) & ~self.box.holds(near)]
+        with np.errstate(over="ignore"):  # of a pole on its way through infinity
+            inside = poles_below(self.at(value), self.box.im_max).values[self.pinned :]
+        upper = np.r_[inside, near]
+        return np.r_[upper, upper[upper.imag > 0].conj()]
 
     def singular(self, values: Real) -> Real:
         """-1/C of the damped segments, at m values (m, p)."""
