@@ -284,15 +284,16 @@ def confirmed(found: Crossings, low: float, high: float, is_stable: Callable[[fl
     between all crossings: next to z = 1 rounding may have made a crossing, and the counts are wrong.
     """
     gains = found.within(low, high).gain
-    edges = np.r_[low, gains[np.r_[True, np.diff(gains) > SAME_EDGE * abs(gains[1:])][: gains.size]], high]
+    edges = np.r_[low, gains[np.diff(gains, prepend=-np.inf) > SAME_EDGE * abs(gains)], high]
     beyond = 2 * (abs(edges[np.isfinite(edges)]).max(initial=0.0) or 1.0)  # where nothing crosses: any value
     inner = np.clip(edges, -beyond, beyond)
     middles = (inner[1:] + inner[:-1]) / 2
     counts = found.passed(middles)  # the same up to a constant
-    is_least = counts == counts.min()
-    stable = [i for i in np.flatnonzero(is_least) if is_stable(float(middles[i]))]
-    stable = stable or [i for i in np.flatnonzero(~is_least) if is_stable(float(middles[i]))]
-    return joined([(float(edges[i]), float(edges[i + 1])) for i in stable])
+    for may_be in (counts == counts.min(), counts > counts.min()):
+        stable = [i for i in np.flatnonzero(may_be).tolist() if is_stable(float(middles[i]))]
+        if stable:
+            return joined([(float(edges[i]), float(edges[i + 1])) for i in stable])
+    return []
 
 
 def joined(windows: list[Window]) -> list[Window]:
