@@ -30,10 +30,8 @@ from tfarm.records import record
 Parts = Callable[[Real], tuple[Complex, Complex]]  # A and B at places of a curve
 
 LAST_BIT = 2.0**-53  # of a place, and of the narrowest bracket
-DIP_STEPS = 14  # of a golden section leave a thousandth of two steps of the grid, of smooth functions far less
 ROUNDED = 1e-11  # of |A| |B|: an imaginary part that may be rounding
 Window = tuple[float, float]  # two values of a gain, the lower first
-SAME_EDGE = 1e-9  # relative: next to z = 1 one static crossing is read several times, each with an error near 1e-12
 
 
 class Crossing(NamedTuple):
@@ -222,7 +220,8 @@ def _dips(
     def depth(at: Real, which: Whole) -> Real:
         return sign[which] * _share(*parts(at, line[which]))
 
-    dip = find_minimum(depth, (first, middle, last), args=(np.arange(line.size),), maxiter=DIP_STEPS)
+    # 14 steps of a golden section leave a thousandth of two steps of the grid, of smooth functions far less
+    dip = find_minimum(depth, (first, middle, last), args=(np.arange(line.size),), maxiter=14)
     through = dip.f_x < -ROUNDED
     return line[through], first[through], dip.x[through], last[through], sign[through]
 
@@ -284,7 +283,8 @@ def confirmed(found: Crossings, low: float, high: float, is_stable: Callable[[fl
     between all crossings: next to z = 1 rounding may have made a crossing, and the counts are wrong.
     """
     gains = found.within(low, high).gain
-    edges = np.r_[low, gains[np.diff(gains, prepend=-np.inf) > SAME_EDGE * abs(gains)], high]
+    # next to z = 1 one static crossing is read several times, each with an error near 1e-12
+    edges = np.r_[low, gains[np.diff(gains, prepend=-np.inf) > 1e-9 * abs(gains)], high]
     beyond = 2 * (abs(edges[np.isfinite(edges)]).max(initial=0.0) or 1.0)  # where nothing crosses: any value
     inner = np.clip(edges, -beyond, beyond)
     middles = (inner[1:] + inner[:-1]) / 2

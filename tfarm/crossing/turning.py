@@ -23,8 +23,6 @@ from .line import Window
 STRETCH = 2.0  # how much wider than high, or higher than wide, a picture is at most: so much more a curve turns in it
 MOST_TURN = math.radians(5.0) / STRETCH  # from one piece of a curve to the next, where the picture is as high as wide
 PIXEL = 2e-3  # of the picture, a pixel: corners of shorter pieces are invisible
-ASIDE = 0.45  # of the way from one column to the next: half way may be the very edge that both were laid around
-DISTINCT = 1e-11  # of a gain: columns nearer to each other are in the rounding of the end of a region
 Slice = tuple[float, float, float]  # a value of the gain across, and an interval of the other there
 
 
@@ -77,8 +75,10 @@ def _halves(across: Real, here: float, other: float) -> list[float]:
     """Nearly half way between two columns; of an upright side, to its neighbours."""
     n = int(np.searchsorted(across, here))
     neighbours = [float(across[k]) for k in (n - 1, n + 1) if 0 <= k < across.size]
-    ends = [each for each in neighbours if abs(each - here) > DISTINCT * abs(here)] if here == other else [other]
-    return [min(here, each) + ASIDE * abs(each - here) for each in ends]
+    # 1e-11 of a gain: columns nearer to each other are in the rounding of the end of a region
+    ends = [each for each in neighbours if abs(each - here) > 1e-11 * abs(here)] if here == other else [other]
+    # 0.45 of the way from one column to the next: half way may be the very edge that both were laid around
+    return [min(here, each) + 0.45 * abs(each - here) for each in ends]
 
 
 @dataclass(eq=False)

@@ -38,17 +38,12 @@ from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import most_gain
 
-NO_EFFECT = 1e-12  # of the terms without a gain: smaller terms of the gain are rounding
 FACTOR = "gain"  # the name of a factor on the whole law
-LEAST_FACTOR = 1e-9  # on a law, of those searched: with less it is none
 MOST_FACTOR = 1e9  # with more its gain is beyond any number
 MOST_GAINS = 4000  # of a map, along one gain
 ENDS_AT = (-0.9, 0.3, 0.9)  # K2 at which upright edges are searched, times `input_per_torque`
 MOST_COLUMNS = 400  # of K1 in a picture
-OUTLINE_ROUNDS = 12  # of halving where its outline bends
 OFF_EDGE = 1e-9  # relative: distance to either side of such an edge at which a region is cut
-CLEAR_OF_CIRCLE = 1e-9  # of ln|z|: a pole nearer to the circle may be counted on either side
-GOLDEN = 0.6180339887498949  # of a range: a place on no rounded number and no grid
 
 
 def line_of(loop: Sampled, name: str) -> Line:
@@ -56,7 +51,8 @@ def line_of(loop: Sampled, name: str) -> Line:
     unit = np.zeros(loop.row.size)
     if name == FACTOR:
         unit[1:] = loop.weights
-        return Line.of(loop.row, unit, 1.0, LEAST_FACTOR, MOST_FACTOR)
+        # the least factor on a law that is searched: with less it is none
+        return Line.of(loop.row, unit, 1.0, 1e-9, MOST_FACTOR)
     place, value = 1 + loop.part(name), loop.number(name)
     gain = ON.get(name, name)
     most = most_gain(loop.plant.arm, gain) if gain in NAMES else MOST_FACTOR * (abs(value) or 1.0)
@@ -99,7 +95,8 @@ def _lowest(terms: Sequence[tuple[int, float]]) -> tuple[float, float]:
 
 def _real_gain(A: Any, B: Any) -> float:
     """The real gain g of A + g B = 0 where A and B are real; inf where there is none."""
-    return float(-A.real / B.real) if abs(B.real) > NO_EFFECT * abs(A.real) else math.inf
+    # 1e-12 of the terms without a gain: smaller terms of the gain are rounding
+    return float(-A.real / B.real) if abs(B.real) > 1e-12 * abs(A.real) else math.inf
 
 
 # ------------------------------------------------------------ windows
@@ -198,7 +195,8 @@ def _map_of_gains(loop: Sampled, x: Real, y: Real, vary: tuple[str, str]) -> Gai
 
     def counted(*point: float) -> int | None:
         poles = at(*point).poles
-        return poles.unstable if abs(poles.log_radius).min() >= CLEAR_OF_CIRCLE else None
+        # 1e-9 of ln|z|: a pole nearer to the circle may be counted on either side
+        return poles.unstable if abs(poles.log_radius).min() >= 1e-9 else None
 
     plane.must_agree(counted, "crossings and eigenvalues differ")
     return plane
@@ -209,7 +207,8 @@ def rounded_map(plane: GainMap, drawn: Callable[[Real, Real], Complex]) -> GainM
 
     `drawn` maps points of the plane to the picture, 1 high.
     """
-    for _ in range(OUTLINE_ROUNDS):
+    # rounds of halving where its outline bends
+    for _ in range(12):
         more = loose_columns(plane.x, pieces(plane.x, plane.stable_intervals), drawn)
         if not more.size or plane.x.size + more.size > MOST_COLUMNS:
             break
@@ -244,4 +243,5 @@ def with_both_sides(K1: Real, ends: Real) -> Real:
 
 def _off_the_edge(values: Real) -> float:
     """A gain inside the range that is on no rounded edge."""
-    return float(values[0] + GOLDEN * (values[-1] - values[0])) if values.size > 1 else float(values[0])
+    # the golden section of a range is on no rounded number and no grid
+    return float(values[0] + 0.6180339887498949 * (values[-1] - values[0])) if values.size > 1 else float(values[0])

@@ -35,10 +35,6 @@ from .stability import MARGIN_OF_ZERO, is_known_without
 FACTOR = "gain"  # the name of a factor on the whole law
 LEADING = ".den.0"  # how the name of a leading coefficient ends
 ORDER_READ_AT = (2e-3, 1e-3)  # of w1: where the order of a zero at s = 0 is read off
-SIMPLE = 3.0  # ratio of values at the first and the second: 2 of a simple zero, 4 of a double one
-NEXT_TO_MEETING = 1e-3  # of the range: how far from such a place its counts are taken
-FINITE_LIMIT = 1.5  # times the gain at the farther of two small s: more at the nearer one is a gain without a limit
-STILL_GROWS = 0.75  # of the step before: by more, of places ever farther right, a gain without a limit grows
 NEAR_ORIGIN = (1e-6, 5e-7)  # of the lowest frequency: where a real pole is searched on its way through 0
 ROUNDED = 4 * float(np.finfo(float).eps)  # of a range: a gain so small is 0
 
@@ -176,7 +172,8 @@ def _with_real_poles(along: Along, found: list[Crossing], N: Complex, P: Complex
     rest = through_origin(N[:2], P[:2])
     if rest is not None and low <= rest.t <= high:
         (zero, half), (whole, part) = abs((N + rest.t * P)[2:4]), abs(P[2:4])
-        is_single = zero * part < SIMPLE * half * whole
+        # ratio of values at the first and the second: 2 of a simple zero, 4 of a double one
+        is_single = zero * part < 3.0 * half * whole
         found.append(rest if is_single else rest._replace(change=_change_at(along, rest.t, found, band)))
     if 0.0 in critical(along.name, (low, high))[1:-1] and (far := through_infinity(N[4:], P[4:])) is not None:
         found.append(far._replace(t=0.0))
@@ -201,7 +198,8 @@ def _change_at(along: Along, at: float, others: list[Crossing], band: float) -> 
     span, loop, name = along.line.high - along.line.low, along.member(), along.name
     at = 0.0 if abs(at) <= ROUNDED * span else at
     away = [abs(each.t - at) for each in others if each.t != at and math.isfinite(each.t)]
-    step = min([NEXT_TO_MEETING * span, *(each / 2 for each in away)])
+    # 1e-3 of the range: how far from such a place its counts are taken
+    step = min([1e-3 * span, *(each / 2 for each in away)])
     try:
         below, above = (unstable_below(loop.having(name, at + side * step), band) for side in (-1, 1))
     except ConvergenceError as error:
@@ -218,7 +216,8 @@ def through_origin(N: Complex, P: Complex) -> Crossing | None:
     if not P.all():
         return None
     far, near = -(N / P).real
-    if not abs(near) < FINITE_LIMIT * abs(far):
+    # 1.5 times the gain at the farther of two small s: more at the nearer one is a gain without a limit
+    if not abs(near) < 1.5 * abs(far):
         return None
     return Crossing(float(2 * near - far) + 0.0, 0.0, 1 if far > near else -1)
 
@@ -230,7 +229,8 @@ def through_infinity(N: Complex, P: Complex) -> Crossing | None:
             return None
         first, second, third = -(N / P).real
     before, last = second - first, third - second
-    if not abs(last) < STILL_GROWS * abs(before):
+    # by more than 0.75 of the step before, of places ever farther right, a gain without a limit grows
+    if not abs(last) < 0.75 * abs(before):
         return None
     return Crossing(float(third + last * last / (before - last)), math.inf, 1 if before < 0 else -1)
 

@@ -40,17 +40,8 @@ from .lines import line_crossings
 from .varied import ARM_PARAMETERS, OF_THE_LAW, Title, Varied
 from .windows import without_losses
 
-LOCUS_VALUES, LAW_LOCUS_VALUES = 500, 100  # values of a locus by default: of gains, of any other law
 MOST_LOCUS_POINTS = 100_000  # values, those between that make it round among them
 MOST_BRANCHES = 200  # and flexible modes below the top of the box
-COMPANY = 2  # flexible modes followed beyond the box, whose poles may come into it
-NODES = 3  # values after the first at which the poles of the box are counted
-SAME_POLE = 1e-6  # of its size: a pole found by two searches
-HALVING_ROUNDS = 24  # of halving at most: where two branches meet their distance goes with the root of that of the gain
-LEAST_WIDTH, LEAST_HEIGHT = 1e-12, 1e-9  # of a picture, of the size of its poles: less is rounding of a constant pole
-AT_ORIGIN = 1e-9  # of the largest of its branch: a pole so near to 0 is there but for the last step of its correction
-SAME_CROSSING = 1e-3  # of the highest frequency: largest distance of a crossing from where the points of its branch are
-AT_END = 1e-9  # of the range: a crossing so near to an end is at the end, and not between
 CROSSINGS_SHOWN = 3  # of a locus, in its finding
 RIGID, CONTROLLER, OTHER = 0, -1, -2  # origin of a branch of no flexible mode
 ORIGINS = {RIGID: "rigid body", CONTROLLER: "controller", OTHER: "other"}
@@ -167,7 +158,8 @@ def locus(
         remedy = f"every gain is 0: give {' or '.join(NAMES)} to be scaled"
         require(vary != "all" or gains != HubFeedback(), "vary", "all", remedy)
     law = as_law(law) if in_box else plain
-    points = (LAW_LOCUS_VALUES if in_box else LOCUS_VALUES) if points is None else points
+    # by default 500 values of gains, 100 of any other law
+    points = (100 if in_box else 500) if points is None else points
     points = whole("points", points, 2, MOST_LOCUS_POINTS, f"a whole number from 2 to {MOST_LOCUS_POINTS}")
     branches = whole("branches", branches, 1, MOST_BRANCHES, f"a whole number from 1 to {MOST_BRANCHES}")
     number = branches if in_box else max(1, branches - 2 * arm.has_rigid_mode)
@@ -196,10 +188,12 @@ def shown(rows: Complex, listed: Whole, pinned: int, box: Box | None) -> Complex
 
 def followed(family: Varied, gain: Real, modes: int) -> tuple[Complex, Whole]:
     """All poles (b, n) but those at 0 at every value, mirror images included, and the origin of each."""
-    row, origin = named(family, modes + COMPANY)
+    # 2 flexible modes are followed beyond the box, whose poles may come into it
+    row, origin = named(family, modes + 2)
     row = np.r_[row, missing(family, family.start, row)]
     rows, low = row[:, None], 0
-    nodes = np.unique(np.linspace(0, gain.size - 1, NODES + 1).round().astype(int)).tolist()[1:]
+    # 3 values after the first at which the poles of the box are counted
+    nodes = np.unique(np.linspace(0, gain.size - 1, 3 + 1).round().astype(int)).tolist()[1:]
     while nodes:
         high = nodes[0]
         try:
@@ -232,7 +226,8 @@ def missing(family: Varied, value: float, row: Complex) -> Complex:
         return row[:0]
     every = family.complete(value, row)
     away = abs(every[:, None] - row[~np.isnan(row)]).min(axis=1, initial=math.inf)
-    return every[away > SAME_POLE * abs(every)]
+    # within 1e-6 of its size a pole of two searches is one
+    return every[away > 1e-6 * abs(every)]
 
 
 def named(family: Varied, number: int) -> tuple[Complex, Whole]:
@@ -285,7 +280,8 @@ def rounded(found: Locus) -> Locus:
     """
     family, gain, rows, branches = found.varied, found.gain, found.followed, found.branches
     way, pinned, box = int(np.sign(gain[-1] - gain[0])), len(branches) - found.listed.size, found.box
-    for _ in range(HALVING_ROUNDS):
+    # rounds of halving at most: where two branches meet their distance goes with the root of that of the gain
+    for _ in range(24):
         whole = [frame(branches)], [view(branches, found.origin)]
         frames = np.array([[*map(frame, branches)], *(each * len(branches) for each in whole)])  # (3, b, 4)
         sizes = np.diff(frames)[..., ::2, None]
@@ -306,8 +302,9 @@ def frame(branches: Complex) -> tuple[float, float, float, float]:
         return 0.0, 1.0, 0.0, 1.0
     left, right = min(float(points.real.min()), 0.0), max(float(points.real.max()), 0.0)
     low, high = float(points.imag.min()), float(points.imag.max())
-    wide = max(right - left, LEAST_WIDTH * float(abs(points).max())) or 1.0  # where no pole moves from 0
-    tall = max(high - low, LEAST_HEIGHT * high) or wide  # where none of them oscillates
+    # less than 1e-12 of the size of its poles is rounding of a constant pole
+    wide = max(right - left, 1e-12 * float(abs(points).max())) or 1.0  # where no pole moves from 0
+    tall = max(high - low, 1e-9 * high) or wide  # where none of them oscillates
     return left, left + wide, low, low + tall
 
 
@@ -379,7 +376,8 @@ def branch_crossings(
         points = branches[number, step]
         at, omega = _crossed(family, gain[step], points, known, top)
         found.append(crossing(at, omega, points[1].real - points[0].real, number))
-    seen, at_end = {(own.gain, own.omega) for own in found}, AT_END * (high - low)
+    # 1e-9 of the range: a crossing so near to an end is at the end, and not between
+    seen, at_end = {(own.gain, own.omega) for own in found}, 1e-9 * (high - low)
     for each in known if is_damped else ():
         is_between = low + at_end < each.t < high - at_end
         if is_between and not top < each.at < math.inf and (each.t, each.at) not in seen:
@@ -395,7 +393,8 @@ def _changes(branches: Complex) -> list[tuple[int, int, int]]:
     """
     size = abs(branches)
     largest = np.fmax.reduce(size, axis=1, initial=0.0)[:, None]
-    on_axis = (abs(branches.real) <= AXIS_SHARE * size) | (size <= AT_ORIGIN * largest)
+    # 1e-9 of the largest of its branch: a pole so near to 0 is there but for the last step of its correction
+    on_axis = (abs(branches.real) <= AXIS_SHARE * size) | (size <= 1e-9 * largest)
     side = np.where(on_axis | np.isnan(branches), 0, np.sign(branches.real)).astype(int)
     becomes_real = (branches[:, :-1].imag > 0) & (branches[:, 1:].imag == 0)
     leaves = becomes_real & (side[:, :-1] == 0) & (side[:, 1:] != 0)
@@ -411,7 +410,8 @@ def _changes(branches: Complex) -> list[tuple[int, int, int]]:
 def _crossed(family: Varied, ends: Real, points: Complex, known: Sequence[Crossing], top: float) -> tuple[float, float]:
     """The value between two (ascending) at which a branch is on the axis, and the frequency there."""
     (low, high), (slow, fast) = ends.tolist(), sorted(abs(points.imag).tolist())
-    wide = SAME_CROSSING * top + fast - slow
+    # 1e-3 of the highest frequency: largest distance of a crossing from where the points of its branch are
+    wide = 1e-3 * top + fast - slow
     near = [each for each in known if low <= each.t <= high and slow - wide <= each.at <= fast + wide]
     if near:
         order = np.argsort(points.real)

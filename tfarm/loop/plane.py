@@ -56,21 +56,12 @@ from .windows import theorem_edges, theorem_windows
 COUNTS = Quantity(key="unstable_roots", help="unstable poles at each point, rows upwards; inf where infinitely many")
 BOUNDARY = Quantity(key="boundary", help="both gains and the frequency [rad/s] with poles on the imaginary axis")
 INFINITE = -1  # count of infinitely many unstable poles
-MOST_GRID_VALUES, MOST_LAW_VALUES = 2000, 400  # of a map, along one gain, and along one number of another law
-SHOWN_K1, SHOWN_K2 = (-1.0, 3.0), (-2.0, 2.0)  # of a map, by default: the stable region of the paper's arm, and around
 NOT_AFFINE = ("delay", ".den.")  # in the name of a number in which L is not affine: its size is not largest at corners
 LINEAR_SCALE = 0.5  # decades that the linear part of an axis takes on each side of 0, as matplotlib's `linscale` has it
 LINEAR_SHARE = LINEAR_SCALE / (1 - 1 / 10)  # factor on values there
-EVEN_GRID = 1e-9  # of its range: by less may the steps of an even grid differ
-LOWEST_MOMENT_GAIN, HIGHEST_MOMENT_GAIN = -4.0, 2.0  # times `input_per_torque`: the range that is shown
 DEEPEST_MOMENT_GAIN = -50.0  # and the lowest value at which unstable gains are searched
-DEEP_ROWS = 400  # values between, at which they are searched
-BELOW_DEEPEST = 1.4  # times the deepest of them: the depth of the picture, so that the region ends in it
-HIGHEST_RATE_GAIN = 10  # J w1: with it the hub of a rigid arm slows down within 0.1/w1
 SHORT_SEGMENT = 0.008  # of the picture: longer pieces of the boundary look straight, and are cut
 LONG_SEGMENT = 0.03  # of the picture: a piece longer than that after all cuts is a jump through infinity, and not drawn
-EDGE_ROUNDS = 30  # of cutting at most: 2^-30 of a step between frequencies is less than a pixel
-SCAN = 32  # columns of the picture in which unstable gains are searched
 ROWS_FROM_EDGE = 1.5  # beyond this many rows from the boundary the count must have changed
 
 
@@ -193,7 +184,8 @@ def plane(loop: ContinuousLoop, vary: tuple[str, str], x: Real, y: Real) -> Plan
     require(vary[0] != vary[1], "vary", list(vary), "two different numbers of the law")
     if vary == PLANE and loop.gains is not None:
         loop = loop.under(with_numbers(loop.law, dict.fromkeys(PLANE, 0.0)))
-    most = MOST_LAW_VALUES if loop.gains is None else MOST_GRID_VALUES
+    # most values of a map, along one number of a law, and along one gain
+    most = 400 if loop.gains is None else 2000
     x, y = ascending(vary[0], x, 2, most), ascending(vary[1], y, 2, most)
     across, up = (float(x[0]), float(x[-1])), (float(y[0]), float(y[-1]))
     corners = [_at(loop, vary, each) for each in itertools.product(critical(vary[0], across), critical(vary[1], up))]
@@ -298,7 +290,8 @@ def ranges_of(arm: Arm) -> tuple[tuple[float, float], tuple[float, float]]:
     """Default ranges of K1 and K2 of a map, in the units of the rig."""
     K1 = 1.0 if arm.is_uniform else default_gains(arm).K1 / PAPER_GAINS.K1
     K2 = arm.input_per_torque
-    (low, high), (lower, upper) = SHOWN_K1, SHOWN_K2
+    # the stable region of the paper's arm, and around
+    (low, high), (lower, upper) = (-1.0, 3.0), (-2.0, 2.0)
     return (low * K1, high * K1), (lower * K2, upper * K2)
 
 
@@ -346,7 +339,8 @@ class Axis:
     def of(cls, values: Real) -> Axis:
         """The axis on which a grid (n,), ascending, is nearly even: linear, or logarithmic beyond its smallest size."""
         low, high = float(values[0]), float(values[-1])
-        if np.ptp(np.diff(values)) <= EVEN_GRID * (high - low):
+        # 1e-9 of its range: by less may the steps of an even grid differ
+        if np.ptp(np.diff(values)) <= 1e-9 * (high - low):
             return cls(low, high)
         return cls(low, high, float(abs(values[values != 0]).min()))
 
@@ -355,7 +349,8 @@ def rate_axis(arm: Arm) -> Axis:
     """The axis of the rate gain, just below 0 to 10 J w1, logarithmic from well below the default gain on."""
     unit = rate_unit(arm)
     linear = 10.0 ** math.floor(math.log10(default_gains(arm)[RATE_GAIN]))
-    return Axis(-linear, HIGHEST_RATE_GAIN * unit, linear)
+    # at 10 J w1 the hub of a rigid arm slows down within 0.1/w1
+    return Axis(-linear, 10 * unit, linear)
 
 
 def rate_columns(arm: Arm, x: Axis, number: int) -> Real:
@@ -369,17 +364,19 @@ def rate_columns(arm: Arm, x: Axis, number: int) -> Real:
 
 def moment_axis(arm: Arm, x: Axis) -> Axis:
     """The axis of the moment gain, -4 to 2 times `input_per_torque`, or down to the lowest unstable gain."""
-    low, high, deepest = (
-        each * arm.input_per_torque for each in (LOWEST_MOMENT_GAIN, HIGHEST_MOMENT_GAIN, DEEPEST_MOMENT_GAIN)
-    )
+    # in units of `input_per_torque`, the range that is shown, and the lowest value that is searched
+    low, high, deepest = (each * arm.input_per_torque for each in (-4.0, 2.0, DEEPEST_MOMENT_GAIN))
     if arm.is_undamped:
         return Axis(low, high)
-    across = x.grid(SCAN)
-    deep = gain_map(arm, across[across > 0], between(deepest, low, DEEP_ROWS))
+    # 32 columns of the picture in which unstable gains are searched
+    across = x.grid(32)
+    # 400 values between, at which they are searched
+    deep = gain_map(arm, across[across > 0], between(deepest, low, 400))
     rows = np.nonzero(~deep.stable.all(axis=1))[0]
     if not rows.size:
         return Axis(low, high)
-    return Axis(max(deepest, BELOW_DEEPEST * float(deep.axes[1][rows[0]])), high, high)
+    # the picture is deeper than all of them, so that the region ends in it
+    return Axis(max(deepest, 1.4 * float(deep.axes[1][rows[0]])), high, high)
 
 
 def edge(found: Plane, x: Axis, y: Axis) -> Real:
@@ -387,7 +384,8 @@ def edge(found: Plane, x: Axis, y: Axis) -> Real:
     points, loop = found.boundary, ContinuousLoop(found.arm, found.law)
     if not points.size:
         return points
-    for _ in range(EDGE_ROUNDS):
+    # rounds of cutting at most: 2^-30 of a step between frequencies is less than a pixel
+    for _ in range(30):
         length, is_seen = _segments(points, x, y)
         (coarse,) = np.nonzero((length > SHORT_SEGMENT) & is_seen)
         if not coarse.size:

@@ -34,12 +34,10 @@ OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}  # units, 
 ARM_PARAMETERS = {
     "payload_mass": "kg", "payload_inertia": "kg m^2", "hub_inertia": "kg m^2", "length": "m", "damping": "s"
 }  # fmt: skip
-HEIGHTS = (1.0, 1.013, 1.031, 1.057, 0.985, 1.09)  # of the box, until no pole is on its edge at the first value
 
 EMPTY = Box(0.0, 0.0, 0.0, 0.0)
 FACTORS = {"all": "factor on all gains", "gain": "factor on the controller"}  # labels of these numbers
 Title = tuple[str, str]  # label and unit
-ARMS_KEPT = 200  # at values needed again: memory against time, of no effect on a result
 
 
 @dataclass(frozen=True)
@@ -112,11 +110,12 @@ class Varied:
         """The loop where the number has that value."""
         return self._of_arm(value) if self.is_of_arm else self.first.under(self.law_at(value))
 
+    # arms at values that are needed again
     @cached_property
     def _of_arm(self) -> Callable[[float], ContinuousLoop]:
         """The same of a number of the arm: of the last values it is kept."""
 
-        @lru_cache(ARMS_KEPT)
+        @lru_cache(200)
         def of_arm(value: float) -> ContinuousLoop:
             return ContinuousLoop(arm_and_law(self.arm.having(**{self.vary: value}), self.law)[0], self.full)
 
@@ -230,7 +229,8 @@ class Varied:
     def boxed(self, modes: int) -> Varied:
         """The same with a box for all values, as high as `modes` modes, no pole on its edge at the first value."""
         loops, lost = [self.at(value) for value in self.few], ConvergenceError("no box", self, 0.0)
-        for factor in HEIGHTS:
+        # heights of the box, until no pole is on its edge at the first value
+        for factor in (1.0, 1.013, 1.031, 1.057, 0.985, 1.09):
             height = factor * max(band_of(loop.arm, modes) for loop in loops)
             boxes = [box_of(loop, height) for loop in loops]
             left, right = max(each.re_min for each in boxes), max(each.re_max for each in boxes)

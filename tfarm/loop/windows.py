@@ -29,9 +29,7 @@ SEARCH_RANGE = Quantity("search range", digits=5, key="search_range", help="valu
 ENDS = "an end with < or > is that of the search range: no limit was found up to there"
 
 WINDOW_REACH, FARTHER_REACH = 20.0, {MOMENT_GAIN: 50.0}  # of the search range, times `gain_unit`
-BEYOND_STATIC = 2.0  # times J/(J - I_h), where K2 cancels the inertia: least search range
 BEYOND_LAW = 10.0  # times the number of the law: least search range too
-STATIC_AT = 1e-9  # of the lowest frequency: L there is that of an arm at rest
 
 
 class Interval(NamedTuple):
@@ -142,7 +140,8 @@ def looked_at(loop: ContinuousLoop, name: str) -> Window:
     reach = max(FARTHER_REACH.get(name, WINDOW_REACH) * gain_unit(arm, name), BEYOND_LAW * abs(value))
     carried = arm.gauged_inertia
     if name == MOMENT_GAIN and 0 < carried < math.inf:
-        reach = max(reach, BEYOND_STATIC * arm.turned_inertia / carried)
+        # 2.0 times J/(J - I_h), where K2 cancels the inertia: least search range
+        reach = max(reach, 2.0 * arm.turned_inertia / carried)
     most = min(most_gain(arm, name), reach)
     return -most, most
 
@@ -241,7 +240,8 @@ def is_held(loop: ContinuousLoop) -> bool:
     parts = absorbed(loop.arm, loop.law)
     if parts is None or not parts[0] < 1 or theorem_of(loop).energy != TAKES:
         return False
-    small = np.array([STATIC_AT * first_frequency(loop.arm)], dtype=complex)
+    # 1e-9 of the lowest frequency: L there is that of an arm at rest
+    small = np.array([1e-9 * first_frequency(loop.arm)], dtype=complex)
     return bool((1 + loop.loop_function(small)[0]).real > 0)
 
 
