@@ -73,9 +73,7 @@ def test_a_long_delay_hides_no_crossing_between_two_points_of_the_grid(lab):
 def test_the_map_has_exact_edges(lab):
     loop = sampled_loop(lab, GAINS, count=11)
     plane = sampled_map(loop, [0.1, 0.3, 30.0], np.linspace(-0.5, 1.5, 5))
-    assert plane.stable_intervals[1] == [pytest.approx(stable_windows(loop, "K2")[0], rel=1e-12)]
-    assert plane.stable_intervals[2] == []
-    assert plane.unstable[1].tolist() == [2, 0, 0, 0, 2] or plane.unstable[1, 0] > 0
+    assert plane.stable_intervals[1:] == [[pytest.approx(stable_windows(loop, "K2")[0], rel=1e-12)], []]
 
 
 @pytest.mark.parametrize("K2", [0.1, 0.3, 0.9])
@@ -131,19 +129,16 @@ def test_the_region_is_upright_where_intervals_of_the_rate_gain_end(lab):
         assert [True, False] in sides or [False, True] in sides
 
 
-def test_no_damping_cures_a_hub_that_only_overdamped_modes_destabilise():
+def test_no_damping_cures_some_loops_and_none_is_needed_for_few_modes(lossless):
     """At the strongest damping the loop of ringing modes alone is stable, and that of 20 modes is not."""
+    assert required_damping(lossless, HubFeedback(K1=0.3, K2=3.0), Chain(), count=6) == np.inf
+    assert required_damping(lossless, GAINS, Chain(), count=6) == 0.0
     case = draw(63, 531)
     chain = Chain(sampling=Sampling(period=2 * math.pi / case.first / 9))
     strongest = case.arm.elastic.having(damping=0.3 / case.first)
     radii = [abs(sampled_loop(strongest, case.law, chain, count=n).eigenvalues).max() for n in (1, 20)]
     assert radii[0] < 1 < radii[1]
     assert required_damping(case.arm.elastic, case.law, chain) == np.inf
-
-
-def test_no_damping_cures_a_gain_far_out_and_none_is_needed_for_few_modes(lossless):
-    assert required_damping(lossless, HubFeedback(K1=0.3, K2=3.0), Chain(), count=6) == np.inf
-    assert required_damping(lossless, GAINS, Chain(), count=6) == 0.0
 
 
 def test_the_verdict_settles_with_damping_and_names_its_modes_without(lab, lossless):

@@ -367,21 +367,14 @@ def test_a_map_around_a_law_s_own_resonance_counts_as_the_verdict_does():
     assert plane(ContinuousLoop(lab, law), ("hub_angle", "tip_deflection.num.0"), values, values).stable.all()
 
 
-def test_a_map_whose_counts_do_not_hold_at_its_corners_is_refused(monkeypatch):
-    """As if a pair had come into the band through its top, on the way to the last corner."""
-    module = import_module("tfarm.loop.plane")
-    counted = module.unstable_below
-
-    def other(loop, band):
-        numbers = loop.law.numbers  # a factor is multiplied into them
-        is_last = numbers["hub_angle.num.0"] == 20 * 2.0 and numbers["hub_angle.den.1"] == 3.0
-        return counted(loop, band) + 2 * is_last
-
-    monkeypatch.setattr(module, "unstable_below", other)
-    with pytest.raises(ConvergenceError, match=r"at gain = 20, hub_angle.den.1 = 3 .* ask for a smaller range"):
-        plane(
-            ContinuousLoop(LAB, LAW), ("gain", "hub_angle.den.1"), np.array([1.0, 5.0, 20.0]), np.array([0.5, 1.0, 3.0])
-        )
+def test_a_map_whose_counts_do_not_hold_at_its_corners_is_refused():
+    """As if a pair had come into the band through its top, on the way to the last corner; one that rests is open."""
+    law = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])})
+    vary, across, up = ("gain", "hub_angle.den.1"), np.array([1.0, 5.0, 20.0]), np.array([0.5, 1.0, 3.0])
+    found = plane(ContinuousLoop(LAB, law), vary, across, up)
+    found.must_agree(lambda x, y: None if x == 20.0 else 0, "")
+    with pytest.raises(ConvergenceError, match=r"at gain = 20, hub_angle.den.1 = 3 2 poles .* not 0: ask for less"):
+        found.must_agree(lambda x, y: 2 * (x == 20.0 and y == 3.0), "ask for less")
 
 
 def test_the_count_of_two_poles_that_meet_at_rest_follows_the_lag():

@@ -21,7 +21,7 @@ from tfarm.arm import Attachment, Motor
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.lines import line_crossings
 from tfarm.loop.loci import damping_ratios, held_branches, loci, most_damped, reduced_locus
-from tfarm.loop.locus import CONTROLLER, RIGID, frame, locus, origin_name, rounded
+from tfarm.loop.locus import CONTROLLER, RIGID, frame, locus, origin_name
 from tfarm.loop.poles import poles_below
 from tfarm.schema import curve_table
 from tfarm.spectrum.damped import damped_modes
@@ -368,21 +368,6 @@ def test_where_the_first_mode_is_damped_most_does_not_depend_on_the_values():
     short = most_damped(locus(LAB, law, "K1", 0.0, 2.0, 20, 4))
     assert (short.gain, short.damping_ratio) == (2.0, pytest.approx(ratio_at(2.0), rel=1e-9))
     assert most_damped(locus(LAB, law, "payload_mass", 0.0, 0.1, 10, 4)) is None
-
-
-@pytest.mark.parametrize(("arm", "vary", "start", "stop"), [(STOCKY, "K2", -5.0, 0.9), (LAB, "K1", 0.3, 3.0)])
-def test_each_branch_is_round_in_a_picture_of_its_own_and_of_all(arm, vary, start, stop):
-    """From 12 values: pieces longer than a five hundredth of the picture turn by at most 2.5 degrees."""
-    branches = rounded(locus(arm, HUB, vary, start, stop, points=12, branches=5)).branches
-    swinging = branches[(branches.imag > 0).all(axis=1)]
-    assert len(swinging) >= 3
-    for points, shown in (*((row, [row]) for row in swinging), (branches, swinging)):
-        wide, tall = max(points.real.max(), 0) - min(points.real.min(), 0), np.ptp(points.imag)
-        for row in shown:
-            across, up = np.diff(row.real) / wide, np.diff(row.imag) / tall
-            heading, seen = np.unwrap(np.arctan2(up, across)), np.hypot(across, up) > 2e-3
-            turn = abs(np.diff(heading))[seen[1:] | seen[:-1]]
-            assert turn.max(initial=0.0) <= math.radians(2.5)
 
 
 @pytest.mark.parametrize("turned", [1.0, -1.0])

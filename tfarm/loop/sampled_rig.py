@@ -19,6 +19,7 @@ import numpy as np
 
 from tfarm.arm.chain import Chain
 from tfarm.arrays import Complex, Real, Whole
+from tfarm.crossing import Steps
 from tfarm.dsp.discretise import LawInZ, lowest_power, root_product
 from tfarm.dsp.plant import Plant, PulseTransfer, SensedPlant, is_analog
 from tfarm.records import record
@@ -144,11 +145,12 @@ class CircleGrid:
         """The rig's `terms` (1 + parts, n), each times the offset of the point from its pole."""
         return self.at(self.base, self.shift)
 
-    @cached_property
-    def turns(self) -> Real:
-        """Im(T_i conj T_j) of the rows T of `terms`, i < j, a row each pair: the same along every line of a map."""
-        i, j = np.triu_indices(len(self.terms), 1)
-        return np.asarray((self.terms[i] * self.terms[j].conj()).imag)
+    def steps(self, number: Whole) -> Steps:
+        """The steps from the points of these numbers to the next, as angles from the pole of each."""
+        base = self.base[number]  # where the next point has another pole, both are as far away
+        is_own = base == self.base[number + 1]
+        high = np.where(is_own, self.shift[number + 1], self.q[number + 1] - self.angles[base])
+        return Steps(self.shift[number], high, lambda shift: self.at(base, shift), self.angles[base])
 
     def at(self, base: Whole, shift: Real) -> Complex:
         """Return the rig's `terms` at other points."""

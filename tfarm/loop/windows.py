@@ -12,15 +12,15 @@ from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, RATE_GAIN, HubFeedback, shown_unit
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN, shown_unit
 from tfarm.crossing import Crossing, Crossings, Window, intervals, joined
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import first_frequency, gain_unit, most_gain
 
-from .continuous import ContinuousLoop, grid
-from .lines import LEADING, Line, along, critical, crossed, static_edge, unstable_below
+from .continuous import ContinuousLoop
+from .lines import LEADING, Along, LawTerms, critical, crossed, static_edge, unstable_below
 from .stability import Stability, band_of_family, is_known_without, verdict_on
 from .theorem import TAKES, absorbed, theorem_of
 
@@ -29,9 +29,7 @@ SEARCH_RANGE = Quantity("search range", digits=5, key="search_range", help="valu
 ENDS = "an end with < or > is that of the search range: no limit was found up to there"
 
 WINDOW_REACH, FARTHER_REACH = 20.0, {MOMENT_GAIN: 50.0}  # of the search range, times `gain_unit`
-BEYOND_STATIC = 2.0  # times J/(J - I_h), where K2 cancels the inertia: least search range
 BEYOND_LAW = 10.0  # times the number of the law: least search range too
-STATIC_AT = 1e-9  # of the lowest frequency: L there is that of an arm at rest
 
 
 class Interval(NamedTuple):
@@ -142,7 +140,8 @@ def looked_at(loop: ContinuousLoop, name: str) -> Window:
     reach = max(FARTHER_REACH.get(name, WINDOW_REACH) * gain_unit(arm, name), BEYOND_LAW * abs(value))
     carried = arm.gauged_inertia
     if name == MOMENT_GAIN and 0 < carried < math.inf:
-        reach = max(reach, BEYOND_STATIC * arm.turned_inertia / carried)
+        # 2.0 times J/(J - I_h), where K2 cancels the inertia: least search range
+        reach = max(reach, 2.0 * arm.turned_inertia / carried)
     most = min(most_gain(arm, name), reach)
     return -most, most
 
@@ -155,9 +154,9 @@ def _lines(verdict: Stability, ranges: dict[str, Window]) -> tuple[dict[str, Cal
     if verdict.is_known_beyond or loop.gains is not None:
         ends = (loop.having(name, end) for name, pair in ranges.items() for end in critical(name, pair))
         band = max(band, band_of_family(ends)[0])
-    lines = [Line(lambda: loop, name, *pair) for name, pair in ranges.items()]
-    found = crossed(loop.arm, along(loop, ranges), lines, np.asarray(grid(loop.arm, band)))
-    return dict(zip(ranges, found, strict=True)), band
+    terms = LawTerms(loop.signals, loop.law, ranges)
+    lines = [Along(lambda: loop, name, terms.line(name, *pair)) for name, pair in ranges.items()]
+    return dict(zip(ranges, crossed(loop.arm, terms, band, lines), strict=True)), band
 
 
 def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, band: float) -> list[Window]:
@@ -167,8 +166,7 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
     the count at an end differs.
     """
     loop, value = verdict.loop, verdict.loop.numbers[name]
-    if loop.gains is not None and loop.arm.loses_at_hub_alone:
-        found = _without_rounding(loop, loop.gains, name, found)
+    found = without_losses(loop, name, found)
     pairs, count, at = found.spans(*limits), verdict.unstable_roots, value
     resting = [each.change for each in found if each.t == value and each.at == 0]
     is_known = verdict.verdict != "marginal"
@@ -193,16 +191,24 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
     return stable
 
 
-def _without_rounding(loop: ContinuousLoop, gains: HubFeedback, name: str, found: Crossings) -> Crossings:
-    """The crossings along a gain without losses, where D is even in s but for the part of the rate gain.
+def without_losses(loop: ContinuousLoop, name: str, found: Crossings) -> Crossings:
+    """The crossings along a gain; of a rig that loses at its hub alone all modes are at the gain that cancels the loss.
 
-    Poles are on the axis where that part vanishes, for all values of the other gains.
+    There D is even in s but for the part of the rate gain: poles are on the axis where that part vanishes, for all
+    values of the other gains.  Elsewhere they reach it where K2 cancels the whole moment on the hub.
     """
-    at = 0.0 - loop.arm.rate_loss
-    if name != RATE_GAIN:
-        return found if at != gains.K1 else Crossings.of([])
-    unit = gain_unit(loop.arm, name)
-    return Crossings.of(each._replace(t=at) if abs(each.t - at) < unit else each for each in found)
+    gains, arm = loop.gains, loop.arm
+    if gains is None or not arm.loses_at_hub_alone:
+        return found
+    at, reach = 0.0 - arm.rate_loss, 1.0
+    if name != RATE_GAIN and at == gains.K1:
+        return Crossings.of([])
+    if name == MOMENT_GAIN and is_decided_along(loop, name):
+        at, reach = arm.input_per_torque, 1e-9
+    elif name != RATE_GAIN:
+        return found
+    near = reach * gain_unit(arm, name)
+    return Crossings.of(each._replace(t=at) if abs(each.t - at) < near else each for each in found)
 
 
 # ------------------------------------------------------------ without damping, by a theorem
@@ -234,7 +240,8 @@ def is_held(loop: ContinuousLoop) -> bool:
     parts = absorbed(loop.arm, loop.law)
     if parts is None or not parts[0] < 1 or theorem_of(loop).energy != TAKES:
         return False
-    small = np.array([STATIC_AT * first_frequency(loop.arm)], dtype=complex)
+    # 1e-9 of the lowest frequency: L there is that of an arm at rest
+    small = np.array([1e-9 * first_frequency(loop.arm)], dtype=complex)
     return bool((1 + loop.loop_function(small)[0]).real > 0)
 
 
