@@ -29,7 +29,7 @@ from tfarm.spectrum.proofs import Disc, disjoint, enclosed, proven_count
 from tfarm.spectrum.starts import damped_starts
 from tfarm.spectrum.table import first_frequency
 
-from .continuous import UNDISPERSED, ContinuousLoop, band_of, steep_places
+from .continuous import ContinuousLoop, band_of, steep_places
 from .theorem import CONSERVES, GIVES, theorem_of
 
 MOST_POLES = 1000  # that may be asked for
@@ -184,7 +184,8 @@ def poles_below(
 def box_of(loop: ContinuousLoop, height: float, late: float = LATE) -> Box:
     """A box of that height, right of the law's poles and until |L| is small; left short of -1/C and -late/delay."""
     own, C = loop.law.poles, loop.arm.damping
-    if own.real.max(initial=0.0) > UNDISPERSED * first_frequency(loop.arm):
+    farthest = 1e8 * first_frequency(loop.arm)  # the phase of waves turns too often along a wider box
+    if own.real.max(initial=0.0) > farthest:
         fastest = complex(own[own.real.argmax()])
         why = f"law: its pole at {fastest:.3g} 1/s is farther right than any box, as its den begins next to 0"
         raise ConvergenceError(f"{why}; begin it with 0, which is another law, or a larger number", fastest, height)
