@@ -123,13 +123,6 @@ def test_print_and_notebook_show_the_card_and_a_narrow_terminal_opens_with_value
     assert any(re.fullmatch(r"phase margin +deg +7.901 at 63.28 rad/s, poor", line) for line in narrow)
 
 
-def test_print_shows_the_modes(capsys):
-    """The frequencies are the design table's, by another solution (30 digits)."""
-    print(tfarm.modes(BARE, 2))
-    rows = [line.split() for line in capsys.readouterr().out.splitlines()[-2:]]
-    assert rows == [["1", "71.5056824669", "11.3804828"], ["2", "204.333139364", "32.5206292"]]
-
-
 def test_default_gains_are_no_design():
     at_default = tfarm.result_card(LAB, tfarm.default_gains(LAB)).notes
     assert [note.partition(";")[0] for note in at_default] == ["default gains: scaled from the paper's, not a design"]
