@@ -32,7 +32,6 @@ from .continuous import FAR_RIGHT, LONG_PATH, SLOWEST, ContinuousLoop, grid
 from .poles import box_of
 from .stability import MARGIN_OF_ZERO, is_known_without
 
-FACTOR = "gain"  # the name of a factor on the whole law
 LEADING = ".den.0"  # how the name of a leading coefficient ends
 ORDER_READ_AT = (2e-3, 1e-3)  # of w1: where the order of a zero at s = 0 is read off
 NEAR_ORIGIN = (1e-6, 5e-7)  # of the lowest frequency: where a real pole is searched on its way through 0
@@ -56,18 +55,32 @@ class LawTerms:
 
         f_j = e^{-s tau} sum of p_ji numerator_i
 
-    Those of weight 0 that follow are the slopes of D in coefficients of q_j or p_j.
+    Those of weight 0 that follow are D of laws with coefficients next to 0: D is affine in these too.
     """
 
     def __init__(self, signals: Signals, law: Law, names: Iterable[str]) -> None:
         self.signals, self.law, self.gains = signals, law, law.part_gains
-        weights = np.ones(1 + len(law.parts))
+        self.weights = np.ones(1 + len(law.parts))
         for name, (part, value) in self.gains.items():
-            weights[1 + part] = value
+            self.weights[1 + part] = value
             self.law = self.law.having(name, 1.0)
-        keys = (_key(name) for name in names)
-        self.coefficients = [key for key in keys if key != FACTOR and self.part(key) is None]
-        self.weights = np.r_[weights, np.zeros(len(self.coefficients))]
+        self.others = {}
+        for name in names:
+            if self.part(name) is None and name != "gain":
+                value = law.numbers.get(name, 0.0)
+                small = value * 2.0**-30 or 1.0  # not 0, as a leading 0 moves the other coefficients
+                self.others[name] = value, small, self.law.having(name, small)
+
+    def of(self, s: Complex, rig: LoopParts) -> Complex:
+        """The terms (rows, ...) at places s, from the parts of the signals there."""
+        late = np.exp(-s * self.law.delay) * rig.numerators
+
+        def rows(law: Law) -> Complex:
+            shares, whole = law.shares(s)
+            return np.array([rig.drive * whole, *(shares * late).sum(axis=1)])
+
+        others = (np.tensordot(self.weights, rows(law), 1) for *_, law in self.others.values())
+        return np.array([*rows(self.law), *others])
 
     def at(self, s: Complex) -> Complex:
         """The terms (rows, n) at places s (n,)."""
@@ -83,35 +96,16 @@ class LawTerms:
             drive = (drive * turn).real + 0j
         return self.of(s, LoopParts(drive, numerators, scale))
 
-    def of(self, s: Complex, rig: LoopParts) -> Complex:
-        """The same from the parts of the signals there."""
-        law = self.law
-        shares, whole = law.shares(s)
-        late = np.exp(-s * law.delay) * rig.numerators
-        rows = [rig.drive * whole, *(shares * late).sum(axis=1)]
-        weights = self.weights[: len(rows)]
-        for key in self.coefficients:
-            part, of, power, _ = self._place_of(key)
-            block, (signal,) = law.parts[part].block, law.parts[part].signals
-            if of == "num":
-                slope = -law.sign * late[law.signals.index(signal)] * whole
-            else:  # D without this part
-                slope = np.tensordot(weights, rows[: weights.size], 1) - weights[1 + part] * rows[1 + part]
-            rows.append(s**power * slope / block.denominator(s))
-        return np.array(rows)
-
     def line(self, name: str, low: float = -math.inf, high: float = math.inf) -> Line:
         """The line of a number of the law."""
-        key, unit, value = _key(name), np.zeros(self.weights.size), 1.0
-        part = self.part(key)
-        if key == FACTOR:
-            unit[1:] = self.weights[1:]
-        elif part is not None:
-            unit[1 + part], value = 1.0, self.weights[1 + part]
-        else:
-            unit[1 + len(self.law.parts) + self.coefficients.index(key)] = 1.0
-            *_, value = self._place_of(key)
-        return Line.of(self.weights, unit, value, low, high)
+        weights, part = np.r_[self.weights, np.zeros(len(self.others))], self.part(name)
+        if name == "gain":  # a factor on the law
+            return Line.of(weights, np.r_[0.0, weights[1:]], 1.0, low, high)
+        if part is not None:
+            return Line.of(weights, np.eye(weights.size)[1 + part], weights[1 + part], low, high)
+        value, small, _ = self.others[name]
+        other = np.eye(weights.size)[self.weights.size + list(self.others).index(name)]
+        return Line.of(other, (weights - other) / (value - small), small, low, high)
 
     def having(self, name: str, value: float) -> LawTerms:
         """The same with another value of the gain of a part."""
@@ -123,20 +117,8 @@ class LawTerms:
 
     def part(self, name: str) -> int | None:
         """The part whose weight is a number; None of any other."""
-        plain = _key(name).removesuffix(".gain")
-        return next((self.gains[name][0] for name in (plain, f"{plain}.gain") if name in self.gains), None)
-
-    def _place_of(self, key: str) -> tuple[int, str, int, float]:
-        """The part, the polynomial, the power of s and the value of a coefficient."""
-        signal, of, place = key.rsplit(".", 2)
-        part = next(n for n, part in enumerate(self.law.parts) if part.signals == (signal,))
-        row = getattr(self.law.parts[part].block, of)
-        return part, of, len(row) - 1 - int(place), row[int(place)]
-
-
-def _key(name: str) -> str:
-    """A number's name by its signal."""
-    return OUTPUT_OF.get(name, name)
+        plain = OUTPUT_OF.get(name, name).removesuffix(".gain")
+        return next((self.gains[key][0] for key in (plain, f"{plain}.gain") if key in self.gains), None)
 
 
 class Along(NamedTuple):
