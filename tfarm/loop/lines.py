@@ -20,7 +20,7 @@ import numpy as np
 
 from tfarm.arm import Arm, Law
 from tfarm.arm.feedback import OUTPUT_OF
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import MACHINE_EPS, Complex, Real
 from tfarm.crossing import Crossing, Crossings, Grid, Line, Window, crossings
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import LoopParts
@@ -35,7 +35,6 @@ from .stability import MARGIN_OF_ZERO, is_known_without
 LEADING = ".den.0"  # how the name of a leading coefficient ends
 ORDER_READ_AT = (2e-3, 1e-3)  # of w1: where the order of a zero at s = 0 is read off
 NEAR_ORIGIN = (1e-6, 5e-7)  # of the lowest frequency: where a real pole is searched on its way through 0
-ROUNDED = 4 * float(np.finfo(float).eps)  # of a range: a gain so small is 0
 
 
 def with_numbers(law: Law, values: Mapping[str, float]) -> Law:
@@ -150,16 +149,21 @@ def _with_real_poles(along: Along, found: list[Crossing], N: Complex, P: Complex
     Poles are counted on either side of a value at which two of them meet at s = 0.  Where the leading coefficient of a
     denominator changes its sign, a real pole passes through infinity.
     """
-    low, high = along.line[2:]
-    rest = through_origin(N[:2], P[:2])
+    low, high = limits = along.line[2:]
+    rest = through_origin(N[:2], P[:2], limits)
     if rest is not None and low <= rest.t <= high:
         (zero, half), (whole, part) = abs((N + rest.t * P)[2:4]), abs(P[2:4])
         # ratio of values at the first and the second: 2 of a simple zero, 4 of a double one
         is_single = zero * part < 3.0 * half * whole
         found.append(rest if is_single else rest._replace(change=_change_at(along, rest.t, found, band)))
-    if 0.0 in critical(along.name, (low, high))[1:-1] and (far := through_infinity(N[4:], P[4:])) is not None:
-        found.append(far._replace(t=0.0))
-    return Crossings.of(e._replace(t=0.0) if abs(e.t) <= ROUNDED * (high - low) else e for e in found)
+    if 0.0 in critical(along.name, limits)[1:-1] and (change := through_infinity(N[4:], P[4:])):
+        found.append(Crossing(0.0, math.inf, change))
+    return Crossings.of(each._replace(t=rounded(each.t, limits)) for each in found)
+
+
+def rounded(t: float, limits: Window) -> float:
+    """A number along a line; one that is 0 but for the rounding of its range is 0."""
+    return 0.0 if abs(t) <= 4 * MACHINE_EPS * (limits[1] - limits[0]) else t
 
 
 def line_crossings(loop: ContinuousLoop, name: str, low: float, high: float, band: float) -> Crossings:
@@ -177,11 +181,10 @@ def _change_at(along: Along, at: float, others: list[Crossing], band: float) -> 
 
     Raises ConvergenceError where nothing is damped and modes cross at that value too, but for rounding.
     """
-    span, loop, name = along.line.high - along.line.low, along.member(), along.name
-    at = 0.0 if abs(at) <= ROUNDED * span else at
+    loop, name = along.member(), along.name
     away = [abs(each.t - at) for each in others if each.t != at and math.isfinite(each.t)]
     # 1e-3 of the range: how far from such a place its counts are taken
-    step = min([1e-3 * span, *(each / 2 for each in away)])
+    step = min([1e-3 * (along.line.high - along.line.low), *(each / 2 for each in away)])
     try:
         below, above = (unstable_below(loop.having(name, at + side * step), band) for side in (-1, 1))
     except ConvergenceError as error:
@@ -193,7 +196,7 @@ def _change_at(along: Along, at: float, others: list[Crossing], band: float) -> 
     return above - below
 
 
-def through_origin(N: Complex, P: Complex) -> Crossing | None:
+def through_origin(N: Complex, P: Complex, limits: Window) -> Crossing | None:
     """A real pole through s = 0, from N and P at two small real s, the second half the first; None without a limit."""
     if not P.all():
         return None
@@ -201,20 +204,16 @@ def through_origin(N: Complex, P: Complex) -> Crossing | None:
     # 1.5 times the gain at the farther of two small s: more at the nearer one is a gain without a limit
     if not abs(near) < 1.5 * abs(far):
         return None
-    return Crossing(float(2 * near - far) + 0.0, 0.0, 1 if far > near else -1)
+    return Crossing(rounded(float(2 * near - far), limits), 0.0, 1 if far > near else -1)
 
 
-def through_infinity(N: Complex, P: Complex) -> Crossing | None:
-    """A real pole through infinity, from N and P at three real s far right, as `FAR_RIGHT`; None without a limit."""
-    with np.errstate(over="ignore", invalid="ignore"):  # a law of high order is beyond any number there
-        if not P.all() or not np.isfinite(N / P).all():
-            return None
-        first, second, third = -(N / P).real
-    before, last = second - first, third - second
-    # by more than 0.75 of the step before, of places ever farther right, a gain without a limit grows
-    if not abs(last) < 0.75 * abs(before):
-        return None
-    return Crossing(float(third + last * last / (before - last)), math.inf, 1 if before < 0 else -1)
+def through_infinity(N: Complex, P: Complex) -> int:
+    """The change of the count by a real pole through infinity, from N and P at three places as `FAR_RIGHT`; 0: none."""
+    with np.errstate(all="ignore"):  # a law of high order is beyond any number there
+        before, last = np.diff(-(N / P).real)
+        # by more than 0.75 of the step before, of places ever farther right, a gain without a limit grows
+        has_limit = abs(last) < 0.75 * abs(before)
+    return (1 if before < 0 else -1) if has_limit else 0
 
 
 def unstable_below(loop: ContinuousLoop, band: float) -> int:
@@ -254,5 +253,4 @@ def static_edge(loop: ContinuousLoop, name: str, limits: Window) -> Crossing | N
     near = SLOWEST * first_frequency(loop.arm) * np.array(NEAR_ORIGIN) + 0j
     terms = LawTerms(loop.signals, loop.law, [name])
     line, rows = terms.line(name), terms.at(near)
-    found = through_origin(line.others @ rows, line.alone @ rows)
-    return found._replace(t=0.0) if found and abs(found.t) <= ROUNDED * (limits[1] - limits[0]) else found
+    return through_origin(line.others @ rows, line.alone @ rows, limits)

@@ -39,12 +39,12 @@ from tfarm.spectrum.table import PAPER_GAINS, default_gains, hub_locked, rate_un
 
 from .continuous import ContinuousLoop, grid
 from .lines import (
-    ROUNDED,
     Along,
     LawTerms,
     critical,
     crossed,
     line_crossings,
+    rounded,
     static_edge,
     turns_over,
     unstable_below,
@@ -298,7 +298,7 @@ def ranges_of(arm: Arm) -> tuple[tuple[float, float], tuple[float, float]]:
 def between(low: float, high: float, number: int) -> Real:
     """The middles of `number` equal parts from low to high: none of them on a line K1 = 0 unless by chance."""
     values = low + (high - low) * (np.arange(number) + 0.5) / number
-    return np.where(abs(values) <= ROUNDED * (high - low), 0.0, values)
+    return np.array([rounded(value, (low, high)) for value in values.tolist()])
 
 
 @dataclass(frozen=True)

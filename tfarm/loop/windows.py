@@ -247,12 +247,10 @@ def is_held(loop: ContinuousLoop) -> bool:
 
 def _with_proven_ends(loop: ContinuousLoop, name: str, pair: Window, limits: Window) -> Window:
     """The interval with ends of the search replaced by infinity where a theorem holds beyond them."""
-    low, high = pair
-    if loop.gains is None:
+    end, beyond = (0, -math.inf) if name == MOMENT_GAIN else (1, math.inf)
+    if loop.gains is None or pair[end] != limits[end] or not is_held(loop.having(name, pair[end])):
         return pair
-    if name == MOMENT_GAIN:
-        return (-math.inf if low == limits[0] and is_held(loop.having(name, low)) else low), high
-    return low, (math.inf if high == limits[1] and is_held(loop.having(name, high)) else high)
+    return (beyond, pair[1]) if end == 0 else (pair[0], beyond)
 
 
 def reach_words(found: Iterable[Windows]) -> str:
