@@ -145,6 +145,12 @@ class GainMap(OfLoop, PlaneOfCounts):
     crossings: list[Crossings]
 
     @property
+    def finding(self) -> Annotated[str, Quantity("stability region",
+            help="grid points of the plane without unstable poles")]:  # fmt: skip
+        """Number of points of the grid at which the loop is stable."""
+        return super().finding
+
+    @property
     def counts(self) -> Annotated[NDArray[np.int64], Quantity(key="unstable_poles",
             help="unstable poles at each point, without z = 1 of a free hub angle")]:  # fmt: skip
         """Unstable poles (len(y), len(x))."""
