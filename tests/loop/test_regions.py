@@ -104,13 +104,10 @@ def test_the_answer_holds_the_boundary_inside_the_map_to_its_very_corner() -> No
     assert not inside.all()
 
 
-@pytest.mark.parametrize(
-    "K1",
-    [np.array([1.0]), np.array([1.0, 1.0]), np.array([2.0, 1.0]), np.array([0.0, math.nan]), np.linspace(0, 1, 2001)],
-)
+@pytest.mark.parametrize("K1", [[1.0], [1.0, 1.0], [2.0, 1.0], [0.0, math.nan], np.linspace(0, 1, 2001)])
 def test_an_empty_or_unordered_range_is_refused(K1) -> None:
     with pytest.raises(ParameterError, match="K1"):
-        gain_map(LAB, K1, np.array([0.0, 1.0]))
+        gain_map(LAB, np.array(K1), np.array([0.0, 1.0]))
 
 
 def test_without_damping_the_intervals_of_a_held_arm_end_where_it_falls_statically() -> None:
