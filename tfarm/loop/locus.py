@@ -300,7 +300,7 @@ def frame(branches: Complex) -> tuple[float, float, float, float]:
     points = branches[~np.isnan(branches)]
     if not points.size:
         return 0.0, 1.0, 0.0, 1.0
-    left, right = min(float(points.real.min()), 0.0), max(float(points.real.max()), 0.0)
+    left, right = float(points.real.min(initial=0.0)), float(points.real.max(initial=0.0))
     low, high = float(points.imag.min()), float(points.imag.max())
     # less than 1e-12 of the size of its poles is rounding of a constant pole
     wide = max(right - left, 1e-12 * float(abs(points).max())) or 1.0  # where no pole moves from 0

@@ -407,19 +407,12 @@ def _segments(points: Real, x: Axis, y: Axis) -> tuple[Real, NDArray[np.bool_]]:
     return np.hypot(*np.diff(places)), np.asarray(((high >= 0) & (low <= 1)).all(axis=0))
 
 
-def stable_edge(found: Plane, points: Real, x: Axis, y: Axis) -> Real:
-    """Points (n, 3) of the boundary in the picture with the stable region on one side, above or below."""
-    points = points[~np.isnan(points[:, 0])]
-    if not points.size:
-        return points
-    across, up = x.place(points[:, 0]), y.place(points[:, 1])
-    columns, rows = (axis.place(values) for axis, values in zip((x, y), found.axes, strict=True))
-    column, row = np.searchsorted((columns[1:] + columns[:-1]) / 2, across), np.interp(up, rows, np.arange(rows.size))
-    below, above = (
-        np.clip(np.round(row + way).astype(int), 0, rows.size - 1) for way in (-ROWS_FROM_EDGE, ROWS_FROM_EDGE)
-    )
-    differ = (found.unstable[below, column] == 0) != (found.unstable[above, column] == 0)
-    return np.asarray(points[differ & (up >= 0) & (up <= 1) & (across <= 1) & (points[:, 0] > 0)])
+def stable_edge(found: Plane) -> Real:
+    """K1 > 0, K2 and frequency [rad/s] (n, 3) where pairs of poles cross at an end of a stability interval."""
+    columns = zip(found.x.tolist(), found.crossings, found.stable_intervals, strict=True)
+    ends = [(K1, t, at) for K1, column, stable in columns for t, at, _ in column if t in np.ravel(stable)]
+    points = np.reshape(ends, (-1, 3))
+    return points[(points[:, 0] > 0) & (points[:, 2] > 0) & np.isfinite(points[:, 2])]
 
 
 def resting_frequencies(found: Plane, count: int) -> Real:
@@ -429,7 +422,7 @@ def resting_frequencies(found: Plane, count: int) -> Real:
 
 def static_edges(found: Plane) -> tuple[float | None, float | None]:
     """The gains at which a real pole passes through 0: an upright line of the boundary, and a level one."""
-    loop, (across, up) = ContinuousLoop(found.arm, found.law), (abs(values).max() for values in found.axes)
-    upright = static_edge(loop.having(MOMENT_GAIN, 0.0), RATE_GAIN, (-across, across))
+    upright = found.upright if found.arm.has_rigid_mode and found.Kp == 0 else None
+    loop, up = ContinuousLoop(found.arm, found.law), float(abs(found.y).max())
     level = static_edge(loop.having(RATE_GAIN, 1.0), MOMENT_GAIN, (-up, up))
-    return None if upright is None else upright.t, None if level is None else level.t
+    return upright, None if level is None else level.t
