@@ -33,7 +33,6 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.box import Box
 from tfarm.spectrum.following import assigned, between, follow
-from tfarm.spectrum.naming import single_zeros
 
 from .continuous import ContinuousLoop
 from .lines import line_crossings
@@ -259,16 +258,12 @@ def at_origin(loop: ContinuousLoop) -> Whole:
 
 def open_poles(arm: Arm, number: int) -> tuple[Complex, Whole]:
     """Poles of the rig without feedback, both of each pair, and their origins: of at least `number` flexible modes."""
-    table = modes(arm, number)
-    if arm.is_undamped:
-        omega, index = table.natural_frequency[table.index > 0], table.index[table.index > 0]
-        pairs, rigid, others = np.stack([1j * omega, -1j * omega], axis=1), [], single_zeros(table)
-    else:
-        found = damped_modes(table)
-        rigid, others = found.eigenvalues[found.index == 0].ravel(), [*found.others, *found.unassigned_pairs.ravel()]
-        pairs, index = found.eigenvalues[found.index > 0], found.index[found.index > 0]
-    row = np.r_[np.array([*rigid, *others], complex), pairs.ravel()]
-    origin = np.r_[np.full(len(rigid), RIGID), np.full(len(others), OTHER), np.repeat(index, 2)]
+    found = damped_modes(modes(arm, number))
+    rigid, pairs = found.eigenvalues[found.index == 0].ravel(), found.eigenvalues[found.index > 0].ravel()
+    others = [*found.others, *found.unassigned_pairs.ravel()]
+    row = np.array([*rigid, *others, *pairs], complex)
+    origin = np.repeat([RIGID, OTHER], [len(rigid), len(others)])
+    origin = np.r_[origin, np.repeat(found.index[found.index > 0], 2)]
     alive = np.isfinite(row) & (row != 0)
     return row[alive], origin[alive]
 
@@ -282,10 +277,10 @@ def rounded(found: Locus) -> Locus:
     way, pinned, box = int(np.sign(gain[-1] - gain[0])), len(branches) - found.listed.size, found.box
     # rounds of halving at most: where two branches meet their distance goes with the root of that of the gain
     for _ in range(24):
-        whole = [frame(branches)], [view(branches, found.origin)]
-        frames = np.array([[*map(frame, branches)], *(each * len(branches) for each in whole)])  # (3, b, 4)
-        sizes = np.diff(frames)[..., ::2, None]
-        more = (gain[:-1] + gain[1:])[np.any([loose(branches, *each.swapaxes(0, 1)) for each in sizes], axis=0)] / 2
+        pictures = np.array([*map(frame, branches)]), frame(branches), view(branches, found.origin)
+        sizes = [np.diff(np.atleast_2d(each))[:, ::2, None] for each in pictures]
+        is_loose = np.any([loose(branches, *each.swapaxes(0, 1)) for each in sizes], axis=0)
+        more = (gain[:-1] + gain[1:])[is_loose] / 2
         if not more.size or more.size + gain.size > MOST_LOCUS_POINTS:
             break
         order = np.argsort(way * np.r_[gain, more], kind="stable")

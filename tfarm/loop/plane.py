@@ -382,18 +382,16 @@ def moment_axis(arm: Arm, x: Axis) -> Axis:
 def edge(found: Plane, x: Axis, y: Axis) -> Real:
     """The boundary in the picture, refined where it is coarse, with a row of nan after each of its parts."""
     points, loop = found.boundary, ContinuousLoop(found.arm, found.law)
-    if not points.size:
-        return points
     # rounds of cutting at most: 2^-30 of a step between frequencies is less than a pixel
     for _ in range(30):
         length, is_seen = _segments(points, x, y)
-        (coarse,) = np.nonzero((length > SHORT_SEGMENT) & is_seen)
-        if not coarse.size:
+        low, high = points[:-1, 2], points[1:, 2]
+        middle = np.sqrt(low * high)
+        is_coarse = (length > SHORT_SEGMENT) & is_seen & (low < middle) & (middle < high)
+        if not is_coarse.any():
             break
-        middle = np.sqrt(points[coarse, 2] * points[coarse + 1, 2])
-        middle = middle[(middle > points[coarse, 2]) & (middle < points[coarse + 1, 2])]
-        points = np.concatenate([points, boundary(loop, middle)])
-        points = points[np.unique(points[:, 2], return_index=True)[1]]
+        points = np.concatenate([points, boundary(loop, middle[is_coarse])])
+        points = points[np.argsort(points[:, 2])]
     length, is_seen = _segments(points, x, y)
     parts = np.split(points, np.flatnonzero(~is_seen | (length >= LONG_SEGMENT)) + 1)
     gap = np.full((1, 3), np.nan)
@@ -402,9 +400,9 @@ def edge(found: Plane, x: Axis, y: Axis) -> Real:
 
 def _segments(points: Real, x: Axis, y: Axis) -> tuple[Real, NDArray[np.bool_]]:
     """The drawn length of each segment, and whether it may pass through the picture."""
-    places = np.stack([axis.place(points[:, i]) for i, axis in enumerate((x, y))])
-    low, high = np.minimum(places[:, 1:], places[:, :-1]), np.maximum(places[:, 1:], places[:, :-1])
-    return np.hypot(*np.diff(places)), np.asarray(((high >= 0) & (low <= 1)).all(axis=0))
+    places = np.array([x.place(points[:, 0]), y.place(points[:, 1])])
+    ends = np.sort([places[:, :-1], places[:, 1:]], axis=0)
+    return np.hypot(*np.diff(places)), np.asarray(((ends[1] >= 0) & (ends[0] <= 1)).all(axis=0))
 
 
 def stable_edge(found: Plane) -> Real:
