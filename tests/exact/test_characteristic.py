@@ -65,12 +65,12 @@ def exact(arm, law):
 
 
 def in_doubles(arm, law, s):
-    """D of a loop, its zeros at the origin and the time of the waves multiplied in again; both kinds without a law."""
+    """D of a loop, its zeros at the origin multiplied in again; both kinds without a law."""
     if not law:
         return characteristic(system_of(arm), s), quick_characteristics(system_of(arm), s)
     loop = ContinuousLoop(arm, HubFeedback(**law))
-    at, n, T = loop.function(s), loop.zeros_at_origin, loop.delay_of_waves
-    return (Analytic(at.value * s**n, (at.slope + (n / s + T) * at.value) * s**n, at.scale + T * s),)
+    at, n = loop.function(s), loop.zeros_at_origin
+    return (Analytic(at.value * s**n, (at.slope + n / s * at.value) * s**n, at.scale),)
 
 
 @pytest.mark.parametrize("points", sized(6, 7))  # the last of S takes longer than all others

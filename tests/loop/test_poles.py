@@ -155,12 +155,12 @@ def test_a_corner_beyond_double_range_leaves_the_gain_alone(corner):
     np.testing.assert_allclose(found.poles.values[:4], alone.poles.values[:4], rtol=1e-6)
 
 
-@pytest.mark.parametrize(("lead", "verdict"), [(-4e-14, None), (-4e-11, "unstable"), (0.0, "stable")])
+@pytest.mark.parametrize(("lead", "verdict"), [(-4e-11, None), (-4e-9, "unstable"), (0.0, "stable")])
 def test_a_pole_of_the_law_beyond_all_boxes_is_named(lead, verdict):
     """A den that begins next to 0: one pole at 1/lead, where waves and powers of s are no doubles."""
     law = Law({"hub_rate": ((0.5,), (lead, 1.0, 1e3) if lead else (1.0, 1e3))})
     if verdict is None:
-        with pytest.raises(ConvergenceError, match=r"pole at 2\.5e\+13"):
+        with pytest.raises(ConvergenceError, match=r"pole at 2\.5e\+10"):
             stability(LAB, law)
     else:
         assert stability(LAB, law).verdict == verdict

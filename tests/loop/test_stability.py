@@ -32,28 +32,20 @@ def test_map_count_and_model_agree_on_random_loops() -> None:
     assert {-1, 0, 1} <= {each.figures["unstable"] for each in found}
 
 
-@pytest.mark.parametrize(
-    ("K1", "K2", "Kp", "verdict"),
-    [
-        (0.3, 0.3, 0.0, "stable"),
-        (0.3, 0.999, 0.0, "stable"),
-        (0.3, -40.0, 2.0, "stable"),
-        (0.3, 1.0, 0.0, "marginal"),
-        (0.0, 0.3, 0.0, "marginal"),
-        (0.0, 0.0, 0.0, "marginal"),
-        (0.0, 0.3, 5.0, "marginal"),
-        (0.3, 1.001, 0.0, "unstable"),
-        (-1e-3, 0.3, 0.0, "unstable"),
-        (0.3, 0.3, -1e-3, "unstable"),
-        (-0.3, 1.5, 0.0, "unstable"),
-    ],
-)
-def test_verdicts_at_no_damping_are_those_of_theory(K1, K2, Kp, verdict) -> None:
-    found = stability(BARE, HubFeedback(K1=K1, K2=K2, Kp=Kp))
+THEORY = {
+    "stable": [(0.3, 0.3, 0.0), (0.3, 0.999, 0.0), (0.3, -40.0, 2.0)],
+    "marginal": [(0.3, 1.0, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.0), (0.0, 0.3, 5.0)],
+    "unstable": [(0.3, 1.001, 0.0), (-1e-3, 0.3, 0.0), (0.3, 0.3, -1e-3), (-0.3, 1.5, 0.0)],
+}
+
+
+@pytest.mark.parametrize(("verdict", "gains"), [(word, each) for word in THEORY for each in THEORY[word]])
+def test_verdicts_at_no_damping_are_those_of_theory(verdict, gains) -> None:
+    K1, K2, _ = gains
+    found = stability(BARE, HubFeedback(**dict(zip(("K1", "K2", "Kp"), gains, strict=True))))
     assert found.verdict == verdict
     assert found.unstable_roots_infinite == ((K1 > 0 and K2 > 1) or (K1 < 0 and K2 < 1))
-    assert (found.unstable_roots > 0) == (verdict == "unstable")
-    assert found.is_stable == (verdict == "stable")
+    assert (found.unstable_roots > 0, found.is_stable) == (verdict == "unstable", verdict == "stable")
 
 
 @pytest.mark.parametrize("K1", [1e-7, 0.3, 1e4])

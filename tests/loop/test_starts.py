@@ -19,7 +19,7 @@ from tfarm.loop.locus import BranchCrossing, Locus
 from tfarm.loop.nyquist import compressed, poles_on_axis
 from tfarm.loop.panels import CHEBYSHEV, Positions, loop_panels, positions, sensed_places
 from tfarm.loop.plane import Axis, moment_axis, rate_axis, stable_edge
-from tfarm.loop.poles import Poles, count_with_mirrors, first_poles, poles_below, real_starts, starting_points
+from tfarm.loop.poles import Poles, count_with_mirrors, first_poles, poles_below, starting_points
 from tfarm.loop.stability import stability
 from tfarm.spectrum.box import Box
 from tfarm.spectrum.table import rate_unit
@@ -240,17 +240,6 @@ def test_an_end_that_no_mode_moves_is_no_place_for_a_sensor():
 def test_an_arm_that_cannot_turn_has_no_such_zeros():
     with pytest.raises(tfarm.ParameterError):
         positions(tfarm.load("sasaki2012").having(hub_inertia=math.inf), "moment", np.array([0.1]), 2)
-
-
-@pytest.mark.parametrize("law", [HubFeedback(K1=3.0, K2=0.15), HubFeedback(K1=40.0, K2=-1.0, Kp=5.0)])
-def test_each_real_pole_right_of_the_singular_point_has_a_real_start(law):
-    """The poles are complete by the winding number, which knows no starts."""
-    values = tfarm.closed_loop_poles(LAB, law, 12).values
-    real = values[(values.imag == 0) & (values != 0)].real
-    assert real.size == (1 if law.Kp == 0 else 2)
-    starts = real_starts(ContinuousLoop(LAB, law), 300.0).real
-    starts = starts[abs(starts) > 1e-12]  # the pole at rest, to rounding
-    np.testing.assert_allclose(np.sort(starts), np.sort(real), rtol=0.01)
 
 
 def test_poles_of_a_long_delay_have_starts_next_to_them():

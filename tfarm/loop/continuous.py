@@ -46,7 +46,6 @@ from tfarm.spectrum.frequencies import ARMS_KEPT
 from tfarm.spectrum.table import LEAST_UNITS, check_gains, first_frequency
 
 FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: far right, where L of an improper law must fall, and poles come from infinity
-UNDISPERSED = 1e11  # of w1: where waves are no longer dispersed
 FALL_FACTOR = 0.5  # L must fall by this there, from one to the next
 SOMEWHERE = 0.31 + 0.71j  # of w1: where a signal is tested for being fed back at all; no law has its zero there
 NEAREST_TO_ORIGIN = 1e-12  # of w1: where a function, its zeros at 0 divided out, is taken for its value at 0
@@ -183,21 +182,9 @@ class ContinuousLoop(Loop):
         return drive + fed_back, of_rig.scale
 
     def function(self, s: Complex) -> Analytic:
-        """D e^{-s T}/s^n, n = `zeros_at_origin` and T = `delay_of_waves`, with slopes from differences."""
+        """D/s^n, n = `zeros_at_origin`, with slopes from differences."""
         s = np.where(s == 0, NEAREST_TO_ORIGIN * first_frequency(self.arm), np.asarray(s, dtype=complex))
-
-        def clipped(at: Complex) -> tuple[Complex, Complex]:
-            D, scale = self.characteristic(at)
-            return D, scale - self.delay_of_waves * at
-
-        return by_differences(self.k, clipped, s, self.zeros_at_origin)
-
-    @cached_property
-    def delay_of_waves(self) -> float:
-        """T [s] with D ~ e^{s T} far right: D e^{-s T}, with the same zeros, does not turn along a wide box."""
-        far = UNDISPERSED * first_frequency(self.arm)
-        scale = self.signals.parts(np.array([far, 2 * far], complex)).scale.real
-        return float(max(0.0, scale[1] - scale[0]) / far)
+        return by_differences(self.k, self.characteristic, s, self.zeros_at_origin)
 
 
 def by_differences(

@@ -29,7 +29,7 @@ from tfarm.spectrum.proofs import Disc, disjoint, enclosed, proven_count
 from tfarm.spectrum.starts import damped_starts
 from tfarm.spectrum.table import first_frequency
 
-from .continuous import UNDISPERSED, ContinuousLoop, band_of, steep_places
+from .continuous import ContinuousLoop, band_of, steep_places
 from .theorem import CONSERVES, GIVES, theorem_of
 
 MOST_POLES = 1000  # that may be asked for
@@ -47,9 +47,6 @@ LATE = 2.0  # of 1/delay: further left a delayed loop has ever more poles, and a
 BEYOND_OWN = 1.1  # times the rightmost pole of a law, where L is infinite: the nearest right edge that is tried
 # Starts of Newton's method affect the time alone: the winding number counts the zeros that they missed.
 STARTS_REACH = 1.3  # heights of the box: modes of the arm up to there, as a law may draw their poles down into it
-REAL_POINTS, REAL_SPAN, REAL_REACH = 300, 1e10, 1.4  # on either side of 0: their number, from 1e-10 to 1.4 heights
-DELAY_STEPS = 3  # of the equation of a delay alone
-LEAST_START = 1e-100  # 1/s: zeros at 0 are divided out
 HUB = 0  # the number of the pole below the first mode that no mode of the link is near
 PADE = 8  # order of the approximation of a delay in a model
 SHRUNK_HEIGHTS = tuple(1 / factor for factor in TRIED_HEIGHTS)  # of a box that may not reach above the shear cut-off
@@ -187,7 +184,8 @@ def poles_below(
 def box_of(loop: ContinuousLoop, height: float, late: float = LATE) -> Box:
     """A box of that height, right of the law's poles and until |L| is small; left short of -1/C and -late/delay."""
     own, C = loop.law.poles, loop.arm.damping
-    if own.real.max(initial=0.0) > UNDISPERSED * first_frequency(loop.arm):
+    farthest = 1e8 * first_frequency(loop.arm)  # the phase of waves turns too often along a wider box
+    if own.real.max(initial=0.0) > farthest:
         fastest = complex(own[own.real.argmax()])
         why = f"law: its pole at {fastest:.3g} 1/s is farther right than any box, as its den begins next to 0"
         raise ConvergenceError(f"{why}; begin it with 0, which is another law, or a larger number", fastest, height)
@@ -243,32 +241,21 @@ def slow_poles(loop: ContinuousLoop, below: float) -> Complex:
 
 
 def starting_points(loop: ContinuousLoop, up_to: float) -> Complex:
-    """Starts of Newton's method: poles of the damped arm and of the law, real ones, and those of its delay.
+    """Return starts of Newton's method: poles of the damped arm, of the law and of its delay, and real ones.
 
     A delay alone would have the poles  s = (ln(-L e^{s delay}) + 2 pi i n)/delay,  where L e^{s delay} changes little.
     """
     near = damped_starts(loop.arm, np.asarray(steep_places(loop.arm, up_to)))
+    real = -np.geomspace(1e-4 * up_to, up_to, 10)
+    real = real[real * loop.arm.damping > -TOWARD_SINGULAR]
     delay = loop.law.delay
     turns = 2j * math.pi * np.arange(1.0, up_to * delay / (2 * math.pi))
     late = turns / (delay or 1.0)
-    for _ in range(DELAY_STEPS if late.size else 0):
+    for _ in range(3 if late.size else 0):
         with np.errstate(all="ignore"):  # at a pole or a zero of L
             late = (np.log(-loop.loop_function(late) * np.exp(late * delay)) + turns) / delay
-    starts = np.concatenate([near, real_starts(loop, up_to), late, late.conj(), loop.law.poles])
-    return starts[np.isfinite(starts) & (abs(starts) > LEAST_START)]
-
-
-def real_starts(loop: ContinuousLoop, up_to: float) -> Complex:
-    """Real points next to which D changes its sign, right of -1/C."""
-    line = np.geomspace(up_to / REAL_SPAN, REAL_REACH * up_to, REAL_POINTS)
-    line = np.r_[-line[::-1], line]
-    line = line[line * loop.arm.damping > -TOWARD_SINGULAR]
-    with np.errstate(all="ignore"):  # a power of s may overflow: there is no start
-        D, scale = loop.characteristic(line.astype(complex))
-        D = (D * np.exp(1j * scale.imag)).real
-    (n,) = np.nonzero(np.sign(D[1:]) * np.sign(D[:-1]) < 0)
-    share = abs(D[n]) / (abs(D[n]) + abs(D[n + 1]))
-    return (line[n] + share * (line[n + 1] - line[n])).astype(complex)
+    starts = np.concatenate([near, real, late, late.conj(), loop.law.poles])
+    return starts[np.isfinite(starts) & (starts != 0)]
 
 
 def poles_by_mode(poles: Complex, open_loop: Mapping[int, complex]) -> dict[int, complex]:

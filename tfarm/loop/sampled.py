@@ -63,7 +63,6 @@ MOST_STEPS = 200  # of all roots together: a cluster of nine takes 24
 LAST_STEP = 1e-12  # of the offset: below its rounding
 UNMOVED = 1e-50  # an offset this small is a pole that the loop does not move
 LEAST_SQUARE = -1.0 + 1e-15  # for |z|^2 - 1 of a pole at z = 0, the base of no root
-CLEAR_BY, ROUNDED = 2.0, 1e-15  # radii of a disc, and more for the rounding of |z|, by which it is off the circle
 FADED_RADIUS = 0.2  # a pole nearer to z = 0 is stable and not polished
 OUTPUT_OF = {gain.name: gain.output for gain in GAINS}
 
@@ -309,49 +308,35 @@ class Sampled(Loop):
         poles = 0 if not self.plant.arm.has_rigid_mode else (1 if self.rig.is_damped else 2) - self.has_free_angle
         return max(0, poles + min(n for n, _ in self.rig.near_one(self.row)))
 
-    @cached_property
-    def near(self) -> tuple[Complex, Whole, Complex, Whole]:
-        """The closed-loop poles z, not polished, with base and offset of each, and the numbers of those to polish.
-
-        `poles_at_one` of them are 1; those next to z = 0 are stable.
-        """
-        z = self.eigenvalues.copy()
-        z[np.argsort(abs(z - 1), kind="stable")[: self.poles_at_one]] = 1.0
-        base = _nearest(self, z - 1)
-        return z, base, (z - 1) - self.rig.open_loop[base], np.flatnonzero((abs(z) > FADED_RADIUS) & (z != 1))
-
-    @cached_property
+    @property
     def is_stable(self) -> bool:
-        """Whether all poles lie inside the unit circle, by the discs around the eigenvalues where these show it.
-
-        As many poles lie outside as discs, where every disc is on one side of the circle.
-        """
-        z, base, offset, rows = self.near
-        if not (z == 1).any():
-            with np.errstate(all="ignore"):
-                f, slope, _ = _weierstrass(base, offset, rows, self)
-                radius = _radius(f, slope, base, offset, rows, self)
-            outside = abs(z[rows]) - 1
-            if (abs(outside) > CLEAR_BY * radius + ROUNDED).all():
-                return not (outside > 0).any()
+        """Whether all poles lie inside the unit circle."""
         return self.poles.is_stable
 
     @cached_property
     def poles(self) -> SampledPoles:
-        """The closed-loop poles, each polished as an offset from its nearest open-loop pole; `poles_at_one` are 1."""
-        z, base, offset, rows = self.near
-        shifts, pulse, log_radius = self.rig.open_loop, self.pulse, np.log(np.maximum(abs(z), SMALLEST_RADIUS))
-        offset, error = _settled(base, offset, rows, self)
-        moved = _nearest(self, shifts[base] + offset)
-        if (moved[rows] != base[rows]).any():  # then all digits are kept from there
-            offset, error = _settled(moved, offset + (shifts[base] - shifts[moved]), rows, self)
-            base = moved
+        """The closed-loop poles, each polished as an offset from its nearest open-loop pole; `poles_at_one` are 1.
+
+        Those next to z = 0 are stable, and not polished.
+        """
+        z, shifts, pulse = self.eigenvalues.copy(), self.rig.open_loop, self.pulse
+        z[np.argsort(abs(z - 1), kind="stable")[: self.poles_at_one]] = 1.0
+        log_radius = np.log(np.maximum(abs(z), SMALLEST_RADIUS))
+        rows = np.flatnonzero((abs(z) > FADED_RADIUS) & (z != 1))
+        base = _nearest(self, z - 1)
+        offset: Complex = (z - 1) - shifts[base]
+        for _ in range(2):
+            offset, error = _settled(base, offset, rows, self)
+            nearest = _nearest(self, shifts[base] + offset)
+            if (nearest[rows] == base[rows]).all():
+                break
+            # all digits are kept from there
+            offset, base = offset + (shifts[base] - shifts[nearest]), nearest
         own = 2 * self.in_z.poles.real + abs(self.in_z.poles) ** 2
         start = np.r_[pulse.poles.real * pulse.sampling.period, np.log1p(np.maximum(own, LEAST_SQUARE)) / 2]
         at, o = base[rows], offset[rows]
         ratio = o / (1 + shifts[at])
         log_radius[rows] = start[at] + np.log1p(2 * ratio.real + abs(ratio) ** 2) / 2
-        z = z.copy()
         z[rows] = (1 + shifts[at]) + o
         log_radius[abs(log_radius) * abs(z) < error] = 0.0
         mode = pulse.mode[abs(z[:, None] - pulse.multipliers).argmin(axis=1)]
@@ -412,15 +397,10 @@ def _settled(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tuple[
                 break
         offset[abs(offset) <= UNMOVED] = 0.0
         f, slope, _ = _weierstrass(base, offset, rows, loop)
-        radius = _radius(f, slope, base, offset, rows, loop)
+        radius = offset.size * (abs(f) + loop.rounding(base[rows], offset[rows])) / abs(slope)
     own = np.where(base[rows] < loop.pulse.poles.size, 0.0, MACHINE_EPS * abs(loop.rig.open_loop[base[rows]]))
     error[rows] = np.nan_to_num(radius, posinf=0.0) + own  # of a pole that the loop does not move 0/0
     return offset, error
-
-
-def _radius(f: Complex, slope: Complex, base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> Real:
-    """The radii of Smith's discs around some roots, with the rounding of F."""
-    return np.asarray(offset.size * (abs(f) + loop.rounding(base[rows], offset[rows])) / abs(slope))
 
 
 def _weierstrass(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tuple[Complex, Complex, Complex]:

@@ -164,8 +164,7 @@ def circle_grid(rig: SampledRig) -> CircleGrid:
     """The grid that resolves every pole of the plant and every pole and zero of the law, for any weights."""
     pulse = rig.pulse
     angles = np.angle(pulse.multipliers)
-    felt = pulse.residues.any(axis=0) | (np.arange(angles.size) == angles.size - 1)
-    bases = np.nonzero((angles >= 0) & (abs(pulse.multipliers) > BRIGHT) & felt)[0]
+    bases = np.nonzero((angles >= 0) & (abs(pulse.multipliers) > BRIGHT))[0]
     bases = bases[np.argsort(angles[bases], kind="stable")]
     seams = np.r_[0.0, (angles[bases][1:] + angles[bases][:-1]) / 2, np.pi]
     base, shift = [], []

@@ -179,21 +179,22 @@ class Verdict(OfLoop, LoopVerdict):
 
 
 def unaliased_poles(loop: Sampled) -> dict[int, complex]:
-    """Return the poles s = ln(z)/T [1/s], Im s > 0, by mode, each at the frequency nearest to that of its mode."""
-    T, poles = loop.chain.sampling.period, loop.poles
+    """Return the poles s = ln(z)/T [1/s], Im s > 0, by mode, each at the frequency nearest to that of its mode.
+
+    Of several poles of a mode it is the least damped one.
+    """
+    poles, table = loop.poles, modes(loop.arm, max(1, int(loop.poles.mode.max(initial=1))))
     rounding = 1e-9 * abs(poles.z)
     # a real z < 0 oscillates at half the sampling rate, one > 0 never does, whatever rounding leaves of Im z
     upper = (poles.z.imag > rounding) | ((poles.z.real < 0) & (abs(poles.z.imag) <= rounding))
-    table = modes(loop.arm, max(1, int(poles.mode.max(initial=1))))
-    natural = dict(zip(table.index.tolist(), table.natural_frequency.tolist(), strict=True))
-    found: dict[int, complex] = {}
-    for n, q, growth in zip(poles.mode[upper].tolist(), np.angle(poles.z[upper]).tolist(),
-                            poles.log_radius[upper].tolist(), strict=True):  # fmt: skip
-        of_mode = natural.get(n, q / T) * T if n else q
-        turned = [abs(side * q + 2 * math.pi * round((of_mode - side * q) / (2 * math.pi))) for side in (1, -1)]
-        s = complex(growth, min(turned, key=lambda each: abs(each - of_mode))) / T
-        found[n] = max(found.get(n, s), s, key=lambda each: each.real / abs(each))
-    return found
+    mode, q = poles.mode[upper], abs(np.angle(poles.z[upper]))
+    own = np.where(mode > 0, np.interp(mode, table.index, table.natural_frequency) * loop.period, q)
+    turns = 2 * math.pi * np.round((own + [[-1], [1]] * q) / (2 * math.pi))
+    aliases = abs([[1], [-1]] * q + turns)
+    nearest = abs(aliases - own).argmin(axis=0)
+    s = (poles.log_radius[upper] + 1j * aliases[nearest, np.arange(q.size)]) / loop.period
+    order = np.argsort(s.real / abs(s))
+    return dict(zip(mode[order].tolist(), s[order].tolist(), strict=True))
 
 
 def sampled_verdict(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | None = None) -> Verdict:
