@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arrays import Complex, Real
-
-from .line import Window
+from tfarm.crossing.line import Window
 
 STRETCH = 2.0  # how much wider than high, or higher than wide, a picture is at most: so much more a curve turns in it
 MOST_TURN = math.radians(5.0) / STRETCH  # from one piece of a curve to the next, where the picture is as high as wide

@@ -24,13 +24,12 @@ from tfarm.arrays import MACHINE_EPS, Complex, Real
 from tfarm.crossing import Crossing, Crossings, Grid, Line, Window, crossings
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import LoopParts
+from tfarm.loop.continuous import FAR_RIGHT, LONG_PATH, SLOWEST, ContinuousLoop, grid
+from tfarm.loop.poles import box_of
+from tfarm.loop.stability import MARGIN_OF_ZERO, is_known_without
 from tfarm.response.signals import Signals
 from tfarm.spectrum.box import FIRST_POINTS, NEAREST_TO_ZERO, TRIED_HEIGHTS, turned
 from tfarm.spectrum.table import first_frequency
-
-from .continuous import FAR_RIGHT, LONG_PATH, SLOWEST, ContinuousLoop, grid
-from .poles import box_of
-from .stability import MARGIN_OF_ZERO, is_known_without
 
 LEADING = ".den.0"  # how the name of a leading coefficient ends
 ORDER_READ_AT = (2e-3, 1e-3)  # of w1: where the order of a zero at s = 0 is read off

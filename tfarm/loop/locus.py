@@ -26,6 +26,10 @@ from tfarm.arrays import Complex, Real, Whole
 from tfarm.crossing import Crossing
 from tfarm.crossing.turning import loose
 from tfarm.errors import ConvergenceError, must_be_known, require
+from tfarm.loop.continuous import ContinuousLoop
+from tfarm.loop.lines import line_crossings
+from tfarm.loop.varied import ARM_PARAMETERS, OF_THE_LAW, Title, Varied
+from tfarm.loop.windows import without_losses
 from tfarm.records import record
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.response.signals import Controller, controller
@@ -33,11 +37,6 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.box import Box
 from tfarm.spectrum.following import assigned, between, follow
-
-from .continuous import ContinuousLoop
-from .lines import line_crossings
-from .varied import ARM_PARAMETERS, OF_THE_LAW, Title, Varied
-from .windows import without_losses
 
 MOST_LOCUS_POINTS = 100_000  # values, those between that make it round among them
 MOST_BRANCHES = 200  # and flexible modes below the top of the box

@@ -31,14 +31,8 @@ from tfarm.arrays import Real
 from tfarm.crossing import Crossings, Window, ascending, counts_over
 from tfarm.crossing.shown import PlaneOfCounts
 from tfarm.errors import ConvergenceError, ParameterError, require
-from tfarm.records import record
-from tfarm.response.signals import Controller, controller
-from tfarm.schema import Quantity
-from tfarm.spectrum import modes
-from tfarm.spectrum.table import PAPER_GAINS, default_gains, hub_locked, rate_unit
-
-from .continuous import ContinuousLoop, grid
-from .lines import (
+from tfarm.loop.continuous import ContinuousLoop, grid
+from tfarm.loop.lines import (
     Along,
     LawTerms,
     critical,
@@ -50,8 +44,13 @@ from .lines import (
     unstable_below,
     with_numbers,
 )
-from .stability import band_of_family, verdict_on
-from .windows import theorem_edges, theorem_windows
+from tfarm.loop.stability import band_of_family, verdict_on
+from tfarm.loop.windows import theorem_edges, theorem_windows
+from tfarm.records import record
+from tfarm.response.signals import Controller, controller
+from tfarm.schema import Quantity
+from tfarm.spectrum import modes
+from tfarm.spectrum.table import PAPER_GAINS, default_gains, hub_locked, rate_unit
 
 COUNTS = Quantity(key="unstable_roots", help="unstable poles at each point, rows upwards; inf where infinitely many")
 BOUNDARY = Quantity(key="boundary", help="both gains and the frequency [rad/s] with poles on the imaginary axis")

@@ -22,14 +22,13 @@ from tfarm.crossing import Line
 from tfarm.errors import ConvergenceError, require
 from tfarm.exact.characteristic import Analytic
 from tfarm.exact.outputs import OUTPUTS
+from tfarm.loop.continuous import NEAREST_TO_ORIGIN, ORDER_READ_AT, ContinuousLoop, band_of, by_differences
+from tfarm.loop.lines import LawTerms
+from tfarm.loop.poles import box_of, poles_below, slow_poles
 from tfarm.records import record
 from tfarm.spectrum.box import Box, winding_number
 from tfarm.spectrum.following import settled
 from tfarm.spectrum.table import first_frequency
-
-from .continuous import NEAREST_TO_ORIGIN, ORDER_READ_AT, ContinuousLoop, band_of, by_differences
-from .lines import LawTerms
-from .poles import box_of, poles_below, slow_poles
 
 OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}  # units, as of the arm's below
 ARM_PARAMETERS = {

@@ -15,14 +15,13 @@ import numpy as np
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, shown_unit
 from tfarm.crossing import Crossing, Crossings, Window, intervals, joined
 from tfarm.errors import ConvergenceError
+from tfarm.loop.continuous import ContinuousLoop
+from tfarm.loop.lines import LEADING, Along, LawTerms, critical, crossed, static_edge, unstable_below
+from tfarm.loop.stability import Stability, band_of_family, is_known_without, verdict_on
+from tfarm.loop.theorem import TAKES, absorbed, theorem_of
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import first_frequency, gain_unit, most_gain
-
-from .continuous import ContinuousLoop
-from .lines import LEADING, Along, LawTerms, critical, crossed, static_edge, unstable_below
-from .stability import Stability, band_of_family, is_known_without, verdict_on
-from .theorem import TAKES, absorbed, theorem_of
 
 End = Literal["edge", "search bound", "no limit"]
 SEARCH_RANGE = Quantity("search range", digits=5, key="search_range", help="values between which limits were searched")
