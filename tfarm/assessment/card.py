@@ -30,7 +30,7 @@ from tfarm.loop.curve import LoopCurve, LoopVerdict, gain_margin
 from tfarm.loop.loop_margins import LoopMargins
 from tfarm.loop.margins import Margins, margins
 from tfarm.loop.poles import HUB
-from tfarm.loop.sampled_verdict import Analysis, sampled
+from tfarm.loop.sampled_verdict import SAMPLED_LOOP, Analysis, sampled
 from tfarm.loop.stability import stability
 from tfarm.records import record
 from tfarm.schema import Percent, Quantity, Table, Tabled, across, text
@@ -172,7 +172,7 @@ def result_card(
     `continuous` (of `margins`) and `at_samples` (of `sampled`) are what is known of these loops already.  Raises
     ParameterError where there is no loop.
     """
-    law, (arm, chain) = as_law(law), admit("card", arm, chain)
+    law, (arm, chain) = as_law(law), admit(SAMPLED_LOOP, arm, chain)
     _, undamped = graded_arm(arm)
     notes = [SCALED + RECOMMENDED[arm.has_elastic_link]] if law.gains == default_gains(arm) else []
     notes += [undamped] if undamped else []
@@ -190,7 +190,7 @@ def loop_card(loop: str, arm: Arm, law: AnyLaw, chain: Chain, known: Margins | A
 
     Raises ConvergenceError where the loop is not determined.
     """
-    arm, chain = admit("card", arm, chain)
+    arm, chain = admit(SAMPLED_LOOP, arm, chain)
     found: Margins | Analysis
     if loop == "sampled":
         found = known or sampled_of(arm, law, chain)
@@ -231,7 +231,7 @@ def card_of(found: Margins | Analysis, chain: Chain) -> LoopCard:
 
 def words_of(verdict: LoopVerdict, chain: Chain) -> dict[str, Any]:
     """Return stability and certainty of a verdict on the loop of a chain."""
-    return {"stability": verdict.word, "certainty": f"{verdict.range_words}{not_covered(verdict.answer, chain)}"}
+    return {"stability": verdict.word, "certainty": f"{verdict.range_words}{not_covered(verdict.consumer, chain)}"}
 
 
 def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurve:
@@ -258,7 +258,7 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
     ConvergenceError
         Where its stability is not determined.
     """
-    law, (arm, usual) = as_law(law), admit("card", arm, chain)
+    law, (arm, usual) = as_law(law), admit(SAMPLED_LOOP, arm, chain)
     damped, note = graded_arm(arm)
 
     def as_card(curve: LoopCurve, own: str) -> LoopCurve:

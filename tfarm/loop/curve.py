@@ -15,6 +15,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from tfarm.arm import AnyLaw, Arm
+from tfarm.arm.stages import Consumer
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.loop.loop import Loop
 from tfarm.loop.loop_margins import LoopMargins, PhaseCrossover, margins_along
@@ -91,10 +92,10 @@ class LoopCurve:
 class LoopVerdict(ABC):
     """The verdict on a loop over either curve, with margins of a stable loop, and the curve of its loop function.
 
-    `full` is the loop with every mode of the verdict's range, `answer` the name of the verdict in the table of stages.
+    `full` is the loop with every mode of the verdict's range, `consumer` states the stages of a sample in the verdict.
     """
 
-    answer: ClassVar[str]
+    consumer: ClassVar[Consumer]
 
     @property
     @abstractmethod

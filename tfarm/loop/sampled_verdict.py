@@ -11,6 +11,7 @@ import numpy as np
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, AnyLaw, Arm, arm_and_law, as_law
 from tfarm.arm.chain import Chain, Sampling
 from tfarm.arm.checks import whole
+from tfarm.arm.stages import Consumer
 from tfarm.arrays import Real
 from tfarm.crossing import Window
 from tfarm.dsp.discretise import RULE, rule_in_words
@@ -38,6 +39,13 @@ from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
+SAMPLED_LOOP = Consumer(
+    "sampled loop",
+    acts=("anti-alias filter", "hub rate", "law", "hold", "delay", "hub damping", "plant"),
+    named=("encoder", "amplifier steps", "amplifier range", "DAC steps", "DAC range", "torque limit"),
+    partly=("arithmetic",),
+    none=("reference", "volts"),
+)
 LAW_DELAY_DIGITS = 4  # of the delay margin of a law that is more than gains at the hub
 UNDAMPED_MODES = 20  # of an undamped arm, whose verdict is of the first modes alone
 FEWEST_COMPARED = 8  # modes of the smallest loop, twice as many in each next
@@ -62,7 +70,7 @@ class Verdict(OfLoop, LoopVerdict):
     band: Band | None = None
     is_converged: bool = False
 
-    answer = "verdict"
+    consumer = SAMPLED_LOOP
 
     @property
     def rule(self) -> Annotated[str, RULE]:
@@ -138,7 +146,7 @@ class Verdict(OfLoop, LoopVerdict):
         """The modes for which the verdict is certified."""
         shown = f"{'converged for' if self.is_converged else 'model of'} the first {self.modes_used} modes"
         shown = shown if self.band is None else f"certified up to {self.band.top:.3g} rad/s"
-        return f"{shown}, not determined beyond{not_covered(self.answer, self.loop.chain)}"
+        return f"{shown}, not determined beyond{not_covered(self.consumer, self.loop.chain)}"
 
     @property
     def range_words(self) -> str:
@@ -204,7 +212,7 @@ def sampled_verdict(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count:
     radius that of the loop with every mode of the band.  Raises ParameterError as `sampled_loop` does, and for a count
     outside 1..400.
     """
-    arm, chain = admit("verdict", arm, chain)
+    arm, chain = admit(SAMPLED_LOOP, arm, chain)
     if count is not None:
         count = whole("modes", count, 1, MOST_COUNT, f"a whole number of flexible modes from 1 to {MOST_COUNT}")
         return Verdict(sampled_loop(arm, law, chain, count=count))
@@ -391,7 +399,7 @@ def sampled(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | N
     `count` is the number of flexible modes, by default enough for the verdict.  Raises ParameterError for a locked hub,
     an algebraic loop, an unknown signal, and a law in z whose period is not the chain's.
     """
-    arm, chain = admit("margins", arm, chain)
+    arm, chain = admit(SAMPLED_LOOP, arm, chain)
     arm, law = arm_and_law(arm, law)
     return Analysis(sampled_verdict(arm, law, chain, count=count), count or UNDAMPED_MODES)
 

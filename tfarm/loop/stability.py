@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from tfarm.arm import AnyLaw, Arm, arm_and_law, as_law
 from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
+from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError, require
 from tfarm.records import record
@@ -58,6 +59,15 @@ REST_SHARE = 1e-7  # of w1: poles at 0 come out as small
 UNDAMPED_SHARE = 1e-9  # of its size: largest real part of a pole that no model damps
 
 
+CONTINUOUS = Consumer(
+    "continuous-time column",
+    acts=("law", "hold", "hub damping", "plant"),
+    named=("torque limit",),
+    none=(
+        "reference", "anti-alias filter", "encoder", "hub rate", "amplifier steps", "amplifier range", "arithmetic",
+        "DAC steps", "DAC range", "delay", "volts",
+    ),
+)  # fmt: skip
 FIRST_MODE = Quantity("lowest destabilised mode", help="of the exact loop; 0: a pole below the first mode")
 SHOWN_FROM = Quantity("design models unstable from (modes)", key="shown_from_modes", help="as are all larger ones")
 DELAYED = "a delay without any damping destabilises infinitely many modes"
@@ -86,7 +96,7 @@ class Stability(LoopVerdict):
     poles: Poles
     is_known_beyond: Annotated[bool, KNOWN_BEYOND] = True
 
-    answer = "continuous-time column"
+    consumer = CONTINUOUS
 
     @property
     def spectral_abscissa(self) -> Annotated[float, Quantity("spectral abscissa", "1/s", 6, "largest Re s in range")]:
