@@ -26,7 +26,7 @@ from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import LoopParts
 from tfarm.loop.continuous import FAR_RIGHT, LONG_PATH, SLOWEST, ContinuousLoop, grid
 from tfarm.loop.poles import box_of
-from tfarm.loop.stability import MARGIN_OF_ZERO, is_known_without
+from tfarm.loop.stability import MARGIN_OF_ZERO
 from tfarm.response.signals import Signals
 from tfarm.spectrum.box import FIRST_POINTS, NEAREST_TO_ZERO, TRIED_HEIGHTS, turned
 from tfarm.spectrum.table import first_frequency
@@ -39,9 +39,9 @@ NEAR_ORIGIN = (1e-6, 5e-7)  # of the lowest frequency: where a real pole is sear
 def with_numbers(law: Law, values: Mapping[str, float]) -> Law:
     """Return the law with other values of some of its numbers.
 
-    Factors act on the new values of the others; a leading 0 moves the other coefficients, and is set after them.
+    Factors act on the new values of the others.
     """
-    for name in sorted(values, key=lambda name: (name == "gain", name.endswith("gain"), name.endswith(".0"))):
+    for name in sorted(values, key=lambda name: (name == "gain", name.endswith("gain"))):
         law = law.having(name, values[name])
     return law
 
@@ -240,11 +240,6 @@ def critical(name: str, limits: Window) -> tuple[float, ...]:
     """Values of a number at which the band must be sufficient: its limits, and 0 of a leading coefficient."""
     low, high = limits
     return (low, 0.0, high) if name.endswith(LEADING) and low < 0 < high else limits
-
-
-def turns_over(loop: ContinuousLoop, name: str, limits: Window) -> bool:
-    """Whether a leading coefficient passes through 0 between these values, where without it high modes are driven."""
-    return 0.0 in critical(name, limits)[1:-1] and not is_known_without(loop, name)
 
 
 def static_edge(loop: ContinuousLoop, name: str, limits: Window) -> Crossing | None:

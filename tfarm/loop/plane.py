@@ -3,8 +3,7 @@
 D-decomposition (Neimark 1948): D is affine in each number (`windows`).  Its crossings of the imaginary axis are solved
 for along the second number, all columns at once, and one count of unstable poles gives all others.  Nothing is
 interpolated or missed between grid points.  D is not affine in a delay: that is the number across the columns, each of
-which is counted by itself.  So is a leading coefficient that passes through 0 where no band is sufficient: there poles
-come to any band from above.
+which is counted by itself.
 
 In the plane of K1 and K2 each frequency has one point with poles at s = i w: the boundary.  Without damping, where the
 gauge reads the hub's moment, it collapses onto two lines.  On one K1 cancels the friction of the hub, on the other K2
@@ -33,14 +32,13 @@ from tfarm.crossing.shown import PlaneOfCounts
 from tfarm.errors import ConvergenceError, ParameterError, require
 from tfarm.loop.continuous import ContinuousLoop, grid
 from tfarm.loop.lines import (
+    LEADING,
     Along,
     LawTerms,
-    critical,
     crossed,
     line_crossings,
     rounded,
     static_edge,
-    turns_over,
     unstable_below,
     with_numbers,
 )
@@ -187,19 +185,21 @@ def plane(loop: ContinuousLoop, vary: tuple[str, str], x: Real, y: Real) -> Plan
     most = 400 if loop.gains is None else 2000
     x, y = ascending(vary[0], x, 2, most), ascending(vary[1], y, 2, most)
     across, up = (float(x[0]), float(x[-1])), (float(y[0]), float(y[-1]))
-    corners = [_at(loop, vary, each) for each in itertools.product(critical(vary[0], across), critical(vary[1], up))]
+    for name, (low, high) in zip(vary, (across, up), strict=True):
+        remedy = "a leading coefficient keeps its sign in a map, as without it the order is another: a range without 0"
+        require(not name.endswith(LEADING) or low * high > 0, name, [low, high], remedy)
+    corners = [_at(loop, vary, each) for each in itertools.product(across, up)]
     if loop.gains is not None and _is_known_everywhere(loop.arm) and tuple(ON.get(n, n) for n in vary) == PLANE:
         counts = _known_counts(loop, x, y)
         return Plane(loop.arm, loop.law, vary, x, y, counts, np.empty((0, 3)), 0.0, [])
-    is_counted = vary[0] == "delay" or turns_over(loop, vary[0], across)
-    if vary[1] == "delay" or (not is_counted and turns_over(loop, vary[1], up)):
+    if vary[1] == "delay":
         turned = plane(loop, (vary[1], vary[0]), y, x)
         return replace(turned, vary=vary, x=x, y=y, unstable=turned.unstable.T.copy(), crossings=[])
     band, is_quiet = band_of_family(corners)
     found = _columns(loop, vary, x, up, band)
     crossing = np.concatenate([y[:0], *(each.gain for each in found)])
     at = 0.0 if vary == PLANE else float(y[_farthest(y, crossing)])  # at K2 = 0 the hub is passive
-    there = _counts_across(loop.having(vary[1], at), vary[0], x, band, one_by_one=is_counted)
+    there = _counts_across(loop.having(vary[1], at), vary[0], x, band)
     unstable = counts_over(y, found, at, there).T.copy()
     edge = np.empty((0, 3))
     if vary == PLANE and loop.gains is not None:
@@ -254,9 +254,9 @@ def _known_counts(loop: ContinuousLoop, K1: Real, K2: Real) -> NDArray[np.int64]
     return unstable
 
 
-def _counts_across(row: ContinuousLoop, name: str, x: Real, band: float, *, one_by_one: bool) -> NDArray[np.int64]:
-    """Unstable poles at each x along a row, from one count at the value farthest from its crossings, or one by one."""
-    if one_by_one:
+def _counts_across(row: ContinuousLoop, name: str, x: Real, band: float) -> NDArray[np.int64]:
+    """Unstable poles at each x along a row, from one count at the value farthest from its crossings; of a delay each."""
+    if name == "delay":
         return np.array([unstable_below(row.having(name, value), band) for value in x.tolist()])
     across = line_crossings(row, name, float(x[0]), float(x[-1]), band)
     start = float(x[_farthest(x, across.gain)])
