@@ -255,7 +255,7 @@ def _known_counts(loop: ContinuousLoop, K1: Real, K2: Real) -> NDArray[np.int64]
 
 
 def _counts_across(row: ContinuousLoop, name: str, x: Real, band: float) -> NDArray[np.int64]:
-    """Unstable poles at each x along a row, from one count at the value farthest from its crossings; of a delay each."""
+    """Unstable poles at each x along a row, from one count at a value far from its crossings; each of a delay."""
     if name == "delay":
         return np.array([unstable_below(row.having(name, value), band) for value in x.tolist()])
     across = line_crossings(row, name, float(x[0]), float(x[-1]), band)
