@@ -25,6 +25,11 @@ LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], 
 OFF_END, OFF_ZERO = 1e-7, 1e-3  # of a window: distance from its end of a verdict; there a pole may be far out
 
 
+def holds(windows, value):
+    """Whether a value lies inside a stability interval."""
+    return any(low < value < high for low, high in windows.all)
+
+
 @pytest.mark.parametrize(("law", "every"), thinned([(LAW, 3), (LAW, 1), (LAW.having("gain", 7.0), 1)], 3))
 def test_verdicts_turn_at_each_end(law, every):
     """Of each number of the law, or of every third one."""
@@ -39,8 +44,7 @@ def test_verdicts_turn_at_each_end(law, every):
                 if each.end(end) == "edge":
                     edges += 1
                     assert not stability(LAB, law.having(name, end - inward)).is_stable
-        is_inside = any(low < law.numbers[name] < high for low, high in each.all)
-        assert is_inside == (each.around is not None) == (law is LAW)
+        assert holds(each, law.numbers[name]) == (each.around is not None) == (law is LAW)
     assert edges >= 8 // every
 
 
@@ -91,8 +95,7 @@ NARROW = {  # two crossings 0.15 rad/s apart, near 72 and 93, lie between neighb
 def test_a_window_has_no_unstable_stretch_inside(law, name, values):
     window = windows_of(stability(LAB, law))[name]
     for value in values:
-        is_inside = any(low < value < high for low, high in window.all)
-        assert is_inside == stability(LAB, law.having(name, value)).is_stable
+        assert holds(window, value) == stability(LAB, law.having(name, value)).is_stable
 
 
 @pytest.mark.parametrize(("name", "band"), [("hub_angle.gain", 90.0), ("tip_acceleration.den.0", 150.0)])
@@ -101,8 +104,8 @@ def test_below_a_band_through_whose_top_poles_pass_each_interval_is_counted(name
     law = LAW.having("gain", 7.0)
     found = windows_of(stability(LAB, law, band), [name])[name]
     for value in np.linspace(*found.looked_at, 8)[1:-1].tolist():
-        is_inside = any(low < value < high for low, high in found.all)
-        assert is_inside == (unstable_below(ContinuousLoop(LAB, law.having(name, value)), found.band) == 0)
+        count = unstable_below(ContinuousLoop(LAB, law.having(name, value)), found.band)
+        assert holds(found, value) == (count == 0)
 
 
 def test_no_number_of_a_signal_in_two_parts_has_a_window():
@@ -130,7 +133,7 @@ def test_next_to_zero_windows_are_not_cut_by_rounding(damping) -> None:
     probes = [*np.geomspace(1e-8, 5.0, 8), *((low + high) / 2 for low, high in found.all)]
     for value in probes:
         count = stability(arm, law.having("hub_angle.den.0", float(value)), band=found.band).unstable_roots
-        assert any(low < value < high for low, high in found.all) == (count == 0)
+        assert holds(found, value) == (count == 0)
 
 
 def reproduced(name):
@@ -144,8 +147,8 @@ def test_counts_are_not_carried_through_a_zero_leading_coefficient() -> None:
     arm, law = reproduced("lifted")
     found = windows_of(stability(arm, law))["tip_acceleration.den.0"]
     for value in (-7.7, -7.4, -6.4):
-        is_inside = any(low < value < high for low, high in found.all)
-        assert is_inside == (stability(arm, law.having("tip_acceleration.den.0", value)).unstable_roots == 0)
+        count = stability(arm, law.having("tip_acceleration.den.0", value)).unstable_roots
+        assert holds(found, value) == (count == 0)
     assert [pair[0] for pair in found.all] == [-10.0]
 
 

@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arrays import Complex, Real
-
-from .line import Window
+from tfarm.crossing.line import Window
 
 STRETCH = 2.0  # how much wider than high, or higher than wide, a picture is at most: so much more a curve turns in it
 MOST_TURN = math.radians(5.0) / STRETCH  # from one piece of a curve to the next, where the picture is as high as wide
@@ -52,29 +51,23 @@ def loose_columns(across: Real, parts: Sequence[RegionPiece], drawn: Callable[[R
     wanted: set[float] = set()
     for part in parts:
         gain, low, high = np.array(part.points).T
-        gain, outline = np.r_[gain, gain[::-1]], drawn(np.r_[gain, gain[::-1]], np.r_[low, high[::-1]])
-        for before, here, after in _corners(outline):
-            for other in (before, after):
-                if abs(outline[other] - outline[here]) > PIXEL:
-                    wanted.update(_halves(across, float(gain[here]), float(gain[other])))
+        gain = np.r_[gain, gain[::-1]]
+        outline = drawn(gain, np.r_[low, high[::-1]])
+        kept = abs(outline - np.roll(outline, 1)) > 0
+        gain, outline = gain[kept], outline[kept]
+        before, after = outline - np.roll(outline, 1), np.roll(outline, -1) - outline
+        is_seen = (outline.real > 0) & (outline.imag > 0) & (outline.imag < 1)
+        is_corner = is_seen & (abs(np.angle(after / before)) > STRETCH * MOST_TURN)
+        for way, side in ((1, before), (-1, after)):
+            sides = np.transpose([gain, np.roll(gain, way)])[is_corner & (abs(side) > PIXEL)]
+            wanted.update(each for ends in sides.tolist() for each in _halves(across, *ends))
     return np.array(sorted(wanted))
-
-
-def _corners(outline: Complex) -> list[tuple[int, int, int]]:
-    """The indices of points of a closed line at which it turns by more than 5 degrees, with their neighbours."""
-    kept = np.flatnonzero(abs(outline - np.roll(outline, 1)) > 0)
-    before, after = np.roll(kept, 1), np.roll(kept, -1)
-    with np.errstate(all="ignore"):
-        turn = abs(np.angle((outline[after] - outline[kept]) / (outline[kept] - outline[before])))
-    seen = (outline[kept].real > 0) & (outline[kept].imag > 0) & (outline[kept].imag < 1)
-    found = np.flatnonzero(seen & (turn > STRETCH * MOST_TURN))
-    return [(int(before[n]), int(kept[n]), int(after[n])) for n in found]
 
 
 def _halves(across: Real, here: float, other: float) -> list[float]:
     """Nearly half way between two columns; of an upright side, to its neighbours."""
     n = int(np.searchsorted(across, here))
-    neighbours = [float(across[k]) for k in (n - 1, n + 1) if 0 <= k < across.size]
+    neighbours = across[max(0, n - 1) : n + 2].tolist()
     # 1e-11 of a gain: columns nearer to each other are in the rounding of the end of a region
     ends = [each for each in neighbours if abs(each - here) > 1e-11 * abs(here)] if here == other else [other]
     # 0.45 of the way from one column to the next: half way may be the very edge that both were laid around

@@ -10,7 +10,7 @@ z = -1 a single pole crosses (see also Ackermann, Robust Control, 1993, ch. 4).
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -145,6 +145,12 @@ class GainMap(OfLoop, PlaneOfCounts):
     crossings: list[Crossings]
 
     @property
+    def finding(self) -> Annotated[str, Quantity("stability region",
+            help="grid points of the plane without unstable poles")]:  # fmt: skip
+        """Number of points of the grid at which the loop is stable."""
+        return super().finding
+
+    @property
     def counts(self) -> Annotated[NDArray[np.int64], Quantity(key="unstable_poles",
             help="unstable poles at each point, without z = 1 of a free hub angle")]:  # fmt: skip
         """Unstable poles (len(y), len(x))."""
@@ -162,39 +168,26 @@ def sampled_map(
     """
     x, y = ascending(vary[0], x, 1, MOST_GAINS), ascending(vary[1], y, 1, MOST_GAINS)
     across, up = (loop.place(name) for name in vary)
-    if across is not None and up is not None:
-        return _map_of_gains(loop, x, y, vary)
-    if across is not None:
+    if up is None and across is not None:
         turned = sampled_map(loop, y, x, (vary[1], vary[0]))
         return GainMap(loop, vary, turned.y, turned.x, turned.unstable.T, [])
-    loops = [loop.under(loop.law.having(vary[0], value)) for value in x.tolist()]
+    make = loop.having if across is not None else lambda name, value: loop.under(loop.law.having(name, value))
+    loops = {value: make(vary[0], value) for value in x.tolist()}
     if up is None:
-        points = [[each.under(each.law.having(vary[1], value)) for value in y.tolist()] for each in loops]
+        points = [[each.under(each.law.having(vary[1], value)) for value in y.tolist()] for each in loops.values()]
         return GainMap(loop, vary, x, y, np.array([[each.poles.unstable for each in row] for row in points]), [])
-    at = _off_the_edge(y)
-    there = np.array([each.having(vary[1], at).poles.unstable for each in loops])
-    found = [crossings_of(each, vary[1]) for each in loops]
-    return GainMap(loop, vary, x, y, counts_over(y, found, at, there), found)
+    at, lines = _off_the_edge(y), [line_of(each, vary[1]) for each in loops.values()]
+    if across is None:
+        there = np.array([each.having(vary[1], at).poles.unstable for each in loops.values()])
+        found = [crossings_along(each.rig.grid, [line])[0] for each, line in zip(loops.values(), lines, strict=True)]
+    else:  # all loops have one grid, and a count in one column those of the row
+        start = loop.having(vary[0], _off_the_edge(x)).having(vary[1], at)
+        row, *found = crossings_along(loop.rig.grid, [line_of(start, vary[0]), *lines])
+        there = start.poles.unstable + row.passed(x) - row.passed(start.number(vary[0]))
+    plane = GainMap(loop, vary, x, y, counts_over(y, found, at, there), found)
 
-
-def _map_of_gains(loop: Sampled, x: Real, y: Real, vary: tuple[str, str]) -> GainMap:
-    """The map over two gains of parts of the law, from the exact crossings of every column (D-decomposition).
-
-    The count of a row by eigenvalues starts it; those at the corners must agree, or a ConvergenceError is raised.
-    """
-
-    def at(first: float, second: float) -> Sampled:
-        return loop.having(vary[0], first).having(vary[1], second)
-
-    across, up, grid = _off_the_edge(x), _off_the_edge(y), loop.rig.grid
-    start = at(across, up)
-    (row,) = crossings_along(grid, [line_of(start, vary[0])])
-    there = start.poles.unstable + row.passed(x) - row.passed(across)
-    found = crossings_along(grid, [line_of(at(value, up), vary[1]) for value in x.tolist()])
-    plane = GainMap(loop, vary, x, y, counts_over(y, found, up, there), found)
-
-    def counted(*point: float) -> int | None:
-        poles = at(*point).poles
+    def counted(first: float, second: float) -> int | None:
+        poles = loops[first].having(vary[1], second).poles
         # 1e-9 of ln|z|: a pole nearer to the circle may be counted on either side
         return poles.unstable if abs(poles.log_radius).min() >= 1e-9 else None
 
@@ -221,12 +214,10 @@ def with_more(plane: GainMap, x: Real) -> GainMap:
     fresh = np.setdiff1d(x, plane.x)
     if not fresh.size:
         return plane
-    more = _map_of_gains(plane.loop, fresh, plane.y, plane.vary)
-    both = np.r_[plane.x, more.x]
-    order = np.argsort(both, kind="stable")
-    found = plane.crossings + more.crossings
-    unstable = np.concatenate([plane.unstable, more.unstable])[order]
-    return GainMap(plane.loop, plane.vary, both[order], plane.y, unstable, [found[n] for n in order])
+    more = sampled_map(plane.loop, fresh, plane.y, plane.vary)
+    order = np.argsort(both := np.r_[plane.x, fresh], kind="stable")
+    found, unstable = plane.crossings + more.crossings, np.concatenate([plane.unstable, more.unstable])
+    return replace(plane, x=both[order], unstable=unstable[order], crossings=[found[n] for n in order])
 
 
 def ends_of_K1(loop: Sampled) -> Real:

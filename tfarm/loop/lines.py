@@ -20,31 +20,28 @@ import numpy as np
 
 from tfarm.arm import Arm, Law
 from tfarm.arm.feedback import OUTPUT_OF
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import MACHINE_EPS, Complex, Real
 from tfarm.crossing import Crossing, Crossings, Grid, Line, Window, crossings
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import LoopParts
+from tfarm.loop.continuous import FAR_RIGHT, LONG_PATH, SLOWEST, ContinuousLoop, grid
+from tfarm.loop.poles import box_of
+from tfarm.loop.stability import MARGIN_OF_ZERO
 from tfarm.response.signals import Signals
 from tfarm.spectrum.box import FIRST_POINTS, NEAREST_TO_ZERO, TRIED_HEIGHTS, turned
 from tfarm.spectrum.table import first_frequency
 
-from .continuous import FAR_RIGHT, LONG_PATH, SLOWEST, ContinuousLoop, grid
-from .poles import box_of
-from .stability import MARGIN_OF_ZERO, is_known_without
-
-FACTOR = "gain"  # the name of a factor on the whole law
 LEADING = ".den.0"  # how the name of a leading coefficient ends
 ORDER_READ_AT = (2e-3, 1e-3)  # of w1: where the order of a zero at s = 0 is read off
 NEAR_ORIGIN = (1e-6, 5e-7)  # of the lowest frequency: where a real pole is searched on its way through 0
-ROUNDED = 4 * float(np.finfo(float).eps)  # of a range: a gain so small is 0
 
 
 def with_numbers(law: Law, values: Mapping[str, float]) -> Law:
     """Return the law with other values of some of its numbers.
 
-    Factors act on the new values of the others; a leading 0 moves the other coefficients, and is set after them.
+    Factors act on the new values of the others.
     """
-    for name in sorted(values, key=lambda name: (name == "gain", name.endswith("gain"), name.endswith(".0"))):
+    for name in sorted(values, key=lambda name: (name == "gain", name.endswith("gain"))):
         law = law.having(name, values[name])
     return law
 
@@ -56,18 +53,32 @@ class LawTerms:
 
         f_j = e^{-s tau} sum of p_ji numerator_i
 
-    Those of weight 0 that follow are the slopes of D in coefficients of q_j or p_j.
+    Those of weight 0 that follow are D of laws with coefficients next to 0: D is affine in these too.
     """
 
     def __init__(self, signals: Signals, law: Law, names: Iterable[str]) -> None:
         self.signals, self.law, self.gains = signals, law, law.part_gains
-        weights = np.ones(1 + len(law.parts))
+        self.weights = np.ones(1 + len(law.parts))
         for name, (part, value) in self.gains.items():
-            weights[1 + part] = value
+            self.weights[1 + part] = value
             self.law = self.law.having(name, 1.0)
-        keys = (_key(name) for name in names)
-        self.coefficients = [key for key in keys if key != FACTOR and self.part(key) is None]
-        self.weights = np.r_[weights, np.zeros(len(self.coefficients))]
+        self.others = {}
+        for name in names:
+            if self.part(name) is None and name != "gain":
+                value = law.numbers.get(name, 0.0)
+                small = value * 2.0**-30 or 1.0  # not 0, as a leading 0 moves the other coefficients
+                self.others[name] = value, small, self.law.having(name, small)
+
+    def of(self, s: Complex, rig: LoopParts) -> Complex:
+        """The terms (rows, ...) at places s, from the parts of the signals there."""
+        late = np.exp(-s * self.law.delay) * rig.numerators
+
+        def rows(law: Law) -> Complex:
+            shares, whole = law.shares(s)
+            return np.array([rig.drive * whole, *(shares * late).sum(axis=1)])
+
+        others = (np.tensordot(self.weights, rows(law), 1) for *_, law in self.others.values())
+        return np.array([*rows(self.law), *others])
 
     def at(self, s: Complex) -> Complex:
         """The terms (rows, n) at places s (n,)."""
@@ -83,35 +94,16 @@ class LawTerms:
             drive = (drive * turn).real + 0j
         return self.of(s, LoopParts(drive, numerators, scale))
 
-    def of(self, s: Complex, rig: LoopParts) -> Complex:
-        """The same from the parts of the signals there."""
-        law = self.law
-        shares, whole = law.shares(s)
-        late = np.exp(-s * law.delay) * rig.numerators
-        rows = [rig.drive * whole, *(shares * late).sum(axis=1)]
-        weights = self.weights[: len(rows)]
-        for key in self.coefficients:
-            part, of, power, _ = self._place_of(key)
-            block, (signal,) = law.parts[part].block, law.parts[part].signals
-            if of == "num":
-                slope = -law.sign * late[law.signals.index(signal)] * whole
-            else:  # D without this part
-                slope = np.tensordot(weights, rows[: weights.size], 1) - weights[1 + part] * rows[1 + part]
-            rows.append(s**power * slope / block.denominator(s))
-        return np.array(rows)
-
     def line(self, name: str, low: float = -math.inf, high: float = math.inf) -> Line:
         """The line of a number of the law."""
-        key, unit, value = _key(name), np.zeros(self.weights.size), 1.0
-        part = self.part(key)
-        if key == FACTOR:
-            unit[1:] = self.weights[1:]
-        elif part is not None:
-            unit[1 + part], value = 1.0, self.weights[1 + part]
-        else:
-            unit[1 + len(self.law.parts) + self.coefficients.index(key)] = 1.0
-            *_, value = self._place_of(key)
-        return Line.of(self.weights, unit, value, low, high)
+        weights, part = np.r_[self.weights, np.zeros(len(self.others))], self.part(name)
+        if name == "gain":  # a factor on the law
+            return Line.of(weights, np.r_[0.0, weights[1:]], 1.0, low, high)
+        if part is not None:
+            return Line.of(weights, np.eye(weights.size)[1 + part], weights[1 + part], low, high)
+        value, small, _ = self.others[name]
+        other = np.eye(weights.size)[self.weights.size + list(self.others).index(name)]
+        return Line.of(other, (weights - other) / (value - small), small, low, high)
 
     def having(self, name: str, value: float) -> LawTerms:
         """The same with another value of the gain of a part."""
@@ -123,20 +115,8 @@ class LawTerms:
 
     def part(self, name: str) -> int | None:
         """The part whose weight is a number; None of any other."""
-        plain = _key(name).removesuffix(".gain")
-        return next((self.gains[name][0] for name in (plain, f"{plain}.gain") if name in self.gains), None)
-
-    def _place_of(self, key: str) -> tuple[int, str, int, float]:
-        """The part, the polynomial, the power of s and the value of a coefficient."""
-        signal, of, place = key.rsplit(".", 2)
-        part = next(n for n, part in enumerate(self.law.parts) if part.signals == (signal,))
-        row = getattr(self.law.parts[part].block, of)
-        return part, of, len(row) - 1 - int(place), row[int(place)]
-
-
-def _key(name: str) -> str:
-    """A number's name by its signal."""
-    return OUTPUT_OF.get(name, name)
+        plain = OUTPUT_OF.get(name, name).removesuffix(".gain")
+        return next((self.gains[key][0] for key in (plain, f"{plain}.gain") if key in self.gains), None)
 
 
 class Along(NamedTuple):
@@ -168,16 +148,21 @@ def _with_real_poles(along: Along, found: list[Crossing], N: Complex, P: Complex
     Poles are counted on either side of a value at which two of them meet at s = 0.  Where the leading coefficient of a
     denominator changes its sign, a real pole passes through infinity.
     """
-    low, high = along.line[2:]
-    rest = through_origin(N[:2], P[:2])
+    low, high = limits = along.line[2:]
+    rest = through_origin(N[:2], P[:2], limits)
     if rest is not None and low <= rest.t <= high:
         (zero, half), (whole, part) = abs((N + rest.t * P)[2:4]), abs(P[2:4])
         # ratio of values at the first and the second: 2 of a simple zero, 4 of a double one
         is_single = zero * part < 3.0 * half * whole
         found.append(rest if is_single else rest._replace(change=_change_at(along, rest.t, found, band)))
-    if 0.0 in critical(along.name, (low, high))[1:-1] and (far := through_infinity(N[4:], P[4:])) is not None:
-        found.append(far._replace(t=0.0))
-    return Crossings.of(e._replace(t=0.0) if abs(e.t) <= ROUNDED * (high - low) else e for e in found)
+    if 0.0 in critical(along.name, limits)[1:-1] and (change := through_infinity(N[4:], P[4:])):
+        found.append(Crossing(0.0, math.inf, change))
+    return Crossings.of(each._replace(t=rounded(each.t, limits)) for each in found)
+
+
+def rounded(t: float, limits: Window) -> float:
+    """A number along a line; one that is 0 but for the rounding of its range is 0."""
+    return 0.0 if abs(t) <= 4 * MACHINE_EPS * (limits[1] - limits[0]) else t
 
 
 def line_crossings(loop: ContinuousLoop, name: str, low: float, high: float, band: float) -> Crossings:
@@ -195,11 +180,10 @@ def _change_at(along: Along, at: float, others: list[Crossing], band: float) -> 
 
     Raises ConvergenceError where nothing is damped and modes cross at that value too, but for rounding.
     """
-    span, loop, name = along.line.high - along.line.low, along.member(), along.name
-    at = 0.0 if abs(at) <= ROUNDED * span else at
+    loop, name = along.member(), along.name
     away = [abs(each.t - at) for each in others if each.t != at and math.isfinite(each.t)]
     # 1e-3 of the range: how far from such a place its counts are taken
-    step = min([1e-3 * span, *(each / 2 for each in away)])
+    step = min([1e-3 * (along.line.high - along.line.low), *(each / 2 for each in away)])
     try:
         below, above = (unstable_below(loop.having(name, at + side * step), band) for side in (-1, 1))
     except ConvergenceError as error:
@@ -211,7 +195,7 @@ def _change_at(along: Along, at: float, others: list[Crossing], band: float) -> 
     return above - below
 
 
-def through_origin(N: Complex, P: Complex) -> Crossing | None:
+def through_origin(N: Complex, P: Complex, limits: Window) -> Crossing | None:
     """A real pole through s = 0, from N and P at two small real s, the second half the first; None without a limit."""
     if not P.all():
         return None
@@ -219,20 +203,16 @@ def through_origin(N: Complex, P: Complex) -> Crossing | None:
     # 1.5 times the gain at the farther of two small s: more at the nearer one is a gain without a limit
     if not abs(near) < 1.5 * abs(far):
         return None
-    return Crossing(float(2 * near - far) + 0.0, 0.0, 1 if far > near else -1)
+    return Crossing(rounded(float(2 * near - far), limits), 0.0, 1 if far > near else -1)
 
 
-def through_infinity(N: Complex, P: Complex) -> Crossing | None:
-    """A real pole through infinity, from N and P at three real s far right, as `FAR_RIGHT`; None without a limit."""
-    with np.errstate(over="ignore", invalid="ignore"):  # a law of high order is beyond any number there
-        if not P.all() or not np.isfinite(N / P).all():
-            return None
-        first, second, third = -(N / P).real
-    before, last = second - first, third - second
-    # by more than 0.75 of the step before, of places ever farther right, a gain without a limit grows
-    if not abs(last) < 0.75 * abs(before):
-        return None
-    return Crossing(float(third + last * last / (before - last)), math.inf, 1 if before < 0 else -1)
+def through_infinity(N: Complex, P: Complex) -> int:
+    """The change of the count by a real pole through infinity, from N and P at three places as `FAR_RIGHT`; 0: none."""
+    with np.errstate(all="ignore"):  # a law of high order is beyond any number there
+        before, last = np.diff(-(N / P).real)
+        # by more than 0.75 of the step before, of places ever farther right, a gain without a limit grows
+        has_limit = abs(last) < 0.75 * abs(before)
+    return (1 if before < 0 else -1) if has_limit else 0
 
 
 def unstable_below(loop: ContinuousLoop, band: float) -> int:
@@ -262,15 +242,9 @@ def critical(name: str, limits: Window) -> tuple[float, ...]:
     return (low, 0.0, high) if name.endswith(LEADING) and low < 0 < high else limits
 
 
-def turns_over(loop: ContinuousLoop, name: str, limits: Window) -> bool:
-    """Whether a leading coefficient passes through 0 between these values, where without it high modes are driven."""
-    return 0.0 in critical(name, limits)[1:-1] and not is_known_without(loop, name)
-
-
 def static_edge(loop: ContinuousLoop, name: str, limits: Window) -> Crossing | None:
     """The value of a number at which a real pole passes through s = 0, if there is one."""
     near = SLOWEST * first_frequency(loop.arm) * np.array(NEAR_ORIGIN) + 0j
     terms = LawTerms(loop.signals, loop.law, [name])
     line, rows = terms.line(name), terms.at(near)
-    found = through_origin(line.others @ rows, line.alone @ rows)
-    return found._replace(t=0.0) if found and abs(found.t) <= ROUNDED * (limits[1] - limits[0]) else found
+    return through_origin(line.others @ rows, line.alone @ rows, limits)

@@ -17,14 +17,13 @@ from tfarm.arm import FED_BACK, NAMES, Arm, HubFeedback
 from tfarm.arm.blocks import Matrices
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.errors import ConvergenceError
+from tfarm.loop.locus import ORIGIN, Locus, locus, origin_name
+from tfarm.loop.varied import OF_THE_LAW, Title
 from tfarm.records import record
 from tfarm.reduced import modal_model
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.following import between
-
-from .locus import ORIGIN, Locus, locus, origin_name
-from .varied import OF_THE_LAW, Title
 
 if TYPE_CHECKING:
     import control

@@ -26,6 +26,10 @@ from tfarm.arrays import Complex, Real, Whole
 from tfarm.crossing import Crossing
 from tfarm.crossing.turning import loose
 from tfarm.errors import ConvergenceError, must_be_known, require
+from tfarm.loop.continuous import ContinuousLoop
+from tfarm.loop.lines import line_crossings
+from tfarm.loop.varied import ARM_PARAMETERS, OF_THE_LAW, Title, Varied
+from tfarm.loop.windows import without_losses
 from tfarm.records import record
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.response.signals import Controller, controller
@@ -33,12 +37,6 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.box import Box
 from tfarm.spectrum.following import assigned, between, follow
-from tfarm.spectrum.naming import single_zeros
-
-from .continuous import ContinuousLoop
-from .lines import line_crossings
-from .varied import ARM_PARAMETERS, OF_THE_LAW, Title, Varied
-from .windows import without_losses
 
 MOST_LOCUS_POINTS = 100_000  # values, those between that make it round among them
 MOST_BRANCHES = 200  # and flexible modes below the top of the box
@@ -259,16 +257,12 @@ def at_origin(loop: ContinuousLoop) -> Whole:
 
 def open_poles(arm: Arm, number: int) -> tuple[Complex, Whole]:
     """Poles of the rig without feedback, both of each pair, and their origins: of at least `number` flexible modes."""
-    table = modes(arm, number)
-    if arm.is_undamped:
-        omega, index = table.natural_frequency[table.index > 0], table.index[table.index > 0]
-        pairs, rigid, others = np.stack([1j * omega, -1j * omega], axis=1), [], single_zeros(table)
-    else:
-        found = damped_modes(table)
-        rigid, others = found.eigenvalues[found.index == 0].ravel(), [*found.others, *found.unassigned_pairs.ravel()]
-        pairs, index = found.eigenvalues[found.index > 0], found.index[found.index > 0]
-    row = np.r_[np.array([*rigid, *others], complex), pairs.ravel()]
-    origin = np.r_[np.full(len(rigid), RIGID), np.full(len(others), OTHER), np.repeat(index, 2)]
+    found = damped_modes(modes(arm, number))
+    rigid, pairs = found.eigenvalues[found.index == 0].ravel(), found.eigenvalues[found.index > 0].ravel()
+    others = [*found.others, *found.unassigned_pairs.ravel()]
+    row = np.array([*rigid, *others, *pairs], complex)
+    origin = np.repeat([RIGID, OTHER], [len(rigid), len(others)])
+    origin = np.r_[origin, np.repeat(found.index[found.index > 0], 2)]
     alive = np.isfinite(row) & (row != 0)
     return row[alive], origin[alive]
 
@@ -282,10 +276,10 @@ def rounded(found: Locus) -> Locus:
     way, pinned, box = int(np.sign(gain[-1] - gain[0])), len(branches) - found.listed.size, found.box
     # rounds of halving at most: where two branches meet their distance goes with the root of that of the gain
     for _ in range(24):
-        whole = [frame(branches)], [view(branches, found.origin)]
-        frames = np.array([[*map(frame, branches)], *(each * len(branches) for each in whole)])  # (3, b, 4)
-        sizes = np.diff(frames)[..., ::2, None]
-        more = (gain[:-1] + gain[1:])[np.any([loose(branches, *each.swapaxes(0, 1)) for each in sizes], axis=0)] / 2
+        pictures = np.array([*map(frame, branches)]), frame(branches), view(branches, found.origin)
+        sizes = [np.diff(np.atleast_2d(each))[:, ::2, None] for each in pictures]
+        is_loose = np.any([loose(branches, *each.swapaxes(0, 1)) for each in sizes], axis=0)
+        more = (gain[:-1] + gain[1:])[is_loose] / 2
         if not more.size or more.size + gain.size > MOST_LOCUS_POINTS:
             break
         order = np.argsort(way * np.r_[gain, more], kind="stable")
@@ -300,7 +294,7 @@ def frame(branches: Complex) -> tuple[float, float, float, float]:
     points = branches[~np.isnan(branches)]
     if not points.size:
         return 0.0, 1.0, 0.0, 1.0
-    left, right = min(float(points.real.min()), 0.0), max(float(points.real.max()), 0.0)
+    left, right = float(points.real.min(initial=0.0)), float(points.real.max(initial=0.0))
     low, high = float(points.imag.min()), float(points.imag.max())
     # less than 1e-12 of the size of its poles is rounding of a constant pole
     wide = max(right - left, 1e-12 * float(abs(points).max())) or 1.0  # where no pole moves from 0

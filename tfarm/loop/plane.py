@@ -3,8 +3,7 @@
 D-decomposition (Neimark 1948): D is affine in each number (`windows`).  Its crossings of the imaginary axis are solved
 for along the second number, all columns at once, and one count of unstable poles gives all others.  Nothing is
 interpolated or missed between grid points.  D is not affine in a delay: that is the number across the columns, each of
-which is counted by itself.  So is a leading coefficient that passes through 0 where no band is sufficient: there poles
-come to any band from above.
+which is counted by itself.
 
 In the plane of K1 and K2 each frequency has one point with poles at s = i w: the boundary.  Without damping, where the
 gauge reads the hub's moment, it collapses onto two lines.  On one K1 cancels the friction of the hub, on the other K2
@@ -31,27 +30,25 @@ from tfarm.arrays import Real
 from tfarm.crossing import Crossings, Window, ascending, counts_over
 from tfarm.crossing.shown import PlaneOfCounts
 from tfarm.errors import ConvergenceError, ParameterError, require
+from tfarm.loop.continuous import ContinuousLoop, grid
+from tfarm.loop.lines import (
+    LEADING,
+    Along,
+    LawTerms,
+    crossed,
+    line_crossings,
+    rounded,
+    static_edge,
+    unstable_below,
+    with_numbers,
+)
+from tfarm.loop.stability import band_of_family, verdict_on
+from tfarm.loop.windows import theorem_edges, theorem_windows
 from tfarm.records import record
 from tfarm.response.signals import Controller, controller
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import PAPER_GAINS, default_gains, hub_locked, rate_unit
-
-from .continuous import ContinuousLoop, grid
-from .lines import (
-    ROUNDED,
-    Along,
-    LawTerms,
-    critical,
-    crossed,
-    line_crossings,
-    static_edge,
-    turns_over,
-    unstable_below,
-    with_numbers,
-)
-from .stability import band_of_family, verdict_on
-from .windows import theorem_edges, theorem_windows
 
 COUNTS = Quantity(key="unstable_roots", help="unstable poles at each point, rows upwards; inf where infinitely many")
 BOUNDARY = Quantity(key="boundary", help="both gains and the frequency [rad/s] with poles on the imaginary axis")
@@ -188,19 +185,21 @@ def plane(loop: ContinuousLoop, vary: tuple[str, str], x: Real, y: Real) -> Plan
     most = 400 if loop.gains is None else 2000
     x, y = ascending(vary[0], x, 2, most), ascending(vary[1], y, 2, most)
     across, up = (float(x[0]), float(x[-1])), (float(y[0]), float(y[-1]))
-    corners = [_at(loop, vary, each) for each in itertools.product(critical(vary[0], across), critical(vary[1], up))]
+    for name, (low, high) in zip(vary, (across, up), strict=True):
+        remedy = "a leading coefficient keeps its sign in a map, as without it the order is another: a range without 0"
+        require(not name.endswith(LEADING) or low * high > 0, name, [low, high], remedy)
+    corners = [_at(loop, vary, each) for each in itertools.product(across, up)]
     if loop.gains is not None and _is_known_everywhere(loop.arm) and tuple(ON.get(n, n) for n in vary) == PLANE:
         counts = _known_counts(loop, x, y)
         return Plane(loop.arm, loop.law, vary, x, y, counts, np.empty((0, 3)), 0.0, [])
-    is_counted = vary[0] == "delay" or turns_over(loop, vary[0], across)
-    if vary[1] == "delay" or (not is_counted and turns_over(loop, vary[1], up)):
+    if vary[1] == "delay":
         turned = plane(loop, (vary[1], vary[0]), y, x)
         return replace(turned, vary=vary, x=x, y=y, unstable=turned.unstable.T.copy(), crossings=[])
     band, is_quiet = band_of_family(corners)
     found = _columns(loop, vary, x, up, band)
     crossing = np.concatenate([y[:0], *(each.gain for each in found)])
     at = 0.0 if vary == PLANE else float(y[_farthest(y, crossing)])  # at K2 = 0 the hub is passive
-    there = _counts_across(loop.having(vary[1], at), vary[0], x, band, one_by_one=is_counted)
+    there = _counts_across(loop.having(vary[1], at), vary[0], x, band)
     unstable = counts_over(y, found, at, there).T.copy()
     edge = np.empty((0, 3))
     if vary == PLANE and loop.gains is not None:
@@ -255,9 +254,9 @@ def _known_counts(loop: ContinuousLoop, K1: Real, K2: Real) -> NDArray[np.int64]
     return unstable
 
 
-def _counts_across(row: ContinuousLoop, name: str, x: Real, band: float, *, one_by_one: bool) -> NDArray[np.int64]:
-    """Unstable poles at each x along a row, from one count at the value farthest from its crossings, or one by one."""
-    if one_by_one:
+def _counts_across(row: ContinuousLoop, name: str, x: Real, band: float) -> NDArray[np.int64]:
+    """Unstable poles at each x along a row, from one count at a value far from its crossings; each of a delay."""
+    if name == "delay":
         return np.array([unstable_below(row.having(name, value), band) for value in x.tolist()])
     across = line_crossings(row, name, float(x[0]), float(x[-1]), band)
     start = float(x[_farthest(x, across.gain)])
@@ -298,7 +297,7 @@ def ranges_of(arm: Arm) -> tuple[tuple[float, float], tuple[float, float]]:
 def between(low: float, high: float, number: int) -> Real:
     """The middles of `number` equal parts from low to high: none of them on a line K1 = 0 unless by chance."""
     values = low + (high - low) * (np.arange(number) + 0.5) / number
-    return np.where(abs(values) <= ROUNDED * (high - low), 0.0, values)
+    return np.array([rounded(value, (low, high)) for value in values.tolist()])
 
 
 @dataclass(frozen=True)
@@ -382,18 +381,16 @@ def moment_axis(arm: Arm, x: Axis) -> Axis:
 def edge(found: Plane, x: Axis, y: Axis) -> Real:
     """The boundary in the picture, refined where it is coarse, with a row of nan after each of its parts."""
     points, loop = found.boundary, ContinuousLoop(found.arm, found.law)
-    if not points.size:
-        return points
     # rounds of cutting at most: 2^-30 of a step between frequencies is less than a pixel
     for _ in range(30):
         length, is_seen = _segments(points, x, y)
-        (coarse,) = np.nonzero((length > SHORT_SEGMENT) & is_seen)
-        if not coarse.size:
+        low, high = points[:-1, 2], points[1:, 2]
+        middle = np.sqrt(low * high)
+        is_coarse = (length > SHORT_SEGMENT) & is_seen & (low < middle) & (middle < high)
+        if not is_coarse.any():
             break
-        middle = np.sqrt(points[coarse, 2] * points[coarse + 1, 2])
-        middle = middle[(middle > points[coarse, 2]) & (middle < points[coarse + 1, 2])]
-        points = np.concatenate([points, boundary(loop, middle)])
-        points = points[np.unique(points[:, 2], return_index=True)[1]]
+        points = np.concatenate([points, boundary(loop, middle[is_coarse])])
+        points = points[np.argsort(points[:, 2])]
     length, is_seen = _segments(points, x, y)
     parts = np.split(points, np.flatnonzero(~is_seen | (length >= LONG_SEGMENT)) + 1)
     gap = np.full((1, 3), np.nan)
@@ -402,24 +399,17 @@ def edge(found: Plane, x: Axis, y: Axis) -> Real:
 
 def _segments(points: Real, x: Axis, y: Axis) -> tuple[Real, NDArray[np.bool_]]:
     """The drawn length of each segment, and whether it may pass through the picture."""
-    places = np.stack([axis.place(points[:, i]) for i, axis in enumerate((x, y))])
-    low, high = np.minimum(places[:, 1:], places[:, :-1]), np.maximum(places[:, 1:], places[:, :-1])
-    return np.hypot(*np.diff(places)), np.asarray(((high >= 0) & (low <= 1)).all(axis=0))
+    places = np.array([x.place(points[:, 0]), y.place(points[:, 1])])
+    ends = np.sort([places[:, :-1], places[:, 1:]], axis=0)
+    return np.hypot(*np.diff(places)), np.asarray(((ends[1] >= 0) & (ends[0] <= 1)).all(axis=0))
 
 
-def stable_edge(found: Plane, points: Real, x: Axis, y: Axis) -> Real:
-    """Points (n, 3) of the boundary in the picture with the stable region on one side, above or below."""
-    points = points[~np.isnan(points[:, 0])]
-    if not points.size:
-        return points
-    across, up = x.place(points[:, 0]), y.place(points[:, 1])
-    columns, rows = (axis.place(values) for axis, values in zip((x, y), found.axes, strict=True))
-    column, row = np.searchsorted((columns[1:] + columns[:-1]) / 2, across), np.interp(up, rows, np.arange(rows.size))
-    below, above = (
-        np.clip(np.round(row + way).astype(int), 0, rows.size - 1) for way in (-ROWS_FROM_EDGE, ROWS_FROM_EDGE)
-    )
-    differ = (found.unstable[below, column] == 0) != (found.unstable[above, column] == 0)
-    return np.asarray(points[differ & (up >= 0) & (up <= 1) & (across <= 1) & (points[:, 0] > 0)])
+def stable_edge(found: Plane) -> Real:
+    """K1 > 0, K2 and frequency [rad/s] (n, 3) where pairs of poles cross at an end of a stability interval."""
+    columns = zip(found.x.tolist(), found.crossings, found.stable_intervals, strict=True)
+    ends = [(K1, t, at) for K1, column, stable in columns for t, at, _ in column if t in np.ravel(stable)]
+    points = np.reshape(ends, (-1, 3))
+    return points[(points[:, 0] > 0) & (points[:, 2] > 0) & np.isfinite(points[:, 2])]
 
 
 def resting_frequencies(found: Plane, count: int) -> Real:
@@ -429,7 +419,7 @@ def resting_frequencies(found: Plane, count: int) -> Real:
 
 def static_edges(found: Plane) -> tuple[float | None, float | None]:
     """The gains at which a real pole passes through 0: an upright line of the boundary, and a level one."""
-    loop, (across, up) = ContinuousLoop(found.arm, found.law), (abs(values).max() for values in found.axes)
-    upright = static_edge(loop.having(MOMENT_GAIN, 0.0), RATE_GAIN, (-across, across))
+    upright = found.upright if found.arm.has_rigid_mode and found.Kp == 0 else None
+    loop, up = ContinuousLoop(found.arm, found.law), float(abs(found.y).max())
     level = static_edge(loop.having(RATE_GAIN, 1.0), MOMENT_GAIN, (-up, up))
-    return None if upright is None else upright.t, None if level is None else level.t
+    return upright, None if level is None else level.t

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -21,14 +22,13 @@ from tfarm.crossing import Line
 from tfarm.errors import ConvergenceError, require
 from tfarm.exact.characteristic import Analytic
 from tfarm.exact.outputs import OUTPUTS
+from tfarm.loop.continuous import NEAREST_TO_ORIGIN, ORDER_READ_AT, ContinuousLoop, band_of, by_differences
+from tfarm.loop.lines import LawTerms
+from tfarm.loop.poles import box_of, poles_below, slow_poles
 from tfarm.records import record
 from tfarm.spectrum.box import Box, winding_number
 from tfarm.spectrum.following import settled
 from tfarm.spectrum.table import first_frequency
-
-from .continuous import NEAREST_TO_ORIGIN, ORDER_READ_AT, ContinuousLoop, band_of, by_differences
-from .lines import LawTerms
-from .poles import box_of, poles_below, slow_poles
 
 OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}  # units, as of the arm's below
 ARM_PARAMETERS = {
@@ -190,10 +190,11 @@ class Varied:
 
     def near(self, values: Real, guess: Complex) -> Complex:
         """The poles (m, b) next to the guesses at m values, by Newton's method; NaN where it does not settle."""
-        found = guess.copy()
-        order = abs(np.where(np.isnan(guess), np.inf, guess)).argsort(axis=1)
-        both = np.take_along_axis(np.where(guess.imag > 0, 2, 1), order, 1).cumsum(axis=1)  # of a pair that rests
-        rests = np.take_along_axis(both, order.argsort(axis=1), 1) <= self.resting(values)[:, None]
+        found, resting, rests = guess.copy(), self.resting(values), np.zeros(guess.shape, bool)
+        for n in np.flatnonzero(resting):
+            nearest = np.argsort(abs(np.where(np.isnan(guess[n]), np.inf, guess[n])))
+            both = np.where(guess[n, nearest].imag > 0, 2, 1).cumsum()  # of a pair that rests
+            rests[n, nearest[both <= resting[n]]] = True
         wanted = ~np.isnan(guess) & ~rests
         for n in np.flatnonzero((wanted & (guess == 0)).any(axis=1)):
             leaving = wanted[n] & (guess[n] == 0)
@@ -228,20 +229,16 @@ class Varied:
 
     def boxed(self, modes: int) -> Varied:
         """The same with a box for all values, as high as `modes` modes, no pole on its edge at the first value."""
-        loops, lost = [self.at(value) for value in self.few], ConvergenceError("no box", self, 0.0)
+        loops = [self.at(value) for value in self.few]
         # heights of the box, until no pole is on its edge at the first value
         for factor in (1.0, 1.013, 1.031, 1.057, 0.985, 1.09):
             height = factor * max(band_of(loop.arm, modes) for loop in loops)
-            boxes = [box_of(loop, height) for loop in loops]
-            left, right = max(each.re_min for each in boxes), max(each.re_max for each in boxes)
+            left, right, _, _ = np.max([box_of(loop, height) for loop in loops], axis=0).tolist()
             found = replace(self, box=Box(left, right, -height, height))
-            try:
+            with suppress(ConvergenceError):
                 found.count(self.start)
-            except ConvergenceError as error:
-                lost = error
-            else:
                 return found
-        raise lost
+        raise ConvergenceError(f"a pole is on the edge of every box at {self.vary} = {self.start:.6g}", self, 0.0)
 
     def count(self, value: float) -> int:
         """Number of poles in the box at one value, without those at 0, by the winding number."""

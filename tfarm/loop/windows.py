@@ -15,14 +15,13 @@ import numpy as np
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, shown_unit
 from tfarm.crossing import Crossing, Crossings, Window, intervals, joined
 from tfarm.errors import ConvergenceError
+from tfarm.loop.continuous import ContinuousLoop
+from tfarm.loop.lines import LEADING, Along, LawTerms, critical, crossed, static_edge, unstable_below
+from tfarm.loop.stability import Stability, band_of_family, is_known_without, verdict_on
+from tfarm.loop.theorem import TAKES, absorbed, theorem_of
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import first_frequency, gain_unit, most_gain
-
-from .continuous import ContinuousLoop
-from .lines import LEADING, Along, LawTerms, critical, crossed, static_edge, unstable_below
-from .stability import Stability, band_of_family, is_known_without, verdict_on
-from .theorem import TAKES, absorbed, theorem_of
 
 End = Literal["edge", "search bound", "no limit"]
 SEARCH_RANGE = Quantity("search range", digits=5, key="search_range", help="values between which limits were searched")
@@ -247,12 +246,10 @@ def is_held(loop: ContinuousLoop) -> bool:
 
 def _with_proven_ends(loop: ContinuousLoop, name: str, pair: Window, limits: Window) -> Window:
     """The interval with ends of the search replaced by infinity where a theorem holds beyond them."""
-    low, high = pair
-    if loop.gains is None:
+    end, beyond = (0, -math.inf) if name == MOMENT_GAIN else (1, math.inf)
+    if loop.gains is None or pair[end] != limits[end] or not is_held(loop.having(name, pair[end])):
         return pair
-    if name == MOMENT_GAIN:
-        return (-math.inf if low == limits[0] and is_held(loop.having(name, low)) else low), high
-    return low, (math.inf if high == limits[1] and is_held(loop.having(name, high)) else high)
+    return (beyond, pair[1]) if end == 0 else (pair[0], beyond)
 
 
 def reach_words(found: Iterable[Windows]) -> str:
