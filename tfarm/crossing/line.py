@@ -146,6 +146,7 @@ class Curve(Protocol):
 
 
 @dataclass(frozen=True)
+@record
 class Grid:
     """A curve with a grid of `places` (n,), and its terms at a place."""
 
