@@ -257,33 +257,3 @@ def test_the_largest_of_many_maxima_is_found_whatever_the_record():
         peak = found.peaks(np.linspace(0.0, 5.0, points))["torque"]
         assert abs(peak.value) == pytest.approx(expected, rel=1e-8)
         assert expected <= peak.most * (1 + 1e-12) < expected * (1 + 1e-8)
-
-
-@pytest.mark.parametrize(("damping", "delay"), thinned([(5e-3, 0.0), (2e-3, 0.004), (0.0, 0.003)], 2))
-def test_early_torque_and_root_moment_are_those_of_de_hoogs_inversion(damping, delay):
-    """Of a filtered law on damped arms, whose own poles are left of the box; the transform at 20 digits."""
-    arm, num, den = LAB.having(damping=damping), [1.0, 3.0], [1 / 2000, 1.0]
-    law = tfarm.Law({"hub_angle": (num, den)}, delay=delay, references=("hub_angle",))
-    found = time_response(usual_poles(ContinuousLoop(arm, law)), NAMES, STEP, 1.0)
-
-    def transform(name):
-        def F(s):
-            C = mpmath.polyval(num, s) / mpmath.polyval(den, s)
-            angle = appendix_response(arm, OUTPUTS["hub_angle"], s, 18)
-            direct = C / s / (1 + mpmath.exp(-s * delay) * C * angle)  # its delay is taken out
-            if name == "torque":
-                return direct - C / s
-            return direct * appendix_response(arm, OUTPUTS[name], s, 18)
-
-        return F
-
-    for t in (2e-2,) if damping else (2e-3,):
-        y = dict(zip(found.names, found.at(np.array([t + delay]))[:, 0], strict=True))
-        own = 3 + 1997 * np.exp(-2000 * t)
-        with mpmath.workdps(20):
-            torque, moment = (
-                float(mpmath.invertlaplace(transform(name), t, method="dehoog", degree=24))
-                for name in ("torque", "root_moment")
-            )
-        assert y["torque"] == pytest.approx(own + torque, abs=2e-5 * (abs(own) + abs(torque)))
-        assert y["root_moment"] == pytest.approx(moment, rel=1e-3)
