@@ -117,8 +117,15 @@ def test_windows_are_those_of_routh_and_hurwitz(A, B, ends, crossings, windows, 
 def test_zeros_are_found_to_the_last_bit_each_in_its_own_bracket():
     """A line, a root of tiny values, a jump and a pole."""
 
-    def f(x):
-        return np.array([x[0] - 2.0, 1e-300 * (x[1] ** 2 - 2.0), np.sign(x[2] - 1.7), 1 / (x[3] - 0.9)])
+    hard = (
+        (lambda x: x - 2.0),
+        (lambda x: 1e-300 * (x**2 - 2.0)),
+        (lambda x: np.sign(x - 1.7)),
+        (lambda x: 1 / (x - 0.9)),
+    )
+
+    def f(places, which):
+        return np.array([hard[n](x) for n, x in zip(which, places, strict=True)])
 
     found = zeros_between(f, np.zeros(4), np.full(4, 3.0))
     np.testing.assert_allclose(found, [2.0, 2.0**0.5, 1.7, 0.9], rtol=0, atol=4 * np.finfo(float).eps)

@@ -19,7 +19,6 @@ from tfarm.crossing.line import (
     crossings,
     intervals,
     joined,
-    solved,
     zeros_between,
 )
 from tfarm.crossing.turning import RegionPiece, pieces
@@ -42,6 +41,5 @@ __all__ = [
     "intervals",
     "joined",
     "pieces",
-    "solved",
     "zeros_between",
 ]

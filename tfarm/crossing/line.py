@@ -95,22 +95,16 @@ def brackets(h: Real) -> tuple[tuple[Whole, ...], Whole]:
     return before, np.where(sign[before] > 0, 2, -2)
 
 
-def zeros_between(f: Callable[[Real], Real], low: Real, high: Real) -> Real:
-    """Return the zeros of functions f (n,) that change sign between `low` and `high` (n,), to the last bit.
+def zeros_between(f: Callable[[Real, Whole], Real], low: Real, high: Real) -> Real:
+    """Return the zeros of functions that change sign between `low` and `high` (n,), to the last bit.
 
-    By SciPy's Chandrupatla (1997); `low` of one that has one sign at both.
+    `f` gives the values of some of them, by their numbers, at a place of each.  By SciPy's Chandrupatla (1997); `low`
+    of a function that has one sign at both.
     """
     if not low.size:
         return low
-    x = low.copy()
-
-    def some(at: Real, which: Whole) -> Real:
-        x[which] = at
-        return np.asarray(f(x)[which])
-
     limits = {"xatol": LAST_BIT * float(abs(high - low).min()), "xrtol": 2 * LAST_BIT, "fatol": 0.0, "frtol": 0.0}
-    which = np.arange(low.size)
-    found = find_root(some, (low, high), args=(which,), tolerances=limits)  # type: ignore[call-overload]  # of its stubs
+    found = find_root(f, (low, high), args=(np.arange(low.size),), tolerances=limits)  # type: ignore[call-overload]
     return np.where(found.success, found.x, low)
 
 
@@ -131,12 +125,12 @@ class Line(NamedTuple):
 class Steps(NamedTuple):
     """Steps between neighbours of a grid: coordinates `low` and `high` (n,), places from an `origin`, and the terms.
 
-    `terms` gives the rows (rows, n) at a coordinate of each.
+    `terms` gives the rows (rows, m) of some steps, by their numbers, at a coordinate of each.
     """
 
     low: Real
     high: Real
-    terms: Callable[[Real], Complex]
+    terms: Callable[[Real, Whole], Complex]
     origin: Real | float = 0.0
 
 
@@ -152,6 +146,7 @@ class Curve(Protocol):
 
 
 @dataclass(frozen=True)
+@record
 class Grid:
     """A curve with a grid of `places` (n,), and its terms at a place."""
 
@@ -165,7 +160,7 @@ class Grid:
 
     def steps(self, number: Whole) -> Steps:
         """The steps from the points of these numbers to the next."""
-        return Steps(self.places[number], self.places[number + 1], self.terms_at)
+        return Steps(self.places[number], self.places[number + 1], lambda at, _: self.terms_at(at))
 
 
 def crossed(places: Real, parts: Parts) -> tuple[Real, Real, Whole]:
@@ -186,15 +181,23 @@ def crossings(curve: Curve, lines: Sequence[Line], *, with_dips: bool = False) -
     (line, step), change = brackets((A * B.conj()).imag)
     low, high, terms, origin = curve.steps(step)
 
-    def parts(at: Real, of: Whole) -> tuple[Complex, Complex]:
-        rows = terms(at)
+    def parts(at: Real, which: Whole, of: Whole) -> tuple[Complex, Complex]:
+        rows = terms(at, which)
         return (others[of].T * rows).sum(axis=0), (alone[of].T * rows).sum(axis=0)
 
     if with_dips:
         dip_line, first, middle, last, sign = _dips(parts, curve, _share(A, B))
         line, change = np.r_[line, dip_line, dip_line], np.r_[change, 2 * sign, -2 * sign]
         low, high = np.r_[low, first, middle], np.r_[high, middle, last]
-    at, gain = solved(lambda place: parts(place, line), low, high)
+
+    def h(at: Real, which: Whole) -> Real:
+        A, B = parts(at, which, line[which])
+        return np.asarray((A * B.conj()).imag)
+
+    at = zeros_between(h, low, high)
+    A, B = parts(at, np.arange(at.size), line)
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # B vanishes: the gain is infinite
+        gain = -(A * B.conj()).real / abs(B) ** 2
     found: list[list[Crossing]] = [[] for _ in lines]
     for number, *each in zip(line.tolist(), gain.tolist(), (origin + at).tolist(), change.tolist(), strict=True):
         found[number].append(Crossing(*each))
@@ -202,7 +205,7 @@ def crossings(curve: Curve, lines: Sequence[Line], *, with_dips: bool = False) -
 
 
 def _dips(
-    parts: Callable[[Real, Whole], tuple[Complex, Complex]], curve: Curve, share: Real
+    parts: Callable[[Real, Whole, Whole], tuple[Complex, Complex]], curve: Curve, share: Real
 ) -> tuple[Whole, Real, Real, Real, Whole]:
     """Dips of |h| through 0 between three neighbours: the line, the first place, one beyond 0, the last, and the sign.
 
@@ -218,7 +221,7 @@ def _dips(
         return line, first, first, last, sign
 
     def depth(at: Real, which: Whole) -> Real:
-        return sign[which] * _share(*parts(at, line[which]))
+        return sign[which] * _share(*parts(at, which, line[which]))
 
     # 14 steps of a golden section leave a thousandth of two steps of the grid, of smooth functions far less
     dip = find_minimum(depth, (first, middle, last), args=(np.arange(line.size),), maxiter=14)
@@ -229,22 +232,6 @@ def _dips(
 def _share(A: Complex, B: Complex) -> Real:
     """h over its largest possible size, -1 to 1."""
     return np.asarray((A * B.conj()).imag / np.maximum(abs(A) * abs(B), LEAST_SIZE))
-
-
-def solved(parts: Parts, low: Real, high: Real) -> tuple[Real, Real]:
-    """Return the place (n,) between `low` and `high` (n,) at which each bracket's gain is real, and that gain.
-
-    `parts` gives A and B of every bracket at a place of each.
-    """
-
-    def h(place: Real) -> Real:
-        A, B = parts(place)
-        return np.asarray((A * B.conj()).imag)
-
-    place = zeros_between(h, low, high)
-    A, B = parts(place)
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # B vanishes: the gain is infinite
-        return place, np.asarray(-(A * B.conj()).real / abs(B) ** 2)
 
 
 def ascending(name: str, values: Any, least: int, most: int) -> Real:

@@ -67,18 +67,21 @@ class LawTerms:
             if self.part(name) is None and name != "gain":
                 value = law.numbers.get(name, 0.0)
                 small = value * 2.0**-30 or 1.0  # not 0, as a leading 0 moves the other coefficients
-                self.others[name] = value, small, self.law.having(name, small)
+                part = [each.signals for each in law.parts].index((name.rsplit(".", 2)[0],))
+                self.others[name] = value, small, part, self.law.having(name, small).parts[part].block
 
     def of(self, s: Complex, rig: LoopParts) -> Complex:
         """The terms (rows, ...) at places s, from the parts of the signals there."""
-        late = np.exp(-s * self.law.delay) * rig.numerators
-
-        def rows(law: Law) -> Complex:
-            shares, whole = law.shares(s)
-            return np.array([rig.drive * whole, *(shares * late).sum(axis=1)])
-
-        others = (np.tensordot(self.weights, rows(law), 1) for *_, law in self.others.values())
-        return np.array([*rows(self.law), *others])
+        law = self.law
+        shares, whole = law.shares(s)
+        late = np.exp(-s * law.delay) * rig.numerators
+        rows = [rig.drive * whole, *(shares * late).sum(axis=1)]
+        D = np.tensordot(self.weights, rows, 1)
+        for _, _, part, block in self.others.values():
+            ((signal,), own) = law.parts[part].signals, law.parts[part].block
+            fed_back = -law.sign * late[law.signals.index(signal)] * whole * block.numerators(s)[0]
+            rows.append(((D - rows[1 + part]) * block.denominator(s) + fed_back) / own.denominator(s))
+        return np.array(rows)
 
     def at(self, s: Complex) -> Complex:
         """The terms (rows, n) at places s (n,)."""
@@ -101,7 +104,7 @@ class LawTerms:
             return Line.of(weights, np.r_[0.0, weights[1:]], 1.0, low, high)
         if part is not None:
             return Line.of(weights, np.eye(weights.size)[1 + part], weights[1 + part], low, high)
-        value, small, _ = self.others[name]
+        value, small, *_ = self.others[name]
         other = np.eye(weights.size)[self.weights.size + list(self.others).index(name)]
         return Line.of(other, (weights - other) / (value - small), small, low, high)
 

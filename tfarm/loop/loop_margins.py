@@ -232,7 +232,7 @@ def unit_crossings(loop: Loop, omega: Real) -> Real:
             return np.asarray(np.log(abs(loop.loop_function(1j * w))))
 
     (before,), _ = brackets(size(omega))
-    return zeros_between(size, omega[before], omega[before + 1])
+    return zeros_between(lambda w, _: size(w), omega[before], omega[before + 1])
 
 
 def lowest(

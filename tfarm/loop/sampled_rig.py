@@ -150,7 +150,7 @@ class CircleGrid:
         base = self.base[number]  # where the next point has another pole, both are as far away
         is_own = base == self.base[number + 1]
         high = np.where(is_own, self.shift[number + 1], self.q[number + 1] - self.angles[base])
-        return Steps(self.shift[number], high, lambda shift: self.at(base, shift), self.angles[base])
+        return Steps(self.shift[number], high, lambda shift, which: self.at(base[which], shift), self.angles[base])
 
     def at(self, base: Whole, shift: Real) -> Complex:
         """Return the rig's `terms` at other points."""
