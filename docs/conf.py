@@ -22,12 +22,12 @@ from tfarm.arm.law_tables import LawTable, SignalTable
 from tfarm.arm.materials import materials
 from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES, StrictTable, file_keys
 from tfarm.arm.stages import ARM_KEYS, STAGES
-from tfarm.assessment import card, step
+from tfarm.assessment import step
 from tfarm.cli.app import whole_command
 from tfarm.dsp import kernel
 from tfarm.exported import controller, fmu, systems, tuner_code
 from tfarm.fitting.recording import RunTable
-from tfarm.loop import sampled_verdict
+from tfarm.loop import sampled_verdict, stability
 from tfarm.report import live
 from tfarm.schema.glossary import CERTAINTY, declared_records
 from tfarm.synthesis import design
@@ -118,7 +118,7 @@ def arm_file_page() -> str:
 
 
 CONSUMERS = (
-    card.CONTINUOUS, sampled_verdict.SAMPLED_LOOP, step.CONSUMER, kernel.CONSUMER, design.CONSUMER,
+    stability.CONTINUOUS, sampled_verdict.SAMPLED_LOOP, step.CONSUMER, kernel.CONSUMER, design.CONSUMER,
     tuner_kernel.CONSUMER, controller.CONSUMER, tuner_code.CONSUMER, fmu.CONSUMER, systems.CONSUMER, live.CONSUMER,
 )  # fmt: skip
 

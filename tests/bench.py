@@ -33,9 +33,9 @@ from tfarm.dsp import Chain, Sampling, Simulator, scenario
 from tfarm.exact.appendix import Appendix
 from tfarm.exact.outputs import output
 from tfarm.loop.circle_crossings import sampled_map
+from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.loci import open_loop, reduced_locus
 from tfarm.loop.locus import locus
-from tfarm.loop.loop import Loop
 from tfarm.loop.plane import gain_map
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.schema import to_dict
@@ -351,7 +351,7 @@ def loci(order=20):
     def error(found, values):
         worst = 0.0
         for at in np.linspace(1, gains.size - 1, 6).round().astype(int):
-            loop = Loop(BARE.arm, HubFeedback(K1=float(gains[at])))
+            loop = ContinuousLoop(BARE.arm, HubFeedback(K1=float(gains[at])))
             for near, value in zip(found.branches[:, at], values[:, at], strict=True):
                 if near:
                     disc = enclosed(loop.k, complex(near), 50, loop.exact)

@@ -20,8 +20,8 @@ from tfarm.dsp import Chain
 from tfarm.dsp.scenarios import slew
 from tfarm.dsp.simulate import Simulator
 from tfarm.loop.circle_crossings import sampled_map
+from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.locus import locus
-from tfarm.loop.loop import Loop
 from tfarm.loop.plane import gain_map
 from tfarm.records import LONGEST_REPR, record
 from tfarm.reduced import modal_model
@@ -151,7 +151,7 @@ def test_a_law_is_shown_as_it_is_typed() -> None:
         ["deflection@0.3", "0.5"],
         ["delay", "0.002"],
     ]
-    assert "law=Law(hub_angle=([2, 1], [0.01, 1]), deflection@0.3=0.5, delay=0.002)" in repr(Loop(LAB, LEAD))
+    assert "law=Law(hub_angle=([2, 1], [0.01, 1]), deflection@0.3=0.5, delay=0.002)" in repr(ContinuousLoop(LAB, LEAD))
 
 
 def test_every_record_with_arrays_is_one() -> None:

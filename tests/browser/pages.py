@@ -25,10 +25,10 @@ from playwright.sync_api import Browser, Page, sync_playwright
 import tfarm
 from tfarm.arm import Arm, HubFeedback, Law, as_law
 from tfarm.arm.law_tables import load_law
-from tfarm.assessment.card import LoopCard, SampledCurve, reference_damping
+from tfarm.assessment.card import LoopCard, reference_damping
 from tfarm.dsp import Chain, load_chain
 from tfarm.dsp.results import simulated_run
-from tfarm.loop.loop import Loop
+from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import gain_map
 from tfarm.loop.sampled_verdict import sampled_verdict
@@ -253,7 +253,7 @@ def test_loci_have_the_poles_of_their_gains(browser, folder, name):
         loop = sampled_verdict(arm, law, chain).full
         for row in discs[:: len(discs) // 12]:
             z = complex(row["re"], row["im"])
-            assert abs(loop.having(K2=row["gain"]).poles.z - z).min() < 1e-6, row
+            assert abs(loop.having("K2", row["gain"]).poles.z - z).min() < 1e-6, row
         box = show_chart(page, "poles")
         page.wait_for_function("live.now.locus?.length", timeout=60_000)
         pole = page.evaluate("[live.now.near[1][0], live.now.near[1][1], live.now.frame]")
@@ -319,7 +319,7 @@ def test_a_chord_of_the_loop_function_is_within_a_pixel_of_it(browser, folder, n
         pixels = page.evaluate("live.room('nyquist')[0]") / 5.0  # of 1, where that is the shorter side
         graded = arm.having(damping=reference_damping(arm)) if arm.has_elastic_link else arm
         of = arm if sampled_verdict(arm, law, chain).word == "unstable" else graded
-        exact = (Loop(graded, as_law(law)).parts, SampledCurve(sampled_verdict(of, law, chain).full).parts)
+        exact = (ContinuousLoop(graded, as_law(law)).parts, sampled_verdict(of, law, chain).full.parts)
         for key, parts in zip(("curve", "zcurve"), exact, strict=True):
             rows = page.evaluate(f"live.now.{key}(live.now.from).map(row => [row.w, row.x, row.y])")
             w, x, y = np.array(rows).T

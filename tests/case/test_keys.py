@@ -16,7 +16,7 @@ from tests.shared import docs_module, remembered
 from tfarm.arm.chain import CHAIN_TABLES, stated
 from tfarm.arm.schema import file_keys
 from tfarm.arm.stages import ARM_KEYS, STAGE_OF, STAGES, Consumer, Stage
-from tfarm.assessment import card, step
+from tfarm.assessment import step
 from tfarm.dsp import Actuator, Chain, Converters, kernel
 from tfarm.dsp.results import simulated_run
 from tfarm.errors import ParameterError
@@ -25,6 +25,7 @@ from tfarm.exact.system import system_of
 from tfarm.exported import controller, fmu, result, systems, tuner_code
 from tfarm.loop import sampled_verdict as verdicts
 from tfarm.loop.sampled_verdict import sampled, sampled_brief, sampled_verdict
+from tfarm.loop.stability import CONTINUOUS
 from tfarm.report import live
 from tfarm.schema import to_dict
 from tfarm.synthesis import design
@@ -123,7 +124,7 @@ def answers_of_samples(arm, chain):
 
 
 ANSWERS = {
-    card.CONTINUOUS: lambda arm, chain: to_dict(card_of(arm, chain).continuous),
+    CONTINUOUS: lambda arm, chain: to_dict(card_of(arm, chain).continuous),
     verdicts.SAMPLED_LOOP: answers_of_samples,
     step.CONSUMER: lambda arm, chain: {
         name: (loop.certainty, *map(list, loop.signals.values()))
@@ -196,7 +197,7 @@ def test_the_table_of_the_documentation_has_every_consumer():
     assert found - {system.CONSUMER} == set(ANSWERS) == set(docs_module("conf").CONSUMERS)
 
 
-WALKED = [pytest.param(each, id=each.name, marks=[pytest.mark.survey] * (each is card.CONTINUOUS)) for each in ANSWERS]
+WALKED = [pytest.param(each, id=each.name, marks=[pytest.mark.survey] * (each is CONTINUOUS)) for each in ANSWERS]
 
 
 @pytest.mark.parametrize("consumer", WALKED)

@@ -17,31 +17,33 @@ def test_a_circle_is_round_where_it_turns_by_less_than_two_and_a_half_degrees(po
     assert loose(arc(points), 1.0, 1.0).tolist() == [wanted] * (points - 1)
 
 
-def test_turns_are_those_of_the_picture():
-    """Of what is drawn four times as wide as high, a steep part turns less and a flat part more."""
-    flat, steep = np.array([[1j, 1 + 1j, 2 + 1.02j]]), np.array([[1j, 2j, 0.02 + 3j]])
-    assert [loose(flat, 1.0, 1.0).all(), loose(steep, 1.0, 1.0).all()] == [False, False]  # both by 1.1 degrees
-    assert [loose(flat, 4.0, 1.0).all(), loose(steep, 4.0, 1.0).all()] == [True, False]
-    assert [loose(flat, 1.0, 4.0).all(), loose(steep, 1.0, 4.0).all()] == [False, True]
-    sizes = np.array([[4.0], [1.0]])
-    assert loose(np.r_[flat[:, :], steep], sizes, 1.0).tolist() == [True, True]
-    assert loose(np.r_[steep, flat], sizes, 1.0).tolist() == [False, False]
+FLAT, STEEP = np.array([1j, 1 + 1j, 2 + 1.02j]), np.array([1j, 2j, 0.02 + 3j])  # both turn by 1.1 degrees
+CORNER = np.array([0, 1, 2, 3, 3 + 1j, 3 + 2j, 3 + 3j]) + 5j
+SIZES = np.array([[4.0], [1.0]])
+LOOSE = [  # curves, width and height of the picture, where a value is wanted: a steep part turns less in a wide one
+    ([FLAT], 1.0, 1.0, [0, 0]),
+    ([STEEP], 1.0, 1.0, [0, 0]),
+    ([FLAT], 4.0, 1.0, [1, 1]),
+    ([STEEP], 4.0, 1.0, [0, 0]),
+    ([FLAT], 1.0, 4.0, [0, 0]),
+    ([STEEP], 1.0, 4.0, [1, 1]),
+    ([FLAT, STEEP], SIZES, 1.0, [1, 1]),
+    ([STEEP, FLAT], SIZES, 1.0, [0, 0]),
+    ([CORNER], 4.0, 4.0, [0, 0, 1, 1, 0, 0]),
+    ([CORNER], 501.0, 501.0, [0] * 6),  # each piece is 1/501 of the picture: not visible
+    ([CORNER], 499.0, 499.0, [0, 0, 1, 1, 0, 0]),
+    ([[5j, 1 + 5j, 1 + 5.001j]], 2.0, 2.0, [1, 0]),
+    ([[1.0, 2.0, 1.5, 3.0]], 1.0, 1.0, [0, 0, 0]),  # it turns back on the axis
+]
 
 
-def test_only_visible_pieces_next_to_a_corner_are_halved():
-    corner = np.array([[0, 1, 2, 3, 3 + 1j, 3 + 2j, 3 + 3j]]) + 5j
-    assert loose(corner, 4.0, 4.0).tolist() == [False, False, True, True, False, False]
-    assert loose(corner, 501.0, 501.0).tolist() == [False] * 6  # each piece is 1/501 of the picture
-    assert loose(corner, 499.0, 499.0).tolist() == [False, False, True, True, False, False]
-    short = np.array([[5j, 1 + 5j, 1 + 5.001j]])
-    assert loose(short, 2.0, 2.0).tolist() == [True, False]
+@pytest.mark.parametrize(("curves", "width", "height", "wanted"), LOOSE)
+def test_visible_pieces_next_to_a_turn_of_the_picture_are_halved(curves, width, height, wanted):
+    assert loose(np.array(curves, complex), width, height).tolist() == [bool(each) for each in wanted]
 
 
-def test_curves_that_stay_on_the_axis_or_end_want_nothing():
-    turning_back = np.array([[1.0, 2.0, 1.5, 3.0]], dtype=complex)
-    ended = np.array([[5j, 1 + 5j, np.nan, 2 + 7j, 1 + 6j]])
-    assert not loose(turning_back, 1.0, 1.0).any()
-    assert not loose(ended, 1.0, 1.0)[1:3].any()
+def test_where_a_curve_ends_nothing_is_wanted():
+    assert not loose(np.array([[5j, 1 + 5j, np.nan, 2 + 7j, 1 + 6j]]), 1.0, 1.0)[1:3].any()
 
 
 def test_only_the_piece_where_two_zeros_leave_the_axis_is_refined():
@@ -62,23 +64,23 @@ def wanted(part, across, drawn=lambda x, y: (x + 1j * y) / 10):
     return loose_columns(np.array(across), [part], drawn).tolist()
 
 
-def test_a_regions_corner_halves_the_sides_next_to_it():
-    """A roof over 1 ... 9 with its ridge at 4; the corners of its foot are at the frame's lower edge, unseen."""
-    across = [1.0, 4.0, 9.0]
-    roof = piece(across, [0.0, 0.0, 0.0], [0.0, 6.0, 0.0])
-    assert wanted(roof, across) == pytest.approx([2.35, 6.25])
-    tip = piece([-1.0, 9.0], [-1.0, 3.0], [6.0, 3.0])  # its upper and lower side end in one point, named twice
-    assert wanted(tip, [-1.0, 9.0]) == pytest.approx([3.5])
-    flat = piece([-1.0, 9.0], [-1.0, 3.0], [3.0, 3.0])  # along one of its sides
-    assert wanted(flat, [-1.0, 9.0]) == pytest.approx([3.5])
+BOX = piece([4.0, 6.0], [2.0, 2.0], [8.0, 8.0])
+ROOF = [1.0, 4.0, 9.0]
+CORNERS = {  # a part of a region, columns, where more are wanted
+    "a roof, its foot at the frame's lower edge": (piece(ROOF, [0.0] * 3, [0.0, 6.0, 0.0]), ROOF, [2.35, 6.25]),
+    "two sides that end in one point": (piece([-1.0, 9.0], [-1.0, 3.0], [6.0, 3.0]), [-1.0, 9.0], [3.5]),
+    "along one of its sides": (piece([-1.0, 9.0], [-1.0, 3.0], [3.0, 3.0]), [-1.0, 9.0], [3.5]),
+    "above the picture": (piece(ROOF, [0.0] * 3, [0.0, 11.0, 0.0]), ROOF, []),
+    "left of the picture": (piece([-9.0, -4.0, -1.0], [2.0] * 3, [2.0, 8.0, 2.0]), [-9.0, -4.0, -1.0], []),
+    "upright sides, from the columns next to them": (BOX, [1.0, 4.0, 6.0, 9.0], [2.35, 4.9, 7.35]),
+    "upright sides alone": (BOX, [4.0, 6.0], [4.9]),
+}
 
 
-def test_corners_outside_the_picture_are_not_seen():
-    across = [1.0, 4.0, 9.0]
-    above = piece(across, [0.0, 0.0, 0.0], [0.0, 11.0, 0.0])
-    left = piece([-9.0, -4.0, -1.0], [2.0, 2.0, 2.0], [2.0, 8.0, 2.0])
-    assert wanted(above, across) == []
-    assert wanted(left, [-9.0, -4.0, -1.0]) == []
+@pytest.mark.parametrize("name", CORNERS)
+def test_a_visible_corner_of_a_region_halves_the_sides_next_to_it(name):
+    part, across, expected = CORNERS[name]
+    assert wanted(part, across) == pytest.approx(expected)
 
 
 def test_an_outline_that_turns_by_less_than_five_degrees_is_round():
@@ -90,13 +92,8 @@ def test_an_outline_that_turns_by_less_than_five_degrees_is_round():
         assert bool(halves) == rough
 
 
-def test_a_vertical_side_is_approached_from_the_columns_next_to_it():
-    """A box from 4 to 6 among columns 1, 4, 6, 9: its corners are on upright sides."""
-    box = piece([4.0, 6.0], [2.0, 2.0], [8.0, 8.0])
-    assert wanted(box, [1.0, 4.0, 6.0, 9.0]) == pytest.approx([2.35, 4.9, 7.35])
-    assert wanted(box, [4.0, 6.0]) == pytest.approx([4.9])
-    flat = wanted(box, [1.0, 4.0, 6.0, 9.0], lambda x, y: x / 10 + 1j * y * 1e-4 + 0.5j)
-    assert flat == pytest.approx([4.9])
+def test_a_side_too_short_to_be_seen_is_left_alone():
+    assert wanted(BOX, [1.0, 4.0, 6.0, 9.0], lambda x, y: x / 10 + 1j * y * 1e-4 + 0.5j) == pytest.approx([4.9])
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])

@@ -206,7 +206,7 @@ def stepped(poles, duration):
 
 def transition(loop, case):
     """The closed loop's matrix in balls: amplitudes of the plant's poles, its two integrals, inputs before, the law."""
-    plant, sampling, read = loop.plant, case.chain.sampling, loop.sensed.read
+    plant, sampling, read = loop.plant, case.chain.sampling, loop.rig.sensed.read
     samples = sampling.delay_samples + case.law.delay / sampling.period
     T, whole = flint.arb(sampling.period), math.floor(samples)
     late = (flint.arb(samples) - whole) * T
@@ -255,7 +255,7 @@ def truth(loop, case):
 
 def integrals_apart(loop):
     """How many of the two integrals of the input the rig does not have: a spring holds its hub, or friction does."""
-    return int(loop.is_damped) if loop.plant.arm.has_rigid_mode else 2
+    return int(loop.rig.is_damped) if loop.plant.arm.has_rigid_mode else 2
 
 
 def judge(case):

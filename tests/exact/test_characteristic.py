@@ -24,7 +24,7 @@ from tfarm.exact.characteristic import (
     tangent,
 )
 from tfarm.exact.system import system_of
-from tfarm.loop.loop import Loop
+from tfarm.loop.continuous import ContinuousLoop
 
 EPS = np.finfo(float).eps
 LAW = {"Kp": 2.0, "K1": 0.3, "K2": 0.4}
@@ -61,16 +61,16 @@ def laws(case):
 
 
 def exact(arm, law):
-    return Loop(arm, HubFeedback(**law)).exact if law else None
+    return ContinuousLoop(arm, HubFeedback(**law)).exact if law else None
 
 
 def in_doubles(arm, law, s):
-    """D of a loop, its zeros at the origin and the time of the waves multiplied in again; both kinds without a law."""
+    """D of a loop, its zeros at the origin multiplied in again; both kinds without a law."""
     if not law:
         return characteristic(system_of(arm), s), quick_characteristics(system_of(arm), s)
-    loop = Loop(arm, HubFeedback(**law))
-    at, n, T = loop.function(s), loop.zeros_at_origin, loop.delay_of_waves
-    return (Analytic(at.value * s**n, (at.slope + (n / s + T) * at.value) * s**n, at.scale + T * s),)
+    loop = ContinuousLoop(arm, HubFeedback(**law))
+    at, n = loop.function(s), loop.zeros_at_origin
+    return (Analytic(at.value * s**n, (at.slope + n / s * at.value) * s**n, at.scale),)
 
 
 @pytest.mark.parametrize("points", sized(6, 7))  # the last of S takes longer than all others
@@ -130,7 +130,7 @@ def test_the_quick_function_is_the_other_without_its_zeros_at_rest(name, at_zero
 @pytest.mark.parametrize("name", ["sasaki2012-lab", "tests/rigs/bench-rig.toml"])
 def test_with_its_zero_at_rest_divided_out_the_function_is_its_limit_there(name) -> None:
     """(K1 + what the hub loses) theta, not 0: else a box would hold a pole at rest twice."""
-    loop = Loop(tfarm.load(name), HubFeedback(K1=0.3, K2=0.4))
+    loop = ContinuousLoop(tfarm.load(name), HubFeedback(K1=0.3, K2=0.4))
     assert loop.zeros_at_origin == 1
     at = loop.function(np.array([0j, 1e-9]))
     assert at.value[0] == pytest.approx(at.value[1], rel=1e-8)
@@ -167,7 +167,7 @@ def test_zeros_at_the_origin_are_as_many_as_the_order_of_D_there(case) -> None:
         law = allowed({"K1": K1, "K2": K2, "Kp": Kp} if any((K1, K2, Kp)) else {}, case[0])
         at = small * (1e-9 if K1 else 1.0)  # where K1 s outweighs the inertia
         far, near = (abs(each) for each in balls(k, at.astype(complex), exact(arm, law)))
-        order = Loop(arm, HubFeedback(**law)).zeros_at_origin if law else k.at_rest
+        order = ContinuousLoop(arm, HubFeedback(**law)).zeros_at_origin if law else k.at_rest
         assert float(mpmath.log10(far / near)) == pytest.approx(order, abs=1e-2)
 
 

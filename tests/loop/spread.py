@@ -17,7 +17,7 @@ from tests.plausible.arms import draw
 from tests.rigs import some_rig
 from tests.survey import Finding
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.loop.loop import Loop
+from tfarm.loop.continuous import ContinuousLoop
 
 UNTIMED = 3  # loops before the first that is timed: what they import is used by all
 
@@ -32,7 +32,7 @@ def some_case(number, seed):
         arm = some_loop(rng)[0] if number % 3 == 1 else some_rig(rng)
         try:
             law = some_law(rng, arm, delay=0.0 if arm.is_undamped else some_delay(rng, arm))
-            Loop(arm, law)
+            ContinuousLoop(arm, law)
         except (ParameterError, ConvergenceError):  # a locked hub, or no loop
             continue
         return arm, law

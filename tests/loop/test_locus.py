@@ -18,10 +18,10 @@ from tests.shared import thinned
 from tests.shell import run
 from tfarm import Arm, Hub, HubFeedback, Law, Link, ParameterError, Payload, Section
 from tfarm.arm import Attachment, Motor
+from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.lines import line_crossings
 from tfarm.loop.loci import damping_ratios, held_branches, loci, most_damped, reduced_locus
-from tfarm.loop.locus import CONTROLLER, RIGID, frame, locus, origin_name, rounded
-from tfarm.loop.loop import Loop
+from tfarm.loop.locus import CONTROLLER, RIGID, frame, locus, origin_name
 from tfarm.loop.poles import poles_below
 from tfarm.schema import curve_table
 from tfarm.spectrum.damped import damped_modes
@@ -199,7 +199,7 @@ def test_a_branch_that_comes_to_the_accumulation_point_ends_there_and_the_others
     assert (ended.imag, -1 / C < ended.real < -0.95 / C) == (0.0, True)
     assert np.isnan(found.branches).sum() == np.isnan(found.branches[branch]).sum() == (found.gain > last).sum()
     others = np.delete(found.branches, branch, axis=0)[:, -1]
-    poles = poles_below(Loop(LAB, HubFeedback(K1=2000.0)), 0.9 * others.imag.max()).values
+    poles = poles_below(ContinuousLoop(LAB, HubFeedback(K1=2000.0)), 0.9 * others.imag.max()).values
     low = 0.8 * others.imag.max()
     assert upper(others[others.imag < low]) == pytest.approx(upper(poles[poles.imag < low]), rel=1e-9)
     assert found.spectral_abscissa[-1] == others[others != 0].real.max()
@@ -303,7 +303,9 @@ def test_a_real_pole_passes_through_0_at_its_closed_form(name):
     here = np.flatnonzero(abs(found.gain - expected) < 1e-12)
     if here.size and arm is MASSED:  # a pole at 0 has no digits to be followed by; the others are there
         row = found.branches[:, here[0]]
-        sides = [poles_below(Loop(arm, law.having(vary, 1.0 + side * 1e-7)), 200.0).values for side in (-1, 1)]
+        sides = [
+            poles_below(ContinuousLoop(arm, law.having(vary, 1.0 + side * 1e-7)), 200.0).values for side in (-1, 1)
+        ]
         assert (row == 0).sum() == 1
         for pole in row[row != 0]:
             assert pole == pytest.approx(np.mean([side[abs(side - pole).argmin()] for side in sides]), rel=1e-6)
@@ -366,21 +368,6 @@ def test_where_the_first_mode_is_damped_most_does_not_depend_on_the_values():
     short = most_damped(locus(LAB, law, "K1", 0.0, 2.0, 20, 4))
     assert (short.gain, short.damping_ratio) == (2.0, pytest.approx(ratio_at(2.0), rel=1e-9))
     assert most_damped(locus(LAB, law, "payload_mass", 0.0, 0.1, 10, 4)) is None
-
-
-@pytest.mark.parametrize(("arm", "vary", "start", "stop"), [(STOCKY, "K2", -5.0, 0.9), (LAB, "K1", 0.3, 3.0)])
-def test_each_branch_is_round_in_a_picture_of_its_own_and_of_all(arm, vary, start, stop):
-    """From 12 values: pieces longer than a five hundredth of the picture turn by at most 2.5 degrees."""
-    branches = rounded(locus(arm, HUB, vary, start, stop, points=12, branches=5)).branches
-    swinging = branches[(branches.imag > 0).all(axis=1)]
-    assert len(swinging) >= 3
-    for points, shown in (*((row, [row]) for row in swinging), (branches, swinging)):
-        wide, tall = max(points.real.max(), 0) - min(points.real.min(), 0), np.ptp(points.imag)
-        for row in shown:
-            across, up = np.diff(row.real) / wide, np.diff(row.imag) / tall
-            heading, seen = np.unwrap(np.arctan2(up, across)), np.hypot(across, up) > 2e-3
-            turn = abs(np.diff(heading))[seen[1:] | seen[:-1]]
-            assert turn.max(initial=0.0) <= math.radians(2.5)
 
 
 @pytest.mark.parametrize("turned", [1.0, -1.0])

@@ -16,8 +16,8 @@ from tests.rigs import some_rig
 from tests.shared import thinned
 from tfarm import Hub, HubFeedback, Payload
 from tfarm.arm import Gauge, Motor
+from tfarm.loop.continuous import ContinuousLoop, band_of
 from tfarm.loop.lines import line_crossings
-from tfarm.loop.loop import Loop, band_of
 from tfarm.loop.margins import margins
 from tfarm.loop.nyquist import nyquist_of
 from tfarm.loop.plane import gain_map
@@ -49,7 +49,7 @@ RIGS |= {f"seed {seed}": lossless_rig(seed) for seed in (4, 6)}
 
 def edges_of(arm):
     """Gains and frequencies of the edges along K2 in the band of twelve modes, by frequency."""
-    loop = Loop(arm, HubFeedback(K1=default_gains(arm).K1))
+    loop = ContinuousLoop(arm, HubFeedback(K1=default_gains(arm).K1))
     found = line_crossings(loop, "K2", -50.0, 50.0, band_of(arm, 12))
     kept = (found.at > 0) & (abs(found.gain) < 1e6)
     order = np.argsort(found.at[kept])
@@ -186,6 +186,6 @@ def test_of_a_hub_without_inertia_nothing_below_its_losses_is_called_stable(seed
     found = gain_map(arm, np.array([-b - 0.3 * unit, 0.5 * unit]), np.array([-1.3, 0.3]) * arm.input_per_torque)
     assert not found.stable[:, 0].any()
     s = tfarm.modes(arm, 12).natural_frequency[-1] * np.geomspace(1.0, 1e15, 61) + 0j
-    L = Loop(arm, law.having("K1", -3.0 * b)).loop_function(s)
+    L = ContinuousLoop(arm, law.having("K1", -3.0 * b)).loop_function(s)
     if not arm.clamp.damping:  # or else that is lost in the clamp too
         assert (1 + L).real.min() < 0 < (1 + L).real.max()  # it changes its sign: there is a real pole on the right

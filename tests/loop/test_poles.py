@@ -12,7 +12,6 @@ from tests.shared import thinned
 from tests.spectrum.independent import newton_step
 from tfarm import Hub, HubFeedback, Law, ParameterError
 from tfarm.errors import ConvergenceError
-from tfarm.loop.loop import Loop
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
 
@@ -86,7 +85,7 @@ def test_a_count_goes_on_into_shear_where_bending_is_overdamped() -> None:
 
 
 @pytest.mark.parametrize("K2", [0.0, -3.0])
-@pytest.mark.parametrize("K1", [1e-7, -1e-12, 1e-60, 1e-99])
+@pytest.mark.parametrize("K1", [1e-7, -1e-10])
 def test_a_very_small_gain_moves_the_rigid_body_pole_alone(K1, K2) -> None:
     """J s^2 + K1 s with J the effective inertia; the others are those at K1 = 0."""
     J = LAB.hub.inertia + (1 - K2) * (LAB.total_inertia - LAB.hub.inertia)
@@ -97,15 +96,17 @@ def test_a_very_small_gain_moves_the_rigid_body_pole_alone(K1, K2) -> None:
 
 
 def test_a_spring_far_too_weak_for_the_flexible_arm_swings_the_rigid_one() -> None:
-    J, K1, Kp = LAB.total_inertia, 1e-60, 1e-100
-    pair = np.roots([J, K1 * 1e50, Kp * 1e100]) / 1e50
+    J, K1, Kp = LAB.total_inertia, 1e-6, 1e-8
+    pair = np.roots([J, K1, Kp])
     poles = closed_loop_poles(LAB, HubFeedback(K1=K1, Kp=Kp), 4).values
     assert poles[0] == pytest.approx(pair[pair.imag > 0][0], rel=1e-9, abs=0)
 
 
-def test_a_gain_without_all_its_digits_is_refused() -> None:
-    with pytest.raises(ParameterError, match="0, or at least"):
-        Loop(LAB, HubFeedback(K1=5e-324))
+@pytest.mark.parametrize("ask", [closed_loop_poles, tfarm.sampled])
+@pytest.mark.parametrize("gains", [{"K1": 5e-324}, {"K2": -9e-13}])
+def test_a_gain_far_below_its_unit_is_refused(ask, gains) -> None:
+    with pytest.raises(ParameterError, match=r"for this arm 0, or at least 1e-12 times"):
+        ask(LAB, HubFeedback(**gains))
 
 
 BARE = tfarm.load("sasaki2012")
@@ -154,12 +155,12 @@ def test_a_corner_beyond_double_range_leaves_the_gain_alone(corner):
     np.testing.assert_allclose(found.poles.values[:4], alone.poles.values[:4], rtol=1e-6)
 
 
-@pytest.mark.parametrize(("lead", "verdict"), [(-4e-14, None), (-4e-11, "unstable"), (0.0, "stable")])
+@pytest.mark.parametrize(("lead", "verdict"), [(-4e-11, None), (-4e-9, "unstable"), (0.0, "stable")])
 def test_a_pole_of_the_law_beyond_all_boxes_is_named(lead, verdict):
     """A den that begins next to 0: one pole at 1/lead, where waves and powers of s are no doubles."""
     law = Law({"hub_rate": ((0.5,), (lead, 1.0, 1e3) if lead else (1.0, 1e3))})
     if verdict is None:
-        with pytest.raises(ConvergenceError, match=r"pole at 2\.5e\+13"):
+        with pytest.raises(ConvergenceError, match=r"pole at 2\.5e\+10"):
             stability(LAB, law)
     else:
         assert stability(LAB, law).verdict == verdict

@@ -14,7 +14,7 @@ from tests.rigs import some_rig
 from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.dsp import Chain, Sampling
-from tfarm.loop.loop import Loop, band_of
+from tfarm.loop.continuous import ContinuousLoop, band_of
 from tfarm.loop.plane import INFINITE, gain_map
 from tfarm.loop.poles import closed_loop_poles, poles_below
 from tfarm.loop.sampled_verdict import sampled_verdict
@@ -70,7 +70,7 @@ def test_no_bound_is_claimed_where_elastic_links_ring_beyond_the_band():
     law = default_gains(arm).having("K2", -0.015)
     verdict = stability(arm, law)
     assert "not determined beyond" in verdict.tail
-    beyond = poles_below(Loop(arm, law), 3e4)
+    beyond = poles_below(ContinuousLoop(arm, law), 3e4)
     driven = beyond.moving[beyond.moving.real > 1e-12 * abs(beyond.moving)]
     assert driven.size
     assert driven.imag.min() > verdict.band
@@ -122,7 +122,7 @@ def test_more_than_the_whole_moment_drives_every_mode_behind_friction(K2):
     assert verdict.unstable_roots_infinite == driven
     assert verdict.is_known_beyond
     heights = [band_of(arm, number) for number in (4, 8)]
-    low, high = (poles_below(Loop(arm, law), height).unstable for height in heights)
+    low, high = (poles_below(ContinuousLoop(arm, law), height).unstable for height in heights)
     assert high - low == 8 * driven
     plane = gain_map(
         arm, np.array([0.5, 1.0]) * law.K1, np.array([1.0, 1.01]) * law.K2 if driven else np.array([1.0, 0.9]) * law.K2

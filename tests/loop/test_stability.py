@@ -15,7 +15,7 @@ from tests.shared import thinned
 from tfarm import Arm, Hub, HubFeedback, Law, Link, Payload, Section
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
-from tfarm.loop.loop import Loop
+from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import band_of_loop, hub_shares, is_controllable, is_quiet, stability
 from tfarm.loop.theorem import lyapunov
@@ -32,31 +32,23 @@ def test_map_count_and_model_agree_on_random_loops() -> None:
     assert {-1, 0, 1} <= {each.figures["unstable"] for each in found}
 
 
-@pytest.mark.parametrize(
-    ("K1", "K2", "Kp", "verdict"),
-    [
-        (0.3, 0.3, 0.0, "stable"),
-        (0.3, 0.999, 0.0, "stable"),
-        (0.3, -40.0, 2.0, "stable"),
-        (0.3, 1.0, 0.0, "marginal"),
-        (0.0, 0.3, 0.0, "marginal"),
-        (0.0, 0.0, 0.0, "marginal"),
-        (0.0, 0.3, 5.0, "marginal"),
-        (0.3, 1.001, 0.0, "unstable"),
-        (-1e-3, 0.3, 0.0, "unstable"),
-        (0.3, 0.3, -1e-3, "unstable"),
-        (-0.3, 1.5, 0.0, "unstable"),
-    ],
-)
-def test_verdicts_at_no_damping_are_those_of_theory(K1, K2, Kp, verdict) -> None:
-    found = stability(BARE, HubFeedback(K1=K1, K2=K2, Kp=Kp))
+THEORY = {
+    "stable": [(0.3, 0.3, 0.0), (0.3, 0.999, 0.0), (0.3, -40.0, 2.0)],
+    "marginal": [(0.3, 1.0, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.0), (0.0, 0.3, 5.0)],
+    "unstable": [(0.3, 1.001, 0.0), (-1e-3, 0.3, 0.0), (0.3, 0.3, -1e-3), (-0.3, 1.5, 0.0)],
+}
+
+
+@pytest.mark.parametrize(("verdict", "gains"), [(word, each) for word in THEORY for each in THEORY[word]])
+def test_verdicts_at_no_damping_are_those_of_theory(verdict, gains) -> None:
+    K1, K2, _ = gains
+    found = stability(BARE, HubFeedback(**dict(zip(("K1", "K2", "Kp"), gains, strict=True))))
     assert found.verdict == verdict
     assert found.unstable_roots_infinite == ((K1 > 0 and K2 > 1) or (K1 < 0 and K2 < 1))
-    assert (found.unstable_roots > 0) == (verdict == "unstable")
-    assert found.is_stable == (verdict == "stable")
+    assert (found.unstable_roots > 0, found.is_stable) == (verdict == "unstable", verdict == "stable")
 
 
-@pytest.mark.parametrize("K1", [1e-9, 0.3, 1e4])
+@pytest.mark.parametrize("K1", [1e-7, 0.3, 1e4])
 def test_what_lyapunov_proves_is_stable_however_slowly_it_decays(K1) -> None:
     """Of a stocky arm some modes decay by less than 1e-11 of their frequency, too little for double precision."""
     found = stability(STOCKY, HubFeedback(K1=K1, K2=0.3))
@@ -127,7 +119,7 @@ def test_beyond_the_band_the_loop_is_quiet_far_up_between_shear_resonances_too()
     rng = np.random.default_rng(8)
     for arm in (LAB, window_arm(), some_free_arm(rng, True), some_free_arm(rng, True)):
         inertia, omega = hub_units(arm)
-        loop = Loop(arm, HubFeedback(K1=inertia * omega, K2=-7.0))
+        loop = ContinuousLoop(arm, HubFeedback(K1=inertia * omega, K2=-7.0))
         band, quiet = band_of_loop(loop)
         assert quiet
         shear = math.pi / arm.link.length * math.sqrt(arm.link.kGA / arm.link.rhoA)

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 import tfarm
 from tests.odd_arms import odd_arms
 from tests.plots.labels import complaints
-from tfarm.assessment.card import continuous_card, reference_damping
+from tfarm.assessment.card import card_of, reference_damping
 from tfarm.dsp import Chain, Sampling
-from tfarm.loop.curve import curve_of, refined
+from tfarm.loop.curve import refined
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
@@ -76,7 +76,7 @@ def test_of_an_undamped_arm_it_is_the_loop_with_which_the_card_grades():
 
 def test_a_margin_is_a_line_from_the_curve_to_one():
     found = tfarm.margins(LAB, LAW)
-    card, (upper, lower) = continuous_card(found, Chain()), Figure().subplots(2)
+    card, (upper, lower) = card_of(found, Chain()), Figure().subplots(2)
     tfarm.plots.loop(found, ax=(upper, lower))
     (gain,) = (each for each in upper.get_lines() if each.get_linewidth() == 1.6)
     assert gain.get_xdata() == pytest.approx([card.gain_margin.omega] * 2)
@@ -92,7 +92,7 @@ def test_a_margin_is_a_line_from_the_curve_to_one():
 def test_nichols_draws_the_curve_of_python_control(model):
     """Of `nichols_plot` the phase to whole turns; |T| on a contour and |S| on that of Ms are constant."""
     ax = tfarm.plots.nichols(tfarm.margins(LAB, LAW), ax=Figure().subplots())
-    curve = curve_of(tfarm.margins(LAB, LAW))
+    curve = tfarm.margins(LAB, LAW).curve
     slow = curve.omega < 1e3
     x, y = line(ax, "continuous-time").get_data()
     phase, size = x[~np.isnan(x)][slow], y[~np.isnan(x)][slow]

@@ -6,8 +6,8 @@ import pytest
 import tfarm
 from tfarm.crossing import pieces
 from tfarm.dsp import load_chain
+from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.locus import locus, rounded
-from tfarm.loop.loop import Loop
 from tfarm.loop.plane import moment_axis, rate_axis
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_modes import sampled_loci
@@ -94,7 +94,7 @@ def test_the_outline_of_a_sampled_region_is_that_of_its_poles():
                         (place.real / 1.5, place.imag), (x, y), (x.grid(4000), y.grid(4000)), strict=True
                     )
                 ]
-                inside = plane.loop.having(K1=K[0], K2=K[1]).poles.is_stable
+                inside = plane.loop.having("K1", K[0]).having("K2", K[1]).poles.is_stable
                 checked += inside == (side > 0)
                 assert inside == (side > 0) or _near_a_corner(line, n)
     assert checked > 40
@@ -119,4 +119,6 @@ def test_a_locus_under_any_law_keeps_its_poles():
         assert set(poles[np.isfinite(poles)]) == set(kept[np.isfinite(kept)])
     for n in more[::3]:
         branches = fine.branches[np.isfinite(fine.branches[:, n]), n]
-        assert abs(1 + Loop(LAB, LEAD.having("gain", float(fine.gain[n]))).loop_function(branches)).max() < 1e-6
+        assert (
+            abs(1 + ContinuousLoop(LAB, LEAD.having("gain", float(fine.gain[n]))).loop_function(branches)).max() < 1e-6
+        )

@@ -15,8 +15,8 @@ from tfarm.arm.chain import Sampling
 from tfarm.assessment.card import margins_of
 from tfarm.dsp import Chain, load_chain
 from tfarm.loop import plane as edges
+from tfarm.loop.continuous import band_of
 from tfarm.loop.loci import loci
-from tfarm.loop.loop import band_of
 from tfarm.loop.nyquist import nyquist
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.report import loop_section as map_room

@@ -17,8 +17,8 @@ from tfarm.arm import implausible
 from tfarm.assessment.card import margins_of
 from tfarm.dsp import Chain
 from tfarm.loop import loci as loci_room
+from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.locus import locus
-from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.report import loop_section
 from tfarm.report import page as cases
@@ -135,7 +135,7 @@ LOOPS = [name for name, arm in ARMS.items() if has_loop(arm)]
 
 def is_stable(arm, law, up_to):
     """By finding every pole below a frequency: a method without stability intervals."""
-    return poles_below(Loop(arm, law), up_to).unstable == 0
+    return poles_below(ContinuousLoop(arm, law), up_to).unstable == 0
 
 
 @pytest.mark.parametrize("name", thinned(LOOPS, 2))

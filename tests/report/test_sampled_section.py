@@ -74,7 +74,10 @@ def test_the_map_of_both_regions_is_that_of_the_poles():
             regions = (data.continuous, *data.sampled)
             inside = [any(a < K2 < b for a, b in each.stable_intervals[i]) for each in regions]
             law = tfarm.HubFeedback(K1=K1, K2=float(K2))
-            assert inside == [stability(LAB, law).is_stable, loop.having(K1=K1, K2=float(K2)).poles.is_stable]
+            assert inside == [
+                stability(LAB, law).is_stable,
+                loop.having("K1", K1).having("K2", float(K2)).poles.is_stable,
+            ]
 
 
 def test_without_damping_the_layers_are_nested_and_name_their_number_of_modes(monkeypatch):

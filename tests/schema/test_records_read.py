@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm.loop.loop import Loop
+from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.margins import Margins, margins
 from tfarm.loop.nyquist import Nyquist, nyquist
 from tfarm.schema import (
@@ -191,7 +191,7 @@ def test_every_quantity_of_a_real_loop_is_read():
     labels = [label for label, _, _ in entries(found)]
     assert len(labels) == len(set(labels))
     assert answer["in_range"]["phase_margin_deg"] == found.in_band.phase
-    assert quantities(Loop)["warnings"].label == "warnings"
+    assert quantities(ContinuousLoop)["warnings"].label == "warnings"
 
 
 def test_a_record_with_flat_records_has_its_own_curves():

@@ -142,7 +142,7 @@ def test_the_exact_arm_obeys_the_criterion_with_its_angle_held():
         rate, moment = aliased_loop(LAB, each, 0.01, terms=2000)
         H = moment / (1 + KP * aliased(angle, each, 0.01, 0.0, 2000)[0] + K1 * rate)
         sizes.append(abs(H / (1 + m * H)))
-    _, theta, rate, moment = loop.loop.terms(z, None, np.ones(z.size))
+    _, theta, rate, moment = loop.loop.rig.terms(z, None, np.ones(z.size))
     H = moment / (1 + KP * theta + K1 * rate)
     np.testing.assert_allclose(sizes, abs(H / (1 + m * H)), rtol=3e-4)
     assert max(sizes) <= 1 / radius * (1 + 3e-4)

@@ -18,42 +18,26 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Annotated, Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tfarm.arm import AnyLaw, Arm, as_law
-from tfarm.arm.stages import Consumer
-from tfarm.arrays import Complex
 from tfarm.digits import general
 from tfarm.dsp import Chain
 from tfarm.dsp.stages import admit, not_covered
 from tfarm.errors import ConvergenceError
-from tfarm.loop.circle_crossings import CircleGrid, circle_grid
-from tfarm.loop.curve import LoopCurve, curve_of, gain_margin, lowest_drawn, refined
-from tfarm.loop.margins import LoopMargins, Margins, margins, margins_of_curve
-from tfarm.loop.sampled import Sampled
-from tfarm.loop.sampled_verdict import SAMPLED_LOOP, Analysis, Verdict, sampled
-from tfarm.loop.stability import SMALL_GAIN, Stability, stability
+from tfarm.loop.curve import LoopCurve, LoopVerdict, gain_margin
+from tfarm.loop.loop_margins import LoopMargins
+from tfarm.loop.margins import Margins, margins
+from tfarm.loop.poles import HUB
+from tfarm.loop.sampled_verdict import SAMPLED_LOOP, Analysis, sampled
+from tfarm.loop.stability import stability
 from tfarm.records import record
 from tfarm.schema import Percent, Quantity, Table, Tabled, across, text
 from tfarm.schema.html import as_html, with_symbols
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import default_gains
 
-from .comparison import HUB, poles_by_mode
-
-CONTINUOUS = Consumer(
-    "continuous-time column",
-    acts=("law", "hold", "hub damping", "plant"),
-    named=("torque limit",),
-    none=(
-        "reference", "anti-alias filter", "encoder", "hub rate", "amplifier steps", "amplifier range", "arithmetic",
-        "DAC steps", "DAC range", "delay", "volts",
-    ),
-)  # fmt: skip
 GRADES = UNDEFINED, GOOD, LOW, POOR = "-", "good", "low", "poor"  # the first of a margin which is not defined
 GRADED = {  # names of the graded margins in the grade of the loop
     "gain_margin": "gain margin",
@@ -64,7 +48,6 @@ GRADED = {  # names of the graded margins in the grade of the loop
 }
 GAIN_LIMITS, PHASE_LIMITS, PERIOD_LIMITS, PEAK_LIMITS = (6.0, 3.0), (45.0, 30.0), (1.0, 0.5), (2.0, 3.0)
 REFERENCE_RATIO = 1e-3  # damping ratio of mode 1 with which an undamped arm is graded; less is small damping
-ON_REAL_AXIS = 1e-9  # of its size: imaginary part of a sampled pole which is rounding
 UNDAMPED = (
     "undamped model: margins and grades are those with C = {:.4g} s, 0.1 % of critical damping in mode 1; "
     "at C = 0 the exact delay and disk margins are 0 for every gain"
@@ -202,18 +185,19 @@ def result_card(
     return ResultCard(**cards, period=chain.sampling.period, notes=tuple(notes))
 
 
-def loop_card(loop: str, arm: Arm, law: AnyLaw, chain: Chain, known: Any = None) -> LoopCard:
+def loop_card(loop: str, arm: Arm, law: AnyLaw, chain: Chain, known: Margins | Analysis | None = None) -> LoopCard:
     """Return the card of the continuous or the sampled loop, of `known` margins or analysis where there are.
 
     Raises ConvergenceError where the loop is not determined.
     """
     arm, chain = admit(SAMPLED_LOOP, arm, chain)
+    found: Margins | Analysis
     if loop == "sampled":
-        own = sampled_card(known or sampled_of(arm, law, chain))
+        found = known or sampled_of(arm, law, chain)
     else:
-        is_own = known is not None and known.stability.loop.arm.hub == arm.hub
-        own = continuous_card(known if is_own else margins_of(arm, law), chain)
-    damped, _ = graded_arm(arm)
+        is_own = known is not None and known.verdict.full.arm.hub == arm.hub
+        found = known if known is not None and is_own else margins_of(arm, law)
+    own, (damped, _) = card_of(found, chain), graded_arm(arm)
     is_own = damped is arm or own.stability == "unstable"
     return own if is_own else _with_margins(own, loop_card(loop, damped, law, chain))
 
@@ -231,86 +215,23 @@ def graded_arm(arm: Arm) -> tuple[Arm, str]:
     return arm.having(damping=reference), UNDAMPED.format(reference)
 
 
-def continuous_card(found: Margins, chain: Chain) -> LoopCard:
-    """The card of a continuous-time loop; its delay margin is graded by the sampling period of a chain."""
-    verdict, band = found.stability, found.in_band
-    moving, table = verdict.poles.moving, modes(verdict.loop.arm, up_to=verdict.band)
-    own = dict(zip(table.index.tolist(), (1j * table.natural_frequency).tolist(), strict=True))
-    oscillating = moving[moving.imag > 0]
-    by_mode = poles_by_mode(oscillating, {n: s for n, s in own.items() if n})
-    is_of_mode = np.isin(oscillating, list(by_mode.values()))
-    abscissa = verdict.spectral_abscissa
-    delay = None if band is None else (band.delay if found.exact_delay is None else found.exact_delay)
+def card_of(found: Margins | Analysis, chain: Chain) -> LoopCard:
+    """Return the card of a loop; its delay margin is graded by the sampling period of a chain."""
+    verdict = found.verdict
+    slowest, arm = verdict.time_constant, verdict.full.arm
+    limit = found.damping_limit if arm.least_damping < reference_damping(arm) else None
     return LoopCard(
         **words_of(verdict, chain),
-        **_margins(band, None if band is None else band.gain, delay, chain.sampling.period),
-        least_damping=_least_damped([*by_mode.items(), *((HUB, s) for s in oscillating[~is_of_mode].tolist())]),
-        time_constant=-1 / abscissa if abscissa < 0 and math.isfinite(abscissa) else None,
-        minimum_damping=None,
+        **_margins(found.in_band, found.delay_margin_seconds, chain.sampling.period),
+        least_damping=_least_damped(verdict.ringing),
+        time_constant=slowest if slowest is not None and slowest > 0 else None,
+        minimum_damping=None if limit is None else limit.value,
     )
 
 
-def words_of(verdict: Stability, chain: Chain) -> dict[str, Any]:
-    """Stability and certainty of a continuous-time verdict on the loop of a chain."""
-    beyond = (
-        ", small gain beyond" if verdict.tail == SMALL_GAIN else ", theorem beyond" if verdict.is_known_beyond else ""
-    )
-    certainty = f"converged to {verdict.band:.4g} rad/s{beyond}{not_covered(CONTINUOUS, chain)}"
-    return {"stability": verdict.verdict, "certainty": certainty}
-
-
-def words_of_samples(verdict: Verdict) -> dict[str, Any]:
-    """Stability and certainty of a sampled verdict."""
-    known = f"{'converged' if verdict.is_converged else 'approximate'}, first {verdict.modes_used} modes"
-    certainty = f"certified to {verdict.band.top:.3g} rad/s" if verdict.band else known
-    return {"stability": verdict.word, "certainty": f"{certainty}{verdict.omitted}"}
-
-
-def sampled_card(found: Analysis) -> LoopCard:
-    """The card of a sampled loop."""
-    verdict, loop, band = found.verdict, found.verdict.full, None
-    arm, T = loop.plant.arm, loop.chain.sampling.period
-    if verdict.is_stable:
-        band = sampled_margins(SampledCurve(loop))
-    is_small = arm.least_damping < reference_damping(arm)
-    needed = found.damping_limit if is_small else None
-    return LoopCard(
-        **words_of_samples(verdict),
-        **_margins(band, found.gain_factors, found.delay_margin_seconds, T),
-        least_damping=_least_damped(unaliased_poles(loop).items()),
-        time_constant=verdict.time_constant if verdict.is_stable else None,
-        minimum_damping=None if needed is None else needed.value,
-    )
-
-
-@dataclass(frozen=True)
-class SampledCurve:
-    """L(e^{i w T}) of a sampled loop as a function of s = i w."""
-
-    loop: Sampled
-
-    @cached_property
-    def grid(self) -> CircleGrid:
-        """Angles w T that resolve L."""
-        return circle_grid(self.loop)
-
-    @property
-    def feeds_back(self) -> bool:
-        """Whether a gain of the law is other than 0."""
-        return any(self.loop.weights)
-
-    def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
-        """Denominator and numerator of L at s = i w."""
-        q = np.ravel(np.imag(s)) * self.loop.chain.sampling.period
-        base = self.grid.base[np.minimum(np.searchsorted(self.grid.q, q), self.grid.q.size - 1)]
-        own, *rows = self.grid.at(base, q - self.grid.angles[base])
-        fed_back = np.asarray(np.array(self.loop.weights) @ np.array(rows), dtype=np.complex128)
-        return own.reshape(np.shape(s)), fed_back.reshape(np.shape(s))
-
-    def loop_function(self, s: NDArray[Any]) -> Complex:
-        """L at s = i w."""
-        own, fed_back = self.parts(s)
-        return np.asarray(np.divide(fed_back, own, out=np.full(own.shape, np.inf + 0j), where=own != 0))
+def words_of(verdict: LoopVerdict, chain: Chain) -> dict[str, Any]:
+    """Return stability and certainty of a verdict on the loop of a chain."""
+    return {"stability": verdict.word, "certainty": f"{verdict.range_words}{not_covered(verdict.consumer, chain)}"}
 
 
 def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurve:
@@ -346,50 +267,12 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
     found = None
     if not law.is_discrete:
         own = margins_of(damped, law)
-        found = as_card(curve_of(own), (own.stability if damped is arm else stability(arm, law)).verdict)
+        found = as_card(own.curve, (own.stability if damped is arm else stability(arm, law)).verdict)
     if found is not None and chain is None:
         return found
     at_samples = sampled_of(damped, law, usual)
     word = sampled_of(arm, law, usual).verdict.word
-    return replace(as_card(sampled_curve(at_samples), word), continuous=found)
-
-
-def sampled_curve(found: Analysis) -> LoopCurve:
-    """The curve of a sampled loop."""
-    loop, band, T = found.verdict.full, None, found.verdict.full.chain.sampling.period
-    curve = SampledCurve(loop)
-    if found.verdict.is_stable:
-        own = sampled_margins(curve)
-        band = replace(own, gain=found.gain_factors or own.gain)
-    omega = curve.grid.q / T
-    omega, L = refined(curve.loop_function, omega[omega >= lowest_drawn(loop.plant.arm, band)])
-    return LoopCurve(
-        arm=loop.plant.arm, law=loop.given, stability=found.verdict.word, period=T, omega=omega, L=L, margins=band
-    )
-
-
-def sampled_margins(curve: SampledCurve) -> LoopMargins:
-    """The margins of a stable sampled loop up to half its sampling rate."""
-    T = curve.loop.chain.sampling.period
-    return margins_of_curve(curve, curve.grid.q / T, math.pi / T)
-
-
-def unaliased_poles(loop: Sampled) -> dict[int, complex]:
-    """The poles s = ln(z)/T [1/s] with Im s > 0 by mode, each at the frequency that is nearest to that of its mode."""
-    T, poles = loop.chain.sampling.period, loop.poles
-    rounding = ON_REAL_AXIS * abs(poles.z)
-    # a real z < 0 oscillates at half the sampling rate, one > 0 never does, whatever rounding leaves of Im z
-    upper = (poles.z.imag > rounding) | ((poles.z.real < 0) & (abs(poles.z.imag) <= rounding))
-    table = modes(loop.plant.arm, max(1, int(poles.mode.max(initial=1))))
-    natural = dict(zip(table.index.tolist(), table.natural_frequency.tolist(), strict=True))
-    found: dict[int, complex] = {}
-    for n, q, growth in zip(poles.mode[upper].tolist(), np.angle(poles.z[upper]).tolist(),
-                            poles.log_radius[upper].tolist(), strict=True):  # fmt: skip
-        of_mode = natural.get(n, q / T) * T if n else q
-        turned = [abs(side * q + 2 * math.pi * round((of_mode - side * q) / (2 * math.pi))) for side in (1, -1)]
-        s = complex(growth, min(turned, key=lambda each: abs(each - of_mode))) / T
-        found[n] = max(found.get(n, s), s, key=lambda each: each.real / abs(each))
-    return found
+    return replace(as_card(at_samples.curve, word), continuous=found)
 
 
 def _least_damped(poles: Iterable[tuple[int, complex]]) -> LeastDamped | None:
@@ -401,14 +284,12 @@ def _least_damped(poles: Iterable[tuple[int, complex]]) -> LeastDamped | None:
     return LeastDamped(ratio, "the hub or the controller" if n == HUB else f"mode {n}")
 
 
-def _margins(
-    band: LoopMargins | None, gain: tuple[float, float] | None, delay: float | None, period: float
-) -> dict[str, Any]:
-    """The graded margins from those of a stable loop function, its stable factors and its delay margin [s]."""
-    if band is None or gain is None:
+def _margins(band: LoopMargins | None, delay: float | None, period: float) -> dict[str, Any]:
+    """Return the graded margins from those of a stable loop function and its delay margin [s]."""
+    if band is None:
         undefined = {"grade": UNDEFINED, "limited_by": (), "delay_margin_periods": None, "disk_margin": None}
         return dict.fromkeys(GRADED, NOT_DEFINED) | undefined
-    down, up = (gain_margin(band, factor) for factor in gain)
+    down, up = (gain_margin(band, factor) for factor in band.gain)
     phase, peak = band.phase_margin, band.sensitivity_peak
     periods = None if delay is None else type(delay)(delay / period)
     graded = (

@@ -1,13 +1,12 @@
 """Two loops compared; each is computed by the functions for one, and `tfarm.schema.compare` finds the differences."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import PLANE, AnyLaw, Arm, HubFeedback, as_law, must_have_free_hub
 from tfarm.arm.checks import whole
@@ -17,12 +16,12 @@ from tfarm.crossing import Window
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import driven
 from tfarm.errors import ConvergenceError, one_line, require
-from tfarm.loop.circle_crossings import FACTOR, circle_grid, stable_windows
-from tfarm.loop.loop import Loop
-from tfarm.loop.margins import Margins, dense
+from tfarm.loop.circle_crossings import FACTOR, stable_windows
+from tfarm.loop.continuous import ContinuousLoop
+from tfarm.loop.margins import Margins
 from tfarm.loop.margins import margins as margins_of
 from tfarm.loop.plane import Plane, between, gain_map, plane, ranges_of
-from tfarm.loop.poles import closed_loop_poles
+from tfarm.loop.poles import HUB, closed_loop_poles, poles_by_mode
 from tfarm.loop.sampled_verdict import Analysis, SampledBrief, Verdict, brief_of, sampled_verdict
 from tfarm.records import record
 from tfarm.response.frequency import Bode, bode, resonant_band
@@ -35,8 +34,6 @@ from tfarm.spectrum.table import default_gains
 MOST_COMPARED = 30  # flexible modes of a table that a person reads
 LONGEST_SIDE_NAME = 60  # characters of a name: of two in one legend
 MOST_FACTOR, FACTORS = 4.0, 40  # of a continuous-time controller: where that plane ends, and values that are counted
-FARTHEST = 1.0  # |ln s - ln p|: by more no controller moves a mode here, a factor e of its frequency or 57 deg
-HUB = 0  # the number of the pole below the first mode that no mode of the link is near
 
 
 class ArmMode(NamedTuple):
@@ -84,7 +81,7 @@ class ComparedSide:
     @property
     def verdict(self) -> str:
         """Of the continuous-time loop, or of the sampled one where there is no other."""
-        return self.loop.verdict.word if isinstance(self.loop, Analysis) else self.loop.stability.verdict
+        return self.loop.verdict.word
 
     @property
     def oscillating(self) -> Complex:
@@ -105,24 +102,16 @@ class ComparedSide:
 
         L(e^{iwT}), up to half the sample rate, of a sampled loop.
         """
-        if isinstance(self.loop, Analysis):
-            loop, grid = self.loop.loop, circle_grid(self.loop.loop)
-            omega = grid.q / loop.chain.sampling.period
-            with np.errstate(all="ignore"):
-                L = np.asarray(loop.weights @ grid.terms[1:] / grid.terms[0], dtype=np.complex128)
-        else:
-            omega = dense(self.loop.stability)
-            L = np.asarray(self.loop.stability.loop.loop_function(1j * omega), dtype=np.complex128)
+        omega = self.loop.verdict.frequencies
+        L = np.asarray(self.loop.verdict.full.loop_function(1j * omega), dtype=np.complex128)
         shown = np.isfinite(L) & (L != 0) & (omega > 0.05 * self.arm_modes[0].frequency)
         return omega[shown], L[shown]
 
     @property
     def delay_margin(self) -> float | None:
         """The smallest further delay [s] that destabilises the loop, as far as it is known."""
-        if isinstance(self.loop, Analysis):
-            return self.loop.delay_margin_seconds if self.loop.verdict.is_stable else None
         in_band = self.loop.in_band
-        return None if in_band is None else self.loop.exact_delay or in_band.delay
+        return None if in_band is None else self.loop.delay_margin_seconds or in_band.delay
 
     @property
     def range_words(self) -> str:
@@ -139,23 +128,8 @@ class ComparedSide:
             sampling, late = self.loop.loop.chain.sampling, self.loop.loop.with_delay
             now = [late(sampling.delay_samples + more) for more in (delay / sampling.period).tolist()]
             return [stable_windows(each, FACTOR) for each in now]
-        loop, factors = Loop(self.arm, as_law(self.law)), between(0.0, MOST_FACTOR, FACTORS)
+        loop, factors = ContinuousLoop(self.arm, as_law(self.law)), between(0.0, MOST_FACTOR, FACTORS)
         return [*plane(loop, ("delay", "gain"), loop.law.delay + delay, factors).stable_intervals]
-
-
-def poles_by_mode(poles: Complex, open_loop: Mapping[int, complex]) -> dict[int, complex]:
-    """The poles s with Im s > 0 by the mode whose open-loop pole p is theirs; a single one below all of these is `HUB`.
-
-    One a mode, by the least sum of |ln s - ln p|; what is farther than `FARTHEST` from its own belongs to no mode.
-    """
-    modes, own = list(open_loop), np.array(list(open_loop.values()))
-    apart = np.minimum(abs(np.log(poles)[:, None] - np.log(own)), FARTHEST)
-    rows, columns = linear_sum_assignment(apart)
-    near = apart[rows, columns] < FARTHEST
-    found = {modes[column]: complex(poles[row]) for row, column in zip(rows[near], columns[near], strict=True)}
-    others = np.delete(poles, rows[near])
-    below = others[abs(others) < min((abs(s) for s in found.values()), default=0.0)]
-    return dict(sorted([*found.items(), *([(HUB, complex(below[0]))] if below.size == 1 else [])]))
 
 
 class SideRow(NamedTuple):

@@ -30,7 +30,6 @@ from tfarm.arm.checks import number
 from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import LEAST_SIZE, Real
-from tfarm.assessment.card import CONTINUOUS
 from tfarm.case import Case
 from tfarm.digits import general
 from tfarm.dsp import Chain, traces
@@ -40,10 +39,10 @@ from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, described, resting, scena
 from tfarm.dsp.simulate import MOST_BETWEEN, SETTLING_BAND, final_value, first_mode, settling_time
 from tfarm.dsp.stages import admit, not_covered
 from tfarm.errors import must_be_known, require
-from tfarm.loop.loop import Loop
+from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.poles import Poles
 from tfarm.loop.sampled_verdict import sampled_verdict
-from tfarm.loop.stability import verdict_on
+from tfarm.loop.stability import CONTINUOUS, verdict_on
 from tfarm.loop.time_response import (
     ACTUATOR,
     TORQUE,
@@ -362,7 +361,7 @@ def step(
     hub, law = followed(law) if is_step else (AT_HUB[0], law)
     arm, law = tracked(arm, law)
     full, of_angle, response = as_law(law), hub == AT_HUB[0], None
-    poles = None if full.is_discrete else usual_poles(Loop(arm, full))
+    poles = None if full.is_discrete else usual_poles(ContinuousLoop(arm, full))
     length = usual_duration(poles, chain) if duration is None else duration
     task = (
         resting("reference", arm, chain, length, hub)
@@ -413,7 +412,7 @@ def usual_duration(poles: Poles | None, chain: Chain) -> float:
     return float(f"{rise + TIME_CONSTANTS / slowest:.2g}")
 
 
-def excitation(loop: Loop, law: Law, chain: Chain, task: Scenario, names: Sequence[str]) -> Excitation:
+def excitation(loop: ContinuousLoop, law: Law, chain: Chain, task: Scenario, names: Sequence[str]) -> Excitation:
     """Return the input of a scenario of the sampled loop in continuous time; `law` names its own references.
 
     Raises ParameterError for a reference that no scenario has.
@@ -443,7 +442,7 @@ def _through(law: Law, references: Mapping[str, Transform]) -> dict[str, Transfo
     return own | {name: lambda s, X=X: -X(s) for name, X in wanted.items()}
 
 
-def _released(loop: Loop, offset: float, names: Sequence[str]) -> Excitation:
+def _released(loop: ContinuousLoop, offset: float, names: Sequence[str]) -> Excitation:
     """The first mode released: the free motion of each signal."""
     signals = tuple(dict.fromkeys(("tip_displacement", *loop.law.signals, *names)))
     plant = sensed_plant(loop.arm, Chain(), signals, 1).unfiltered

@@ -6,8 +6,10 @@ The curve may be the imaginary axis or the unit circle, and A and B any function
 from tfarm.crossing.line import (
     Crossing,
     Crossings,
-    Family,
-    Parts,
+    Curve,
+    Grid,
+    Line,
+    Steps,
     Window,
     ascending,
     brackets,
@@ -17,7 +19,6 @@ from tfarm.crossing.line import (
     crossings,
     intervals,
     joined,
-    solved,
     zeros_between,
 )
 from tfarm.crossing.turning import RegionPiece, pieces
@@ -25,9 +26,11 @@ from tfarm.crossing.turning import RegionPiece, pieces
 __all__ = [
     "Crossing",
     "Crossings",
-    "Family",
-    "Parts",
+    "Curve",
+    "Grid",
+    "Line",
     "RegionPiece",
+    "Steps",
     "Window",
     "ascending",
     "brackets",
@@ -38,6 +41,5 @@ __all__ = [
     "intervals",
     "joined",
     "pieces",
-    "solved",
     "zeros_between",
 ]

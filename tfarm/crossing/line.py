@@ -15,8 +15,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,15 +27,11 @@ from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
 from tfarm.errors import require
 from tfarm.records import record
 
-Places = NDArray[Any]  # of a curve, in any coordinate
 Parts = Callable[[Real], tuple[Complex, Complex]]  # A and B at places of a curve
-Family = Callable[[Whole, Places], tuple[Complex, Complex]]  # the same of lines by their numbers, broadcast with places
 
 LAST_BIT = 2.0**-53  # of a place, and of the narrowest bracket
-DIP_STEPS = 14  # of a golden section leave a thousandth of two steps of the grid, of smooth functions far less
 ROUNDED = 1e-11  # of |A| |B|: an imaginary part that may be rounding
 Window = tuple[float, float]  # two values of a gain, the lower first
-SAME_EDGE = 1e-9  # relative: next to z = 1 one static crossing is read several times, each with an error near 1e-12
 
 
 class Crossing(NamedTuple):
@@ -98,54 +95,118 @@ def brackets(h: Real) -> tuple[tuple[Whole, ...], Whole]:
     return before, np.where(sign[before] > 0, 2, -2)
 
 
-def zeros_between(f: Callable[[Real], Real], low: Real, high: Real) -> Real:
-    """Return the zeros of functions f (n,) that change sign between `low` and `high` (n,), to the last bit.
+def zeros_between(f: Callable[[Real, Whole], Real], low: Real, high: Real) -> Real:
+    """Return the zeros of functions that change sign between `low` and `high` (n,), to the last bit.
 
-    By SciPy's Chandrupatla (1997); `low` of one that has one sign at both.
+    `f` gives the values of some of them, by their numbers, at a place of each.  By SciPy's Chandrupatla (1997); `low`
+    of a function that has one sign at both.
     """
     if not low.size:
         return low
-    x = low.copy()
-
-    def some(at: Real, which: Whole) -> Real:
-        x[which] = at
-        return np.asarray(f(x)[which])
-
     limits = {"xatol": LAST_BIT * float(abs(high - low).min()), "xrtol": 2 * LAST_BIT, "fatol": 0.0, "frtol": 0.0}
-    which = np.arange(low.size)
-    found = find_root(some, (low, high), args=(which,), tolerances=limits)  # type: ignore[call-overload]  # of its stubs
+    found = find_root(f, (low, high), args=(np.arange(low.size),), tolerances=limits)  # type: ignore[call-overload]
     return np.where(found.success, found.x, low)
+
+
+class Line(NamedTuple):
+    """The loops along one number g of a law, from `low` to `high`: weights `others` + g `alone` (rows,) of terms."""
+
+    others: Real
+    alone: Real
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, weights: Real, unit: Real, value: float, low: float, high: float) -> Line:
+        """The line of a number with this value in a law: one unit of it adds `unit` to the weights."""
+        return cls(weights - value * unit, unit, low, high)
+
+
+class Steps(NamedTuple):
+    """Steps between neighbours of a grid: coordinates `low` and `high` (n,), places from an `origin`, and the terms.
+
+    `terms` gives the rows (rows, m) of some steps, by their numbers, at a coordinate of each.
+    """
+
+    low: Real
+    high: Real
+    terms: Callable[[Real, Whole], Complex]
+    origin: Real | float = 0.0
+
+
+class Curve(Protocol):
+    """A curve with a grid that resolves the terms (rows, points) of a loop: D = weights @ terms."""
+
+    @property
+    def terms(self) -> Complex:
+        """The terms at the points of the grid."""
+
+    def steps(self, number: Whole) -> Steps:
+        """The steps from the points of these numbers to the next."""
+
+
+@dataclass(frozen=True)
+@record
+class Grid:
+    """A curve with a grid of `places` (n,), and its terms at a place."""
+
+    places: Real
+    terms_at: Callable[[Real], Complex]
+
+    @cached_property
+    def terms(self) -> Complex:
+        """The terms at the points of the grid."""
+        return self.terms_at(self.places)
+
+    def steps(self, number: Whole) -> Steps:
+        """The steps from the points of these numbers to the next."""
+        return Steps(self.places[number], self.places[number + 1], lambda at, _: self.terms_at(at))
 
 
 def crossed(places: Real, parts: Parts) -> tuple[Real, Real, Whole]:
     """Gain, place and change of the count (n,) of every crossing between neighbours of a grid of places, ascending."""
-    A, B = parts(places)
-    (before,), change = brackets((A * B.conj()).imag)
-    at, gain = solved(parts, places[before], places[before + 1])
-    return gain, at, change
+    curve = Grid(places, lambda at: np.array(parts(at)))
+    (found,) = crossings(curve, [Line(np.array([1.0, 0.0]), np.array([0.0, 1.0]), -np.inf, np.inf)])
+    gain, at, change = np.reshape(found, (-1, 3)).T
+    return gain, at, change.astype(np.int64)
 
 
-def crossings(family: Family, count: int, places: Real, *, with_dips: bool) -> list[list[Crossing]]:
-    """The crossings of each line between neighbours of a grid of places, all solved for at once.
+def crossings(curve: Curve, lines: Sequence[Line], *, with_dips: bool = False) -> list[list[Crossing]]:
+    """The crossings of each line by pairs between neighbours of the curve's grid, all solved for at once.
 
-    `with_dips`: those too of which two lie between neighbours, where |h| dips through 0.
+    `with_dips`, on a `Grid`: those too of which two lie between neighbours, where |h| dips through 0.
     """
-    A, B = family(np.arange(count)[:, None], places[None])
-    h = (A * B.conj()).imag
-    (line, before), change = brackets(h)
-    low, high = places[before], places[before + 1]
+    others, alone = np.array([line.others for line in lines]), np.array([line.alone for line in lines])
+    A, B = others @ curve.terms, alone @ curve.terms
+    (line, step), change = brackets((A * B.conj()).imag)
+    low, high, terms, origin = curve.steps(step)
+
+    def parts(at: Real, which: Whole, of: Whole) -> tuple[Complex, Complex]:
+        rows = terms(at, which)
+        return (others[of].T * rows).sum(axis=0), (alone[of].T * rows).sum(axis=0)
+
     if with_dips:
-        dip_line, first, middle, last, sign = _dips(family, places, _share(A, B))
+        dip_line, first, middle, last, sign = _dips(parts, curve, _share(A, B))
         line, change = np.r_[line, dip_line, dip_line], np.r_[change, 2 * sign, -2 * sign]
         low, high = np.r_[low, first, middle], np.r_[high, middle, last]
-    at, gain = solved(lambda w: family(line, w), low, high)
-    found: list[list[Crossing]] = [[] for _ in range(count)]
-    for number, *each in zip(line.tolist(), gain.tolist(), at.tolist(), change.tolist(), strict=True):
+
+    def h(at: Real, which: Whole) -> Real:
+        A, B = parts(at, which, line[which])
+        return np.asarray((A * B.conj()).imag)
+
+    at = zeros_between(h, low, high)
+    A, B = parts(at, np.arange(at.size), line)
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # B vanishes: the gain is infinite
+        gain = -(A * B.conj()).real / abs(B) ** 2
+    found: list[list[Crossing]] = [[] for _ in lines]
+    for number, *each in zip(line.tolist(), gain.tolist(), (origin + at).tolist(), change.tolist(), strict=True):
         found[number].append(Crossing(*each))
     return found
 
 
-def _dips(family: Family, places: Real, share: Real) -> tuple[Whole, Real, Real, Real, Whole]:
+def _dips(
+    parts: Callable[[Real, Whole, Whole], tuple[Complex, Complex]], curve: Curve, share: Real
+) -> tuple[Whole, Real, Real, Real, Whole]:
     """Dips of |h| through 0 between three neighbours: the line, the first place, one beyond 0, the last, and the sign.
 
     Two crossings lie there, as near to each other as a resonance is narrow, and h has one sign at the points of the
@@ -154,14 +215,16 @@ def _dips(family: Family, places: Real, share: Real) -> tuple[Whole, Real, Real,
     inner, signs = share[:, 1:-1], np.sign(share[:, 1:-1])
     lower = np.minimum(signs * share[:, :-2], signs * share[:, 2:])  # of the neighbours: below 0 where one is across
     line, before = np.nonzero((abs(inner) <= lower) & (abs(inner) > ROUNDED))
-    sign, first, last = signs[line, before].astype(np.int64), places[before], places[before + 2]
+    sign = signs[line, before].astype(np.int64)
+    (first, middle, *_), (_, last, *_) = curve.steps(before), curve.steps(before + 1)
     if not line.size:
         return line, first, first, last, sign
 
     def depth(at: Real, which: Whole) -> Real:
-        return sign[which] * _share(*family(line[which], at))
+        return sign[which] * _share(*parts(at, which, line[which]))
 
-    dip = find_minimum(depth, (first, places[before + 1], last), args=(np.arange(line.size),), maxiter=DIP_STEPS)
+    # 14 steps of a golden section leave a thousandth of two steps of the grid, of smooth functions far less
+    dip = find_minimum(depth, (first, middle, last), args=(np.arange(line.size),), maxiter=14)
     through = dip.f_x < -ROUNDED
     return line[through], first[through], dip.x[through], last[through], sign[through]
 
@@ -169,22 +232,6 @@ def _dips(family: Family, places: Real, share: Real) -> tuple[Whole, Real, Real,
 def _share(A: Complex, B: Complex) -> Real:
     """h over its largest possible size, -1 to 1."""
     return np.asarray((A * B.conj()).imag / np.maximum(abs(A) * abs(B), LEAST_SIZE))
-
-
-def solved(parts: Parts, low: Real, high: Real) -> tuple[Real, Real]:
-    """Return the place (n,) between `low` and `high` (n,) at which each bracket's gain is real, and that gain.
-
-    `parts` gives A and B of every bracket at a place of each.
-    """
-
-    def h(place: Real) -> Real:
-        A, B = parts(place)
-        return np.asarray((A * B.conj()).imag)
-
-    place = zeros_between(h, low, high)
-    A, B = parts(place)
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # B vanishes: the gain is infinite
-        return place, np.asarray(-(A * B.conj()).real / abs(B) ** 2)
 
 
 def ascending(name: str, values: Any, least: int, most: int) -> Real:
@@ -223,15 +270,17 @@ def confirmed(found: Crossings, low: float, high: float, is_stable: Callable[[fl
     between all crossings: next to z = 1 rounding may have made a crossing, and the counts are wrong.
     """
     gains = found.within(low, high).gain
-    edges = np.r_[low, gains[np.r_[True, np.diff(gains) > SAME_EDGE * abs(gains[1:])][: gains.size]], high]
+    # next to z = 1 one static crossing is read several times, each with an error near 1e-12
+    edges = np.r_[low, gains[np.diff(gains, prepend=-np.inf) > 1e-9 * abs(gains)], high]
     beyond = 2 * (abs(edges[np.isfinite(edges)]).max(initial=0.0) or 1.0)  # where nothing crosses: any value
     inner = np.clip(edges, -beyond, beyond)
     middles = (inner[1:] + inner[:-1]) / 2
     counts = found.passed(middles)  # the same up to a constant
-    is_least = counts == counts.min()
-    stable = [i for i in np.flatnonzero(is_least) if is_stable(float(middles[i]))]
-    stable = stable or [i for i in np.flatnonzero(~is_least) if is_stable(float(middles[i]))]
-    return joined([(float(edges[i]), float(edges[i + 1])) for i in stable])
+    for may_be in (counts == counts.min(), counts > counts.min()):
+        stable = [i for i in np.flatnonzero(may_be).tolist() if is_stable(float(middles[i]))]
+        if stable:
+            return joined([(float(edges[i]), float(edges[i + 1])) for i in stable])
+    return []
 
 
 def joined(windows: list[Window]) -> list[Window]:

@@ -17,14 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arrays import Complex, Real
-
-from .line import Window
+from tfarm.crossing.line import Window
 
 STRETCH = 2.0  # how much wider than high, or higher than wide, a picture is at most: so much more a curve turns in it
 MOST_TURN = math.radians(5.0) / STRETCH  # from one piece of a curve to the next, where the picture is as high as wide
 PIXEL = 2e-3  # of the picture, a pixel: corners of shorter pieces are invisible
-ASIDE = 0.45  # of the way from one column to the next: half way may be the very edge that both were laid around
-DISTINCT = 1e-11  # of a gain: columns nearer to each other are in the rounding of the end of a region
 Slice = tuple[float, float, float]  # a value of the gain across, and an interval of the other there
 
 
@@ -54,34 +51,30 @@ def loose_columns(across: Real, parts: Sequence[RegionPiece], drawn: Callable[[R
     wanted: set[float] = set()
     for part in parts:
         gain, low, high = np.array(part.points).T
-        gain, outline = np.r_[gain, gain[::-1]], drawn(np.r_[gain, gain[::-1]], np.r_[low, high[::-1]])
-        for before, here, after in _corners(outline):
-            for other in (before, after):
-                if abs(outline[other] - outline[here]) > PIXEL:
-                    wanted.update(_halves(across, float(gain[here]), float(gain[other])))
+        gain = np.r_[gain, gain[::-1]]
+        outline = drawn(gain, np.r_[low, high[::-1]])
+        kept = abs(outline - np.roll(outline, 1)) > 0
+        gain, outline = gain[kept], outline[kept]
+        before, after = outline - np.roll(outline, 1), np.roll(outline, -1) - outline
+        is_seen = (outline.real > 0) & (outline.imag > 0) & (outline.imag < 1)
+        is_corner = is_seen & (abs(np.angle(after / before)) > STRETCH * MOST_TURN)
+        for way, side in ((1, before), (-1, after)):
+            sides = np.transpose([gain, np.roll(gain, way)])[is_corner & (abs(side) > PIXEL)]
+            wanted.update(each for ends in sides.tolist() for each in _halves(across, *ends))
     return np.array(sorted(wanted))
-
-
-def _corners(outline: Complex) -> list[tuple[int, int, int]]:
-    """The indices of points of a closed line at which it turns by more than 5 degrees, with their neighbours."""
-    kept = np.flatnonzero(abs(outline - np.roll(outline, 1)) > 0)
-    before, after = np.roll(kept, 1), np.roll(kept, -1)
-    with np.errstate(all="ignore"):
-        turn = abs(np.angle((outline[after] - outline[kept]) / (outline[kept] - outline[before])))
-    seen = (outline[kept].real > 0) & (outline[kept].imag > 0) & (outline[kept].imag < 1)
-    found = np.flatnonzero(seen & (turn > STRETCH * MOST_TURN))
-    return [(int(before[n]), int(kept[n]), int(after[n])) for n in found]
 
 
 def _halves(across: Real, here: float, other: float) -> list[float]:
     """Nearly half way between two columns; of an upright side, to its neighbours."""
     n = int(np.searchsorted(across, here))
-    neighbours = [float(across[k]) for k in (n - 1, n + 1) if 0 <= k < across.size]
-    ends = [each for each in neighbours if abs(each - here) > DISTINCT * abs(here)] if here == other else [other]
-    return [min(here, each) + ASIDE * abs(each - here) for each in ends]
+    neighbours = across[max(0, n - 1) : n + 2].tolist()
+    # 1e-11 of a gain: columns nearer to each other are in the rounding of the end of a region
+    ends = [each for each in neighbours if abs(each - here) > 1e-11 * abs(here)] if here == other else [other]
+    # 0.45 of the way from one column to the next: half way may be the very edge that both were laid around
+    return [min(here, each) + 0.45 * abs(each - here) for each in ends]
 
 
-@dataclass
+@dataclass(eq=False)
 class RegionPiece:
     """A part of a region to fill: (across, low, high) from column to column.
 
@@ -95,41 +88,32 @@ class RegionPiece:
 
 def pieces(across: Real, intervals: Sequence[Sequence[Window]]) -> list[RegionPiece]:
     """Cut the region into parts with one interval a column; where intervals split or join, parts meet without a gap."""
-    done: list[RegionPiece] = []
+    found: list[RegionPiece] = []
     going: list[RegionPiece] = []
-    for gain, column in zip(across, intervals, strict=True):
-        here = [(float(gain), low, high) for low, high in column]
-        last = [piece.points[-1] for piece in going]
-        parents = [[i for i, one in enumerate(last) if _overlap(one, each)] for each in here]
-        children = [[j for j, each in enumerate(here) if _overlap(one, each)] for one in last]
-        following = []
-        for each, before in zip(here, parents, strict=True):
-            if len(before) == 1 and len(children[before[0]]) == 1:
-                going[before[0]].points.append(each)
-                following.append(going[before[0]])
-            elif len(before) == 1:  # one of the parts of an interval
-                parts = _shares(last[before[0]], [here[j] for j in children[before[0]]])
-                start = parts[children[before[0]].index(here.index(each))]
-                following.append(RegionPiece([start, each], begins=False))
-            else:  # begins here, or is where several join
-                parts = _shares(each, [last[i] for i in before]) if before else []
-                for i, part in zip(before, parts, strict=True):
-                    going[i].points.append(part)
-                following.append(RegionPiece([each], begins=not before))
-        for piece, after in zip(going, children, strict=True):
-            piece.ends = not after
-        done += [piece for piece in going if not any(piece is each for each in following)]
+    for gain, column in zip(across.tolist(), intervals, strict=True):
+        here, last = [(gain, *ends) for ends in column], [piece.points[-1] for piece in going]
+        pairs = itertools.product(range(len(last)), range(len(here)))
+        links = [(i, j) for i, j in pairs if last[i][1] < here[j][2] and here[j][1] < last[i][2]]
+        following = [RegionPiece([each], begins=True) for each in here]
+        for i, j in links:
+            children, parents = [b for a, b in links if a == i], [a for a, b in links if b == j]
+            piece = going[i]
+            if len(children) > 1:  # a part of an interval begins
+                piece.ends = False
+                piece = RegionPiece([_share(last[i], [here[b] for b in children], children.index(j))], begins=False)
+                found.append(piece)
+            piece.points.append(_share(here[j], [last[a] for a in parents], parents.index(i)))
+            if len(parents) > 1:  # here several parts join
+                piece.ends = following[j].begins = False
+            else:
+                following[j] = piece
+        found += [piece for piece in following if piece not in found]
         going = following
-    for piece in going:
-        piece.ends = True
-    return [piece for piece in done + going if len(piece.points) > 1]
+    return [piece for piece in found if len(piece.points) > 1]
 
 
-def _shares(whole: Slice, parts: Sequence[Slice]) -> list[Slice]:
-    """The interval divided among its parts, in the middles of the gaps between them."""
+def _share(whole: Slice, parts: Sequence[Slice], number: int) -> Slice:
+    """The share of one of its parts in an interval, up to the middles of the gaps between them."""
     gaps = [(a[2] + b[1]) / 2 for a, b in itertools.pairwise(parts)]
-    return [(whole[0], low, high) for low, high in itertools.pairwise([whole[1], *gaps, whole[2]])]
-
-
-def _overlap(a: Slice, b: Slice) -> bool:
-    return a[1] < b[2] and b[1] < a[2]
+    ends = [whole[1], *gaps, whole[2]]
+    return whole[0], ends[number], ends[number + 1]

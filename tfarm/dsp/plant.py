@@ -209,7 +209,7 @@ class SensedPlant:
     chain: Chain
     plants: tuple[Plant, ...]
 
-    @property
+    @cached_property
     def together(self) -> Plant:
         """All signals in the order of their names, through their analog filters."""
         whole, corner = self.unfiltered, self.chain.sampling.antialias_corner

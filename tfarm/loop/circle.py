@@ -1,13 +1,12 @@
 """Number of poles of a sampled loop outside the unit circle, certified between the points of the circle too.
 
-With x = 1 - 1/z, a_j = e^{p_j (1-f) T}, b_j = e^{p_j T} and g0 the finite part of G at s = 0, the pulse transfer
-function of the plant is
+With x = 1 - 1/z, a_j = e^{p_j (1-f) T} and b_j = e^{p_j T} the pulse transfer function of the plant is
 
-    H(z) = z^-d [ g0/z + x sum over poles of (r_j/p_j) a_j/(z - b_j) + the rigid body's terms in 1/x ]
+    H(z) = z^-d [ g0/z + sum over poles of (r_j/p_j) (a_j - 1 + (b_j - a_j)/z)/(z - b_j) + rigid terms in 1/x ]
 
-so a pole that has settled before the sample has no effect.  Of a slow one, as friction at the hub makes it, the share
-in g0 nearly cancels that in the sum.  Both are taken as one, (r_j/p_j) (a_j - 1 + (b_j - a_j)/z)/(z - b_j).  So are
-that pole p and the integral of the rate of a braked hub, R/s - R/(s - p) of the angle with R = 1/b large:
+g0 is the finite part of G at s = 0 of what is not in the sum.  A pole is its share -r_j/p_j of g0 and
+x (r_j/p_j) a_j/(z - b_j), which is nothing of a pole that has settled before the sample.  The slow pole p of a braked
+hub and the integral of its rate, R/s - R/(s - p) of the angle with R = 1/b large, nearly cancel, and are taken as one:
 
     x H(z) = -R p (c0 + c1/z + c2/z^2)/(z - e^{pT}),  c0 = t^2 phi(p t), t = (1 - f) T,
     c2 = (f T)^2 e^{pT} phi(-p f T),  c0 + c1 + c2 = T (e^{pT} - 1)/p,  phi(u) = (e^u - 1 - u)/u^2
@@ -178,20 +177,20 @@ class Circle:
         """x, and the terms of F z^-n without powers of x, on arcs."""
         arcs, order = Arcs((low + high) / 2, (high - low) / 2), self.loop.in_z.poles.size
         sums, n = self.summed(arcs, self.weights), len(self.orders) - 1
-        signals = [self._output(row, arcs, sums[row], sums[n + row], sums[2 * n + row], sums[-1]) for row in range(n)]
+        signals = [self._output(row, arcs, sums[row] + sums[n + row] * arcs.turned(1), sums[-1]) for row in range(n)]
         found = [arcs.x]
         for _, row, _, roots in self.terms:
             term = product(arcs.x, roots[roots != 0]) * arcs.turned(order - roots.size)
             found.append(term if row < 0 else term * signals[row])
         return Discs(np.array([each.middle for each in found]), np.array([each.radius for each in found]))
 
-    def _output(self, row: int, arcs: Arcs, fast: Discs, now: Discs, before: Discs, pair: Discs) -> Discs:
-        """x^n times an output's pulse transfer function, n its order at z = 1, from sums with `weights`."""
+    def _output(self, row: int, arcs: Arcs, of_poles: Discs, pair: Discs) -> Discs:
+        """Return x^n times an output's pulse transfer function, n its order at z = 1, from the sums over the poles."""
         plant, pulse, order = self.loop.plant, self.loop.pulse, self.orders[row]
         T, f, (twice, once) = pulse.sampling.period, pulse.sampling.fraction, plant.rigid[row]
         x, late = arcs.x, arcs.turned(1)
-        at_rest = float(plant.static[row] - (plant.residues[row] / plant.poles)[~self.is_slow].real.sum())
-        held = fast * x + Discs(0 * x.middle, self.missing[row]) + late.times(at_rest) + now + before * late
+        at_rest = float(plant.static[row] - (plant.residues[row] / plant.poles)[~self.kept].real.sum())
+        held = of_poles + late.times(at_rest) + Discs(0 * x.middle, self.missing[row])
         total = power(x, order) * held
         push = arcs.turned(0).times((1 - f) * T) + late.times(f * T)
         if order == 2:  # then there is no 1/s: an arm that turns freely has no friction at the hub
@@ -217,31 +216,23 @@ class Circle:
         )
 
     @cached_property
-    def is_slow(self) -> NDArray[np.bool_]:
-        """Whether each pole hardly decays in a sample, as that of friction at the hub."""
-        return np.asarray(self.kept & (abs(self.loop.plant.poles) * self.loop.chain.sampling.period < SLOW))
-
-    @cached_property
     def weights(self) -> Complex:
-        """Numerators of sums over the poles of weight/(z - b), (3 signals + 1, poles); 0 of those left out.
+        """Numerators of sums over the poles of weight/(z - b), (2 signals + 1, poles); 0 of those left out.
 
-        (r/p) a of poles that are not slow, to be multiplied by x; of slow ones (r/p) (a - 1), and (r/p) (b - a) that is
-        to be multiplied by 1/z, their whole share; and -p of a braked hub.
+        (r/p) (a - 1), and (r/p) (b - a) that is to be multiplied by 1/z; and -p of a braked hub.
         """
         plant, sampling = self.loop.plant, self.loop.chain.sampling
         p, T, late = plant.poles, sampling.period, sampling.fraction * sampling.period
         is_braked = np.arange(p.size) == (-1 if self.braked is None else self.braked)
         share = (plant.residues + np.outer(plant.rigid[:, 1], is_braked)) / p  # the rest is in `_braked_pair`
-        a = np.exp(p * (T - late))
-        fast = np.where(self.kept & ~self.is_slow, share * a, 0.0)
-        slow = np.where(self.is_slow, [share * np.expm1(p * (T - late)), share * a * np.expm1(p * late)], 0.0)
-        return np.concatenate([fast, *slow, [np.where(is_braked, -p, 0.0)]])
+        now, before = np.expm1(p * (T - late)), np.exp(p * (T - late)) * np.expm1(p * late)
+        return np.vstack([*np.where(self.kept, [share * now, share * before], 0.0), np.where(is_braked, -p, 0.0)])
 
     @cached_property
     def braked(self) -> int | None:
         """The pole of a hub that friction brings to rest, if it is slow and kept; else None."""
         found = self.loop.plant.braked(SLOW / self.loop.chain.sampling.period)
-        return found if found is not None and self.is_slow[found] else None
+        return found if found is not None and self.kept[found] else None
 
     def _braked_pair(self, arcs: Arcs) -> Discs:
         """(c0 + c1/z + c2/z^2): x times the pulse transfer function of 1/s - 1/(s - p), without -p/(z - e^{pT})."""
@@ -356,7 +347,7 @@ def _highest(loop: Sampled, line: float) -> float | None:
 
 def _left_of(loop: Sampled, line: float, top: float) -> Real | None:
     """The bound on all poles of the band left of the line; None where the integral does not converge."""
-    sampling, exact, analog = loop.chain.sampling, loop.exact, np.array(loop.analog)[:, None]
+    sampling, exact, analog = loop.chain.sampling, loop.rig.exact, np.array(loop.rig.analog)[:, None]
     T, remaining = sampling.period, sampling.period * (1 - sampling.fraction)
 
     def sizes(s: Complex) -> Real:
@@ -390,10 +381,10 @@ def _of_the_filter(loop: Sampled, line: float) -> Real:
     """The bound on the error of the filter's own pole, whose residue has the model's value at -wc, not the arm's."""
     sampling, plant = loop.chain.sampling, loop.plant
     corner = sampling.antialias_corner
-    if corner >= line or not any(loop.analog):  # then none of the kept poles is it, and the integral has it right
-        return np.zeros(len(loop.analog))
+    if corner >= line or not any(loop.rig.analog):  # then none of the kept poles is it, and the integral has it right
+        return np.zeros(len(loop.rig.analog))
     own = plant.mode.size - 1
-    arm = loop.exact(np.array([-corner + 0j]))[:, 0]
+    arm = loop.rig.exact(np.array([-corner + 0j]))[:, 0]
     wrong = np.where(plant.residues[:, own] == 0, 0.0, abs(plant.residues[:, own] / corner - arm))
     left = sampling.period * corner
     return wrong * np.exp(-left * (1 - sampling.fraction)) * 2 / (1 + np.exp(-left))

@@ -9,159 +9,55 @@ z = -1 a single pole crosses (see also Ackermann, Robust Control, 1993, ch. 4).
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Annotated, Any, NamedTuple
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import NAMES, PLANE
 from tfarm.arm.feedback import ON
-from tfarm.arrays import Complex, Real, Whole
+from tfarm.arrays import Complex, Real
 from tfarm.crossing import (
     Crossing,
     Crossings,
+    Line,
     Window,
     ascending,
-    brackets,
     confirmed,
     counts_over,
-    intervals,
+    crossings,
     pieces,
-    solved,
 )
 from tfarm.crossing.shown import PlaneOfCounts
 from tfarm.crossing.turning import loose_columns
-from tfarm.errors import ConvergenceError
 from tfarm.loop.sampled import OfLoop, Sampled
+from tfarm.loop.sampled_rig import CircleGrid
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import most_gain
 
-A_DECADE = 48  # grid points a decade of the distance to a pole
-NARROWEST_WIDTH = 1e-17  # rad, of a pole: closer to it angles are not distinct
-WIDTH_SHARE = 1e-2  # of the distance of a pole from the circle: the grid begins so near to it
-BRIGHT = 1e-2  # poles and roots nearer to z = 0 have no narrow feature on the circle
-NO_EFFECT = 1e-12  # of the terms without a gain: smaller terms of the gain are rounding
-COARSEST = 2000  # points of the uniform grid over the half circle
-STILL = 1e-8  # of the way from z = 1 to the nearest pole of a held arm: nearer than that the rate of the arm is
-# rounding, and a gain on it would have to be 1e8 times too large to move a pole
 FACTOR = "gain"  # the name of a factor on the whole law
-LEAST_FACTOR = 1e-9  # on a law, of those searched: with less it is none
 MOST_FACTOR = 1e9  # with more its gain is beyond any number
 MOST_GAINS = 4000  # of a map, along one gain
 ENDS_AT = (-0.9, 0.3, 0.9)  # K2 at which upright edges are searched, times `input_per_torque`
 MOST_COLUMNS = 400  # of K1 in a picture
-OUTLINE_ROUNDS = 12  # of halving where its outline bends
 OFF_EDGE = 1e-9  # relative: distance to either side of such an edge at which a region is cut
-CLEAR_OF_CIRCLE = 1e-9  # of ln|z|: a pole nearer to the circle may be counted on either side
-GOLDEN = 0.6180339887498949  # of a range: a place on no rounded number and no grid
-
-
-@dataclass(frozen=True)
-@record
-class CircleGrid:
-    """Points z = e^{iq}, 0 < q < pi, each as a pole `base` and an angle `shift` from it."""
-
-    loop: Sampled
-    base: Whole
-    shift: Real
-
-    @cached_property
-    def angles(self) -> Real:
-        """The angle of each open-loop pole on the circle."""
-        return np.angle(self.loop.pulse.multipliers).astype(np.float64)
-
-    @cached_property
-    def q(self) -> Real:
-        """The angle of each point."""
-        return self.angles[self.base] + self.shift
-
-    @cached_property
-    def terms(self) -> Complex:
-        """The loop's `terms` (1 + parts, n), each times the offset of the point from its pole."""
-        return self.at(self.base, self.shift)
-
-    @cached_property
-    def turns(self) -> Real:
-        """Im(T_i conj T_j) of the rows T of `terms`, i < j, a row each pair: the same along every line of a map."""
-        i, j = np.triu_indices(len(self.terms), 1)
-        return np.asarray((self.terms[i] * self.terms[j].conj()).imag)
-
-    def at(self, base: Whole, shift: Real) -> Complex:
-        """`terms` at other points."""
-        pulse = self.loop.pulse
-        decay = pulse.poles.real[base] * pulse.sampling.period
-        offset = pulse.multipliers[base] * np.expm1(-decay + 1j * shift)
-        return self.loop.terms(np.exp(1j * (self.angles[base] + shift)), base, offset)
-
-
-def circle_grid(loop: Sampled) -> CircleGrid:
-    """The grid that resolves every pole of the plant and every pole and zero of the law, for any weights."""
-    pulse = loop.pulse
-    angles = np.angle(pulse.multipliers)
-    felt = pulse.residues.any(axis=0) | (np.arange(angles.size) == angles.size - 1)
-    bases = np.nonzero((angles >= 0) & (abs(pulse.multipliers) > BRIGHT) & felt)[0]
-    bases = bases[np.argsort(angles[bases], kind="stable")]
-    seams = np.r_[0.0, (angles[bases][1:] + angles[bases][:-1]) / 2, np.pi]
-    base, shift = [], []
-    for pole, low, high in zip(bases, seams[:-1], seams[1:], strict=True):
-        width = max(abs(pulse.poles.real[pole]) * pulse.sampling.period * WIDTH_SHARE, NARROWEST_WIDTH)
-        for edge in (low - angles[pole], high - angles[pole]):
-            shift.append(geometric(abs(edge), width) * np.sign(edge))
-            base.append(np.full(shift[-1].size, pole))
-    near = [*_next_to_roots(1 + np.concatenate([loop.in_z.poles, *(zeros for *_, zeros in loop.in_z.columns)]))]
-    extra = np.unique(np.concatenate([np.empty(0), *near]))
-    base.append(bases[np.searchsorted(seams[1:-1], extra)])
-    shift.append(extra - angles[base[-1]])
-    whole = CircleGrid(loop, np.concatenate(base), np.concatenate(shift))
-    order = np.lexsort((whole.shift, np.searchsorted(seams, whole.q, side="left"), whole.q))
-    away = abs(1 - pulse.multipliers[bases])  # 0 of the last, the pole of an arm that drifts
-    lowest = 0.0 if loop.plant.rigid.any() else STILL * away[away > 0].min(initial=1.0)
-    inside = order[(whole.q[order] >= lowest) & (whole.q[order] < np.pi)]
-    return CircleGrid(loop, whole.base[inside], whole.shift[inside])
-
-
-def _next_to_roots(roots: Complex) -> Iterator[Real]:
-    """Angles on the upper half of the circle at geometric distances from some roots."""
-    for root in roots[(abs(roots) > BRIGHT) & (roots.imag >= 0)]:  # the upper of each pair
-        near = geometric(math.pi, max(WIDTH_SHARE * abs(1 - abs(root)), NARROWEST_WIDTH))
-        q = abs(np.angle(root)) + np.r_[-near, near]
-        yield q[(q > 0) & (q < math.pi)]
-
-
-def geometric(edge: float, width: float) -> Real:
-    """Distances from a pole, from a hundredth of its width to the seam with its neighbour."""
-    if edge <= width:
-        return np.array([edge / 2])[: int(edge > 0)]
-    decades = np.log10(edge / width)
-    near = np.geomspace(width, edge, max(2, int(A_DECADE * decades)), endpoint=False)
-    even = np.arange(1, int(edge * COARSEST / np.pi) + 1) * (np.pi / COARSEST)
-    return np.union1d(near, even[even < edge])
-
-
-class Line(NamedTuple):
-    """Weights `others` + g `alone` (1 + parts,) of the rows of `Sampled.terms`, g a number from `low` to `high`."""
-
-    others: Real
-    alone: Real
-    low: float
-    high: float
 
 
 def line_of(loop: Sampled, name: str) -> Line:
     """The line of one number of the law, or of `FACTOR`.  A gain at the hub ends at `most_gain`."""
-    others, alone = loop.row.copy(), np.zeros(loop.row.size)
+    unit = np.zeros(loop.row.size)
     if name == FACTOR:
-        others[1:], alone[1:] = 0.0, loop.weights
-        return Line(others, alone, LEAST_FACTOR, MOST_FACTOR)
-    place = 1 + loop.part(name)
+        unit[1:] = loop.weights
+        # the least factor on a law that is searched: with less it is none
+        return Line.of(loop.row, unit, 1.0, 1e-9, MOST_FACTOR)
+    place, value = 1 + loop.part(name), loop.number(name)
     gain = ON.get(name, name)
-    most = most_gain(loop.plant.arm, gain) if gain in NAMES else MOST_FACTOR * (abs(others[place]) or 1.0)
-    others[place], alone[place] = 0.0, 1.0
-    return Line(others, alone, -most, most)
+    most = most_gain(loop.plant.arm, gain) if gain in NAMES else MOST_FACTOR * (abs(value) or 1.0)
+    unit[place] = 1.0
+    return Line.of(loop.row, unit, value, -most, most)
 
 
 def crossings_along(grid: CircleGrid, lines: Sequence[Line]) -> list[Crossings]:
@@ -171,34 +67,23 @@ def crossings_along(grid: CircleGrid, lines: Sequence[Line]) -> list[Crossings]:
     angle from the next pole, to the last bit.  At z = 1 and z = -1, where a single pole crosses, h = Im(A conj B)
     vanishes: it falls towards that end where it is positive just before.
     """
-    others, alone = np.array([line.others for line in lines]), np.array([line.alone for line in lines])
-    i, j = np.triu_indices(others.shape[1], 1)
-    h = (others[:, i] * alone[:, j] - others[:, j] * alone[:, i]) @ grid.turns
-    (line, step), change = brackets(h)
-    base, low = grid.base[step], grid.shift[step]  # where the next point has another pole, both are as far away
-    high = np.where(base == grid.base[step + 1], grid.shift[step + 1], grid.q[step + 1] - grid.angles[base])
-
-    def parts(shift: Real) -> tuple[Complex, Complex]:
-        terms = grid.at(base, shift)
-        return (others[line].T * terms).sum(axis=0), (alone[line].T * terms).sum(axis=0)
-
-    shift, gain = solved(parts, low, high)
-    found: list[list[Crossing]] = [[] for _ in lines]
-    for number, *each in zip(line.tolist(), gain, grid.angles[base] + shift, change, strict=True):
-        found[number].append(Crossing(*each))
-    at_end = grid.loop.terms(np.array([-1.0 + 0j]), None, np.ones(1))[:, 0]
-    for here, row, unit, first, last in zip(found, others, alone, h[:, 0], h[:, -1], strict=True):
-        here.append(Crossing(_real_gain(row @ at_end, unit @ at_end), math.pi, 1 if last >= 0 else -1))
-        (lowest, at_one), (least, moving) = (_lowest(grid.loop.near_one(each)) for each in (row, unit))
+    found = []
+    (first, last), at_end = grid.terms[:, [0, -1]].T, grid.rig.terms(np.array([-1.0 + 0j]), None, np.ones(1))[:, 0]
+    for line, here in zip(lines, crossings(grid, lines), strict=True):
+        others, alone, low, high = line
+        ways = [1 if ((others @ rows) * (alone @ rows).conj()).imag >= 0 else -1 for rows in (first, last)]
+        here.append(Crossing(_real_gain(others @ at_end, alone @ at_end), math.pi, ways[1]))
+        (lowest, at_one), (least, moving) = (_lowest(grid.rig.near_one(each)) for each in (others, alone))
         if least <= lowest:  # A and B are of the same order in x = 1 - 1/z, or A is of a higher one: it crosses at 0
             static = _real_gain(at_one, moving) if least == lowest else 0.0
-            here.append(Crossing(static, 0.0, -1 if first >= 0 else 1))
-    return [Crossings.of(here).within(each.low, each.high) for here, each in zip(found, lines, strict=True)]
+            here.append(Crossing(static, 0.0, -ways[0]))
+        found.append(Crossings.of(here).within(low, high))
+    return found
 
 
 def crossings_of(loop: Sampled, name: str) -> Crossings:
     """Return the crossings of the circle along one number of the law, or along `FACTOR`."""
-    (found,) = crossings_along(circle_grid(loop), [line_of(loop, name)])
+    (found,) = crossings_along(loop.rig.grid, [line_of(loop, name)])
     return found
 
 
@@ -210,7 +95,8 @@ def _lowest(terms: Sequence[tuple[int, float]]) -> tuple[float, float]:
 
 def _real_gain(A: Any, B: Any) -> float:
     """The real gain g of A + g B = 0 where A and B are real; inf where there is none."""
-    return float(-A.real / B.real) if abs(B.real) > NO_EFFECT * abs(A.real) else math.inf
+    # 1e-12 of the terms without a gain: smaller terms of the gain are rounding
+    return float(-A.real / B.real) if abs(B.real) > 1e-12 * abs(A.real) else math.inf
 
 
 # ------------------------------------------------------------ windows
@@ -219,7 +105,7 @@ def _real_gain(A: Any, B: Any) -> float:
 def windows_of(loop: Sampled, names: Sequence[str]) -> dict[str, list[Window]]:
     """Return every stability interval of some numbers of the law, the others constant, confirmed by the poles."""
     lines, windows = [line_of(loop, name) for name in names], []
-    for name, line, found in zip(names, lines, crossings_along(circle_grid(loop), lines), strict=True):
+    for name, line, found in zip(names, lines, crossings_along(loop.rig.grid, lines), strict=True):
 
         def is_stable(value: float, line: Line = line) -> bool:
             return loop.weighted((line.others + value * line.alone)[1:].tolist()).is_stable
@@ -262,19 +148,13 @@ class GainMap(OfLoop, PlaneOfCounts):
     def finding(self) -> Annotated[str, Quantity("stability region",
             help="grid points of the plane without unstable poles")]:  # fmt: skip
         """Number of points of the grid at which the loop is stable."""
-        return f"stable at {int((self.unstable == 0).sum())} of {self.unstable.size} points"
+        return super().finding
 
     @property
     def counts(self) -> Annotated[NDArray[np.int64], Quantity(key="unstable_poles",
             help="unstable poles at each point, without z = 1 of a free hub angle")]:  # fmt: skip
         """Unstable poles (len(y), len(x))."""
         return self.unstable.T
-
-    @property
-    def stable_intervals(self) -> list[list[Window]]:
-        """For each x the stability intervals of y, cut to the map: the region with exact edges."""
-        low, high, first = float(self.y[0]), float(self.y[-1]), self.unstable[:, 0].tolist()
-        return [intervals(found, low, high, low, count) for found, count in zip(self.crossings, first, strict=True)]
 
 
 def sampled_map(
@@ -288,57 +168,30 @@ def sampled_map(
     """
     x, y = ascending(vary[0], x, 1, MOST_GAINS), ascending(vary[1], y, 1, MOST_GAINS)
     across, up = (loop.place(name) for name in vary)
-    if across is not None and up is not None:
-        return _map_of_gains(loop, x, y, vary, row_of(loop, x, y, vary))
-    if across is not None:
+    if up is None and across is not None:
         turned = sampled_map(loop, y, x, (vary[1], vary[0]))
         return GainMap(loop, vary, turned.y, turned.x, turned.unstable.T, [])
-    loops = [loop.under(loop.given.having(vary[0], value)) for value in x.tolist()]
+    make = loop.having if across is not None else lambda name, value: loop.under(loop.law.having(name, value))
+    loops = {value: make(vary[0], value) for value in x.tolist()}
     if up is None:
-        points = [[each.under(each.given.having(vary[1], value)) for value in y.tolist()] for each in loops]
+        points = [[each.under(each.law.having(vary[1], value)) for value in y.tolist()] for each in loops.values()]
         return GainMap(loop, vary, x, y, np.array([[each.poles.unstable for each in row] for row in points]), [])
-    at = _off_the_edge(y)
-    there = np.array([each.having(**{vary[1]: at}).poles.unstable for each in loops])
-    found = [crossings_of(each, vary[1]) for each in loops]
-    return GainMap(loop, vary, x, y, counts_over(y, found, at, there), found)
+    at, lines = _off_the_edge(y), [line_of(each, vary[1]) for each in loops.values()]
+    if across is None:
+        there = np.array([each.having(vary[1], at).poles.unstable for each in loops.values()])
+        found = [crossings_along(each.rig.grid, [line])[0] for each, line in zip(loops.values(), lines, strict=True)]
+    else:  # all loops have one grid, and a count in one column those of the row
+        start = loop.having(vary[0], _off_the_edge(x)).having(vary[1], at)
+        row, *found = crossings_along(loop.rig.grid, [line_of(start, vary[0]), *lines])
+        there = start.poles.unstable + row.passed(x) - row.passed(start.number(vary[0]))
+    plane = GainMap(loop, vary, x, y, counts_over(y, found, at, there), found)
 
+    def counted(first: float, second: float) -> int | None:
+        poles = loops[first].having(vary[1], second).poles
+        # 1e-9 of ln|z|: a pole nearer to the circle may be counted on either side
+        return poles.unstable if abs(poles.log_radius).min() >= 1e-9 else None
 
-class MapRow(NamedTuple):
-    """A row of a map at the second gain `up`: its `crossings`, with a count of unstable poles `there` at `across`."""
-
-    grid: CircleGrid
-    up: float
-    crossings: list[Crossings]
-    across: float
-    there: int
-
-
-def row_of(loop: Sampled, x: Real, y: Real, vary: tuple[str, str]) -> MapRow:
-    """Return the row with which a map of these gains begins, counted by eigenvalues."""
-    start = loop.having(**{vary[0]: _off_the_edge(x), vary[1]: _off_the_edge(y)})
-    grid, (across, up) = circle_grid(loop), (start.number(name) for name in vary)
-    return MapRow(grid, up, crossings_along(grid, [line_of(start, vary[0])]), across, start.poles.unstable)
-
-
-def _map_of_gains(loop: Sampled, x: Real, y: Real, vary: tuple[str, str], row: MapRow) -> GainMap:
-    """The map over two gains of parts of the law, from the exact crossings of every column (D-decomposition).
-
-    The count of its row starts it; those by eigenvalues at three corners must agree, or a ConvergenceError is raised.
-    """
-
-    def at(first: float, second: float) -> Sampled:
-        return loop.having(**{vary[0]: first, vary[1]: second})
-
-    at_start = counts_over(x, row.crossings, row.across, np.array([row.there]))[0]
-    found = crossings_along(row.grid, [line_of(at(float(value), row.up), vary[1]) for value in x])
-    plane = GainMap(loop, vary, x, y, counts_over(y, found, row.up, at_start), found)
-    for i, j in ((0, 0), (-1, 0), (-1, -1)):
-        corner = at(float(x[i]), float(y[j]))
-        is_clear = abs(corner.poles.log_radius).min() >= CLEAR_OF_CIRCLE  # else on an edge, or too close to it
-        if is_clear and (count := corner.poles.unstable) != plane.unstable[i, j]:
-            where = ", ".join(f"{name} = {corner.number(name):g}" for name in vary)
-            message = f"at {where} crossings count {plane.unstable[i, j]} unstable poles, eigenvalues {count}"
-            raise ConvergenceError(message, plane, abs(count - int(plane.unstable[i, j])))
+    plane.must_agree(counted, "crossings and eigenvalues differ")
     return plane
 
 
@@ -347,33 +200,30 @@ def rounded_map(plane: GainMap, drawn: Callable[[Real, Real], Complex]) -> GainM
 
     `drawn` maps points of the plane to the picture, 1 high.
     """
-    row = row_of(plane.loop, plane.x, plane.y, plane.vary)
-    for _ in range(OUTLINE_ROUNDS):
+    # rounds of halving where its outline bends
+    for _ in range(12):
         more = loose_columns(plane.x, pieces(plane.x, plane.stable_intervals), drawn)
         if not more.size or plane.x.size + more.size > MOST_COLUMNS:
             break
-        plane = with_more(plane, more, row)
+        plane = with_more(plane, more)
     return plane
 
 
-def with_more(plane: GainMap, x: Real, row: MapRow | None = None) -> GainMap:
-    """The map of two gains with further values across, from its row if that is there already."""
+def with_more(plane: GainMap, x: Real) -> GainMap:
+    """The map of two gains with further values across."""
     fresh = np.setdiff1d(x, plane.x)
     if not fresh.size:
         return plane
-    row = row or row_of(plane.loop, plane.x, plane.y, plane.vary)
-    more = _map_of_gains(plane.loop, fresh, plane.y, plane.vary, row)
-    both = np.r_[plane.x, more.x]
-    order = np.argsort(both, kind="stable")
-    found = plane.crossings + more.crossings
-    unstable = np.concatenate([plane.unstable, more.unstable])[order]
-    return GainMap(plane.loop, plane.vary, both[order], plane.y, unstable, [found[n] for n in order])
+    more = sampled_map(plane.loop, fresh, plane.y, plane.vary)
+    order = np.argsort(both := np.r_[plane.x, fresh], kind="stable")
+    found, unstable = plane.crossings + more.crossings, np.concatenate([plane.unstable, more.unstable])
+    return replace(plane, x=both[order], unstable=unstable[order], crossings=[found[n] for n in order])
 
 
 def ends_of_K1(loop: Sampled) -> Real:
     """Ends of stability intervals of K1 at a few K2, without 0: upright edges of the region."""
     unit = loop.plant.arm.input_per_torque
-    found = [window for K2 in ENDS_AT for window in stable_windows(loop.having(K2=unit * K2), "K1")]
+    found = [window for K2 in ENDS_AT for window in stable_windows(loop.having("K2", unit * K2), "K1")]
     return np.array(sorted({end for window in found for end in window if math.isfinite(end) and end}))
 
 
@@ -384,4 +234,5 @@ def with_both_sides(K1: Real, ends: Real) -> Real:
 
 def _off_the_edge(values: Real) -> float:
     """A gain inside the range that is on no rounded edge."""
-    return float(values[0] + GOLDEN * (values[-1] - values[0])) if values.size > 1 else float(values[0])
+    # the golden section of a range is on no rounded number and no grid
+    return float(values[0] + 0.6180339887498949 * (values[-1] - values[0])) if values.size > 1 else float(values[0])

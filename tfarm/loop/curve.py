@@ -1,26 +1,31 @@
-"""The loop function as a curve with its margins: of Bode, Nichols and sensitivity plots, and of their files."""
+"""The verdict on a loop over either curve, and its loop function as a curve with margins.
+
+The curve is that of Bode, Nichols and sensitivity plots, and of their files.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import singledispatch
-from typing import Annotated, Any
+from functools import cached_property
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from tfarm.arm import AnyLaw, Arm
+from tfarm.arm.stages import Consumer
 from tfarm.arrays import LEAST_SIZE, Complex, Real
+from tfarm.loop.loop import Loop
+from tfarm.loop.loop_margins import LoopMargins, PhaseCrossover, margins_along
 from tfarm.records import record
 from tfarm.schema import At, Quantity
 from tfarm.spectrum.table import first_frequency
 
-from .margins import BELOW_SLOWEST, IN_RANGE, LoopMargins, Margins, dense
-
-MOST_FACTOR = 1e9  # on the controller: a larger gain margin is none
-SAME_FACTOR = 1e-6  # relative: by no more the gain margin differs from the factor at its phase crossover
-LONGEST_STEP, LONGEST_OF_S, FINER_ROUNDS = 0.15, 0.4, 6  # of ln L and ln S, and rounds in which longer steps are halved
+IN_RANGE = Quantity(
+    "margins in the frequency range", key="in_range", help="of L(iw) up to the end of the verdict's frequency range"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,21 +79,107 @@ class LoopCurve:
         return self.magnitude + self.sensitivity
 
     @property
+    def curve(self) -> LoopCurve:
+        """Itself, as the curve of what has one."""
+        return self
+
+    @property
     def sides(self) -> tuple[LoopCurve, ...]:
         """The continuous-time loop, where there is one, and this one."""
         return (self,) if self.continuous is None else (self.continuous, self)
 
 
-def refined(L: Callable[[Complex], Complex], omega: Real) -> tuple[Real, Complex]:
-    """Frequencies (n,), more of them where L or 1 + L (s = i w) changes by much from one to the next, and L there."""
-    for number in range(FINER_ROUNDS):
+class LoopVerdict(ABC):
+    """The verdict on a loop over either curve, with margins of a stable loop, and the curve of its loop function.
+
+    `full` is the loop with every mode of the verdict's range, `consumer` states the stages of a sample in the verdict.
+    """
+
+    consumer: ClassVar[Consumer]
+
+    @property
+    @abstractmethod
+    def full(self) -> Loop:
+        """The loop with every mode of the range."""
+
+    @property
+    @abstractmethod
+    def word(self) -> str:
+        """The verdict: stable, marginal or unstable."""
+
+    @property
+    @abstractmethod
+    def is_stable(self) -> bool:
+        """Whether every pole but that of a free hub angle is stable."""
+
+    @property
+    @abstractmethod
+    def range_words(self) -> str:
+        """The word of certainty and the range of the verdict."""
+
+    @property
+    @abstractmethod
+    def time_constant(self) -> float | None:
+        """Time constant [s] of the dominant pole, below 0 where it grows."""
+
+    @property
+    @abstractmethod
+    def ringing(self) -> list[tuple[int, complex]]:
+        """The oscillating poles s [1/s], Im s > 0, each with its mode, 0 without one."""
+
+    @property
+    @abstractmethod
+    def frequencies(self) -> Real:
+        """Frequencies [rad/s] that resolve L, ascending."""
+
+    @property
+    @abstractmethod
+    def margins_end(self) -> float:
+        """The end of the frequency range of margins [rad/s]."""
+
+    @abstractmethod
+    def gain_limits(self, by_phase: tuple[PhaseCrossover, ...]) -> tuple[float, float]:
+        """Return the factors on the law between which the loop is stable."""
+
+    @cached_property
+    def in_band(self) -> LoopMargins | None:
+        """The margins in the frequency range; None unless the loop is stable."""
+        if not self.is_stable:
+            return None
+        return margins_along(self.full, self.frequencies, self.margins_end, self.gain_limits)
+
+    @cached_property
+    def curve(self) -> LoopCurve:
+        """The loop function on a grid that resolves it."""
+        loop, omega = self.full, self.frequencies
+        omega, L = refined(loop.loop_function, omega[omega >= lowest_drawn(loop.arm, self.in_band)])
+        return LoopCurve(
+            arm=loop.arm,
+            law=loop.law,
+            stability=self.word,
+            period=loop.period,
+            omega=omega,
+            L=L,
+            margins=self.in_band,
+        )
+
+
+def next_limits(factors: Iterable[float]) -> tuple[float, float]:
+    """Return the factors next to 1 on both sides, 0 and infinity where there are none."""
+    factors = list(factors)
+    return max((t for t in factors if 0 <= t < 1), default=0.0), min((t for t in factors if t > 1), default=math.inf)
+
+
+def refined(L: Callable[[Complex], Complex], omega: Real, rounds: int = 6) -> tuple[Real, Complex]:
+    """Return frequencies (n,), more of them where L or 1 + L (s = i w) changes by much between two, and L there."""
+    for number in range(rounds):
         values = np.asarray(L(1j * omega), dtype=np.complex128)
         known = np.isfinite(values) & ((values != 0) | (not values.any()))
         omega, values = omega[known], values[known]
         sizes = np.array([values, 1 + values])
         steps = abs(np.diff(np.log(np.where(sizes == 0, 1.0, sizes))))
-        (coarse,) = np.nonzero((steps[0] > LONGEST_STEP) | (steps[1] > LONGEST_OF_S))
-        if number < FINER_ROUNDS - 1:
+        (coarse,) = np.nonzero((steps[0] > 0.15) | (steps[1] > 0.4))
+        if number < rounds - 1:
             omega = np.union1d(omega, np.sqrt(omega[coarse] * omega[coarse + 1]))  # each once, by rounding too
     return omega, values
 
@@ -96,7 +187,7 @@ def refined(L: Callable[[Complex], Complex], omega: Real) -> tuple[Real, Complex
 def lowest_drawn(arm: Arm, band: LoopMargins | None) -> float:
     """A frequency [rad/s] below the first crossing and the first mode: further down L does not change."""
     crossed = [] if band is None else [w for w, _ in (*band.gain_crossovers, *band.phase_crossovers) if w > 0]
-    return float(min([first_frequency(arm), *crossed])) / BELOW_SLOWEST
+    return float(min([first_frequency(arm), *crossed])) / 20.0
 
 
 def decibels(values: Complex | Real | float) -> Real:
@@ -106,23 +197,7 @@ def decibels(values: Complex | Real | float) -> Real:
 
 def gain_margin(band: LoopMargins, factor: float) -> tuple[float, float | None]:
     """Size [dB] of a factor that ends stability, and the frequency [rad/s] at which it does."""
-    if not 1 / MOST_FACTOR < factor < MOST_FACTOR:
+    if not 1e-9 < factor < 1e9:  # a larger margin is none
         return math.inf, None
-    near = [w for w, t in band.phase_crossovers if abs(t / factor - 1) < SAME_FACTOR]
+    near = [w for w, t in band.phase_crossovers if abs(t / factor - 1) < 1e-6]
     return abs(20 * math.log10(factor)), near[0] if near else None
-
-
-@singledispatch
-def curve_of(found: Any) -> Any:
-    """The curve of the margins of a continuous-time loop around every steep place; a curve is its own."""
-    return found
-
-
-@curve_of.register
-def _(found: Margins) -> LoopCurve:
-    verdict, omega = found.stability, dense(found.stability)
-    loop = verdict.loop
-    omega, L = refined(loop.loop_function, omega[omega >= lowest_drawn(loop.arm, found.in_band)])
-    return LoopCurve(
-        arm=loop.arm, law=loop.law, stability=verdict.verdict, omega=omega, L=L, margins=found.in_band
-    )  # fmt: skip

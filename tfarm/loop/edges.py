@@ -33,23 +33,9 @@ from tfarm.spectrum.table import first_frequency
 
 LONGEST_DELAY_SAMPLES = 20.0  # samples: end of the search of a delay margin
 MOST_STEPS = 2000  # of a scan of the delay
-LONGEST_SCAN_STEP = 0.1  # samples: 18 degrees of a pole at z = -1
-STEPS_A_TURN = 12  # of the fastest mode that may be unstable
-PUSH_ROOM = 4  # times the first-order shift of a pole by the feedback: a mode with more damping stays stable
-DELAY_KNOWN = 1e-10  # samples: tolerance of a delay margin
-CLEARLY = 1e-6  # within the circle: an eigenvalue there is not polished, as even a double one has an error of 1e-7
-KEPT_BEYOND = 2  # modes kept beyond the last one that does not decay within a sample
-MODES_BEYOND = 4  # those of a whole loop that decay within a sample
 MOST_LOOP_MODES = 128  # of a whole loop: half a second of work
-FAR_BEYOND = 5.0  # of critical in the first mode: all poles of bending lie left of any line, one mode is enough
-STRONGEST = 0.15  # of critical in the first mode: the largest damping of the search
-DAMPING_MODES = 40  # of the loop in which a required damping is searched, by default
-DAMPING_DECADES = 16  # down from there
-DAMPING_XTOL, DAMPING_RTOL, MADE_SURE = 1e-7, 4e-7, 1e-6  # relative: C is solved for to the first two, then raised
-NUDGES = (0.0, 1e-6, -1e-6)  # of C, tried in turn where two damped modes are one at it
 MOST_EDGE_MODES = 64  # of loops in which edges are searched
 GAIN_DIGITS, OTHER_DIGITS = 6, 4  # that are printed where all are certified
-DISTINCT_FROM_ZERO = 1e-6  # of the other edge of an interval: distance from 0 at which an edge at 0 is tested
 
 Proof = tuple[bool | None, float]  # whether a loop is stable (None: not shown), and the band [rad/s] of that proof
 Test = Callable[[float], Proof]
@@ -78,20 +64,25 @@ def delay_margin(loop: Sampled) -> DelayMargin:
     if log_radius(0.0) >= 0:
         return DelayMargin(0.0, False)
     plant, T = loop.plant, loop.chain.sampling.period
-    reach = PUSH_ROOM * loop.push * abs(held_amplitude(plant.poles, T))
+    # 4 times the first-order shift of a pole by the feedback: a mode with more damping stays stable
+    reach = 4 * loop.push * abs(held_amplitude(plant.poles, T))
     risky = (reach > -plant.poles.real * T) & (plant.poles.imag > 0)  # the feedback may exceed their own damping
     fastest = (plant.poles.imag[risky] * T).max(initial=np.pi / 4)
-    step = float(min(LONGEST_SCAN_STEP, 2 * np.pi / fastest / STEPS_A_TURN))  # samples
+    # 0.1 samples: 18 degrees of a pole at z = -1
+    # 12 steps a turn of the fastest mode that may be unstable
+    step = float(min(0.1, 2 * np.pi / fastest / 12))  # samples
     scanned = step * np.arange(min(MOST_STEPS, int(LONGEST_DELAY_SAMPLES / step)) + 1)
     for low, high in pairwise(scanned.tolist()):
         later = loop.with_delay(now + high)
-        if (abs(later.eigenvalues) > 1 - CLEARLY).any() and not later.is_stable:
+        # 1e-6 within the circle: an eigenvalue there is not polished, as even a double one has an error of 1e-7
+        if (abs(later.eigenvalues) > 1 - 1e-6).any() and not later.is_stable:
             is_between = log_radius(low) < 0
-            return DelayMargin(float(brentq(log_radius, low, high, xtol=DELAY_KNOWN)) if is_between else low, False)
+            # a delay margin is known to 1e-10 samples
+            return DelayMargin(float(brentq(log_radius, low, high, xtol=1e-10)) if is_between else low, False)
     return DelayMargin(min(MOST_STEPS * step, LONGEST_DELAY_SAMPLES), True)
 
 
-def required_damping(arm: Arm, law: AnyLaw, chain: Chain, *, count: int = DAMPING_MODES) -> float:
+def required_damping(arm: Arm, law: AnyLaw, chain: Chain, *, count: int = 40) -> float:
     """Return the smallest C [s] from which on the loop of this law is stable on this arm (without its own C).
 
     0 where it is stable without damping, inf where it is unstable up to 15 % of critical in the first mode.
@@ -111,13 +102,16 @@ def damping_edge(loop: Sampled) -> float:
 
     if loop.is_stable:
         return 0.0
-    high = 2 * STRONGEST / first_frequency(loop.plant.arm)
+    # 0.15 of critical in the first mode: the largest damping of the search
+    high = 2 * 0.15 / first_frequency(loop.plant.arm)
     if log_radius(high) >= 0:
         return math.inf
-    for low in high / 10.0 ** np.arange(1, DAMPING_DECADES + 1):
+    # 16 decades down from there
+    for low in high / 10.0 ** np.arange(1, 16 + 1):
         if log_radius(low) >= 0:  # a radius is nearly linear in C where C is small
-            C = float(brentq(log_radius, low, 10 * low, xtol=DAMPING_XTOL * low, rtol=DAMPING_RTOL))
-            return C * (1 + MADE_SURE)
+            # C is solved for to 4e-7, and then raised by more, so that the loop is stable there
+            C = float(brentq(log_radius, low, 10 * low, xtol=1e-7 * low, rtol=4e-7))
+            return C * (1 + 1e-6)
     return float(low)
 
 
@@ -126,9 +120,11 @@ def log_radius_with(loop: Sampled, C: float, count: int) -> float:
 
     def damped(nudge: float) -> Sampled:
         arm = loop.plant.arm.having(damping=C * (1 + nudge))
-        return loop.on(arm, min(count, KEPT_BEYOND + outliving(arm, loop.chain)))
+        # 2 modes are kept beyond the last one that does not decay within a sample
+        return loop.on(arm, min(count, 2 + outliving(arm, loop.chain)))
 
-    return first_distinct(damped, NUDGES).poles.log_spectral_radius
+    # shares of C, tried in turn where two damped modes are one at it
+    return first_distinct(damped, (0.0, 1e-6, -1e-6)).poles.log_spectral_radius
 
 
 def outliving(arm: Arm, chain: Chain) -> int:
@@ -142,14 +138,16 @@ def outliving(arm: Arm, chain: Chain) -> int:
 
 def most_modes(arm: Arm, chain: Chain) -> int:
     """Largest number of modes of a loop: of a damped arm those that outlive a sample, and a few; at most 128."""
-    return min(MOST_LOOP_MODES, MODES_BEYOND + outliving(arm, chain)) if arm.least_damping else MOST_LOOP_MODES
+    # 4 modes of a whole loop decay within a sample
+    return min(MOST_LOOP_MODES, 4 + outliving(arm, chain)) if arm.least_damping else MOST_LOOP_MODES
 
 
 def whole_loop(arm: Arm, law: AnyLaw, chain: Chain) -> Sampled:
     """Return the loop of a damped arm with `most_modes`, or with one mode where that is far overdamped."""
     criticals = arm.damping * first_frequency(arm) / 2
     most = most_modes(arm, acting_law(arm, with_all_gains(arm, law), chain)[1])
-    return sampled_loop(arm, law, chain, count=1 if criticals > FAR_BEYOND else max(1, most))
+    # beyond 5 times critical in the first mode: all poles of bending lie left of any line, one mode is enough
+    return sampled_loop(arm, law, chain, count=1 if criticals > 5.0 else max(1, most))
 
 
 @dataclass(frozen=True)
@@ -265,16 +263,17 @@ def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[Interval]
     """Return the stability intervals of a number, with more and more modes until all digits are certified."""
 
     def proof(value: float) -> Proof:
-        return _proof(band, loop.having(**{name: value}))
+        return _proof(band, loop.having(name, value))
 
     def found(loop: Sampled) -> list[tuple[Limit, Limit]]:
         other, modes = _with_others(loop), loop.plant.count
 
         def confirmed(value: float) -> Proof:
-            return other().having(**{name: value}).is_stable, math.inf
+            return other().having(name, value).is_stable, math.inf
 
         def edge(value: float, opposite: float, *, below: bool) -> Limit:
-            spare = DISTINCT_FROM_ZERO * (abs(opposite) if opposite and math.isfinite(opposite) else 1.0)
+            # 1e-6 of the other edge of an interval: distance from 0 at which an edge at 0 is tested
+            spare = 1e-6 * (abs(opposite) if opposite and math.isfinite(opposite) else 1.0)
             return Limit(value, GAIN_DIGITS, modes, proof, confirmed, below=below, spare=spare)
 
         return [(edge(low, high, below=False), edge(high, low, below=True)) for low, high in stable_windows(loop, name)]
@@ -350,7 +349,7 @@ def delay_limit(loop: Sampled, band: Band | None) -> Figure | Limit:
 def damping_limit(loop: Sampled, count: int) -> Figure | Limit:
     """Return the damping [s] from which on a loop is stable, by a search with `count` modes."""
     count = min(count, MOST_EDGE_MODES)
-    bare, law = loop.on(loop.plant.arm.elastic, count), replace(loop.given, delay=0.0)  # that is in the chain
+    bare, law = loop.on(loop.plant.arm.elastic, count), replace(loop.law, delay=0.0)  # that is in the chain
     C = damping_edge(bare)
     if C == 0.0:
         return Figure(C, OTHER_DIGITS, None, count)

@@ -17,14 +17,13 @@ from tfarm.arm import FED_BACK, NAMES, Arm, HubFeedback
 from tfarm.arm.blocks import Matrices
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.errors import ConvergenceError
+from tfarm.loop.locus import ORIGIN, Locus, locus, origin_name
+from tfarm.loop.varied import OF_THE_LAW, Title
 from tfarm.records import record
 from tfarm.reduced import modal_model
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.following import between
-
-from .locus import ORIGIN, Locus, locus, origin_name
-from .varied import OF_THE_LAW, Title
 
 if TYPE_CHECKING:
     import control
@@ -43,10 +42,6 @@ BRANCHES_NOTE = (
     "followed: beyond -1/C, where real poles accumulate; outside the box of a law. Crossings of poles on no branch are "
     "listed too (branch null)."
 )
-LEAST_ORDER = 20  # of the model, ten modes, where no order is asked for
-MODES_BEYOND_BRANCHES = 2  # modes of the reduced model above the last branch, if no order is asked for
-REDUCED_VALUES = 9  # values at which an arm is reduced anew, where a parameter of it varies
-LEAST_STEP = 1e-7  # of the gain: a damping ratio, flat there, is known to 1e-14 of its curvature
 
 
 @dataclass(frozen=True)
@@ -76,7 +71,8 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
     Raises ConvergenceError if the model is beyond python-control.
     """
     arm, rigid = exact.arm, exact.arm.has_rigid_mode
-    order = order or max(LEAST_ORDER, 2 * (int(exact.mode.max()) + rigid + MODES_BEYOND_BRANCHES))
+    # by default ten modes at least, and two modes above the last branch
+    order = order or max(20, 2 * (int(exact.mode.max()) + rigid + 2))
     count = order // 2 - rigid
     if exact.vary in OF_THE_LAW:
         import control
@@ -89,7 +85,8 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
             text = f"python-control cannot follow a model of this arm: {error}"
             raise ConvergenceError(text, arm.name, count) from None
     else:
-        which = np.unique(np.linspace(0, exact.gain.size - 1, REDUCED_VALUES).round().astype(int))
+        # 9 values at which an arm is reduced anew, where a parameter of it varies
+        which = np.unique(np.linspace(0, exact.gain.size - 1, 9).round().astype(int))
         arms = [exact.varied.at(float(value)).arm for value in exact.gain[which]]
         none = np.zeros(len(FED_BACK))
         closed = [_closed(each, np.array(exact.gains.row), count, none)[0][0] for each in arms]
@@ -161,7 +158,8 @@ def most_damped(found: Locus) -> MostDamped | None:
         def ratio(value: float) -> float:
             return -float(damping_ratios(between(found.varied, gain, branch[:, None], np.array([value])))[0, 0])
 
-        ends, known = (float(gain[0]), float(gain[2])), float(LEAST_STEP * abs(gain[1]))
+        # 1e-7 of the gain: a damping ratio, flat there, is known to 1e-14 of its curvature
+        ends, known = (float(gain[0]), float(gain[2])), float(1e-7 * abs(gain[1]))
         least = minimize_scalar(ratio, bounds=ends, method="bounded", options={"xatol": known})
         best = float(least.x), -float(least.fun)
     return MostDamped(*best, bool((rows[0][at:].imag > 0).all()), found.varied.title)

@@ -23,9 +23,13 @@ from scipy.optimize import brentq
 from tfarm.arm import FED_BACK, NAMES, PLANE, AnyLaw, Arm, HubFeedback, arm_and_law, as_law
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real, Whole
-from tfarm.crossing import Crossing, crossed
+from tfarm.crossing import Crossing
 from tfarm.crossing.turning import loose
 from tfarm.errors import ConvergenceError, must_be_known, require
+from tfarm.loop.continuous import ContinuousLoop
+from tfarm.loop.lines import line_crossings
+from tfarm.loop.varied import ARM_PARAMETERS, OF_THE_LAW, Title, Varied
+from tfarm.loop.windows import without_losses
 from tfarm.records import record
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.response.signals import Controller, controller
@@ -33,26 +37,9 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.box import Box
 from tfarm.spectrum.following import assigned, between, follow
-from tfarm.spectrum.naming import single_zeros
 
-from .lines import line_crossings
-from .loop import Loop, grid
-from .varied import ARM_PARAMETERS, OF_THE_LAW, Title, Varied
-
-LOCUS_VALUES, LAW_LOCUS_VALUES = 500, 100  # values of a locus by default: of gains, of any other law
 MOST_LOCUS_POINTS = 100_000  # values, those between that make it round among them
 MOST_BRANCHES = 200  # and flexible modes below the top of the box
-COMPANY = 2  # flexible modes followed beyond the box, whose poles may come into it
-NODES = 3  # values after the first at which the poles of the box are counted
-SAME_POLE = 1e-6  # of its size: a pole found by two searches
-HALVING_ROUNDS = 24  # of halving at most: where two branches meet their distance goes with the root of that of the gain
-LEAST_WIDTH, LEAST_HEIGHT = 1e-12, 1e-9  # of a picture, of the size of its poles: less is rounding of a constant pole
-AT_ORIGIN = 1e-9  # of the largest of its branch: a pole so near to 0 is there but for the last step of its correction
-SAME_CROSSING = 1e-3  # of the highest frequency: largest distance of a crossing from where the points of its branch are
-AT_END = 1e-9  # of the range: a crossing so near to an end is at the end, and not between
-GAIN_KNOWN = 1e-15  # of the larger end of a step: the value at which a branch crosses
-JUST_ABOVE = 1.01  # times the highest frequency of a branch: between two values it may be higher
-STEP = 1e-6  # of a frequency, for a difference
 CROSSINGS_SHOWN = 3  # of a locus, in its finding
 RIGID, CONTROLLER, OTHER = 0, -1, -2  # origin of a branch of no flexible mode
 ORIGINS = {RIGID: "rigid body", CONTROLLER: "controller", OTHER: "other"}
@@ -169,7 +156,8 @@ def locus(
         remedy = f"every gain is 0: give {' or '.join(NAMES)} to be scaled"
         require(vary != "all" or gains != HubFeedback(), "vary", "all", remedy)
     law = as_law(law) if in_box else plain
-    points = (LAW_LOCUS_VALUES if in_box else LOCUS_VALUES) if points is None else points
+    # by default 500 values of gains, 100 of any other law
+    points = (100 if in_box else 500) if points is None else points
     points = whole("points", points, 2, MOST_LOCUS_POINTS, f"a whole number from 2 to {MOST_LOCUS_POINTS}")
     branches = whole("branches", branches, 1, MOST_BRANCHES, f"a whole number from 1 to {MOST_BRANCHES}")
     number = branches if in_box else max(1, branches - 2 * arm.has_rigid_mode)
@@ -198,10 +186,12 @@ def shown(rows: Complex, listed: Whole, pinned: int, box: Box | None) -> Complex
 
 def followed(family: Varied, gain: Real, modes: int) -> tuple[Complex, Whole]:
     """All poles (b, n) but those at 0 at every value, mirror images included, and the origin of each."""
-    row, origin = named(family, modes + COMPANY)
+    # 2 flexible modes are followed beyond the box, whose poles may come into it
+    row, origin = named(family, modes + 2)
     row = np.r_[row, missing(family, family.start, row)]
     rows, low = row[:, None], 0
-    nodes = np.unique(np.linspace(0, gain.size - 1, NODES + 1).round().astype(int)).tolist()[1:]
+    # 3 values after the first at which the poles of the box are counted
+    nodes = np.unique(np.linspace(0, gain.size - 1, 3 + 1).round().astype(int)).tolist()[1:]
     while nodes:
         high = nodes[0]
         try:
@@ -234,7 +224,8 @@ def missing(family: Varied, value: float, row: Complex) -> Complex:
         return row[:0]
     every = family.complete(value, row)
     away = abs(every[:, None] - row[~np.isnan(row)]).min(axis=1, initial=math.inf)
-    return every[away > SAME_POLE * abs(every)]
+    # within 1e-6 of its size a pole of two searches is one
+    return every[away > 1e-6 * abs(every)]
 
 
 def named(family: Varied, number: int) -> tuple[Complex, Whole]:
@@ -259,23 +250,19 @@ def named(family: Varied, number: int) -> tuple[Complex, Whole]:
     return row[~np.isnan(row)], origin[~np.isnan(row)]
 
 
-def at_origin(loop: Loop) -> Whole:
+def at_origin(loop: ContinuousLoop) -> Whole:
     """Origins of the poles at s = 0 of a loop: those of the rig first."""
     return np.where(np.arange(loop.zeros_at_origin) < loop.k.at_rest, RIGID, CONTROLLER)
 
 
 def open_poles(arm: Arm, number: int) -> tuple[Complex, Whole]:
     """Poles of the rig without feedback, both of each pair, and their origins: of at least `number` flexible modes."""
-    table = modes(arm, number)
-    if arm.is_undamped:
-        omega, index = table.natural_frequency[table.index > 0], table.index[table.index > 0]
-        pairs, rigid, others = np.stack([1j * omega, -1j * omega], axis=1), [], single_zeros(table)
-    else:
-        found = damped_modes(table)
-        rigid, others = found.eigenvalues[found.index == 0].ravel(), [*found.others, *found.unassigned_pairs.ravel()]
-        pairs, index = found.eigenvalues[found.index > 0], found.index[found.index > 0]
-    row = np.r_[np.array([*rigid, *others], complex), pairs.ravel()]
-    origin = np.r_[np.full(len(rigid), RIGID), np.full(len(others), OTHER), np.repeat(index, 2)]
+    found = damped_modes(modes(arm, number))
+    rigid, pairs = found.eigenvalues[found.index == 0].ravel(), found.eigenvalues[found.index > 0].ravel()
+    others = [*found.others, *found.unassigned_pairs.ravel()]
+    row = np.array([*rigid, *others, *pairs], complex)
+    origin = np.repeat([RIGID, OTHER], [len(rigid), len(others)])
+    origin = np.r_[origin, np.repeat(found.index[found.index > 0], 2)]
     alive = np.isfinite(row) & (row != 0)
     return row[alive], origin[alive]
 
@@ -287,11 +274,12 @@ def rounded(found: Locus) -> Locus:
     """
     family, gain, rows, branches = found.varied, found.gain, found.followed, found.branches
     way, pinned, box = int(np.sign(gain[-1] - gain[0])), len(branches) - found.listed.size, found.box
-    for _ in range(HALVING_ROUNDS):
-        whole = [frame(branches)], [view(branches, found.origin)]
-        frames = np.array([[*map(frame, branches)], *(each * len(branches) for each in whole)])  # (3, b, 4)
-        sizes = np.diff(frames)[..., ::2, None]
-        more = (gain[:-1] + gain[1:])[np.any([loose(branches, *each.swapaxes(0, 1)) for each in sizes], axis=0)] / 2
+    # rounds of halving at most: where two branches meet their distance goes with the root of that of the gain
+    for _ in range(24):
+        pictures = np.array([*map(frame, branches)]), frame(branches), view(branches, found.origin)
+        sizes = [np.diff(np.atleast_2d(each))[:, ::2, None] for each in pictures]
+        is_loose = np.any([loose(branches, *each.swapaxes(0, 1)) for each in sizes], axis=0)
+        more = (gain[:-1] + gain[1:])[is_loose] / 2
         if not more.size or more.size + gain.size > MOST_LOCUS_POINTS:
             break
         order = np.argsort(way * np.r_[gain, more], kind="stable")
@@ -306,10 +294,11 @@ def frame(branches: Complex) -> tuple[float, float, float, float]:
     points = branches[~np.isnan(branches)]
     if not points.size:
         return 0.0, 1.0, 0.0, 1.0
-    left, right = min(float(points.real.min()), 0.0), max(float(points.real.max()), 0.0)
+    left, right = float(points.real.min(initial=0.0)), float(points.real.max(initial=0.0))
     low, high = float(points.imag.min()), float(points.imag.max())
-    wide = max(right - left, LEAST_WIDTH * float(abs(points).max())) or 1.0  # where no pole moves from 0
-    tall = max(high - low, LEAST_HEIGHT * high) or wide  # where none of them oscillates
+    # less than 1e-12 of the size of its poles is rounding of a constant pole
+    wide = max(right - left, 1e-12 * float(abs(points).max())) or 1.0  # where no pole moves from 0
+    tall = max(high - low, 1e-9 * high) or wide  # where none of them oscillates
     return left, left + wide, low, low + tall
 
 
@@ -358,44 +347,36 @@ def branch_crossings(
     Of a damped rig along a number of its law those of poles on no branch too, up to `top` [rad/s].  Where D is linear
     in the number they are those of D-decomposition.
     """
-    sign, span = float(np.sign(gain[-1] - gain[0])), abs(float(gain[-1] - gain[0]))
+    way, (low, high) = float(np.sign(gain[-1] - gain[0])), sorted(gain[[0, -1]].tolist())
     changes, is_damped = _changes(branches), not family.is_reactive
-    band = max(top, JUST_ABOVE * float(np.nanmax(branches.imag, initial=0.0)))
     known: list[Crossing] = []
     if (changes or is_damped) and not (family.is_of_arm or family.vary == "delay"):
         loop, name = family.first.under(family.full), "gain" if family.vary == "all" else family.vary
-        if is_damped:
-            known = list(line_crossings(loop, name, float(gain.min()), float(gain.max()), band))
-        else:
-            gains, places, changed = crossed(np.asarray(grid(loop.arm, band)), family.on_axis)
-            known = [*map(Crossing, _corrected(family, gains, places), places, changed)]
+        # between two values a branch may be higher
+        band = max(top, 1.01 * float(np.nanmax(branches.imag, initial=0.0)))
+        try:
+            known = list(without_losses(loop, name, line_crossings(loop, name, low, high, band)))
+        except ConvergenceError:  # two poles meet at s = 0, and those of modes that rest are on the axis throughout
+            if is_damped:
+                raise
 
-    def crossing(at: float, omega: float, branch: int | None, *, grows: bool) -> BranchCrossing:
+    def crossing(at: float, omega: float, change: float, branch: int | None = None) -> BranchCrossing:
         of = None if branch is None else origin_name(int(origin[branch]))
-        return BranchCrossing(at, omega, branch, "unstable" if grows else "stable", of, family.title)
+        return BranchCrossing(at, omega, branch, "unstable" if way * change > 0 else "stable", of, family.title)
 
     found = []
-    for number, low, high in changes:
-        ends, points = gain[[low, high]], branches[number, [low, high]]
-        at, omega = _crossed(family, ends, points, known, top)
-        found.append(crossing(at, omega, number, grows=points[1].real > points[0].real))
-    seen = {(own.gain, own.omega) for own in found}
+    for number, *step in changes:
+        step.sort(key=lambda n: gain[n])
+        points = branches[number, step]
+        at, omega = _crossed(family, gain[step], points, known, top)
+        found.append(crossing(at, omega, points[1].real - points[0].real, number))
+    # 1e-9 of the range: a crossing so near to an end is at the end, and not between
+    seen, at_end = {(own.gain, own.omega) for own in found}, 1e-9 * (high - low)
     for each in known if is_damped else ():
-        is_between = AT_END * span < sign * (each.t - float(gain[0])) < (1 - AT_END) * span
+        is_between = low + at_end < each.t < high - at_end
         if is_between and not top < each.at < math.inf and (each.t, each.at) not in seen:
-            found.append(crossing(each.t, each.at, None, grows=sign * each.change > 0))
-    return tuple(sorted(found, key=lambda own: (sign * own.gain, own.omega)))
-
-
-def _corrected(family: Varied, t: Real, at: Real) -> Real:
-    """Gains corrected for the rounding of the frequency, by a step of Newton's method for both.
-
-    Of D + B dt + D' dw = 0 the part across D' is an equation for dt alone.
-    """
-    (A, B), (after, by_after), (before, by_before) = (family.on_axis(at * (1 + d)) for d in (0.0, STEP, -STEP))
-    slope = (after + t * by_after) - (before + t * by_before)
-    with np.errstate(all="ignore"):
-        return np.asarray(t - ((A + t * B) * slope.conj()).imag / (B * slope.conj()).imag)
+            found.append(crossing(*each))
+    return tuple(sorted(found, key=lambda own: (way * own.gain, own.omega)))
 
 
 def _changes(branches: Complex) -> list[tuple[int, int, int]]:
@@ -405,37 +386,38 @@ def _changes(branches: Complex) -> list[tuple[int, int, int]]:
     images are not listed.
     """
     size = abs(branches)
-    largest = np.nanmax(np.where(np.isnan(size), 0.0, size), axis=1)[:, None]
-    on_axis = (abs(branches.real) <= AXIS_SHARE * size) | (size <= AT_ORIGIN * largest)
+    largest = np.fmax.reduce(size, axis=1, initial=0.0)[:, None]
+    # 1e-9 of the largest of its branch: a pole so near to 0 is there but for the last step of its correction
+    on_axis = (abs(branches.real) <= AXIS_SHARE * size) | (size <= 1e-9 * largest)
     side = np.where(on_axis | np.isnan(branches), 0, np.sign(branches.real)).astype(int)
+    becomes_real = (branches[:, :-1].imag > 0) & (branches[:, 1:].imag == 0)
+    leaves = becomes_real & (side[:, :-1] == 0) & (side[:, 1:] != 0)
     found = []
     for number, (sides, poles) in enumerate(zip(side, branches, strict=True)):
         pairs = {(a, b) for a, b in pairwise(np.flatnonzero(sides).tolist()) if sides[a] != sides[b]}
-        left = np.flatnonzero((sides[:-1] == 0) & (sides[1:] != 0) & (poles[:-1].imag > 0) & (poles[1:].imag == 0))
-        listed = sorted(pairs | {(n, n + 1) for n in left.tolist()})
-        found += [
-            (number, a, b) for a, b in listed if (poles[[a, b]].imag >= 0).all() and np.isfinite(poles[a:b]).all()
-        ]
+        pairs |= {(n, n + 1) for n in np.flatnonzero(leaves[number]).tolist()}
+        is_upper = poles.imag >= 0
+        found += [(number, a, b) for a, b in sorted(pairs) if is_upper[[a, b]].all() and np.isfinite(poles[a:b]).all()]
     return found
 
 
 def _crossed(family: Varied, ends: Real, points: Complex, known: Sequence[Crossing], top: float) -> tuple[float, float]:
-    """The value between two at which a branch is on the axis, and the frequency there."""
-    low, high = sorted(ends.tolist())
-    omegas = sorted(abs(points.imag).tolist())
-    wide = SAME_CROSSING * top + (omegas[1] - omegas[0])
-    near = [each for each in known if low <= each.t <= high and omegas[0] - wide <= each.at <= omegas[1] + wide]
+    """The value between two (ascending) at which a branch is on the axis, and the frequency there."""
+    (low, high), (slow, fast) = ends.tolist(), sorted(abs(points.imag).tolist())
+    # 1e-3 of the highest frequency: largest distance of a crossing from where the points of its branch are
+    wide = 1e-3 * top + fast - slow
+    near = [each for each in known if low <= each.t <= high and slow - wide <= each.at <= fast + wide]
     if near:
-        share = points.real[0] / (points.real[0] - points.real[1])
-        best = min(near, key=lambda each: abs(each.at - abs((points[0] + share * (points[1] - points[0])).imag)))
+        order = np.argsort(points.real)
+        there = np.interp(0.0, points.real[order], abs(points.imag[order]))
+        best = min(near, key=lambda each: abs(each.at - there))
         return best.t, best.at
-    tolerance = GAIN_KNOWN * max(abs(low), abs(high))
+    tolerance = 1e-15 * max(abs(low), abs(high))
     if not points.imag.all() and family.at_rest(low) * family.at_rest(high) <= 0:
         return float(brentq(family.at_rest, low, high, xtol=tolerance)), 0.0
 
     def pole(value: float) -> complex:
-        share = (value - ends[0]) / (ends[1] - ends[0])
-        found = family.near(np.array([value]), np.array([[points[0] + share * (points[1] - points[0])]]))[0, 0]
+        found = family.near(np.array([value]), np.array([[np.interp(value, ends, points)]]))[0, 0]
         if np.isnan(found):
             text = f"a crossing of the imaginary axis near {family.vary} = {value:.6g} was not found"
             raise ConvergenceError(text, value, found)

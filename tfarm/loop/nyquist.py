@@ -22,7 +22,7 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import flexible_frequencies
 from tfarm.spectrum.box import turned
 
-from .loop import Loop, band_of, grid
+from .continuous import ContinuousLoop, band_of, grid
 from .poles import count_with_mirrors
 from .stability import Stability, stability
 
@@ -105,12 +105,12 @@ def nyquist_of(verdict: Stability) -> Nyquist:
     return plot
 
 
-def _difference(loop: Loop, s: Complex) -> Analytic:
+def _difference(loop: ContinuousLoop, s: Complex) -> Analytic:
     """1 + L without its slope, as the contour is dense where it is steep."""
     return Analytic(1 + loop.loop_function(s), np.zeros_like(s), np.zeros_like(s))
 
 
-def poles_on_axis(loop: Loop, band: float) -> Real:
+def poles_on_axis(loop: ContinuousLoop, band: float) -> Real:
     """Poles of L on the imaginary axis [rad/s], from 0 up: of the rigid body and the law, and at C = 0 of all modes."""
     arm = loop.arm
     flexible = np.asarray(flexible_frequencies(arm, band)) if arm.is_undamped else np.empty(0)
@@ -121,7 +121,7 @@ def poles_on_axis(loop: Loop, band: float) -> Real:
     return np.unique(np.r_[[0.0] * (integrators > loop.zeros_at_origin), flexible, ringing])
 
 
-def upper_contour(loop: Loop, poles: Real, band: float, closed: Complex) -> tuple[Complex, NDArray[np.bool_]]:
+def upper_contour(loop: ContinuousLoop, poles: Real, band: float, closed: Complex) -> tuple[Complex, NDArray[np.bool_]]:
     """The contour from s = 0 (or right of a pole there) up the axis to the band, past each pole on its right.
 
     `closed` are the closed-loop poles: each arc around a pole of L is smaller than its distance to the nearest of them.
@@ -145,7 +145,7 @@ def upper_contour(loop: Loop, poles: Real, band: float, closed: Complex) -> tupl
     return s[order], is_arc[order]
 
 
-def smooth(loop: Loop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, NDArray[np.bool_]]:
+def smooth(loop: ContinuousLoop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, NDArray[np.bool_]]:
     """The contour with more points on the axis where the drawn curve would have corners."""
     for _ in range(TURN_ROUNDS):
         length = abs(np.diff(compressed(loop.loop_function(s))))

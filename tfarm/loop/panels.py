@@ -30,7 +30,7 @@ from tfarm.records import record
 from tfarm.response import transfer
 from tfarm.spectrum import Modes, modes
 
-from .loop import Loop, band_of, steep_places
+from .continuous import ContinuousLoop, band_of, steep_places
 
 PANEL_SAMPLES = 24  # of order 1/2 as the parts are, few more never help where a panel holds one mode
 STEEP_A_PANEL = 3  # steep places a panel: each mode has one of the own, the locked and the free hub
@@ -65,7 +65,7 @@ class Panels:
     error: float
 
 
-def loop_panels(arm: Arm, band: float, loop: Loop | None = None) -> Panels:
+def loop_panels(arm: Arm, band: float, loop: ContinuousLoop | None = None) -> Panels:
     """Return the samples up to a band [rad/s], of hub angle and gauge or of the parts of a loop's law.
 
     Raises ParameterError for an arm that cannot turn freely, ConvergenceError where halving panels does not help.
@@ -104,7 +104,7 @@ def _hub_rows(arm: Arm, order: int, s: Complex) -> Complex:
     return both.real + 0j if arm.is_reactive else both
 
 
-def _law_rows(loop: Loop, at_rest: int, s: Complex) -> Complex:
+def _law_rows(loop: ContinuousLoop, at_rest: int, s: Complex) -> Complex:
     """The drive times the law's denominator over s^at_rest, and what each part feeds back over the s^n of D."""
     rig, (shares, whole) = loop.signals.parts(s), loop.law.shares(s)
     fed_back = np.exp(-s * loop.law.delay) * (shares * rig.numerators).sum(axis=1) / s**loop.zeros_at_origin

@@ -3,8 +3,7 @@
 D-decomposition (Neimark 1948): D is affine in each number (`windows`).  Its crossings of the imaginary axis are solved
 for along the second number, all columns at once, and one count of unstable poles gives all others.  Nothing is
 interpolated or missed between grid points.  D is not affine in a delay: that is the number across the columns, each of
-which is counted by itself.  So is a leading coefficient that passes through 0 where no band is sufficient: there poles
-come to any band from above.
+which is counted by itself.
 
 In the plane of K1 and K2 each frequency has one point with poles at s = i w: the boundary.  Without damping, where the
 gauge reads the hub's moment, it collapses onto two lines.  On one K1 cancels the friction of the hub, on the other K2
@@ -28,50 +27,38 @@ from numpy.typing import NDArray
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, AnyLaw, Arm, HubFeedback, Law, as_law
 from tfarm.arm.feedback import ON
 from tfarm.arrays import Real
-from tfarm.crossing import Crossings, Window, ascending, counts_over, intervals
+from tfarm.crossing import Crossings, Window, ascending, counts_over
 from tfarm.crossing.shown import PlaneOfCounts
 from tfarm.errors import ConvergenceError, ParameterError, require
+from tfarm.loop.continuous import ContinuousLoop, grid
+from tfarm.loop.lines import (
+    LEADING,
+    Along,
+    LawTerms,
+    crossed,
+    line_crossings,
+    rounded,
+    static_edge,
+    unstable_below,
+    with_numbers,
+)
+from tfarm.loop.stability import band_of_family, verdict_on
+from tfarm.loop.windows import theorem_edges, theorem_windows
 from tfarm.records import record
 from tfarm.response.signals import Controller, controller
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import PAPER_GAINS, default_gains, hub_locked, rate_unit
 
-from .lines import (
-    ROUNDED,
-    Line,
-    along,
-    columns,
-    critical,
-    crossed,
-    line_crossings,
-    static_edge,
-    turns_over,
-    unstable_below,
-    with_numbers,
-)
-from .loop import Loop, grid
-from .stability import band_of_family, verdict_on
-from .windows import theorem_edges, theorem_windows
-
 COUNTS = Quantity(key="unstable_roots", help="unstable poles at each point, rows upwards; inf where infinitely many")
 BOUNDARY = Quantity(key="boundary", help="both gains and the frequency [rad/s] with poles on the imaginary axis")
 INFINITE = -1  # count of infinitely many unstable poles
-MOST_GRID_VALUES, MOST_LAW_VALUES = 2000, 400  # of a map, along one gain, and along one number of another law
-SHOWN_K1, SHOWN_K2 = (-1.0, 3.0), (-2.0, 2.0)  # of a map, by default: the stable region of the paper's arm, and around
 NOT_AFFINE = ("delay", ".den.")  # in the name of a number in which L is not affine: its size is not largest at corners
 LINEAR_SCALE = 0.5  # decades that the linear part of an axis takes on each side of 0, as matplotlib's `linscale` has it
 LINEAR_SHARE = LINEAR_SCALE / (1 - 1 / 10)  # factor on values there
-EVEN_GRID = 1e-9  # of its range: by less may the steps of an even grid differ
-LOWEST_MOMENT_GAIN, HIGHEST_MOMENT_GAIN = -4.0, 2.0  # times `input_per_torque`: the range that is shown
 DEEPEST_MOMENT_GAIN = -50.0  # and the lowest value at which unstable gains are searched
-DEEP_ROWS = 400  # values between, at which they are searched
-BELOW_DEEPEST = 1.4  # times the deepest of them: the depth of the picture, so that the region ends in it
-HIGHEST_RATE_GAIN = 10  # J w1: with it the hub of a rigid arm slows down within 0.1/w1
 SHORT_SEGMENT = 0.008  # of the picture: longer pieces of the boundary look straight, and are cut
 LONG_SEGMENT = 0.03  # of the picture: a piece longer than that after all cuts is a jump through infinity, and not drawn
-EDGE_ROUNDS = 30  # of cutting at most: 2^-30 of a step between frequencies is less than a pixel
-SCAN = 32  # columns of the picture in which unstable gains are searched
 ROWS_FROM_EDGE = 1.5  # beyond this many rows from the boundary the count must have changed
 
 
@@ -118,11 +105,6 @@ class Plane(PlaneOfCounts):
         )]  # fmt: skip
 
     @property
-    def finding(self) -> Annotated[str, Quantity("stability region", help="points of the grid without unstable pole")]:
-        """Number of points of the grid at which the loop is stable."""
-        return f"stable at {int(self.stable.sum())} of {self.stable.size} points"
-
-    @property
     def is_of_gains(self) -> bool:
         """Whether it is the plane of K1 and K2."""
         return self.vary == PLANE and self.law.gains is not None
@@ -144,23 +126,22 @@ class Plane(PlaneOfCounts):
 
     @property
     def stable_intervals(self) -> list[list[Window]]:
-        """For each x the stability intervals of y, cut to the map: the region with exact edges.
+        """For each x the stability intervals of y, cut to the map.
 
         Where a theorem decides they are the same for every K1 > `upright`, and none for others.
         """
+        if not self.is_known:
+            return super().stable_intervals
         limits = float(self.y[0]), float(self.y[-1])
-        if self.is_known:
-            loop = Loop(self.arm, self.law.having(RATE_GAIN, self.upright + default_gains(self.arm).K1))
-            stable = theorem_windows(loop, MOMENT_GAIN, limits, theorem_edges(loop, MOMENT_GAIN, limits))
-            return [stable if self.upright < K1 else [] for K1 in self.x]
-        first = self.unstable[0].tolist()
-        return [intervals(found, *limits, limits[0], count) for found, count in zip(self.crossings, first, strict=True)]
+        loop = ContinuousLoop(self.arm, self.law.having(RATE_GAIN, self.upright + default_gains(self.arm).K1))
+        stable = theorem_windows(loop, MOMENT_GAIN, limits, theorem_edges(loop, MOMENT_GAIN, limits))
+        return [stable if self.upright < K1 else [] for K1 in self.x]
 
     @property
     def stable(self) -> NDArray[np.bool_]:
         """Points without unstable pole, double pole of the free hub angle at 0 (K1 = Kp = 0), or undamped modes."""
         if not self.is_of_gains:
-            return np.asarray(self.unstable == 0)
+            return super().stable
         arm = self.arm
         drifts = (self.x == 0) & arm.has_rigid_mode & (self.Kp == 0)
         swings = (self.upright == self.x) & arm.loses_at_hub_alone
@@ -181,8 +162,8 @@ def gain_map(
     """
     if law is None:
         require(vary is None, "law", None, "give the HubFeedback or Law whose numbers vary names")
-        return plane(Loop(arm, as_law(HubFeedback(Kp=Kp))), PLANE, K1, K2)
-    loop = Loop(arm, as_law(law))
+        return plane(ContinuousLoop(arm, as_law(HubFeedback(Kp=Kp))), PLANE, K1, K2)
+    loop = ContinuousLoop(arm, as_law(law))
     require(not Kp, ANGLE_GAIN, Kp, "give Kp in the law, or no law")
     vary = PLANE if vary is None and loop.gains is not None else vary
     match vary:
@@ -191,7 +172,7 @@ def gain_map(
     raise ParameterError(key="vary", value=vary, remedy='two numbers of the law, such as ("gain", "delay")')
 
 
-def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real) -> Plane:
+def plane(loop: ContinuousLoop, vary: tuple[str, str], x: Real, y: Real) -> Plane:
     """Return the map over two numbers of the law of a loop, x and y (1-D, ascending), the others constant.
 
     Raises ParameterError for an unknown number, an invalid loop or range; ConvergenceError where poles cannot be
@@ -200,34 +181,56 @@ def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real) -> Plane:
     require(vary[0] != vary[1], "vary", list(vary), "two different numbers of the law")
     if vary == PLANE and loop.gains is not None:
         loop = loop.under(with_numbers(loop.law, dict.fromkeys(PLANE, 0.0)))
-    most = MOST_LAW_VALUES if loop.gains is None else MOST_GRID_VALUES
+    # most values of a map, along one number of a law, and along one gain
+    most = 400 if loop.gains is None else 2000
     x, y = ascending(vary[0], x, 2, most), ascending(vary[1], y, 2, most)
     across, up = (float(x[0]), float(x[-1])), (float(y[0]), float(y[-1]))
-    corners = [_at(loop, vary, each) for each in itertools.product(critical(vary[0], across), critical(vary[1], up))]
+    for name, (low, high) in zip(vary, (across, up), strict=True):
+        remedy = "a leading coefficient keeps its sign in a map, as without it the order is another: a range without 0"
+        require(not name.endswith(LEADING) or low * high > 0, name, [low, high], remedy)
+    corners = [_at(loop, vary, each) for each in itertools.product(across, up)]
     if loop.gains is not None and _is_known_everywhere(loop.arm) and tuple(ON.get(n, n) for n in vary) == PLANE:
         counts = _known_counts(loop, x, y)
         return Plane(loop.arm, loop.law, vary, x, y, counts, np.empty((0, 3)), 0.0, [])
-    is_counted = vary[0] == "delay" or turns_over(loop, vary[0], across)
-    if vary[1] == "delay" or (not is_counted and turns_over(loop, vary[1], up)):
+    if vary[1] == "delay":
         turned = plane(loop, (vary[1], vary[0]), y, x)
         return replace(turned, vary=vary, x=x, y=y, unstable=turned.unstable.T.copy(), crossings=[])
     band, is_quiet = band_of_family(corners)
-    omega = np.asarray(grid(loop.arm, band))
-    lines = [Line(partial(loop.having, vary[0], value), vary[1], *up) for value in x.tolist()]
-    family = columns(loop, vary, x, max(map(abs, across)))
-    found = [column() for column in crossed(loop.arm, family, lines, omega)]
+    found = _columns(loop, vary, x, up, band)
     crossing = np.concatenate([y[:0], *(each.gain for each in found)])
     at = 0.0 if vary == PLANE else float(y[_farthest(y, crossing)])  # at K2 = 0 the hub is passive
-    there = _counts_across(loop.having(vary[1], at), vary[0], x, band, one_by_one=is_counted)
+    there = _counts_across(loop.having(vary[1], at), vary[0], x, band)
     unstable = counts_over(y, found, at, there).T.copy()
-    edge = boundary(loop, omega) if vary == PLANE and loop.gains is not None else np.empty((0, 3))
+    edge = np.empty((0, 3))
+    if vary == PLANE and loop.gains is not None:
+        edge = boundary(loop, np.asarray(grid(loop.arm, band)))
     done = Plane(loop.arm, loop.law, vary, x, y, unstable, edge, band, found)
+
+    def counted(*point: float) -> int | None:
+        try:
+            return unstable_below(_at(loop, vary, point), band)
+        except ConvergenceError:  # a pole on the axis to working precision, which is on either side
+            return None
+
+    # poles may enter or leave the band through its top, between the corners
     if not is_quiet or any(part in name for part in NOT_AFFINE for name in vary):
-        _must_hold_at_corners(loop, done)
+        remedy = f"some cross the end of the frequency range, {band:.4g} rad/s; ask for a smaller range of values"
+        done.must_agree(counted, remedy)
     return done
 
 
-def _at(loop: Loop, vary: tuple[str, str], point: tuple[float, ...]) -> Loop:
+def _columns(loop: ContinuousLoop, vary: tuple[str, str], x: Real, up: Window, band: float) -> list[Crossings]:
+    """The crossings along the second number at each value of the first; of gains of parts all at once."""
+    terms = LawTerms(loop.signals, loop.law, [])
+    if None in map(terms.part, vary):
+        return [line_crossings(loop.having(vary[0], value), vary[1], *up, band) for value in x.tolist()]
+    lines = [terms.having(vary[0], value).line(vary[1], *up) for value in x.tolist()]
+    members = (partial(loop.having, vary[0], value) for value in x.tolist())
+    loops = [Along(member, vary[1], line) for member, line in zip(members, lines, strict=True)]
+    return [column() for column in crossed(loop.arm, terms, band, loops)]
+
+
+def _at(loop: ContinuousLoop, vary: tuple[str, str], point: tuple[float, ...]) -> ContinuousLoop:
     """The loop at a point of the plane of two numbers of its law."""
     return loop.under(with_numbers(loop.law, dict(zip(vary, point, strict=True))))
 
@@ -237,7 +240,7 @@ def _is_known_everywhere(arm: Arm) -> bool:
     return arm.loses_at_hub_alone and arm.reads_hub_moment and not arm.input_lags
 
 
-def _known_counts(loop: Loop, K1: Real, K2: Real) -> NDArray[np.int64]:
+def _known_counts(loop: ContinuousLoop, K1: Real, K2: Real) -> NDArray[np.int64]:
     """Unstable poles without damping: one count for each side of each line on which modes meet the axis."""
     limits = float(K2[0]), float(K2[-1])
     static = static_edge(loop.having(RATE_GAIN, default_gains(loop.arm).K1), MOMENT_GAIN, limits)
@@ -251,14 +254,12 @@ def _known_counts(loop: Loop, K1: Real, K2: Real) -> NDArray[np.int64]:
     return unstable
 
 
-def _counts_across(row: Loop, name: str, x: Real, band: float, *, one_by_one: bool) -> NDArray[np.int64]:
-    """Unstable poles at each x along a row, from one count at the value farthest from its crossings, or one by one."""
-    if one_by_one:
+def _counts_across(row: ContinuousLoop, name: str, x: Real, band: float) -> NDArray[np.int64]:
+    """Unstable poles at each x along a row, from one count at a value far from its crossings; each of a delay."""
+    if name == "delay":
         return np.array([unstable_below(row.having(name, value), band) for value in x.tolist()])
     across = line_crossings(row, name, float(x[0]), float(x[-1]), band)
-    start = float(x[-1] if name == RATE_GAIN else x[x.size // 2])
-    if row.having(name, start).resting_zeros:
-        start = float(x[_farthest(x, across.gain)])
+    start = float(x[_farthest(x, across.gain)])
     return unstable_below(row.having(name, start), band) + across.passed(x) - across.passed(start)
 
 
@@ -267,27 +268,15 @@ def _farthest(values: Real, at: Real) -> int:
     return int(np.argmax(abs(values[:, None] - at).min(axis=1))) if at.size else values.size // 2
 
 
-def _must_hold_at_corners(loop: Loop, found: Plane) -> None:
-    """Raise ConvergenceError for a map where poles entered or left the band through its top, between the corners."""
-    for i, j in ((0, 0), (0, -1), (-1, 0), (-1, -1)):
-        at = (float(found.x[i]), float(found.y[j]))
-        try:
-            count = unstable_below(_at(loop, found.vary, at), found.band)
-        except ConvergenceError:  # a pole on the axis to working precision, which is on either side
-            continue
-        if count != found.unstable[j, i]:
-            where = ", ".join(f"{name} = {value:.6g}" for name, value in zip(found.vary, at, strict=True))
-            why = f"at {where} {count} poles below {found.band:.4g} rad/s are unstable, not {found.unstable[j, i]}"
-            remedy = "some crossed the end of the frequency range: ask for a smaller range of values"
-            raise ConvergenceError(f"{why}; {remedy}", found, abs(count - int(found.unstable[j, i])))
-
-
-def boundary(loop: Loop, omega: Real) -> Real:
+def boundary(loop: ContinuousLoop, omega: Real) -> Real:
     """K1 and K2 with poles at +-i w, the other gains those of the loop, and w: (n, 3), in the order of omega."""
     if loop.arm.loses_at_hub_alone:
         return np.empty((0, 3))  # both equations are one
     apart = loop.under(with_numbers(loop.law, dict.fromkeys(PLANE, 0.0)))
-    (N, _), (a, b) = along(apart, PLANE)(np.arange(2)[:, None], 1j * omega[None])
+    terms = LawTerms(apart.signals, apart.law, [])
+    rows = terms.at(1j * omega)
+    N = terms.weights @ rows
+    a, b = (terms.line(name).alone @ rows for name in PLANE)
     determinant = (a * b.conj()).imag
     with np.errstate(all="ignore"):  # where both equations are one, the point is far away
         K1 = -(N * b.conj()).imag / determinant
@@ -300,14 +289,15 @@ def ranges_of(arm: Arm) -> tuple[tuple[float, float], tuple[float, float]]:
     """Default ranges of K1 and K2 of a map, in the units of the rig."""
     K1 = 1.0 if arm.is_uniform else default_gains(arm).K1 / PAPER_GAINS.K1
     K2 = arm.input_per_torque
-    (low, high), (lower, upper) = SHOWN_K1, SHOWN_K2
+    # the stable region of the paper's arm, and around
+    (low, high), (lower, upper) = (-1.0, 3.0), (-2.0, 2.0)
     return (low * K1, high * K1), (lower * K2, upper * K2)
 
 
 def between(low: float, high: float, number: int) -> Real:
     """The middles of `number` equal parts from low to high: none of them on a line K1 = 0 unless by chance."""
     values = low + (high - low) * (np.arange(number) + 0.5) / number
-    return np.where(abs(values) <= ROUNDED * (high - low), 0.0, values)
+    return np.array([rounded(value, (low, high)) for value in values.tolist()])
 
 
 @dataclass(frozen=True)
@@ -348,7 +338,8 @@ class Axis:
     def of(cls, values: Real) -> Axis:
         """The axis on which a grid (n,), ascending, is nearly even: linear, or logarithmic beyond its smallest size."""
         low, high = float(values[0]), float(values[-1])
-        if np.ptp(np.diff(values)) <= EVEN_GRID * (high - low):
+        # 1e-9 of its range: by less may the steps of an even grid differ
+        if np.ptp(np.diff(values)) <= 1e-9 * (high - low):
             return cls(low, high)
         return cls(low, high, float(abs(values[values != 0]).min()))
 
@@ -357,7 +348,8 @@ def rate_axis(arm: Arm) -> Axis:
     """The axis of the rate gain, just below 0 to 10 J w1, logarithmic from well below the default gain on."""
     unit = rate_unit(arm)
     linear = 10.0 ** math.floor(math.log10(default_gains(arm)[RATE_GAIN]))
-    return Axis(-linear, HIGHEST_RATE_GAIN * unit, linear)
+    # at 10 J w1 the hub of a rigid arm slows down within 0.1/w1
+    return Axis(-linear, 10 * unit, linear)
 
 
 def rate_columns(arm: Arm, x: Axis, number: int) -> Real:
@@ -371,33 +363,34 @@ def rate_columns(arm: Arm, x: Axis, number: int) -> Real:
 
 def moment_axis(arm: Arm, x: Axis) -> Axis:
     """The axis of the moment gain, -4 to 2 times `input_per_torque`, or down to the lowest unstable gain."""
-    low, high, deepest = (
-        each * arm.input_per_torque for each in (LOWEST_MOMENT_GAIN, HIGHEST_MOMENT_GAIN, DEEPEST_MOMENT_GAIN)
-    )
+    # in units of `input_per_torque`, the range that is shown, and the lowest value that is searched
+    low, high, deepest = (each * arm.input_per_torque for each in (-4.0, 2.0, DEEPEST_MOMENT_GAIN))
     if arm.is_undamped:
         return Axis(low, high)
-    across = x.grid(SCAN)
-    deep = gain_map(arm, across[across > 0], between(deepest, low, DEEP_ROWS))
+    # 32 columns of the picture in which unstable gains are searched
+    across = x.grid(32)
+    # 400 values between, at which they are searched
+    deep = gain_map(arm, across[across > 0], between(deepest, low, 400))
     rows = np.nonzero(~deep.stable.all(axis=1))[0]
     if not rows.size:
         return Axis(low, high)
-    return Axis(max(deepest, BELOW_DEEPEST * float(deep.axes[1][rows[0]])), high, high)
+    # the picture is deeper than all of them, so that the region ends in it
+    return Axis(max(deepest, 1.4 * float(deep.axes[1][rows[0]])), high, high)
 
 
 def edge(found: Plane, x: Axis, y: Axis) -> Real:
     """The boundary in the picture, refined where it is coarse, with a row of nan after each of its parts."""
-    points, loop = found.boundary, Loop(found.arm, found.law)
-    if not points.size:
-        return points
-    for _ in range(EDGE_ROUNDS):
+    points, loop = found.boundary, ContinuousLoop(found.arm, found.law)
+    # rounds of cutting at most: 2^-30 of a step between frequencies is less than a pixel
+    for _ in range(30):
         length, is_seen = _segments(points, x, y)
-        (coarse,) = np.nonzero((length > SHORT_SEGMENT) & is_seen)
-        if not coarse.size:
+        low, high = points[:-1, 2], points[1:, 2]
+        middle = np.sqrt(low * high)
+        is_coarse = (length > SHORT_SEGMENT) & is_seen & (low < middle) & (middle < high)
+        if not is_coarse.any():
             break
-        middle = np.sqrt(points[coarse, 2] * points[coarse + 1, 2])
-        middle = middle[(middle > points[coarse, 2]) & (middle < points[coarse + 1, 2])]
-        points = np.concatenate([points, boundary(loop, middle)])
-        points = points[np.unique(points[:, 2], return_index=True)[1]]
+        points = np.concatenate([points, boundary(loop, middle[is_coarse])])
+        points = points[np.argsort(points[:, 2])]
     length, is_seen = _segments(points, x, y)
     parts = np.split(points, np.flatnonzero(~is_seen | (length >= LONG_SEGMENT)) + 1)
     gap = np.full((1, 3), np.nan)
@@ -406,24 +399,17 @@ def edge(found: Plane, x: Axis, y: Axis) -> Real:
 
 def _segments(points: Real, x: Axis, y: Axis) -> tuple[Real, NDArray[np.bool_]]:
     """The drawn length of each segment, and whether it may pass through the picture."""
-    places = np.stack([axis.place(points[:, i]) for i, axis in enumerate((x, y))])
-    low, high = np.minimum(places[:, 1:], places[:, :-1]), np.maximum(places[:, 1:], places[:, :-1])
-    return np.hypot(*np.diff(places)), np.asarray(((high >= 0) & (low <= 1)).all(axis=0))
+    places = np.array([x.place(points[:, 0]), y.place(points[:, 1])])
+    ends = np.sort([places[:, :-1], places[:, 1:]], axis=0)
+    return np.hypot(*np.diff(places)), np.asarray(((ends[1] >= 0) & (ends[0] <= 1)).all(axis=0))
 
 
-def stable_edge(found: Plane, points: Real, x: Axis, y: Axis) -> Real:
-    """Points (n, 3) of the boundary in the picture with the stable region on one side, above or below."""
-    points = points[~np.isnan(points[:, 0])]
-    if not points.size:
-        return points
-    across, up = x.place(points[:, 0]), y.place(points[:, 1])
-    columns, rows = (axis.place(values) for axis, values in zip((x, y), found.axes, strict=True))
-    column, row = np.searchsorted((columns[1:] + columns[:-1]) / 2, across), np.interp(up, rows, np.arange(rows.size))
-    below, above = (
-        np.clip(np.round(row + way).astype(int), 0, rows.size - 1) for way in (-ROWS_FROM_EDGE, ROWS_FROM_EDGE)
-    )
-    differ = (found.unstable[below, column] == 0) != (found.unstable[above, column] == 0)
-    return np.asarray(points[differ & (up >= 0) & (up <= 1) & (across <= 1) & (points[:, 0] > 0)])
+def stable_edge(found: Plane) -> Real:
+    """K1 > 0, K2 and frequency [rad/s] (n, 3) where pairs of poles cross at an end of a stability interval."""
+    columns = zip(found.x.tolist(), found.crossings, found.stable_intervals, strict=True)
+    ends = [(K1, t, at) for K1, column, stable in columns for t, at, _ in column if t in np.ravel(stable)]
+    points = np.reshape(ends, (-1, 3))
+    return points[(points[:, 0] > 0) & (points[:, 2] > 0) & np.isfinite(points[:, 2])]
 
 
 def resting_frequencies(found: Plane, count: int) -> Real:
@@ -433,7 +419,7 @@ def resting_frequencies(found: Plane, count: int) -> Real:
 
 def static_edges(found: Plane) -> tuple[float | None, float | None]:
     """The gains at which a real pole passes through 0: an upright line of the boundary, and a level one."""
-    loop, (across, up) = Loop(found.arm, found.law), (abs(values).max() for values in found.axes)
-    upright = static_edge(loop.having(MOMENT_GAIN, 0.0), RATE_GAIN, (-across, across))
+    upright = found.upright if found.arm.has_rigid_mode and found.Kp == 0 else None
+    loop, up = ContinuousLoop(found.arm, found.law), float(abs(found.y).max())
     level = static_edge(loop.having(RATE_GAIN, 1.0), MOMENT_GAIN, (-up, up))
-    return None if upright is None else upright.t, None if level is None else level.t
+    return upright, None if level is None else level.t

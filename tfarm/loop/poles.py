@@ -7,15 +7,17 @@ their number (`spectrum.box`).  Where it disagrees the others are searched for, 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
-from tfarm.arrays import LEAST_SIZE, Complex
+from tfarm.arrays import Complex
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, require
 from tfarm.records import record
@@ -27,16 +29,13 @@ from tfarm.spectrum.proofs import Disc, disjoint, enclosed, proven_count
 from tfarm.spectrum.starts import damped_starts
 from tfarm.spectrum.table import first_frequency
 
-from .loop import UNDISPERSED, Loop, band_of, steep_places
+from .continuous import ContinuousLoop, band_of, steep_places
 from .theorem import CONSERVES, GIVES, theorem_of
 
 MOST_POLES = 1000  # that may be asked for
 USUAL_POLES = 10  # poles listed where no count is asked for
 MOST_BOX_MODES = 4000  # flexible, below the highest box that is searched for as many poles as are asked for
-SLOW_SHARE = 1e-6  # of a box's height: poles nearer to 0 are the rigid arm's, and known beforehand
-SLOW_STEPS = 4  # of Newton's method from there
-AT_REST = 1e-12  # of these: so near 0 the slope there is read
-NEAR_RIGID = 0.01  # of its size: largest distance of a slow pole from the rigid arm's
+SLOW_SHARE = 1e-6  # of a box's height: poles nearer to 0 are known beforehand
 LEAST_REAL_PART = -0.5  # of L, so that 1 + L has no zero
 RIGHT_OF_EDGE = (2.0, 5.0, 20.0)  # times the right edge of a box, where L is evaluated again
 FAR_RIGHT, BEYOND_CORNER = 1e5, 10.0  # times that edge, and a law's fastest corner: the end of a search of real poles
@@ -48,9 +47,7 @@ LATE = 2.0  # of 1/delay: further left a delayed loop has ever more poles, and a
 BEYOND_OWN = 1.1  # times the rightmost pole of a law, where L is infinite: the nearest right edge that is tried
 # Starts of Newton's method affect the time alone: the winding number counts the zeros that they missed.
 STARTS_REACH = 1.3  # heights of the box: modes of the arm up to there, as a law may draw their poles down into it
-REAL_POINTS, REAL_SPAN, REAL_REACH = 300, 1e10, 1.4  # on either side of 0: their number, from 1e-10 to 1.4 heights
-DELAY_STEPS = 3  # of the equation of a delay alone
-LEAST_START = 1e-100  # 1/s: zeros at 0 are divided out
+HUB = 0  # the number of the pole below the first mode that no mode of the link is near
 PADE = 8  # order of the approximation of a delay in a model
 SHRUNK_HEIGHTS = tuple(1 / factor for factor in TRIED_HEIGHTS)  # of a box that may not reach above the shear cut-off
 
@@ -74,7 +71,7 @@ class Poles:
     sqrt(kappa G A/(rho I)), since no more poles lie below it: those above are shear modes, damped by bending alone.
     """
 
-    loop: Annotated[Loop, Quantity(flat=True)]
+    loop: Annotated[ContinuousLoop, Quantity(flat=True)]
     values: Annotated[Complex, Quantity("s", "1/s", 12, "closed-loop poles with Im s >= 0", key="poles")]
     box: Annotated[Box, Quantity("box: Re s from, to, Im s from, to", help="searched, and complete")]
     ends_at_shear_cutoff: Annotated[bool, ENDS_AT_SHEAR] = False
@@ -145,7 +142,7 @@ def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles:
     """
     if count is not None:
         count = whole("count", count, 1, MOST_POLES, f"a whole number from 1 to {MOST_POLES}")
-    loop = Loop(arm, as_law(law))
+    loop = ContinuousLoop(arm, as_law(law))
     wanted, limit = (USUAL_POLES, loop.arm.shear_cutoff) if count is None else (count, math.inf)
     number = wanted + 2
     while True:
@@ -165,7 +162,9 @@ def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles:
         number *= 2
 
 
-def poles_below(loop: Loop, height: float, late: float = LATE, factors: tuple[float, ...] = TRIED_HEIGHTS) -> Poles:
+def poles_below(
+    loop: ContinuousLoop, height: float, late: float = LATE, factors: tuple[float, ...] = TRIED_HEIGHTS
+) -> Poles:
     """Return all closed-loop poles with |Im s| <= height [rad/s] in a box that reaches right of every unstable one.
 
     Left it reaches to about -1.5 heights, -0.8/C or -late/delay.  Where a zero lies on the edge of the box the next of
@@ -182,10 +181,11 @@ def poles_below(loop: Loop, height: float, late: float = LATE, factors: tuple[fl
     return Poles(loop, np.r_[np.zeros(loop.zeros_at_origin, complex), upper], box)
 
 
-def box_of(loop: Loop, height: float, late: float = LATE) -> Box:
+def box_of(loop: ContinuousLoop, height: float, late: float = LATE) -> Box:
     """A box of that height, right of the law's poles and until |L| is small; left short of -1/C and -late/delay."""
     own, C = loop.law.poles, loop.arm.damping
-    if own.real.max(initial=0.0) > UNDISPERSED * first_frequency(loop.arm):
+    farthest = 1e8 * first_frequency(loop.arm)  # the phase of waves turns too often along a wider box
+    if own.real.max(initial=0.0) > farthest:
         fastest = complex(own[own.real.argmax()])
         why = f"law: its pole at {fastest:.3g} 1/s is farther right than any box, as its den begins next to 0"
         raise ConvergenceError(f"{why}; begin it with 0, which is another law, or a larger number", fastest, height)
@@ -198,7 +198,7 @@ def box_of(loop: Loop, height: float, late: float = LATE) -> Box:
     return Box(-float(left), right, -height, height)
 
 
-def quiet_edge(loop: Loop, right: float, height: float) -> float:
+def quiet_edge(loop: ContinuousLoop, right: float, height: float) -> float:
     """The right edge [1/s] of a box of that height, from `right` on: where 1 + L has no zero, or `MOST_HEIGHTS_RIGHT`.
 
     There Re L > -1/2, on the edge and at a few places beyond; L > 0 may be large, as on a hub without inertia.  On the
@@ -220,58 +220,62 @@ def quiet_edge(loop: Loop, right: float, height: float) -> float:
     return float(far[turns[-1] + 1] if turns.size else right)
 
 
-def slow_poles(loop: Loop, below: float) -> Complex:
-    """Poles [1/s] but 0 of size up to `below`: of the turning arm under small gains zeros of J s^2 + b s + c.
+def slow_poles(loop: ContinuousLoop, below: float) -> Complex:
+    """Return poles [1/s] but 0 of size up to `below`, from the power series of D at 0, corrected on D.
 
-    These are from `Loop.at_rest`, corrected on the characteristic function, and one zero next to 0 from its slope.
+    D is evaluated on a circle that is small beside the first frequency, 1/C and 1/delay: there the series converges.
     """
-    at = loop.function(np.array([below * AT_REST + 0j]))
-    with np.errstate(all="ignore"):  # an even function has no slope there, and no zero
-        alone = below * AT_REST - (at.value / at.slope).real
-    c, b, J = loop.at_rest or (0.0, 0.0, 1.0)
-    unit = max(abs(b), math.sqrt(abs(c * J)), LEAST_SIZE)  # b and sqrt(c J) alike
-    with np.errstate(over="ignore"):
-        roots = unit * np.roots([J, b / unit, c / unit / unit]).astype(complex)
-    slow = np.r_[roots, alone[[(abs(roots - alone) > NEAR_RIGID * abs(alone)).all()]]]
-    slow = slow[(slow != 0) & (abs(slow) <= below)]
-    exact = slow.copy()
-    for _ in range(SLOW_STEPS if slow.size else 0):
+    radius = 0.2 / (1 / first_frequency(loop.arm) + loop.arm.damping + loop.law.delay)
+    points = 32
+    circle = loop.function(radius * np.exp(2j * np.pi * np.arange(points) / points))
+    series = np.fft.fft(circle.value * np.exp(circle.scale - circle.scale[0])).real[: points // 4]
+    slow = radius * np.roots(series[::-1]).astype(complex)
+    slow = slow[(abs(slow) <= min(below, radius / 2)) & (slow != 0)]
+    step = slow
+    for _ in range(6 if slow.size else 0):
         with np.errstate(all="ignore"):  # a start whose slope is rounding diverges, and is left out
-            at = loop.function(exact)
-            exact = exact - at.value / at.slope
-    return exact[abs(exact - slow) <= NEAR_RIGID * abs(slow)]
+            at = loop.function(slow)
+            step = at.value / at.slope
+            slow = slow - step
+    return slow[(abs(step) <= 1e-9 * abs(slow)) & (abs(slow) <= below)]
 
 
-def starting_points(loop: Loop, up_to: float) -> Complex:
-    """Starts of Newton's method: poles of the damped arm and of the law, real ones, and those of its delay.
+def starting_points(loop: ContinuousLoop, up_to: float) -> Complex:
+    """Return starts of Newton's method: poles of the damped arm, of the law and of its delay, and real ones.
 
     A delay alone would have the poles  s = (ln(-L e^{s delay}) + 2 pi i n)/delay,  where L e^{s delay} changes little.
     """
     near = damped_starts(loop.arm, np.asarray(steep_places(loop.arm, up_to)))
+    real = -np.geomspace(1e-4 * up_to, up_to, 10)
+    real = real[real * loop.arm.damping > -TOWARD_SINGULAR]
     delay = loop.law.delay
     turns = 2j * math.pi * np.arange(1.0, up_to * delay / (2 * math.pi))
     late = turns / (delay or 1.0)
-    for _ in range(DELAY_STEPS if late.size else 0):
+    for _ in range(3 if late.size else 0):
         with np.errstate(all="ignore"):  # at a pole or a zero of L
             late = (np.log(-loop.loop_function(late) * np.exp(late * delay)) + turns) / delay
-    starts = np.concatenate([near, real_starts(loop, up_to), late, late.conj(), loop.law.poles])
-    return starts[np.isfinite(starts) & (abs(starts) > LEAST_START)]
+    starts = np.concatenate([near, real, late, late.conj(), loop.law.poles])
+    return starts[np.isfinite(starts) & (starts != 0)]
 
 
-def real_starts(loop: Loop, up_to: float) -> Complex:
-    """Real points next to which D changes its sign, right of -1/C."""
-    line = np.geomspace(up_to / REAL_SPAN, REAL_REACH * up_to, REAL_POINTS)
-    line = np.r_[-line[::-1], line]
-    line = line[line * loop.arm.damping > -TOWARD_SINGULAR]
-    with np.errstate(all="ignore"):  # a power of s may overflow: there is no start
-        D, scale = loop.characteristic(line.astype(complex))
-        D = (D * np.exp(1j * scale.imag)).real
-    (n,) = np.nonzero(np.sign(D[1:]) * np.sign(D[:-1]) < 0)
-    share = abs(D[n]) / (abs(D[n]) + abs(D[n + 1]))
-    return (line[n] + share * (line[n + 1] - line[n])).astype(complex)
+def poles_by_mode(poles: Complex, open_loop: Mapping[int, complex]) -> dict[int, complex]:
+    """Return the poles s, Im s > 0, by the mode whose open-loop pole p is theirs; a single one below these is `HUB`.
+
+    One a mode, by the least sum of |ln s - ln p|.  By more than 1, a factor e of its frequency or 57 deg, no controller
+    moves a mode here: such a pole belongs to none.
+    """
+    farthest = 1.0
+    modes, own = list(open_loop), np.array(list(open_loop.values()))
+    apart = np.minimum(abs(np.log(poles)[:, None] - np.log(own)), farthest)
+    rows, columns = linear_sum_assignment(apart)
+    near = apart[rows, columns] < farthest
+    found = {modes[column]: complex(poles[row]) for row, column in zip(rows[near], columns[near], strict=True)}
+    others = np.delete(poles, rows[near])
+    below = others[abs(others) < min((abs(s) for s in found.values()), default=0.0)]
+    return dict(sorted([*found.items(), *([(HUB, complex(below[0]))] if below.size == 1 else [])]))
 
 
-def poles_of_model(loop: Loop, plant: Matrices) -> Complex:
+def poles_of_model(loop: ContinuousLoop, plant: Matrices) -> Complex:
     """Poles of a model of the rig, from its input to the law's signals, under the law; a delay is a Pade fraction."""
     law = loop.law.matrices()
     if loop.law.delay:

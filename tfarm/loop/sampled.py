@@ -4,7 +4,7 @@
     F(z) = q(z) + sum over parts of weight sum over signals of p_i(z) H_i(z)     0 at the closed-loop poles
 
 Gains at the hub are a law of three parts without states, u = -Kp theta - K1 theta_t - K2 M + r, M the root moment
-E I phi'(0) as a strain gauge reads it.  F is affine in the weights of the parts, and `Sampled.terms` has its terms.
+E I phi'(0) as a strain gauge reads it.  F is affine in the weights of the parts, and `SampledRig.terms` has its terms.
 
 Matrix eigenvalues have an error of about 1e-14, and a mode may grow by 1e-10 a sample; n poles next to each other, as a
 law of high order has them next to z = 1, have the nth root of that error.  So all are polished together, each as an
@@ -23,12 +23,13 @@ rounding error of F in W that bounds the error of the root: where |ln|z|| is les
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tfarm.arm import FED_BACK, GAINS, AnyLaw, Arm, HubFeedback, Law, law_of
 from tfarm.arm.chain import Chain, Sampling, chain_or_usual
@@ -37,7 +38,6 @@ from tfarm.dsp.discretise import (
     LawInZ,
     acting_law,
     law_in_z,
-    lowest_power,
     root_product,
     root_product_error,
     with_all_gains,
@@ -47,24 +47,22 @@ from tfarm.dsp.plant import (
     USUAL_MODES,
     Plant,
     PulseTransfer,
-    SensedPlant,
     first_distinct,
-    is_analog,
     sensed_plant,
 )
 from tfarm.errors import ParameterError, did_you_mean
+from tfarm.loop.loop import Loop
+from tfarm.loop.sampled_rig import SampledRig
 from tfarm.records import record
-from tfarm.response.signals import Controller, controller
+from tfarm.response.signals import Controller
 from tfarm.schema import Quantity
 
-STATIC_ZERO = 1e-11  # of its terms: a static gain that is 0, summed over 400 modes
 SMALLEST_RADIUS = 5e-324  # the smallest double, for the logarithm of 0
 OFF_POLE = 1e-17  # for an offset of 0: next to 1 that is none
 MOST_STEPS = 200  # of all roots together: a cluster of nine takes 24
 LAST_STEP = 1e-12  # of the offset: below its rounding
 UNMOVED = 1e-50  # an offset this small is a pole that the loop does not move
 LEAST_SQUARE = -1.0 + 1e-15  # for |z|^2 - 1 of a pole at z = 0, the base of no root
-CLEAR_BY, ROUNDED = 2.0, 1e-15  # radii of a disc, and more for the rounding of |z|, by which it is off the circle
 FADED_RADIUS = 0.2  # a pole nearer to z = 0 is stable and not polished
 OUTPUT_OF = {gain.name: gain.output for gain in GAINS}
 
@@ -106,40 +104,58 @@ class SampledPoles:
 
 @dataclass(frozen=True)
 @record
-class Sampled:
-    """A rig under a law at the samples of a chain, which has the law's delay too.
+class Sampled(Loop):
+    """A rig under a law at the samples of a chain.
 
-    `sensed` are the signals of the law, `law` its parts, with 1 for each plain gain, and `in_z` these in z; `weights`
-    are the factors on the parts: such a gain, or 1.
+    `unit_law` has the parts of the law, with 1 for each plain gain; `weights` are the factors on these parts: such a
+    gain, or 1.
     """
 
-    sensed: SensedPlant
-    chain: Chain
-    law: Law
-    in_z: LawInZ
+    rig: SampledRig
+    unit_law: Law
     weights: tuple[float, ...]
 
-    @cached_property
+    @property
+    def chain(self) -> Chain:
+        """The chain, which has the delay of the law too."""
+        return self.rig.chain
+
+    @property
+    def period(self) -> float:
+        """The sampling period [s]."""
+        return self.chain.sampling.period
+
+    @property
+    def in_z(self) -> LawInZ:
+        """The parts of `unit_law` in z."""
+        return self.rig.in_z
+
+    @property
     def plant(self) -> Plant:
         """From the input to the signals of the law, through their filters."""
-        return self.sensed.together
+        return self.rig.plant
 
-    @cached_property
+    @property
     def pulse(self) -> PulseTransfer:
         """The pulse transfer functions to the signals of the law."""
-        return PulseTransfer(self.plant, self.chain.sampling).folded()
+        return self.rig.pulse
+
+    @cached_property
+    def arm(self) -> Arm:  # type: ignore[override]
+        """The arm, without the actuator's damping."""
+        return self.plant.arm
 
     # ------------------------------------------------------------ its numbers, and other loops
 
-    @property
-    def given(self) -> Law:
-        """The law with its weights, in its given form."""
-        return self.law.weighted(self.weights)
+    @cached_property
+    def law(self) -> Law:  # type: ignore[override]
+        """The law with its weights."""
+        return self.unit_law.weighted(self.weights)
 
     @property
     def is_of_gains(self) -> bool:
-        """Whether the law is that of all gains at the hub."""
-        return self.law.signals == FED_BACK and self.law.gains is not None
+        """Whether the law is that of all gains at the hub, with their references."""
+        return self.unit_law.signals == FED_BACK and self.unit_law.gains is not None
 
     @property
     def gains(self) -> HubFeedback:
@@ -147,9 +163,21 @@ class Sampled:
         assert self.is_of_gains
         return law_of(self.weights)
 
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The weights that are numbers of the law, by name."""
+        if self.is_of_gains:
+            return self.gains.by_name
+        return {name: self.weights[place] for name, (place, _) in self.unit_law.part_gains.items()}
+
+    @property
+    def feeds_back(self) -> bool:
+        """Whether a weight is other than 0."""
+        return any(self.weights)
+
     def place(self, name: str) -> int | None:
         """The part whose weight is a number, by its name in `Law.having`; None of any other number."""
-        known, name = self.law.part_gains, OUTPUT_OF.get(name, name).removesuffix(".gain")
+        known, name = self.unit_law.part_gains, OUTPUT_OF.get(name, name).removesuffix(".gain")
         return next((known[key][0] for key in (name, f"{name}.gain") if key in known), None)
 
     def number(self, name: str) -> float:
@@ -159,23 +187,17 @@ class Sampled:
     def part(self, name: str) -> int:
         """The part whose weight is a number.  Raises ParameterError for any other number."""
         if (place := self.place(name)) is None:
-            raise ParameterError(key="law", value=name, remedy=did_you_mean(name, list(self.law.part_gains)))
+            raise ParameterError(key="law", value=name, remedy=did_you_mean(name, list(self.unit_law.part_gains)))
         return place
 
     def weighted(self, weights: Sequence[float]) -> Sampled:
-        """The same loop with other weights; plant and pulse transfer functions are shared."""
-        other = replace(self, weights=tuple(weights))
-        vars(other).update(plant=self.plant, pulse=self.pulse)
-        if "frame" in vars(self):
-            vars(other)["frame"] = self.frame
-        return other
+        """Return the same loop with other weights."""
+        return replace(self, weights=tuple(weights))
 
-    def having(self, **numbers: float) -> Sampled:
-        """The same loop with other values of some numbers, by name."""
-        weights = list(self.weights)
-        for name, value in numbers.items():
-            weights[self.part(name)] = value
-        return self.weighted(weights)
+    def having(self, name: str, value: float) -> Sampled:
+        """Return the same loop with another value of the gain or factor of one part of its law."""
+        place = self.part(name)
+        return self.weighted([*self.weights[:place], value, *self.weights[place + 1 :]])
 
     def times(self, factor: float) -> Sampled:
         """The same loop with a factor on the whole law."""
@@ -184,36 +206,22 @@ class Sampled:
     def with_delay(self, samples: float) -> Sampled:
         """The same loop with another total delay."""
         chain = replace(self.chain, sampling=replace(self.chain.sampling, delay_samples=samples))
-        other = replace(self, chain=chain)
-        vars(other).update(plant=self.plant, has_free_angle=self.has_free_angle, poles_at_one=self.poles_at_one)
-        return other
+        return replace(self, rig=replace(self.rig, chain=chain))
 
     def with_modes(self, count: int) -> Sampled:
         """The same loop with another number of flexible modes; cheap where its models have as many."""
-        return replace(self, sensed=self.sensed.with_modes(count))
+        return replace(self, rig=replace(self.rig, sensed=self.rig.sensed.with_modes(count)))
 
     def under(self, law: Law) -> Sampled:
         """The loop of another law on the same arm, with the same number of modes."""
         sampling = self.chain.sampling
         own = max(0.0, sampling.delay_samples - self.law.delay / sampling.period)
         chain = replace(self.chain, sampling=replace(sampling, delay_samples=own))
-        return sampled_loop(self.plant.arm, law, chain, count=self.plant.count)
+        return sampled_loop(self.arm, law, chain, count=self.plant.count)
 
     def on(self, arm: Arm, count: int) -> Sampled:
         """The loop of the same law on another arm, with `count` flexible modes."""
-        return replace(self, sensed=sensed_plant(arm, self.chain, self.in_z.signals, count))
-
-    # ------------------------------------------------------------ its signals
-
-    @property
-    def exact(self) -> Callable[[Complex], Complex]:
-        """The exact transfer functions of the signals, at s (n,), without the filters."""
-        return self.sensed.read.values
-
-    @property
-    def analog(self) -> tuple[bool, ...]:
-        """Whether each signal passes the anti-alias filter."""
-        return tuple(is_analog(each, self.chain) for each in self.sensed.read.outputs)
+        return replace(self, rig=replace(self.rig, sensed=sensed_plant(arm, self.chain, self.in_z.signals, count)))
 
     @property
     def push(self) -> Real:
@@ -228,37 +236,13 @@ class Sampled:
     # ------------------------------------------------------------ characteristic function
 
     @cached_property
-    def open_loop(self) -> Complex:
-        """z - 1 of each pole of the plant, in the order of `PulseTransfer.poles`, and then of each of the law."""
-        return np.r_[self.pulse.shifts, self.in_z.poles]
-
-    @cached_property
     def row(self) -> Real:
-        """The weights of the rows of `terms`."""
+        """The weights of the rows of `SampledRig.terms`."""
         return np.array([1.0, *self.weights])
-
-    def terms(self, z: Complex, base: Whole | None, offset: Any) -> Complex:
-        """Rows (1 + parts, n): offset q, and of each part offset times its sum of p_i H_i.
-
-        At z = e^{pT} + offset (n,), p the pole number `base`; of the law's poles, which are numbered after those of the
-        plant, not times the offset.
-        """
-        z, more, at, delta = np.asarray(z), 0.0, base, None
-        start = z - 1
-        if base is not None:
-            start, more = self.open_loop[base], offset
-            is_of_law, delta = base >= self.pulse.poles.size, start + offset
-            at, offset = np.where(is_of_law, -1, base), np.where(is_of_law, 1.0, offset)
-        measured = self.pulse.scaled(z, at, offset, delta)
-        rows = np.zeros((1 + len(self.weights), z.size), complex)
-        rows[0] = offset * root_product(start, self.in_z.poles, more)
-        for part, row, gain, zeros in self.in_z.terms:
-            rows[1 + part] += gain * root_product(start, zeros, more) * measured[row]
-        return rows
 
     def rounding(self, base: Whole, offset: Complex) -> Real:
         """Bound on the rounding error (n,) of row @ terms at the same points: of the sizes of all terms."""
-        start, is_of_law = self.open_loop[base], base >= self.pulse.poles.size
+        start, is_of_law = self.rig.open_loop[base], base >= self.pulse.poles.size
         scale = np.where(is_of_law, 1.0, offset)
         sizes = self.pulse.sizes(np.where(is_of_law, -1, base), scale, start + offset)
         error = abs(scale) * root_product_error(start, self.in_z.poles, offset)
@@ -266,46 +250,43 @@ class Sampled:
             error += abs(self.weights[part] * gain) * root_product_error(start, zeros, offset) * sizes[row]
         return error
 
+    def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
+        """Return denominator and numerator of L at s = i w, up to pi/T."""
+        grid = self.rig.grid
+        q = np.ravel(np.imag(s)) * self.chain.sampling.period
+        base = grid.base[np.minimum(np.searchsorted(grid.q, q), grid.q.size - 1)]
+        own, *rows = grid.at(base, q - grid.angles[base])
+        fed_back = np.asarray(np.array(self.weights) @ np.array(rows), dtype=np.complex128)
+        return own.reshape(np.shape(s)), fed_back.reshape(np.shape(s))
+
     def __call__(self, z: Complex) -> Complex:
         """F(z) at an array of z."""
         z = np.asarray(z, dtype=complex)
-        return np.asarray(self.row @ self.terms(z.ravel(), None, np.ones(z.size))).reshape(z.shape)
+        return np.asarray(self.row @ self.rig.terms(z.ravel(), None, np.ones(z.size))).reshape(z.shape)
 
     # ------------------------------------------------------------ poles
 
-    @cached_property
-    def frame(self) -> tuple[Real, Real]:
-        """The matrix without feedback, and what the input adds to its states."""
-        A, B, C = self.pulse.matrices()
-        own, Bk, _, _ = self.in_z.matrices
-        return np.block([[A, np.zeros((len(A), len(own)))], [Bk @ C, own]]), np.r_[B, np.zeros(len(own))]
-
     def matrix(self) -> Real:
         """The closed-loop matrix: states of `PulseTransfer.matrices`, then those of the law."""
-        (M, b), (_, _, Ck, Dk), weights = self.frame, self.in_z.matrices, np.array([self.weights])
+        (M, b), (_, _, Ck, Dk), weights = self.rig.frame, self.in_z.matrices, np.array([self.weights])
         return M - np.outer(b, np.hstack([weights @ Dk @ self.pulse.matrices()[2], weights @ Ck]))
-
-    @property
-    def is_damped(self) -> bool:
-        """Whether friction makes the turning hub a single integral of the input."""
-        return bool(self.plant.model.arm.rate_loss)
 
     @cached_property
     def has_free_angle(self) -> bool:
         """Whether the hub angle is a pole at z = 1 without feedback."""
-        turned = self.plant.rigid[:, int(self.is_damped)]
+        turned = self.plant.rigid[:, int(self.rig.is_damped)]
         return bool(self.plant.arm.has_rigid_mode and self.in_z.ignores(turned, self.weights))
 
     def reduced_matrix(self) -> Real:
         """The closed-loop matrix without the pole z = 1 of a free hub angle, or of a hub that cannot drift."""
         A, first = self.matrix(), self.pulse.integrals_at
-        unfelt = 2 if not self.plant.arm.has_rigid_mode else int(self.is_damped)  # its angle is the single integral
+        unfelt = 2 if not self.plant.arm.has_rigid_mode else int(self.rig.is_damped)  # its angle is the single integral
         felt = np.r_[np.arange(first), np.arange(first + unfelt, len(A))]
         A = A[np.ix_(felt, felt)]
         if not self.has_free_angle:
             return A
         own, B, _, _ = self.in_z.matrices
-        angle = self.pulse.matrices()[2][:, first + int(self.is_damped)]
+        angle = self.pulse.matrices()[2][:, first + int(self.rig.is_damped)]
         shift = np.zeros(len(A))
         shift[first] = 1.0  # and the states of the law where the hub is at rest at that angle
         shift[len(A) - len(own) :] = np.linalg.lstsq(np.eye(len(own)) - own, B @ angle, rcond=None)[0]
@@ -317,23 +298,6 @@ class Sampled:
         """The closed-loop poles, not polished, in the order of `poles`."""
         return np.linalg.eigvals(self.reduced_matrix()).astype(complex)
 
-    def near_one(self, weights: Real) -> list[tuple[int, float]]:
-        """The rows of `terms` times weights (1 + parts,) other than 0, each as (n, c) of c x^n at small x = 1 - 1/z."""
-        plant, T, at_rest = self.plant, self.chain.sampling.period, self.plant.at_rest
-        size = abs(plant.static) + abs(plant.residues / plant.poles).sum(axis=1)
-        found = [lowest_power(self.in_z.poles)] if weights[0] else []
-        slopes = self.pulse.slopes_at_one
-        for part, row, gain, zeros in self.in_z.terms:
-            weight = float(weights[1 + part] * gain)
-            if weight:
-                n, value = lowest_power(zeros)
-                (twice, once), rest = plant.rigid[row], at_rest[row]
-                own = (-2, twice * T * T) if twice else (-1, once * T) if once else (0, rest)
-                if own[0] == 0 and abs(rest) <= STATIC_ZERO * size[row]:
-                    own = (1, slopes[row])
-                found.append((n + own[0], float(own[1] * value * weight)))
-        return found
-
     @cached_property
     def poles_at_one(self) -> int:
         """Number of closed-loop poles at z = 1 for any numbers, without a free hub angle.
@@ -341,52 +305,38 @@ class Sampled:
         Such are an integrator of a signal that is 0 at rest, one of two parallel integrators, a hub without feedback of
         its rate.  The order of x^N F, N the poles of the plant there, at x = 1 - 1/z = 0 is the least of its terms.
         """
-        poles = 0 if not self.plant.arm.has_rigid_mode else (1 if self.is_damped else 2) - self.has_free_angle
-        return max(0, poles + min(n for n, _ in self.near_one(self.row)))
+        poles = 0 if not self.plant.arm.has_rigid_mode else (1 if self.rig.is_damped else 2) - self.has_free_angle
+        return max(0, poles + min(n for n, _ in self.rig.near_one(self.row)))
 
-    @cached_property
-    def near(self) -> tuple[Complex, Whole, Complex, Whole]:
-        """The closed-loop poles z, not polished, with base and offset of each, and the numbers of those to polish.
-
-        `poles_at_one` of them are 1; those next to z = 0 are stable.
-        """
-        z = self.eigenvalues.copy()
-        z[np.argsort(abs(z - 1), kind="stable")[: self.poles_at_one]] = 1.0
-        base = _nearest(self, z - 1)
-        return z, base, (z - 1) - self.open_loop[base], np.flatnonzero((abs(z) > FADED_RADIUS) & (z != 1))
-
-    @cached_property
+    @property
     def is_stable(self) -> bool:
-        """Whether all poles lie inside the unit circle, by the discs around the eigenvalues where these show it.
-
-        As many poles lie outside as discs, where every disc is on one side of the circle.
-        """
-        z, base, offset, rows = self.near
-        if "poles" not in vars(self) and not (z == 1).any():
-            with np.errstate(all="ignore"):
-                f, slope, _ = _weierstrass(base, offset, rows, self)
-                radius = _radius(f, slope, base, offset, rows, self)
-            outside = abs(z[rows]) - 1
-            if (abs(outside) > CLEAR_BY * radius + ROUNDED).all():
-                return not (outside > 0).any()
+        """Whether all poles lie inside the unit circle."""
         return self.poles.is_stable
 
     @cached_property
     def poles(self) -> SampledPoles:
-        """The closed-loop poles, each polished as an offset from its nearest open-loop pole; `poles_at_one` are 1."""
-        z, base, offset, rows = self.near
-        shifts, pulse, log_radius = self.open_loop, self.pulse, np.log(np.maximum(abs(z), SMALLEST_RADIUS))
-        offset, error = _settled(base, offset, rows, self)
-        moved = _nearest(self, shifts[base] + offset)
-        if (moved[rows] != base[rows]).any():  # then all digits are kept from there
-            offset, error = _settled(moved, offset + (shifts[base] - shifts[moved]), rows, self)
-            base = moved
+        """The closed-loop poles, each polished as an offset from its nearest open-loop pole; `poles_at_one` are 1.
+
+        Those next to z = 0 are stable, and not polished.
+        """
+        z, shifts, pulse = self.eigenvalues.copy(), self.rig.open_loop, self.pulse
+        z[np.argsort(abs(z - 1), kind="stable")[: self.poles_at_one]] = 1.0
+        log_radius = np.log(np.maximum(abs(z), SMALLEST_RADIUS))
+        rows = np.flatnonzero((abs(z) > FADED_RADIUS) & (z != 1))
+        base = _nearest(self, z - 1)
+        offset: Complex = (z - 1) - shifts[base]
+        for _ in range(2):
+            offset, error = _settled(base, offset, rows, self)
+            nearest = _nearest(self, shifts[base] + offset)
+            if (nearest[rows] == base[rows]).all():
+                break
+            # all digits are kept from there
+            offset, base = offset + (shifts[base] - shifts[nearest]), nearest
         own = 2 * self.in_z.poles.real + abs(self.in_z.poles) ** 2
         start = np.r_[pulse.poles.real * pulse.sampling.period, np.log1p(np.maximum(own, LEAST_SQUARE)) / 2]
         at, o = base[rows], offset[rows]
         ratio = o / (1 + shifts[at])
         log_radius[rows] = start[at] + np.log1p(2 * ratio.real + abs(ratio) ** 2) / 2
-        z = z.copy()
         z[rows] = (1 + shifts[at]) + o
         log_radius[abs(log_radius) * abs(z) < error] = 0.0
         mode = pulse.mode[abs(z[:, None] - pulse.multipliers).argmin(axis=1)]
@@ -401,7 +351,7 @@ class OfLoop:
     @property
     def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller."""
-        return controller(self.loop.given, self.loop.plant.arm)
+        return self.loop.controller
 
     @property
     def sampling(self) -> Annotated[Sampling, Quantity(flat=True, help="sampling period and delay of the loop")]:
@@ -419,8 +369,8 @@ def _nearest(loop: Sampled, delta: Complex) -> Whole:
 
     The integrals of a hub that cannot drift are not among them, as F has no digits next to them.
     """
-    away = abs(delta[:, None] - loop.open_loop)
-    away[:, abs(1 + loop.open_loop) <= FADED_RADIUS] = np.inf
+    away = abs(delta[:, None] - loop.rig.open_loop)
+    away[:, abs(1 + loop.rig.open_loop) <= FADED_RADIUS] = np.inf
     if not loop.plant.rigid.any():
         away[:, loop.pulse.poles.size - 1] = np.inf
     return np.asarray(away.argmin(axis=1))
@@ -447,25 +397,20 @@ def _settled(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tuple[
                 break
         offset[abs(offset) <= UNMOVED] = 0.0
         f, slope, _ = _weierstrass(base, offset, rows, loop)
-        radius = _radius(f, slope, base, offset, rows, loop)
-    own = np.where(base[rows] < loop.pulse.poles.size, 0.0, MACHINE_EPS * abs(loop.open_loop[base[rows]]))
+        radius = offset.size * (abs(f) + loop.rounding(base[rows], offset[rows])) / abs(slope)
+    own = np.where(base[rows] < loop.pulse.poles.size, 0.0, MACHINE_EPS * abs(loop.rig.open_loop[base[rows]]))
     error[rows] = np.nan_to_num(radius, posinf=0.0) + own  # of a pole that the loop does not move 0/0
     return offset, error
-
-
-def _radius(f: Complex, slope: Complex, base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> Real:
-    """The radii of Smith's discs around some roots, with the rounding of F."""
-    return np.asarray(offset.size * (abs(f) + loop.rounding(base[rows], offset[rows])) / abs(slope))
 
 
 def _weierstrass(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tuple[Complex, Complex, Complex]:
     """At some roots o F and o F/W, and their distances from all roots, 1 from themselves."""
     pulse = loop.pulse
     b, o = base[rows], offset[rows]
-    one = loop.open_loop[b]
+    one = loop.rig.open_loop[b]
     known = np.r_[pulse.shifts[:-1], np.full(pulse.sampling.whole_delay + 1, -1.0)]  # the other poles are at z = 1
     poles = np.r_[known, np.zeros(max(0, offset.size - known.size - loop.in_z.poles.size))]
-    apart = (one[:, None] - loop.open_loop[base]) + (o[:, None] - offset)
+    apart = (one[:, None] - loop.rig.open_loop[base]) + (o[:, None] - offset)
     apart[np.arange(rows.size), rows] = 1.0
     away = (one[:, None] - poles) + o[:, None]
     of_plant, own = b < pulse.poles.size, np.where(b == pulse.poles.size - 1, known.size, b)
@@ -473,7 +418,7 @@ def _weierstrass(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tu
     away[listed, own[listed]] = 1.0  # F is times the distance from that pole
     of_poles, others = (apart[:, : poles.size] / away).prod(axis=1), apart[:, poles.size :].prod(axis=1)
     slope = np.where(of_plant & ~listed, o, 1.0) * of_poles * others
-    return loop.row @ loop.terms(1 + (one + o), b, o), slope, apart
+    return loop.row @ loop.rig.terms(1 + (one + o), b, o), slope, apart
 
 
 def sampled_loop(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int = USUAL_MODES) -> Sampled:
@@ -489,7 +434,7 @@ def sampled_loop(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: in
         weights[place] = value
         law, acting = (each.having(name, 1.0) for each in (law, acting))
     in_z = law_in_z(law, acting, chain)
-    return Sampled(sensed_plant(arm, chain, in_z.signals, count), chain, law, in_z, tuple(weights))
+    return Sampled(SampledRig(sensed_plant(arm, chain, in_z.signals, count), chain, in_z), law, tuple(weights))
 
 
 def resized(loop: Sampled, count: int) -> Sampled:

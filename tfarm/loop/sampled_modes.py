@@ -29,15 +29,11 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
 FOLLOWING_STEPS = 24  # of the continuation from zero gain
-FIRST_SCALE = 1e-6  # of the gains: there each pole is still at that of the plant
 LOOPS_KEPT = 4  # whose origins are kept: memory against time, of no effect on a result
 SAMPLED_LOCUS_VALUES = 61  # of a gain along its locus, to begin with
-BRANCH_ROUNDS = 24  # of halving the steps where a branch bends, at most
-IMAGINARY_ROUNDING = 1e-12  # imaginary part of a real z: rounding
 RIM = 1.12  # radius up to which the z-plane is shown
 DRAWN_RADIUS = 1.2 * RIM  # and up to which a branch is drawn, so that its line runs out of the picture
 RATE_DECADES, STRONGER = 3, 10.0  # of the rate gain: below the end of its locus, and above its own value
-LISTED_DECAY = -20.0  # modes that lose more than this in ln|a| between two samples are not listed
 
 
 @dataclass(frozen=True)
@@ -80,7 +76,7 @@ class ModeTable:
 def first_order(loop: Sampled, poles: Whole) -> Real:
     """Change of ln|z| (parts, poles) to first order by each part of the law alone, at open-loop poles by number."""
     z = loop.pulse.multipliers[poles]
-    _, *rows = loop.terms(z, poles, np.zeros(z.size))
+    _, *rows = loop.rig.terms(z, poles, np.zeros(z.size))
     whole = (loop.pulse.shifts[poles][:, None] - loop.in_z.poles).prod(axis=1)
     return np.asarray(-(np.array(loop.weights)[:, None] * rows / (z * whole)).real) + 0.0  # -0.0 where a weight is 0
 
@@ -89,7 +85,8 @@ def mode_table(loop: Sampled) -> ModeTable:
     """Return the modes of a loop one by one."""
     pulse = loop.pulse
     own = np.asarray(pulse.poles.real * pulse.sampling.period, dtype=float)
-    upper = np.nonzero((pulse.poles.imag > 0) & (pulse.mode > 0) & (own > LISTED_DECAY))[0]
+    # -20.0: modes that lose more than this in ln|a| between two samples are not listed
+    upper = np.nonzero((pulse.poles.imag > 0) & (pulse.mode > 0) & (own > -20.0))[0]
     upper = upper[np.argsort(pulse.mode[upper])]
     index = pulse.mode[upper]
     table, T = modes(pulse.plant.arm, max(1, int(index.max(initial=1)))), pulse.sampling.period
@@ -137,7 +134,8 @@ def origins(loop: Sampled) -> NDArray[np.int64]:
     """
     open_loop = np.r_[loop.pulse.multipliers, 1 + loop.in_z.poles]
     labels = np.flatnonzero(np.r_[loop.pulse.poles != 0, loop.in_z.poles + 1 != 0])
-    scales = np.r_[FIRST_SCALE, np.arange(1, FOLLOWING_STEPS) / FOLLOWING_STEPS, 1.0]
+    # 1e-6 of the gains: there each pole is still at that of the plant
+    scales = np.r_[1e-6, np.arange(1, FOLLOWING_STEPS) / FOLLOWING_STEPS, 1.0]
     first, *others = (loop.times(scale).eigenvalues for scale in scales[:-1].tolist())
     poles = [first[_matched(open_loop[labels], first)], *others, loop.eigenvalues]
     origin = np.full(loop.eigenvalues.size, -1)
@@ -215,13 +213,15 @@ def sampled_locus(loop: Sampled, gain: str, values: Real) -> SampledLocus:
     """Return the locus of a number at these values, at that of the loop, and between where a branch turns."""
 
     def poles(value: float) -> Complex:
-        z = loop.having(**{gain: value}).poles.z
-        return np.where(abs(z.imag) <= IMAGINARY_ROUNDING, z.real, z)
+        z = loop.having(gain, value).poles.z
+        # 1e-12: imaginary part of a real z: rounding
+        return np.where(abs(z.imag) <= 1e-12, z.real, z)
 
     known: dict[float, Complex] = {}
     own = loop.number(gain)
     wanted = np.union1d(values, own) if values[0] < own < values[-1] else values
-    for _ in range(BRANCH_ROUNDS):
+    # 24 of halving the steps where a branch bends, at most
+    for _ in range(24):
         known |= {value: poles(value) for value in wanted.tolist() if value not in known}
         values = np.array(sorted(known))
         z = followed_branches([known[value] for value in values.tolist()], values)
@@ -229,7 +229,7 @@ def sampled_locus(loop: Sampled, gain: str, values: Real) -> SampledLocus:
         if not bent.any():
             break
         wanted = (values[:-1] + values[1:])[bent] / 2
-    first = loop.having(**{gain: float(values[0])})
+    first = loop.having(gain, float(values[0]))
     origin = origins(first)
     modes = np.r_[loop.pulse.mode, np.zeros(loop.in_z.poles.size, np.int64)]
     mode = np.where(origin < 0, 0, modes[origin])

@@ -6,16 +6,20 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, NamedTuple
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, AnyLaw, Arm, arm_and_law, as_law, cancelled
+import numpy as np
+
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, AnyLaw, Arm, arm_and_law, as_law
 from tfarm.arm.chain import Chain, Sampling
 from tfarm.arm.checks import whole
 from tfarm.arm.stages import Consumer
+from tfarm.arrays import Real
 from tfarm.crossing import Window
 from tfarm.dsp.discretise import RULE, rule_in_words
 from tfarm.dsp.stages import admit, not_covered
 from tfarm.errors import ConvergenceError
 from tfarm.loop.circle import Band, complete_band
-from tfarm.loop.circle_crossings import FACTOR, around, windows_of
+from tfarm.loop.circle_crossings import FACTOR, around, stable_windows, windows_of
+from tfarm.loop.curve import LoopCurve, LoopVerdict, next_limits
 from tfarm.loop.edges import (
     DelayMargin,
     Figure,
@@ -28,10 +32,12 @@ from tfarm.loop.edges import (
     shown_windows,
     whole_loop,
 )
+from tfarm.loop.loop_margins import LoopMargins, PhaseCrossover
 from tfarm.loop.sampled import OfLoop, Sampled, resized, sampled_loop
 from tfarm.loop.sampled_modes import ModeTable, dominant, mode_table
 from tfarm.records import record
 from tfarm.schema import Quantity
+from tfarm.spectrum import modes
 
 SAMPLED_LOOP = Consumer(
     "sampled loop",
@@ -52,7 +58,7 @@ DEFAULT_PERIOD, LAWS_PERIOD = "tfarm's default period", "the controller's period
 
 @dataclass(frozen=True)
 @record
-class Verdict(OfLoop):
+class Verdict(OfLoop, LoopVerdict):
     """Whether a sampled loop is stable, without z = 1 of a free hub angle.
 
     `band` is the part of the arm for which it is certified (`loop.circle`).  Without one, as at C = 0, the verdict
@@ -64,10 +70,12 @@ class Verdict(OfLoop):
     band: Band | None = None
     is_converged: bool = False
 
+    consumer = SAMPLED_LOOP
+
     @property
     def rule(self) -> Annotated[str, RULE]:
         """The discretisation of the law."""
-        return rule_in_words(self.loop.given)
+        return rule_in_words(self.loop.law)
 
     @property
     def is_settled(self) -> Annotated[bool, Quantity(key="certified",
@@ -136,21 +144,65 @@ class Verdict(OfLoop):
     def holds_for(self) -> Annotated[str, Quantity("certainty", key="certainty",
             help="frequency range or number of modes for which the verdict was shown")]:  # fmt: skip
         """The modes for which the verdict is certified."""
-        if self.band is None:
-            shown = "converged for" if self.is_converged else "model of"
-            return f"{shown} the first {self.modes_used} modes, not determined beyond{self.omitted}"
-        return f"certified up to {self.band.top:.3g} rad/s, not determined beyond{self.omitted}"
+        shown = f"{'converged for' if self.is_converged else 'model of'} the first {self.modes_used} modes"
+        shown = shown if self.band is None else f"certified up to {self.band.top:.3g} rad/s"
+        return f"{shown}, not determined beyond{not_covered(self.consumer, self.loop.chain)}"
 
     @property
-    def omitted(self) -> str:
-        """The keys of the chain that the verdict does not cover, as the end of its certainty."""
-        return not_covered(SAMPLED_LOOP, self.loop.chain)
+    def range_words(self) -> str:
+        """The same in short."""
+        if self.band is not None:
+            return f"certified to {self.band.top:.3g} rad/s"
+        return f"{'converged' if self.is_converged else 'approximate'}, first {self.modes_used} modes"
 
     @property
     def time_constant(self) -> Annotated[float | None, Quantity("dominant time constant", "s",
             help="time constant of the pole of largest |z|, negative of a growing one")]:  # fmt: skip
         """Time constant of the dominant pole, below 0 where it grows."""
         return -self.loop.chain.sampling.period / self.log_radius if self.log_radius else None
+
+    @property
+    def ringing(self) -> list[tuple[int, complex]]:
+        """The oscillating poles s = ln(z)/T by mode, each at the frequency that is nearest to that of its mode."""
+        return [*unaliased_poles(self.full).items()]
+
+    @property
+    def frequencies(self) -> Real:
+        """The grid of the circle, w = q/T."""
+        return self.full.rig.grid.q / self.full.period
+
+    @property
+    def margins_end(self) -> float:
+        """Half the sampling rate."""
+        return math.pi / self.full.period
+
+    @cached_property
+    def factors(self) -> list[Window]:
+        """Every stability interval of a factor on the whole law, with the modes of the verdict."""
+        return stable_windows(self.loop, FACTOR)
+
+    def gain_limits(self, by_phase: tuple[PhaseCrossover, ...]) -> tuple[float, float]:
+        """Return the stability interval of that factor, or what the phase crossovers show."""
+        return around(self.factors, 1.0) or next_limits(t for _, t in by_phase)
+
+
+def unaliased_poles(loop: Sampled) -> dict[int, complex]:
+    """Return the poles s = ln(z)/T [1/s], Im s > 0, by mode, each at the frequency nearest to that of its mode.
+
+    Of several poles of a mode it is the least damped one.
+    """
+    poles, table = loop.poles, modes(loop.arm, max(1, int(loop.poles.mode.max(initial=1))))
+    rounding = 1e-9 * abs(poles.z)
+    # a real z < 0 oscillates at half the sampling rate, one > 0 never does, whatever rounding leaves of Im z
+    upper = (poles.z.imag > rounding) | ((poles.z.real < 0) & (abs(poles.z.imag) <= rounding))
+    mode, q = poles.mode[upper], abs(np.angle(poles.z[upper]))
+    own = np.where(mode > 0, np.interp(mode, table.index, table.natural_frequency) * loop.period, q)
+    turns = 2 * math.pi * np.round((own + [[-1], [1]] * q) / (2 * math.pi))
+    aliases = abs([[1], [-1]] * q + turns)
+    nearest = abs(aliases - own).argmin(axis=0)
+    s = (poles.log_radius[upper] + 1j * aliases[nearest, np.arange(q.size)]) / loop.period
+    order = np.argsort(s.real / abs(s))
+    return dict(zip(mode[order].tolist(), s[order].tolist(), strict=True))
 
 
 def sampled_verdict(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | None = None) -> Verdict:
@@ -204,13 +256,23 @@ class Analysis:
     verdict: Annotated[Verdict, Quantity(flat=True, help="stability of the loop")]
     damping_modes: int = UNDAMPED_MODES
 
+    @property
+    def curve(self) -> LoopCurve:
+        """The loop function on a grid that resolves it."""
+        return self.verdict.curve
+
+    @property
+    def in_band(self) -> LoopMargins | None:
+        """The margins up to half the sampling rate; None unless the loop is stable."""
+        return self.verdict.in_band
+
     @cached_property
     def stability_intervals(self) -> Annotated[list[SampledNumber], Quantity("stability intervals", first=True,
             help="stability intervals of each number of the controller, the others constant")]:  # fmt: skip
         """One row for each gain at the hub, or number of another law, the others constant."""
         if not self.loop.is_of_gains:
-            found = {name: each for name, each in self.plain_windows.items() if name != FACTOR}
-            values = {name: self.loop.number(name) for name in found}
+            values = {name: value for name, value in self.loop.numbers.items() if value}
+            found = windows_of(self.loop, [*values]) if values else {}
             return [SampledNumber(n, values[n], each, around(each, values[n])) for n, each in found.items()]
         return [SampledNumber(n, self.loop.number(n), each, self.interval(n)) for n, each in self.shown.items()]
 
@@ -243,7 +305,7 @@ class Analysis:
     def unfiltered_signals(self) -> Annotated[list[str], Quantity(
             help="signals of the controller without an analog anti-alias filter")]:  # fmt: skip
         """Signals without an anti-alias filter."""
-        return [name for name, analog in zip(self.loop.in_z.signals, self.loop.analog, strict=True) if not analog]
+        return [name for name, analog in zip(self.loop.in_z.signals, self.loop.rig.analog, strict=True) if not analog]
 
     @property
     def loop(self) -> Sampled:
@@ -312,35 +374,23 @@ class Analysis:
         """The same with a test of its digits, which takes as long as the search."""
         return damping_limit(self.loop, self.damping_modes) if self.loop.is_of_gains else None
 
-    @cached_property
-    def plain_windows(self) -> Mapping[str, list[Window]]:
-        """Stability intervals with the modes of the verdict: of a factor on the law, and of the numbers of no gains."""
-        loop = self.loop
-        numbers = () if loop.is_of_gains else (name for name in loop.law.part_gains if loop.number(name))
-        return windows_of(loop, [*numbers, FACTOR])
-
-    @property
-    def factors(self) -> list[Window]:
-        """Every stability interval of a factor on the whole law, with the modes of the verdict."""
-        return self.plain_windows[FACTOR]
-
     @property
     def stable_gain_factors(self) -> Annotated[list[Window] | None, Quantity("stable factors on the controller",
             help="all intervals of a factor on the whole controller in which the loop is stable")]:  # fmt: skip
         """All intervals, of a controller that is more than gains at the hub."""
-        return None if self.loop.is_of_gains else self.factors
+        return None if self.loop.is_of_gains else self.verdict.factors
 
     @property
     def gain_factors(self) -> Annotated[Window | None, Quantity("gain margin, factors down and up",
             help="interval around 1 of a factor on the whole controller in which the loop is stable")]:  # fmt: skip
         """The stability interval around 1 of a factor on the law; None unless the loop is stable."""
-        return around(self.factors, 1.0)
+        return around(self.verdict.factors, 1.0)
 
     @property
     def warnings(self) -> Annotated[tuple[str, ...], Quantity("warnings",
             help="unstable poles of the controller that its own zeros cancel")]:  # fmt: skip
         """Unstable poles of the law that its own zeros cancel."""
-        return cancelled(self.loop.given)
+        return self.loop.warnings
 
 
 def sampled(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | None = None) -> Analysis:

@@ -20,6 +20,7 @@ Spillover: a law is designed on a model of a few modes, and may destabilise a mo
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -28,6 +29,7 @@ from numpy.typing import NDArray
 from tfarm.arm import AnyLaw, Arm, arm_and_law, as_law
 from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
+from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError, require
 from tfarm.records import record
@@ -35,8 +37,10 @@ from tfarm.reduced.modal import modal_model, sensed_model
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes, modes_below
 
-from .loop import MOST_BAND_MODES, QUIET_REACH, Loop, band_of, quiet_places
-from .poles import Poles, box_of, poles_below, poles_of_model
+from .continuous import MOST_BAND_MODES, QUIET_REACH, ContinuousLoop, band_of, grid, quiet_places
+from .curve import LoopVerdict, next_limits
+from .loop_margins import PhaseCrossover
+from .poles import HUB, Poles, box_of, poles_below, poles_by_mode, poles_of_model
 from .theorem import GIVES, TAKES, Theorem, theorem_of
 
 LEAST_BAND_MODES = 12  # flexible modes in the band at C = 0, and at least
@@ -55,6 +59,15 @@ REST_SHARE = 1e-7  # of w1: poles at 0 come out as small
 UNDAMPED_SHARE = 1e-9  # of its size: largest real part of a pole that no model damps
 
 
+CONTINUOUS = Consumer(
+    "continuous-time column",
+    acts=("law", "hold", "hub damping", "plant"),
+    named=("torque limit",),
+    none=(
+        "reference", "anti-alias filter", "encoder", "hub rate", "amplifier steps", "amplifier range", "arithmetic",
+        "DAC steps", "DAC range", "delay", "volts",
+    ),
+)  # fmt: skip
 FIRST_MODE = Quantity("lowest destabilised mode", help="of the exact loop; 0: a pole below the first mode")
 SHOWN_FROM = Quantity("design models unstable from (modes)", key="shown_from_modes", help="as are all larger ones")
 DELAYED = "a delay without any damping destabilises infinitely many modes"
@@ -68,13 +81,13 @@ KNOWN_BEYOND = Quantity(
 
 @dataclass(frozen=True)
 @record
-class Stability:
+class Stability(LoopVerdict):
     """Verdict on a loop, "stable", "marginal" or "unstable", its poles in the band, and its stability beyond (`tail`).
 
     Where `is_known_beyond` is false the verdict is that of the band alone.
     """
 
-    loop: Annotated[Loop, Quantity(flat=True)]
+    loop: Annotated[ContinuousLoop, Quantity(flat=True)]
     verdict: Annotated[str, Quantity("stability", help="stable, marginal or unstable; the pole of a free hub left out")]
     unstable_roots: Annotated[int, Quantity("unstable poles", help="in the frequency range")]
     unstable_roots_infinite: Annotated[bool, Quantity(help="infinitely many poles beyond the range are unstable")]
@@ -82,6 +95,8 @@ class Stability:
     tail: Annotated[str, Quantity("beyond the range", key="beyond", help="what decides the poles of higher frequency")]
     poles: Poles
     is_known_beyond: Annotated[bool, KNOWN_BEYOND] = True
+
+    consumer = CONTINUOUS
 
     @property
     def spectral_abscissa(self) -> Annotated[float, Quantity("spectral abscissa", "1/s", 6, "largest Re s in range")]:
@@ -98,6 +113,69 @@ class Stability:
         """Whether every pole but that of the free hub angle lies left of the axis."""
         return self.verdict == "stable"
 
+    @property
+    def full(self) -> ContinuousLoop:
+        """The loop, which has every mode."""
+        return self.loop
+
+    @property
+    def word(self) -> str:
+        """The verdict."""
+        return self.verdict
+
+    @property
+    def range_words(self) -> str:
+        """The range in which poles are counted, and what is known beyond."""
+        known = ", small gain beyond" if self.tail == SMALL_GAIN else ", theorem beyond" if self.is_known_beyond else ""
+        return f"converged to {self.band:.4g} rad/s{known}"
+
+    @property
+    def time_constant(self) -> float | None:
+        """Time constant [s] of the rightmost pole in range."""
+        return -1 / self.spectral_abscissa if self.spectral_abscissa else None
+
+    @property
+    def ringing(self) -> list[tuple[int, complex]]:
+        """The oscillating poles by mode."""
+        moving, table = self.poles.moving, modes(self.loop.arm, up_to=self.band)
+        own = dict(zip(table.index.tolist(), (1j * table.natural_frequency).tolist(), strict=True))
+        oscillating = moving[moving.imag > 0]
+        by_mode = poles_by_mode(oscillating, {n: s for n, s in own.items() if n})
+        others = oscillating[~np.isin(oscillating, list(by_mode.values()))]
+        return [*by_mode.items(), *((HUB, s) for s in others.tolist())]
+
+    @property
+    def margins_end(self) -> float:
+        """The end of the verdict's range."""
+        return self.band
+
+    @cached_property
+    def frequencies(self) -> Real:
+        """The grid of the arm, and points about every pole of the loop and of its law at its distance from the axis.
+
+        |1 + L| dips there, and not where the arm's own functions are steep; the less damping, the narrower the dip.
+        """
+        omega, poles = np.asarray(grid(self.loop.arm, self.band)), np.r_[self.poles.values, self.loop.law.poles]
+        near = np.geomspace(0.05, 20.0, 12)
+        close = poles.imag[:, None] + abs(poles.real[:, None]) * np.r_[-near, 0.0, near]
+        # |L| may cross 1 down to a twentieth of the slowest pole
+        slowest = abs(self.poles.moving).min(initial=omega[0])
+        slow = np.geomspace(0.05 * slowest, omega[0], 400) if slowest < omega[0] else omega[:0]
+        return np.unique(np.r_[omega, close[(close > 0) & (close < omega[-1])], slow])
+
+    def gain_limits(self, by_phase: tuple[PhaseCrossover, ...]) -> tuple[float, float]:
+        """Return the factors on all of the law at which a pole reaches the axis, from where L < 0.
+
+        Without damping all modes may reach it at one factor, where rounding alone decides whether L < 0.  There the
+        factor follows from a theorem.
+        """
+        gains, arm = self.loop.gains, self.loop.arm
+        if gains is None or not arm.loses_at_hub_alone or theorem_of(self.loop).energy is None:
+            return next_limits(t for _, t in by_phase)
+        found = [t for w, t in by_phase if w == 0]
+        found += [arm.input_per_torque / gains.K2] if gains.K2 else []
+        return next_limits(found + ([-arm.rate_loss / gains.K1] if gains.K1 and arm.rate_loss else []))
+
 
 def stability(arm: Arm, law: AnyLaw, band: float | None = None) -> Stability:
     """Return the verdict on the loop of an arm and a law.  `band` [rad/s] is chosen if it is not given.
@@ -105,10 +183,10 @@ def stability(arm: Arm, law: AnyLaw, band: float | None = None) -> Stability:
     Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted, and where with damping
     one is on the axis to working precision.
     """
-    return verdict_on(Loop(arm, as_law(law)), band)
+    return verdict_on(ContinuousLoop(arm, as_law(law)), band)
 
 
-def verdict_on(loop: Loop, band: float | None = None) -> Stability:
+def verdict_on(loop: ContinuousLoop, band: float | None = None) -> Stability:
     """Return the verdict on a loop, as `stability`."""
     theorem = theorem_of(loop)
     height, quiet = (band, False) if band is not None else band_of_loop(loop, theorem)
@@ -162,7 +240,7 @@ def hub_shares(arm: Arm, up_to: float) -> Real:
     return np.array([b * scale / k, b * arm.hub_side_inertia * omega**2 * scale / (EI * k**2)])
 
 
-def band_of_loop(loop: Loop, theorem: Theorem | None = None) -> tuple[float, bool]:
+def band_of_loop(loop: ContinuousLoop, theorem: Theorem | None = None) -> tuple[float, bool]:
     """The band [rad/s] in which poles are computed, and whether small gain holds beyond it (never without damping)."""
     theorem, arm, own = theorem or theorem_of(loop), loop.arm, loop.law.poles
     ringing = own[own.real > -DULL * abs(own)]
@@ -179,13 +257,13 @@ def band_of_loop(loop: Loop, theorem: Theorem | None = None) -> tuple[float, boo
     return max(least, band / WIDENED) if loop.law.is_static else least, False
 
 
-def band_of_family(loops: Iterable[Loop]) -> tuple[float, bool]:
+def band_of_family(loops: Iterable[ContinuousLoop]) -> tuple[float, bool]:
     """A band [rad/s] for all these loops, and whether small gain holds beyond it for all."""
     bands, quiet = zip(*map(band_of_loop, loops), strict=True)
     return max(bands), all(quiet)
 
 
-def is_quiet(loop: Loop, band: float) -> bool:
+def is_quiet(loop: ContinuousLoop, band: float) -> bool:
     """Whether small gain decides every pole beyond a band.
 
     Not determined for a rig with an elastic segment: its resonances become ever narrower, and pass between any points
@@ -194,7 +272,7 @@ def is_quiet(loop: Loop, band: float) -> bool:
     return loop.arm.least_damping > 0 and has_fallen(loop, band)
 
 
-def has_fallen(loop: Loop, band: float) -> bool:
+def has_fallen(loop: ContinuousLoop, band: float) -> bool:
     """Whether 1 + L has no zero with Im s > band right of the axis, by |L| < 1/2 on the edges of that region.
 
     L is evaluated on two decades of the axis, where |L| falls, with the natural frequencies between, and on the upper
@@ -209,7 +287,7 @@ def has_fallen(loop: Loop, band: float) -> bool:
     return bool(abs(loop.loop_function(edge)).max() < QUIET)
 
 
-def is_known_without(loop: Loop, name: str) -> bool:
+def is_known_without(loop: ContinuousLoop, name: str) -> bool:
     """Whether poles beyond some band are known of this law, and of any nearer to it, once a leading coefficient is 0.
 
     Else high modes become unstable as it goes to 0, and their poles come to a band from above: the counts on one side
@@ -324,7 +402,7 @@ def spill(arm: Arm, law: AnyLaw, most: int = USUAL_SPILL_MODES) -> Spill:
     return Spill(verdict, numbers, np.array(unstable), np.array(rightmost))
 
 
-def _bare_models(loop: Loop, most: int) -> list[Matrices]:
+def _bare_models(loop: ContinuousLoop, most: int) -> list[Matrices]:
     """Models of 1 to `most` flexible modes without static remainder, each with the poles of its modes alone.
 
     They are cut from the largest.  A search of more modes of a strongly damped arm may leave poles without a mode,

@@ -49,7 +49,7 @@ from tfarm.records import record
 from tfarm.response import transfer
 from tfarm.schema import Quantity
 
-from .loop import Loop
+from .continuous import ContinuousLoop
 
 if TYPE_CHECKING:
     Poly = Any  # of sympy, over the rationals: it comes without types, and is imported where it is used
@@ -109,7 +109,7 @@ def absorbed(arm: Arm, law: Law) -> tuple[float, Law] | None:
     return share, replace(law, parts=tuple(rest), references=())
 
 
-def theorem_of(loop: Loop) -> Theorem:
+def theorem_of(loop: ContinuousLoop) -> Theorem:
     """Return the theorem that decides the stability of every mode of a loop."""
     arm, parts = loop.arm, absorbed(loop.arm, loop.law)
     if parts is None or (arm.input_lags and loop.feeds_back):
@@ -130,7 +130,7 @@ def theorem_of(loop: Loop) -> Theorem:
     return NO_THEOREM
 
 
-def signs_of_loop(loop: Loop) -> Signs:
+def signs_of_loop(loop: ContinuousLoop) -> Signs:
     """The sign of the law of a loop, the hub's friction included; none behind an inductance."""
     if loop.arm.input_lags:
         return Signs("", "the torque lags behind the input, through an inductance")
@@ -213,7 +213,7 @@ class Lyapunov:
     the law is "unproven", which alone does not make it unstable.  `reason` is one sentence.
     """
 
-    loop: Loop
+    loop: ContinuousLoop
     proven: Annotated[bool, Quantity("stability proven", help="no pole in the right half-plane, as V never grows")]
     a1_over_a2: Annotated[float | None, Quantity("weights a1/a2", help="1 - K2, of the energies in V")]
     kind: Literal["dissipated", "conserved", "unproven"]
@@ -225,7 +225,7 @@ def lyapunov(arm: Arm, law: HubFeedback) -> Lyapunov:
 
     V_t = -a2 K1 theta_t^2 - a1 C integral(E I phi_xt^2) with a1/a2 = 1 - K2, where that has a sign.
     """
-    loop, C = Loop(arm, as_law(law)), arm.damping
+    loop, C = ContinuousLoop(arm, as_law(law)), arm.damping
     weight, K1 = 1.0 - law.K2 / arm.input_per_torque, law.K1 + arm.rate_loss
     least = 0.0  # of Kp: below 0 where the tip is held, and gives the hub a static stiffness
     if law.Kp < 0 and not arm.has_rigid_mode:

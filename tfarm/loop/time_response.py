@@ -38,8 +38,8 @@ from tfarm.records import record
 from tfarm.response.signals import Signals
 from tfarm.spectrum.table import first_frequency
 
+from .continuous import FAR_RIGHT, ContinuousLoop, band_of
 from .inversion import POINTS, Inversion, inverted
-from .loop import FAR_RIGHT, Loop, band_of
 from .poles import Poles, poles_below
 
 ACTUATOR, TORQUE = "actuator", "torque"  # the input of the arm as a place of excitation, and as a signal
@@ -212,7 +212,7 @@ def _of_both(bends: Real) -> Real:
     return np.maximum(np.insert(bends, 0, 0.0, axis=1), np.insert(bends, bends.shape[1], 0.0, axis=1))
 
 
-def usual_poles(loop: Loop, count: int = USUAL_COUNT) -> Poles:
+def usual_poles(loop: ContinuousLoop, count: int = USUAL_COUNT) -> Poles:
     """Return the poles of a response: those below a frequency with `count` flexible modes, complete in their box.
 
     Raises ConvergenceError where they are not complete.
@@ -247,7 +247,7 @@ class Transforms:
     without the factor e^{-s tau} of its delay.
     """
 
-    loop: Loop
+    loop: ContinuousLoop
     names: tuple[str, ...]
     excitation: Excitation
     acts: bool

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -17,30 +18,26 @@ import numpy as np
 
 from tfarm.arm import LISTED, NAMES, RATE_GAIN, AnyLaw, Arm, Law, arm_and_law, full_law, unit_of
 from tfarm.arrays import Complex, Real, Whole
+from tfarm.crossing import Line
 from tfarm.errors import ConvergenceError, require
-from tfarm.exact.characteristic import Analytic, LoopParts
+from tfarm.exact.characteristic import Analytic
 from tfarm.exact.outputs import OUTPUTS
+from tfarm.loop.continuous import NEAREST_TO_ORIGIN, ORDER_READ_AT, ContinuousLoop, band_of, by_differences
+from tfarm.loop.lines import LawTerms
+from tfarm.loop.poles import box_of, poles_below, slow_poles
 from tfarm.records import record
-from tfarm.spectrum.box import Box, winding_number, zeros_in_box
+from tfarm.spectrum.box import Box, winding_number
 from tfarm.spectrum.following import settled
 from tfarm.spectrum.table import first_frequency
-
-from .lines import Place, parts_of, place_of
-from .loop import NEAREST_TO_ORIGIN, ORDER_READ_AT, Loop, band_of, by_differences
-from .poles import SLOW_SHARE, box_of, slow_poles, starting_points
 
 OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}  # units, as of the arm's below
 ARM_PARAMETERS = {
     "payload_mass": "kg", "payload_inertia": "kg m^2", "hub_inertia": "kg m^2", "length": "m", "damping": "s"
 }  # fmt: skip
-HEIGHTS = (1.0, 1.013, 1.031, 1.057, 0.985, 1.09)  # of the box, until no pole is on its edge at the first value
 
-SERIES_RADIUS, SERIES_POINTS = 0.2, 16  # of the first frequency: where a power series next to 0 is read off
-NO_PART = 1e-9  # of a pole's size: a smaller imaginary part is rounding
 EMPTY = Box(0.0, 0.0, 0.0, 0.0)
 FACTORS = {"all": "factor on all gains", "gain": "factor on the controller"}  # labels of these numbers
 Title = tuple[str, str]  # label and unit
-ARMS_KEPT = 200  # at values needed again: memory against time, of no effect on a result
 
 
 @dataclass(frozen=True)
@@ -109,24 +106,25 @@ class Varied:
         """The law where the number has that value."""
         return self.full if self.is_of_arm else self.full.having("gain" if self.vary == "all" else self.vary, value)
 
-    def at(self, value: float) -> Loop:
+    def at(self, value: float) -> ContinuousLoop:
         """The loop where the number has that value."""
         return self._of_arm(value) if self.is_of_arm else self.first.under(self.law_at(value))
 
+    # arms at values that are needed again
     @cached_property
-    def _of_arm(self) -> Callable[[float], Loop]:
+    def _of_arm(self) -> Callable[[float], ContinuousLoop]:
         """The same of a number of the arm: of the last values it is kept."""
 
-        @lru_cache(ARMS_KEPT)
-        def of_arm(value: float) -> Loop:
-            return Loop(arm_and_law(self.arm.having(**{self.vary: value}), self.law)[0], self.full)
+        @lru_cache(200)
+        def of_arm(value: float) -> ContinuousLoop:
+            return ContinuousLoop(arm_and_law(self.arm.having(**{self.vary: value}), self.law)[0], self.full)
 
         return of_arm
 
     @cached_property
-    def first(self) -> Loop:
+    def first(self) -> ContinuousLoop:
         """The loop at the first value."""
-        return self.at(self.start) if self.is_of_arm else Loop(self.arm, self.law_at(self.start))
+        return self.at(self.start) if self.is_of_arm else ContinuousLoop(self.arm, self.law_at(self.start))
 
     @cached_property
     def pinned(self) -> int:
@@ -139,9 +137,11 @@ class Varied:
         return self.start, self.start + (self.stop - self.start) / math.e, self.stop
 
     @cached_property
-    def place(self) -> Place:
-        """The place of the number in the law."""
-        return place_of(self.full, "gain" if self.vary == "all" else self.vary)
+    def terms(self) -> tuple[LawTerms, Line]:
+        """The terms of D, and their weights along the number of the law."""
+        name = "gain" if self.vary in ("all", "delay") else self.vary
+        terms = LawTerms(self.first.signals, self.full, [name])
+        return terms, terms.line(name)
 
     def function(self, s: Complex, values: Real) -> Analytic:
         """D/s^n at s (n,), each at a value of its own (n,), n = `pinned`, with slopes from differences."""
@@ -156,11 +156,11 @@ class Varied:
                 here = values == value
                 found[:, :, here] = self.at(float(value)).characteristic(s[:, here])
             return found[0], found[1]
-        rig = self.first.signals.parts(s)
-        parts = parts_of(self.full, rig, s)
-        if self.vary == "delay":
-            return parts._replace(f=parts.f * np.exp(-s * (values - self.full.delay))).whole, rig.scale
-        return parts.having(self.place, values).whole, rig.scale
+        (terms, line), rig = self.terms, self.first.signals.parts(s)
+        rows = terms.of(s, rig)
+        others, alone = (np.tensordot(each, rows, 1) for each in (line.others, line.alone))
+        share = np.exp(-s * (values - self.full.delay)) if self.vary == "delay" else values
+        return others + share * alone, rig.scale
 
     @cached_property
     def frequency(self) -> float:
@@ -186,26 +186,15 @@ class Varied:
         found = self.function(s, np.full(2, value))
         return float((found.value * np.exp(1j * found.scale.imag)).real.mean())
 
-    def on_axis(self, omega: Real) -> tuple[Complex, Complex]:
-        """A and B of D = A + t B at s = i omega (n,), of a rig without losses, where D is linear in the number.
-
-        There drive and numerators are real, or imaginary with an odd power of s: the other part is rounding, and 0.
-        """
-        s, odd = 1j * omega, np.array([[each.power % 2] for each in self.first.signals.outputs])
-        drive, numerators, scale = self.first.signals.parts(s)
-        turn = np.exp(1j * scale.imag)
-        drive, numerators = (drive * turn).real + 0j, numerators * turn
-        numerators = np.where(odd, 1j * numerators.imag, numerators.real)
-        return parts_of(self.full, LoopParts(drive, numerators, scale), s).line(self.place)
-
     # ------------------------------------------------------------ interface of `spectrum.following`
 
     def near(self, values: Real, guess: Complex) -> Complex:
         """The poles (m, b) next to the guesses at m values, by Newton's method; NaN where it does not settle."""
-        found = guess.copy()
-        order = abs(np.where(np.isnan(guess), np.inf, guess)).argsort(axis=1)
-        both = np.take_along_axis(np.where(guess.imag > 0, 2, 1), order, 1).cumsum(axis=1)  # of a pair that rests
-        rests = np.take_along_axis(both, order.argsort(axis=1), 1) <= self.resting(values)[:, None]
+        found, resting, rests = guess.copy(), self.resting(values), np.zeros(guess.shape, bool)
+        for n in np.flatnonzero(resting):
+            nearest = np.argsort(abs(np.where(np.isnan(guess[n]), np.inf, guess[n])))
+            both = np.where(guess[n, nearest].imag > 0, 2, 1).cumsum()  # of a pair that rests
+            rests[n, nearest[both <= resting[n]]] = True
         wanted = ~np.isnan(guess) & ~rests
         for n in np.flatnonzero((wanted & (guess == 0)).any(axis=1)):
             leaving = wanted[n] & (guess[n] == 0)
@@ -215,26 +204,20 @@ class Varied:
         return found
 
     def slow(self, value: float, count: int) -> Complex:
-        """The `count` poles nearest to 0 at a value, from the power series of D there; the upper, or larger, first."""
-        circle = SERIES_RADIUS * self.frequency * np.exp(2j * np.pi * np.arange(SERIES_POINTS) / SERIES_POINTS)
-        D, scale = (each[0] for each in self._characteristic(circle[None], np.full(circle.size, value)))
-        series = np.fft.fft(D * np.exp(scale - scale[0]) / circle**self.pinned).real[: SERIES_POINTS // 2]
-        roots = SERIES_RADIUS * self.frequency * np.roots(series[::-1]).astype(complex)
-        nearest = roots[np.argsort(abs(roots))[:count]]
-        return np.asarray(nearest[np.lexsort((-nearest.real, -nearest.imag))], dtype=complex)
+        """The `count` poles next to 0 at a value, the upper, or larger, first; NaN for missing ones."""
+        found = slow_poles(self.at(value), self.frequency)
+        nearest = found[np.argsort(abs(found))[:count]]
+        nearest = nearest[np.lexsort((-nearest.real, -nearest.imag))]
+        return np.r_[nearest, np.full(count - nearest.size, np.nan)]
 
     def complete(self, value: float, guess: Complex) -> Complex:
         """All poles in the box at one value, both of each pair, and those next to the guesses that lie outside it."""
-        loop, height = self.at(value), self.box.im_max
         near = self.near(np.array([value]), np.where(guess.imag < 0, np.nan, guess)[None])[0]
-        near = near[~np.isnan(near) & (near != 0)]
-        near = np.r_[near, near[near.imag > 0].conj()]
-        starts, slow = np.r_[near, starting_points(loop, height)], slow_poles(loop, SLOW_SHARE * height)
-        found = zeros_in_box(loop.function, self.box, starts, slow)
-        found = np.where(abs(found.imag) < NO_PART * abs(found), found.real, found)
-        upper, rests = found[found.imag > 0], np.zeros(loop.zeros_at_origin - self.pinned, complex)
-        every = np.r_[rests, found[found.imag == 0], upper, upper.conj(), near[~self.box.holds(near)]]
-        return every.astype(complex)
+        near = near[~np.isnan(near) & (near != 0) & ~self.box.holds(near)]
+        with np.errstate(over="ignore"):  # of a pole on its way through infinity
+            inside = poles_below(self.at(value), self.box.im_max).values[self.pinned :]
+        upper = np.r_[inside, near]
+        return np.r_[upper, upper[upper.imag > 0].conj()]
 
     def singular(self, values: Real) -> Real:
         """-1/C of the damped segments, at m values (m, p)."""
@@ -246,19 +229,16 @@ class Varied:
 
     def boxed(self, modes: int) -> Varied:
         """The same with a box for all values, as high as `modes` modes, no pole on its edge at the first value."""
-        loops, lost = [self.at(value) for value in self.few], ConvergenceError("no box", self, 0.0)
-        for factor in HEIGHTS:
+        loops = [self.at(value) for value in self.few]
+        # heights of the box, until no pole is on its edge at the first value
+        for factor in (1.0, 1.013, 1.031, 1.057, 0.985, 1.09):
             height = factor * max(band_of(loop.arm, modes) for loop in loops)
-            boxes = [box_of(loop, height) for loop in loops]
-            left, right = max(each.re_min for each in boxes), max(each.re_max for each in boxes)
+            left, right, _, _ = np.max([box_of(loop, height) for loop in loops], axis=0).tolist()
             found = replace(self, box=Box(left, right, -height, height))
-            try:
+            with suppress(ConvergenceError):
                 found.count(self.start)
-            except ConvergenceError as error:
-                lost = error
-            else:
                 return found
-        raise lost
+        raise ConvergenceError(f"a pole is on the edge of every box at {self.vary} = {self.start:.6g}", self, 0.0)
 
     def count(self, value: float) -> int:
         """Number of poles in the box at one value, without those at 0, by the winding number."""

@@ -12,26 +12,23 @@ from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, RATE_GAIN, HubFeedback, shown_unit
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN, shown_unit
 from tfarm.crossing import Crossing, Crossings, Window, intervals, joined
 from tfarm.errors import ConvergenceError
+from tfarm.loop.continuous import ContinuousLoop
+from tfarm.loop.lines import LEADING, Along, LawTerms, critical, crossed, static_edge, unstable_below
+from tfarm.loop.stability import Stability, band_of_family, is_known_without, verdict_on
+from tfarm.loop.theorem import TAKES, absorbed, theorem_of
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import first_frequency, gain_unit, most_gain
-
-from .lines import LEADING, Line, along, critical, crossed, static_edge, unstable_below
-from .loop import Loop, grid
-from .stability import Stability, band_of_family, is_known_without, verdict_on
-from .theorem import TAKES, absorbed, theorem_of
 
 End = Literal["edge", "search bound", "no limit"]
 SEARCH_RANGE = Quantity("search range", digits=5, key="search_range", help="values between which limits were searched")
 ENDS = "an end with < or > is that of the search range: no limit was found up to there"
 
 WINDOW_REACH, FARTHER_REACH = 20.0, {MOMENT_GAIN: 50.0}  # of the search range, times `gain_unit`
-BEYOND_STATIC = 2.0  # times J/(J - I_h), where K2 cancels the inertia: least search range
 BEYOND_LAW = 10.0  # times the number of the law: least search range too
-STATIC_AT = 1e-9  # of the lowest frequency: L there is that of an arm at rest
 
 
 class Interval(NamedTuple):
@@ -126,7 +123,7 @@ def windows_of(verdict: Stability, names: Iterable[str] | None = None) -> dict[s
     return done
 
 
-def looked_at(loop: Loop, name: str) -> Window:
+def looked_at(loop: ContinuousLoop, name: str) -> Window:
     """The search range of a number: well beyond values that matter to the first mode, or ten times its value.
 
     Of a leading coefficient without which high modes are unstable: from a tenth of its value on, with its sign.
@@ -142,7 +139,8 @@ def looked_at(loop: Loop, name: str) -> Window:
     reach = max(FARTHER_REACH.get(name, WINDOW_REACH) * gain_unit(arm, name), BEYOND_LAW * abs(value))
     carried = arm.gauged_inertia
     if name == MOMENT_GAIN and 0 < carried < math.inf:
-        reach = max(reach, BEYOND_STATIC * arm.turned_inertia / carried)
+        # 2.0 times J/(J - I_h), where K2 cancels the inertia: least search range
+        reach = max(reach, 2.0 * arm.turned_inertia / carried)
     most = min(most_gain(arm, name), reach)
     return -most, most
 
@@ -155,9 +153,9 @@ def _lines(verdict: Stability, ranges: dict[str, Window]) -> tuple[dict[str, Cal
     if verdict.is_known_beyond or loop.gains is not None:
         ends = (loop.having(name, end) for name, pair in ranges.items() for end in critical(name, pair))
         band = max(band, band_of_family(ends)[0])
-    lines = [Line(lambda: loop, name, *pair) for name, pair in ranges.items()]
-    found = crossed(loop.arm, along(loop, ranges), lines, np.asarray(grid(loop.arm, band)))
-    return dict(zip(ranges, found, strict=True)), band
+    terms = LawTerms(loop.signals, loop.law, ranges)
+    lines = [Along(lambda: loop, name, terms.line(name, *pair)) for name, pair in ranges.items()]
+    return dict(zip(ranges, crossed(loop.arm, terms, band, lines), strict=True)), band
 
 
 def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, band: float) -> list[Window]:
@@ -167,8 +165,7 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
     the count at an end differs.
     """
     loop, value = verdict.loop, verdict.loop.numbers[name]
-    if loop.gains is not None and loop.arm.loses_at_hub_alone:
-        found = _without_rounding(loop, loop.gains, name, found)
+    found = without_losses(loop, name, found)
     pairs, count, at = found.spans(*limits), verdict.unstable_roots, value
     resting = [each.change for each in found if each.t == value and each.at == 0]
     is_known = verdict.verdict != "marginal"
@@ -193,29 +190,37 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
     return stable
 
 
-def _without_rounding(loop: Loop, gains: HubFeedback, name: str, found: Crossings) -> Crossings:
-    """The crossings along a gain without losses, where D is even in s but for the part of the rate gain.
+def without_losses(loop: ContinuousLoop, name: str, found: Crossings) -> Crossings:
+    """The crossings along a gain; of a rig that loses at its hub alone all modes are at the gain that cancels the loss.
 
-    Poles are on the axis where that part vanishes, for all values of the other gains.
+    There D is even in s but for the part of the rate gain: poles are on the axis where that part vanishes, for all
+    values of the other gains.  Elsewhere they reach it where K2 cancels the whole moment on the hub.
     """
-    at = 0.0 - loop.arm.rate_loss
-    if name != RATE_GAIN:
-        return found if at != gains.K1 else Crossings.of([])
-    unit = gain_unit(loop.arm, name)
-    return Crossings.of(each._replace(t=at) if abs(each.t - at) < unit else each for each in found)
+    gains, arm = loop.gains, loop.arm
+    if gains is None or not arm.loses_at_hub_alone:
+        return found
+    at, reach = 0.0 - arm.rate_loss, 1.0
+    if name != RATE_GAIN and at == gains.K1:
+        return Crossings.of([])
+    if name == MOMENT_GAIN and is_decided_along(loop, name):
+        at, reach = arm.input_per_torque, 1e-9
+    elif name != RATE_GAIN:
+        return found
+    near = reach * gain_unit(arm, name)
+    return Crossings.of(each._replace(t=at) if abs(each.t - at) < near else each for each in found)
 
 
 # ------------------------------------------------------------ without damping, by a theorem
 
 
-def is_decided_along(loop: Loop, name: str) -> bool:
+def is_decided_along(loop: ContinuousLoop, name: str) -> bool:
     """Whether a theorem without losses decides the stability of the loop for every value of this gain."""
     if loop.gains is None or not loop.arm.loses_at_hub_alone or loop.arm.input_lags:
         return False
     return loop.arm.reads_hub_moment or (name != MOMENT_GAIN and loop.gains.K2 == 0)
 
 
-def theorem_edges(loop: Loop, name: str, limits: Window) -> Crossings:
+def theorem_edges(loop: ContinuousLoop, name: str, limits: Window) -> Crossings:
     """The values of such a gain at which all modes at once, or a real pole, may cross."""
     found = [] if (static := static_edge(loop, name, limits)) is None else [static]
     at = {MOMENT_GAIN: loop.arm.input_per_torque, RATE_GAIN: 0.0 - loop.arm.rate_loss}.get(name)
@@ -224,28 +229,27 @@ def theorem_edges(loop: Loop, name: str, limits: Window) -> Crossings:
     return Crossings.of(found).within(*limits)
 
 
-def theorem_windows(loop: Loop, name: str, limits: Window, edges: Crossings) -> list[Window]:
+def theorem_windows(loop: ContinuousLoop, name: str, limits: Window, edges: Crossings) -> list[Window]:
     """The stability intervals of such a gain: there every mode is damped, and the static stiffness is positive."""
     return joined([pair for pair in edges.spans(*limits) if is_held(loop.having(name, sum(pair) / 2))])
 
 
-def is_held(loop: Loop) -> bool:
+def is_held(loop: ContinuousLoop) -> bool:
     """Whether a theorem excludes unstable poles: every mode is damped, and the static stiffness is positive."""
     parts = absorbed(loop.arm, loop.law)
     if parts is None or not parts[0] < 1 or theorem_of(loop).energy != TAKES:
         return False
-    small = np.array([STATIC_AT * first_frequency(loop.arm)], dtype=complex)
+    # 1e-9 of the lowest frequency: L there is that of an arm at rest
+    small = np.array([1e-9 * first_frequency(loop.arm)], dtype=complex)
     return bool((1 + loop.loop_function(small)[0]).real > 0)
 
 
-def _with_proven_ends(loop: Loop, name: str, pair: Window, limits: Window) -> Window:
+def _with_proven_ends(loop: ContinuousLoop, name: str, pair: Window, limits: Window) -> Window:
     """The interval with ends of the search replaced by infinity where a theorem holds beyond them."""
-    low, high = pair
-    if loop.gains is None:
+    end, beyond = (0, -math.inf) if name == MOMENT_GAIN else (1, math.inf)
+    if loop.gains is None or pair[end] != limits[end] or not is_held(loop.having(name, pair[end])):
         return pair
-    if name == MOMENT_GAIN:
-        return (-math.inf if low == limits[0] and is_held(loop.having(name, low)) else low), high
-    return low, (math.inf if high == limits[1] and is_held(loop.having(name, high)) else high)
+    return (beyond, pair[1]) if end == 0 else (pair[0], beyond)
 
 
 def reach_words(found: Iterable[Windows]) -> str:

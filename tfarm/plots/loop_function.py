@@ -15,8 +15,9 @@ from matplotlib.ticker import MaxNLocator
 
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.digits import general, plain
-from tfarm.loop.curve import LoopCurve, curve_of, decibels, gain_margin
-from tfarm.loop.margins import LoopMargins, Margins, loop_margins
+from tfarm.loop.curve import LoopCurve, decibels, gain_margin
+from tfarm.loop.loop_margins import LoopMargins
+from tfarm.loop.margins import Margins
 from tfarm.loop.nyquist import Nyquist, compressed
 
 from .frequency import FREQUENCY, Drawn, draw_curves, over_frequency, parted
@@ -72,7 +73,7 @@ def _of_loop(words: str, **how: Any) -> Callable[[Callable[..., None]], Any]:
     """A picture of the loop function, by its margins or as a curve."""
 
     def title(found: Any) -> str:
-        curve = curve_of(found)
+        curve = found.curve
         return f"{curve.arm.name}: {words}; {gains_words(curve.law)}\n{curve.note}".rstrip()
 
     return picture((Margins | LoopCurve, "tfarm.margins or tfarm.loop_function returns"), title=title, **how)
@@ -97,7 +98,7 @@ def loop(found: Margins | LoopCurve, *, ax: Sequence[Axes]) -> None:
     All gain and phase crossovers have a mark, the decisive ones a line of the size of the margin and a label.
     """
     upper, lower = ax
-    sides = curve_of(found).sides
+    sides = found.curve.sides
     draw_loops([(each.omega, each.L, _looks(each)) for each in sides], "|L| [dB]", upper, lower)
     for each in sides:
         if each.margins is not None:
@@ -128,7 +129,7 @@ def nichols(found: Margins | LoopCurve, *, ax: Axes) -> None:
     `found` is what `tfarm.margins` or `tfarm.loop_function` returns.  Phases are from -360 to 0 deg.  Contours: |T| in
     dB, and Ms = 2.
     """
-    sides = curve_of(found).sides
+    sides = found.curve.sides
     sizes = np.concatenate([each.magnitude for each in sides])
     low, high = np.clip((min(*sizes, -7) - 3, max(*sizes, 7) + 3), -40.0, 40.0)
     ax.set(
@@ -158,7 +159,7 @@ def sensitivity(found: Margins | LoopCurve, *, ax: Axes) -> None:
 
     `found` is what `tfarm.margins` or `tfarm.loop_function` returns.
     """
-    sides = curve_of(found).sides
+    sides = found.curve.sides
     for each in sides:
         for name, values, colour, width, marker, size in (
             ("S", each.sensitivity, BLUE, 1.5, "o", 9.0), ("T", each.complementary, INK, 1.0, "s", 5.0)
@@ -210,7 +211,7 @@ def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
         (0.0, 1.0, {"color": GREY, "ls": "-", "label": "|L| = 1"}),
         (-1.0, 1 / USUAL_PEAK, {"color": INK, "ls": ":", "label": f"Ms = {USUAL_PEAK:g}"}),
     ]
-    for peak in [loop_margins(data.verdict).sensitivity_peak] if data.verdict.is_stable else []:
+    for peak in [data.verdict.in_band.sensitivity_peak] if data.verdict.in_band is not None else []:
         label = f"radius 1/Ms, Ms {_at(peak.value, '', peak.omega)}"
         circles.append((-1.0, 1 / peak.value, {"color": INK, "ls": "--", "label": label}))
     for place in (ax, zoom):

@@ -184,7 +184,7 @@ def draw_boundary(found: Plane, points: Real, x: Axis, y: Axis, ax: Axes) -> Non
     for line, at in zip((ax.axvline, ax.axhline), static_edges(found), strict=True):
         if at is not None:
             line(at, color=INK, lw=1.6)
-    along = stable_edge(found, points, x, y)
+    along = stable_edge(found)
     place = x.place(along[:, 0])
     first = max(0.0, float(x.place(np.array(0.0))))
     inside = (first + 0.07 < place) & (place < 0.93) & (y.low < along[:, 1]) & (along[:, 1] < y.high)

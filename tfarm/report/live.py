@@ -52,8 +52,8 @@ from tfarm.dsp.simulate import FOLDED_UP, quantisers
 from tfarm.dsp.stages import admit
 from tfarm.errors import TfarmError, require
 from tfarm.loop.circle_crossings import GainMap
+from tfarm.loop.continuous import ContinuousLoop, steep_places
 from tfarm.loop.edges import LONGEST_DELAY_SAMPLES
-from tfarm.loop.loop import Loop, steep_places
 from tfarm.loop.panels import PANEL_SAMPLES, Sensor, loop_panels, positions, sensed_places
 from tfarm.loop.plane import gain_map, moment_axis, rate_axis, rate_columns
 from tfarm.loop.sampled import Sampled
@@ -304,8 +304,8 @@ def _samples(arm: Arm, laws: Sequence[Law], law: Law | None = None) -> tuple[dic
 
     They are those of hub angle and gauge, or of each part of `law`, whose poles and zeros are steep places too.
     """
-    band, is_quiet = band_of_family(Loop(arm, each) for each in laws)
-    samples = loop_panels(arm, band, None if law is None else Loop(arm, law))
+    band, is_quiet = band_of_family(ContinuousLoop(arm, each) for each in laws)
+    samples = loop_panels(arm, band, None if law is None else ContinuousLoop(arm, law))
     blocks = () if law is None else (cast(Rational, part.block) for part in law.parts)
     own = [abs(s) for block in blocks for s in (*block.poles, *block.zeros) if s]
     return {

@@ -18,9 +18,8 @@ from tfarm.digits import plain, significant
 from tfarm.dsp import Chain
 from tfarm.dsp.discretise import rule_in_words
 from tfarm.errors import ConvergenceError, TfarmError
-from tfarm.loop import loci, loop, margins, nyquist, plane, poles, stability
+from tfarm.loop import continuous, loci, margins, nyquist, plane, poles, stability
 from tfarm.loop.circle_crossings import GainMap as SampledMap
-from tfarm.loop.curve import curve_of
 from tfarm.plots import loop_function, regions, roots, style
 from tfarm.plots.style import Axes
 from tfarm.records import record
@@ -90,7 +89,7 @@ def _bode_picture(each: Controller, found: margins.Margins, chain: Chain) -> Pic
     try:
         curve = loop_curves(each.arm, each.law, chain)
     except ConvergenceError:
-        curve = curve_of(found)
+        curve = found.curve
     rows = (
         (own.period or 0.0, *row) for own in curve.sides for row in zip(own.omega, own.L.real, own.L.imag, strict=True)
     )
@@ -265,7 +264,7 @@ def map_section(case: Case) -> PageSection:
     arm, data = case.arm, map_of_arm(case)
     drawn = picture(
         "map", draw_map_of_arm.figure(data), data=map_data(data), found=data, arm=arm,
-        band=loop.band_of(arm, DESIGNED_MODES),
+        band=continuous.band_of(arm, DESIGNED_MODES),
         unit=f"{plain(rate_unit(arm), 4)} {unit_of(RATE_GAIN, arm)}",
         deepest=plane.DEEPEST_MOMENT_GAIN * arm.input_per_torque,
     )  # fmt: skip

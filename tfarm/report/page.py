@@ -44,7 +44,7 @@ from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.fitting.recording import MeasuredRun
 from tfarm.loop import sampled_verdict as verdict
-from tfarm.loop.loop import Loop
+from tfarm.loop.continuous import ContinuousLoop
 from tfarm.plots.style import Figure, drawn_for, gains_words, save_figure
 from tfarm.records import record
 from tfarm.response.signals import Signals, sign_of
@@ -378,7 +378,7 @@ def check_laws(case: Case) -> None:
         law = discretise.with_all_gains(*arm_and_law(each.arm, each.law))
         Signals(each.arm, law.signals)
         if not law.is_discrete:
-            Loop(each.arm, law)
+            ContinuousLoop(each.arm, law)
         discretise.discretised(law, case.chain.sampling.period)
 
 

@@ -147,7 +147,7 @@ def loci_picture(found: Analysis) -> Picture:
     rows = []  # a gain and a branch each
     for name, locus in loci.by.items():
         for value, poles in zip(locus.values.tolist(), locus.z, strict=True):
-            own, each = locus.loop.having(**{locus.gain: value}), zip(locus.mode.tolist(), poles, strict=True)
+            own, each = locus.loop.having(locus.gain, value), zip(locus.mode.tolist(), poles, strict=True)
             rows += [(name, *map(own.number, PLANE), mode, z.real, z.imag) for mode, z in each if not z.imag < 0]
     data, figure = (
         columns_of(("locus", *PLANE, "mode", "real", "imaginary"), rows),

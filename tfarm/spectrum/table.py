@@ -29,7 +29,7 @@ from tfarm.arm import (
 from tfarm.arm.checks import on_the_arm, whole
 from tfarm.arrays import Real, Whole
 from tfarm.digits import DOUBLE_DIGITS, general, singly
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError, ParameterError, require
 from tfarm.exact.system import System, shear_flexibility, system_of
 from tfarm.exact.values import (
     APPENDIX_DIGITS,
@@ -323,6 +323,7 @@ def flexible_frequencies(arm: Arm, up_to: float) -> Real:
 
 PAPER_GAINS = HubFeedback(K1=0.3, K2=0.3)  # of the paper's arms
 RATE_SHARE = 6.42e-3  # of J w1: K1 = 0.3 N m s/rad on the preset sasaki2012
+LEAST_UNITS = 1e-12  # of J w1, 1 and J w1^2: a smaller gain moves no pole in a lifetime
 MOST_UNITS = 1e9  # of J w1, 1 and J w1^2: practically infinite, far from overflow
 DEFAULT_DIGITS = 3  # of a default K1
 # Section, hub and payload of the paper's arms, with density [kg/m^3] and C [s] as in their presets.
@@ -367,17 +368,15 @@ def most_gain(arm: Arm, name: str) -> float:
     return MOST_UNITS * gain_unit(arm, name)
 
 
-def check_gains(arm: Arm, law: HubFeedback) -> None:
-    """Raise ParameterError for a gain that is too large for the arm."""
+def check_gains(arm: Arm, law: HubFeedback, least: float = LEAST_UNITS) -> None:
+    """Raise ParameterError for a gain that is too large for the arm, or too small: 0 to `least` of its unit."""
     for gain in GAINS:
-        value = law[gain.name]
-        if value and not abs(value) <= (most := most_gain(arm, gain.name)):
-            unit = UNITS_OF_OUTPUTS[gain.output][0] if gain.output in UNITS_OF_OUTPUTS else "1"
-            raise ParameterError(
-                key=gain.name,
-                value=value,
-                remedy=f"for this arm at most {MOST_UNITS:g} times {unit} in size, {most:.3g}",
-            )
+        size, own = abs(law[gain.name]), gain_unit(arm, gain.name)
+        unit = UNITS_OF_OUTPUTS[gain.output][0] if gain.output in UNITS_OF_OUTPUTS else "1"
+        remedy = f"for this arm at most {MOST_UNITS:g} times {unit} in size, {MOST_UNITS * own:.3g}"
+        require(not size or size <= MOST_UNITS * own, gain.name, law[gain.name], remedy)
+        remedy = f"for this arm 0, or at least {least:g} times {unit} in size, {least * own:.3g}"
+        require(not size or size >= least * own, gain.name, law[gain.name], remedy)
 
 
 def default_gains(arm: Arm) -> HubFeedback:

@@ -22,7 +22,7 @@ import scipy  # whose statistics take half a second to load
 
 from tfarm.arm import PLANE
 from tfarm.arrays import Real
-from tfarm.assessment.card import LoopCard, loop_card, words_of, words_of_samples
+from tfarm.assessment.card import LoopCard, loop_card, words_of
 from tfarm.assessment.step import LoopResponse, step
 from tfarm.errors import ConvergenceError, TfarmError, must_be_known, require
 from tfarm.exact.system import system_of
@@ -127,11 +127,9 @@ def _card_of(loop: str) -> Asked:
         if not names <= {f"{loop}.stability", f"{loop}.certainty"}:
             card = loop_card(loop, case.arm, case.law, case.chain)
             return {name: value for name, _, value in entries_of(LoopCard, card, loop)}
-        known = (
-            words_of(stability(one.driven_arm, case.law), case.chain) if loop == "continuous"
-            else words_of_samples(sampled(case.arm, case.law, case.chain).verdict)
-        )  # fmt: skip
-        return {f"{loop}.{key}": text for key, text in known.items()}
+        arm, law, chain = case.arm, case.law, case.chain
+        verdict = stability(one.driven_arm, law) if loop == "continuous" else sampled(arm, law, chain).verdict
+        return {f"{loop}.{key}": text for key, text in words_of(verdict, chain).items()}
 
     return {name: column for name, column, _ in entries_of(LoopCard, None, loop)}, values
 

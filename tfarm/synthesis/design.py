@@ -16,8 +16,8 @@ from tfarm.arm.stages import Consumer
 from tfarm.dsp import Chain
 from tfarm.dsp.stages import admit
 from tfarm.errors import ConvergenceError, must_be_known, require
+from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.edges import most_modes
-from tfarm.loop.loop import Loop
 from tfarm.loop.sampled_verdict import SampledBrief, sampled_brief, sampled_verdict
 from tfarm.loop.stability import Stability, stability
 from tfarm.records import frozen
@@ -224,7 +224,7 @@ def design(
     same_input(arms)
     form = structure_of(structure, arm, Kp=Kp, modes=modes, period=chain.sampling.period, bounds={"K1": K1, "K2": K2})
     for each in arms:
-        Loop(each.arm, as_law(form.record_at(form.origin)))
+        ContinuousLoop(each.arm, as_law(form.record_at(form.origin)))
         check_bounds(form, each.arm)
     tell = progress or (lambda text: None)
     task = _Task(arm, objective, form, modes, chain, continuous, tell)

@@ -32,7 +32,7 @@ from tfarm.dsp.plant import driven
 from tfarm.dsp.results import simulated
 from tfarm.errors import ConvergenceError
 from tfarm.loop.edges import LowerBound, most_modes
-from tfarm.loop.margins import lowest
+from tfarm.loop.loop_margins import lowest
 from tfarm.loop.sampled_verdict import UNDAMPED_MODES, sampled_verdict
 from tfarm.loop.stability import stability
 from tfarm.records import frozen

@@ -26,7 +26,7 @@ from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain, Scenario, scenario
 from tfarm.dsp.plant import PulseTransfer, sensed_plant
 from tfarm.dsp.scenarios import TRIAL_SLEWS, trial_weights
-from tfarm.loop.loop import band_of, grid
+from tfarm.loop.continuous import band_of, grid
 from tfarm.records import frozen
 from tfarm.reduced.modal import ALGEBRAIC, sensed_model
 from tfarm.response.signals import Signals

@@ -23,7 +23,7 @@ import numpy as np
 from tfarm.arm import ANGLE_GAIN, PLANE, TWO_GAINS, AnyLaw, Arm, HubFeedback, Law, must_not_be_algebraic
 from tfarm.arrays import Real
 from tfarm.errors import must_be_known, require
-from tfarm.loop.loop import band_of
+from tfarm.loop.continuous import band_of
 from tfarm.records import frozen
 from tfarm.spectrum import modes as natural_modes
 from tfarm.spectrum.table import check_gains, first_frequency, rate_unit, turning_inertia

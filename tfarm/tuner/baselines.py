@@ -129,7 +129,7 @@ def shaper(loop: Sampled, kind: Shaper, modes: int = 2) -> Real:
     By default for those two that a slew excites most.
     """
     impulses, build = np.ones(1), zero_vibration if kind == "ZV" else extra_insensitive
-    poles: Any = loop.having(**{MOMENT_GAIN: 0.0}).poles
+    poles: Any = loop.having(MOMENT_GAIN, 0.0).poles
     for mode in range(1, modes + 1):
         own = loop.plant.poles[(loop.plant.mode == mode) & (loop.plant.poles.imag > 0)]
         upper = poles.z[(poles.mode == mode) & (poles.z.imag > 0)]

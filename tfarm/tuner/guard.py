@@ -51,7 +51,7 @@ from tfarm.dsp.stages import not_covered
 from tfarm.errors import CertificationError, ConvergenceError, must_be_known
 from tfarm.exact.rationals import exact_matrix, falls, is_positive_definite
 from tfarm.loop.circle_crossings import around, stable_windows
-from tfarm.loop.margins import lowest
+from tfarm.loop.loop_margins import lowest
 from tfarm.loop.sampled import Sampled, sampled_loop
 from tfarm.records import record
 from tfarm.schema import Quantity
@@ -128,12 +128,12 @@ class MovingGain:
     @cached_property
     def open(self) -> Real:
         """The matrix with rate feedback alone."""
-        return self.loop.having(**{MOMENT_GAIN: 0.0}).reduced_matrix()
+        return self.loop.having(MOMENT_GAIN, 0.0).reduced_matrix()
 
     @cached_property
     def _fed_back(self) -> Real:
         """drive sense^T: the change of the matrix by a gain of -1."""
-        return self.open - self.loop.having(**{MOMENT_GAIN: 1.0}).reduced_matrix()
+        return self.open - self.loop.having(MOMENT_GAIN, 1.0).reduced_matrix()
 
     @cached_property
     def sense(self) -> Real:
@@ -363,7 +363,7 @@ def _settled(loops: list[Sampled], found: list[tuple[float, float]]) -> bool:
 def upper_modes_are_quiet(loop: Sampled, highest: float) -> bool:
     """Whether the own decay of the upper half of the modes exceeds the bound on the push of the feedback."""
     plant, T = loop.plant, loop.chain.sampling.period
-    fed_back = loop.having(**{MOMENT_GAIN: highest}).push
+    fed_back = loop.having(MOMENT_GAIN, highest).push
     push = 2 * fed_back * abs(held_amplitude(plant.poles, T))
     upper = (plant.mode > plant.count // 2) & (plant.poles.imag > 0)
     return bool((push[upper] < -plant.poles.real[upper] * T).all())

@@ -110,11 +110,11 @@ class Trial:
     def model(self) -> kernel.Model:
         """The loop from sample to sample, open at the torque, and the rows of the servo and the moment."""
         loop, last = self.loop, self.loop.pulse.integrals_at + 2
-        A = loop.having(Kp=0.0, K1=0.0, K2=0.0).matrix()
+        A = loop.times(0.0).matrix()
         # the last state is the torque of the last sample: B is 1 there
-        servo = -loop.having(K2=0.0).matrix()[last]
-        moment = -loop.having(Kp=0.0, K1=0.0, K2=1.0).matrix()[last]
-        of_plant = loop.pulse.matrices()[1], loop.sensed.own_moment(loop.chain.sampling)
+        servo = -loop.having("K2", 0.0).matrix()[last]
+        moment = -loop.times(0.0).having("K2", 1.0).matrix()[last]
+        of_plant = loop.pulse.matrices()[1], loop.rig.sensed.own_moment(loop.chain.sampling)
         drive, own = (np.pad(of, (0, len(A) - of.size)) for of in of_plant)
         return kernel.Model(*(np.ascontiguousarray(each) for each in (A.T, A, drive, servo, moment, own)))
 

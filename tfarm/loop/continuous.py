@@ -1,0 +1,278 @@
+"""The continuous-time loop, exact: its loop function, and the analytic function whose zeros are its poles.
+
+    L(s) = e^{-s tau} sum of C_i(s) G_i(s),    D(s) = drive q(s) + e^{-s tau} sum of p_i(s) numerator_i(s)
+
+q is the common denominator of the law and p_i/q its entries: D has no poles but a damped link's -1/C, so its zeros can
+be counted.  Where the law and the rig share a zero and a pole, D keeps both: no cancellation is hidden.  Gains at the
+hub are a law of order 0 on hub angle, hub rate and root moment.
+
+Along s = i w the loop function is steep at the arm's natural frequencies, at those with the hub locked (zeros of the
+hub angle) and with the hub free of inertia (zeros of the root moment).  At small C these features are as narrow as
+C w^2, so a grid has points at geometric distances from each.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from typing import Annotated, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import (
+    Arm,
+    HubFeedback,
+    Law,
+    as_law,
+    full_law,
+    must_be_arm,
+    must_have_free_hub,
+    must_not_be_algebraic,
+)
+from tfarm.arrays import Complex
+from tfarm.errors import require
+from tfarm.exact.characteristic import Analytic, Feedback, LoopParts, deflated, difference_steps, feedback
+from tfarm.exact.system import System
+from tfarm.loop.loop import Loop
+from tfarm.records import record
+from tfarm.response.signals import Controller, Signals, controller
+from tfarm.schema import Quantity
+from tfarm.spectrum import flexible_frequencies, modes, modes_below
+from tfarm.spectrum.frequencies import ARMS_KEPT
+from tfarm.spectrum.table import LEAST_UNITS, check_gains, first_frequency
+
+FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: far right, where L of an improper law must fall, and poles come from infinity
+FALL_FACTOR = 0.5  # L must fall by this there, from one to the next
+SOMEWHERE = 0.31 + 0.71j  # of w1: where a signal is tested for being fed back at all; no law has its zero there
+NEAREST_TO_ORIGIN = 1e-12  # of w1: where a function, its zeros at 0 divided out, is taken for its value at 0
+ROUNDING_AT_REST = 1e-13  # of the terms of D: less is left by their rounding where they cancel at s = 0
+ORDER_READ_AT = (2e-5, 1e-5)  # of w1: where the order of a zero at s = 0 is read off
+NEAREST_TO_STEEP, FARTHEST_FROM_STEEP = 1e-10, 0.06  # distances from a steep place, as shares of its frequency
+POINTS_NEAR_STEEP = 14  # of a grid on either side of a steep place, one and a half a decade
+POINTS_BETWEEN_STEEP = 24  # and between two of them
+STEEP_BEYOND = 1.05  # of the end of a grid: the points of steep places up to there reach below it
+SLOWEST = 1e-6  # of the first steep place: where a grid begins, as nothing bends there
+POINTS_BELOW_STEEP = 60  # from there to that place, ten a decade
+QUIET_REACH = 100.0  # times a band: the end of the range beyond it in which |L| is evaluated, two decades of its fall
+MOST_RESONANCES = 2000  # evaluated in it: 20 ms
+LONG_PATH = 1000  # points, and three at each: a contour that the loops of other laws have too, whose values are kept
+MOST_BAND_MODES = 150  # flexible: in a band; beyond, poles are not determined without a theorem or small gain
+
+
+@dataclass(frozen=True)
+@record
+class ContinuousLoop(Loop):
+    """A rig under a law in s, gains at the hub among them; `signals` are those fed back, made unless given.
+
+    Raises ParameterError for a locked hub, a law in z, an algebraic loop, and gains that are far too small or
+    too large for the arm.
+    """
+
+    arm: Arm
+    law: Law
+    signals: Signals = field(default=cast("Signals", None), repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        must_be_arm(self.arm)
+        law = as_law(self.law)
+        if law.input is not None and law.input != self.arm.input:
+            object.__setattr__(self, "arm", replace(self.arm, input=law.input))  # type: ignore[arg-type]
+        must_have_free_hub(self.arm)
+        remedy = "a law in z has a sampled loop: ask for that, or leave the period out of a law in s"
+        require(not law.is_discrete, "period", law.period, remedy)
+        object.__setattr__(self, "law", full_law(law))
+        given: Signals | None = self.signals
+        if given is None or given.names != self.law.signals or given.arm != self.arm:
+            object.__setattr__(self, "signals", Signals(self.arm, self.law.signals))
+        if self.gains is not None:
+            # searches under other laws may come to values next to 0
+            _must_be_possible(self.arm, self.gains, LEAST_UNITS if given is None else 0.0)
+        _must_not_be_algebraic(self)
+
+    @property
+    def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
+        """Names of the arm and the controller."""
+        return controller(self.law if self.gains is None else as_law(self.gains), self.arm)
+
+    def under(self, law: Law) -> ContinuousLoop:
+        """Return the same rig under another law; its signals at rest are kept."""
+        return ContinuousLoop(self.arm, law, self.signals)
+
+    @cached_property
+    def gains(self) -> HubFeedback | None:
+        """The law as gains at the hub; None of any other law."""
+        return self.law.gains
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The numbers of the law in which D is linear, by name: the gains at the hub, or `Law.numbers`."""
+        return self.law.numbers if self.gains is None else self.gains.by_name
+
+    @cached_property
+    def feeds_back(self) -> bool:
+        """Whether the law feeds anything back."""
+        return bool(self.law.polynomials(np.array([SOMEWHERE * first_frequency(self.arm)]))[0].any())
+
+    @cached_property
+    def is_lossless(self) -> bool:
+        """Whether D is real on the imaginary axis, and its zeros come in pairs +-s: energy is conserved."""
+        if not self.feeds_back:
+            return self.arm.is_undamped
+        odd = np.array([each.power % 2 for each in self.signals.outputs])
+        return (
+            self.arm.is_reactive
+            and self.law.is_static
+            and not (odd @ abs(self.law.polynomials(np.ones(1, complex))[0])).any()
+        )
+
+    @property
+    def k(self) -> System:
+        """The exact system."""
+        return self.signals.system
+
+    @cached_property
+    def exact(self) -> Feedback:
+        """The fed-back terms, exact, for proofs in ball arithmetic."""
+        return feedback(self.k, self.law, self.signals.outputs, self.signals.places)
+
+    def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
+        """Denominator and numerator of L at s, up to one factor: finite at poles too."""
+        s = np.asarray(s, dtype=complex)
+        return self._parts(s, self.signals.kept(s))
+
+    def _parts(self, s: Complex, of_rig: LoopParts) -> tuple[Complex, Complex]:
+        """The same from those of the signals."""
+        entries, whole = self.law.polynomials(s)
+        return of_rig.drive * whole, np.exp(-s * self.law.delay) * (entries * of_rig.numerators).sum(axis=0)
+
+    @cached_property
+    def zeros_at_origin(self) -> int:
+        """Order of the zero of D at s = 0: the least order of its terms, and more where these cancel."""
+        integrators = int((self.law.poles == 0).sum())
+        terms = [self.k.at_rest + integrators]
+        (numerators,) = self.law.polynomials(np.array([SOMEWHERE * first_frequency(self.arm)]))[0].T
+        for name, order, numerator in zip(self.law.signals, self.signals.orders, numerators, strict=True):
+            for part in self.law.parts if numerator else ():
+                own = part.block.zeros_at_origin(part.signals.index(name)) if name in part.signals else None
+                if own is not None:  # and the integrators of the other parts
+                    terms.append(order + own + integrators - int((part.block.poles == 0).sum()))
+        return min(terms) + self.resting_zeros
+
+    @cached_property
+    def resting_zeros(self) -> int:
+        """Number of poles at s = 0 because the law cancels the stiffness of the rig exactly: L(0) = -1.
+
+        The orders of the terms of D do not show that they cancel there, but their values do.  The mean on both sides
+        of 0 has no terms odd in s.
+        """
+        s = first_frequency(self.arm) * np.array([NEAREST_TO_ORIGIN, -NEAREST_TO_ORIGIN, *ORDER_READ_AT]) + 0j
+        with np.errstate(all="ignore"):  # L is infinite at a pole of the rig or of the law: then nothing cancels
+            right, left, farther, nearer = 1 + self.loop_function(s)
+            cancels = abs(right + left) <= 2 * ROUNDING_AT_REST and abs(right) < 1  # else odd terms dominate
+        return round(float(np.log2(abs(farther / nearer)))) if cancels else 0
+
+    def characteristic(self, s: Complex) -> tuple[Complex, Complex]:
+        """D e^{-scale} and scale at s."""
+        of_rig = (self.signals.kept if s.size >= LONG_PATH else self.signals.parts)(s)
+        drive, fed_back = self._parts(s, of_rig)
+        return drive + fed_back, of_rig.scale
+
+    def function(self, s: Complex) -> Analytic:
+        """D/s^n, n = `zeros_at_origin`, with slopes from differences."""
+        s = np.where(s == 0, NEAREST_TO_ORIGIN * first_frequency(self.arm), np.asarray(s, dtype=complex))
+        return by_differences(self.k, self.characteristic, s, self.zeros_at_origin)
+
+
+def by_differences(
+    k: System, characteristic: Callable[[Complex], tuple[Complex, Complex]], s: Complex, at_zero: int
+) -> Analytic:
+    """D/s^at_zero at s (n,), not 0, with slopes from differences; `characteristic` gives D e^{-scale} and scale."""
+    h = difference_steps(k, s)
+    with np.errstate(over="ignore", invalid="ignore"):  # far from where it is large: no number, and no start
+        D, scale = characteristic(np.array([s, s + h, s - h]))
+        up, down = D[1:] * np.exp(scale[1:] - scale[0])
+        return deflated(D[0], (up - down) / (2 * h), scale[0], s, at_zero)
+
+
+def _must_not_be_algebraic(loop: ContinuousLoop) -> None:
+    """Raise ParameterError for a law whose loop function does not fall far right: the loop would be algebraic."""
+    arm, law = loop.arm, loop.law
+    moment = [part for part in law.parts if "root_moment" in part.signals and part.block.excess == 0]
+    if arm.has_massless_hub and any(p.block.matrices()[3][0, p.signals.index("root_moment")] for p in moment):
+        key, value = ("law.root_moment", law.name) if loop.gains is None else ("K2", loop.gains.K2)
+        must_not_be_algebraic(arm, key, value)
+    if not law.is_improper:
+        return
+    far = first_frequency(arm) * np.array(FAR_RIGHT) + 0j
+    drive, numerators, _ = loop.signals.parts(far)
+    entries, whole = law.polynomials(far)
+    with np.errstate(all="ignore"):
+        size = abs((entries * numerators).sum(axis=0) / (drive * whole))  # L without its delay
+    falls = np.isfinite(size).all() and (size[1:] < FALL_FACTOR * size[:-1]).all()
+    worst = next(p for p in law.parts if p.block.excess > 0)
+    remedy = "the degree of its numerator is too high for this signal, so the loop is algebraic; add a pole to den"
+    require(falls, f"law.{worst.signals[0]}.num", worst.block.excess, remedy)
+
+
+def _must_be_possible(arm: Arm, gains: HubFeedback, least: float) -> None:
+    """Raise ParameterError for gains without a loop, and for gains too small or too large for the arm."""
+    is_possible = not arm.is_undamped or arm.hub_side_inertia or arm.reads_hub_moment
+    remedy = "with hub.inertia = 0 and no damping K2 moves poles through infinity; use K2 = 0 or some inertia"
+    require(not gains.K2 or is_possible, "K2", gains.K2, remedy)
+    check_gains(arm, gains, least)
+
+
+@lru_cache(maxsize=ARMS_KEPT)
+def steep_places(arm: Arm, up_to: float) -> Any:
+    """Natural frequencies [rad/s] with the arm's own hub, with a locked one and with none, ascending; read-only."""
+    pin = replace(arm, hub=replace(arm.hub, inertia=0.0, friction=0.0, stiffness=0.0), motor=None, input="hub_torque")
+    others = (arm, arm.having(hub_inertia=math.inf), pin)
+    places = np.unique(np.concatenate([flexible_frequencies(each, up_to) for each in others]))
+    places.flags.writeable = False
+    return places
+
+
+@lru_cache(maxsize=ARMS_KEPT)
+def grid(arm: Arm, up_to: float) -> Any:
+    """Frequencies [rad/s] from a millionth of the first natural one to `up_to`, dense at steep places; read-only."""
+    places = np.asarray(steep_places(arm, STEEP_BEYOND * up_to))
+    lowest = SLOWEST * min(up_to, places[0] if places.size else up_to)
+    away = np.geomspace(NEAREST_TO_STEEP, FARTHEST_FROM_STEEP, POINTS_NEAR_STEEP)
+    close = (places[:, None] * (1 + np.r_[-away[::-1], away])).ravel()
+    corners = np.r_[lowest, places[places < up_to], up_to]
+    between = np.concatenate(
+        [np.linspace(a, b, POINTS_BETWEEN_STEEP, endpoint=False) for a, b in itertools.pairwise(corners)]
+    )
+    slow = np.geomspace(lowest, corners[1], POINTS_BELOW_STEEP)
+    omega = np.unique(np.concatenate([close, between, slow]))
+    omega = np.append(omega[(omega >= lowest) & (omega < up_to)], up_to)
+    omega.flags.writeable = False
+    return omega
+
+
+@lru_cache(maxsize=ARMS_KEPT)
+def band_of(arm: Arm, number: int) -> float:
+    """A frequency [rad/s] half-way between two natural ones, with `number` flexible modes below."""
+    omega = modes(arm, number + 1).natural_frequency
+    return float((omega[-1] + omega[-2]) / 2)
+
+
+@lru_cache(maxsize=ARMS_KEPT)
+def quiet_places(arm: Arm, band: float, points: int) -> Any:
+    """Frequencies [rad/s] in two decades above a band, for the test of small gain of a damped loop; read-only.
+
+    `points` of them have equal ratios.  The natural ones are added, as a resonance may be narrower than that spacing:
+    the first `MOST_RESONANCES`, up to where bending is overdamped, 2/C of the segment with the least C.
+    """
+    places = band * np.geomspace(1.0, QUIET_REACH, points)
+    if arm.least_damping:
+        first, last = (modes_below(arm, min(end, 2 / arm.least_damping)) for end in (band, QUIET_REACH * band))
+        many = min(last - first, MOST_RESONANCES)
+        if many:
+            places = np.unique(np.r_[places, modes(arm, first + many).natural_frequency[-many:]])
+    places.flags.writeable = False
+    return places
