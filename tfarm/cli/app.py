@@ -149,10 +149,6 @@ Png = Annotated[
                  help="draw the picture into this file: .png, or .pdf or .svg at the width of a paper's column"),
 ]  # fmt: skip
 File = Annotated[Path | None, typer.Option(metavar="FILE")]  # to be written
-Place = Annotated[float | None, typer.Option("--x", help="place on the arm [m], for outputs along it")]
-SideName = Annotated[
-    str | None, typer.Option("--side", help="outer (default) or inner side of a joint, for outputs along the arm")
-]
 InputName = Annotated[
     str | None,
     typer.Option("--input", help="hub_torque, motor_voltage, motor_current, hub_angle, force@X or moment_pair@X1,X2"),
@@ -346,11 +342,18 @@ def load_chain(
     return replace(chain, sampling=sampling, period_from=chain.period_from if period is None else "--period")
 
 
-def outputs_on(names: Sequence[str], side: str | None) -> list[Any]:
-    """Return the outputs of these names, on one side of a joint where that is given."""
+def outputs_on(
+    names: Sequence[str],
+    *,
+    x: Annotated[float | None, typer.Option("--x", help="place on the arm [m], for outputs along it")] = None,
+    side: Annotated[
+        str | None, typer.Option("--side", help="outer (default) or inner side of a joint, for outputs along the arm")
+    ] = None,
+) -> tuple[list[Any], float | None]:
+    """Return the outputs of these names, on one side of a joint where that is given, and the place of those along."""
     from tfarm.exact.outputs import on_side
 
-    return [name if side is None else on_side(name, cast("Any", side)) for name in names]
+    return [name if side is None else on_side(name, cast("Any", side)) for name in names], x
 
 
 def refuse(others: Mapping[str, Any], remedy: str) -> None:
