@@ -269,20 +269,15 @@ def compare(
     output: output of the Bode plot of two arms
     out: write a page, compare.html, to this folder
     """
-    files = read_arms(law or [])
-    extra = [each.name for each in files[2:]]
-    refuse({"ARM": [each.name for each in arms[2:]] or None, "--law": extra or None}, "two at most can be compared")
-    refuse(
-        {"ARM": arms[0].name if len(arms) + len(files) < 2 or len(arms) == len(files) == 1 else None},
-        "give a second arm, or --law FILE twice",
-    )
     subjects = [load_arm(file, theory) for file in arms]
-    wanted = files * (2 // len(files)) if files else [None, None]
-    pairs = zip(arms * (2 // len(arms)), subjects * (2 // len(arms)), wanted, strict=True)
-    laws = [load_law(source, subject, gains, file)[0] for source, subject, file in pairs]
-    paths = [Path(each.name) for each in files]
-    candidates = ([each.name for each in subjects], [each.stem for each in paths], [each.name for each in files])
-    names = next((each for each in candidates if len(set(each)) == 2), ["first", "second"])
+    files = read_arms(law or [])
+    if files:
+        laws = [load_law(arms[0], subjects[0], gains, file)[0] for file in files]
+    else:
+        laws = [load_law(file, subject, gains)[0] for file, subject in zip(arms, subjects, strict=True)]
+    stems = [Path(each.name).stem for each in files]
+    candidates = ([each.name for each in subjects], stems, [each.name for each in files])
+    names = next((each for each in candidates if len(set(each)) == 2), ())
     found = tfarm.compare(subjects, laws, names=names, modes=modes, output=output, chain=chain(arms[0]))
     page = None
     if out is not None:
@@ -428,7 +423,6 @@ def report(
     measured: measured response; may be repeated
     paper: each figure as a PDF at the width of a paper's column too, which takes about a quarter longer
     """
-    from tfarm.arm.law_tables import LAW_TABLE
     from tfarm.fitting import data, recording
     from tfarm.report import page, write, writing
 
@@ -444,7 +438,7 @@ def report(
                 page.GivenLaw(load_law(file, arm, gains, each)[0], Path(each.name).name, recording.load_run(each))
                 for each in others
             ]
-        elif LAW_TABLE in file.tables or set(gains.values()) != {None}:
+        elif "law" in file.tables or set(gains.values()) != {None}:
             runs = [page.GivenLaw(load_law(file, arm, gains)[0])]
         else:
             runs = []
