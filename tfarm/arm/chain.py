@@ -14,6 +14,7 @@ from tfarm.arm.checks import above_zero, check_annotated, not_negative, number, 
 from tfarm.arm.reading import AnyFile, load_tables
 from tfarm.arm.records import Arm
 from tfarm.arm.schema import ArmTable, TomlTable, validated
+from tfarm.arm.stages import are_linear
 from tfarm.arm.writing import to_toml
 from tfarm.errors import ParameterError, must_be_known, naming, require, unknown_key
 from tfarm.schema import Quantity
@@ -171,10 +172,8 @@ class Chain:
 
     @property
     def is_linear(self) -> bool:
-        """Whether there is neither quantisation nor saturation."""
-        c = self.converters
-        ideal = Converters(hub_rate=c.hub_rate, rate_filter=c.rate_filter, arithmetic=c.arithmetic)
-        return c == ideal and math.isinf(self.actuator.torque_limit)
+        """Whether all of its stages are: there is neither quantisation nor saturation."""
+        return are_linear(stated(self))
 
 
 def chain_or_usual(chain: object) -> Chain:

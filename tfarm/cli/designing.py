@@ -52,7 +52,7 @@ def design(
     arm: ArmName,
     objective: str = "damping",
     structure: Annotated[
-        str, typer.Option("--structure", help=f"{TWO_GAINS}, PD, PD+notch, lead, PI, PID, PPF or strain-rate")
+        str, typer.Option("--structure", help="form of the law, such as PD+notch; any other word lists them all")
     ] = TWO_GAINS,
     k1: Annotated[
         Any, typer.Option(f"--{RATE_GAIN}", parser=interval, metavar="LO,HI", help=f"bounds of {RATE_GAIN}")

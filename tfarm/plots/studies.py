@@ -105,9 +105,9 @@ def key_label(key: str, found: Study) -> str:
     """A varied number with its SI unit."""
     plan = found.parts.plan
     if key.startswith("law."):
-        return number_label(key.removeprefix("law."), plan.arm, plan.law)
+        return number_label(key.removeprefix("law."), plan.case.arm, plan.case.law)
     is_known = ".".join(word for word in key.split(".") if not word.isdecimal()) in file_keys()
-    return f"{key} [{unit(file_key(key, plan.arm).unit if is_known else '') or '−'}]"
+    return f"{key} [{unit(file_key(key, plan.case.arm).unit if is_known else '') or '−'}]"
 
 
 def _shown(found: Study, quantity: str | None = None) -> tuple[list[Spread], list[str]]:
@@ -159,15 +159,15 @@ def study_band(found: Study, output: str = "root_moment", *, ax: Axes) -> None:
     The arms are even over the rows.  Raises ParameterError for an unknown output, and where no arm has that response.
     """
     plan, table, curves = found.parts.plan, found.table(), []
-    omega, row = np.geomspace(*resonant_band(plan.arm), POINTS), transfer(plan.arm, output).rows[0]
+    omega, row = np.geomspace(*resonant_band(plan.case.arm), POINTS), transfer(plan.case.arm, output).rows[0]
     for n in range(0, found.done, 1 + (found.done - 1) // CURVES):
         with suppress(TfarmError):  # of an arm that is illegal
             one = plan.subjects.at([float(table[key][n]) for key in plan.space.keys])
-            curves.append(decibels(transfer(one.arm, output)(1j * omega)))
+            curves.append(decibels(transfer(one.case.arm, output)(1j * omega)))
     require(curves, "output", output, "no arm of the study has that response")
     low, median, high = np.quantile(curves, [QUANTILES[end] for end in ("low", "median", "high")], axis=0)
     ax.fill_between(omega, low, high, color=BLUE, alpha=0.3, lw=0, label="5 to 95 % of the arms, at each frequency")
     for n, curve in enumerate(curves[:: max(1, len(curves) // SINGLE)]):
         ax.plot(omega, curve, color=GREY, lw=0.5, alpha=0.6, zorder=1.5, label="single arms" * (not n))
     ax.plot(omega, median, color=BLUE, lw=1.4, label="median, at each frequency")
-    over_frequency(ax, f"{row.label} [dB re 1 {unit_over(row.unit, plan.arm.input_unit)}]")
+    over_frequency(ax, f"{row.label} [dB re 1 {unit_over(row.unit, plan.case.arm.input_unit)}]")

@@ -31,6 +31,7 @@ from tfarm.arm import (
     unit_of,
 )
 from tfarm.arm.blocks import Rational
+from tfarm.arm.stages import Consumer
 from tfarm.arm.writing import law_toml
 from tfarm.arrays import Complex
 from tfarm.assessment.card import (
@@ -65,6 +66,14 @@ from tfarm.report.page import TEMPLATES, Case, GivenLaw, argument, has_loop, is_
 from tfarm.response import transfer
 from tfarm.spectrum.table import angle_unit, default_gains
 
+CONSUMER = Consumer(
+    "live page",
+    acts=(
+        "reference", "anti-alias filter", "encoder", "hub rate", "amplifier steps", "amplifier range", "law",
+        "arithmetic", "DAC steps", "DAC range", "torque limit", "hold", "delay", "hub damping", "plant",
+    ),
+    none=("volts",),
+)  # fmt: skip
 MOST_LIVE_SAMPLES = 5000  # of a slew: 160 kB of references; a longer one is left to `tfarm simulate`
 LIVE_COLUMNS = 90  # values of the gain across at which the continuous region is cut
 SENSED_MODES = 6  # whose frequencies and zeros the chart of sensors has
@@ -424,7 +433,7 @@ def save_live(case: Case, folder: Path) -> None:
     law = next((law for each in laws if has_sliders(law := as_law(each.law))), as_law(default_gains(arm)))
     arm, _ = arm_and_law(arm, law)
     try:
-        admit("live page", arm, chain)
+        admit(CONSUMER, arm, chain)
         data = law_data(arm, chain, law) if law.gains is None else live_data(arm, chain, law.gains)
     except TfarmError as error:
         write_text(out, render("live_failed.html", title=title, why=str(error)))
@@ -500,7 +509,7 @@ def explore(arm: Arm, law: AnyLaw | None = None, chain: Chain | None = None) -> 
     ParameterError
         For what is no arm, and one whose hub does not turn freely or has no inertia.
     """
-    case = Case(*admit("live page", arm, chain), () if law is None else (GivenLaw(law),))
+    case = Case(*admit(CONSUMER, arm, chain), () if law is None else (GivenLaw(law),))
     require(is_live(case), "arm", arm.name, "give one whose hub turns freely and has inertia")
     place = Path(mkdtemp(prefix="tfarm-"))
     (folder := place / "arm").mkdir()
