@@ -24,13 +24,14 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from tfarm.arm import AT_HUB, AnyLaw, Arm, Law, as_law, tracked
+from tfarm.arm import AT_HUB, AnyLaw, Arm, Law, as_law
 from tfarm.arm.chain import PERIOD, TIME_ROUNDING
 from tfarm.arm.checks import number
 from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.assessment.card import CONTINUOUS
+from tfarm.case import Case
 from tfarm.digits import general
 from tfarm.dsp import Chain, traces
 from tfarm.dsp.plant import sensed_plant
@@ -363,7 +364,8 @@ def step(
     require(0 < band < 1, "settling_band", settling_band, "a share of the travel between 0 and 1, such as 0.02")
     (arm, chain), is_step = admit(CONSUMER, arm, chain), scenario_name == "reference"
     hub, law = followed(law) if is_step else (AT_HUB[0], law)
-    arm, law = tracked(arm, law)
+    case = Case(arm, as_law(law), chain)
+    arm, law = case.arm, case.law
     full, of_angle, response = as_law(law), hub == AT_HUB[0], None
     poles = None if full.is_discrete else usual_poles(Loop(arm, full))
     length = usual_duration(poles, chain) if duration is None else duration
