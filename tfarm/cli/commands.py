@@ -1,7 +1,7 @@
 """The commands on an arm and on measured data.  Packages are imported inside them: `tfarm --help` needs none."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, cast
@@ -99,12 +99,8 @@ class Presets:
 @command(epilog="presets")
 def presets(*, show: Any = emit_record) -> None:
     """List the arms that come with tfarm, with their assumptions."""
-    rows = []
-    for arm in map(tfarm.load, tfarm.presets()):
-        payload = arm.payload
-        rows.append(
-            Preset(arm.name, arm.length, arm.damping, arm.hub.inertia, payload.mass, payload.inertia, arm.assumptions)
-        )
+    names = [each.name for each in fields(Preset)]
+    rows = [Preset(*(getattr(arm, name) for name in names)) for arm in map(tfarm.load, tfarm.presets())]
     show(Presets(rows))
 
 
@@ -250,7 +246,7 @@ def bode(
         return
     from tfarm.response.frequency import resonant_band
 
-    of_loop = {**under.keywords["gains"], "law": under.keywords["law"], **chain.keywords}
+    of_loop = {**under.keywords["gains"].keywords, "law": under.keywords["law"], **chain.keywords}
     for name, value in of_loop.items():
         refuse({f"--{name.replace('_', '-')}": value}, "the loop function: give --loop too")
     subject = load_arm(arm, under.keywords["theory"], driven)

@@ -17,9 +17,7 @@ from tfarm.cli.app import (
     CONTROLLER,
     AngleGain,
     ArmName,
-    ArmNames,
     File,
-    Gains,
     LawFiles,
     ModeCount,
     Png,
@@ -28,6 +26,7 @@ from tfarm.cli.app import (
     advance,
     emit,
     emit_record,
+    given_gains,
     interval,
     load_arm,
     load_chain,
@@ -228,7 +227,8 @@ def tune(
     from tfarm.tuner import trial, tuning
 
     subject, sampling = load_arm(arm, theory), chain(arm)
-    law, defaults = load_law(arm, subject, {RATE_GAIN: k1, MOMENT_GAIN: 0.0})
+    typed = {MOMENT_GAIN: 0.0} if k1 is None else {RATE_GAIN: k1, MOMENT_GAIN: 0.0}
+    law, defaults = load_law(arm, subject, typed)
     rate = cast("tfarm.HubFeedback", law)[RATE_GAIN]
     if k1 is None and kp:
         rate = trial.usual_rate_gain(subject, kp)
@@ -250,14 +250,24 @@ def tune(
 @command(epilog="compare sasaki2012 sasaki2012-lab --png both.png")
 def compare(
     *,
-    arms: ArmNames,
+    arms: Annotated[
+        list[Any],
+        typer.Argument(
+            metavar="ARM [ARM]",
+            help="presets or TOML files",
+            parser=str,
+            callback=read_arms,
+            autocompletion=preset_names,
+            show_default=False,
+        ),
+    ],
     law: LawFiles = None,
     modes: ModeCount = 10,
     output: str = "root_moment",
     theory: TheoryName = None,
     png: Png = None,
     out: Annotated[Path | None, typer.Option(metavar="FOLDER")] = None,
-    gains: Gains,
+    gains: Any = given_gains,
     chain: Any = load_chain,
     show: Any = emit_record,
 ) -> None:
@@ -272,9 +282,9 @@ def compare(
     subjects = [load_arm(file, theory) for file in arms]
     files = read_arms(law or [])
     if files:
-        laws = [load_law(arms[0], subjects[0], gains, file)[0] for file in files]
+        laws = [load_law(arms[0], subjects[0], gains(), file)[0] for file in files]
     else:
-        laws = [load_law(file, subject, gains)[0] for file, subject in zip(arms, subjects, strict=True)]
+        laws = [load_law(file, subject, gains())[0] for file, subject in zip(arms, subjects, strict=True)]
     stems = [Path(each.name).stem for each in files]
     candidates = ([each.name for each in subjects], stems, [each.name for each in files])
     names = next((each for each in candidates if len(set(each)) == 2), ())
@@ -410,7 +420,7 @@ def report(
     theory: TheoryName = None,
     measured: Annotated[list[str] | None, typer.Option(metavar="OUTPUT/INPUT=FILE")] = None,
     paper: Annotated[bool, typer.Option("--paper")] = False,
-    gains: Gains,
+    gains: Any = given_gains,
     chain: Any = load_chain,
 ) -> None:
     """Pages with pictures, tables and data: open index.html in a browser.
@@ -435,11 +445,11 @@ def report(
     for file, arm in zip(files, subjects, strict=True):
         if others:
             runs = [
-                page.GivenLaw(load_law(file, arm, gains, each)[0], Path(each.name).name, recording.load_run(each))
+                page.GivenLaw(load_law(file, arm, gains(), each)[0], Path(each.name).name, recording.load_run(each))
                 for each in others
             ]
-        elif "law" in file.tables or set(gains.values()) != {None}:
-            runs = [page.GivenLaw(load_law(file, arm, gains)[0])]
+        elif "law" in file.tables or gains():
+            runs = [page.GivenLaw(load_law(file, arm, gains())[0])]
         else:
             runs = []
         laws.append(runs)
