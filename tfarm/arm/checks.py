@@ -119,6 +119,8 @@ def plain_name(name: Any) -> str:
     remedy = 'a name has 1 to 80 characters, begins with a letter or digit and has no / \\ : * ? " < > |'
     is_name = isinstance(name, str) and re.fullmatch(r'[^\W_]([^/\\:*?"<>|]{0,78}[^/\\:*?"<>| .])?', name)
     require(is_name and name.isprintable(), "name", name, remedy)
+    size = len(name.encode())  # file systems stop at 255 bytes, and a temporary file's name is longer than its own
+    require(size <= 200, "name", name, f"{size} bytes; at most 200")
     return str(name)
 
 

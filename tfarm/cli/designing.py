@@ -405,14 +405,8 @@ def study(
 def report(
     *,
     arms: Annotated[
-        list[Any] | None,
-        typer.Argument(
-            metavar="[ARM ...]",
-            help="presets or files; by default all",
-            parser=str,
-            callback=read_arms,
-            autocompletion=preset_names,
-        ),
+        list[str] | None,
+        typer.Argument(metavar="[ARM ...]", help="presets or files; by default all", autocompletion=preset_names),
     ] = None,
     out: Annotated[Path, typer.Option(metavar="FOLDER")] = Path("reports"),
     only: str | None = None,
@@ -438,7 +432,7 @@ def report(
 
     if only is not None:
         must_be_known("--only", only, writing.QUESTIONS)
-    files = arms or read_arms(tfarm.presets())
+    files = read_arms(arms or tfarm.presets())
     others = read_arms(law or [])
     subjects = [load_arm(file, theory) for file in files]
     laws = []
