@@ -13,7 +13,7 @@ from tfarm.records import record
 from tfarm.report.page import Case, Fact, PageSection, Picture, has_loop, picture, prose, sheet
 from tfarm.report.sampled_section import chain_words, piece_of_bands, response_columns
 from tfarm.schema import Column, Table, table
-from tfarm.studies.cases import learning_curves
+from tfarm.studies.candidates import learning_curves
 from tfarm.tuner import LearningCurves, Tuning, compare_controllers, tried_loops, tune
 from tfarm.tuner.baselines import Outcomes, quantised_chain
 from tfarm.tuner.tuning import usual_plan
