@@ -11,7 +11,7 @@ from typing import Any
 import typer
 from typer.exceptions import TyperException
 
-from tfarm.cli import arm_files, commands, control, designing  # noqa: F401  each adds its commands
+from tfarm.cli import arm_files, commands, control, designing, pages  # noqa: F401  each adds its commands
 from tfarm.cli.app import discard, print_line, progress, whole_command
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError, require
 from tfarm.files import STANDARD_OUTPUT
