@@ -68,18 +68,6 @@ def test_a_pipe_without_a_reader_is_refused_and_not_waited_for(tmp_path):
     assert stat.S_ISFIFO(pipe.stat().st_mode)
 
 
-def test_a_device_stays_a_device(tmp_path):
-    """A node of its own, like that of /dev/null, where this user may make one."""
-    node = tmp_path / "null"
-    try:
-        os.mknod(node, stat.S_IFCHR | 0o666, os.makedev(1, 3))
-        write(node)
-    except (PermissionError, ParameterError):
-        pytest.skip("this user can make or open no device nodes")
-    assert stat.S_ISCHR(node.stat().st_mode)
-    assert list(tmp_path.iterdir()) == [node]
-
-
 def test_standard_output_by_its_path(tmp_path):
     """Through a pipe, and into a file that the shell keeps writing to."""
     script = "from pathlib import Path; from tfarm.files import write_file\n"

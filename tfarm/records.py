@@ -18,11 +18,8 @@ _Record = TypeVar("_Record")
 
 SHOWN_FIRST = ("verdict", "word", "text", "finding", "unstable", "worst_error")  # the finding
 LONGEST_REPR = 200  # characters of a repr: a line or two of a terminal
-LONGEST_ENTRY, LONGEST_FINDING = 60, 100  # characters of an entry, and of the finding
 PLAIN = frozenset({float, int, str, bool, type(None), Fraction})  # types without arrays
-LONGEST_INSIDE = 80  # of a record inside another one
 OF_TEXTS = hash("tfarm")  # another in each process, as the hash of every record with a text
-SHOWN_SINGLY = 3  # numbers of an array or a list that are shown
 
 
 def record(cls: _Class) -> _Class:
@@ -46,15 +43,12 @@ def record(cls: _Class) -> _Class:
     for value in vars(cls).values():
         if isinstance(value, cached_property):
             value.func = _read_only_result(value.func)
-    methods = {
-        "__post_init__": after_init,
-        "__eq__": _equal,
-        "__hash__": _hash,
-        "__repr__": _repr,
-        "_repr_html_": vars(cls).get("_repr_html_", _repr_html),
-    }
-    for name, method in methods.items():
-        setattr(cls, name, method)
+    of_class: Any = cls
+    of_class.__post_init__ = after_init
+    of_class.__eq__ = _equal
+    of_class.__hash__ = _hash
+    of_class.__repr__ = _repr
+    of_class._repr_html_ = vars(cls).get("_repr_html_", _repr_html)
     return cls
 
 
@@ -108,12 +102,11 @@ def _same(one: Any, other: Any) -> bool:
         return True
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
         one, other = np.asarray(one), np.asarray(other)
-        return np.array_equal(one, other, equal_nan=bool(one.dtype.kind in "fc" and other.dtype.kind in "fc"))
+        return np.array_equal(one, other, equal_nan={one.dtype.kind, other.dtype.kind} <= {"f", "c"})
     if isinstance(one, dict) and isinstance(other, dict):
         return one.keys() == other.keys() and all(_same(one[key], other[key]) for key in one)
-    if isinstance(one, tuple | list) and isinstance(other, tuple | list):
-        pairs = zip(one, other, strict=False)
-        return type(one) is type(other) and len(one) == len(other) and all(_same(*pair) for pair in pairs)
+    if isinstance(one, tuple | list):
+        return type(one) is type(other) and len(one) == len(other) and all(map(_same, one, other))
     return bool(one == other or (one != one and other != other))
 
 
@@ -151,7 +144,7 @@ def _entries(self: Any) -> Iterator[tuple[str, str]]:
     """Yield the shown names and texts: the finding, those of `as_typed`, then the fields other than defaults."""
     found = _found(self)
     for name in found:
-        yield name, _shown(getattr(self, name), LONGEST_FINDING)
+        yield name, _shown(getattr(self, name), 100)
     if hasattr(type(self), "as_typed"):
         yield from self.as_typed()
     for each in fields(self):
@@ -170,23 +163,23 @@ def _found(self: Any) -> list[str]:
     return [name for name in SHOWN_FIRST if hasattr(type(self), name) or name in self.__dataclass_fields__]
 
 
-def _shown(value: Any, longest: int = LONGEST_ENTRY) -> str:
+def _shown(value: Any, longest: int = 60) -> str:
     """Return an entry in a few characters: six digits of a number, an array's shape; a record's finding or name."""
+    few = 3  # numbers of an array or a list that are shown
     if isinstance(value, np.ndarray):
-        small = value.ndim == 1 and value.size <= SHOWN_SINGLY
-        return f"[{', '.join(map(_shown, value.tolist()))}]" if small else f"<array {value.shape}>"
+        is_short = value.ndim == 1 and value.size <= few
+        return f"[{', '.join(map(_shown, value.tolist()))}]" if is_short else f"<array {value.shape}>"
     if isinstance(value, float | complex):
         return f"{value:.6g}"
     if isinstance(value, dict):
-        numbers = 0 < len(value) <= SHOWN_SINGLY and all(isinstance(each, float) for each in value.values())
-        return f"<{', '.join(f'{key}={_shown(each)}' if numbers else str(key) for key, each in value.items())}>"
+        is_short = 0 < len(value) <= few and all(isinstance(each, float) for each in value.values())
+        return f"<{', '.join(f'{key}={_shown(each)}' if is_short else str(key) for key, each in value.items())}>"
     if isinstance(value, tuple | list):
-        shown = ", ".join(map(_shown, value)) if len(value) <= SHOWN_SINGLY else f"{len(value)} entries"
-        return f"({shown})"
+        return f"({', '.join(map(_shown, value)) if len(value) <= few else f'{len(value)} entries'})"
     if is_dataclass(value) and not isinstance(value, type):
         named = [each.name for each in fields(value) if each.name == "name" and not _is_default(value, each)]
         known = _found(value) or named
         text = _shown(getattr(value, known[0])) if known else repr(value)
-        return text if len(text) <= LONGEST_INSIDE else f"{type(value).__name__}(...)"
+        return text if len(text) <= 80 else f"{type(value).__name__}(...)"
     text = repr(value)
     return text if len(text) <= longest else f"{text[: longest - 4]} ..."

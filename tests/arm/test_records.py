@@ -141,6 +141,8 @@ def test_a_name_has_the_letters_of_a_folder_on_any_machine(name):
     with pytest.raises(ParameterError, match=r"^name = .*begins with a letter or digit"):
         replace(ARM, name=name)
     assert replace(ARM, name="Arm nº 2 (β)").name == "Arm nº 2 (β)"
+    with pytest.raises(ParameterError, match=r"320 bytes; at most 200"):
+        replace(ARM, name="\U0001d538" * 80)
 
 
 @pytest.mark.parametrize("assumptions", ["one text", [3], ["\x1b[31m"], None])

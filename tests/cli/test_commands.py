@@ -69,29 +69,15 @@ def test_presets_are_listed_with_their_assumptions(capsys):
     assert "2766.7" in out
 
 
-def test_tables_for_people(capsys):
-    _, out, _ = run(capsys, "modes", "sasaki2012", "--count", "2")
-    assert "71.5056824669" in out
-    assert "none missing" in out
-    _, out, _ = run(capsys, "response", "sasaki2012", "--output", "hub_rate", "--omega", "5")
-    assert "rad/s / N m" in out
-
-
 BENCH = str(Path(__file__).parents[1] / "rigs" / "bench-rig.toml")
 BAD = [
     (["modes", "sasaki2021"], 'did you mean "sasaki2012"'),
     (["modes", "sasaki2012", "--count", "0"], "--count = '0'"),
-    (["modes", "sasaki2012", "--count", "1001"], "less than or equal to 1000"),
     (["modes", "sasaki2012", "--count", "5_0"], "--count = '5_0'"),
     (["margins", "sasaki2012", "--law="], "--law = '': give a path"),
-    (["report", "sasaki2012", "--out= "], "--out = ' ': give a path"),
-    (["design", "sasaki2012", "--K1", "0,1_0"], "write numbers as 50"),
     (["sampled", "sasaki2012", "--Ts", "0.01"], "Did you mean --period?"),
-    (["modes", "sasaki2012", "--n", "3"], "Did you mean --count?"),
     (["margins", "sasaki2012", "--period", "0.01"], "tfarm sampled ARM --period 0.01"),
     (["rlocus", "sasaki2012"], 'Did you mean "locus"?'),
-    (["damp", "sasaki2012"], 'Did you mean "poles"?'),
-    (["c2d", "sasaki2012"], 'Did you mean "sampled"?'),
     (["lqr", "sasaki2012"], 'Did you mean "design"?'),
     (["response", "sasaki2012", "--output", "tip"], 'did you mean "tip_displacement"'),
     (["modes", "sasaki2012", "--cuont", "3"], "Possible options: --count"),
@@ -103,7 +89,6 @@ BAD = [
     (["response", "sasaki2012", "--output", "moment", "--x", "3"], "between 0 and 1 m"),
     (["response", "sasaki2012", "--output", "root_moment", "--side", "inner", "--s", "1j"], "has a fixed place"),
     (["response", "sasaki2012", "--output", "moment", "--x", "0.4", "--side", "left", "--s", "1j"], "outer, inner"),
-    (["response", "sasaki2012", "--output", "root_moment", "--points", "1e12"], "a valid integer"),
     (["response", "sasaki2012", "--output", "root_moment", "--from", "10", "--to", "1"], "--to = 1.0"),
     (["response", "sasaki2012", "--output", "root_moment", "--from", "0"], "--from = 0.0"),
     (["response", "sasaki2012", "--output", "root_moment", "--s", "abc"], "--s: 'abc': write"),
@@ -112,11 +97,9 @@ BAD = [
     (["response", "sasaki2012", "--output", "hub_angle", "--s", "1e300j"], "at most 1e+20 1/s"),
     (["response", "sasaki2012", "--output", "root_moment", "--s", "71.50568246689015j"], "a natural frequency"),
     (["response", "sasaki2012", "--output", "root_moment", "--csv", "/no/such/folder/a.csv"], "--csv"),
-    (["response", "sasaki2012", "--output", "root_moment", "--omega", "1", "--csv", "."], "--csv = '.'"),
     (["bode", "sasaki2012-lab", "--K1", "1"], "give --loop too"),
     (["bode", "sasaki2012-lab", "--loop", "--output", "hub_rate"], "the loop function has no output"),
     (["bode", "sasaki2012-lab", "--from", "-1"], "--from = -1.0: a positive frequency"),
-    (["nyquist", "sasaki2012-lab", "--law", "no-such.toml"], "no-such.toml"),
     (["margins", "sasaki2012", "--K1", "nan"], "K1 = nan"),
     (["margins", "sasaki2012", "--Kp", "1e30"], "Kp = 1e+30"),
     (["margins", "sasaki2012", "--K1", "much"], "--K1 = 'much'"),
@@ -124,7 +107,6 @@ BAD = [
     (["map", "sasaki2012", "--K1", "-1e300,1e300"], "at most 1e+150"),
     (["sampled", "sasaki2012", "--period", "0"], "sampling.period = 0.0"),
     (["simulate", "sasaki2012", "--duration", "1e300"], "duration"),
-    (["simulate", "sasaki2012", "--between", "-1"], "--between = '-1'"),
     (["simulate", "sasaki2012", "--dsp", "./nothing.toml"], "No such file"),
     (["design", "sasaki2012", "--objective", "beauty"], "'beauty'"),
     (["design", "sasaki2012", "--K1", "0,1e300"], "K1"),
@@ -134,8 +116,8 @@ BAD = [
     (["completion", "fsh"], "'fish'"),
     (["step", "sasaki2012-lab", "--figure", "t.pdf", "--csv", "t.pdf"], "two results in one file"),
     (["simulate", "sasaki2012-lab", "--animate", "x.gif", "--figure", "nowhere/a.png"], "is in no folder"),
-    (["compare", "sasaki2012"], "give a second arm, or --law FILE twice"),
-    (["compare", "sasaki2012", "sasaki2012-lab", "stocky-steel"], "two at most"),
+    (["compare", "sasaki2012"], "compare = '1 arms, 1 laws': give two arms, or one arm and two laws"),
+    (["compare", "sasaki2012", "sasaki2012-lab", "stocky-steel"], "'3 arms, 3 laws': give two arms"),
     (["compare", "sasaki2012", "--law", "a.toml"], "does not exist"),
     (["compare", "sasaki2012", "sasaki2012-lab", "--modes", "31"], "1 to 30"),
     (["compare", "sasaki2012", "quanser-2dsfl"], "gains of sasaki2012 are in another unit"),
@@ -178,11 +160,6 @@ def test_a_file_is_read_once_in_a_command(tmp_path):
     words = [sys.executable, "-c", OPENED, *lines]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
     assert done.stdout.splitlines() == list(lines.values())
-
-
-def test_an_unproven_digit_is_exit_3(capsys, monkeypatch):
-    monkeypatch.setattr("tfarm.exact.appendix.roots_near", lambda *_: 0)
-    assert "no root" in refused(capsys, "modes", "sasaki2012", "--digits", "20", "--json", code=3)
 
 
 def test_files_get_the_usual_permissions(capsys, tmp_path):

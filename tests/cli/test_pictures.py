@@ -99,19 +99,6 @@ def test_bode_reports_and_draws_an_output_that_is_zero(capsys, tmp_path):
     assert [each.get_text() for each in figure.axes[0].texts] == ["zero at every frequency"]
 
 
-@pytest.mark.parametrize(("K2", "unstable"), [("0.3", 0), ("1.5", 2)])
-def test_nyquist_counts_what_the_map_counts(capsys, K2, unstable):
-    found = answer(capsys, "nyquist", LAB, "--K1", "0.3", "--K2", K2)
-    assert tfarm.map(tfarm.load(LAB), np.array([0.3, 0.4]), np.array([0.0, float(K2)])).unstable[1, 0] == unstable
-    assert found["encirclements"] == -unstable
-    assert (found["unstable_by_nyquist"], found["unstable_roots"]) == (unstable, unstable)
-    assert found["verdict"] == ("unstable" if unstable else "stable")
-    assert len(found["s"]) == len(found["L"]) > 100
-    _, out, _ = run(capsys, "nyquist", LAB, "--K1", "0.3", "--K2", K2)
-    lines = [re.split("  +", line) for line in out.splitlines()]
-    assert all([label, str(unstable)] in lines for label in ("unstable poles by Nyquist's criterion", "unstable poles"))
-
-
 def test_a_film_is_that_of_the_run_and_a_gif(capsys, tmp_path):
     file = tmp_path / "slew.gif"
     words = ("simulate", LAB, "--duration", "0.2", "--modes", "20", "--animate")

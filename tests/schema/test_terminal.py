@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import pytest
 
-from tfarm.digits import TEXTS, general, singly
+from tfarm.digits import TEXTS
 from tfarm.schema import Column, Table
 from tfarm.schema.terminal import first_and_last, show_text, table_lines
 
@@ -42,12 +42,6 @@ def test_blocks_begin_with_every_leading_column():
 
 def words(lines):
     return sorted(" ".join(lines).split())
-
-
-def test_in_a_pipe_a_row_is_a_line():
-    lines = printed(sys.maxsize)
-    assert len(lines) == 3
-    assert all(column.cells[0] in lines[1] and column.cells[1] in lines[2] for column in COLUMNS)
 
 
 @pytest.mark.parametrize("width", [100, 80, 60, 50, 40])
@@ -110,11 +104,6 @@ def test_twice_the_rows_take_twice_the_calls(width):
         return sum(each.callcount for each in profile.getstats())
 
     assert calls(400) < 3 * calls(200)  # four times as many where each cell asks the whole column
-
-
-def test_a_heading_has_the_unit():
-    one = Column("omega_rad_s", "frequency", "rad/s", of=[71.50568246689], digits=singly(general, 5))
-    assert printed(80, (one,)) == ["frequency [rad/s]", "           71.506"]
 
 
 BOTH = """

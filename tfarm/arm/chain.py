@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, Literal
 
 from tfarm.arm import schema
-from tfarm.arm.checks import check_fields, extended, not_negative, number, positive, whole
+from tfarm.arm.checks import above_zero, check_annotated, not_negative, number, positive, positive_if_given, whole
 from tfarm.arm.reading import AnyFile, load_tables
 from tfarm.arm.records import Arm
 from tfarm.arm.schema import ArmTable, TomlTable, validated
@@ -22,6 +22,7 @@ from tfarm.schema import Quantity
 Reading = Literal["vibration", "total"]
 LEAST_BITS, MOST_BITS = 2, 32  # of a converter: of one bit there are no steps, of more than 32 no part
 MOST_DELAY = 100.0  # samples: each whole one is a state more
+DELAYS = "a computational delay is zero or positive, in samples, at most 100"
 TIME_ROUNDING = 1e-12  # of a time: by so little before a sample it is at it, as its quotient with the period is rounded
 PAPER_ANGLE = 1.15  # rad, as tip travel over length: the paper moves the tip of its 1 m by 1.15 m
 PERIOD = Quantity("sampling period", "s", help="time between two samples of the controller")
@@ -37,19 +38,15 @@ class Sampling:
     (tachometer) hub rate; inf is none.  An encoder is digital and has none.
     """
 
-    period: Annotated[float, PERIOD] = 0.01
-    delay_samples: Annotated[float, DELAY] = 0.0
-    antialias_corner: float = math.inf
+    period: Annotated[
+        float, PERIOD, positive, "a sampling period is a positive, finite time in seconds, 0.01 for instance"
+    ] = 0.01
+    delay_samples: Annotated[float, DELAY, not_negative, DELAYS] = 0.0
+    antialias_corner: Annotated[float, above_zero, "a corner is positive in rad/s, or inf for no filter"] = math.inf
 
     def __post_init__(self) -> None:
-        remedy = f"a computational delay is zero or positive, in samples, at most {MOST_DELAY:g}"
-        period = "a sampling period is a positive, finite time in seconds, 0.01 for instance"
-        check_fields(self, "sampling", positive, period=period)
-        check_fields(self, "sampling", not_negative, delay_samples=remedy)
-        check_fields(
-            self, "sampling", _above_zero, antialias_corner="a corner is positive in rad/s, or inf for no filter"
-        )
-        require(self.delay_samples <= MOST_DELAY, "sampling.delay_samples", self.delay_samples, remedy)
+        check_annotated(self, "sampling")
+        require(self.delay_samples <= MOST_DELAY, "sampling.delay_samples", self.delay_samples, DELAYS)
 
     @property
     def whole_delay(self) -> int:
@@ -60,9 +57,6 @@ class Sampling:
     def fraction(self) -> float:
         """f in [0, 1): the remainder of the delay, in samples."""
         return self.delay_samples - self.whole_delay
-
-
-RANGE_UNITS = {"moment": " of N m", "torque": " of N m (of V or A where that is the arm's input)"}  # of ranges
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,27 +72,31 @@ class Converters:
 
     encoder_counts: int | None = None
     hub_rate: Literal["ideal", "difference"] = "ideal"
-    rate_filter: float = math.inf
+    rate_filter: Annotated[
+        float, above_zero, "the corner of the rate filter is positive in rad/s, or inf for a plain difference"
+    ] = math.inf
     moment_bits: int | None = None
-    moment_range: float | None = None
+    moment_range: Annotated[
+        float | None, positive_if_given, "the range +-R of a converter is a positive, finite number of N m"
+    ] = None
     torque_bits: int | None = None
-    torque_range: float | None = None
+    torque_range: Annotated[
+        float | None,
+        positive_if_given,
+        "the range +-R of a converter is a positive, finite number of N m (of V or A where that is the arm's input)",
+    ] = None
     arithmetic: Literal["float64", "float32"] = "float64"
 
     def __post_init__(self) -> None:
         _whole("converters.encoder_counts", self.encoder_counts, 2, 2**31, "counts a revolution")
         must_be_known("converters.hub_rate", self.hub_rate, ("ideal", "difference"))
         must_be_known("converters.arithmetic", self.arithmetic, ("float64", "float32"))
-        remedy = "the corner of the rate filter is positive in rad/s, or inf for a plain difference"
-        check_fields(self, "converters", _above_zero, rate_filter=remedy)
-        for signal, unit in RANGE_UNITS.items():
-            bits, name = getattr(self, f"{signal}_bits"), f"{signal}_range"
+        check_annotated(self, "converters")
+        for signal in ("moment", "torque"):
+            bits = getattr(self, f"{signal}_bits")
             _whole(f"converters.{signal}_bits", bits, LEAST_BITS, MOST_BITS, "bits")
-            if getattr(self, name) is not None:
-                remedy = f"the range +-R of a converter is a positive, finite number{unit}"
-                check_fields(self, "converters", positive, **{name: remedy})
-            remedy = f"{bits} bits need a range +-R{unit}: give it, or leave converters.{signal}_bits out"
-            require(bits is None or getattr(self, name), f"converters.{name}", None, remedy)
+            remedy = f"{bits} bits need a range +-R: give it, or leave converters.{signal}_bits out"
+            require(bits is None or getattr(self, f"{signal}_range"), f"converters.{signal}_range", None, remedy)
 
     @property
     def is_single(self) -> bool:
@@ -114,17 +112,20 @@ class Actuator:
     `hub_damping` [N m s/rad] is analog: a back-EMF torque -hub_damping theta_t that acts between the samples too.
     """
 
-    torque_limit: float = math.inf
-    motor_constant: float | None = None
-    hub_damping: float = 0.0
+    torque_limit: Annotated[
+        float,
+        above_zero,
+        "a torque limit is positive (in N m; in V or A where that is the arm's input), or inf for none",
+    ] = math.inf
+    motor_constant: Annotated[
+        float | None,
+        positive_if_given,
+        "a motor constant is a positive number of N m a volt; leave it out if there is none",
+    ] = None
+    hub_damping: Annotated[float, not_negative, "hub damping is zero or positive, in N m s/rad"] = 0.0
 
     def __post_init__(self) -> None:
-        limit = "a torque limit is positive (in N m; in V or A where that is the arm's input), or inf for none"
-        constant = "a motor constant is a positive number of N m a volt; leave it out if there is none"
-        check_fields(self, "actuator", _above_zero, torque_limit=limit)
-        check_fields(self, "actuator", not_negative, hub_damping="hub damping is zero or positive, in N m s/rad")
-        if self.motor_constant is not None:
-            check_fields(self, "actuator", positive, motor_constant=constant)
+        check_annotated(self, "actuator")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,15 +137,15 @@ class Slew:
     """
 
     travel: float | None = None
-    rise_time: float = 1.0
+    rise_time: Annotated[float, positive, "a rise time is a positive, finite number of seconds"] = 1.0
     reading: Reading = "vibration"
 
     def __post_init__(self) -> None:
         if self.travel is not None:
             remedy = "tip travel is a finite number of metres, other than zero"
-            check_fields(self, "slew", number, travel=remedy)
+            object.__setattr__(self, "travel", number("slew.travel", self.travel, remedy))
             positive("slew.travel", abs(self.travel), remedy)
-        check_fields(self, "slew", positive, rise_time="a rise time is a positive, finite number of seconds")
+        check_annotated(self, "slew")
         must_be_known("slew.reading", self.reading, ("vibration", "total"))
 
     def travel_of(self, reach: float) -> float:
@@ -182,12 +183,6 @@ def chain_or_usual(chain: object) -> Chain:
         return chain
     remedy = "give a tfarm.dsp.Chain, as tfarm.dsp.load_chain reads one; nothing for 10 ms and ideal converters"
     raise ParameterError(key="chain", value=chain, remedy=remedy)
-
-
-def _above_zero(key: str, value: object, remedy: str) -> float:
-    found = extended(key, value, remedy)
-    require(found, key, found, remedy)
-    return found
 
 
 def _whole(key: str, value: object, least: int, most: int, unit: str) -> None:

@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable
 from functools import cache
 from numbers import Integral, Real
-from typing import Annotated, Any, Literal, cast, get_args, get_origin, get_type_hints
+from typing import Any, Literal, cast, get_args, get_type_hints
 
 import numpy as np
 
@@ -21,7 +21,7 @@ OUT_OF_RANGE = f"beyond any arm ({SMALLEST_NUMBER:g} to {LARGEST_NUMBER:g}); che
 Input = Literal["hub_torque", "motor_voltage", "motor_current", "hub_angle"]
 INPUTS: tuple[Input, ...] = get_args(Input)
 INPUT_UNITS = {"hub_torque": "N m", "motor_voltage": "V", "motor_current": "A", "hub_angle": "rad"}
-Check = Callable[[str, object, str], float]  # of key, value and the legal values in words
+Check = Callable[[str, object, str], float | None]  # of key, value and the legal values in words
 Theory = Literal["timoshenko", "shear", "rayleigh", "euler-bernoulli"]  # of the beam
 THEORIES: tuple[Theory, ...] = get_args(Theory)
 WITH_ROTARY_INERTIA: tuple[Theory, ...] = ("timoshenko", "rayleigh")
@@ -87,6 +87,11 @@ def above_zero(key: str, value: object, meaning: str) -> float:
     return x
 
 
+def positive_if_given(key: str, value: object, meaning: str) -> float | None:
+    """Return a finite number above zero, or None."""
+    return None if value is None else positive(key, value, meaning)
+
+
 def on_the_arm(key: str, x: Reals | float, length: float) -> Reals:
     """Return points x [m] of an arm of this length as an array.  Raises ParameterError for points off it and nan."""
     points = np.asarray(x, dtype=float)
@@ -94,24 +99,19 @@ def on_the_arm(key: str, x: Reals | float, length: float) -> Reals:
     return points
 
 
-def check_fields(record: object, kind: str, check: Check, **meanings: str) -> None:
-    """Replace fields of a frozen record by their checked values, each under the key `kind.field`."""
-    for name, meaning in meanings.items():
-        key = f"{kind}.{name}" if kind else name
-        object.__setattr__(record, name, check(key, getattr(record, name), meaning))
-
-
 @cache
 def _annotated(kind: type) -> dict[str, tuple[Check, str]]:
-    """Return check and meaning of each field of a class of records that has both in its annotation."""
+    """Return check and meaning of each field of a class of records that ends its annotation with both."""
     hints = get_type_hints(kind, include_extras=True)
-    return {name: hint.__metadata__ for name, hint in hints.items() if get_origin(hint) is Annotated}
+    marks: dict[str, Any] = {name: getattr(hint, "__metadata__", ()) for name, hint in hints.items()}
+    return {name: own[-2:] for name, own in marks.items() if len(own) > 1}
 
 
 def check_annotated(record: object, kind: str) -> None:
     """Replace each field of a frozen record that has a check in its annotation by its checked value."""
     for name, (check, meaning) in _annotated(cast("Any", type(record))).items():
-        object.__setattr__(record, name, check(f"{kind}.{name}", getattr(record, name), meaning))
+        key = f"{kind}.{name}" if kind else name
+        object.__setattr__(record, name, check(key, getattr(record, name), meaning))
 
 
 def plain_name(name: Any) -> str:
@@ -119,6 +119,8 @@ def plain_name(name: Any) -> str:
     remedy = 'a name has 1 to 80 characters, begins with a letter or digit and has no / \\ : * ? " < > |'
     is_name = isinstance(name, str) and re.fullmatch(r'[^\W_]([^/\\:*?"<>|]{0,78}[^/\\:*?"<>| .])?', name)
     require(is_name and name.isprintable(), "name", name, remedy)
+    size = len(name.encode())  # file systems stop at 255 bytes, and a temporary file's name is longer than its own
+    require(size <= 200, "name", name, f"{size} bytes; at most 200")
     return str(name)
 
 

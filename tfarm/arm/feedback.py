@@ -8,7 +8,6 @@ the hub.  Under a static torque u it is -(J - I_h)/J u.  With a reversed gauge K
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
@@ -35,18 +34,16 @@ GAINS = (
     Gain("K1", "hub_rate", "N m s/rad", "theta_t"),
     Gain("K2", "root_moment", "1", "M"),
 )  # in the order in which the outputs are fed back, everywhere
-FED_BACK = tuple(gain.output for gain in GAINS)
+FED_BACK = AT_HUB = ("hub_angle", "hub_rate", "root_moment")  # theorems on the loop are about gains on these
 LISTED = tuple(sorted(GAINS, key=lambda gain: gain.name))  # in the order in which a person lists them
-NAMES = tuple(gain.name for gain in LISTED)
-AT_HUB = ("hub_angle", "hub_rate", "root_moment")  # theorems on the loop are about gains on these, the first
-assert FED_BACK[: len(AT_HUB)] == AT_HUB
+NAMES = ("K1", "K2", "Kp")
 ON = {gain.output: gain.name for gain in GAINS}  # the name of the gain on each output
-OUTPUT_OF = {name: output for output, name in ON.items()}
-ANGLE_GAIN, RATE_GAIN, MOMENT_GAIN = (ON[output] for output in AT_HUB)
+OUTPUT_OF = {gain.name: gain.output for gain in GAINS}
+ANGLE_GAIN, RATE_GAIN, MOMENT_GAIN = "Kp", "K1", "K2"
 PLANE = (RATE_GAIN, MOMENT_GAIN)  # the gains of the paper's law: axes of the stability region
-TWO_GAINS = "-".join(PLANE)  # the name of that structure, as PD or lead
-TAKEN_OFF = " - ".join(f"{gain.name} {gain.letter}" for gain in GAINS)  # the law, subtracted from the input
-SPELT_OUT = re.sub(r"\bM(?= |$)", "E I phi'(0)", TAKEN_OFF)
+TWO_GAINS = "K1-K2"  # the name of that structure, as PD or lead
+TAKEN_OFF = "Kp theta - K1 theta_t - K2 M"  # the law, subtracted from the input
+SPELT_OUT = "Kp theta - K1 theta_t - K2 E I phi'(0)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,7 +68,7 @@ class HubFeedback:
     @property
     def row(self) -> tuple[float, ...]:
         """The gains in the order of `GAINS`, on the outputs in `FED_BACK`."""
-        return tuple(self[gain.name] for gain in GAINS)
+        return self.Kp, self.K1, self.K2
 
     def __getitem__(self, name: str) -> float:
         """Return the gain of that name."""
@@ -85,8 +82,7 @@ class HubFeedback:
     @property
     def point(self) -> tuple[float, float]:
         """The coordinates of the law in the plane of `PLANE`: across, up."""
-        across, up = (self[name] for name in PLANE)
-        return across, up
+        return self.K1, self.K2
 
     def gain_text(self, name: str, how: Callable[[float], str], arm: Arm | None = None) -> str:
         """Return `K1 = 0.3`: the gain of that name, its value written by `how`, with its unit on an arm."""
@@ -99,7 +95,7 @@ class HubFeedback:
 
     def times(self, factor: float) -> HubFeedback:
         """Return the law with every gain times a number."""
-        return HubFeedback(**{gain.name: factor * self[gain.name] for gain in GAINS})
+        return law_of([factor * each for each in self.row])
 
 
 def unit_of(name: str, arm: Arm) -> str:
@@ -134,4 +130,5 @@ def input_words(arm: Arm) -> str:
 
 def law_of(row: ArrayLike) -> HubFeedback:
     """Return the law with these gains, in the order of `GAINS`."""
-    return HubFeedback(**{gain.name: float(value) for gain, value in zip(GAINS, np.asarray(row), strict=True)})
+    Kp, K1, K2 = np.asarray(row, dtype=float).tolist()
+    return HubFeedback(Kp=Kp, K1=K1, K2=K2)

@@ -12,12 +12,12 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace, block_of
-from tfarm.arm.checks import INPUTS, check_fields, not_negative, number, positive
+from tfarm.arm.checks import INPUTS, check_annotated, not_negative, number, positive
 from tfarm.arm.feedback import AT_HUB, GAINS, ON, OUTPUT_OF, HubFeedback
 from tfarm.arm.records import Arm
 from tfarm.arrays import Complex
@@ -55,13 +55,13 @@ class Law:
     """
 
     entries: Mapping[str, Any] = field(repr=False, compare=False)
-    delay: float = 0.0
+    delay: Annotated[float, not_negative, "a delay in s, 0 or more"] = 0.0
     input: str | None = None
     period: float | None = None
     references: tuple[str, ...] = ()
     sign: int = -1
     rule: str = "tustin"
-    prewarp: float = 0.0
+    prewarp: Annotated[float, not_negative, "a frequency in rad/s, or 0"] = 0.0
     name: str = "law"
     parts: tuple[Part, ...] = field(default=(), repr=False)
 
@@ -69,7 +69,7 @@ class Law:
         parts, periods = (self.parts, ()) if self.parts else _parts_of(self.entries)
         object.__setattr__(self, "parts", parts)
         object.__setattr__(self, "entries", {})
-        check_fields(self, "", not_negative, delay="a delay in s, 0 or more", prewarp="a frequency in rad/s, or 0")
+        check_annotated(self, "")
         known = {float(each) for each in periods}
         if self.period is not None:
             known.add(positive("period", self.period, "a sampling period in s; leave it out for a continuous-time law"))

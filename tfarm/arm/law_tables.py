@@ -24,9 +24,6 @@ from tfarm.arm.schema import StrictTable, validated
 from tfarm.errors import MISSING, ParameterError, close_to, listed, must_be_known, naming, require
 from tfarm.files import read_mat
 
-LAW_TABLE = "law"  # the table's name
-MOST_MAT_BYTES = 16 * 1024 * 1024  # of a .mat file
-
 
 class LawTable(StrictTable):
     """[law], without the tables of its signals."""
@@ -73,19 +70,19 @@ def load_law(name_or_path: AnyFile) -> Law | None:
     """
     tables, file = load_tables(name_or_path)
     with naming(file):
-        return law_of_table(tables[LAW_TABLE], Path(file).parent) if LAW_TABLE in tables else None
+        return law_of_table(tables["law"], Path(file).parent) if "law" in tables else None
 
 
 def law_of_table(table: Any, folder: Path) -> Law:
     """Return the law of a parsed [law] table; the path of a .mat file is relative to `folder`."""
-    require(isinstance(table, dict), LAW_TABLE, table, "give a table, headed [law]")
+    require(isinstance(table, dict), "law", table, "give a table, headed [law]")
     signals = {key: value for key, value in table.items() if isinstance(value, dict)}
     others = {key: value for key, value in table.items() if key not in signals}
     for key, value in others.items():  # hub_angle = 2.0, and no misspelt delay
         is_signal = type(value) in (int, float) and not close_to(key, LawTable.model_fields)
-        remedy = f"a signal has a table of its own: [{LAW_TABLE}.{key}] with gain = {value}"
-        require(not is_signal, f"{LAW_TABLE}.{key}", value, remedy)
-    head = validated(LawTable, others, LAW_TABLE)
+        remedy = f"a signal has a table of its own: [law.{key}] with gain = {value}"
+        require(not is_signal, f"law.{key}", value, remedy)
+    head = validated(LawTable, others, "law")
     common = head.model_dump(include={"name", "input", "delay", "period", "sign", "references", "rule", "prewarp"})
     try:
         if head.matrices is not None:
@@ -96,11 +93,11 @@ def law_of_table(table: Any, folder: Path) -> Law:
         require(is_alone, "matrices", MISSING, "signals, system and scales need a .mat file")
         entries = {}
         for name, values in signals.items():
-            block = validated(SignalTable, values, f"{LAW_TABLE}.{name}")
-            entries[name if block.x is None else f"{name}@{block.x!r}"] = block.build(f"{LAW_TABLE}.{name}")
+            block = validated(SignalTable, values, f"law.{name}")
+            entries[name if block.x is None else f"{name}@{block.x!r}"] = block.build(f"law.{name}")
         return Law(entries, **common)
     except ParameterError as error:
-        key = error.key if error.key.startswith(LAW_TABLE) else f"{LAW_TABLE}.{error.key}"
+        key = error.key if error.key.startswith("law") else f"law.{error.key}"
         raise ParameterError(key=key, value=error.value, remedy=error.remedy) from None
 
 
@@ -108,7 +105,7 @@ def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:
     """Return the law of a .mat file with A, B, C and D, or of its structure named `system`."""
     signals = head.signals or []
     require(signals, "signals", MISSING, "name a signal for each column of B")
-    found, _ = read_mat(folder / str(head.matrices), MOST_MAT_BYTES, key="matrices")
+    found, _ = read_mat(folder / str(head.matrices), 16 << 20, key="matrices")  # bytes at most
     place = ""
     if head.system is not None:
         must_be_known("system", head.system, dict.fromkeys(name.split(".")[0] for name in found if "." in name))

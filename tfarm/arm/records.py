@@ -23,8 +23,6 @@ from tfarm.arm.parts import Attachment, Gauge, Hub, Link, Motor, Payload, Rotary
 from tfarm.errors import ParameterError, must_be_known, require, shown
 
 MOST_PARTS = 64  # segments, and attachments: a check of the chain has 64 equal pieces
-FLATTEST = 1e-3  # arm's length over a segment's radius of gyration: below it the units are wrong
-LENGTH_ROUNDING = 1e-12  # of the length: rounding of a sum of up to 64 decimal lengths
 IDEAL_MOTOR = Motor(resistance=1.0, torque_constant=1.0, back_emf_constant=0.0)  # without inertia, friction and gear
 
 _Part = TypeVar("_Part")
@@ -63,48 +61,31 @@ class Arm:
         must_be_known("theory", self.theory, THEORIES)
         must_be_known("input", self.input, INPUTS)
         slenderness = min(self.length / link.section.radius_of_gyration for link in self.links)  # of the whole length
-        require(
-            slenderness >= FLATTEST,
-            "length" if self.outer else "link.length",
-            self.length,
-            f"{slenderness:.3g} times the section's radius of gyration is no beam; check the units",
-        )
+        remedy = f"{slenderness:.3g} times the section's radius of gyration is no beam; check the units"
+        require(slenderness >= 1e-3, "length" if self.outer else "link.length", self.length, remedy)
         self._check_places()
-        require(
-            self.motor is not None or self.input not in ("motor_voltage", "motor_current"),
-            "input",
-            self.input,
-            "there is no motor; describe it under [motor], or take hub_torque or hub_angle",
-        )
-        require(
-            self.motor is None or math.isfinite(self.hub.inertia),
-            "hub.inertia",
-            self.hub.inertia,
-            "locks the hub, so the motor has no effect; leave out the motor, or give the hub's own inertia",
-        )
+        if self.motor is None:
+            remedy = "there is no motor; describe it under [motor], or take hub_torque or hub_angle"
+            require(self.input in ("hub_torque", "hub_angle"), "input", self.input, remedy)
+        else:
+            remedy = "locks the hub, so the motor has no effect; leave out the motor, or give the hub's own inertia"
+            require(math.isfinite(self.hub.inertia), "hub.inertia", self.hub.inertia, remedy)
 
     def __repr__(self) -> str:
         return brief_repr(self, always=4)
 
     def _check_places(self) -> None:
         """Check the places of attachments, gauge and pin; move an attachment that rounding has put beyond the tip."""
-        end = self.length * (1 + LENGTH_ROUNDING)
+        end = self.length * (1 + 1e-12)  # with the rounding of a sum of up to 64 decimal lengths
         places = [(f"attachment.{i}", each.x, end) for i, each in enumerate(self.attachments, 1)]
+        remedy = f"is beyond the tip; x counts from the clamp, up to the link's length of {self.length!r} m"
         for part, x, most in [*places, ("gauge", self.gauge.x, self.length)]:
-            require(
-                x <= most,
-                f"{part}.x",
-                x,
-                f"is beyond the tip; x counts from the clamp, up to the link's length of {self.length!r} m",
-            )
-        on_it = tuple(each if each.x <= self.length else replace(each, x=self.length) for each in self.attachments)
+            require(x <= most, f"{part}.x", x, remedy)
+        on_it = tuple(replace(each, x=min(each.x, self.length)) for each in self.attachments)
         object.__setattr__(self, "attachments", on_it)
-        require(
-            math.isfinite(self.payload.mass) or abs(self.centre_distance) >= 1e-9 * self.reach,
-            "payload.offset",
-            self.payload.offset,
-            "puts the pinned centre of mass on the axis, which is fixed anyway; give a finite payload.mass",
-        )
+        is_right = math.isfinite(self.payload.mass) or abs(self.centre_distance) >= 1e-9 * self.reach
+        remedy = "puts the pinned centre of mass on the axis, which is fixed anyway; give a finite payload.mass"
+        require(is_right, "payload.offset", self.payload.offset, remedy)
 
     @property
     def links(self) -> tuple[Link, ...]:
@@ -154,8 +135,7 @@ class Arm:
     @property
     def is_undamped(self) -> bool:
         """Whether nothing dissipates: then every natural frequency is real."""
-        at_hub = (self.hub.friction, self._drive.rotor_friction, self._back_emf)
-        return not any((self.damping, self.clamp.damping, self.joint.damping, *at_hub))
+        return self.loses_at_hub_alone and not self.rate_loss
 
     @property
     def is_reactive(self) -> bool:
@@ -182,9 +162,8 @@ class Arm:
     @property
     def has_massless_hub(self) -> bool:
         """Whether the hub has no inertia, friction or stiffness, and r = 0: then the root moment is -u."""
-        losses = (self.hub.friction, self._drive.rotor_friction, self._back_emf)
-        elsewhere = (self.hub.radius, self.gauge.x)  # the gauge measures another moment
-        return not any((self.hub_side_inertia, self.hub.stiffness, *losses, *elsewhere))
+        elsewhere = self.hub.radius, self.gauge.x  # the gauge measures another moment
+        return not any((self.hub_side_inertia, self.hub.stiffness, self.rate_loss, *elsewhere))
 
     @property
     def bending_scale(self) -> float:
@@ -276,14 +255,14 @@ class Arm:
     def reads_hub_moment(self) -> bool:
         """Whether the gauge measures the moment on the hub: it is at the root, r = 0, no inertia at the clamp."""
         at_clamp = any(each.x == 0 and (each.inertia or each.rotational_stiffness) for each in self.attachments)
-        return self.hub.radius == 0 and self.gauge.x == 0 and not at_clamp
+        return not (self.hub.radius or self.gauge.x or at_clamp)
 
     @property
     def input_per_torque(self) -> float:
         """The input for a torque of 1 N m at the hub: 1, or a motor's current [A] or voltage [V]."""
         motor = self._drive
-        per_ampere = motor.gear_efficiency * motor.gear_ratio * motor.torque_constant
-        return {"motor_current": 1.0 / per_ampere, "motor_voltage": motor.resistance / per_ampere}.get(self.input, 1.0)
+        at_one = {"motor_current": 1.0, "motor_voltage": motor.resistance}.get(self.input)
+        return at_one / (motor.gear_efficiency * motor.gear_ratio * motor.torque_constant) if at_one else 1.0
 
     @property
     def input_lags(self) -> bool:
@@ -293,7 +272,7 @@ class Arm:
     @property
     def loses_at_hub_alone(self) -> bool:
         """Whether only friction of hub and rotor and the back-EMF dissipate."""
-        return not any((*(link.damping for link in self.links), self.clamp.damping, self.joint.damping))
+        return not any((self.damping, self.clamp.damping, self.joint.damping))
 
     @property
     def _turning_friction(self) -> float:
@@ -341,13 +320,10 @@ class Arm:
         arm = self
         for name, value in numbers.items():
             part, number = ADJUSTABLE[name]
-            require(
-                name != "length" or not arm.outer,
-                name,
-                value,
-                f"ambiguous, as there are {len(arm.links)} segments: change their [[link]] tables",
-            )
-            if name == "damping" and arm.outer:
+            if name == "length":
+                remedy = f"ambiguous, as there are {len(arm.links)} segments: change their [[link]] tables"
+                require(not arm.outer, name, value, remedy)
+            if name == "damping":
                 arm = replace(arm, outer=tuple(replace(link, damping=value) for link in arm.outer))
             if name == "hub_inertia" and value == math.inf:
                 idle = replace(arm.hub, friction=0.0, stiffness=0.0)
@@ -404,13 +380,10 @@ def must_have_free_hub(arm: Arm) -> None:
 
 def must_turn(arm: Arm) -> None:
     """Raise ParameterError, naming the infinite part or the spring, for an arm that cannot slew."""
-    parts = {
-        "hub.inertia": arm.hub.inertia,
-        "payload.mass": arm.payload.mass,
-        "payload.inertia": arm.payload.inertia,
-    }
-    key, value = max(parts.items(), key=lambda part: part[1])
-    require(not math.isinf(value), key, value, "an arm that cannot turn has no slew; give finite inertias")
+    payload = arm.payload
+    parts = ("hub.inertia", arm.hub.inertia), ("payload.mass", payload.mass), ("payload.inertia", payload.inertia)
+    for key, value in parts:
+        require(not math.isinf(value), key, value, "an arm that cannot turn has no slew; give finite inertias")
     for key, value in arm._springs_to_ground():
         require(value <= 0.0, key, value, "an arm with a spring to ground has no slew; leave the spring out")
 

@@ -24,7 +24,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from tfarm.arm import AT_HUB, AnyLaw, Arm, Law, as_law, tracked
+from tfarm.arm import AT_HUB, AnyLaw, Arm, Law, as_law
 from tfarm.arm.chain import PERIOD, TIME_ROUNDING
 from tfarm.arm.checks import number
 from tfarm.arm.law import REFERENCE
@@ -70,18 +70,13 @@ CONSUMER = Consumer(
     none=("volts",),
 )  # fmt: skip
 SAMPLED_NAMES = {"reference": "reference", "slew": "slew", "pulse": "pulse", "deflection": "decay"}  # by scenario
-MOMENT, UNSTABLE, GROWS = AT_HUB[-1], "unstable", " (the response grows, its figures are not defined)"
+MOMENT, UNSTABLE = AT_HUB[-1], "unstable"
 Curve = tuple[Real, Real, Real, Peak | None]  # times [s], values, bounds of their errors, and the peak where known
 PARTS = ("hub", "tip", "root_moment", "torque")
 TIME_CONSTANTS = 8.0  # of the dominant pole: length of a record after its input, to 3e-4 of the final value
-LONGEST_SLEWS = 20.0  # times the slew: a record without a duration is no longer
-DOMINANT = 2.0  # times the first frequency: a pole farther away is not the dominant one
-LEAST_POINTS, MOST_POINTS = 2000, 20_000  # of a record
 CONVERGED = 1e-6  # of the peak of each signal: bound on its error, everywhere in the record, of a converged response
 OPEN = 0.01  # of a figure: more than its error may be is not determined
 RESOLVED = 1e-3  # of the largest value of a signal: figures of its values below a hundredth of that are 0
-LEAST_OVERSHOOT = 0.01  # whose hundredth is of no interest
-FIGURES = ("final_value", "rise_time", "overshoot", "settling_time", "steady_state_error", "residual_rms")
 
 
 class Millimetres(float):
@@ -198,35 +193,43 @@ class _Record:
         n = int(abs(y).argmax())
         peak = peak or Peak(float(t[n]), float(y[n]), 0.0, abs(float(y[n])))
         size, step = max(abs(peak.value), LEAST_SIZE), float(self.t[1])
-        found, *others = (self._values(name, t, y, sign * bound) for sign in (0, -1, 1))
-        least = {"overshoot": LEAST_OVERSHOOT, "settling_time": step / OPEN, "rise_time": step / OPEN}
+        known = self._values(name, t, y, 0 * bound)
+        below, above = self._values(name, t, y, -bound), self._values(name, t, y, bound)
+        least = {"overshoot": 0.01, "settling_time": step / OPEN, "rise_time": step / OPEN}
         spread = {
-            key: _spread(value, [each[key] for each in others], least.get(key, RESOLVED * size))
-            for key, value in found.items()
+            key: _spread(value, (below[key], above[key]), least.get(key, RESOLVED * size))
+            for key, value in known.items()
         }
+        spread["peak"] = (peak.most - abs(peak.value) + peak.bound) / size
         largest = t[abs(y) + bound >= abs(peak.value) - peak.bound] if peak.bound > RESOLVED * OPEN * size else t[:0]
-        spread |= {
-            "peak": (peak.most - abs(peak.value) + peak.bound) / size,
-            "peak_time": (float(np.ptp(np.r_[peak.time, largest])) - 2 * step) / max(peak.time, self.t[-1] / 10),
-        }
-        found |= {"peak": peak.value, "peak_time": peak.time}
-        words = [f"{key.replace('_', ' ')}: remainder {100 * of:.2g} %" for key, of in spread.items() if of > OPEN]
-        known = {key: value if spread[key] <= OPEN else None for key, value in found.items()}
+        late = float(np.ptp(np.r_[peak.time, largest])) - 2 * step
+        spread["peak_time"] = late / max(peak.time, self.t[-1] / 10)
+        known |= {"peak": peak.value, "peak_time": peak.time}
+        words = []
+        for key, share in spread.items():
+            if share > OPEN:
+                known[key] = None
+                words.append(f"{key.replace('_', ' ')}: remainder {100 * share:.2g} %")
         if math.isinf(peak.most):
             known |= dict.fromkeys(("peak", "peak_time", "settling_time"))
             words = ["impulse"]
         settled = known["settling_time"]
         return SignalFigures(
-            signal=name, unit=unit_of(self.arm, name), **known, note="; ".join(words) or None,
-            at_rest_after=None if settled is None else self.busy_until + settled, remainder_bound=peak.bound or None,
-        )  # fmt: skip
+            signal=name,
+            unit=unit_of(self.arm, name),
+            **known,
+            note="; ".join(words) or None,
+            at_rest_after=None if settled is None else self.busy_until + settled,
+            remainder_bound=peak.bound or None,
+        )
 
     def _values(self, name: str, t: Real, y: Real, more: Real) -> dict[str, Any]:
         """Figures but the peak of a signal, `more` being added to it and to its deviations."""
         final, away, scale = self._deviations(name, t, y)
         settled = settling_time(t, np.maximum(away + more, 0), scale, self.busy_until, self.band)
         after = t >= self.busy_until * (1 - TIME_ROUNDING)
-        values: dict[str, Any] = dict.fromkeys(FIGURES) | {"settling_time": settled}
+        names = ("final_value", "rise_time", "overshoot", "steady_state_error", "residual_rms")
+        values: dict[str, Any] = {**dict.fromkeys(names), "settling_time": settled}
         if self.busy_until and after.sum() > 1:
             unit = Millimetres if name == "tip_displacement" else float
             values["residual_rms"] = unit(np.sqrt(np.trapezoid((y - final)[after] ** 2, t[after]) / np.ptp(t[after])))
@@ -287,7 +290,8 @@ class Step(_Record):
     @property
     def finding(self) -> Annotated[str, Quantity("finding", help="stability of each loop")]:
         """Stability of each loop."""
-        return "; ".join(f"{name} {each.stability}{'' if each.hub else GROWS}" for name, each in self.loops.items())
+        grows = " (the response grows, its figures are not defined)"
+        return "; ".join(f"{name} {each.stability}{'' if each.hub else grows}" for name, each in self.loops.items())
 
     @property
     def settling_band(self) -> Annotated[Percent, Quantity("settling band", digits=3,
@@ -359,7 +363,8 @@ def step(
     require(0 < band < 1, "settling_band", settling_band, "a share of the travel between 0 and 1, such as 0.02")
     (arm, chain), is_step = admit(CONSUMER, arm, chain), scenario_name == "reference"
     hub, law = followed(law) if is_step else (AT_HUB[0], law)
-    arm, law = tracked(arm, law)
+    case = Case(arm, as_law(law), chain)
+    arm, law = case.arm, case.law
     full, of_angle, response = as_law(law), hub == AT_HUB[0], None
     poles = None if full.is_discrete else usual_poles(ContinuousLoop(arm, full))
     length = usual_duration(poles, chain) if duration is None else duration
@@ -407,9 +412,10 @@ def usual_duration(poles: Poles | None, chain: Chain) -> float:
     if poles is None:
         return TRIAL_SLEWS * rise
     sizes = abs(poles.moving)
-    near = poles.moving[sizes <= DOMINANT * max(first_frequency(poles.loop.arm), sizes.min(initial=math.inf))]
-    slowest = max(abs(near.real).min(initial=math.inf), TIME_CONSTANTS / (LONGEST_SLEWS * rise))
-    return float(f"{rise + TIME_CONSTANTS / slowest:.2g}")
+    # a pole farther away than twice the first frequency is not the dominant one
+    near = poles.moving[sizes <= 2.0 * max(first_frequency(poles.loop.arm), sizes.min(initial=math.inf))]
+    decay = max(abs(near.real).min(initial=math.inf), TIME_CONSTANTS / (20.0 * rise))  # at most 20 slews
+    return float(f"{rise + TIME_CONSTANTS / decay:.2g}")
 
 
 def excitation(loop: ContinuousLoop, law: Law, chain: Chain, task: Scenario, names: Sequence[str]) -> Excitation:
@@ -455,14 +461,14 @@ def _released(loop: ContinuousLoop, offset: float, names: Sequence[str]) -> Exci
 def _times(response: TimeResponse | None, task: Scenario) -> Real:
     """Times [s] of a record: the samples and times between them, which resolve the fastest mode that shows."""
     T, n = task.period, task.t.size
-    finest = (n - 1) * T / LEAST_POINTS
+    finest = (n - 1) * T / 2000
     if response is not None:
         z, amplitudes = (np.hstack([part.late[n] for part in response.parts]) for n in (0, 1))
         sizes = abs(amplitudes[:-1])
         shows = (sizes > traces.VISIBLE * sizes.max(axis=1, keepdims=True)).any(axis=0)
         fastest = max(z.imag[shows].max(initial=0.0), LEAST_SIZE)
         finest = min(finest, 2 * math.pi / (traces.POINTS_A_PERIOD * fastest))
-    steps = int(np.clip(math.ceil(T / finest), 1, min(MOST_BETWEEN, max(1, MOST_POINTS // n))))
+    steps = int(np.clip(math.ceil(T / finest), 1, min(MOST_BETWEEN, max(1, 20_000 // n))))
     k = np.arange((n - 1) * steps + 1)
     return T * (k // steps + k % steps / steps)
 

@@ -18,7 +18,7 @@ from typing import IO, TYPE_CHECKING, Annotated, Any, cast, get_args, get_origin
 import typer
 
 import tfarm
-from tfarm.arm import ANGLE_GAIN, LISTED, MOMENT_GAIN, RATE_GAIN, AnyLaw, Arm, Theory, implausible
+from tfarm.arm import ANGLE_GAIN, PLANE, AnyLaw, Arm, Theory, implausible
 from tfarm.arm.reading import ArmFile, load_tables
 from tfarm.errors import one_line, require
 from tfarm.files import is_standard_output, write_file
@@ -131,17 +131,6 @@ ArmName = Annotated[  # in a command the tables of that file, read and parsed on
         show_default=False,
     ),
 ]
-ArmNames = Annotated[
-    list[Any],
-    typer.Argument(
-        metavar="ARM [ARM]",
-        help="presets or TOML files",
-        parser=str,
-        callback=read_arms,
-        autocompletion=preset_names,
-        show_default=False,
-    ),
-]
 TheoryName = Annotated[Theory | None, typer.Option("--theory", help="beam theory; by default that of the arm's file")]
 Png = Annotated[
     Path | None,
@@ -149,10 +138,6 @@ Png = Annotated[
                  help="draw the picture into this file: .png, or .pdf or .svg at the width of a paper's column"),
 ]  # fmt: skip
 File = Annotated[Path | None, typer.Option(metavar="FILE")]  # to be written
-Place = Annotated[float | None, typer.Option("--x", help="place on the arm [m], for outputs along it")]
-SideName = Annotated[
-    str | None, typer.Option("--side", help="outer (default) or inner side of a joint, for outputs along the arm")
-]
 InputName = Annotated[
     str | None,
     typer.Option("--input", help="hub_torque, motor_voltage, motor_current, hub_angle, force@X or moment_pair@X1,X2"),
@@ -168,32 +153,42 @@ LawFiles = Annotated[
     typer.Option("--law", metavar="FILE", exists=True, help="TOML file with a [law]; may be repeated",
                  rich_help_panel=CONTROLLER),
 ]  # fmt: skip
-Gains = dict[str, float | None]  # by name; None where not given
-DEFAULT_GAINS = {
-    RATE_GAIN: "hub rate gain [N m s/rad, V s/rad or A s/rad]; by default 0.00642 J w1 (0.3 on the paper's arm)",
-    MOMENT_GAIN: f"root moment gain, u = ... - {MOMENT_GAIN} E I phi'(0); by default 0.3, 0 without hub inertia",
-}
+AngleGain = Annotated[float, typer.Option(f"--{ANGLE_GAIN}", help="hub angle gain", rich_help_panel=CONTROLLER)]
 
 
-def gain_option(name: str, text: str, kind: Any = float | None) -> Any:
-    """Return the type of the option of a gain."""
-    return Annotated[kind, typer.Option(f"--{name}", help=text, rich_help_panel=CONTROLLER)]
-
-
-AngleGain = gain_option(ANGLE_GAIN, "hub angle gain", float)
-GAIN_OPTIONS = []
-for each in LISTED:
-    words = DEFAULT_GAINS.get(each.name, f"{each.output.replace('_', ' ')} gain [{each.unit}]; by default 0")
-    kind = gain_option(each.name, words)
-    GAIN_OPTIONS.append(Parameter(each.name, Parameter.KEYWORD_ONLY, default=None, annotation=kind))
+def given_gains(
+    *,
+    K1: Annotated[
+        float | None,
+        typer.Option(
+            "--K1",
+            help="hub rate gain [N m s/rad, V s/rad or A s/rad]; by default 0.00642 J w1 (0.3 on the paper's arm)",
+            rich_help_panel=CONTROLLER,
+        ),
+    ] = None,
+    K2: Annotated[
+        float | None,
+        typer.Option(
+            "--K2",
+            help="root moment gain, u = ... - K2 E I phi'(0); by default 0.3, 0 without hub inertia",
+            rich_help_panel=CONTROLLER,
+        ),
+    ] = None,
+    Kp: Annotated[
+        float | None,
+        typer.Option("--Kp", help="hub angle gain [N m/rad]; by default 0", rich_help_panel=CONTROLLER),
+    ] = None,
+) -> dict[str, float]:
+    """Return the gains that are given, by name."""
+    return {name: value for name, value in {"K1": K1, "K2": K2, "Kp": Kp}.items() if value is not None}
 
 
 def add_command(group: str, **how: Any) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Return the decorator that adds a command to a group of the help; `how` are its name and its example.
 
     Its keyword-only parameters are its arguments and options.  "name: text" below "Options:" in its docstring is the
-    help of one.  A parameter of type `Gains` has an option for each gain.  One whose default is a function has an
-    option for each keyword-only parameter of that, and is the function with their values.
+    help of one.  A parameter whose default is a function has an option for each keyword-only parameter of that, and is
+    the function with their values.
     """
 
     def add(command: Callable[..., None]) -> Callable[..., None]:
@@ -225,9 +220,7 @@ def options_of(function: Callable[..., Any]) -> list[Parameter]:
     helps = help_of(function)[1]
     found: list[Parameter] = []
     for each in keyword_only(function):
-        if each.annotation == Gains:
-            found += GAIN_OPTIONS
-        elif isfunction(each.default):
+        if isfunction(each.default):
             found += options_of(each.default)
         else:
             found.append(_with_help(each, helps.get(each.name, "")))
@@ -238,9 +231,7 @@ def keywords_of(function: Callable[..., Any], options: Mapping[str, Any]) -> dic
     """Return the keywords of a command, or of a function that has some of its options, by the values of all."""
     found: dict[str, Any] = {}
     for each in keyword_only(function):
-        if each.annotation == Gains:
-            found[each.name] = {gain.name: options[gain.name] for gain in LISTED}
-        elif isfunction(each.default):
+        if isfunction(each.default):
             found[each.name] = partial(each.default, **keywords_of(each.default, options))
         else:
             found[each.name] = options[each.name]
@@ -278,7 +269,7 @@ def load_arm(file: ArmFile, theory: Theory | None = None, driven: str | None = N
 
 
 def load_law(
-    file: ArmFile, arm: Arm, gains: Gains, other: Path | ArmFile | None = None
+    file: ArmFile, arm: Arm, gains: Mapping[str, float], other: Path | ArmFile | None = None
 ) -> tuple[AnyLaw, dict[str, Any]]:
     """Return the law of another file, of the gains given, or of the arm's own [law], and JSON's part of default gains.
 
@@ -287,25 +278,24 @@ def load_law(
     from tfarm.arm.law_tables import load_law as read
     from tfarm.spectrum.table import default_words
 
-    typed = {gain: value for gain, value in gains.items() if value is not None}
     if other is not None:
         file = load_tables(other)
-        refuse({f"--{gain}": value for gain, value in typed.items()}, f"the law is that of {file.name}; leave this out")
-    own = None if typed else read(file)
+        refuse({f"--{gain}": value for gain, value in gains.items()}, f"the law is that of {file.name}; leave this out")
+    own = None if gains else read(file)
     if own is not None:
         return own, {}
     require(other is None, "--law", file.name, "has no table [law]")
-    missing = [gain for gain in DEFAULT_GAINS if gain not in typed]
+    missing = [gain for gain in PLANE if gain not in gains]
     words = default_words(arm, missing) if missing else None
-    return replace(tfarm.default_gains(arm), **typed), {"default_gains": missing, "default_gains_in_words": words}
+    return replace(tfarm.default_gains(arm), **gains), {"default_gains": missing, "default_gains_in_words": words}
 
 
 def load_loop(
-    file: ArmFile, *, law: LawFile = None, theory: TheoryName = None, gains: Gains
+    file: ArmFile, *, law: LawFile = None, theory: TheoryName = None, gains: Any = given_gains
 ) -> tuple[Arm, AnyLaw, dict[str, Any]]:
     """Return arm and law of a command, and JSON's part of default gains."""
     arm = load_arm(file, theory)
-    return arm, *load_law(file, arm, gains, law)
+    return arm, *load_law(file, arm, gains(), law)
 
 
 def load_driven_loop(file: ArmFile, *, loop: Any = load_loop) -> tuple[Arm, AnyLaw, dict[str, Any]]:
@@ -346,11 +336,18 @@ def load_chain(
     return replace(chain, sampling=sampling, period_from=chain.period_from if period is None else "--period")
 
 
-def outputs_on(names: Sequence[str], side: str | None) -> list[Any]:
-    """Return the outputs of these names, on one side of a joint where that is given."""
+def outputs_on(
+    names: Sequence[str],
+    *,
+    x: Annotated[float | None, typer.Option("--x", help="place on the arm [m], for outputs along it")] = None,
+    side: Annotated[
+        str | None, typer.Option("--side", help="outer (default) or inner side of a joint, for outputs along the arm")
+    ] = None,
+) -> tuple[list[Any], float | None]:
+    """Return the outputs of these names, on one side of a joint where that is given, and the place of those along."""
     from tfarm.exact.outputs import on_side
 
-    return [name if side is None else on_side(name, cast("Any", side)) for name in names]
+    return [name if side is None else on_side(name, cast("Any", side)) for name in names], x
 
 
 def refuse(others: Mapping[str, Any], remedy: str) -> None:

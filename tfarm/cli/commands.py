@@ -1,7 +1,7 @@
 """The commands on an arm and on measured data.  Packages are imported inside them: `tfarm --help` needs none."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, cast
@@ -14,9 +14,7 @@ from tfarm.cli.app import (
     ArmName,
     File,
     InputName,
-    Place,
     Png,
-    SideName,
     TheoryName,
     add_command,
     advance,
@@ -41,13 +39,30 @@ measuring_command = partial(add_command, "Measurement")
 RecordName = Annotated[
     Path, typer.Argument(metavar="RECORD", exists=True, help="CSV or .mat file: t [s] and signals", show_default=False)
 ]
-MethodName = Annotated[str, typer.Option("--method", help="closed-form, balls, or appendix (the paper's determinant)")]
-Compare = Annotated[bool, typer.Option("--compare", help="all three methods and their differences")]
-DigitCount = Annotated[
-    int | None, typer.Option("--digits", min=1, max=1000, help="certified digits; texts in JSON above 15")
-]
 pair = named(numbers("KEY=NUMBER,NUMBER", 2))
 OWN_TABLE = "--compare prints a table of its own: ask for one of them"
+
+
+def check_method(
+    number: int,
+    *,
+    method: Annotated[
+        str, typer.Option("--method", help="closed-form, balls, or appendix (the paper's determinant)")
+    ] = "closed-form",
+    compare: Annotated[bool, typer.Option("--compare", help="all three methods and their differences")] = False,
+    digits: Annotated[
+        int | None, typer.Option("--digits", min=1, max=1000, help="certified digits; texts in JSON above 15")
+    ] = None,
+) -> tuple[Any, bool, int | None]:
+    """Return method, comparison and digits of an answer at that number of points.
+
+    Raises ParameterError for digits, or too many points, by one of the slow methods.
+    """
+    if method != "closed-form" or compare:
+        refuse({"--digits": digits}, "they are certified by balls in any case: leave --method and --compare out")
+        remedy = "at most 2000 by balls or the appendix, which take milliseconds for each"
+        require(number <= 2000, "points", number, remedy)
+    return method, compare, digits
 
 
 @dataclass(frozen=True)
@@ -84,12 +99,8 @@ class Presets:
 @command(epilog="presets")
 def presets(*, show: Any = emit_record) -> None:
     """List the arms that come with tfarm, with their assumptions."""
-    rows = []
-    for arm in map(tfarm.load, tfarm.presets()):
-        payload = arm.payload
-        rows.append(
-            Preset(arm.name, arm.length, arm.damping, arm.hub.inertia, payload.mass, payload.inertia, arm.assumptions)
-        )
+    names = [each.name for each in fields(Preset)]
+    rows = [Preset(*(getattr(arm, name) for name in names)) for arm in map(tfarm.load, tfarm.presets())]
     show(Presets(rows))
 
 
@@ -98,11 +109,9 @@ def modes(
     *,
     arm: ArmName,
     count: Annotated[int, typer.Option(min=1, max=1000)] = 10,
-    digits: DigitCount = None,
     certify: bool = False,
-    method: MethodName = "closed-form",
-    compare: Compare = False,
     theory: TheoryName = None,
+    how: Any = check_method,
     show: Any = emit_record,
 ) -> None:
     """Natural frequencies, damping ratios and modes, complete by construction.
@@ -115,12 +124,12 @@ def modes(
     from tfarm.spectrum.listing import listed_modes
 
     found = tfarm.modes(load_arm(arm, theory), count)
-    check_method(method, len(found), digits, compare)
-    if compare:
+    method, is_compared, digits = how(len(found))
+    if is_compared:
         refuse({"--certify": certify}, OWN_TABLE)
         show(ByMethods(found.arm.name, "natural_frequency", "rad/s", found.index.tolist(), found.by_methods()))
         return
-    listed = listed_modes(found, digits, certify, cast("Any", method))
+    listed = listed_modes(found, digits, certify, method)
     show(listed)
     if listed.damped_failure:
         print_line(listed.damped_failure)
@@ -143,14 +152,11 @@ def response(
     start: Annotated[float, typer.Option("--from")] = 0.1,
     stop: Annotated[float, typer.Option("--to")] = 1000.0,
     points: Annotated[int, typer.Option(min=2, max=1_000_000)] = 500,
-    x: Place = None,
-    side: SideName = None,
     driven: InputName = None,
-    digits: DigitCount = None,
-    method: MethodName = "closed-form",
-    compare: Compare = False,
     measured: Annotated[str | None, typer.Option(metavar="OUTPUT/INPUT=FILE")] = None,
     theory: TheoryName = None,
+    along: Any = outputs_on,
+    how: Any = check_method,
     show: Any = emit,
 ) -> None:
     """Exact frequency response to the arm's input, or its values at points s.
@@ -170,20 +176,20 @@ def response(
     if measured is not None:
         from tfarm.fitting.data import data_of
 
-        refuse(
-            {"--s": s, "--omega": omega, "--output": output, "--x": x, "--side": side, "--digits": digits},
-            "a measured response has its own outputs and frequencies; leave this out",
-        )
+        own = {"s": s, "omega": omega, "output": output, **along.keywords, "digits": how.keywords["digits"]}
+        for name, value in own.items():
+            refuse({f"--{name}": value}, "a measured response has its own outputs and frequencies; leave this out")
         show(tfarm.overlay(load_arm(arm, theory), data_of(measured, "--measured")))
         return
     refuse({"--png": show.keywords["png"]}, "a picture needs --measured; tfarm bode draws the exact response")
     from tfarm.response.transfer import ByMethods, values_at
 
-    (wanted,) = outputs_on([output or "root_moment"], side)
-    G = tfarm.transfer(load_arm(arm, theory, driven), wanted, x=x, method=cast("Any", method), input=driven)
+    (wanted,), x = along([output or "root_moment"])
+    method = how.keywords["method"]
+    G = tfarm.transfer(load_arm(arm, theory, driven), wanted, x=x, method=method, input=driven)
     at = places_of(s, omega, (start, stop), points)
-    check_method(method, at.size, digits, compare)
-    if compare:
+    _, is_compared, digits = how(at.size)
+    if is_compared:
         refuse({"--csv": show.keywords["csv"], "--input": driven if G.load else None}, OWN_TABLE)
         show(ByMethods(G.arm.name, G.outputs[0], G.units[0], at.tolist(), G.by_methods(at)))
         return
@@ -201,14 +207,6 @@ def places_of(s: Any, omega: Any, limits: tuple[float, float], points: int) -> A
     return 1j * np.array(omega)
 
 
-def check_method(method: str, number: int, digits: int | None, compare: bool) -> None:
-    """Raise ParameterError for digits, or too many points, by one of the slow methods."""
-    if method != "closed-form" or compare:
-        refuse({"--digits": digits}, "they are certified by balls in any case: leave --method and --compare out")
-        remedy = "at most 2000 by balls or the appendix, which take milliseconds for each"
-        require(number <= 2000, "points", number, remedy)
-
-
 def check_range(start: float, stop: float) -> None:
     """Raise ParameterError for what is no frequency range [rad/s]."""
     require(0 < start < math.inf, "--from", start, "a positive frequency in rad/s")
@@ -222,10 +220,9 @@ def bode(
     output: str | None = None,
     start: Annotated[float | None, typer.Option("--from")] = None,
     stop: Annotated[float | None, typer.Option("--to")] = None,
-    x: Place = None,
-    side: SideName = None,
     driven: InputName = None,
     loop: bool = False,
+    along: Any = outputs_on,
     under: Any = load_loop,
     chain: Any = load_chain,
     show: Any = emit,
@@ -242,19 +239,18 @@ def bode(
     loop: loop function under the controller, in place of the response of an output
     """
     if loop:
-        refuse(
-            {"--output": output, "--from": start, "--to": stop, "--x": x, "--side": side, "--input": driven},
-            "the loop function has no output and its own frequencies; leave this out",
-        )
+        own = {"output": output, "from": start, "to": stop, **along.keywords, "input": driven}
+        for name, value in own.items():
+            refuse({f"--{name}": value}, "the loop function has no output and its own frequencies; leave this out")
         emit_loop("loop", arm, under, chain, show)
         return
     from tfarm.response.frequency import resonant_band
 
-    of_loop = {**under.keywords["gains"], "law": under.keywords["law"], **chain.keywords}
+    of_loop = {**under.keywords["gains"].keywords, "law": under.keywords["law"], **chain.keywords}
     for name, value in of_loop.items():
         refuse({f"--{name.replace('_', '-')}": value}, "the loop function: give --loop too")
     subject = load_arm(arm, under.keywords["theory"], driven)
-    (wanted,) = outputs_on([output or "root_moment"], side)
+    (wanted,), x = along([output or "root_moment"])
     low, high = resonant_band(tfarm.transfer(subject, wanted, x=x, input=driven).arm)
     band = low if start is None else start, high if stop is None else stop
     check_range(*band)
@@ -270,10 +266,9 @@ def reduce(
     error: float | None = None,
     band: Annotated[Any, typer.Option(parser=interval, metavar="LOW,HIGH")] = "0.1,1000",
     method: str | None = None,
-    x: Place = None,
-    side: SideName = None,
     mat: File = None,
     theory: TheoryName = None,
+    along: Any = outputs_on,
     show: Any = emit_record,
 ) -> None:
     """Reduced state-space model, with its largest error against the exact arm over a frequency range.
@@ -288,10 +283,10 @@ def reduce(
     """
     from tfarm.exported.systems import save_mat
 
+    wanted, x = along([name.strip() for name in outputs.split(",")])
     reduced = tfarm.reduce(
-        load_arm(arm, theory), outputs_on([name.strip() for name in outputs.split(",")], side),
-        order=order, error=error, method=cast("Any", method), band=band, x=x,
-    )  # fmt: skip
+        load_arm(arm, theory), wanted, order=order, error=error, method=cast("Any", method), band=band, x=x
+    )
     show(reduced, also=() if mat is None else save_mat(reduced, mat, key="--mat"))
 
 

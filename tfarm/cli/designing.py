@@ -1,14 +1,13 @@
-"""The commands that choose a law or compare, write pages, give evidence, and help with the others."""
+"""The commands that choose a law, compare, and study uncertain arms."""
 
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, cast
 
 import typer
-from typer.completion import get_completion_script  # type: ignore[attr-defined]  # Typer does not list it
 
 import tfarm
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, TWO_GAINS, as_law
@@ -17,9 +16,7 @@ from tfarm.cli.app import (
     CONTROLLER,
     AngleGain,
     ArmName,
-    ArmNames,
     File,
-    Gains,
     LawFiles,
     ModeCount,
     Png,
@@ -28,6 +25,7 @@ from tfarm.cli.app import (
     advance,
     emit,
     emit_record,
+    given_gains,
     interval,
     load_arm,
     load_chain,
@@ -40,10 +38,9 @@ from tfarm.cli.app import (
     read_arms,
     refuse,
 )
-from tfarm.errors import must_be_known, require
+from tfarm.errors import require
 
 command = partial(add_command, "Design")
-report_command = partial(add_command, "Report")
 
 
 @command(epilog="design sasaki2012-lab --structure PD+notch --save notch.toml")
@@ -228,7 +225,8 @@ def tune(
     from tfarm.tuner import trial, tuning
 
     subject, sampling = load_arm(arm, theory), chain(arm)
-    law, defaults = load_law(arm, subject, {RATE_GAIN: k1, MOMENT_GAIN: 0.0})
+    typed = {MOMENT_GAIN: 0.0} if k1 is None else {RATE_GAIN: k1, MOMENT_GAIN: 0.0}
+    law, defaults = load_law(arm, subject, typed)
     rate = cast("tfarm.HubFeedback", law)[RATE_GAIN]
     if k1 is None and kp:
         rate = trial.usual_rate_gain(subject, kp)
@@ -250,14 +248,24 @@ def tune(
 @command(epilog="compare sasaki2012 sasaki2012-lab --png both.png")
 def compare(
     *,
-    arms: ArmNames,
+    arms: Annotated[
+        list[Any],
+        typer.Argument(
+            metavar="ARM [ARM]",
+            help="presets or TOML files",
+            parser=str,
+            callback=read_arms,
+            autocompletion=preset_names,
+            show_default=False,
+        ),
+    ],
     law: LawFiles = None,
     modes: ModeCount = 10,
     output: str = "root_moment",
     theory: TheoryName = None,
     png: Png = None,
     out: Annotated[Path | None, typer.Option(metavar="FOLDER")] = None,
-    gains: Gains,
+    gains: Any = given_gains,
     chain: Any = load_chain,
     show: Any = emit_record,
 ) -> None:
@@ -269,20 +277,15 @@ def compare(
     output: output of the Bode plot of two arms
     out: write a page, compare.html, to this folder
     """
-    files = read_arms(law or [])
-    extra = [each.name for each in files[2:]]
-    refuse({"ARM": [each.name for each in arms[2:]] or None, "--law": extra or None}, "two at most can be compared")
-    refuse(
-        {"ARM": arms[0].name if len(arms) + len(files) < 2 or len(arms) == len(files) == 1 else None},
-        "give a second arm, or --law FILE twice",
-    )
     subjects = [load_arm(file, theory) for file in arms]
-    wanted = files * (2 // len(files)) if files else [None, None]
-    pairs = zip(arms * (2 // len(arms)), subjects * (2 // len(arms)), wanted, strict=True)
-    laws = [load_law(source, subject, gains, file)[0] for source, subject, file in pairs]
-    paths = [Path(each.name) for each in files]
-    candidates = ([each.name for each in subjects], [each.stem for each in paths], [each.name for each in files])
-    names = next((each for each in candidates if len(set(each)) == 2), ["first", "second"])
+    files = read_arms(law or [])
+    if files:
+        laws = [load_law(arms[0], subjects[0], gains(), file)[0] for file in files]
+    else:
+        laws = [load_law(file, subject, gains())[0] for file, subject in zip(arms, subjects, strict=True)]
+    stems = [Path(each.name).stem for each in files]
+    candidates = ([each.name for each in subjects], stems, [each.name for each in files])
+    names = next((each for each in candidates if len(set(each)) == 2), ())
     found = tfarm.compare(subjects, laws, names=names, modes=modes, output=output, chain=chain(arms[0]))
     page = None
     if out is not None:
@@ -391,132 +394,3 @@ def study(
 
         page = write_study(found)
     show(found, None if any(key.startswith("law.") for key in keys) else defaults, also=(page,))
-
-
-# ------------------------------------------------------------ pages and evidence
-
-
-@report_command(epilog="report sasaki2012-lab --out pages")
-def report(
-    *,
-    arms: Annotated[
-        list[Any] | None,
-        typer.Argument(
-            metavar="[ARM ...]",
-            help="presets or files; by default all",
-            parser=str,
-            callback=read_arms,
-            autocompletion=preset_names,
-        ),
-    ] = None,
-    out: Annotated[Path, typer.Option(metavar="FOLDER")] = Path("reports"),
-    only: str | None = None,
-    law: LawFiles = None,
-    theory: TheoryName = None,
-    measured: Annotated[list[str] | None, typer.Option(metavar="OUTPUT/INPUT=FILE")] = None,
-    paper: Annotated[bool, typer.Option("--paper")] = False,
-    gains: Gains,
-    chain: Any = load_chain,
-) -> None:
-    """Pages with pictures, tables and data: open index.html in a browser.
-
-    The pages are about the gains or the laws that are given, or the [law] of an arm's file, or the default gains.
-
-    Options:
-    out: the folder to write to
-    only: one page: bode, modes, margins, locus ...
-    measured: measured response; may be repeated
-    paper: each figure as a PDF at the width of a paper's column too, which takes about a quarter longer
-    """
-    from tfarm.arm.law_tables import LAW_TABLE
-    from tfarm.fitting import data, recording
-    from tfarm.report import page, write, writing
-
-    if only is not None:
-        must_be_known("--only", only, writing.QUESTIONS)
-    files = arms or read_arms(tfarm.presets())
-    others = read_arms(law or [])
-    subjects = [load_arm(file, theory) for file in files]
-    laws = []
-    for file, arm in zip(files, subjects, strict=True):
-        if others:
-            runs = [
-                page.GivenLaw(load_law(file, arm, gains, each)[0], Path(each.name).name, recording.load_run(each))
-                for each in others
-            ]
-        elif LAW_TABLE in file.tables or set(gains.values()) != {None}:
-            runs = [page.GivenLaw(load_law(file, arm, gains)[0])]
-        else:
-            runs = []
-        laws.append(runs)
-    index = write(
-        subjects,
-        out,
-        laws=laws,
-        only=None if only is None else (only,),
-        paper=paper,
-        progress=advance,
-        notice=print_line,
-        announce=print_line,
-        chains=[chain(file) for file in files],
-        measured=[data.data_of(text, "--measured") for text in measured or []],
-    )
-    print(index)
-
-
-@report_command(epilog="audit")
-def audit(*, show: Any = emit_record) -> None:
-    """Every equation of the paper, as printed and as corrected, with the check of each."""
-    from tfarm import audit as paper
-
-    show(paper.Audit(paper.PAPER, paper.audit()))
-
-
-@report_command(epilog="assumptions sasaki2012")
-def assumptions(
-    *,
-    arm: ArmName,
-    count: Annotated[int, typer.Option(min=1, max=100)] = 4,
-    theory: TheoryName = None,
-    show: Any = emit_record,
-) -> None:
-    """Effect of the assumed section and hub inertia: frequencies over the candidates, with exact sensitivities.
-
-    Options:
-    count: flexible modes
-    """
-    from tfarm.studies.candidates import assumptions as find
-
-    show(find(load_arm(arm, theory), count))
-
-
-@report_command(epilog="validate")
-def validate(*, show: Any = emit_record) -> None:
-    """Natural frequencies of published tables compared with the exact ones, with the reason of each difference."""
-    from tfarm.audit import published
-
-    show(published.Validation(published.validate()))
-
-
-@report_command(epilog="glossary margin")
-def glossary(
-    *,
-    words: Annotated[str | None, typer.Argument(metavar="[TERM]", help="part of a term; by default all")] = None,
-    show: Any = emit_record,
-) -> None:
-    """Words of certainty, terms, and the quantities of all results with their units."""
-    from tfarm.schema.glossary import glossary as find
-
-    show(find(words))
-
-
-@report_command(epilog="completion bash")
-def completion(
-    *,
-    shell: Annotated[
-        Literal["bash", "zsh", "fish", "powershell"],
-        typer.Argument(metavar="SHELL", help="the shell"),
-    ],
-) -> None:
-    """Script that completes commands, options and presets in a shell: eval "$(tfarm completion bash)"."""
-    print(get_completion_script(prog_name="tfarm", complete_var="_TFARM_COMPLETE", shell=shell))

@@ -11,7 +11,7 @@ from typing import Any
 import typer
 from typer.exceptions import TyperException
 
-from tfarm.cli import arm_files, commands, control, designing  # noqa: F401  each adds its commands
+from tfarm.cli import arm_files, commands, control, designing, pages  # noqa: F401  each adds its commands
 from tfarm.cli.app import discard, print_line, progress, whole_command
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError, require
 from tfarm.files import STANDARD_OUTPUT
@@ -103,19 +103,22 @@ def usage(error: Any) -> str:
     """Return a refusal as one line: option, value, expected form, and the option or command that may be meant."""
     if not hasattr(error, "format_message"):
         return str(error)
-    text, name = error.format_message(), getattr(error, "option_name", "")
+    text = error.format_message()
     hints = tomllib.loads((Path(__file__).parent / "hints.toml").read_text(encoding="utf-8"))
     if text.startswith("No such option"):
+        name = error.option_name
         known = [option for each in error.ctx.command.params for option in each.opts]
         meant = [option for option, others in hints["options"].items() if name in others and option in known]
-        other = hints["other_commands"].get(name, "")
-        return f"No such option: {name}. Did you mean {' or '.join(meant)}?" if meant else text + other
+        if meant:
+            return f"No such option: {name}. Did you mean {' or '.join(meant)}?"
+        return text + hints["other_commands"].get(name, "")
     for problem in getattr(error.__cause__, "errors", list)():  # of pydantic, which converts for Typer
-        low, high = error.param.min, error.param.max
-        within = f", from {low} to {high}" if None not in (low, high) else ""
+        of = error.param
+        within = "" if None in (of.min, of.max) else f", from {of.min} to {of.max}"
         remedy = problem["msg"].removeprefix("Value error, ").replace("Input should", "should") + within
-        return str(ParameterError(key=error.param.opts[0], value=problem["input"], remedy=remedy))
-    word = (*text.split("'"), "")[1].lower()
-    if text.startswith("No such command") and word in hints["commands"]:
-        return f"No such command '{word}'. Did you mean \"{hints['commands'][word]}\"?"
+        return str(ParameterError(key=of.opts[0], value=problem["input"], remedy=remedy))
+    if text.startswith("No such command"):
+        word = text.split("'")[1].lower()
+        if word in hints["commands"]:
+            return f"No such command '{word}'. Did you mean \"{hints['commands'][word]}\"?"
     return text.removeprefix("Invalid value for ").replace("'", "", 2) if "param" in vars(error) else text

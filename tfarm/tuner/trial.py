@@ -31,7 +31,7 @@ from pydantic import Field
 
 from tfarm.arm import FED_BACK, Arm, HubFeedback, must_not_be_algebraic
 from tfarm.arm.chain import Reading
-from tfarm.arm.checks import check_fields, not_negative, number, positive
+from tfarm.arm.checks import check_annotated, not_negative, number, positive
 from tfarm.arm.schema import StrictTable, validated_file
 from tfarm.arrays import Real
 from tfarm.dsp import Chain, Measurement, Scenario, Simulation, Simulator, scenario
@@ -55,12 +55,11 @@ ANGLE_REMEDY = "the hub angle gain is zero or positive, in N m/rad"
 class Cost:
     """Weighting coefficients `a` [1/(N m)^2 s], of the root moment, and `b`, of the control signal e."""
 
-    a: float = TRIAL_COST[0]
-    b: float = TRIAL_COST[1]
+    a: Annotated[float, not_negative, "the weighting coefficient a is zero or positive"] = TRIAL_COST[0]
+    b: Annotated[float, not_negative, "the weighting coefficient b is zero or positive"] = TRIAL_COST[1]
 
     def __post_init__(self) -> None:
-        remedy = "the weighting coefficient {} is zero or positive".format
-        check_fields(self, "", not_negative, a=remedy("a"), b=remedy("b"))
+        check_annotated(self, "")
         require(self.a or self.b, "a", self.a, "a and b are both zero: one of them has to be positive")
 
 
