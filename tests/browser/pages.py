@@ -34,7 +34,7 @@ from tfarm.loop.plane import gain_map
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import stability
 from tfarm.report.live import ASSETS, SCRIPT, LivePage, save_live, write_assets
-from tfarm.report.page import Case, GivenLaw
+from tfarm.report.page import ArmReport, GivenLaw
 from tfarm.schema import to_dict
 
 Real = NDArray[np.float64]
@@ -55,7 +55,7 @@ def folder(tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("pages")
     for name in ARMS:
         (out / name).mkdir()
-        save_live(Case(tfarm.load(name), load_chain(name)), out / name)
+        save_live(ArmReport(tfarm.load(name), load_chain(name)), out / name)
     write_assets(out / ASSETS)
     return out
 
@@ -597,7 +597,7 @@ def test_a_page_without_sampled_loop_slew_and_sensor_has_the_rest(browser, folde
     data = json.loads(text) | missing | {"no_sensor": "no polynomial follows"}
     monkeypatch.setattr("tfarm.report.live.live_data", lambda *_: data)
     (tmp_path / "arm").mkdir()
-    save_live(Case(tfarm.load(ARMS[0]), load_chain(ARMS[0])), tmp_path / "arm")
+    save_live(ArmReport(tfarm.load(ARMS[0]), load_chain(ARMS[0])), tmp_path / "arm")
     write_assets(tmp_path / ASSETS)
     with Opened(browser, tmp_path / "arm" / "live.html") as opened:
         page = opened.page
@@ -639,7 +639,7 @@ def test_a_law_of_rational_parts_has_a_slider_for_the_gain_of_each(browser, tmp_
     """At random gains the card, the file of the law and what the map has there are the library's."""
     arm, chain, rng = tfarm.load(name), load_chain(name), np.random.default_rng(4)
     (tmp_path / name).mkdir()
-    save_live(Case(arm, chain, (GivenLaw(law),)), tmp_path / name)
+    save_live(ArmReport(arm, chain, (GivenLaw(law),)), tmp_path / name)
     write_assets(tmp_path / ASSETS)
     verdicts = set()
     with Opened(browser, tmp_path / name / "live.html") as opened:

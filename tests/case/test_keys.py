@@ -15,8 +15,9 @@ from tfarm.dsp import Actuator, Chain, Converters, stages
 from tfarm.dsp.results import simulated_run
 from tfarm.errors import ParameterError
 from tfarm.exported import result
+from tfarm.exported.live_loop import sampled_numbers, slew_numbers
 from tfarm.loop.sampled_verdict import sampled, sampled_brief, sampled_verdict
-from tfarm.report.live import explore, sampled_numbers, slew_numbers
+from tfarm.report.live import explore
 from tfarm.schema import to_dict
 from tfarm.synthesis.judge import judge_of
 from tfarm.tuner.guard import sector_guard

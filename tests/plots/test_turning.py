@@ -9,10 +9,10 @@ from tfarm.dsp import load_chain
 from tfarm.loop.locus import locus, rounded
 from tfarm.loop.loop import Loop
 from tfarm.loop.plane import moment_axis, rate_axis
+from tfarm.loop.regions import sampled_region
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_modes import sampled_loci
 from tfarm.plots import locus as locus_plot
-from tfarm.plots.regions import sampled_region
 from tfarm.plots.roots import draw_sampled_loci
 from tfarm.spectrum.table import default_gains, rate_unit
 

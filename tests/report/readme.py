@@ -6,9 +6,10 @@ from pathlib import Path
 import tfarm
 from tfarm.digits import plain
 from tfarm.dsp import load_chain
+from tfarm.loop.regions import stable_regions
 from tfarm.plots.frequency import bode as bode_plot
 from tfarm.plots.motion import modes
-from tfarm.plots.regions import overlay, stable_regions
+from tfarm.plots.regions import overlay
 from tfarm.plots.style import save_figure
 from tfarm.response.frequency import bode, resonant_band
 from tfarm.spectrum.table import default_gains

@@ -22,7 +22,7 @@ from tfarm.dsp import Chain, load_chain
 from tfarm.fitting.fit import fit
 from tfarm.report import overview, write, writing
 from tfarm.report.live import save_live
-from tfarm.report.page import Case, PageSection
+from tfarm.report.page import ArmReport, PageSection
 from tfarm.report.response_sections import fit_section
 from tfarm.report.writing import PIECES, Piece, pieces_of
 
@@ -120,7 +120,7 @@ def test_overview_and_live_page_are_written_first_and_stay(tmp_path, monkeypatch
 
 
 def test_every_piece_has_the_anchor_of_its_section(pages):
-    pieces = pieces_of(Case(ARM, Chain()))
+    pieces = pieces_of(ArmReport(ARM, Chain()))
     for page in {piece.page for piece in pieces}:
         ids = links_of(pages / NAME / f"{page}.html").ids
         assert [piece.anchor for piece in pieces if piece.page == page] == [i for i in ids if i in ANCHORS]
@@ -292,7 +292,7 @@ def test_of_a_fit(tmp_path):
     H = tfarm.transfer(LAB, "root_moment")(1j * OMEGA)
     seen = tfarm.Measured(output="root_moment", input="hub_torque", omega=OMEGA, values=H, sigma=abs(H), source=TEXT)
     found = fit(LAB, [seen], free=["hub.inertia"], profile=False)
-    case = Case(found.arm, Chain(), (), found)
+    case = ArmReport(found.arm, Chain(), (), found)
     saved = writing.make_section("fit", "fit", partial(fit_section, count=2), case, tmp_path)
     for suffix in ("svg", "json"):
         assert list(tmp_path.rglob(f"*.{suffix}"))
@@ -312,9 +312,11 @@ def test_of_a_section_and_a_live_page_that_cannot_be_made(tmp_path, monkeypatch)
         raise error
 
     monkeypatch.setattr("tfarm.report.live.live_data", fails)
-    save_live(Case(LAB, Chain()), tmp_path)
+    save_live(ArmReport(LAB, Chain()), tmp_path)
     check_page((tmp_path / "live.html").read_text(encoding="utf-8"), NAME, TEXT)
-    saved = writing.make_section("stability region of both gains", "margins-map", fails, Case(LAB, Chain()), tmp_path)
+    saved = writing.make_section(
+        "stability region of both gains", "margins-map", fails, ArmReport(LAB, Chain()), tmp_path
+    )
     assert saved.failure
-    writing._write_pages(Case(LAB, Chain()), tmp_path, [saved], None, "", tmp_path)
+    writing._write_pages(ArmReport(LAB, Chain()), tmp_path, [saved], None, "", tmp_path)
     check_page((tmp_path / "index.html").read_text(encoding="utf-8"), NAME, TEXT.partition(" & ")[0])

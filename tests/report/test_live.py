@@ -22,13 +22,14 @@ from tfarm.arm import HubFeedback, Law
 from tfarm.dsp import Chain, Sampling, load_chain
 from tfarm.exact.characteristic import float_units, loop_parts
 from tfarm.exact.system import system_of
+from tfarm.exported.live_loop import law_data, live_data, sensor_numbers, slew_numbers
 from tfarm.loop.loop import Loop
 from tfarm.loop.panels import MOST_MISS, loop_panels
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import stability
 from tfarm.report import live
-from tfarm.report.live import has_sliders, law_data, live_data, save_live, sensor_numbers, slew_numbers
-from tfarm.report.page import Case, GivenLaw
+from tfarm.report.live import has_sliders, save_live
+from tfarm.report.page import ArmReport, GivenLaw
 
 SIGNALS = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
 ARMS = ("sasaki2012-lab", "stocky-steel", "quanser-flexlink")
@@ -165,12 +166,12 @@ def test_zeros_of_sensors_that_are_not_determined_have_their_reason(case, monkey
     def fails(*_):
         raise tfarm.ConvergenceError("no polynomial follows", 0.0, 1.0)
 
-    monkeypatch.setattr("tfarm.report.live.positions", fails)
+    monkeypatch.setattr("tfarm.exported.live_loop.positions", fails)
     arm = tfarm.load("sasaki2012-lab")
     found = sensor_numbers(arm)
     assert found == {"sensor": None, "no_sensor": "no polynomial follows"}
     monkeypatch.setattr("tfarm.report.live.live_data", lambda *_: {**data, **found})
-    save_live(Case(arm, Chain()), tmp_path)
+    save_live(ArmReport(arm, Chain()), tmp_path)
     assert "as its zeros are not determined: no polynomial follows." in (tmp_path / "live.html").read_text(
         encoding="utf-8"
     )
@@ -193,7 +194,7 @@ def policy_of(page):
 def test_the_page_stays_small_and_has_its_text_alone(tmp_path, monkeypatch):
     monkeypatch.setattr("tfarm.report.live.live_data", data_of)
     odd = replace(tfarm.load(ARMS[0]), name=ARMS[0] + ODD)
-    save_live(Case(odd, chain_of(odd)), tmp_path)
+    save_live(ArmReport(odd, chain_of(odd)), tmp_path)
     page = (tmp_path / "live.html").read_text(encoding="utf-8")
     assert len(page) < 3e6
     assert "<h1>sasaki2012-lab &amp; &#39;co&#39;: live loop</h1>" in page
@@ -218,7 +219,7 @@ def test_explore_writes_the_page_that_a_report_has_and_opens_it(tmp_path, monkey
     arm, law, chain = tfarm.load(ARMS[0]), HubFeedback(K1=0.25, K2=0.4), Chain(sampling=Sampling(period=0.005))
     found = tfarm.explore(arm, law, chain)
     (tmp_path / "report").mkdir()
-    save_live(Case(arm, chain, (GivenLaw(law),)), tmp_path / "report")
+    save_live(ArmReport(arm, chain, (GivenLaw(law),)), tmp_path / "report")
     assert found.path.read_bytes() == (tmp_path / "report" / "live.html").read_bytes()
     assert opened == [found.path.as_uri()]
     monkeypatch.setitem(sys.modules, "ipykernel", sys)

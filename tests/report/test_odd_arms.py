@@ -28,7 +28,7 @@ from tfarm.report.loop_section import (
     margin_table,
     margins_section,
 )
-from tfarm.report.page import Case, has_loop, on_hub, prose
+from tfarm.report.page import ArmReport, has_loop, on_hub, prose
 from tfarm.report.response_sections import bode_section, damped_tables, modal_table
 from tfarm.report.writing import pieces_of
 from tfarm.spectrum import DampedModes
@@ -52,7 +52,7 @@ def number(text):
 
 
 def test_a_locked_hub_is_not_turned_by_a_torque():
-    captions = {name: arm_section(Case(arm, Chain())).blocks[0].caption for name, arm in ARMS.items()}
+    captions = {name: arm_section(ArmReport(arm, Chain())).blocks[0].caption for name, arm in ARMS.items()}
     assert {name for name, caption in captions.items() if "turns the link by the torque u" in caption} == set(ARMS) - {
         "locked",
         "free-pin",
@@ -91,7 +91,7 @@ def test_rows_outside_the_certified_box_are_marked(name, monkeypatch):
 
 
 def test_a_gauge_on_a_free_pin_reads_the_torque():
-    section = bode_section(Case(ARMS["free-pin"], Chain()), "root_moment")
+    section = bode_section(ArmReport(ARMS["free-pin"], Chain()), "root_moment")
     assert "0 poles" not in section.blocks[0].caption
     assert section.words[0].endswith("There are none.")
     assert "zeros ," not in section.words[0]
@@ -109,11 +109,11 @@ def test_a_ratio_that_no_isotropic_material_has_is_not_called_poissons():
 def test_a_slip_of_units_is_named_on_the_page():
     link = ARMS["boom"].link
     slip = replace(ARMS["boom"], link=replace(link, density=1.6, length=800.0))
-    words = arm_section(Case(slip, Chain())).words
+    words = arm_section(ArmReport(slip, Chain())).words
     assert words[0].startswith("Check the units, ")
     assert all(key in words[0] for key in ("link.density = 1.6", "link.length = 800.0"))
     for arm in ARMS.values():
-        assert len(arm_section(Case(arm, Chain())).words) == (0 if arm.assumptions else 1) + bool(implausible(arm))
+        assert len(arm_section(ArmReport(arm, Chain())).words) == (0 if arm.assumptions else 1) + bool(implausible(arm))
 
 
 def test_a_contradiction_on_a_page_is_found(tmp_path):
@@ -153,7 +153,7 @@ def test_the_interval_of_K2_is_that_of_the_poles(name):
 @pytest.mark.parametrize("name", LOOPS)
 def test_sentences_about_the_pole_at_0_and_J_are_for_arms_that_turn_freely(name, monkeypatch):
     monkeypatch.setattr(cases, "best", lambda arm, chain: None)
-    section = margins_section(Case(ARMS[name], Chain()))
+    section = margins_section(ArmReport(ARMS[name], Chain()))
     (windows,) = (block for block in section.blocks if block.stem == "default-windows")
     (margins,) = (block for block in section.blocks if block.stem == "margins")
     shown = [cell for each in margins.columns for cell in each.cells]
@@ -175,7 +175,7 @@ def test_branches_that_cannot_be_followed_are_left_out_with_a_word(monkeypatch):
         return locus(arm, law, vary, start, stop, points, branches)
 
     monkeypatch.setattr(loci_room, "locus", follow)
-    section = locus_section(Case(arm, Chain()))
+    section = locus_section(ArmReport(arm, Chain()))
     words = " ".join(section.words)
     assert "separated from its neighbours" not in words
     assert "Along K1 the branches of this arm could not be followed" in words
@@ -188,12 +188,12 @@ def test_a_free_pin_has_its_rate_loop(monkeypatch):
     arm = ARMS["free-pin"]
     assert "−u/(1 + C s)" in prose("no_loop", arm=arm)
     assert "at every instant" in prose("no_loop", arm=replace(arm, link=replace(arm.link, damping=0.0)))
-    section = margins_section(Case(arm, Chain()))
+    section = margins_section(ArmReport(arm, Chain()))
     assert margins_of(arm, default_gains(arm)).stability.is_stable
     (windows,) = (block for block in section.blocks if block.stem == "default-windows")
     stable = dict(zip(column(windows, "number").values, column(windows, "intervals").values, strict=True))
     assert (stable["K2"], [len(stable[name]) for name in ("K1", "Kp")]) == ([], [1, 1])
-    pieces = pieces_of(Case(arm, Chain()))
+    pieces = pieces_of(ArmReport(arm, Chain()))
     names = [each.name for each in pieces if each.page in ("margins", "locus", "sampled", "tune")]
     assert names == ["stability margins", "Nyquist plot", "root loci"]
 
@@ -218,7 +218,7 @@ def test_a_margin_without_end_has_no_frequency(monkeypatch):
 def test_frequencies_over_the_hub_inertia_are_those_of_arms_that_have_it():
     """The arm's own value once."""
     arm = tfarm.load("sasaki2012-lab")
-    _, table = assumptions_section(Case(arm, Chain())).blocks
+    _, table = assumptions_section(ArmReport(arm, Chain())).blocks
     assert table.title == "Candidate hub inertias"
     assert sum(column(table, "is_own").values) == 1
     for inertia, omega in zip(

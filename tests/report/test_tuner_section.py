@@ -17,7 +17,7 @@ from tfarm.dsp import Chain, Sampling
 from tfarm.dsp.traces import away
 from tfarm.errors import CertificationError
 from tfarm.report import tuner_section as tuner_section_room
-from tfarm.report.page import Case
+from tfarm.report.page import ArmReport
 from tfarm.report.tuner_section import section_of, tuner_section
 from tfarm.schema.html import with_symbols
 from tfarm.tuner import Learning, LearningCurves, Plan, initial_network, train, tune
@@ -114,7 +114,7 @@ def test_the_angle_that_a_moving_gain_leaves_is_named(small):
     ],
 )
 def test_other_arms_have_the_reason_why_there_is_no_tuner(arm, word):
-    section = tuner_section(Case(arm, Chain()))
+    section = tuner_section(ArmReport(arm, Chain()))
     assert not section.words
     assert word in section.answer
     assert not section.blocks
@@ -124,13 +124,13 @@ def test_a_slew_that_runs_away_and_a_guard_that_fails_are_a_sentence(monkeypatch
     """Random arms met both: a traceback out of matplotlib, and 3.21e+06 in the middle of a sentence."""
     runs_away = SimpleNamespace(tuning=SimpleNamespace(without=SimpleNamespace(cost=math.inf)))
     monkeypatch.setattr(tuner_section_room, "tuner_numbers", lambda *_: runs_away)
-    assert "is unstable" in tuner_section(Case(LAB, Chain())).answer
+    assert "is unstable" in tuner_section(ArmReport(LAB, Chain())).answer
 
     def unproven(*_):
         raise CertificationError("no sector at K1 = 3.21e+06, C = 6.94e-05 s")
 
     monkeypatch.setattr(tuner_section_room, "tuner_numbers", unproven)
-    words = tuner_section(Case(LAB, Chain())).answer
+    words = tuner_section(ArmReport(LAB, Chain())).answer
     assert "K1 = 3.21 × 10⁶, C = 6.94 × 10⁻⁵ s" in with_symbols(words)
 
 
@@ -144,7 +144,7 @@ def test_a_slew_of_too_many_samples_has_no_study_but_its_number(monkeypatch):
     """600,001 samples of a slew of 3 s at 5 us, and nothing begun."""
     monkeypatch.setattr(tuner_section_room, "tuner_numbers", lambda *_: pytest.fail("begun"))
     chain = Chain(sampling=Sampling(period=5e-6))
-    words = tuner_section(Case(LAB, chain)).answer
+    words = tuner_section(ArmReport(LAB, chain)).answer
     assert "600,001 samples" in words
     assert "tfarm tune" in words
 

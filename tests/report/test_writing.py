@@ -38,7 +38,7 @@ from tfarm.plots.style import GOOD, LOW, MARGINAL, POOR, UNSTABLE
 from tfarm.report import overview, write, writing
 from tfarm.report.arm_section import arm_section
 from tfarm.report.overview import Card, results, save_card
-from tfarm.report.page import TEMPLATES, Case, GivenLaw, best, explained, prose, sheet, templates
+from tfarm.report.page import TEMPLATES, ArmReport, GivenLaw, best, explained, prose, sheet, templates
 from tfarm.report.response_sections import bode_section
 from tfarm.report.trust import write_trust, written_proofs
 from tfarm.report.writing import PIECES, QUESTIONS, index_page, kept, make_section, navigation, pieces_of
@@ -53,7 +53,7 @@ def test_another_process_with_other_hashes_writes_the_same_bytes(pages, audit_ro
     coarsen(monkeypatch.setattr)
     made = tmp_path / "made"
     made.mkdir()
-    case = Case(ARM, Chain())
+    case = ArmReport(ARM, Chain())
     for piece in pieces_of(case):
         if piece.anchor in ("margins-map", "bode-root-moment", "margins", "margins-nyquist"):
             writing.make_section(piece.name, piece.anchor, piece.make, case, made)
@@ -253,7 +253,9 @@ def test_without_the_page_of_words_none_is_linked():
 def test_a_page_has_a_narrow_picture_for_a_phone(tmp_path):
     """As wide as a screen of 400 pixels less its margins, the other half a page; both of the size that is stated."""
     make = partial(bode_section, output="root_moment")
-    section = make_section("response", "bode-root-moment", make, Case(tfarm.load("sasaki2012-lab"), Chain()), tmp_path)
+    section = make_section(
+        "response", "bode-root-moment", make, ArmReport(tfarm.load("sasaki2012-lab"), Chain()), tmp_path
+    )
     source, image = re.findall(r"<(?:source|img) ([^>]*)>", section.blocks[0].html)
     assert 'media="(max-width: 40rem)" srcset="pictures/bode-root-moment-narrow.svg"' in source
     for tag, end, least, most in ((source, "-narrow", 360, 370), (image, "", 590, 600)):
@@ -360,7 +362,7 @@ def test_an_arm_that_cannot_turn_nor_move_its_tip_is_reported_on_too(tmp_path, m
     text = page.read_text(encoding="utf-8")
     assert "From hub angle to root moment" in text
     assert "is zero at every frequency" in text
-    assert "states no assumptions" in arm_section(Case(arm, Chain())).words[0]
+    assert "states no assumptions" in arm_section(ArmReport(arm, Chain())).words[0]
 
 
 def test_the_pictures_of_the_readme(tmp_path, monkeypatch):
@@ -438,7 +440,7 @@ def rows_of(tmp_path, laws, chain):
     """The rows that the index has of an arm with a page."""
     folder = tmp_path / LAB.name
     folder.mkdir()
-    save_card(Case(LAB, chain, tuple(laws)), folder)
+    save_card(ArmReport(LAB, chain, tuple(laws)), folder)
     (folder / "index.html").write_text("a page")
     (card,) = kept(tmp_path, "card", Card).values()
     return card.loops, index_page(tmp_path, trust="")
@@ -468,11 +470,11 @@ def test_each_law_has_a_row_and_one_in_z_no_continuous_verdict(tmp_path):
 
 def test_an_arm_without_hub_inertia_has_its_loops_and_the_reason_why_there_is_no_other(tmp_path):
     bare = replace(LAB, hub=tfarm.Hub(inertia=0.0))
-    save_card(Case(bare, Chain()), tmp_path)
+    save_card(ArmReport(bare, Chain()), tmp_path)
     card = json.loads((tmp_path / "card.json").read_text(encoding="utf-8"))
     assert [loop["loop"] for loop in card["loops"]] == ["continuous-time", "sampled, 10 ms"]
     assert "The hub of this arm has no inertia" in card["notes"][0]
-    writing._write_pages(Case(bare, Chain()), tmp_path, [], (), "", tmp_path)
+    writing._write_pages(ArmReport(bare, Chain()), tmp_path, [], (), "", tmp_path)
     assert "The hub of this arm has no inertia" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
 

@@ -10,15 +10,14 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import MaxNLocator, NullFormatter
 
-from tfarm.arm import PLANE, Arm, HubFeedback
+from tfarm.arm import PLANE, HubFeedback
 from tfarm.arrays import Complex, Real
 from tfarm.exact.outputs import signal_words, unit_over
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.fitting.overlay import Overlay
+from tfarm.fitting.possible import ResponseBand, ShareOfArms, fitted_curves
 from tfarm.loop.curve import decibels
-from tfarm.loop.plane import gain_map
-from tfarm.response import transfer
 from tfarm.response.frequency import Bode
 
 from .style import (
@@ -191,37 +190,29 @@ def _over_measured(one: Measured, curves: Sequence[Drawn], upper: Axes, lower: A
     grid=lambda figure, fit: figure.subplots(2, max(1, len(fit.responses)), sharex="col", height_ratios=(1.75, 1.0)),
 )  # fmt: skip
 def fitted(fit: Fit, *, ax: Sequence[Axes]) -> None:
-    """Each measured response with the arm's before and after: magnitude over phase, a column a response.
+    """Draw each measured response with the arm's before and after: magnitude over phase, a column a response.
 
     Phases are broken where they wrap.
     """
-    count, problem = len(fit.responses), fit.problem
-    arms: tuple[tuple[Real, dict[str, Any]], ...] = (
-        (fit.point * 0, {"color": GREY, "lw": 1.0, "label": "start"}),
-        (fit.point, {"color": BLUE, "lw": 1.4, "label": "fitted, exact"}),
-    )
-    for number, (one, upper, lower) in enumerate(zip(fit.responses, ax[:count], ax[count:], strict=False)):
-        omega = np.unique(np.r_[np.geomspace(one.omega[0], one.omega[-1], 1200), one.omega])
-        curves = [(omega, problem.at(number, omega).computed(point)[0], looks) for point, looks in arms]
-        _over_measured(one, curves, upper, lower)
+    count = len(fit.responses)
+    looks = {"color": GREY, "lw": 1.0, "label": "start"}, {"color": BLUE, "lw": 1.4, "label": "fitted, exact"}
+    for one, (omega, *curves), upper, lower in zip(fit.responses, fitted_curves(fit), ax, ax[count:], strict=False):
+        _over_measured(one, [(omega, *each) for each in zip(curves, looks, strict=True)], upper, lower)
         upper.set(title=one.label, xlabel="", ylabel=f"magnitude [{one.unit}]")
 
 
 @picture(
     size=(9.0, 4.6),
-    title=lambda fit, _, output: f"{fit.before.name}: {signal_words(output)[0]} of the arms "
-                                 "that the data leave possible",
+    title=lambda fit, _, output, __: f"{fit.before.name}: {signal_words(output)[0]} of the arms "
+                                     "that the data leave possible",
 )  # fmt: skip
-def draw_band(fit: Fit, arms: Sequence[Arm], output: str, *, ax: Axes) -> None:
-    """Magnitude of a response of the arm that fits best, in the band of arms that the data leave possible."""
-    ends = [end for each in fit.responses for end in each.omega[[0, -1]]]
-    omega = np.geomspace(min(ends), max(ends), 800)  # about one to a pixel
-    best, *others = (abs(transfer(each, output)(1j * omega)) for each in (fit.arm, *arms))
+def draw_band(fit: Fit, band: ResponseBand, output: str, count: int, *, ax: Axes) -> None:
+    """Draw the magnitude of a response of the arm that fits best, in the band of `count` possible arms."""
+    hertz = band.omega / RAD_PER_CYCLE
     name, unit = signal_words(output)
-    label = f"all of {len(arms)} arms that the data leave possible"
-    ax.fill_between(omega / RAD_PER_CYCLE, np.min(others, axis=0), np.max(others, axis=0), color=BLUE, alpha=0.3,
-                    lw=0, label=label)  # fmt: skip
-    ax.plot(omega / RAD_PER_CYCLE, best, color=BLUE, lw=1.3, label="the arm that fits best")
+    label = f"all of {count} arms that the data leave possible"
+    ax.fill_between(hertz, band.low, band.high, color=BLUE, alpha=0.3, lw=0, label=label)
+    ax.plot(hertz, band.best, color=BLUE, lw=1.3, label="the arm that fits best")
     ax.set(xscale="log", yscale="log", xlabel=FREQUENCY_HZ)
     ax.set_ylabel(f"|{name}| [{unit_over(unit, fit.arm.input_unit)}]")
     plain_ticks(ax.xaxis, subs=TICKS_A_DECADE)
@@ -231,13 +222,9 @@ def draw_band(fit: Fit, arms: Sequence[Arm], output: str, *, ax: Axes) -> None:
     size=(8.0, 5.0),
     title=lambda fit, *_: f"{fit.before.name}: stabilising gains for the arms that the data leave possible",
 )  # fmt: skip
-def draw_share(fit: Fit, arms: Sequence[Arm], ranges: Sequence[tuple[float, float]], *, ax: Axes) -> None:
-    """The share of the possible arms that each pair of gains stabilises in continuous time; `ranges` of both gains."""
-    across, up = (np.linspace(*ends, 60) for ends in ranges)
-    share = np.mean([gain_map(arm, across, up).unstable == 0 for arm in arms], axis=0)
-    mesh = ax.pcolormesh(
-        across, up, share, cmap="Blues", vmin=0.0, vmax=1.0, shading="nearest", rasterized=True,
-    )  # fmt: skip
+def draw_share(fit: Fit, found: ShareOfArms, *, ax: Axes) -> None:
+    """Draw the share of the possible arms that each pair of gains stabilises in continuous time."""
+    mesh = ax.pcolormesh(*found, cmap="Blues", vmin=0.0, vmax=1.0, shading="nearest", rasterized=True)
     ax.figure.colorbar(mesh, ax=ax).set_label("share of the arms with a stable loop [−]")
     name_axes(PLANE, fit.arm, HubFeedback(), ax)
     ax.grid(False)

@@ -16,7 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.digits import general, plain
 from tfarm.loop.curve import LoopCurve, curve_of, decibels, gain_margin
-from tfarm.loop.margins import LoopMargins, Margins, loop_margins
+from tfarm.loop.margins import LoopMargins, Margins
 from tfarm.loop.nyquist import Nyquist, compressed
 
 from .frequency import FREQUENCY, Drawn, draw_curves, over_frequency, parted
@@ -210,7 +210,7 @@ def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
         (0.0, 1.0, {"color": GREY, "ls": "-", "label": "|L| = 1"}),
         (-1.0, 1 / USUAL_PEAK, {"color": INK, "ls": ":", "label": f"Ms = {USUAL_PEAK:g}"}),
     ]
-    for peak in [loop_margins(data.verdict).sensitivity_peak] if data.verdict.is_stable else []:
+    if (peak := data.sensitivity_peak) is not None:
         label = f"radius 1/Ms, Ms {_at(peak.value, '', peak.omega)}"
         circles.append((-1.0, 1 / peak.value, {"color": INK, "ls": "--", "label": label}))
     for place in (ax, zoom):

@@ -3,7 +3,6 @@
 import math
 import textwrap
 from collections.abc import Sequence
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -11,14 +10,11 @@ from matplotlib.ticker import MaxNLocator
 
 from tfarm.arm.schema import file_key, file_keys
 from tfarm.digits import how_many, unit
-from tfarm.errors import TfarmError, require
+from tfarm.errors import require
 from tfarm.exact.outputs import signal_words, unit_over
-from tfarm.loop.curve import decibels
-from tfarm.response import transfer
-from tfarm.response.frequency import resonant_band
+from tfarm.studies.bands import study_band as response_band
 from tfarm.studies.quantities import (
     COLUMNS,
-    QUANTILES,
     Spread,
     column_names,
     loop_of,
@@ -35,7 +31,6 @@ BINS = 24  # at most, of a histogram
 ACROSS, MOST_QUANTITIES = 4, 12  # axes of distributions side by side, and in all
 MOST_NUMBERS, MOST_ROWS, MOST_MARKS = 4, 3, 1000  # of a scatter picture: axes, and arms
 LINE = 24  # letters of a label of such small axes
-POINTS, CURVES, SINGLE = 1200, 100, 12  # of a band: frequencies, arms at most, and curves drawn of these
 FIRST = ("gain_margin_db", "phase_margin_deg", "delay_margin_ms", "peak_sensitivity")  # where there are too many
 LOOKS: dict[str, dict[str, Any]] = {
     "continuous": {"fill": True, "color": BLUE, "alpha": 0.4, "label": "continuous-time"},
@@ -158,16 +153,13 @@ def study_band(found: Study, output: str = "root_moment", *, ax: Axes) -> None:
 
     The arms are even over the rows.  Raises ParameterError for an unknown output, and where no arm has that response.
     """
-    plan, table, curves = found.parts.plan, found.table(), []
-    omega, row = np.geomspace(*resonant_band(plan.arm), POINTS), transfer(plan.arm, output).rows[0]
-    for n in range(0, found.done, 1 + (found.done - 1) // CURVES):
-        with suppress(TfarmError):  # of an arm that is illegal
-            one = plan.subjects.at([float(table[key][n]) for key in plan.space.keys])
-            curves.append(decibels(transfer(one.arm, output)(1j * omega)))
-    require(curves, "output", output, "no arm of the study has that response")
-    low, median, high = np.quantile(curves, [QUANTILES[end] for end in ("low", "median", "high")], axis=0)
-    ax.fill_between(omega, low, high, color=BLUE, alpha=0.3, lw=0, label="5 to 95 % of the arms, at each frequency")
-    for n, curve in enumerate(curves[:: max(1, len(curves) // SINGLE)]):
+    band = response_band(found, output)
+    omega = band.omega
+    ax.fill_between(
+        omega, band.low, band.high, color=BLUE, alpha=0.3, lw=0, label="5 to 95 % of the arms, at each frequency"
+    )
+    # a dozen single arms at least
+    for n, curve in enumerate(band.curves[:: max(1, len(band.curves) // 12)]):
         ax.plot(omega, curve, color=GREY, lw=0.5, alpha=0.6, zorder=1.5, label="single arms" * (not n))
-    ax.plot(omega, median, color=BLUE, lw=1.4, label="median, at each frequency")
-    over_frequency(ax, f"{row.label} [dB re 1 {unit_over(row.unit, plan.arm.input_unit)}]")
+    ax.plot(omega, band.median, color=BLUE, lw=1.4, label="median, at each frequency")
+    over_frequency(ax, f"{band.label} [dB re 1 {unit_over(band.unit, found.parts.plan.arm.input_unit)}]")

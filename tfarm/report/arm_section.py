@@ -11,14 +11,14 @@ from tfarm.arm.chain import file_text
 from tfarm.arm.schema import file_key
 from tfarm.digits import plain, significant, unit
 from tfarm.plots.motion import sketch
-from tfarm.report.page import Case, Fact, PageSection, picture, prose, sheet
+from tfarm.report.page import ArmReport, Fact, PageSection, picture, prose, sheet
 from tfarm.schema import Quantity, Table, table
 from tfarm.studies.cases import Candidates, has_hub_inertia, hub_study, section_study
 
 
-def arm_section(case: Case) -> PageSection:
+def arm_section(report: ArmReport) -> PageSection:
     """The first part of every page: headline numbers, slips of units, the theory, and the parameters."""
-    arm, input = case.arm, input_words(case.arm)
+    arm, input = report.arm, input_words(report.arm)
     words = (
         prose("units", odd="; ".join(implausible(arm))), prose("rig", arm=arm, input=input),
         "" if arm.assumptions else "This arm states no assumptions.",
@@ -28,7 +28,7 @@ def arm_section(case: Case) -> PageSection:
         items=arm.assumptions,
         blocks=(
             picture("arm", sketch.figure(arm), arm=arm, input=input),
-            sheet("parameters", table([*parameters(arm, tomllib.loads(file_text(arm, case.chain)))]),
+            sheet("parameters", table([*parameters(arm, tomllib.loads(file_text(arm, report.chain)))]),
                   is_rig=not arm.is_uniform),
             derived_table(arm),
         ),
@@ -120,9 +120,9 @@ def derived_table(arm: Arm) -> Table:
 # ------------------------------------------------------------ assumptions
 
 
-def assumptions_section(case: Case) -> PageSection:
+def assumptions_section(report: ArmReport) -> PageSection:
     """Frequencies over the sections and the hub inertias that could be chosen, with sensitivities."""
-    arm, found = case.arm, dict[str, Candidates]()
+    arm, found = report.arm, dict[str, Candidates]()
     if arm.is_uniform:
         found["assumptions_section"] = section_study(arm)
     if arm.is_uniform and has_hub_inertia(arm):

@@ -11,7 +11,7 @@ from tfarm.assessment.card import ResultCard, result_card
 from tfarm.errors import TfarmError
 from tfarm.plots.frequency import draw_card
 from tfarm.plots.style import save_figure
-from tfarm.report.page import PICTURES, Case, PageSection, SavedBlock, keep, prose
+from tfarm.report.page import PICTURES, ArmReport, PageSection, SavedBlock, keep, prose
 from tfarm.response.frequency import bode
 from tfarm.schema import table, text, to_dict
 from tfarm.spectrum import modes
@@ -47,29 +47,29 @@ class Card:
     notes: tuple[str, ...]
 
 
-def save_card(case: Case, folder: Path) -> None:
+def save_card(report: ArmReport, folder: Path) -> None:
     """pictures/card.svg and card.json; a picture that cannot be made is left out, as its section on the page is."""
     (folder / PICTURES).mkdir(exist_ok=True)
-    arm, picture = case.arm, ""
+    arm, picture = report.arm, ""
     with suppress(TfarmError):
         save_figure(draw_card.figure(bode(arm, "root_moment")), folder / PICTURES, "card", formats=("svg",))
         picture = "card.svg"
-    loops, notes = list[dict[str, Any]](), [] if case.has_loop else [prose("no_loop", arm=arm)]
-    for each in () if arm.is_locked else case.controllers:
+    loops, notes = list[dict[str, Any]](), [] if report.has_loop else [prose("no_loop", arm=arm)]
+    for each in () if arm.is_locked else report.controllers:
         try:
-            found = result_card(each.arm, each.law, case.chain)
-            loops += results(found, each.name if case.laws else each.title)
+            found = result_card(each.arm, each.law, report.chain)
+            loops += results(found, each.name if report.laws else each.title)
             notes += found.notes
         except TfarmError as error:
             notes.append(f"{each.name}: not determined, {error}.")
     first = table([row for row in listed_modes(modes(arm, SHOWN_MODES)).modes if row.index > 0], MODE_COLUMNS)
-    shown = Card(arm.name, summary(case), picture, tuple(first), tuple(loops), tuple(dict.fromkeys(notes)))
+    shown = Card(arm.name, summary(report), picture, tuple(first), tuple(loops), tuple(dict.fromkeys(notes)))
     keep(folder, "card", asdict(shown))
 
 
-def summary(case: Case) -> str:
+def summary(report: ArmReport) -> str:
     """The arm in one sentence, and the laws that its page is about in another."""
-    return prose("summary", arm=case.arm, laws=[each.name for each in case.laws])
+    return prose("summary", arm=report.arm, laws=[each.name for each in report.laws])
 
 
 def results(found: ResultCard, controller: str) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""A page: the case that it is about, and what it is made of: texts, pictures and tables, saved before it is written.
+"""A page: the report that it is about, and what it is made of: texts, pictures and tables, saved before it is written.
 
 Texts are in templates/prose.txt, pages in the other templates; here is how both are filled in.
 """
@@ -37,6 +37,7 @@ from tfarm.arm import (
 from tfarm.arm.chain import file_text
 from tfarm.arm.writing import law_toml
 from tfarm.assessment.card import LoopCard
+from tfarm.assessment.stability_map import DESIGNED_MODES
 from tfarm.digits import how_many, kept_digits, listed, plain, scientific, significant
 from tfarm.dsp import Chain, discretise, load_chain
 from tfarm.errors import ConvergenceError, ParameterError, one_line
@@ -64,7 +65,6 @@ PROMISES = (
 )  # fmt: skip
 IN_PILL = ("stability", "grade", "limited_by", "delay_margin_periods")  # quantities without a cell of their own
 CARD_ROWS = {of.key: of for name, of in quantities(LoopCard).items() if name not in IN_PILL}
-DESIGNED_MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
 
 
 # ------------------------------------------------------------ texts
@@ -277,7 +277,7 @@ def kept(out: Path, kind: str, record: type[T]) -> dict[Path, T]:
     return {folder: each for folder, each in found.items() if getattr(each, "name", "") == folder.name}
 
 
-# ------------------------------------------------------------ the case
+# ------------------------------------------------------------ the report
 
 
 @dataclass(frozen=True)
@@ -326,7 +326,7 @@ class Controller:
         return f"{self.key.replace('_', '-')}-{suffix}"
 
 
-class Case(NamedTuple):
+class ArmReport(NamedTuple):
     """An arm, its chain, and the laws that the page is about; without any it is about the default gains.
 
     `fit` is the source of the arm's numbers, if they were fitted to measurements; `measured` are responses that are
@@ -372,14 +372,14 @@ def on_hub(arm: Arm, gains: HubFeedback, name: str, key: str) -> Controller:
     return Controller(arm, as_law(gains), GivenLaw(gains), name, key)
 
 
-def check_laws(case: Case) -> None:
+def check_laws(report: ArmReport) -> None:
     """Raise ParameterError for a law that does not suit this arm or the sampling period of its chain."""
-    for each in case.controllers if case.laws and not case.arm.is_locked else ():
+    for each in report.controllers if report.laws and not report.arm.is_locked else ():
         law = discretise.with_all_gains(*arm_and_law(each.arm, each.law))
         Signals(each.arm, law.signals)
         if not law.is_discrete:
             Loop(each.arm, law)
-        discretise.discretised(law, case.chain.sampling.period)
+        discretise.discretised(law, report.chain.sampling.period)
 
 
 def has_loop(arm: Arm) -> bool:
@@ -429,25 +429,25 @@ def argument(name: str, preset: bool) -> str:
     return shlex.quote(name if preset else f"{name}.toml")
 
 
-def file_of(case: Case) -> str:
+def file_of(report: ArmReport) -> str:
     """The arm's file with its chain, and with the law that the page is about where TOML can say that alone."""
-    law = own_law(case)
-    return file_text(case.arm, case.chain) + ("" if law is None else f"\n{law}")
+    law = own_law(report)
+    return file_text(report.arm, report.chain) + ("" if law is None else f"\n{law}")
 
 
-def own_law(case: Case) -> str | None:
+def own_law(report: ArmReport) -> str | None:
     """The table [law] of the one law of a page; None of none or several, or of one with files of its own."""
     with suppress(ParameterError):
-        if len(case.laws) == 1 and case.laws[0].measured is None:
-            return law_toml(as_law(case.laws[0].law))
+        if len(report.laws) == 1 and report.laws[0].measured is None:
+            return law_toml(as_law(report.laws[0].law))
     return None
 
 
-def command_of(case: Case, only: str) -> str:
+def command_of(report: ArmReport, only: str) -> str:
     """The command that writes this page; an arm that is no preset is named by its file, as are laws with theirs."""
-    law = own_law(case)
-    options = [] if law is not None else [f"--law {shlex.quote(each.file or 'FILE')}" for each in case.laws]
-    options += [f"--measured {shlex.quote(f'{each.name}={each.source}')}" for each in case.measured]
-    options += [f"--only {only}"] * bool(only) + ["--paper"] * case.is_paper
-    name = argument(case.arm.name, law is None and is_preset(case.arm, case.chain))
+    law = own_law(report)
+    options = [] if law is not None else [f"--law {shlex.quote(each.file or 'FILE')}" for each in report.laws]
+    options += [f"--measured {shlex.quote(f'{each.name}={each.source}')}" for each in report.measured]
+    options += [f"--only {only}"] * bool(only) + ["--paper"] * report.is_paper
+    name = argument(report.arm.name, law is None and is_preset(report.arm, report.chain))
     return " ".join(["tfarm report", name, *options, "--out reports"])

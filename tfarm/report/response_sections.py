@@ -15,11 +15,12 @@ from tfarm.digits import fixed, kept_digits, lined, listed, plain
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.fitting.fit import ARMS, arms_drawn
 from tfarm.fitting.overlay import overlay
+from tfarm.fitting.possible import response_band, stable_share
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import ranges_of
 from tfarm.plots import frequency, motion
 from tfarm.plots.style import gains_words
-from tfarm.report.page import Case, PageSection, Picture, has_loop, picture, prose, sheet, upper
+from tfarm.report.page import ArmReport, PageSection, Picture, has_loop, picture, prose, sheet, upper
 from tfarm.response.frequency import AXIS_SHARE, Bode, bode
 from tfarm.schema import Column, Table, curve_table, table
 from tfarm.spectrum import DampedModes, Modes, damped_modes, modes
@@ -34,9 +35,9 @@ TABLED_MODES, DRAWN_MODES = 10, 6  # as `tfarm modes` lists them; shapes in thre
 THEORIES: tuple[Theory, ...] = ("timoshenko", "shear", "rayleigh", "euler-bernoulli")
 
 
-def modes_section(case: Case) -> PageSection:
+def modes_section(report: ArmReport) -> PageSection:
     """Everything about free vibration: at C = 0, and the eigenvalues at the arm's own C."""
-    arm, found = case.arm, tfarm.modes(case.arm, count=TABLED_MODES)
+    arm, found = report.arm, tfarm.modes(report.arm, count=TABLED_MODES)
     words, blocks = [prose("complete_modes")], list[Picture | Table]([modal_table(found)])
     if not arm.is_uniform:
         blocks.append(locked_table(found))
@@ -190,9 +191,9 @@ def tint(x: float) -> str:
 # ------------------------------------------------------------ frequency responses
 
 
-def bode_section(case: Case, output: str) -> PageSection:
+def bode_section(report: ArmReport, output: str) -> PageSection:
     """One output: picture, its meaning, poles and zeros."""
-    data = bode(case.arm, output)
+    data = bode(report.arm, output)
     stem, what = f"bode-{output.replace('_', '-')}", f"{data.input_label} to {data.label}"
     if data.is_zero:
         none = f"The {data.label} is zero at every frequency: this arm's tip is pinned."
@@ -221,9 +222,9 @@ def bode_facts(data: Bode) -> dict[str, Any]:
 # ------------------------------------------------------------ fitted to measurements
 
 
-def fit_section(case: Case, count: int = ARMS) -> PageSection:
+def fit_section(report: ArmReport, count: int = ARMS) -> PageSection:
     """Measurements, the fitted numbers with their intervals, and the share of possible arms on which a loop holds."""
-    fit = case.fit
+    fit = report.fit
     assert fit is not None
     words = [f"{upper(each)}." for each in fit.not_determined]
     words += [f"Remedy: {fit.advice}."] * bool(fit.misses)
@@ -246,13 +247,14 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
             [each.in_band for each in every if each.in_band is not None],
         )
         if fit.responses:
-            figure = frequency.draw_band.figure(fit, arms, "root_moment")
+            output = "root_moment"
+            figure = frequency.draw_band.figure(fit, response_band(fit, arms, output), output, len(arms))
             blocks.append(picture("fit_band", figure, arms=arms))
         if every:
             words.append(prose("fit_share", gains=gains, every=every))
             columns = table(stable, ("phase_margin", "delay_margin", "disk_margin"))
             blocks += [
-                picture("fit_map", frequency.draw_share.figure(fit, arms, ranges_of(fit.arm))),
+                picture("fit_map", frequency.draw_share.figure(fit, stable_share(arms, ranges_of(fit.arm)))),
                 sheet("fit_margins", columns, gains=gains),
             ]
     answer = prose("fit", verdict=fit.verdict, found=fit.in_words)
@@ -262,11 +264,11 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
 # ------------------------------------------------------------ measured
 
 
-def measured_section(case: Case) -> PageSection:
+def measured_section(report: ArmReport) -> PageSection:
     """Each response over the exact one, with the differences."""
     blocks, words = list[Picture | Table](), list[str]()
-    for number, one in enumerate(case.measured, start=1):
-        found, label = overlay(case.arm, one), f"-{number}" if len(case.measured) > 1 else ""
+    for number, one in enumerate(report.measured, start=1):
+        found, label = overlay(report.arm, one), f"-{number}" if len(report.measured) > 1 else ""
         name = found.measured.label
         words.append(prose("measured_response", name=name, found=found, peaks=found.unmatched / (2 * math.pi)))
         blocks += [

@@ -1,4 +1,4 @@
-"""The sampled loops of a case: verdict, margins, stability intervals, modes, and motion in time.
+"""The sampled loops of a report: verdict, margins, stability intervals, modes, and motion in time.
 
 In time: slews, and steps that were measured with the exact sampled loop over them.
 """
@@ -16,14 +16,16 @@ from tfarm.assessment.card import margins_of, sampled_of
 from tfarm.assessment.step import Step, step
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain, Simulation, Simulator, results, traces
+from tfarm.dsp.film import motion_of
 from tfarm.errors import ParameterError
 from tfarm.fitting.recording import RunComparison, compare_run, overshoot
 from tfarm.loop import sampled_modes as modes
 from tfarm.loop import sampled_verdict as verdict
+from tfarm.loop.regions import StableRegions, stable_regions
 from tfarm.loop.sampled_verdict import Analysis, sampled_verdict
 from tfarm.plots import animation, motion, regions, roots, style
 from tfarm.report.page import (
-    Case,
+    ArmReport,
     Controller,
     Fact,
     PageSection,
@@ -44,21 +46,21 @@ MOST_SAMPLES = 10_000  # after a record in which an unstable loop may seem settl
 FILM_SLEWS, FILM_FRAMES = 1.5, 80  # length of a film in slews, and frames at most: a second of computing
 
 
-def sampled_section(case: Case) -> PageSection:
+def sampled_section(report: ArmReport) -> PageSection:
     """The sampled loop of each controller; in time runs measured under the laws, else the slew."""
-    arm, chain = case.arm, case.chain
-    found = [(each, sampled_of(each.arm, each.law, chain)) for each in case.controllers]
+    arm, chain = report.arm, report.chain
+    found = [(each, sampled_of(each.arm, each.law, chain)) for each in report.controllers]
     first = found[0][1]
     planes, along = list[Picture | Table](), list[Picture | Table]()
-    if not case.laws:
-        planes = [overlay_picture(regions.stable_regions(arm, first.loop.gains, chain), first)]
+    if not report.laws:
+        planes = [overlay_picture(stable_regions(arm, first.loop.gains, chain), first)]
         along = [loci_picture(first)]
     numbers = across({each.title: it for each, it in found}, keys=[each.key for each, _ in found])
-    pictures, words, facts = slews(case)
+    pictures, words, facts = slews(report)
     growths = [growth_words(each, it.verdict, chain) for each, it in found if it.verdict.log_radius > 0]
     return PageSection(
         title=f"The sampled loop, {plain(1e3 * chain.sampling.period)} ms",
-        facts=[*(interval_facts(first) if not case.laws else ()), *facts],
+        facts=[*(interval_facts(first) if not report.laws else ()), *facts],
         words=[" ".join([chain_words(arm, chain), *growths]), *words],
         blocks=[
             *planes,
@@ -69,7 +71,7 @@ def sampled_section(case: Case) -> PageSection:
             *along,
             *(sheet("sampled_modes", table(it.modes, () if it.loop.is_of_gains else WHOLE_LAW_COLUMNS),
                     stem=_stem("modes", each), each=each, found=it) for each, it in found),
-            *measured_blocks(case),
+            *measured_blocks(report),
             *pictures,
         ],
     )  # fmt: skip
@@ -119,14 +121,14 @@ def delays_table(found: Sequence[tuple[Controller, Analysis]], chain: Chain) -> 
 # ------------------------------------------------------------ pictures of gains
 
 
-def overlay_picture(both: regions.StableRegions, found: Analysis) -> Picture:
+def overlay_picture(both: StableRegions, found: Analysis) -> Picture:
     """Stability regions of the continuous and of the sampled loop in one plane, with the intervals of K2 below it."""
     arm, gains = both.continuous.arm, found.loop.gains
     rows = [row for row in margins_of(arm, as_law(gains)).stability_intervals if row.name == MOMENT_GAIN]
     return picture(
         "sampled_overlay",
         regions.overlay.figure(*both),
-        data=regions.region_columns(both),
+        data=both.columns,
         arm=arm,
         low=float(both.continuous.axes[0][0]),
         nested=len(both.sampled) > 1,
@@ -159,22 +161,22 @@ def loci_picture(found: Analysis) -> Picture:
 # ------------------------------------------------------------ in time
 
 
-def slews(case: Case) -> tuple[list[Picture | Table], list[str], list[Fact]]:
+def slews(report: ArmReport) -> tuple[list[Picture | Table], list[str], list[Fact]]:
     """The slew under each controller, reasons of a missing one, settling times; nothing where runs are measured.
 
     Of an arm's own gains the slew without moment feedback is there too.
     """
-    if not case.arm.has_rigid_mode:
-        return [], [f"{prose('what_holds', arm=case.arm)}: no slew is simulated."], []
-    if all(each.given.measured is not None for each in case.controllers):
+    if not report.arm.has_rigid_mode:
+        return [], [f"{prose('what_holds', arm=report.arm)}: no slew is simulated."], []
+    if all(each.given.measured is not None for each in report.controllers):
         return [], [], []
-    bare = on_hub(case.arm, default_gains(case.arm).having(MOMENT_GAIN, 0.0), f"{MOMENT_GAIN} = 0", "without")
-    runs, words, task = dict[str, Simulation](), list[str](), case.chain.slew
+    bare = on_hub(report.arm, default_gains(report.arm).having(MOMENT_GAIN, 0.0), f"{MOMENT_GAIN} = 0", "without")
+    runs, words, task = dict[str, Simulation](), list[str](), report.chain.slew
     duration = traces.RECORD_LENGTH * task.rise_time
-    candidates = [*([] if case.laws else [bare]), *case.controllers]
+    candidates = [*([] if report.laws else [bare]), *report.controllers]
     for each in candidates:
         try:
-            runs[each.name] = results.drawn(each.arm, each.law, case.chain, "slew", duration)
+            runs[each.name] = results.drawn(each.arm, each.law, report.chain, "slew", duration)
         except ParameterError as error:
             words.append(f"No slew of {each.name} is simulated: {error}.")
     simulated = [each for each in candidates if each.name in runs]
@@ -182,11 +184,11 @@ def slews(case: Case) -> tuple[list[Picture | Table], list[str], list[Fact]]:
         return [], [*words, "The controllers drive inputs of different units: their slews are not drawn together."], []
     if not runs:
         return [], words, []
-    arm, title = simulated[0].arm, prose("slew_title", task=task, reach=case.arm.reach)
+    arm, title = simulated[0].arm, prose("slew_title", task=task, reach=report.arm.reach)
     figure = motion.slew.figure(arm, {style.safe(name): run for name, run in runs.items()}, title)
     columns = response_columns(arm, {each.key: runs[each.name] for each in simulated})
     moving = [each for each in simulated if each is not bare and runs[each.name].stopped is None]
-    responses = [(each, step(each.arm, each.law, case.chain, "slew")) for each in moving[:1]]
+    responses = [(each, step(each.arm, each.law, report.chain, "slew")) for each in moving[:1]]
     numbers = (
         Column("law", "controller", of=list(runs)),
         *table(list(runs.values()), ("residual_moment", "settling_time")).columns,
@@ -200,7 +202,7 @@ def slews(case: Case) -> tuple[list[Picture | Table], list[str], list[Fact]]:
             *(sheet("time_responses", it.table, each=each, found=it) for each, it in responses),
         ],
         words,
-        [settling_fact(each, runs[each.name], len(case.laws) > 1) for each in simulated if each is not bare]
+        [settling_fact(each, runs[each.name], len(report.laws) > 1) for each in simulated if each is not bare]
         + [fact for _, it in responses for fact in tip_facts(it)],
     )
 
@@ -218,7 +220,7 @@ def tip_facts(found: Step) -> Iterator[Fact]:
 
 def film_picture(each: Controller, run: Simulation, rise: float) -> Picture:
     """The film of a slew, and of what follows for half as long."""
-    found = animation.motion_of(each.arm, run, FILM_SLEWS * rise, FILM_FRAMES)
+    found = motion_of(each.arm, run, FILM_SLEWS * rise, FILM_FRAMES)
     still = picture("slew_film", animation.draw_motion.figure(found), name=each.name, found=found)
     return still._replace(film=animation.film(found).gif)
 
@@ -285,10 +287,10 @@ def step_rows(name: str, found: RunComparison) -> Iterator[StepRow]:
         yield StepRow(name, origin, 100 * overshoot(angle, step, end), math.degrees(angle[-1] - end))
 
 
-def measured_blocks(case: Case) -> Iterator[Picture | Table]:
+def measured_blocks(report: ArmReport) -> Iterator[Picture | Table]:
     """Each measured run with the exact loop over it, and both in numbers; nothing where none was measured."""
-    runs = [(each, each.given.measured) for each in case.controllers if each.given.measured is not None]
-    found = {each.name: compare_run(each.arm, each.law, case.chain, run) for each, run in runs}
+    runs = [(each, each.given.measured) for each in report.controllers if each.given.measured is not None]
+    found = {each.name: compare_run(each.arm, each.law, report.chain, run) for each, run in runs}
     if not found:
         return
     figure = motion.draw_measured_runs.figure(found)

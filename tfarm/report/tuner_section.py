@@ -8,9 +8,10 @@ from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain, Simulation, results, scenarios, traces
 from tfarm.errors import CertificationError
-from tfarm.plots import motion, regions
+from tfarm.loop.regions import stable_regions
+from tfarm.plots import motion
 from tfarm.records import record
-from tfarm.report.page import Case, Fact, PageSection, Picture, has_loop, picture, prose, sheet
+from tfarm.report.page import ArmReport, Fact, PageSection, Picture, has_loop, picture, prose, sheet
 from tfarm.report.sampled_section import chain_words, piece_of_bands, response_columns
 from tfarm.schema import Column, Table, table
 from tfarm.studies.cases import learning_curves
@@ -28,12 +29,12 @@ SAME_COST = 1e-4  # relative difference of two costs below which they are called
 TITLE = "The gain tuner against baselines"
 
 
-def tuner_section(case: Case) -> PageSection:
+def tuner_section(report: ArmReport) -> PageSection:
     """The tuner with the paper's figures on a damped arm and its own chain; one sentence for any other."""
-    answer = why_not(case.arm, case.chain)
+    answer = why_not(report.arm, report.chain)
     try:
         if not answer:
-            data = tuner_numbers(case.arm, case.chain)
+            data = tuner_numbers(report.arm, report.chain)
             if math.isfinite(data.tuning.without.cost):
                 return section_of(data)
             answer = prose("tuner_unstable")
@@ -155,7 +156,7 @@ def blocks_of(data: TunerNumbers) -> Iterator[Picture | Table]:
     The slews are through ideal converters, then with those and the delay of the arm's own chain.
     """
     tuning, result, curves = data.tuning, data.tuning.training.result, data.curves
-    plane = regions.stable_regions(data.arm, tuning.constant, tuning.trial.loop.chain)
+    plane = stable_regions(data.arm, tuning.constant, tuning.trial.loop.chain)
     columns = Column("t_s", of=result.t), Column("K", of=result.K), Column("x_N_m", of=result.x)
     gain = tuning.constant.gain_text(RATE_GAIN, plain)
     yield picture("tune_gain", motion.draw_gain.figure(tuning, *plane), data=columns, tuning=tuning, gain=gain)

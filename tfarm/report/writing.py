@@ -38,7 +38,7 @@ from tfarm.report.loop_section import (
 )
 from tfarm.report.overview import SHORT, Card, blocks, save_card, summary
 from tfarm.report.page import (
-    Case,
+    ArmReport,
     Fact,
     GivenLaw,
     PageSection,
@@ -87,17 +87,17 @@ RESERVED_NAMES = {  # of folders that no arm may have
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A section of an arm's pages: a name for the progress bar, the section's anchor, and how to make it of a case.
+    """A section of an arm's pages: a name for the progress bar, the section's anchor, and how to make it of a report.
 
-    A case that it does not suit has no such section.  The page that has it is called by the first word of its anchor,
+    A report that it does not suit has no such section.  The page that has it is called by the first word of its anchor,
     or `on`; the `title` of the page is that of one of its sections.  The first page shows blocks of some.
     Sections of one `task` are made one after the other in one process.
     """
 
     name: str
     anchor: str
-    make: Callable[[Case], PageSection]
-    suits: Callable[[Case], Any] = lambda case: True
+    make: Callable[[ArmReport], PageSection]
+    suits: Callable[[ArmReport], Any] = lambda report: True
     title: str = ""
     on: str = ""
     task: str = ""
@@ -108,14 +108,14 @@ class Piece:
         return self.on or self.anchor.partition("-")[0]
 
 
-def _in_s(case: Case) -> bool:
-    """Whether a controller of the case acts in continuous time."""
-    return not case.arm.is_locked and any(not each.law.is_discrete for each in case.controllers)
+def _in_s(report: ArmReport) -> bool:
+    """Whether a controller of the report acts in continuous time."""
+    return not report.arm.is_locked and any(not each.law.is_discrete for each in report.controllers)
 
 
-def _of_gains(case: Case) -> bool:
+def _of_gains(report: ArmReport) -> bool:
     """Whether the page is about both gains of the arm itself."""
-    return not case.laws and has_loop(case.arm)
+    return not report.laws and has_loop(report.arm)
 
 
 PIECES = (
@@ -126,31 +126,33 @@ PIECES = (
     Piece("response of the root moment", "bode-root-moment", partial(bode_section, output="root_moment"),
           title="Bode plots"),
     Piece("response of the tip", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),
-    Piece("measured responses", "bode-measured", measured_section, lambda case: case.measured),
+    Piece("measured responses", "bode-measured", measured_section, lambda report: report.measured),
     Piece("the arm", "arm", arm_section, on="modes"),
     Piece("modes", "modes", modes_section, title="Arm and modes"),
     Piece("root loci", "locus", locus_section, _in_s, "Root loci", task=LOOP_TASK),
-    Piece("sampled loop", "sampled", sampled_section, lambda case: case.has_loop, "The sampled loop",
+    Piece("sampled loop", "sampled", sampled_section, lambda report: report.has_loop, "The sampled loop",
           task=SAMPLED_TASK),
-    Piece("controllers", "law", law_section, lambda case: case.laws and not case.arm.is_locked, "The controller"),
+    Piece("controllers", "law", law_section, lambda report: report.laws and not report.arm.is_locked, "The controller"),
     Piece("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", task=SAMPLED_TASK),
-    Piece("fit to measurements", "fit", fit_section, lambda case: case.fit, "Fitted numbers"),
+    Piece("fit to measurements", "fit", fit_section, lambda report: report.fit, "Fitted numbers"),
     Piece("assumptions", "assumptions", assumptions_section, title="Assumptions"),
 )  # fmt: skip
 QUESTIONS = {piece.page: piece.title for piece in PIECES if piece.title}  # pages that may be asked for alone
 PAGES = {"index": "Overview", "live": "Live loop", **QUESTIONS}
 
 
-def pieces_of(case: Case) -> list[Piece]:
-    """The sections of a case, in their order."""
-    return [piece for piece in PIECES if piece.suits(case)]
+def pieces_of(report: ArmReport) -> list[Piece]:
+    """The sections of a report, in their order."""
+    return [piece for piece in PIECES if piece.suits(report)]
 
 
-def make_section(name: str, anchor: str, make: Callable[[Case], PageSection], case: Case, folder: Path) -> PageSection:
+def make_section(
+    name: str, anchor: str, make: Callable[[ArmReport], PageSection], report: ArmReport, folder: Path
+) -> PageSection:
     """A section saved in the arm's folder, or in its place why tfarm could not make it; a bug of ours stays loud."""
     try:
         with drawn_for("page"):
-            section = replace(make(case), anchor=anchor)
+            section = replace(make(report), anchor=anchor)
     except TfarmError as error:
         section = PageSection(
             anchor=anchor,
@@ -158,7 +160,7 @@ def make_section(name: str, anchor: str, make: Callable[[Case], PageSection], ca
             answer=f"This section could not be made for this arm: {error}.",
             failure=str(error),
         )
-    return save_section(section, folder, case.is_paper)
+    return save_section(section, folder, report.is_paper)
 
 
 # ------------------------------------------------------------ a report
@@ -196,11 +198,11 @@ def write(
     out, n, names, only = Path(out), len(arms), [arm.name for arm in arms], only or ()
     _check(names, only)
     each = zip(arms, chains or [Chain()] * n, laws or [()] * n, fits or [None] * n, strict=True)
-    cases = [Case(*driven(arm, chain), tuple(own), fit, tuple(measured), paper) for arm, chain, own, fit in each]
-    for case in cases:
-        check_laws(case)
+    reports = [ArmReport(*driven(arm, chain), tuple(own), fit, tuple(measured), paper) for arm, chain, own, fit in each]
+    for report in reports:
+        check_laws(report)
     with place_in(out, "out", names + [TRUST_FOLDER, ASSETS] * (not only)) as place:
-        sections = _written(cases, out, place, only, progress, announce)
+        sections = _written(reports, out, place, only, progress, announce)
     for name, section in sections:
         if section.failure and notice is not None:
             notice(f"{name}: the page leaves out “{section.title}”: {section.failure}")
@@ -219,7 +221,7 @@ def _check(names: Sequence[str], only: tuple[str, ...]) -> None:
 
 
 def _written(
-    cases: Sequence[Case],
+    reports: Sequence[ArmReport],
     out: Path,
     place: Path,
     only: tuple[str, ...],
@@ -228,16 +230,16 @@ def _written(
 ) -> list[tuple[str, PageSection]]:
     """Make all pages in `place` and move them to `out`, the index last; every section with the name of its arm."""
     tasks: dict[str, Sequence[Callable[[], Any]]] = {} if only else {EVIDENCE: [gather]}
-    own = [tasks_of(case, place / case.arm.name, only, out, announce) for case in cases]
+    own = [tasks_of(report, place / report.arm.name, only, out, announce) for report in reports]
     for each in own:
         tasks |= each
     done = make_all(tasks, progress)
     trust = TRUST_PAGE if not only or (out / TRUST_PAGE).is_file() else ""
     sections = []
-    for case, each in zip(cases, own, strict=True):
+    for report, each in zip(reports, own, strict=True):
         made = [section for task in each for section in done[task] if section is not None]
-        _write_pages(case, place / case.arm.name, made, only, trust, out / case.arm.name)
-        sections += [(case.arm.name, section) for section in made]
+        _write_pages(report, place / report.arm.name, made, only, trust, out / report.arm.name)
+        sections += [(report.arm.name, section) for section in made]
     move_into(place, out)
     if not only:
         audited, printed = done[EVIDENCE][0]
@@ -248,7 +250,7 @@ def _written(
 
 
 def tasks_of(
-    case: Case, folder: Path, only: tuple[str, ...], out: Path, announce: Callable[[str], object] | None
+    report: ArmReport, folder: Path, only: tuple[str, ...], out: Path, announce: Callable[[str], object] | None
 ) -> Calls:
     """What is to be made of one arm: its sections, its card and proof, and of a full report its first pages.
 
@@ -258,31 +260,33 @@ def tasks_of(
     folder.mkdir()
     tasks: dict[str, list[Callable[[], Any]]] = defaultdict(list)
     if not only:
-        tasks[LOOP_TASK].append(partial(first_pages, case, folder, out, announce))
-    for piece in pieces_of(case):
+        tasks[LOOP_TASK].append(partial(first_pages, report, folder, out, announce))
+    for piece in pieces_of(report):
         if piece.page in only or (not only and piece.anchor != MAP):
-            make = partial(make_section, piece.name, piece.anchor, piece.make, case, folder)
+            make = partial(make_section, piece.name, piece.anchor, piece.make, report, folder)
             tasks[piece.task or piece.name].append(make)
     if only:
-        tasks[LOOP_TASK if LOOP_TASK in tasks else "card"].append(partial(save_card, case, folder))
-    if not (only and case.laws):
-        tasks["modes"].append(partial(save_proof, case.arm, folder, case.chain))
-    return {f"{case.arm.name}: {task}": calls for task, calls in tasks.items()}
+        tasks[LOOP_TASK if LOOP_TASK in tasks else "card"].append(partial(save_card, report, folder))
+    if not (only and report.laws):
+        tasks["modes"].append(partial(save_proof, report.arm, folder, report.chain))
+    return {f"{report.arm.name}: {task}": calls for task, calls in tasks.items()}
 
 
-def first_pages(case: Case, folder: Path, out: Path, announce: Callable[[str], object] | None) -> PageSection | None:
+def first_pages(
+    report: ArmReport, folder: Path, out: Path, announce: Callable[[str], object] | None
+) -> PageSection | None:
     """Write map, card, live page and overview of an arm to `out` at once, and to `folder` for its report: the map."""
-    name = case.arm.name
+    name = report.arm.name
     with temporary_folder(folder.parent) as stage:
         own = stage / name
         own.mkdir()
-        pieces = [piece for piece in pieces_of(case) if piece.anchor == MAP]
-        made = [make_section(piece.name, piece.anchor, piece.make, case, own) for piece in pieces]
-        save_card(case, own)
-        if is_live(case):
-            save_live(case, own)
+        pieces = [piece for piece in pieces_of(report) if piece.anchor == MAP]
+        made = [make_section(piece.name, piece.anchor, piece.make, report, own) for piece in pieces]
+        save_card(report, own)
+        if is_live(report):
+            save_live(report, own)
             write_assets(stage / ASSETS)
-        _write_pages(case, own, made, ("index",), "", out / name)
+        _write_pages(report, own, made, ("index",), "", out / name)
         shutil.copytree(stage, folder.parent, dirs_exist_ok=True)
         move_into(stage, out)
         write_text(stage / "index.html", index_page(out, trust=TRUST_PAGE if (out / TRUST_PAGE).is_file() else ""))
@@ -318,21 +322,21 @@ def _in_turn(calls: Sequence[Callable[[], Any]]) -> list[Any]:
 
 
 def _write_pages(
-    case: Case, folder: Path, made: Sequence[PageSection], only: Sequence[str], trust: str, earlier: Path
+    report: ArmReport, folder: Path, made: Sequence[PageSection], only: Sequence[str], trust: str, earlier: Path
 ) -> None:
     """The arm's file with its chain, its first page and those of its sections, or `only` some.
 
     These lead to each other, to what is in the `earlier` folder of the arm, and to the page on `trust`, if any.
     """
-    file, by_anchor, own = file_of(case), {section.anchor: section for section in made}, defaultdict(list)
+    file, by_anchor, own = file_of(report), {section.anchor: section for section in made}, defaultdict(list)
     write_text(folder / "arm.toml", file)
-    for piece in pieces_of(case):
+    for piece in pieces_of(report):
         if piece.anchor in by_anchor:
             own[piece.page].append(by_anchor[piece.anchor])
     written = only or ("index", *own)
-    pages = navigation(case.arm, pages_in(earlier, folder, written=written), trust, earlier)
+    pages = navigation(report.arm, pages_in(earlier, folder, written=written), trust, earlier)
     shared = {
-        "card": kept_in(folder, "card", Card) or Card(case.arm.name, summary(case), "", (), (), ()),
+        "card": kept_in(folder, "card", Card) or Card(report.arm.name, summary(report), "", (), (), ()),
         "short": SHORT,
         "pages": pages,
         "titles": dict(pages),
@@ -347,8 +351,8 @@ def _write_pages(
         "explained": partial(explained, words=f"../{trust}" if trust else ""),
     }
     for name in written:
-        title = f"{case.arm.name}: {QUESTIONS[name]}" if name in QUESTIONS else case.arm.name
-        command = command_of(case, name if name in QUESTIONS else "")
+        title = f"{report.arm.name}: {QUESTIONS[name]}" if name in QUESTIONS else report.arm.name
+        command = command_of(report, name if name in QUESTIONS else "")
         page = render("arm.html", title=title, sections=own[name], here=f"{name}.html", command=command, **shared)
         write_text(folder / f"{name}.html", page)
 
