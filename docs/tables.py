@@ -8,6 +8,7 @@ A function returns lines of Markdown.  No number is typed here: all come from th
 
 import ast
 import json
+import re
 import tomllib
 from collections import defaultdict
 from collections.abc import Callable, Iterable
@@ -178,7 +179,7 @@ def rooms() -> list[str]:
     """The rooms of the package, from the highest to the lowest, each with the first line of its docstring."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
     layers = "|".join(settings["contracts"][0]["layers"]).replace("(", "").replace(")", "")
-    names = [name.strip() for name in layers.split("|") if "__main__" not in name]
+    names = [name.strip() for name in re.split("[|:]", layers) if "__main__" not in name]
     return markdown_table(("room", "purpose"), ([f"`tfarm.{name}`", _purpose(name)] for name in names))
 
 

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
     from tfarm.exact.outputs import Output
     from tfarm.exported import export
+    from tfarm.face import CaseFace as Case
     from tfarm.fitting.data import Measured, read_measured
     from tfarm.fitting.fit import fit
     from tfarm.fitting.overlay import overlay
@@ -60,6 +61,7 @@ __version__ = "1.0.0"
 __all__ = [
     "Arm",
     "Attachment",
+    "Case",
     "CertificationError",
     "ConvergenceError",
     "Gauge",
@@ -106,6 +108,7 @@ __all__ = [
 ]
 
 _ROOMS = {  # the module of a name; after a colon another name there
+    "Case": "face:CaseFace",
     "bode": "response",
     "design": "synthesis.design",
     "locus": "loop.locus",

@@ -350,11 +350,15 @@ def as_law(law: AnyLaw) -> Law:
 
 
 def full_law(law: AnyLaw) -> Law:
-    """Return a Law; for gains at the hub with all of their signals, also those with a gain of 0."""
-    gains = as_law(law).gains
-    if gains is None:
-        return as_law(law)
-    return Law({gain.output: gains[gain.name] for gain in GAINS}, name="gains at the hub", references=AT_HUB)
+    """Return a Law; for gains at the hub with a part for each of the three, also for 0.
+
+    Where each of its signals follows a reference the three of them do.
+    """
+    law = as_law(law)
+    if law.gains is None:
+        return law
+    references = AT_HUB if set(law.signals) <= set(law.references) else law.references
+    return Law({gain.output: law.gains[gain.name] for gain in GAINS}, name="gains at the hub", references=references)
 
 
 def of_common_blocks(law: Law) -> Law:

@@ -1,0 +1,88 @@
+"""The case: an arm under a controller, sampled by a chain.  Whatever asks a loop takes one.
+
+    y = G(s) u,    u = -sum over signals of C_i(s) (y_i - r_i),    sampled every T
+
+The controller is normalised here, once.  Gains at the hub, each on the error of its signal, are a part for each gain
+that is not 0 (`Law.of_gains`); any other controller is as it was given.  In the loop gains at the hub have a part for
+each of the three, also for 0 (`feedback`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import cast
+
+from tfarm.arm.chain import Chain, chain_or_usual
+from tfarm.arm.feedback import HubFeedback
+from tfarm.arm.law import AnyLaw, Law, as_law, full_law
+from tfarm.arm.records import Arm, must_be_arm
+from tfarm.exact.system import System
+from tfarm.records import record
+from tfarm.response.signals import Signals
+from tfarm.spectrum import Modes, modes
+
+
+@dataclass(frozen=True)
+@record
+class Case:
+    """An arm with the input of its controller, the controller in its normal form, and the chain between both.
+
+    `law` may be given as gains at the hub; a `chain` of 10 ms with ideal converters is taken unless one is given.
+    Raises ParameterError for what is no arm, no controller or no chain.
+    """
+
+    arm: Arm
+    law: Law
+    chain: Chain = field(default=cast("Chain", None))
+
+    def __post_init__(self) -> None:
+        must_be_arm(self.arm)
+        law = as_law(self.law)
+        if law.input not in (None, self.arm.input):
+            # the record refuses an input that the arm has no motor for
+            object.__setattr__(self, "arm", replace(self.arm, input=law.input))  # type: ignore[arg-type]
+        gains = law.gains if set(law.signals) <= set(law.references) else None
+        object.__setattr__(self, "law", law if gains is None else Law.of_gains(gains))
+        object.__setattr__(self, "chain", chain_or_usual(self.chain))
+
+    @property
+    def gains(self) -> HubFeedback | None:
+        """The controller as gains at the hub; None of any other."""
+        return self.law.gains
+
+    @cached_property
+    def feedback(self) -> Law:
+        """The controller in the loop: of gains at the hub a part for each, also for 0."""
+        return full_law(self.law)
+
+    @cached_property
+    def signals(self) -> Signals:
+        """The outputs that are fed back."""
+        return Signals(self.arm, self.feedback.signals)
+
+    @property
+    def system(self) -> System:
+        """The exact system of the arm."""
+        return self.signals.system
+
+    @cached_property
+    def spectrum(self) -> Modes:
+        """The first ten modes of the arm without controller."""
+        return modes(self.arm, 10)
+
+    def having(self, name: str, value: float) -> Case:
+        """Return the case with another value of one number of the controller, by its name in `Law.having`."""
+        return replace(self, law=self.law.having(name, value))
+
+    def under(self, law: AnyLaw) -> Case:
+        """Return the case with another controller."""
+        return Case(self.arm, as_law(law), self.chain)
+
+    def on(self, arm: Arm) -> Case:
+        """Return the case with another arm."""
+        return replace(self, arm=arm)
+
+    def through(self, chain: Chain) -> Case:
+        """Return the case with another chain."""
+        return replace(self, chain=chain)
