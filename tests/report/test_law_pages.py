@@ -12,7 +12,7 @@ import pytest
 
 import tfarm
 from tests.hostile import check_page
-from tests.report.written import blocks_of, plain_cards, values_of
+from tests.report.written import blocks_of, values_of
 from tests.shared import sized
 from tests.shell import answer, run
 from tfarm import HubFeedback, Law, ParameterError
@@ -27,7 +27,7 @@ from tfarm.report import writing
 from tfarm.report.loop_section import law_section, margins_section
 from tfarm.report.page import ArmReport, GivenLaw, file_of
 from tfarm.report.sampled_section import sampled_section, step_rows
-from tfarm.report.writing import PIECES, pieces_of
+from tfarm.report.writing import pieces_of
 from tfarm.schema import to_json
 
 LAB, BARE, PRESET = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "quanser-2dsfl"))
@@ -95,9 +95,7 @@ def test_the_loop_function_of_an_unstable_loop_has_no_margins(given):
 # ------------------------------------------------------------ pages
 
 
-def test_a_page_is_about_its_law_and_its_file_repeats_it(file, tmp_path, monkeypatch, capsys):
-    plain_cards(monkeypatch.setattr)
-    monkeypatch.setattr("tfarm.report.writing.PIECES", [piece for piece in PIECES if piece.anchor == "law"])
+def test_a_page_is_about_its_law_and_its_file_repeats_it(file, tmp_path, capsys):
     code, out, err = run(
         capsys, "report", LAB.name, "--law", str(file), "--period", "0.004", "--only", "law", "--out", str(tmp_path)
     )
@@ -252,10 +250,7 @@ FILE = "tests/data/sweep/tip.csv"
 GIVEN = f"tip_acceleration/hub_torque={FILE}"
 
 
-def test_the_page_has_the_command_that_makes_it(tmp_path, capsys, monkeypatch):
-    for kept in ("save_proof", "save_card"):  # which have their own tests
-        monkeypatch.setattr(writing, kept, lambda *_: None)
-    monkeypatch.setattr("tfarm.report.writing.PIECES", [each for each in PIECES if each.name == "measured responses"])
+def test_the_page_has_the_command_that_makes_it(tmp_path, capsys):
     given = ("report", "sasaki2012-lab", "--only", "bode", "--measured", GIVEN, "--out", str(tmp_path))
     code, out, _ = run(capsys, *given)
     assert code == 0

@@ -9,7 +9,7 @@ from matplotlib.contour import QuadContourSet
 
 import tfarm
 from tests.plots.labels import complaints
-from tests.report.written import coarsen, plain_cards
+from tests.report.written import coarsen
 from tfarm.arm import Hub, HubFeedback
 from tfarm.arm.chain import Sampling
 from tfarm.assessment import stability_map
@@ -20,7 +20,7 @@ from tfarm.loop.loci import loci
 from tfarm.loop.loop import band_of
 from tfarm.loop.nyquist import nyquist
 from tfarm.loop.poles import closed_loop_poles
-from tfarm.report import write, writing
+from tfarm.report import write
 from tfarm.report.loop_section import (
     map_section,
     margin_table,
@@ -149,9 +149,7 @@ def test_every_pole_on_the_axis_is_passed_on_its_right():
 
 
 @pytest.mark.parametrize(("inertia", "reason"), [(math.inf, "locked"), (0.0, "no inertia")])
-def test_an_arm_without_a_loop_gets_a_sentence(tmp_path, monkeypatch, inertia, reason):
-    monkeypatch.setattr(writing, "save_proof", lambda *_: None)
-    plain_cards(monkeypatch.setattr)
+def test_an_arm_without_a_loop_gets_a_sentence(tmp_path, inertia, reason):
     arm = replace(PURE, name="held", hub=Hub(inertia=inertia))
     assert not has_loop(arm)
     page = write([arm], tmp_path, only=("margins",)).read_text()

@@ -11,6 +11,7 @@ import pytest
 import tfarm
 from tests.odd_arms import odd_arms
 from tests.report import plausible
+from tests.report.written import blocks_of
 from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.arm import implausible
@@ -21,14 +22,13 @@ from tfarm.loop.locus import locus
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.report import loop_section
-from tfarm.report import page as cases
 from tfarm.report.arm_section import arm_section, assumptions_section, derived_table
 from tfarm.report.loop_section import (
     locus_section,
     margin_table,
     margins_section,
 )
-from tfarm.report.page import ArmReport, has_loop, on_hub, prose
+from tfarm.report.page import ArmReport, GivenLaw, has_loop, on_hub, prose, sign_words
 from tfarm.report.response_sections import bode_section, damped_tables, modal_table
 from tfarm.report.writing import pieces_of
 from tfarm.spectrum import DampedModes
@@ -151,15 +151,13 @@ def test_the_interval_of_K2_is_that_of_the_poles(name):
 
 
 @pytest.mark.parametrize("name", LOOPS)
-def test_sentences_about_the_pole_at_0_and_J_are_for_arms_that_turn_freely(name, monkeypatch):
-    monkeypatch.setattr(cases, "best", lambda arm, chain: None)
-    section = margins_section(ArmReport(ARMS[name], Chain()))
-    (windows,) = (block for block in section.blocks if block.stem == "default-windows")
-    (margins,) = (block for block in section.blocks if block.stem == "margins")
+def test_sentences_about_the_pole_at_0_and_J_are_for_arms_that_turn_freely(name):
+    arm = ARMS[name]
+    section = margins_section(ArmReport(arm, Chain(), (GivenLaw(default_gains(arm)),)))
+    windows, margins = (blocks_of(section)[stem] for stem in ("law-windows", "margins"))
     shown = [cell for each in margins.columns for cell in each.cells]
-    words = " ".join([*section.words, *shown, windows.caption, cases.sign_words(ARMS[name])])
-    turns = ARMS[name].has_rigid_mode
-    assert ("free hub angle" in words) == ("(J - I_h)/J" in words) == turns
+    words = " ".join([*section.words, *shown, windows.caption, sign_words(arm)])
+    assert ("free hub angle" in words) == ("(J - I_h)/J" in words) == arm.has_rigid_mode
     for interval, searched in zip(*(column(windows, key).values for key in ("interval", "search_range")), strict=True):
         for side, end in zip(("low", "high"), searched, strict=True):
             assert interval is None or (interval[f"{side}_is"] == "search bound") == (interval[side] == end)
@@ -183,7 +181,7 @@ def test_branches_that_cannot_be_followed_are_left_out_with_a_word(monkeypatch):
     assert [block.stem for block in section.blocks][:3] == stems
 
 
-def test_a_free_pin_has_its_rate_loop(monkeypatch):
+def test_a_free_pin_has_its_rate_loop():
     """K1 at K2 = 0: verdict, windows and locus; no K2, and the gauge as it is."""
     arm = ARMS["free-pin"]
     assert "−u/(1 + C s)" in prose("no_loop", arm=arm)
@@ -198,8 +196,7 @@ def test_a_free_pin_has_its_rate_loop(monkeypatch):
     assert names == ["stability margins", "Nyquist plot", "root loci"]
 
 
-def test_a_margin_without_end_has_no_frequency(monkeypatch):
-    monkeypatch.setattr(cases, "best", lambda arm, chain: None)
+def test_a_margin_without_end_has_no_frequency():
     named = on_hub(ARMS["pinned"], HubFeedback(K1=5.0338, K2=-3.0), "default gains", "default")
     found = margins_of(ARMS["pinned"], named.law)
     table = margin_table([(named, found)])

@@ -45,15 +45,13 @@ def windows(arm, gains=GAINS):
 # ------------------------------------------------------------ the overlay
 
 
-def test_the_picture_of_a_rig_is_as_high_as_its_own_gains(monkeypatch):
+def test_the_picture_of_a_rig_is_as_high_as_its_own_gains():
     """Driven by its motor's current, K2 balances a torque at 0.112 A/(N m), and not at 1."""
-    monkeypatch.setattr("tfarm.loop.regions.OVERLAY_COLUMNS", 6)
-    monkeypatch.setattr("tfarm.loop.regions.LITTLE_DAMPINGS", ())
     rig = tfarm.load("quanser-2dsfl")
     data = stable_regions(rig, default_gains(rig), Chain())
     low, high = overlay.figure(*data).axes[0].get_ylim()
     assert 0.112 < high < 0.2
-    (sampled,) = data.sampled
+    *_, sampled = data.sampled
     ((bottom, top),) = sampled.stable_intervals[0]
     assert top - bottom > 0.4 * (high - low)
     assert low < bottom < top < high
@@ -72,9 +70,7 @@ def test_the_map_of_both_regions_is_that_of_the_poles():
             assert inside == [stability(LAB, law).is_stable, loop.having(K1=K1, K2=float(K2)).poles.is_stable]
 
 
-def test_without_damping_the_layers_are_nested_and_name_their_number_of_modes(monkeypatch):
-    monkeypatch.setattr("tfarm.loop.regions.OVERLAY_COLUMNS", 8)
-    monkeypatch.setattr("tfarm.loop.circle_crossings.MOST_COLUMNS", 0)
+def test_without_damping_the_layers_are_nested_and_name_their_number_of_modes():
     data = stable_regions(PAPER, GAINS, Chain())
     assert [layer.loop.plant.arm.damping for layer in data.sampled] == [1e-4, 1e-6, 0.0]
     assert data.sampled[-1].modes_used == 20
@@ -185,9 +181,7 @@ def test_a_loop_that_diverges_has_no_film():
 # ------------------------------------------------------------ bytes and odd arms
 
 
-def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
-    monkeypatch.setattr("tfarm.loop.regions.OVERLAY_COLUMNS", 8)
-    monkeypatch.setattr("tfarm.loop.circle_crossings.MOST_COLUMNS", 0)
+def test_a_held_tip_has_a_map_but_no_slew():
     section = sampled_section(ArmReport(replace(LAB, payload=tfarm.Payload(mass=math.inf)), Chain()))
     assert "no slew" in section.words[-1]
     assert "sampled-overlay" in blocks_of(section)

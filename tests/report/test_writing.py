@@ -9,7 +9,6 @@ import sys
 import time
 from collections import defaultdict
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from urllib.parse import unquote
@@ -28,7 +27,6 @@ from tests.report.written import (
     files_of,
     ids_of,
     links_of,
-    plain_cards,
     validated,
 )
 from tfarm.assessment.card import Graded, LoopCard
@@ -39,7 +37,6 @@ from tfarm.report import overview, write, writing
 from tfarm.report.arm_section import arm_section
 from tfarm.report.overview import Card, results, save_card
 from tfarm.report.page import TEMPLATES, ArmReport, GivenLaw, best, explained, prose, sheet, templates
-from tfarm.report.response_sections import bode_section
 from tfarm.report.trust import write_trust, written_proofs
 from tfarm.report.writing import PIECES, QUESTIONS, index_page, kept, make_section, navigation, pieces_of
 from tfarm.schema import Column, quantities, to_dict
@@ -56,7 +53,7 @@ def test_another_process_with_other_hashes_writes_the_same_bytes(pages, audit_ro
     case = ArmReport(ARM, Chain())
     for piece in pieces_of(case):
         if piece.anchor in ("margins-map", "bode-root-moment", "margins", "margins-nyquist"):
-            writing.make_section(piece.name, piece.anchor, piece.make, case, made)
+            make_section(piece, case, made)
     there = files_of(pages / NAME)
     pictures = ("map", "bode-root-moment", "default-nyquist")
     assert {f"pictures/{picture}.svg" for picture in pictures} <= set(files_of(made))
@@ -252,10 +249,8 @@ def test_without_the_page_of_words_none_is_linked():
 
 def test_a_page_has_a_narrow_picture_for_a_phone(tmp_path):
     """As wide as a screen of 400 pixels less its margins, the other half a page; both of the size that is stated."""
-    make = partial(bode_section, output="root_moment")
-    section = make_section(
-        "response", "bode-root-moment", make, ArmReport(tfarm.load("sasaki2012-lab"), Chain()), tmp_path
-    )
+    piece = next(piece for piece in PIECES if piece.anchor == "bode-root-moment")
+    section = make_section(piece, ArmReport(tfarm.load("sasaki2012-lab"), Chain()), tmp_path)
     source, image = re.findall(r"<(?:source|img) ([^>]*)>", section.blocks[0].html)
     assert 'media="(max-width: 40rem)" srcset="pictures/bode-root-moment-narrow.svg"' in source
     for tag, end, least, most in ((source, "-narrow", 360, 370), (image, "", 590, 600)):
@@ -318,16 +313,18 @@ def test_every_cell_of_a_narrow_page_has_its_title(pages):
     assert not re.search(r"<th[^>]*></th>", text)  # no heading without words
 
 
-def test_the_pages_of_an_arm_lead_to_each_other(tmp_path, monkeypatch):
-    piece = next(piece for piece in PIECES if piece.name == "the arm")
-    monkeypatch.setattr("tfarm.report.writing.PIECES", (piece,))
-    monkeypatch.setattr(writing, "save_proof", lambda *_: None)
-    plain_cards(monkeypatch.setattr)
-    write([replace(ARM, name="plain")], tmp_path, only=("modes", "bode"))
-    assert "bode.html" in Links(tmp_path / "plain" / "modes.html").targets
-    assert "modes.html" in Links(tmp_path / "plain" / "bode.html").targets
-    write([replace(ARM, name="plain")], tmp_path, only=("locus",))
-    assert {"bode.html", "modes.html"} <= set(Links(tmp_path / "plain" / "locus.html").targets)
+def test_the_pages_of_an_arm_lead_to_each_other(tmp_path):
+    """To those that are written later too; and an arm that cannot turn nor move its tip is reported on."""
+    held = replace(HELD, name="held", payload=tfarm.Payload(mass=math.inf, inertia=0.1), assumptions=())
+    page = write([held], tmp_path, only=("bode",))
+    assert page == tmp_path / "held" / "bode.html"
+    text = page.read_text(encoding="utf-8")
+    assert "From hub angle to root moment" in text
+    assert "is zero at every frequency" in text
+    assert "states no assumptions" in arm_section(ArmReport(held, Chain())).words[0]
+    write([held], tmp_path, only=("modes", "assumptions"))
+    assert {"bode.html", "assumptions.html"} <= set(Links(tmp_path / "held" / "modes.html").targets)
+    assert {"bode.html", "modes.html"} <= set(Links(tmp_path / "held" / "assumptions.html").targets)
 
 
 def test_the_index_has_a_row_a_loop(pages):
@@ -345,24 +342,7 @@ def test_the_index_has_a_row_a_loop(pages):
         assert f"{omega:.6g}" in rows[0][2]
 
 
-# ------------------------------------------------------------ odd arms, the README
-
-
-def test_an_arm_that_cannot_turn_nor_move_its_tip_is_reported_on_too(tmp_path, monkeypatch):
-    plain_cards(monkeypatch.setattr)
-    arm = replace(
-        ARM,
-        name="held",
-        hub=tfarm.Hub(inertia=math.inf),
-        payload=tfarm.Payload(mass=math.inf, inertia=0.1),
-        assumptions=(),
-    )
-    page = write([arm], tmp_path, only=("bode",))
-    assert page == tmp_path / "held" / "bode.html"
-    text = page.read_text(encoding="utf-8")
-    assert "From hub angle to root moment" in text
-    assert "is zero at every frequency" in text
-    assert "states no assumptions" in arm_section(ArmReport(arm, Chain())).words[0]
+# ------------------------------------------------------------ the README, processes
 
 
 def test_the_pictures_of_the_readme(tmp_path, monkeypatch):

@@ -276,7 +276,8 @@ def sampled_numbers(loop: Sampled) -> Numbers:
 
 def law_in_page(loop: Sampled, names: Sequence[str]) -> Numbers:
     """Return the sampled loop of a law: `columns` are its parts by name, in delta = z - 1; `ones` poles at z = 1."""
-    plant, in_z = loop.pulse.plant, loop.in_z
+    plant = loop.pulse.plant
+    in_z = loop.in_z
     orders = _orders(plant)
     return {
         **_sampling(loop.chain),
@@ -292,7 +293,8 @@ def law_in_page(loop: Sampled, names: Sequence[str]) -> Numbers:
 
 def _sampling(chain: Chain) -> Numbers:
     """Return the period [s], the delay in samples, and how the hub rate is had: `smoothing` is its filter's pole."""
-    T, of = chain.sampling.period, chain.converters
+    T = chain.sampling.period
+    of = chain.converters
     return {
         "period": T,
         "delay": chain.sampling.whole_delay,

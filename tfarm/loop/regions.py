@@ -24,7 +24,6 @@ from tfarm.spectrum.table import default_gains
 K2_RANGE = (-1.0, 1.5)  # of the gain that balances a torque: 1 where the input is one, less for a motor's current
 CUT_RANGE = (-1.02, 1.52)  # of the same: where intervals are cut, just outside the picture: no cut is seen as an edge
 OVERLAY_COLUMNS = 72  # values of the gain across, and either side of upright edges
-LITTLE_DAMPINGS = (1e-4, 1e-6)  # s: drawn too at C = 0
 SAMPLED_COLUMNS = 120  # values of the gain across at which the sampled region is cut, besides its exact ends
 BEYOND_PICTURE = 0.1  # of the gain up the plane, beyond the picture: an edge there is none of the region
 
@@ -51,7 +50,8 @@ class StableRegions(NamedTuple):
 
 def stable_regions(arm: Arm, gains: HubFeedback, chain: Chain) -> StableRegions:
     """Return the regions around these gains.  Raises ParameterError where the arm has no loop."""
-    dampings = (arm.damping,) if arm.damping else (*LITTLE_DAMPINGS, 0.0)
+    # at C = 0 with a little damping too
+    dampings = (arm.damping,) if arm.damping else (1e-4, 1e-6, 0.0)
     loops = [sampled_verdict(arm.having(damping=C), gains, chain).full for C in dampings]
     ends = np.unique(np.concatenate([ends_of_K1(loop) for loop in loops]))
     ends = ends[ends > 0]

@@ -39,7 +39,9 @@ from .style import (
 RAD_PER_CYCLE = 2 * np.pi  # rad/s of 1 Hz
 NUMBER_STRIP = 0.085  # height of the strip of mode numbers above the magnitude, as a share of its axes: a line of them
 TICKS_A_DECADE = (1.0, 2.0, 5.0)  # where a measurement covers few of them
-FREQUENCY, FREQUENCY_HZ, PHASE = "angular frequency [rad/s]", "frequency [Hz]", "phase [deg]"
+FREQUENCY = "angular frequency [rad/s]"
+FREQUENCY_HZ = "frequency [Hz]"
+PHASE = "phase [deg]"
 POINTS: dict[str, Any] = {"ls": "none", "marker": ".", "ms": 3.5, "color": ORANGE, "zorder": 3}
 EXACT = "flexible arm, exact"
 Drawn = tuple[Real, Complex, dict[str, Any]]  # a curve over x: its values and looks
@@ -73,7 +75,8 @@ def draw_magnitude(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
     each = by_name(data, EXACT)
     first = next(iter(each.values()))
     limits = np.array([magnitude_limits(one) for one in each.values()])
-    low, high = float(limits[:, 0].min()), float(limits[:, 1].max())
+    low = float(limits[:, 0].min())
+    high = float(limits[:, 1].max())
     label = f"|{first.label} / {first.input_label}|\nmagnitude [dB re 1 {first.gain_unit}]".replace("1 −", "1")
     over_frequency(ax, label, 1.0 + NUMBER_STRIP)
     ax.set(xlim=first.band, ylim=(low, high))
@@ -129,8 +132,10 @@ def parted(angle: Real, other: Real) -> tuple[Real, Real]:
 def broken(x: Real, y: Real, at: Real, limit: Real) -> tuple[Real, Real]:
     """The curve broken at each of the places, where it runs to its `limit` from both sides (nan: it just ends)."""
     order = np.argsort(at)
-    at, limit = at[order], limit[order]
-    where, gap = np.repeat(np.searchsorted(x, at), 3), np.full(at.size, np.nan)
+    at = at[order]
+    limit = limit[order]
+    where = np.repeat(np.searchsorted(x, at), 3)
+    gap = np.full(at.size, np.nan)
     return np.insert(x, where, np.c_[at, gap, at].ravel()), np.insert(y, where, np.c_[limit, gap, limit].ravel())
 
 
@@ -171,7 +176,8 @@ def _over_measured(one: Measured, curves: Sequence[Drawn], upper: Axes, lower: A
 
     An infinite peak of a curve leaves the picture.
     """
-    hertz, size = one.omega / RAD_PER_CYCLE, abs(one.values)
+    hertz = one.omega / RAD_PER_CYCLE
+    size = abs(one.values)
     upper.plot(hertz, size, label="measured", **POINTS)
     lower.plot(hertz, np.degrees(np.angle(one.values)), **POINTS)
     draw_curves([(omega / RAD_PER_CYCLE, values, looks) for omega, values, looks in curves], np.abs, upper, lower)
@@ -242,7 +248,9 @@ def measured(data: Overlay, *, ax: Sequence[Axes]) -> None:
     their measured frequencies, and measured peaks far from every pole.
     """
     upper, middle, lower = ax
-    one, hertz, size = data.measured, data.measured.omega / RAD_PER_CYCLE, abs(data.measured.values)
+    one = data.measured
+    hertz = data.measured.omega / RAD_PER_CYCLE
+    size = abs(data.measured.values)
     _over_measured(one, [(data.omega, data.curve, {"color": BLUE, "label": "exact"})], upper, middle)
     paired = [(abs(row.pole) / RAD_PER_CYCLE, row.frequency_ratio) for row in data.modes]
     upper.set_ylabel(f"magnitude [{data.ratio.unit}]")

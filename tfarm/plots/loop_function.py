@@ -22,17 +22,25 @@ from tfarm.loop.nyquist import Nyquist, compressed
 from .frequency import FREQUENCY, Drawn, draw_curves, over_frequency, parted
 from .style import BLUE, FAINT, GREY, INK, UNSTABLE, Axes, arrows, gains_words, note, picture, safe
 
-HIGHEST, LOWEST = 60.0, -80.0  # dB of L that are drawn: so that the part near 0 dB shows
+# dB of L that are drawn: so that the part near 0 dB shows
+HIGHEST = 60.0
+LOWEST = -80.0
 USUAL_PEAK = 2.0  # Ms that is usual at most
 CLOSED_LOOP = (-20.0, -12.0, -6.0, -3.0, -1.0, 0.25, 0.5, 1.0, 3.0, 6.0)  # dB: |T| of the contours of a Nichols chart
 CONTOURS = ", ".join(f"{size:g}" for size in CLOSED_LOOP if size > 0) + " dB, the larger the nearer to −1"
 AROUND: Complex = np.exp(1j * math.pi * np.linspace(-1, 1, 721) ** 3)  # a circle, dense at 1, where T/(1 - T) is steep
-MOST_LINEAR, LEAST_LINEAR = 20.0, 2.2  # |L| at the edge of a linear Nyquist plot: at least as far as the zoom
+# |L| at the edge of a linear Nyquist plot: at least as far as the zoom
+MOST_LINEAR = 20.0
+LEAST_LINEAR = 2.2
 ZOOM = (-2.2, 0.4, -1.3, 1.3)  # of L around -1: Re from and to, Im from and to
 RING_SIZES = (0.2, 0.5, 1.0, 2.0, 5.0, math.inf)  # |L| of the rings
-ARC_RADIUS, REACH = 1.04, 1.35  # of the first arc at infinity, and of the picture
+# of the first arc at infinity, and of the picture
+ARC_RADIUS = 1.04
+REACH = 1.35
 ARCS_ALIKE = math.radians(20.0)  # arcs whose ends are as near as that turn alike
-GAIN, PHASE_MARGIN = "o", "D"  # marks of margins
+# marks of margins
+GAIN = "o"
+PHASE_MARGIN = "D"
 DIGITS = 4  # of a margin, as on a card
 Looks = dict[str, Any]
 
@@ -109,7 +117,8 @@ def loop(found: Margins | LoopCurve, *, ax: Sequence[Axes]) -> None:
                 w, sizes = np.reshape(crossed, (-1, 2)).T
                 upper.plot(w, decibels(sizes), marker, ms=3.0, color=GREY, label=label)
             for omega, L, label, marker in decisive(each.margins):
-                size, angle = float(decibels(abs(L))), math.degrees(float(np.angle(L)))
+                size = float(decibels(abs(L)))
+                angle = math.degrees(float(np.angle(L)))
                 upper.plot([omega], [size], **_marked(each, label, marker))
                 lower.plot([omega], [angle], **_marked(each, label, marker))
                 place, ends = (upper, (size, 0)) if marker == GAIN else (lower, (math.copysign(180, angle), angle))

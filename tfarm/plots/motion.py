@@ -47,11 +47,14 @@ from .style import (
 )
 
 SHAPE_POINTS = 401  # of a drawn mode: about one to a pixel of its picture
-ALONG, DISPLACEMENT = "distance from the hub, x [m]", "displacement w(x), largest = 1 [−]"
+ALONG = "distance from the hub, x [m]"
+DISPLACEMENT = "displacement w(x), largest = 1 [−]"
 HUB_WIDTH = 0.06  # width of the drawn hub, as a share of the length
 TIME = "time [s]"
 RUNS = ("#a3a3a3", INK, "#0b7f93", "#8a6d3b")  # several simulations, without feedback first: no colours of stability
-DASHED, DOTTED, LONG_DASHED = (0, (4, 3)), (0, (1, 2)), (0, (5, 3))
+DASHED = (0, (4, 3))
+DOTTED = (0, (1, 2))
+LONG_DASHED = (0, (5, 3))
 OF_STABILITY = {"stable": (STABLE, "o"), "marginal": (MARGINAL, "s"), "unstable": (UNSTABLE, "x")}  # colour, mark
 HATCH = "/////"
 LEAST_RISE = 1 / 3000  # of the height of a curve: rise from point to point that counts
@@ -92,7 +95,8 @@ def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
     Displacement along the arm [m], largest 1, with the places of the nodes [m].  Of more modes than axes the first are
     drawn.
     """
-    payload, length = found.arm.payload, found.arm.length
+    payload = found.arm.payload
+    length = found.arm.length
     for one, (number, w) in zip(ax, scaled(found, len(ax)).items(), strict=False):
         row = int(np.flatnonzero(found.index == number)[0])
         one.axhline(0.0, color=GREY, lw=0.8)
@@ -165,7 +169,8 @@ def sketch(arm: Arm, *, ax: Axes) -> None:
 
 def _numbers(arm: Arm) -> Iterator[str]:
     """Hub, link and payload in numbers, a line each."""
-    payload, inertia = arm.payload, unit("kg m^2")
+    payload = arm.payload
+    inertia = unit("kg m^2")
     free = f"hub  $I_h$ = {plain(arm.hub.inertia, 6)} {inertia}" if arm.hub.inertia else "free pin, no hub inertia"
     hub = "hub locked: driven by its angle" if arm.is_locked else free
     yield hub + (f",  r = {plain(arm.hub.radius, 6)} m" if arm.hub.radius else "")
@@ -218,7 +223,8 @@ def slew(arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "", 
 
 def _draw_curve(curve: traces.TimeCurve, ax: Axes, colour: str, *, scale: float = 1.0, **looks: Any) -> None:
     """The line, or the band."""
-    low, high = scale * curve.low, scale * curve.high
+    low = scale * curve.low
+    high = scale * curve.high
     if curve.is_band:
         is_dashed = looks.get("ls") == DASHED  # of a sampled loop: its band is hatched
         own = {"fc": "none", "ec": colour, "hatch": HATCH} if is_dashed else {"color": colour, "alpha": 0.55}
@@ -229,7 +235,8 @@ def _draw_curve(curve: traces.TimeCurve, ax: Axes, colour: str, *, scale: float 
 
 def _draw_signal(ax: Axes, t: Real, y: Real, looks: tuple[str, str], every: int = 0, **how: Any) -> None:
     """A signal at even times; with `every` that of a sampled loop, with marks at the samples where these are few."""
-    (colour, mark), step = looks, math.ceil(t.size / traces.MOST_LINE)
+    (colour, mark) = looks
+    step = math.ceil(t.size / traces.MOST_LINE)
     rises = np.diff(y)[abs(np.diff(y)) > LEAST_RISE * np.ptp(y)]
     if np.count_nonzero(np.diff(np.signbit(rises))) > MOST_TURNS:
         step = 1  # for a band
@@ -260,7 +267,8 @@ def step(found: Step, *, ax: Sequence[Axes]) -> None:
         for of in (loop.hub, loop.tip, loop.root_moment, loop.torque)
         if of
     ]
-    t, every = found.t[found.t <= max(settled, default=math.inf)], round(found.period / found.t[1])
+    t = found.t[found.t <= max(settled, default=math.inf)]
+    every = round(found.period / found.t[1])
     for one, name, label in zip(ax, found.names, labels, strict=True):
         one.axhline(0.0, color=GREY, lw=0.6)
         one.set(xlabel=TIME, ylabel=label, xlim=(0.0, t[-1]))
@@ -269,11 +277,14 @@ def step(found: Step, *, ax: Sequence[Axes]) -> None:
             one.axhspan(*ends, color=FAINT, lw=0, alpha=0.6, zorder=0)
             one.plot(t, reference[: t.size], color=GREY, lw=0.8, label=f"reference, {text(found.settling_band)}")
         for loop, each in found.loops.items():
-            y, looks, key = each.signals[name][: t.size], OF_STABILITY[each.stability], f"{loop}, {each.stability}"
+            y = each.signals[name][: t.size]
+            looks = OF_STABILITY[each.stability]
+            key = f"{loop}, {each.stability}"
             _draw_signal(one, t[: y.size], y, looks, every if each is found.sampled else 0, label=key)
         stable = [each.signals[name] for each in found.loops.values() if each.hub]
         if stable and len(stable) < len(found.loops):
-            low, high = stable[0].min(), stable[0].max()
+            low = stable[0].min()
+            high = stable[0].max()
             one.set_ylim(low - OFF_FRAME * (high - low), high + OFF_FRAME * (high - low))
 
 
@@ -293,7 +304,8 @@ def draw_measured_runs(each: Mapping[str, RunComparison], *, ax: Sequence[Axes])
     """A column a controller: hub angle above, root moment below where it was measured."""
     axes = np.reshape(np.array(ax), (-1, len(each)))
     for column, (name, found) in zip(axes.T, each.items(), strict=True):
-        measured, run = found.measured, found.run
+        measured = found.measured
+        run = found.run
         column[0].plot(measured.t, np.degrees(measured.reference), color=GREY, lw=1.0, ls=DASHED, label="reference")
         for one, label in zip(column, ("hub angle [deg]", "root moment [N m]"), strict=False):
             one.set(title=safe(name), xlim=(0.0, float(measured.t[-1])), ylabel=label)
@@ -315,7 +327,8 @@ def draw_measured_runs(each: Mapping[str, RunComparison], *, ax: Sequence[Axes])
 )  # fmt: skip
 def tuned_gain(found: Tuning, *, ax: Axes) -> None:
     """A tuned gain over time (from `tfarm.tune`) in its guard, in the axes given or new ones; the axes."""
-    guard, result = found.training.guard, found.training.result
+    guard = found.training.guard
+    result = found.training.result
     ax.axhspan(guard.lo, guard.hi, color=REGIONS[0], lw=0, zorder=0.5, label="guard: proven for any K(t) in it")
     ax.step(result.t, result.K, where="post", color=INK, lw=1.4, label="the tuner's gain K(t)")
     best = found.best_constant.gain
@@ -336,7 +349,8 @@ def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap], *, 
     overlay(continuous, sampled, ax=left)
     left.set_title("", loc="right")
     left.lines[-1].remove()  # the mark of one controller: the bar is at its rate gain
-    guard, K = tuning.training.guard, tuning.training.result.K
+    guard = tuning.training.guard
+    K = tuning.training.result.K
     at, _ = tuning.trial.loop.gains.point
     for ends, colour, width, alpha in ((guard.lo, guard.hi), STABLE, 9, 0.75), ((K.min(), K.max()), INK, 2.4, None):
         left.plot([at, at], ends, solid_capstyle="butt", zorder=6, color=colour, lw=width, alpha=alpha)

@@ -52,7 +52,9 @@ from .style import (
 )
 
 SLATE = "#3d5468"  # of contours of damping: no colour of stability
-DASHED, DASH_DOTTED = (0, (5, 2.5)), (0, (6, 2, 1, 2))  # edges of a sampled loop, and of a second one
+# edges of a sampled loop, and of a second one
+DASHED = (0, (5, 2.5))
+DASH_DOTTED = (0, (6, 2, 1, 2))
 HATCHES = ("..", "\\\\\\\\", "////")  # of a sampled loop: with more damping, with less, with its own
 
 
@@ -285,7 +287,9 @@ def draw_stability_map(
     data: StabilityMap, laws: Sequence[MarkedLaw], bounds: Mapping[str, tuple[float, float]], *, ax: Axes
 ) -> None:
     """Draw count, boundary, damping, sampled region, Lyapunov's frame, laws and the bounds of their search."""
-    arm, x, y = data.arm, data.x, data.y
+    arm = data.arm
+    x = data.x
+    y = data.y
     ground(data.region, x, y, ax)
     contours(*data.coarse.axes, np.where(data.coarse.unstable == 0, data.damping, np.nan), ax)
     draw_boundary(data.region, data.edge, x, y, ax)

@@ -28,8 +28,13 @@ from .motion import OF_STABILITY
 from .style import BLUE, GREY, INK, Axes, number_label, picture, plain_ticks, safe
 
 BINS = 24  # at most, of a histogram
-ACROSS, MOST_QUANTITIES = 4, 12  # axes of distributions side by side, and in all
-MOST_NUMBERS, MOST_ROWS, MOST_MARKS = 4, 3, 1000  # of a scatter picture: axes, and arms
+# axes of distributions side by side, and in all
+ACROSS = 4
+MOST_QUANTITIES = 12
+# of a scatter picture: axes, and arms
+MOST_NUMBERS = 4
+MOST_ROWS = 3
+MOST_MARKS = 1000
 LINE = 24  # letters of a label of such small axes
 FIRST = ("gain_margin_db", "phase_margin_deg", "delay_margin_ms", "peak_sensitivity")  # where there are too many
 LOOKS: dict[str, dict[str, Any]] = {
@@ -73,12 +78,14 @@ def study(found: Study, quantity: str | None = None, *, ax: Sequence[Axes]) -> N
     table = found.table()
     for one, each in zip(ax, distributions(found, quantity), strict=False):
         values = [table[of.name][np.isfinite(table[of.name])] for of in each]
-        low, high = min(of.least for of in each), max(of.largest for of in each)
+        low = min(of.least for of in each)
+        high = max(of.largest for of in each)
         room = 0.02 * (abs(high) or 1.0) if high - low <= 1e-9 * abs(high) else 0.0
         edges = np.linspace(low - room, high + room, min(BINS, 2 + math.isqrt(max(map(len, values)))))
         counts = [np.histogram(own, edges)[0] for own in values]
         for n, (of, own) in enumerate(zip(each, counts, strict=True)):
-            looks, height = LOOKS[loop_of(of.name)], np.max(counts) * (1.08 + 0.1 * n)
+            looks = LOOKS[loop_of(of.name)]
+            height = np.max(counts) * (1.08 + 0.1 * n)
             one.stairs(own, edges, **looks)
             one.plot(
                 [of.low, of.median, of.high], [height] * 3, "|-", ms=7, markevery=[1], color=looks["color"], lw=1.2
@@ -125,11 +132,13 @@ def study_scatter(found: Study, quantity: str | None = None, *, ax: Sequence[Axe
     A mark is an arm, in the colour of the stability of its loop; at the upper edge it has no limit, at the lower edge
     no value.  Of more than a thousand arms as many are drawn, even over the rows.
     """
-    (rows, keys), step = _shown(found, quantity), 1 + (found.done - 1) // MOST_MARKS
+    (rows, keys) = _shown(found, quantity)
+    step = 1 + (found.done - 1) // MOST_MARKS
     table = {name: values[::step] for name, values in found.table().items()}
     for of, line in zip(rows, np.reshape(np.array(ax, dtype=object), (len(rows), len(keys))), strict=True):
         y = table[of.name]
-        words, edge = table.get(stability_of(of.name), np.full(len(y), "arm")), np.where(np.isnan(y), 0.02, 0.98)
+        words = table.get(stability_of(of.name), np.full(len(y), "arm"))
+        edge = np.where(np.isnan(y), 0.02, 0.98)
         for key, one in zip(keys, line, strict=True):
             for word, (colour, mark) in MARKS.items():
                 for own, height, transform in (

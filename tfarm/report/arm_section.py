@@ -18,7 +18,8 @@ from tfarm.studies.cases import Candidates, has_hub_inertia, hub_study, section_
 
 def arm_section(report: ArmReport) -> PageSection:
     """The first part of every page: headline numbers, slips of units, the theory, and the parameters."""
-    arm, input = report.arm, input_words(report.arm)
+    arm = report.arm
+    input = input_words(report.arm)
     words = (
         prose("units", odd="; ".join(implausible(arm))), prose("rig", arm=arm, input=input),
         "" if arm.assumptions else "This arm states no assumptions.",
@@ -122,7 +123,8 @@ def derived_table(arm: Arm) -> Table:
 
 def assumptions_section(report: ArmReport) -> PageSection:
     """Frequencies over the sections and the hub inertias that could be chosen, with sensitivities."""
-    arm, found = report.arm, dict[str, Candidates]()
+    arm = report.arm
+    found: dict[str, Candidates] = {}
     if arm.is_uniform:
         found["assumptions_section"] = section_study(arm)
     if arm.is_uniform and has_hub_inertia(arm):

@@ -31,7 +31,9 @@ from tfarm.report.page import (
 )
 from tfarm.spectrum.table import default_gains
 
-LIVE_PAGE, ASSETS, SCRIPT = "live.html", "assets", "live.js"
+LIVE_PAGE = "live.html"
+ASSETS = "assets"
+SCRIPT = "live.js"
 SCRIPTS = "script-src 'self'"  # in the policy of a page, from the folder of its script
 MOST_PARTS = 4  # of a law: |L| beyond the frequency range is bounded at all 2^n corners of their ranges
 
@@ -55,8 +57,11 @@ def save_live(report: ArmReport, folder: Path) -> None:
 
     Where its numbers cannot be made the page has the reason.
     """
-    arm, chain, laws = report.arm, report.chain, report.laws
-    title, out = f"{arm.name}: live loop", folder / LIVE_PAGE
+    arm = report.arm
+    chain = report.chain
+    laws = report.laws
+    title = f"{arm.name}: live loop"
+    out = folder / LIVE_PAGE
     law = next((law for each in laws if has_sliders(law := as_law(each.law))), as_law(default_gains(arm)))
     arm, _ = arm_and_law(arm, law)
     try:

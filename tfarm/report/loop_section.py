@@ -158,7 +158,9 @@ def entries_of(each: Controller) -> Iterator[Entry]:
 
 def map_section(report: ArmReport) -> PageSection:
     """The stability regions of both gains, continuous and sampled."""
-    arm, data, designed = report.arm, stability_map(report.arm, report.chain), best(report.arm, report.chain)
+    arm = report.arm
+    data = stability_map(report.arm, report.chain)
+    designed = best(report.arm, report.chain)
     laws = []
     points = [default_gains(arm).point, *([] if designed is None else [designed.law.point])]
     for each, point in zip(report.in_s, points, strict=True):
@@ -192,7 +194,8 @@ def recommended_section(report: ArmReport) -> PageSection:
     if found is None:
         return PageSection(title=RECOMMENDED, answer=prose("no_best_gains", modes=DESIGNED_MODES))
     gains = ", ".join(found.law.gain_text(name, partial(significant, digits=4), report.arm) for name in PLANE)
-    answer, each = prose("best_gains", found=found, modes=DESIGNED_MODES, gains=gains), report.in_s[-1]
+    answer = prose("best_gains", found=found, modes=DESIGNED_MODES, gains=gains)
+    each = report.in_s[-1]
     card = results(result_card(each.arm, each.law, report.chain), each.title)
     title = (
         "Gains of best damping" if POOR in (each["grade"] for each in card[-1:]) else RECOMMENDED
@@ -205,7 +208,9 @@ def recommended_section(report: ArmReport) -> PageSection:
 
 def locus_section(report: ArmReport) -> PageSection:
     """Poles of the controllers; of an arm's own page root loci along each gain too."""
-    words, tables, of = list[str](), list[Table](), quantities(poles.Poles)["values"]
+    words: list[str] = []
+    tables: list[Table] = []
+    of = quantities(poles.Poles)["values"]
     for each in report.in_s:
         try:
             listed = poles.closed_loop_poles(each.arm, each.law)
@@ -215,7 +220,9 @@ def locus_section(report: ArmReport) -> PageSection:
             words.append(f"{upper(each.name)}: poles not determined, {error}.")
     if report.laws:
         return PageSection(title="Closed-loop poles", words=words, blocks=tables)
-    arm, gains, blocks = report.arm, default_gains(report.arm), list[Picture | Table]()
+    arm = report.arm
+    gains = default_gains(report.arm)
+    blocks: list[Picture | Table] = []
     ranges = {RATE_GAIN: (0.0, 2.0 * rate_unit(arm))}
     if has_loop(arm):
         ranges[MOMENT_GAIN] = RANGE_OF_K2[0] * arm.input_per_torque, RANGE_OF_K2[1] * arm.input_per_torque

@@ -50,11 +50,13 @@ class Card:
 def save_card(report: ArmReport, folder: Path) -> None:
     """pictures/card.svg and card.json; a picture that cannot be made is left out, as its section on the page is."""
     (folder / PICTURES).mkdir(exist_ok=True)
-    arm, picture = report.arm, ""
+    arm = report.arm
+    picture = ""
     with suppress(TfarmError):
         save_figure(draw_card.figure(bode(arm, "root_moment")), folder / PICTURES, "card", formats=("svg",))
         picture = "card.svg"
-    loops, notes = list[dict[str, Any]](), [] if report.has_loop else [prose("no_loop", arm=arm)]
+    loops: list[dict[str, Any]] = []
+    notes = [] if report.has_loop else [prose("no_loop", arm=arm)]
     for each in () if arm.is_locked else report.controllers:
         try:
             found = result_card(each.arm, each.law, report.chain)

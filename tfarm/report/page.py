@@ -55,7 +55,9 @@ from tfarm.spectrum.table import default_gains
 from tfarm.synthesis.design import Design, design
 
 TEMPLATES = Path(__file__).parent / "templates"
-PICTURES, DATA = "pictures", "data"  # folders in that of an arm
+# folders in that of an arm
+PICTURES = "pictures"
+DATA = "data"
 DRAWN_DIGITS = 7  # of the numbers of a picture in its file: a hundredth of the width of a line is four
 T = TypeVar("T")
 PART = "\ue000"  # between title and caption, which no name has in it

@@ -43,15 +43,19 @@ MORE_DELAY = (0.0, 0.5, 1.0)  # samples of further delay for which the verdict i
 VERDICT_COLUMNS = ("word", "spectral_radius", "time_constant", "slowest", "holds_for")
 WHOLE_LAW_COLUMNS = ("index", "natural_frequency", "band", "aliased", "first_order", "by_damping", "log_radius")
 MOST_SAMPLES = 10_000  # after a record in which an unstable loop may seem settled: a second of computing
-FILM_SLEWS, FILM_FRAMES = 1.5, 80  # length of a film in slews, and frames at most: a second of computing
+# length of a film in slews, and frames at most: a second of computing
+FILM_SLEWS = 1.5
+FILM_FRAMES = 80
 
 
 def sampled_section(report: ArmReport) -> PageSection:
     """The sampled loop of each controller; in time runs measured under the laws, else the slew."""
-    arm, chain = report.arm, report.chain
+    arm = report.arm
+    chain = report.chain
     found = [(each, sampled_of(each.arm, each.law, chain)) for each in report.controllers]
     first = found[0][1]
-    planes, along = list[Picture | Table](), list[Picture | Table]()
+    planes: list[Picture | Table] = []
+    along: list[Picture | Table] = []
     if not report.laws:
         planes = [overlay_picture(stable_regions(arm, first.loop.gains, chain), first)]
         along = [loci_picture(first)]
@@ -82,9 +86,11 @@ def sampled_section(report: ArmReport) -> PageSection:
 
 def interval_facts(found: Analysis) -> Iterator[Fact]:
     """The stability intervals of both gains of a sampled loop."""
-    period, modes = plain(1e3 * found.loop.chain.sampling.period), f" (first {found.verdict.modes_used} modes)"
+    period = plain(1e3 * found.loop.chain.sampling.period)
+    modes = f" (first {found.verdict.modes_used} modes)"
     for name in PLANE:
-        unit, shown = shown_unit(name, found.loop.plant.arm), text(list(found.shown[name]), 4) or "no value"
+        unit = shown_unit(name, found.loop.plant.arm)
+        shown = text(list(found.shown[name]), 4) or "no value"
         known = f"{name}, sampled, {period} ms{modes if modes in shown else ''}"
         yield Fact(known, shown.replace(modes, ""), unit)
 
@@ -101,7 +107,8 @@ def _stem(name: str, each: Controller) -> str:
 
 def delays_table(found: Sequence[tuple[Controller, Analysis]], chain: Chain) -> Table:
     """The verdict on each controller as it is, and with half a sample and a whole one of further delay."""
-    T, own = chain.sampling.period, chain.sampling.delay_samples
+    T = chain.sampling.period
+    own = chain.sampling.delay_samples
     late = {more: replace(chain, sampling=replace(chain.sampling, delay_samples=own + more)) for more in MORE_DELAY[1:]}
     rows = [
         (each.name, 1e3 * T * more, sampled_verdict(each.arm, each.law, late[more]) if more else it.verdict)
@@ -123,7 +130,8 @@ def delays_table(found: Sequence[tuple[Controller, Analysis]], chain: Chain) -> 
 
 def overlay_picture(both: StableRegions, found: Analysis) -> Picture:
     """Stability regions of the continuous and of the sampled loop in one plane, with the intervals of K2 below it."""
-    arm, gains = both.continuous.arm, found.loop.gains
+    arm = both.continuous.arm
+    gains = found.loop.gains
     rows = [row for row in margins_of(arm, as_law(gains)).stability_intervals if row.name == MOMENT_GAIN]
     return picture(
         "sampled_overlay",
@@ -140,7 +148,8 @@ def overlay_picture(both: StableRegions, found: Analysis) -> Picture:
 
 def loci_picture(found: Analysis) -> Picture:
     """Root loci of the sampled loop in the z-plane, along each gain; its data are the poles with Im z >= 0."""
-    loop, arm = found.loop, found.loop.plant.arm
+    loop = found.loop
+    arm = found.loop.plant.arm
     turning = arm.hub_side_inertia * arm.input_per_torque  # at the hub, in the unit of the input times s^2
     # past the rate gain at which sampling alone makes the hub unstable; K2 over the stable interval of most arms
     top = max(1.25 * 2 * turning / loop.chain.sampling.period, modes.STRONGER * loop.gains[RATE_GAIN])
@@ -149,12 +158,11 @@ def loci_picture(found: Analysis) -> Picture:
     rows = []  # a gain and a branch each
     for name, locus in loci.by.items():
         for value, poles in zip(locus.values.tolist(), locus.z, strict=True):
-            own, each = locus.loop.having(**{locus.gain: value}), zip(locus.mode.tolist(), poles, strict=True)
+            own = locus.loop.having(**{locus.gain: value})
+            each = zip(locus.mode.tolist(), poles, strict=True)
             rows += [(name, *map(own.number, PLANE), mode, z.real, z.imag) for mode, z in each if not z.imag < 0]
-    data, figure = (
-        columns_of(("locus", *PLANE, "mode", "real", "imaginary"), rows),
-        roots.draw_sampled_loci.figure(loci),
-    )
+    data = columns_of(("locus", *PLANE, "mode", "real", "imaginary"), rows)
+    figure = roots.draw_sampled_loci.figure(loci)
     return picture("sampled_loci", figure, data=data, half=loci.half_rate, aliased=aliased)
 
 
@@ -171,7 +179,9 @@ def slews(report: ArmReport) -> tuple[list[Picture | Table], list[str], list[Fac
     if all(each.given.measured is not None for each in report.controllers):
         return [], [], []
     bare = on_hub(report.arm, default_gains(report.arm).having(MOMENT_GAIN, 0.0), f"{MOMENT_GAIN} = 0", "without")
-    runs, words, task = dict[str, Simulation](), list[str](), report.chain.slew
+    runs: dict[str, Simulation] = {}
+    words: list[str] = []
+    task = report.chain.slew
     duration = traces.RECORD_LENGTH * task.rise_time
     candidates = [*([] if report.laws else [bare]), *report.controllers]
     for each in candidates:
@@ -184,7 +194,8 @@ def slews(report: ArmReport) -> tuple[list[Picture | Table], list[str], list[Fac
         return [], [*words, "The controllers drive inputs of different units: their slews are not drawn together."], []
     if not runs:
         return [], words, []
-    arm, title = simulated[0].arm, prose("slew_title", task=task, reach=report.arm.reach)
+    arm = simulated[0].arm
+    title = prose("slew_title", task=task, reach=report.arm.reach)
     figure = motion.slew.figure(arm, {style.safe(name): run for name, run in runs.items()}, title)
     columns = response_columns(arm, {each.key: runs[each.name] for each in simulated})
     moving = [each for each in simulated if each is not bare and runs[each.name].stopped is None]
@@ -247,10 +258,12 @@ def response_columns(arm: Arm, each: Mapping[str, Simulation]) -> Sequence[Colum
     Torques are those held at that time, the rigid arm's moment that of the sample after it.
     """
     moments = {key: traces.curve_of(run, "root_moment") for key, run in each.items()}
-    t, first = min((moment.t for moment in moments.values()), key=len), next(iter(each.values()))
+    t = min((moment.t for moment in moments.values()), key=len)
+    first = next(iter(each.values()))
     rigid = np.r_[first.scenario.rigid_moment[1:], first.scenario.rigid_moment[-1:]]
     columns: list[Column] = [Column("t_s", of=t), Column("rigid_moment_N_m", of=traces.held_at(first, rigid, t))]
-    driven, unit = "torque" if arm.input_unit == "N m" else "input", arm.input_unit
+    driven = "torque" if arm.input_unit == "N m" else "input"
+    unit = arm.input_unit
     for key, run in each.items():
         columns += moments[key].at(t).columns(f"root_moment_{key}", "N m")
         columns += traces.tip_deviation(arm, run).at(t).columns(f"tip_error_{key}", "m")
@@ -282,7 +295,8 @@ class StepRow(NamedTuple):
 
 def step_rows(name: str, found: RunComparison) -> Iterator[StepRow]:
     """The measured step, and the computed one."""
-    step, end = found.measured.step, float(found.measured.reference[-1])
+    step = found.measured.step
+    end = float(found.measured.reference[-1])
     for origin, angle in (("measured", found.measured.hub_angle), ("computed", found.hub_angle)):
         yield StepRow(name, origin, 100 * overshoot(angle, step, end), math.degrees(angle[-1] - end))
 
@@ -302,10 +316,13 @@ def measured_blocks(report: ArmReport) -> Iterator[Picture | Table]:
 
 def growth_words(each: Controller, found: verdict.Verdict, chain: Chain) -> str:
     """The growth of an unstable loop; of one with a measured run also when the hub angle shows it, after that run."""
-    T, measured, shown = chain.sampling.period, each.given.measured, list[float]()
+    T = chain.sampling.period
+    measured = each.given.measured
+    shown: list[float] = []
     growth = T / found.log_radius
     if measured is not None:
-        reference, end = measured.reference, float(measured.t[-1])
+        reference = measured.reference
+        end = float(measured.t[-1])
         t = np.append(measured.t, end + min(20 * growth, MOST_SAMPLES * T))
         longer = replace(measured, t=t, reference=np.append(reference, reference[-1]))
         arm, law = tracked(each.arm, each.law)
@@ -321,7 +338,8 @@ def compared_data(found: Mapping[str, RunComparison]) -> Iterator[Column]:
     t = min((it.run.t for it in found.values()), key=len)
     yield Column("t_s", of=t)
     for key, it in found.items():
-        measured, run = it.measured, it.run
+        measured = it.measured
+        run = it.run
         for name, at, values in (
             (f"reference_{key}_rad", measured.t, measured.reference),
             (f"hub_angle_measured_{key}_rad", measured.t, measured.hub_angle),

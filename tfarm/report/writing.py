@@ -72,11 +72,14 @@ MOST_WORKERS = 2  # processes that share the pieces of a report: as many cores a
 WORTH_A_PROCESS = 8  # pieces for which a second process, which takes a second or two to start, is worth it
 EVIDENCE = "method and proofs"  # a task of no arm
 MAP = "margins-map"  # anchor of the section that the overview begins with
-LOOP_TASK, SAMPLED_TASK = "continuous loop", "sampled loop"  # each of sections that share a design or damped modes
+# each of sections that share a design or damped modes
+LOOP_TASK = "continuous loop"
+SAMPLED_TASK = "sampled loop"
 LONGEST = (SAMPLED_TASK, LOOP_TASK, EVIDENCE)  # tasks of five seconds and more, which are begun first
 EXPORTS = "export"  # folder in that of an arm, to whose files its pages lead
 EXPORTED = [f"{of}{end}" for of in ("controller", "tuner", "plant", "loop") for end in (".h", ".fmu", ".mat", ".py")]
-TRUST_PAGE, COMPARISON_PAGE = f"{TRUST_FOLDER}/index.html", "compare.html"
+TRUST_PAGE = f"{TRUST_FOLDER}/index.html"
+COMPARISON_PAGE = "compare.html"
 RESERVED_NAMES = {  # of folders that no arm may have
     "index.html", "readme.md", "pictures", "bench.json", TRUST_FOLDER, "data", COMPARISON_PAGE, "compare.json", ASSETS,
 }  # fmt: skip
@@ -146,17 +149,15 @@ def pieces_of(report: ArmReport) -> list[Piece]:
     return [piece for piece in PIECES if piece.suits(report)]
 
 
-def make_section(
-    name: str, anchor: str, make: Callable[[ArmReport], PageSection], report: ArmReport, folder: Path
-) -> PageSection:
-    """A section saved in the arm's folder, or in its place why tfarm could not make it; a bug of ours stays loud."""
+def make_section(piece: Piece, report: ArmReport, folder: Path) -> PageSection:
+    """Return a section saved in the arm's folder, or the reason why tfarm could not make it; a bug of ours is loud."""
     try:
         with drawn_for("page"):
-            section = replace(make(report), anchor=anchor)
+            section = replace(piece.make(report), anchor=piece.anchor)
     except TfarmError as error:
         section = PageSection(
-            anchor=anchor,
-            title=upper(name),
+            anchor=piece.anchor,
+            title=upper(piece.name),
             answer=f"This section could not be made for this arm: {error}.",
             failure=str(error),
         )
@@ -195,7 +196,10 @@ def write(
     written, two arms share a name or there is none, or an arm or its chain does not suit a law; ConvergenceError if a
     process dies.  If the work itself fails, the other pages in `out` are as they were.
     """
-    out, n, names, only = Path(out), len(arms), [arm.name for arm in arms], only or ()
+    out = Path(out)
+    n = len(arms)
+    names = [arm.name for arm in arms]
+    only = only or ()
     _check(names, only)
     each = zip(arms, chains or [Chain()] * n, laws or [()] * n, fits or [None] * n, strict=True)
     reports = [ArmReport(*driven(arm, chain), tuple(own), fit, tuple(measured), paper) for arm, chain, own, fit in each]
@@ -263,8 +267,7 @@ def tasks_of(
         tasks[LOOP_TASK].append(partial(first_pages, report, folder, out, announce))
     for piece in pieces_of(report):
         if piece.page in only or (not only and piece.anchor != MAP):
-            make = partial(make_section, piece.name, piece.anchor, piece.make, report, folder)
-            tasks[piece.task or piece.name].append(make)
+            tasks[piece.task or piece.name].append(partial(make_section, piece, report, folder))
     if only:
         tasks[LOOP_TASK if LOOP_TASK in tasks else "card"].append(partial(save_card, report, folder))
     if not (only and report.laws):
@@ -280,8 +283,7 @@ def first_pages(
     with temporary_folder(folder.parent) as stage:
         own = stage / name
         own.mkdir()
-        pieces = [piece for piece in pieces_of(report) if piece.anchor == MAP]
-        made = [make_section(piece.name, piece.anchor, piece.make, report, own) for piece in pieces]
+        made = [make_section(piece, report, own) for piece in pieces_of(report) if piece.anchor == MAP]
         save_card(report, own)
         if is_live(report):
             save_live(report, own)
@@ -328,7 +330,9 @@ def _write_pages(
 
     These lead to each other, to what is in the `earlier` folder of the arm, and to the page on `trust`, if any.
     """
-    file, by_anchor, own = file_of(report), {section.anchor: section for section in made}, defaultdict(list)
+    file = file_of(report)
+    by_anchor = {section.anchor: section for section in made}
+    own = defaultdict(list)
     write_text(folder / "arm.toml", file)
     for piece in pieces_of(report):
         if piece.anchor in by_anchor:
@@ -442,7 +446,9 @@ def write_study(found: Study) -> Path:
 
 def study_sections(found: Study) -> list[PageSection]:
     """Findings, distributions, drivers, responses, worst arm and failures of a study, as far as it has them."""
-    worst, missing, bands = found.worst, list[str](), list[Any]()
+    worst = found.worst
+    missing: list[str] = []
+    bands: list[Any] = []
     facts = [
         *(Fact(each.loop, f"{each.stable:,}", f"of {found.done:,} arms stable", each.finding) for each in found.shares),
         Fact("arms computed", f"{found.done:,}", note=f"of {found.rows:,}"),
@@ -451,7 +457,8 @@ def study_sections(found: Study) -> list[PageSection]:
         ("study_distributions", studies.study), ("study_scatter", studies.study_scatter)) if found.spreads]  # fmt: skip
     for output in ("root_moment", "tip_displacement"):
         try:
-            figure, stem = studies.study_band.figure(found, output), f"study-{output.replace('_', '-')}"
+            figure = studies.study_band.figure(found, output)
+            stem = f"study-{output.replace('_', '-')}"
             bands.append(picture("study_band", figure, stem=stem, name=signal_words(output)[0]))
         except TfarmError as error:
             missing.append(f"{output}: {error}.")
@@ -473,7 +480,8 @@ def study_sections(found: Study) -> list[PageSection]:
 
 def _numbers(found: Study) -> list[Column]:
     """A row a varied number: its distribution or grid, and its value of the worst arm where that was searched."""
-    space, worst = found.parts.plan.space, [] if found.worst is None else list(found.worst.numbers.values())
+    space = found.parts.plan.space
+    worst = [] if found.worst is None else list(found.worst.numbers.values())
     kinds = {key: one_line(f"{each.kind} {', '.join(map(text, each.numbers))}", 60) for key, each in space.over.items()}
     columns = [
         Column("key", "number", of=space.keys),
