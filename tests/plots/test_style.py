@@ -46,7 +46,7 @@ INCHES = 3.5, 7.16  # IEEE: one and both columns
 def saved(tmp_path_factory):
     """The picture of an arm as an SVG."""
     folder = tmp_path_factory.mktemp("saved")
-    save_figure(tfarm.plots.sketch.figure(LAB), folder, "arm", ("svg",))
+    save_figure(tfarm.plots.sketch.figure(LAB), folder / "arm.svg")
     return folder / "arm.svg"
 
 
@@ -227,7 +227,7 @@ def test_a_layout_leaves_axes_where_matplotlib_does_and_writes_its_file(place, t
             assert ends[0] == pytest.approx(ends[1], abs=0.01)  # inches
             sizes = [ax.yaxis.label.get_window_extent().size for ax in (own, other)]
             assert sizes[0] == pytest.approx(sizes[1])
-        save_figure(here, tmp_path, "kept", ("svg",))
+        save_figure(here, tmp_path / "kept.svg")
         monkeypatch.setattr(style, "ticks_kept", lambda _: nullcontext())
-        save_figure(here, tmp_path, "anew", ("svg",))
+        save_figure(here, tmp_path / "anew.svg")
     assert (tmp_path / "kept.svg").read_bytes() == (tmp_path / "anew.svg").read_bytes()

@@ -29,7 +29,7 @@ def write_pictures(out: Path) -> None:
         "mode-shapes": modes.figure(tfarm.modes(lab, count=4)),  # two rows
     }
     for stem, figure in figures.items():
-        save_figure(figure, out, stem, formats=("png",), dpi=DOTS)
+        save_figure(figure, out / f"{stem}.png", DOTS)
 
 
 if __name__ == "__main__":

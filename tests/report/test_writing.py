@@ -63,7 +63,7 @@ def test_another_process_with_other_hashes_writes_the_same_bytes(pages, audit_ro
     assert {name: there[name] == content for name, content in files_of(made).items() if there[name] != content} == {}
     write_trust(audit_rows, validated(), written_proofs(pages), tmp_path / "trust")
     assert files_of(tmp_path / "trust") == files_of(pages / "trust")
-    index = index_page(pages, trust="trust/index.html")
+    index = index_page(pages)
     assert (pages / "index.html").read_text(encoding="utf-8") == index
 
 
@@ -423,7 +423,7 @@ def rows_of(tmp_path, laws, chain):
     save_card(ArmReport(LAB, chain, tuple(laws)), folder)
     (folder / "index.html").write_text("a page")
     (card,) = kept(tmp_path, "card", Card).values()
-    return card.loops, index_page(tmp_path, trust="")
+    return card.loops, index_page(tmp_path)
 
 
 @pytest.mark.parametrize("law", [FAST, SLOW])

@@ -50,7 +50,7 @@ def plain_cards(put):
     """Cards of the index with an empty picture, for tests that are not about it: a response and a drawing each."""
     put(overview, "bode", lambda *_: None)
     put(overview, "draw_card", SimpleNamespace(figure=lambda _: None))
-    put(overview, "save_figure", lambda _, folder, stem, formats: (folder / f"{stem}.svg").write_text("<svg/>"))
+    put(overview, "save_figure", lambda _, file: file.write_text("<svg/>"))
 
 
 ASSUMPTIONS = (PRINTED, "second assumption", LONG)

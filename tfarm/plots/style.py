@@ -383,21 +383,41 @@ def name_axes(vary: Sequence[str], arm: Arm, law: AnyLaw, ax: Axes) -> None:
 # ------------------------------------------------------------ files
 
 
-def save_figure(figure: Figure, folder: Path, stem: str, formats: tuple[str, ...], dpi: int = PICTURE_DOTS) -> None:
-    """The figure as folder/stem.svg and .png, or as one of these."""
-    for kind, content in zip(formats, _drawn(figure, formats, dpi), strict=True):
-        (folder / f"{stem}.{kind}").write_bytes(content)
+def save_figure(figure: Figure, file: Path, dpi: int = PICTURE_DOTS) -> None:
+    """Write a figure to a file of the kind that its name ends in."""
+    file.write_bytes(content_of(figure, file.suffix.removeprefix("."), dpi))
 
 
 def save_picture(draw: Callable[[Any], Figure], record: Any, path: Path) -> None:
-    """The picture of a record as one file, written whole: an SVG or a PDF for a column, else a PNG.
+    """Write the picture of a record as one file, whole: an SVG or a PDF for a column, else a PNG.
 
     Raises ParameterError, naming --figure, where it cannot be written.
     """
     kind = path.suffix.lower().removeprefix(".") or "png"
     with nullcontext() if kind == "png" else column():
-        (content,) = _drawn(draw(record), (kind,), PICTURE_DOTS)
+        content = content_of(draw(record), kind)
     write_file(path, content, key="--figure")
+
+
+def content_of(figure: Figure, kind: str, dpi: int = PICTURE_DOTS) -> bytes:
+    """Return the file of a figure.
+
+    In an SVG coordinates have two decimals of a point, a 60th of a pixel, where matplotlib writes six.
+    """
+    content = io.BytesIO()
+    with style(), warnings.catch_warnings():
+        # an arm's name may hold any letter
+        warnings.filterwarnings("ignore", "Glyph .* missing")
+        settled(figure)
+        with ticks_kept(figure.axes):
+            figure.savefig(content, format=kind, dpi=dpi, metadata=METADATA[kind])
+    drawn = content.getvalue()
+    return COORDINATES.sub(_short, drawn).replace(b"<defs>", DARK, 1) if kind == "svg" else drawn
+
+
+def _short(part: re.Match[bytes]) -> bytes:
+    """Return two decimals, and no space around the letters of a path."""
+    return PATH_LETTER.sub(rb"\1", LONG_NUMBER.sub(lambda number: b"%.2f" % float(number[0]), part[0]))
 
 
 def settled(figure: Figure) -> None:
@@ -457,24 +477,3 @@ def once(call: Callable[..., Any]) -> Callable[..., Any]:
         return found[0]
 
     return kept
-
-
-def _drawn(figure: Figure, formats: tuple[str, ...], dpi: int) -> Iterator[bytes]:
-    """The figure in each format, its layout made once for all of them.
-
-    In an SVG coordinates have two decimals of a point, a 60th of a pixel, where matplotlib writes six.
-    """
-    with style(), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing")  # an arm's name may hold any letter
-        settled(figure)
-        for kind in formats:
-            content = io.BytesIO()
-            with ticks_kept(figure.axes):
-                figure.savefig(content, format=kind, dpi=dpi, metadata=METADATA[kind])
-            drawn = content.getvalue()
-            yield COORDINATES.sub(_short, drawn).replace(b"<defs>", DARK, 1) if kind == "svg" else drawn
-
-
-def _short(part: re.Match[bytes]) -> bytes:
-    """Two decimals, and no space around the letters of a path."""
-    return PATH_LETTER.sub(rb"\1", LONG_NUMBER.sub(lambda number: b"%.2f" % float(number[0]), part[0]))

@@ -53,7 +53,7 @@ def save_card(report: ArmReport, folder: Path) -> None:
     arm = report.arm
     picture = ""
     with suppress(TfarmError):
-        save_figure(draw_card.figure(bode(arm, "root_moment")), folder / PICTURES, "card", formats=("svg",))
+        save_figure(draw_card.figure(bode(arm, "root_moment")), folder / PICTURES / "card.svg")
         picture = "card.svg"
     loops: list[dict[str, Any]] = []
     notes = [] if report.has_loop else [prose("no_loop", arm=arm)]

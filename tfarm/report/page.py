@@ -214,22 +214,24 @@ def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> 
     if isinstance(block, Table):
         files = [f"{DATA}/{name}" for name in save_table(block, folder / DATA)]
         return SavedBlock(block.stem, block.title, shape.table(block, files))
-    save_figure(block.figure, folder / PICTURES, block.stem, formats=("svg",))
+    pictures = folder / PICTURES
+    save_figure(block.figure, pictures / f"{block.stem}.svg")
+    again = block.figure.again  # type: ignore[attr-defined]
     narrow = None
     if not block.film:
         with drawn_for("phone"):
-            narrow = block.figure.again()  # type: ignore[attr-defined]
-            save_figure(narrow, folder / PICTURES, f"{block.stem}-narrow", formats=("svg",))
+            narrow = again()
+            save_figure(narrow, pictures / f"{block.stem}-narrow.svg")
     if is_paper:
         with drawn_for("column"):
-            save_figure(block.figure.again(), folder / PICTURES, block.stem, formats=("pdf",))  # type: ignore[attr-defined]
+            save_figure(again(), pictures / f"{block.stem}.pdf")
     columns = tuple(
         replace(each, of=[kept_digits((x,), DRAWN_DIGITS)[0] if isinstance(x, float) else x for x in each.of])
         for each in block.data
     )
     saved = save_table(Table(columns=columns, stem=f"{block.stem}-data"), folder / DATA, ("csv",)) if columns else ()
     if block.film:
-        (folder / PICTURES / f"{block.stem}.gif").write_bytes(block.film)
+        (pictures / f"{block.stem}.gif").write_bytes(block.film)
     kinds = ("svg", *["pdf"] * is_paper, *["gif"] * bool(block.film))
     drawn = [f"{PICTURES}/{block.stem}.{kind}" for kind in kinds]
     files = [*drawn, *(f"{DATA}/{name}" for name in saved)]

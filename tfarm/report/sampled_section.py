@@ -39,46 +39,36 @@ from tfarm.report.page import (
 from tfarm.schema import Column, Quantity, Table, across, table, text
 from tfarm.spectrum.table import default_gains
 
-MORE_DELAY = (0.0, 0.5, 1.0)  # samples of further delay for which the verdict is given
-VERDICT_COLUMNS = ("word", "spectral_radius", "time_constant", "slowest", "holds_for")
-WHOLE_LAW_COLUMNS = ("index", "natural_frequency", "band", "aliased", "first_order", "by_damping", "log_radius")
-MOST_SAMPLES = 10_000  # after a record in which an unstable loop may seem settled: a second of computing
-# length of a film in slews, and frames at most: a second of computing
-FILM_SLEWS = 1.5
-FILM_FRAMES = 80
+FILM_FRAMES = 80  # at most: a second of computing
 
 
 def sampled_section(report: ArmReport) -> PageSection:
-    """The sampled loop of each controller; in time runs measured under the laws, else the slew."""
-    arm = report.arm
+    """Return the sampled loop of each controller; in time runs measured under the laws, else the slew."""
     chain = report.chain
     found = [(each, sampled_of(each.arm, each.law, chain)) for each in report.controllers]
-    first = found[0][1]
-    planes: list[Picture | Table] = []
-    along: list[Picture | Table] = []
-    if not report.laws:
-        planes = [overlay_picture(stable_regions(arm, first.loop.gains, chain), first)]
-        along = [loci_picture(first)]
     numbers = across({each.title: it for each, it in found}, keys=[each.key for each, _ in found])
+    blocks: list[Picture | Table] = [sheet("sampled", numbers)]
+    for each, it in found:
+        intervals = table(it.stability_intervals)
+        blocks.append(sheet("sampled_numbers", intervals, stem=_stem("numbers", each), each=each, found=it))
+    blocks.append(delays_table(found, chain))
     pictures, words, facts = slews(report)
+    if not report.laws:
+        # the gains of the arm itself
+        (_, own), *_ = found
+        blocks = [overlay_picture(stable_regions(report.arm, own.loop.gains, chain), own), *blocks, loci_picture(own)]
+        facts = [*interval_facts(own), *facts]
+    of_whole_law = ("index", "natural_frequency", "band", "aliased", "first_order", "by_damping", "log_radius")
+    for each, it in found:
+        modes = table(it.modes, () if it.loop.is_of_gains else of_whole_law)
+        blocks.append(sheet("sampled_modes", modes, stem=_stem("modes", each), each=each, found=it))
     growths = [growth_words(each, it.verdict, chain) for each, it in found if it.verdict.log_radius > 0]
     return PageSection(
         title=f"The sampled loop, {plain(1e3 * chain.sampling.period)} ms",
-        facts=[*(interval_facts(first) if not report.laws else ()), *facts],
-        words=[" ".join([chain_words(arm, chain), *growths]), *words],
-        blocks=[
-            *planes,
-            sheet("sampled", numbers),
-            *(sheet("sampled_numbers", table(it.stability_intervals), stem=_stem("numbers", each), each=each,
-                    found=it) for each, it in found),
-            delays_table(found, chain),
-            *along,
-            *(sheet("sampled_modes", table(it.modes, () if it.loop.is_of_gains else WHOLE_LAW_COLUMNS),
-                    stem=_stem("modes", each), each=each, found=it) for each, it in found),
-            *measured_blocks(report),
-            *pictures,
-        ],
-    )  # fmt: skip
+        facts=facts,
+        words=[" ".join([chain_words(report.arm, chain), *growths]), *words],
+        blocks=[*blocks, *measured_blocks(report), *pictures],
+    )
 
 
 # ------------------------------------------------------------ verdict
@@ -106,21 +96,21 @@ def _stem(name: str, each: Controller) -> str:
 
 
 def delays_table(found: Sequence[tuple[Controller, Analysis]], chain: Chain) -> Table:
-    """The verdict on each controller as it is, and with half a sample and a whole one of further delay."""
-    T = chain.sampling.period
-    own = chain.sampling.delay_samples
-    late = {more: replace(chain, sampling=replace(chain.sampling, delay_samples=own + more)) for more in MORE_DELAY[1:]}
-    rows = [
-        (each.name, 1e3 * T * more, sampled_verdict(each.arm, each.law, late[more]) if more else it.verdict)
-        for each, it in found
-        for more in MORE_DELAY
-        if not more or own + more + each.law.delay / T <= MOST_DELAY
-    ]
+    """Return the verdict on each controller as it is, and with half a sample and a whole one of further delay."""
+    sampling = chain.sampling
+    rows = []
+    for each, it in found:
+        rows.append((each.name, 0.0, it.verdict))
+        for more in (0.5, 1.0):
+            delay = sampling.delay_samples + more
+            if delay + each.law.delay / sampling.period <= MOST_DELAY:
+                late = replace(chain, sampling=replace(sampling, delay_samples=delay))
+                rows.append((each.name, 1e3 * sampling.period * more, sampled_verdict(each.arm, each.law, late)))
     names, delays, verdicts = zip(*rows, strict=True)
     columns = (
         Column("law", "controller", of=names),
         Column("further_delay_ms", "further delay", "ms", of=delays),
-        *table(verdicts, VERDICT_COLUMNS).columns,
+        *table(verdicts, ("word", "spectral_radius", "time_constant", "slowest", "holds_for")).columns,
     )
     return sheet("sampled_delays", columns, free=any(verdict.loop.has_free_angle for verdict in verdicts))
 
@@ -129,7 +119,7 @@ def delays_table(found: Sequence[tuple[Controller, Analysis]], chain: Chain) -> 
 
 
 def overlay_picture(both: StableRegions, found: Analysis) -> Picture:
-    """Stability regions of the continuous and of the sampled loop in one plane, with the intervals of K2 below it."""
+    """Return the regions of the continuous and of the sampled loop in one plane, with the intervals of K2 below it."""
     arm = both.continuous.arm
     gains = found.loop.gains
     rows = [row for row in margins_of(arm, as_law(gains)).stability_intervals if row.name == MOMENT_GAIN]
@@ -138,7 +128,7 @@ def overlay_picture(both: StableRegions, found: Analysis) -> Picture:
         regions.overlay.figure(*both),
         data=both.columns,
         arm=arm,
-        low=float(both.continuous.axes[0][0]),
+        low=float(both.continuous.x[0]),
         nested=len(both.sampled) > 1,
         continuous=text([each for row in rows for each in row.intervals], 4) or "no value",
         sampled=text(list(found.shown[MOMENT_GAIN]), 4) or "no value",
@@ -147,75 +137,79 @@ def overlay_picture(both: StableRegions, found: Analysis) -> Picture:
 
 
 def loci_picture(found: Analysis) -> Picture:
-    """Root loci of the sampled loop in the z-plane, along each gain; its data are the poles with Im z >= 0."""
+    """Return root loci of the sampled loop in the z-plane, along each gain; its data are the poles with Im z >= 0."""
     loop = found.loop
-    arm = found.loop.plant.arm
-    turning = arm.hub_side_inertia * arm.input_per_torque  # at the hub, in the unit of the input times s^2
+    arm = loop.plant.arm
     # past the rate gain at which sampling alone makes the hub unstable; K2 over the stable interval of most arms
+    turning = arm.hub_side_inertia * arm.input_per_torque
     top = max(1.25 * 2 * turning / loop.chain.sampling.period, modes.STRONGER * loop.gains[RATE_GAIN])
     loci = modes.sampled_loci(loop, top, (-0.5, 1.5))
-    aliased = int((found.modes.band > 0).sum())
-    rows = []  # a gain and a branch each
+    rows = []
     for name, locus in loci.by.items():
         for value, poles in zip(locus.values.tolist(), locus.z, strict=True):
             own = locus.loop.having(**{locus.gain: value})
-            each = zip(locus.mode.tolist(), poles, strict=True)
-            rows += [(name, *map(own.number, PLANE), mode, z.real, z.imag) for mode, z in each if not z.imag < 0]
-    data = columns_of(("locus", *PLANE, "mode", "real", "imaginary"), rows)
-    figure = roots.draw_sampled_loci.figure(loci)
-    return picture("sampled_loci", figure, data=data, half=loci.half_rate, aliased=aliased)
+            gains = [own.number(each) for each in PLANE]
+            upper = [(mode, z) for mode, z in zip(locus.mode.tolist(), poles, strict=True) if not z.imag < 0]
+            rows += [(name, *gains, mode, z.real, z.imag) for mode, z in upper]
+    return picture(
+        "sampled_loci",
+        roots.draw_sampled_loci.figure(loci),
+        data=columns_of(("locus", *PLANE, "mode", "real", "imaginary"), rows),
+        half=loci.half_rate,
+        aliased=int((found.modes.band > 0).sum()),
+    )
 
 
 # ------------------------------------------------------------ in time
 
 
 def slews(report: ArmReport) -> tuple[list[Picture | Table], list[str], list[Fact]]:
-    """The slew under each controller, reasons of a missing one, settling times; nothing where runs are measured.
+    """Return the slew under each controller, reasons of a missing one, settling times; none where runs are measured.
 
     Of an arm's own gains the slew without moment feedback is there too.
     """
+    chain = report.chain
     if not report.arm.has_rigid_mode:
         return [], [f"{prose('what_holds', arm=report.arm)}: no slew is simulated."], []
     if all(each.given.measured is not None for each in report.controllers):
         return [], [], []
-    bare = on_hub(report.arm, default_gains(report.arm).having(MOMENT_GAIN, 0.0), f"{MOMENT_GAIN} = 0", "without")
     runs: dict[str, Simulation] = {}
+    simulated: list[Controller] = []
     words: list[str] = []
-    task = report.chain.slew
-    duration = traces.RECORD_LENGTH * task.rise_time
-    candidates = [*([] if report.laws else [bare]), *report.controllers]
-    for each in candidates:
+    bare = on_hub(report.arm, default_gains(report.arm).having(MOMENT_GAIN, 0.0), f"{MOMENT_GAIN} = 0", "without")
+    for each in (*([] if report.laws else [bare]), *report.controllers):
         try:
-            runs[each.name] = results.drawn(each.arm, each.law, report.chain, "slew", duration)
+            duration = traces.RECORD_LENGTH * chain.slew.rise_time
+            runs[each.name] = results.drawn(each.arm, each.law, chain, "slew", duration)
+            simulated.append(each)
         except ParameterError as error:
             words.append(f"No slew of {each.name} is simulated: {error}.")
-    simulated = [each for each in candidates if each.name in runs]
     if len({each.arm.input_unit for each in simulated}) > 1:
         return [], [*words, "The controllers drive inputs of different units: their slews are not drawn together."], []
     if not runs:
         return [], words, []
     arm = simulated[0].arm
-    title = prose("slew_title", task=task, reach=report.arm.reach)
+    title = prose("slew_title", task=chain.slew, reach=report.arm.reach)
     figure = motion.slew.figure(arm, {style.safe(name): run for name, run in runs.items()}, title)
     columns = response_columns(arm, {each.key: runs[each.name] for each in simulated})
-    moving = [each for each in simulated if each is not bare and runs[each.name].stopped is None]
-    responses = [(each, step(each.arm, each.law, report.chain, "slew")) for each in moving[:1]]
     numbers = (
         Column("law", "controller", of=list(runs)),
         *table(list(runs.values()), ("residual_moment", "settling_time")).columns,
         Column("finding", "finding", of=[run.finding for run in runs.values()]),
     )
-    return (
-        [
-            picture("sampled_slew", figure, data=columns, runs=runs, piece=piece_of_bands(runs), task=title),
-            *(film_picture(each, runs[each.name], task.rise_time) for each in moving[:1]),
-            sheet("slew_numbers", numbers, stem="sampled-slew-numbers"),
-            *(sheet("time_responses", it.table, each=each, found=it) for each, it in responses),
-        ],
-        words,
-        [settling_fact(each, runs[each.name], len(report.laws) > 1) for each in simulated if each is not bare]
-        + [fact for _, it in responses for fact in tip_facts(it)],
-    )
+    own = [each for each in simulated if each is not bare]
+    moving = next((each for each in own if runs[each.name].stopped is None), None)
+    blocks: list[Picture | Table] = [
+        picture("sampled_slew", figure, data=columns, runs=runs, piece=piece_of_bands(runs), task=title),
+        sheet("slew_numbers", numbers, stem="sampled-slew-numbers"),
+    ]
+    facts = [settling_fact(each, runs[each.name], len(report.laws) > 1) for each in own]
+    if moving is not None:
+        found = step(moving.arm, moving.law, chain, "slew")
+        blocks.insert(1, film_picture(moving, runs[moving.name], chain.slew.rise_time))
+        blocks.append(sheet("time_responses", found.table, each=moving, found=found))
+        facts += tip_facts(found)
+    return blocks, words, facts
 
 
 def tip_facts(found: Step) -> Iterator[Fact]:
@@ -230,8 +224,8 @@ def tip_facts(found: Step) -> Iterator[Fact]:
 
 
 def film_picture(each: Controller, run: Simulation, rise: float) -> Picture:
-    """The film of a slew, and of what follows for half as long."""
-    found = motion_of(each.arm, run, FILM_SLEWS * rise, FILM_FRAMES)
+    """Return the film of a slew, and of what follows for half as long."""
+    found = motion_of(each.arm, run, 1.5 * rise, FILM_FRAMES)
     still = picture("slew_film", animation.draw_motion.figure(found), name=each.name, found=found)
     return still._replace(film=animation.film(found).gif)
 
@@ -315,20 +309,20 @@ def measured_blocks(report: ArmReport) -> Iterator[Picture | Table]:
 
 
 def growth_words(each: Controller, found: verdict.Verdict, chain: Chain) -> str:
-    """The growth of an unstable loop; of one with a measured run also when the hub angle shows it, after that run."""
+    """State the growth of an unstable loop; after a measured run also when the hub angle shows it."""
     T = chain.sampling.period
+    growth = T / found.log_radius
     measured = each.given.measured
     shown: list[float] = []
-    growth = T / found.log_radius
     if measured is not None:
-        reference = measured.reference
+        # as much longer as an unstable loop may seem settled: a second of computing at most
         end = float(measured.t[-1])
-        t = np.append(measured.t, end + min(20 * growth, MOST_SAMPLES * T))
-        longer = replace(measured, t=t, reference=np.append(reference, reference[-1]))
+        t = np.append(measured.t, end + min(20 * growth, 10_000 * T))
+        longer = replace(measured, t=t, reference=np.append(measured.reference, measured.reference[-1]))
         arm, law = tracked(each.arm, each.law)
         run = Simulator(arm, chain, longer.scenario(T), law, count=found.modes_used).run().at_samples
         settled = run.hub_angle[run.t <= end][-1]
-        away = abs(run.hub_angle - settled) > 0.05 * abs(measured.step)  # which shows
+        away = abs(run.hub_angle - settled) > 0.05 * abs(measured.step)
         shown = run.t[away & (run.t > end)].tolist()
     return prose("growth", name=each.name, found=found, growth=growth, measured=measured, shown=shown)
 

@@ -42,6 +42,7 @@ from tfarm.report.page import (
     Fact,
     GivenLaw,
     PageSection,
+    Picture,
     anchor,
     check_laws,
     command_of,
@@ -63,7 +64,7 @@ from tfarm.report.response_sections import bode_section, fit_section, measured_s
 from tfarm.report.sampled_section import sampled_section
 from tfarm.report.trust import TRUST_FOLDER, gather, save_proof, write_trust, written_proofs
 from tfarm.report.tuner_section import tuner_section
-from tfarm.schema import Column, quantities, table, text
+from tfarm.schema import Column, Table, quantities, table, text
 from tfarm.studies.study import Study
 
 ReportProgress = Callable[[int, int, str], object]
@@ -238,7 +239,7 @@ def _written(
     for each in own:
         tasks |= each
     done = make_all(tasks, progress)
-    trust = TRUST_PAGE if not only or (out / TRUST_PAGE).is_file() else ""
+    trust = TRUST_PAGE if not only else trust_in(out)
     sections = []
     for report, each in zip(reports, own, strict=True):
         made = [section for task in each for section in done[task] if section is not None]
@@ -248,8 +249,8 @@ def _written(
     if not only:
         audited, printed = done[EVIDENCE][0]
         write_trust(audited, printed, written_proofs(out), place / TRUST_FOLDER)
-    write_text(place / "index.html", index_page(out, trust=trust))
-    move_into(place, out)
+        move_into(place, out)
+    write_index(out, place)
     return sections
 
 
@@ -291,8 +292,7 @@ def first_pages(
         _write_pages(report, own, made, ("index",), "", out / name)
         shutil.copytree(stage, folder.parent, dirs_exist_ok=True)
         move_into(stage, out)
-        write_text(stage / "index.html", index_page(out, trust=TRUST_PAGE if (out / TRUST_PAGE).is_file() else ""))
-        move_into(stage, out)
+        write_index(out, stage)
     if announce is not None:
         pages = [page for page in (out / name / "index.html", out / name / LIVE_PAGE) if page.is_file()]
         announce(f"written first: {' and '.join(map(str, pages))}; the other pages follow")
@@ -379,13 +379,22 @@ def pages_in(*folders: Path, written: Sequence[str] = ()) -> list[tuple[str, str
 # ------------------------------------------------------------ the index
 
 
-def index_page(out: Path, *, trust: str) -> str:
-    """The page that leads to all others in a folder of reports."""
+def index_page(out: Path) -> str:
+    """Return the page that leads to all others in a folder of reports."""
     cards = [(card, pages) for folder, card in kept(out, "card", Card).items() if (pages := pages_in(folder))]
-    return render(
-        "index.html", title="tfarm reports", cards=cards, trust=trust, compared=kept_comparison(out)["title"],
-        short=SHORT,
-    )  # fmt: skip
+    compared = kept_comparison(out)["title"]
+    return render("index.html", title="tfarm reports", cards=cards, trust=trust_in(out), compared=compared, short=SHORT)
+
+
+def trust_in(out: Path) -> str:
+    """Return the page on method and proofs in a folder of reports, if there is one."""
+    return TRUST_PAGE if (out / TRUST_PAGE).is_file() else ""
+
+
+def write_index(out: Path, stage: Path) -> None:
+    """Write the index of a folder of reports, through a folder next to it."""
+    write_text(stage / "index.html", index_page(out))
+    move_into(stage, out)
 
 
 # ------------------------------------------------------------ a comparison
@@ -420,8 +429,7 @@ def write_comparison(found: Comparison, out: Path) -> Path:
         keep(made, "compare", {"title": title, "arms": arms})
         move_into(made, out)
         if (out / "index.html").is_file():
-            write_text(made / "index.html", index_page(out, trust=TRUST_PAGE if (out / TRUST_PAGE).is_file() else ""))
-            move_into(made, out)
+            write_index(out, made)
     return out / COMPARISON_PAGE
 
 
@@ -445,16 +453,20 @@ def write_study(found: Study) -> Path:
 
 
 def study_sections(found: Study) -> list[PageSection]:
-    """Findings, distributions, drivers, responses, worst arm and failures of a study, as far as it has them."""
-    worst = found.worst
-    missing: list[str] = []
-    bands: list[Any] = []
+    """Return findings, distributions, drivers, responses, worst arm and failures of a study, as far as it has them."""
     facts = [
         *(Fact(each.loop, f"{each.stable:,}", f"of {found.done:,} arms stable", each.finding) for each in found.shares),
         Fact("arms computed", f"{found.done:,}", note=f"of {found.rows:,}"),
     ]
-    pictures = [picture(name, draw.figure(found), found=found) for name, draw in (
-        ("study_distributions", studies.study), ("study_scatter", studies.study_scatter)) if found.spreads]  # fmt: skip
+    numbers = [sheet("study_ranges", table(found.spreads)), sheet("study_numbers", _numbers(found), found=found)]
+    distributions: list[Picture | Table] = []
+    drivers: list[Picture | Table] = []
+    if found.spreads:
+        distributions.append(picture("study_distributions", studies.study.figure(found), found=found))
+        drivers.append(picture("study_scatter", studies.study_scatter.figure(found), found=found))
+    drivers.append(sheet("study_sobol", table(found.sobol)))
+    missing: list[str] = []
+    bands: list[Picture] = []
     for output in ("root_moment", "tip_displacement"):
         try:
             figure = studies.study_band.figure(found, output)
@@ -462,20 +474,17 @@ def study_sections(found: Study) -> list[PageSection]:
             bands.append(picture("study_band", figure, stem=stem, name=signal_words(output)[0]))
         except TfarmError as error:
             missing.append(f"{output}: {error}.")
-    sections: tuple[tuple[str, list[str], list[Any]], ...] = (
-        ("Findings", [prose("study", found=found)], [sheet("study_ranges", table(found.spreads)),
-         sheet("study_numbers", _numbers(found), found=found)]),
-        ("Distributions", [], pictures[:1]),
-        ("Drivers", [], [*pictures[1:], sheet("study_sobol", table(found.sobol))]),
-        ("Responses", missing, bands),
-        ("Worst arm", [] if worst is None else [prose("study_worst", worst=worst)], []),
-        ("Arms without a result", [], [sheet("study_failures", table(found.failures))]),
-    )  # fmt: skip
-    return [
-        PageSection(anchor=anchor("study", title), title=title, facts=facts[: len(facts) * (title == "Findings")],
-                    words=words, blocks=blocks)
-        for title, words, blocks in sections if words or any(getattr(each, "columns", True) for each in blocks)
-    ]  # fmt: skip
+    worst = [] if found.worst is None else [prose("study_worst", worst=found.worst)]
+    sections = (
+        PageSection(title="Findings", facts=facts, words=[prose("study", found=found)], blocks=numbers),
+        PageSection(title="Distributions", blocks=distributions),
+        PageSection(title="Drivers", blocks=drivers),
+        PageSection(title="Responses", words=missing, blocks=bands),
+        PageSection(title="Worst arm", words=worst),
+        PageSection(title="Arms without a result", blocks=[sheet("study_failures", table(found.failures))]),
+    )
+    shown = [each for each in sections if each.words or any(getattr(block, "columns", True) for block in each.blocks)]
+    return [replace(each, anchor=anchor("study", each.title)) for each in shown]
 
 
 def _numbers(found: Study) -> list[Column]:
