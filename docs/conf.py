@@ -21,10 +21,17 @@ from tfarm.arm.chain import CHAIN_TABLES
 from tfarm.arm.law_tables import LawTable, SignalTable
 from tfarm.arm.materials import materials
 from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES, StrictTable, file_keys
+from tfarm.arm.stages import ARM_KEYS, STAGES
+from tfarm.assessment import card, step
 from tfarm.cli.app import whole_command
-from tfarm.dsp.stages import stages
+from tfarm.dsp import kernel
+from tfarm.exported import controller, fmu, systems, tuner_code
 from tfarm.fitting.recording import RunTable
+from tfarm.loop import sampled_verdict
+from tfarm.report import live
 from tfarm.schema.glossary import CERTAINTY, declared_records
+from tfarm.synthesis import design
+from tfarm.tuner import kernel as tuner_kernel
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]  # `tables`; and `tests`, with the surveys that tables are measured by
@@ -110,18 +117,34 @@ def arm_file_page() -> str:
     return "\n".join([*lines, *stages_table()])
 
 
+CONSUMERS = (
+    card.CONTINUOUS, sampled_verdict.SAMPLED_LOOP, step.CONSUMER, kernel.CONSUMER, design.CONSUMER,
+    tuner_kernel.CONSUMER, controller.CONSUMER, tuner_code.CONSUMER, fmu.CONSUMER, systems.CONSUMER, live.CONSUMER,
+)  # fmt: skip
+
+
 def stages_table() -> list[str]:
-    """Return the stages of one sample, their keys, and what each answer does with them."""
-    rows = [(stage, key, words) for stage, keys in stages().items() if stage != "arm" for key, words in keys.items()]
-    titles = ("stage", "key", *rows[0][2])
-    text = (
-        "Stages of one sample, in the order in which they act. **acts**: the key changes the answer. **named**: the "
-        "answer is without it, and its line of certainty names the key where a file has it. **partly**: both. "
-        "**none**: the answer has no such stage. Every other key of an arm acts in all answers. A key that is not in "
-        "this table is refused."
+    """Return the stages of one sample, and what each consumer does with their keys."""
+    shown = [(stage, ", ".join(f"`{key}`" for key in stage.keys if key not in ARM_KEYS)) for stage in STAGES]
+    head = markdown_table(
+        ("stage", "keys", "equation", "meaning", "linear"),
+        (
+            [stage.name, keys, f"`{stage.equation}`", stage.meaning, "yes" if stage.is_linear else "no"]
+            for stage, keys in shown
+        ),
     )
-    table = markdown_table(titles, ([stage, f"`{key}`", *words.values()] for stage, key, words in rows))
-    return ["## Keys and answers", "", text, "", *table, ""]
+    text = (
+        "**acts**: the stage changes the answer. **named**: the answer is without it, and its line of certainty names "
+        "the key where a file has it. **partly**: both. **none**: the stage does not concern the answer. **refused**: "
+        "a file with such a key has no such answer. Every other key of an arm is one of the stage plant. The sampled "
+        "loop has its verdict, its margins and its column of the card."
+    )
+    rows = (
+        [keys, *(consumer.word(stage.name) or "refused" for consumer in CONSUMERS)] for stage, keys in shown if keys
+    )
+    words = markdown_table(("keys", *(consumer.name for consumer in CONSUMERS)), rows)
+    intro = "What happens in one sample, in this order. A stage that an answer does not state is refused by its name."
+    return ["## Stages of one sample", "", intro, "", *head, "", "## Keys and answers", "", text, "", *words, ""]
 
 
 def materials_table() -> list[str]:

@@ -26,6 +26,7 @@ from tfarm.digits import general
 from tfarm.fitting.recording import compare_run, load_run, overshoot, read_recording
 from tfarm.fitting.resonances import ring
 from tfarm.spectrum.table import hub_locked
+from tfarm.synthesis.structures import STRUCTURES
 
 ROOT = Path(__file__).parent.parent
 RIG = ROOT / "tests" / "data" / "quanser-2dsfl"
@@ -211,6 +212,13 @@ def outputs() -> list[str]:
 
     rows = ([f"`{name}`", each.label, each.unit] for name, each in OUTPUTS.items())
     return markdown_table(("name", "meaning", "unit"), rows)
+
+
+@table
+def structures() -> list[str]:
+    """Structures of a design and their formulas, as they are declared."""
+    rows = ((f"`{name}`", of.formula) for name, of in STRUCTURES.items())
+    return markdown_table(("`--structure`", "controller"), rows)
 
 
 @table

@@ -28,6 +28,7 @@ import numpy as np
 import tfarm
 from tests.plausible.arms import draw
 from tfarm.arm import Arm, HubFeedback
+from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling, Simulator, scenario
 from tfarm.exact.appendix import Appendix
 from tfarm.exact.outputs import output
@@ -252,7 +253,7 @@ def study(ask, n, values):
     """The first rows of a study, by `values` of its plan; prepared is the plan."""
 
     def prepared(subject):
-        plan = Plan(*subject, space_of(over(subject), draws=n, seed=0, posterior=None), column_names([ask]))
+        plan = Plan(Case(*subject), space_of(over(subject), draws=n, seed=0, posterior=None), column_names([ask]))
         return lambda: values(plan, n)
 
     return prepared

@@ -8,6 +8,15 @@ from pathlib import Path
 import pytest
 
 import tfarm
+from tfarm.errors import ParameterError
+
+
+def refusal(call, *given, kind=ParameterError, **named):
+    """The error that a call ends with, which is one line."""
+    with pytest.raises(kind) as caught:
+        call(*given, **named)
+    assert "\n" not in str(caught.value)
+    return caught.value
 
 
 def once(factory, name, make):

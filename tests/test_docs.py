@@ -38,11 +38,11 @@ def test_every_key_of_an_arm_file_is_on_its_page(conf):
 def test_the_table_of_keys_has_each_key_and_each_answer(conf):
     table = conf.arm_file_page().partition("## Keys and answers")[2]
     titles = (
-        "stage | key | continuous-time column | verdict | margins | card | step | simulate | design | tune | "
-        "export c | export fmu | export mat | export py | live page"
+        "keys | continuous-time column | sampled loop | step | simulate | design | tune | "
+        "export c | export c of a tuner | export fmu | export mat, py | live page"
     )
     assert f"| {titles} |" in table
-    assert "| plant | `actuator.hub_damping` | acts | acts |" in table
+    assert "| `actuator.hub_damping` | acts | acts |" in table
     assert all(f"`{name}.{key}`" in table for name, kind in conf.CHAIN_TABLES.items() for key in kind.model_fields)
 
 
@@ -50,7 +50,7 @@ def test_every_json_key_of_every_record_is_in_its_section(conf):
     sections = dict(re.findall(r"^## (\S+ \(\w+\))$(.*?)(?=^## |\Z)", conf.json_page(), re.MULTILINE | re.DOTALL))
     records = list(declared_records())
     assert len(sections) == len(records)
-    assert {"Margins (loop)", "ModeList (spectrum)", "Verdict (dsp)"} <= sections.keys()
+    assert {"Margins (loop)", "ModeList (spectrum)", "Verdict (loop)"} <= sections.keys()
     for kind, declared in records:
         section = sections[f"{kind.__name__} ({kind.__module__.split('.')[1]})"]
         assert all(f"| `{of.key}` | {of.label} |" in section.replace(r"\|", "|") for of in declared.values()), kind

@@ -34,7 +34,7 @@ def test_importing_tfarm_and_reading_an_arm_load_nothing_heavy(code):
 
 
 def test_pictures_load_matplotlib_on_request_and_pyplot_for_own_figures_only():
-    """And a process that makes pages loads neither SymPy nor Altair nor statistics.
+    """And a process that makes pages loads neither SymPy nor statistics.
 
     Each takes a second, or half of one: the audit alone wants the first.
     """

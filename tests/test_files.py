@@ -32,14 +32,6 @@ def test_a_symbolic_link_stays_one(tmp_path):
     assert list(target.parent.iterdir()) == [target]
 
 
-def test_a_link_to_itself_is_refused(tmp_path):
-    link = tmp_path / "link"
-    link.symlink_to(link)
-    with pytest.raises(ParameterError, match="symbolic links"):
-        write(link)
-    assert link.is_symlink()
-
-
 def test_a_replaced_file_keeps_its_mode(tmp_path):
     file = tmp_path / "file"
     file.write_bytes(b"old")

@@ -56,6 +56,7 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
     if verb == "--help":
         return
     command = whole_command().commands[verb]
+    (tmp_path / "my-arm.toml").touch()
     command.make_context(verb, list(words))
     with pytest.raises(TyperException, match="no-such-option"):
         command.make_context(verb, [*words, "--no-such-option"])

@@ -18,6 +18,7 @@ from tfarm.arm.feedback import HubFeedback
 from tfarm.arm.law import AnyLaw, Law, as_law, full_law
 from tfarm.arm.records import Arm, must_be_arm
 from tfarm.exact.system import System
+from tfarm.moved import moved
 from tfarm.records import record
 from tfarm.response.signals import Signals
 from tfarm.spectrum import Modes, modes
@@ -86,3 +87,8 @@ class Case:
     def through(self, chain: Chain) -> Case:
         """Return the case with another chain."""
         return replace(self, chain=chain)
+
+
+# names that this module, a room then, had up to version 1.0
+_MOVED = ("ComparedSide", "Comparison", "LoopCard", "ResultCard", "compare", "loop_function", "result_card")
+__getattr__ = moved(__name__, dict.fromkeys(_MOVED, "tfarm.assessment"))

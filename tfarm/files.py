@@ -26,11 +26,7 @@ if sys.platform != "win32":
     import fcntl
 
 STANDARD_OUTPUT = "-"  # in the place of a path, as other programs have it; a file of that name is written as a/-
-PART, FOLDER = ".part", ".writing-"  # how the names of temporary files end, and those of temporary folders begin
-MAT_HEADER = b"MATLAB 5.0 MAT-file, written by tfarm"
-HEADER_TEXT = 116  # bytes of text that a MAT-file begins with, before its version
 UNREADABLE = "cannot be read ({}); check the path and its permissions"
-SUFFIX = "[a-z0-9_]{8}"  # in their middle or at their end: eight hexadecimal digits, once Python's tempfile
 
 
 def read_file(path: str | os.PathLike[str], most: int, *, key: str, what: str) -> bytes:
@@ -77,7 +73,8 @@ def mat_content(variables: Mapping[str, Any], oned_as: Literal["row", "column"])
 
     content = io.BytesIO()
     savemat(cast("Any", content), dict(variables), oned_as=oned_as)
-    return MAT_HEADER.ljust(HEADER_TEXT) + content.getvalue()[HEADER_TEXT:]
+    size = 116  # bytes of text that a MAT-file begins with, before its version
+    return b"MATLAB 5.0 MAT-file, written by tfarm".ljust(size) + content.getvalue()[size:]
 
 
 def write_file(path: Path, content: bytes, *, key: str) -> None:
@@ -106,8 +103,7 @@ def is_standard_output(path: Path) -> bool:
 @contextmanager
 def temporary_folder(place: Path) -> Iterator[Path]:
     """Yield a new folder in `place`, removed afterwards with its content; leftovers of killed runs go first."""
-    _remove_leftovers(place, re.escape(FOLDER) + SUFFIX)
-    with _temporary(place, FOLDER, "", partial(Path.mkdir, mode=0o700)) as folder:
+    with _temporary(place, ".writing-", "", partial(Path.mkdir, mode=0o700)) as folder:
         yield folder
 
 
@@ -182,13 +178,10 @@ def _descriptor(path: Path) -> int | None:
 def _replace(path: Path, content: bytes) -> None:
     """Write a regular file, new or in the place of another, whose mode and owner it keeps."""
     old = path.stat() if path.exists() else None
-    for number, is_so in ((errno.ELOOP, path.is_symlink()), (errno.EACCES, old and not os.access(path, os.W_OK))):
-        if is_so:  # a chain of links without an end, and a file that is not the user's to write
-            raise OSError(number, os.strerror(number))
-    prefix = f".{path.name[:40]}."
-    _remove_leftovers(path.parent, re.escape(prefix) + SUFFIX + re.escape(PART))
+    if old is not None and not os.access(path, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     make = partial(Path.touch, mode=0o666 if old is None else 0o600, exist_ok=False)
-    with _temporary(path.parent, prefix, PART, make) as temporary:
+    with _temporary(path.parent, f".{path.name[:40]}.", ".part", make) as temporary:
         temporary.write_bytes(content)
         if old is not None:
             with suppress(OSError, AttributeError):  # AttributeError: of a system without owners
@@ -199,7 +192,15 @@ def _replace(path: Path, content: bytes) -> None:
 
 @contextmanager
 def _temporary(folder: Path, prefix: str, suffix: str, make: Callable[[Path], object]) -> Iterator[Path]:
-    """Yield the path that `make` makes, locked until it is removed afterwards; made again if another run removed it."""
+    """Yield the path that `make` makes, locked until it is removed afterwards; made again if another run removed it.
+
+    Others of such a name that are not locked go first: their writers are gone.
+    """
+    pattern = re.compile(f"{re.escape(prefix)}[0-9a-f]{{8}}{re.escape(suffix)}")
+    with suppress(PermissionError):  # of a folder that cannot be listed, and may yet be written to
+        for name in filter(pattern.fullmatch, os.listdir(folder)):
+            with suppress(OSError), _locked(folder / name, wait=False):
+                _remove(folder / name)
     while True:
         path = folder / f"{prefix}{secrets.token_hex(4)}{suffix}"
         with undone_if_stopped(partial(_remove, path)):
@@ -211,14 +212,6 @@ def _temporary(folder: Path, prefix: str, suffix: str, make: Callable[[Path], ob
                         return
                 finally:
                     _remove(path)
-
-
-def _remove_leftovers(folder: Path, pattern: str) -> None:
-    """Remove temporary files of that name that are not locked: their writers are gone."""
-    with suppress(PermissionError):  # of a folder that cannot be listed, and may yet be written to
-        for name in filter(re.compile(pattern).fullmatch, os.listdir(folder)):
-            with suppress(OSError), _locked(folder / name, wait=False):
-                _remove(folder / name)
 
 
 @contextmanager

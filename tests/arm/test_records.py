@@ -34,16 +34,6 @@ def test_shear_cutoff_is_where_one_wave_number_vanishes():
     assert 1 - w**2 * LINK.rhoI / LINK.kGA == pytest.approx(0.0, abs=4e-16)
 
 
-@pytest.mark.parametrize(
-    ("hub", "mass", "inertia", "rigid"),
-    [(1, 1, 1, True), (0, 0, 0, True), (math.inf, 0, 0, False), (1, math.inf, 0, False), (1, 0, math.inf, False)],
-)
-def test_the_arm_turns_rigidly_unless_something_holds_it(hub, mass, inertia, rigid):
-    arm = Arm(link=LINK, hub=Hub(inertia=hub), payload=Payload(mass=mass, inertia=inertia))
-    assert arm.has_rigid_mode is rigid
-    assert arm.is_locked is (hub == math.inf)
-
-
 def test_poissons_ratio_gives_the_shear_modulus():
     link = Link.isotropic(**STEEL, poissons_ratio=0.3)
     assert link.shear_modulus == 2.1e11 / 2.6
@@ -110,22 +100,22 @@ def test_poissons_ratio_lies_above_minus_one_up_to_a_half(nu):
         Link.isotropic(**STEEL, poissons_ratio=nu)
 
 
-@pytest.mark.parametrize("value", [-1e-4, math.nan, math.inf, -math.inf, True, "0", 1e-300])
-def test_damping_is_zero_or_a_positive_time(value):
-    with pytest.raises(ParameterError, match=r"^link\.damping = "):
-        replace(LINK, damping=value)
-    assert replace(LINK, damping=0).damping == 0.0
+LIMITED = {  # of a number that may be 0: how a record has it, and what the refusal says
+    r"link\.damping = ": lambda value: replace(LINK, damping=value),
+    r"hub\.inertia = .*(locked|check the unit)": lambda value: Hub(inertia=value),
+    r"payload\.mass = .*(tip pinned|check the unit)": lambda value: Payload(mass=value),
+    r"payload\.inertia = .*(cannot rotate|check the unit)": lambda value: Payload(inertia=value),
+}
+
+
+@pytest.mark.parametrize("message", LIMITED)
+@pytest.mark.parametrize("value", [-1e-4, math.nan, -math.inf, False, "0", 1e-300, 1e300])
+def test_dampings_and_inertias_are_zero_or_positive(value, message):
+    with pytest.raises(ParameterError, match=f"^{message}"):
+        LIMITED[message](value)
     assert math.copysign(1.0, replace(LINK, damping=-0.0).damping) == 1.0
-
-
-@pytest.mark.parametrize("value", [-1e-4, math.nan, -math.inf, False, "inf", 1e300])
-def test_inertias_are_zero_positive_or_infinite(value):
-    with pytest.raises(ParameterError, match=r"^hub\.inertia = .*(locked|check the unit)"):
-        Hub(inertia=value)
-    with pytest.raises(ParameterError, match=r"^payload\.mass = .*(tip pinned|check the unit)"):
-        Payload(mass=value)
-    with pytest.raises(ParameterError, match=r"^payload\.inertia = .*(cannot rotate|check the unit)"):
-        Payload(inertia=value)
+    with pytest.raises(ParameterError, match=r"^link\.damping = inf"):
+        replace(LINK, damping=math.inf)
 
 
 def test_nothing_that_is_accepted_overflows():
@@ -144,19 +134,13 @@ def test_a_plate_or_an_endless_thread_is_no_beam(length):
 
 
 BAD_NAMES = ["", "../up", "a/b", "a\\b", ".hidden", "end.", "two\nlines", "\x1b[1m", "x" * 81, 3, "a:b"]
-DEVICES = ["CON", "nul", "com1.old", "LPT9", "aux .x", "\U0001d538" * 80]  # and 320 bytes, more than Linux's 255
 
 
-@pytest.mark.parametrize("name", BAD_NAMES + DEVICES)
-def test_a_name_can_be_a_folder_on_any_machine(name):
-    words = "" if name in DEVICES else ".*begins with a letter or digit"
-    with pytest.raises(ParameterError, match=f"^name = {words}"):
+@pytest.mark.parametrize("name", BAD_NAMES)
+def test_a_name_has_the_letters_of_a_folder_on_any_machine(name):
+    with pytest.raises(ParameterError, match=r"^name = .*begins with a letter or digit"):
         replace(ARM, name=name)
-
-
-@pytest.mark.parametrize("name", ["console", "null", "com", "lpt10", "é" * 80, "Arm nº 2 (β)"])
-def test_names_that_are_allowed(name):
-    assert replace(ARM, name=name).name == name
+    assert replace(ARM, name="Arm nº 2 (β)").name == "Arm nº 2 (β)"
 
 
 @pytest.mark.parametrize("assumptions", ["one text", [3], ["\x1b[31m"], None])

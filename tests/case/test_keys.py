@@ -4,23 +4,34 @@ import re
 from dataclasses import fields, replace
 from functools import partial
 from importlib import import_module
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
+import numpy as np
 import pytest
 
 import tfarm
-from tests.shared import remembered
+from tests.exported.tuners import some_tuner
+from tests.shared import docs_module, remembered
 from tfarm.arm.chain import CHAIN_TABLES
 from tfarm.arm.schema import file_keys
-from tfarm.dsp import Actuator, Chain, Converters, stages
+from tfarm.arm.stages import ARM_KEYS, STAGE_OF, STAGES, Consumer, Stage
+from tfarm.assessment import card, step
+from tfarm.dsp import Actuator, Chain, Converters, kernel
 from tfarm.dsp.results import simulated_run
 from tfarm.errors import ParameterError
-from tfarm.exported import result
-from tfarm.exported.live_loop import sampled_numbers, slew_numbers
+from tfarm.exact import system
+from tfarm.exact.system import system_of
+from tfarm.exported import controller, fmu, live_loop, result, systems, tuner_code
+from tfarm.loop import sampled_verdict as verdicts
 from tfarm.loop.sampled_verdict import sampled, sampled_brief, sampled_verdict
-from tfarm.report.live import explore
+from tfarm.report import live
 from tfarm.schema import to_dict
+from tfarm.synthesis import design
 from tfarm.synthesis.judge import judge_of
+from tfarm.tuner import kernel as tuner
 from tfarm.tuner.guard import sector_guard
+from tfarm.tuner.trial import to_text
 from tfarm.tuner.tuning import usual_plan
 
 ARM, GAINS = tfarm.load("sasaki2012-lab"), tfarm.HubFeedback(K1=0.3, K2=0.3)
@@ -75,11 +86,11 @@ def tuned(arm, chain):
     return trial.with_constant(0.3).cost, sector_guard(trial.loop, 0.33, 0.34).sentence, end
 
 
-def exported(form, what):
+def exported(form, what, tuned=None):
     def export(arm, chain):
-        precision = "float" if form == "c" else "double"
+        precision = "float" if (form, what) == ("c", "controller") else "double"
         task = result.ExportTask(
-            arm=arm, given=GAINS, chain=chain, what=what, form=form, precision=precision, anyway=True
+            arm=arm, given=GAINS, chain=chain, what=what, form=form, precision=precision, anyway=True, tuned=tuned
         )
         module, _, function = result.WRITERS[what, form].partition(":")
         made = getattr(import_module(f"tfarm.exported.{module}"), function)(task)
@@ -88,78 +99,111 @@ def exported(form, what):
     return export
 
 
+def tuner_in_c(arm, chain):
+    """A tuner of the period of the chain, whose file has one name."""
+    saved = some_tuner(
+        np.random.default_rng(0), period=chain.sampling.period, guard_kind="time-varying", guard=(0.33, 0.34)
+    )
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "tuned.json"
+        file.write_text(to_text(saved), encoding="utf-8")
+        return exported("c", "tuner", file)(arm, chain)
+
+
 def run_of(arm, chain):
     return simulated_run(arm, GAINS, chain, "slew", 1.5, count=3).signals
 
 
+def answers_of_samples(arm, chain):
+    """Verdict, margins, and the column of the card."""
+    found = sampled(arm, GAINS, chain, count=3)
+    brief = sampled_brief(arm, GAINS, chain)
+    return to_dict(found.verdict), found.gain_factors, brief, to_dict(card_of(arm, chain).sampled)
+
+
 ANSWERS = {
-    "continuous-time column": lambda arm, chain: to_dict(card_of(arm, chain).continuous),
-    "verdict": lambda arm, chain: to_dict(sampled_verdict(arm, GAINS, chain, count=3)),
-    "margins": lambda arm, chain: (sampled(arm, GAINS, chain, count=3).gain_factors, sampled_brief(arm, GAINS, chain)),
-    "card": lambda arm, chain: to_dict(card_of(arm, chain)),
-    "step": lambda arm, chain: {
+    card.CONTINUOUS: lambda arm, chain: to_dict(card_of(arm, chain).continuous),
+    verdicts.SAMPLED_LOOP: answers_of_samples,
+    step.CONSUMER: lambda arm, chain: {
         name: (loop.certainty, *map(list, loop.signals.values()))
         for name, loop in tfarm.step(arm, GAINS, chain, "slew", 0.3).loops.items()
     },
-    "simulate": lambda arm, chain: {name: list(values) for name, values in run_of(arm, chain).items()},
-    "design": designed,
-    "tune": tuned,
-    "export c": exported("c", "controller"),
-    "export fmu": exported("fmu", "loop"),
-    "export mat": exported("mat", "loop"),
-    "export py": exported("py", "loop"),
-    "live page": lambda arm, chain: (
-        sampled_numbers(sampled_verdict(arm, GAINS, chain, count=3).loop), slew_numbers(arm, chain, GAINS)
+    kernel.CONSUMER: lambda arm, chain: {name: list(values) for name, values in run_of(arm, chain).items()},
+    design.CONSUMER: designed,
+    tuner.CONSUMER: tuned,
+    controller.CONSUMER: exported("c", "controller"),
+    tuner_code.CONSUMER: tuner_in_c,
+    fmu.CONSUMER: exported("fmu", "loop"),
+    systems.CONSUMER: exported("py", "loop"),
+    live_loop.CONSUMER: lambda arm, chain: (
+        live_loop.sampled_numbers(sampled_verdict(arm, GAINS, chain, count=3).loop),
+        live_loop.slew_numbers(arm, chain, GAINS),
     ),
 }  # fmt: skip
 PUBLIC = {  # the functions that users call, which refuse before any work
+    "transfer": lambda arm, _: tfarm.transfer(arm, "hub_angle"),
+    "modes": lambda arm, _: tfarm.modes(arm, 3),
+    "margins": lambda arm, _: tfarm.margins(arm, GAINS),
     "verdict": lambda arm, chain: sampled_verdict(arm, GAINS, chain),
-    "margins": lambda arm, chain: tfarm.sampled(arm, GAINS, chain),
+    "sampled": lambda arm, chain: tfarm.sampled(arm, GAINS, chain),
     "card": lambda arm, chain: tfarm.result_card(arm, GAINS, chain),
     "step": lambda arm, chain: tfarm.step(arm, GAINS, chain),
     "simulate": lambda arm, chain: tfarm.simulate(arm, GAINS, chain),
     "design": lambda arm, chain: tfarm.design(arm, chain=chain),
     "tune": lambda arm, chain: tfarm.tune(arm, chain=chain),
-    "live page": lambda arm, chain: explore(arm, GAINS, chain),
+    "live page": lambda arm, chain: live.explore(arm, GAINS, chain),
     **{
-        f"export {form}": lambda arm, chain, form=form, what=what: tfarm.export(
+        f"export {what} {form}": lambda arm, chain, form=form, what=what: tfarm.export(
             arm, GAINS, chain=chain, what=what, form=form, folder="never-made"
         )
-        for form, what in {"c": "controller", "fmu": "plant", "mat": "loop", "py": "plant"}.items()
+        for what, form in result.WRITERS
     },
 }
 
 
-def test_every_key_and_every_answer_is_in_the_table():
-    rows = {key: words for keys in stages.stages().values() for key, words in keys.items()}
+def test_every_key_has_a_stage_and_every_consumer_states_stages_that_there_are():
     chain = {f"{table}.{each.name}" for table in CHAIN_TABLES for each in fields(getattr(Chain(), table))}
-    assert chain == set(CHANGES) == {key for key in rows if key.partition(".")[0] in CHAIN_TABLES}
+    assert chain == set(CHANGES) == set(STAGE_OF) - set(ARM_KEYS)
     others = ("law", "measured", "sensor", *CHAIN_TABLES)
     arm = {key.removeprefix("top.") for key in file_keys() if key.partition(".")[0] not in others}
     tables = {"link", "hub", "clamp", "joint", "motor", "attachment", "gauge", "payload"}
     filled = {"link.material", "link.section"}  # by numbers that have their own keys
-    assert arm - tables - filled == {key for key in rows if key.partition(".")[0] not in CHAIN_TABLES}
-    assert all(words.keys() == ANSWERS.keys() for words in rows.values())
-    assert {word for words in rows.values() for word in words.values()} <= {"acts", "named", "partly", "none"}
+    assert arm - tables - filled == set(ARM_KEYS)
+    assert len(STAGE_OF) == sum(len(stage.keys) for stage in STAGES)
+    for consumer in ANSWERS:
+        stated = [*consumer.acts, *consumer.named, *consumer.partly, *consumer.none]
+        assert sorted(stated) == sorted(stage.name for stage in STAGES), consumer.name
 
 
-LIKE_OTHERS = ("continuous-time column", "margins", "export mat")  # of card, verdict and export py
-WALKED = [pytest.param(each, marks=[pytest.mark.survey] * (each in LIKE_OTHERS)) for each in ANSWERS]
+def test_the_table_of_the_documentation_has_every_consumer():
+    root = Path(tfarm.__file__).parent
+    declared = [path for path in root.rglob("*.py") if re.search(r"= Consumer\(", path.read_text("utf-8"))]
+    found = {
+        value
+        for path in declared
+        for value in vars(import_module(".".join(["tfarm", *path.relative_to(root).with_suffix("").parts]))).values()
+        if isinstance(value, Consumer)
+    }
+    assert found - {system.CONSUMER} == set(ANSWERS) == set(docs_module("conf").CONSUMERS)
 
 
-@pytest.mark.parametrize("answer", WALKED)
-def test_a_key_changes_the_answer_or_is_named_in_it(answer, monkeypatch):
+WALKED = [pytest.param(each, id=each.name, marks=[pytest.mark.survey] * (each is card.CONTINUOUS)) for each in ANSWERS]
+
+
+@pytest.mark.parametrize("consumer", WALKED)
+def test_a_key_changes_the_answer_or_is_named_in_it(consumer, monkeypatch):
     monkeypatch.setattr(result.ExportTask, "sha256", "of the inputs")
     monkeypatch.setattr("tfarm.exported.fmu.binary_of", lambda sources, identifier: ({}, "none"))
     for place in ("exported.result.sampled", "exported.controller.sampled", "assessment.step.sampled_verdict"):
         few = partial(sampled if place.endswith("sampled") else sampled_verdict, count=3)
         monkeypatch.setattr(f"tfarm.{place}", few)
-    ask = remembered(lambda chain: str(ANSWERS[answer](ARM, chain)))
+    ask = remembered(lambda chain: str(ANSWERS[consumer](ARM, chain)))
     for key in CHANGES:
         before, after = map(ask, changed(key))
-        word, name = stages.word_of(key, answer), stages.REMAINDERS.get(key, key.partition(".")[2])
-        assert (before != after) == (word != "none"), key
+        stage = STAGE_OF[key]
+        word, name = consumer.word(stage.name), stage.remainder or key.partition(".")[2]
         is_named = "not covered: " in after and name in after.partition("not covered: ")[2].partition("'")[0]
+        assert (before != after) == (word != "none"), key
         if word in ("named", "partly"):
             assert is_named, key
             assert (without(before) != without(after)) == (word == "partly"), key
@@ -170,29 +214,29 @@ def without(text):
     return re.sub(r"; not covered: [\w, ]*", "", text)
 
 
-FRICTION = replace(ARM, hub=replace(ARM.hub, friction=0.01))
-NEW_KEYS = {  # an arm and a chain with a key that the table does not have yet, or that an answer refuses
-    "actuator.hub_damping": (ARM, Chain(actuator=Actuator(hub_damping=0.1)), None),
-    "hub.friction": (FRICTION, IDEAL, None),
-    "actuator.torque_limit": (ARM, Chain(actuator=Actuator(torque_limit=1.0)), stages.REFUSED),
+FRICTION = replace(ARM, hub=replace(ARM.hub, friction=0.0123))
+DAMPED = Chain(actuator=Actuator(hub_damping=0.1))
+NEW = {  # an arm or a chain with a key that has no stage yet, or a stage that no consumer states
+    "hub.friction": (FRICTION, IDEAL),
+    "actuator.hub_damping": (ARM, DAMPED),
 }
+OF_ARM_ALONE = ("transfer", "modes", "margins")
+REFUSALS = [(answer, key) for answer in PUBLIC for key in NEW if key == "hub.friction" or answer not in OF_ARM_ALONE]
 
 
-@pytest.mark.parametrize("key", NEW_KEYS)
-@pytest.mark.parametrize("answer", PUBLIC)
-def test_a_key_without_a_row_is_refused_by_default(key, answer, monkeypatch):
-    arm, chain, word = NEW_KEYS[key]
-    rows = {
-        stage: {of: words if of != key else words | {answer: word} for of, words in keys.items() if of != key or word}
-        for stage, keys in stages.stages().items()
-    }
-    monkeypatch.setattr(stages, "stages", lambda: rows)
+@pytest.mark.parametrize("stage", [None, "dry friction"])
+@pytest.mark.parametrize(("answer", "key"), REFUSALS)
+def test_a_new_key_and_a_new_stage_are_refused_by_default(answer, key, stage, monkeypatch):
+    if stage:
+        monkeypatch.setitem(STAGE_OF, key, Stage(stage, (key,), "", "", is_linear=False))
+    else:
+        monkeypatch.delitem(STAGE_OF, key)
+    system_of.cache_clear()
     with pytest.raises(ParameterError) as refused:
-        PUBLIC[answer](arm, chain)
-    words = str(refused.value)
-    assert words.startswith(f"{key} = ")
-    assert words.endswith("does not have this key: leave it out")
-    assert word is None or f": {answer} does not" in words
+        PUBLIC[answer](*NEW[key])
+    words = f"does not have the stage {stage}: leave it out" if stage else "does not have this key: leave it out"
+    assert str(refused.value).startswith(f"{key} = ")
+    assert str(refused.value).endswith(words)
 
 
 def test_code_in_c_is_in_the_arithmetic_of_the_chain(tmp_path):

@@ -4,6 +4,8 @@ import csv
 import json
 import re
 import stat
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -143,6 +145,39 @@ BAD = [
 @pytest.mark.parametrize(("arguments", "message"), BAD, ids=[" ".join(arguments) for arguments, _ in BAD])
 def test_bad_input_is_one_line_and_exit_2(capsys, arguments, message):
     assert message in refused(capsys, *arguments)
+
+
+OPENED = """
+import sys
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+opened = []
+sys.addaudithook(lambda event, of: opened.append(Path(of[0]).name) if event == "open" and ".toml" in str(of[0]) else 0)
+from tfarm.cli.running import run
+for line in sys.argv[1:]:
+    opened.clear()
+    with redirect_stdout(StringIO()):
+        assert run(line.split()) == 0
+    print(*sorted(name for name in opened if name.startswith("my-")))
+"""
+
+
+def test_a_file_is_read_once_in_a_command(tmp_path):
+    """Arm, law and chain of one file are made of what is read of it once."""
+    tables = "[sampling]\nperiod = 0.005\n[law.hub_rate]\ngain = 0.3\n"
+    (tmp_path / "my-arm.toml").write_text(PRESETS.joinpath("sasaki2012-lab.toml").read_text("utf-8") + tables)
+    (tmp_path / "my-law.toml").write_text("[law.hub_rate]\ngain = 0.3\n")
+    lines = {
+        "margins my-arm.toml": "my-arm.toml",
+        "sampled my-arm.toml --law my-law.toml --modes 3": "my-arm.toml my-law.toml",
+        "check my-arm.toml": "my-arm.toml",
+        "compare sasaki2012 my-arm.toml --law my-law.toml --modes 2": "my-arm.toml my-law.toml",
+        "design my-arm.toml --modes 1 --structure PD": "my-arm.toml",
+    }
+    words = [sys.executable, "-c", OPENED, *lines]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == list(lines.values())
 
 
 def test_an_unproven_digit_is_exit_3(capsys, monkeypatch):

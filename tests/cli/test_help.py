@@ -78,7 +78,8 @@ def test_help_is_whole_and_has_an_example_that_is_understood(capsys, monkeypatch
     assert command.epilog in words
     verb, *rest = shlex.split(command.epilog.removeprefix("Example: tfarm "))
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "record.csv").touch()
+    for file in ("record.csv", "my-arm.toml", "rig.toml"):
+        (tmp_path / file).touch()
     assert verb == name
     command.make_context(verb, rest)
 

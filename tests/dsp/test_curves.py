@@ -22,7 +22,6 @@ from tfarm.dsp.traces import (
     curve_of,
     points_a_period,
     reference_angle,
-    ringing,
 )
 from tfarm.report.sampled_section import response_columns
 from tfarm.spectrum.table import default_gains
@@ -107,6 +106,6 @@ def test_torques_applied_again_let_a_mode_ring_as_far_as_in_the_simulation(name,
     simulator = Simulator(arm, chain, scenario(name, arm, chain, 0.3 if name == "step" else 1.5), count=1, between=400)
     run = simulator.linear(HubFeedback(K1=0.0, K2=0.0))
     moment = run.between.root_moment.reshape(-1, 400)[math.ceil(delay) :]  # 96 records a period, four periods a sample
-    frequency, size = ringing(simulator, run)
+    frequency, size = run.rings
     assert frequency == pytest.approx(tfarm.modes(arm, 1).natural_frequency[-1:])
     assert size[2, 0] == pytest.approx(np.ptp(moment, axis=1).max() / 2, rel=2e-3)

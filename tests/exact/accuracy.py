@@ -1,6 +1,6 @@
 """float64 against ball arithmetic at random (arm, s, x):  python -m tests.exact.accuracy SIZE SEED
 
-Arms of one link, whose ends the fused kernel has, and rigs.  The error of an output G is counted in the change of G
+Arms of one link and rigs.  The error of an output G is counted in the change of G
 that a relative change of its argument brings about: what is left of |G_64/G - 1| after division by 1 + |s dG/ds / G|,
 along the arm by 1 + |s dG/ds / G| + |x dG/dx / G|.  All of it comes from ball evaluations at (s, x) and next to it.
 Points that the kernel flags are not its own to answer: balls do.
@@ -51,13 +51,11 @@ def measure(arm, s, x, wanted=WANTED):
     """The outputs of one arm at one s and share x of the length: the representable ones as Points."""
     k = system_of(arm)
     exact = exact_values(k, s, x, wanted)
+    values, flagged = float_values(k, s, x, wanted)
     points = []
-    for names in (wanted.keys() & AT_ENDS.keys(), wanted.keys() - AT_ENDS.keys()):
-        values, flagged = float_values(k, s, x, {name: wanted[name] for name in wanted if name in names})
-        for name in names & exact.keys():
-            size, condition = exact[name]
-            error = float(abs(balls.point(values[name]) / size - 1).mid()) if np.isfinite(values[name]) else np.inf
-            points.append(Point(name, error / (1 + condition), flagged, (arm, s, x)))
+    for name, (size, condition) in exact.items():
+        error = float(abs(balls.point(values[name]) / size - 1).mid()) if np.isfinite(values[name]) else np.inf
+        points.append(Point(name, error / (1 + condition), flagged, (arm, s, x)))
     return points
 
 

@@ -71,13 +71,13 @@ def step_time(folder, compiler):
 
 
 def some_tuner(rng, **changed):
-    """A random tuner: 6 or 7 inputs, 1 to 12 neurons, both readings, with a guard or without."""
-    inputs, hidden, is_free = int(rng.choice([6, 7])), int(rng.integers(1, 13)), bool(rng.random() < 0.3)
+    """A random tuner: 6 or 7 inputs, 1 to 12 neurons, both readings."""
+    inputs, hidden = int(rng.choice([6, 7])), int(rng.integers(1, 13))
     size = float(rng.choice([0.5, 5.0, 50.0]))
     return SavedTuner(
         format=FORMAT, arm="sasaki2012-lab", period=0.01, K1=0.3, Kp=float(rng.choice([0.0, 2.0])),
         signals=str(rng.choice(["vibration", "total"])), a=1.0, b=2.6,
-        guard_kind="none" if is_free else "time-varying", guard=None if is_free else SECTOR,
+        guard_kind="time-varying", guard=SECTOR,
         scales=(10 ** rng.uniform(-2, 2, inputs)).tolist(),
         W1=rng.normal(0, size, (hidden, inputs)).tolist(), w2=rng.normal(0, size, hidden).tolist(),
     ).model_copy(update=changed)  # fmt: skip

@@ -41,15 +41,6 @@ def test_a_change_is_seen(now, path):
     assert differences("margins x", before, now)[0].split(":")[0] == path
 
 
-def test_numbers_are_compared_under_their_new_names():
-    before = {"K1_interval": [0.0, 2.0], "in_band": {"band_rad_s": 5.0}}
-    now = {"stability_intervals": [{"number": "K1", "interval": {"low": 0.0, "high": 2.1}}], "in_range": {}}
-    assert differences("margins x", before, now) == [
-        "K1_interval[1]: 2.0, 2.1",
-        "in_band.band_rad_s: in_range.up_to_rad_s is not there",
-    ]
-
-
 def test_a_search_may_improve_and_not_fall_back():
     before = {"verdict": "stable", "value": 0.1, "K1": 3.0}
     for value, worse in ((0.2, []), (0.09, ["value: 0.1, 0.09"])):

@@ -15,7 +15,7 @@ DRAWS = 40
 
 def planted(one, sources):
     """Return margins that fall with K2; unstable above 1, no limit of the gain below 0.3, an error above 1.3."""
-    mass, K2 = one.arm.payload.mass, one.law.K2
+    mass, K2 = one.case.arm.payload.mass, one.case.law.gains.K2
     if K2 > 1.3:
         raise tfarm.ConvergenceError(f"{TEXT} {K2}", None, None)
     found = {}

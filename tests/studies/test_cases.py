@@ -7,13 +7,14 @@ import pytest
 
 import tfarm
 from tests.shell import answer
+from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.studies import quantities as room
-from tfarm.studies.cases import learning_curves, over_values, results
+from tfarm.studies.cases import learning_curves
 from tfarm.studies.quantities import column_names, sources_of, values_of
 from tfarm.studies.running import Plan, chunk
-from tfarm.studies.space import Subjects
+from tfarm.studies.space import Subjects, space_of
 from tfarm.tuner import tune
 from tfarm.tuner import tuning as tuning_room
 from tfarm.tuner.tuning import usual_plan
@@ -24,13 +25,13 @@ LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
 
 def values(words, arm=LAB, law=LAW, **numbers):
     """Values of the columns of some words for one arm, with other numbers by key."""
-    subject = Subjects(arm, law, Chain(), tuple(numbers)).at(tuple(numbers.values()))
+    subject = Subjects(Case(arm, law), tuple(numbers)).at(tuple(numbers.values()))
     return values_of(subject, sources_of(column_names(words)))
 
 
 def grid(key, points, names):
     """The plan of a study over the values of one key."""
-    return Plan(LAB, LAW, Chain(), over_values(key, points), tuple(names))
+    return Plan(Case(LAB, LAW), space_of({key: {"values": points}}, draws=1, seed=0), tuple(names))
 
 
 def test_a_mode_of_any_number_has_a_column():
@@ -103,8 +104,3 @@ def test_learning_curves_have_guard_and_baselines_computed_once(monkeypatch):
     assert seen == [(n, 3, "learning curves") for n in (1, 2, 3)]
     assert curves.costs[0].tolist() == tuning.training.costs.tolist()
     assert curves.final[0] == tuning.training.result.cost
-
-
-def test_a_row_without_a_result_is_an_error_of_a_case():
-    with pytest.raises(ConvergenceError, match=r"payload\.mass = -1"):
-        results(grid("payload.mass", (0.1, -1.0), column_names(["modes"])), 0, 2)

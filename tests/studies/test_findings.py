@@ -12,7 +12,7 @@ from tests.shared import sized, thinned
 from tests.studies.planted import confidence
 from tfarm.arm.chain import load_chain
 from tfarm.arm.law_tables import load_law
-from tfarm.dsp import Chain
+from tfarm.case import Case
 from tfarm.errors import ParameterError
 from tfarm.spectrum.table import default_gains
 from tfarm.studies import running
@@ -178,7 +178,7 @@ def test_an_unknown_quantity_is_one_line_with_the_nearest(word, near):
 
 
 def test_values_are_those_of_the_card_and_no_more_is_computed(lab, monkeypatch):
-    one = Subject(lab, GAINS, Chain(), {})
+    one = Subject(Case(lab, GAINS), {})
     card = tfarm.result_card(lab, GAINS)
     whole = values_of(one, sources_of(column_names(["card"])))
     for loop in ("continuous", "sampled"):
@@ -200,7 +200,7 @@ def test_a_loop_that_is_not_determined_leaves_the_other_one_and_its_reason(lab, 
         raise tfarm.ConvergenceError("the pole is lost", None, None)
 
     monkeypatch.setattr("tfarm.studies.quantities.stability", lost)
-    found = values_of(Subject(lab, GAINS, Chain(), {}), sources_of(["continuous.stability", "sampled.stability"]))
+    found = values_of(Subject(Case(lab, GAINS), {}), sources_of(["continuous.stability", "sampled.stability"]))
     assert found == {
         "continuous.stability": None,
         "sampled.stability": "stable",
@@ -211,7 +211,7 @@ def test_a_loop_that_is_not_determined_leaves_the_other_one_and_its_reason(lab, 
 def test_a_law_in_z_has_a_sampled_loop_alone(lab):
     law = tfarm.Law({"hub_rate": 0.3}, period=0.01, references=("hub_rate",))
     names = ["continuous.stability", "sampled.stability"]
-    found = values_of(Subject(lab, law, Chain(), {}), sources_of(names))
+    found = values_of(Subject(Case(lab, law), {}), sources_of(names))
     assert found == {"continuous.stability": None, "sampled.stability": "stable", "failed": None}
 
 
@@ -222,7 +222,7 @@ ASKED = ["step.sampled.tip.settling_time_s", "step.continuous.tip.settling_time_
 def test_time_response_and_damping_ratios_of_every_preset(name, monkeypatch):
     arm, chain, seen = tfarm.load(name), load_chain(name), []
     monkeypatch.setattr("tfarm.studies.quantities.step", lambda *args: seen.append(tfarm.step(*args)) or seen[-1])
-    found = values_of(Subject(arm, default_gains(arm), chain, {}), sources_of(column_names(ASKED)))
+    found = values_of(Subject(Case(arm, default_gains(arm), chain), {}), sources_of(column_names(ASKED)))
     assert found["failed"] is None
     for loop in ("sampled", "continuous"):
         own = getattr(seen[0], loop)

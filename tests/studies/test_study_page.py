@@ -63,7 +63,7 @@ def test_the_confidence_is_named_for_draws_alone(found, page):
     assert re.search(
         r"converged stable on \d+ of 40 arms \(\d+ not stable, \d+ not determined\): at least [\d.]+ %", page
     )
-    counted = [replace(each, at_least=None).finding for each in found.shares]
+    counted = [each._replace(at_least=None).finding for each in found.shares]
     assert all("at least" not in each for each in counted)
 
 

@@ -7,7 +7,7 @@ characteristic function of a loop has no pole at a pole of its controller.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -22,10 +22,7 @@ from tfarm.records import record
 
 Matrices = tuple[Real, Real, Real, Real]
 
-LARGEST_COEFFICIENT = 1e150  # the square of one is still a double
 MOST_DEGREE = 60  # of one part: beyond it rounding of the coefficients moves the roots
-GROWTH_READ_AT = (1e-6, 1e-9)  # 1/s: the numerator of a state space grows there as its lowest power of s
-REAL_PAIR = 1e-9  # of its size: how far a root may be from the conjugate of another
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +53,11 @@ class Rational:
     def order(self) -> int:
         """The number of its states, where it is proper."""
         return len(self.den) - 1
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether it is a number."""
+        return len(self.num) == len(self.den) == 1
 
     @property
     def excess(self) -> int:
@@ -91,19 +93,14 @@ class Rational:
 
     def matrices(self) -> Matrices:
         """Return a state space (controllable form, balanced).  Raises ParameterError where it is not proper."""
-        require(
-            self.excess <= 0,
-            "num",
-            list(self.num),
-            "of a higher degree than its denominator: it has no state space; add a pole",
-        )
+        remedy = "of a higher degree than its denominator: it has no state space; add a pole"
+        require(self.excess <= 0, "num", list(self.num), remedy)
         den = np.array(self.den) / self.den[0]
         num = np.r_[np.zeros(-self.excess), np.array(self.num) / self.den[0]]
-        n = self.order
-        A, B = np.eye(n, k=-1), np.eye(n, 1)
+        A = np.eye(self.order, k=-1)
         A[:1] = -den[1:]
-        C = (num[1:] - num[0] * den[1:])[None]
-        return balanced(A, B, C, np.array([[num[0]]]))
+        C = num[1:] - num[0] * den[1:]
+        return balanced(A, np.eye(self.order, 1), C[None], num[:1, None])
 
 
 @dataclass(frozen=True)
@@ -118,6 +115,7 @@ class StateSpace:
     B: Real
     C: Real
     D: Real
+    is_constant = False  # a name of Rational's, though without states it may be
 
     def __post_init__(self) -> None:
         for name in "ABCD":
@@ -126,17 +124,16 @@ class StateSpace:
             except (TypeError, ValueError):
                 raise ParameterError(key=name, value="matrix", remedy="rows of numbers") from None
             require(found.ndim == 2 and np.isfinite(found).all(), name, "matrix", "rows of finite numbers")
-            if name in "AB" and not found.size:  # without states
-                found = np.empty((0, 0 if name == "A" else found.shape[1] or 1))
             object.__setattr__(self, name, found)
-        n, m = len(self.A), self.D.shape[1]
+        m = self.D.shape[1]
+        if not self.A.size:  # without states
+            object.__setattr__(self, "A", np.empty((0, 0)))
+            object.__setattr__(self, "B", np.empty((0, m)))
+        n = len(self.A)
         for name, shape in {"A": (n, n), "B": (n, m), "C": (1, n), "D": (1, m)}.items():
-            require(
-                getattr(self, name).shape == shape,
-                name,
-                "matrix",
-                f"{getattr(self, name).shape}, expected {shape}: A (n, n), B (n, m), C (1, n), D (1, m)",
-            )
+            own = getattr(self, name).shape
+            remedy = f"{own}, expected {shape}: A (n, n), B (n, m), C (1, n), D (1, m)"
+            require(own == shape, name, "matrix", remedy)
         require(n <= MOST_DEGREE, "A", n, f"at most {MOST_DEGREE} states are read")
 
     @property
@@ -165,14 +162,15 @@ class StateSpace:
 
     def numerators(self, s: Complex) -> Complex:
         """Return det[[s - A, B_j], [-C, D_j]] (m, n): the transfer function from each signal j times det(s - A)."""
-        n, flat = self.order, np.ravel(s)
-        bordered = np.zeros((flat.size, n + 1, n + 1), complex)
-        bordered[:, :n, :n] = flat[:, None, None] * np.eye(n) - self.A
-        bordered[:, n, :n] = -self.C
+        n = self.order
+        bordered = np.zeros((*np.shape(s), n + 1, n + 1), complex)
+        bordered[..., :n, :n] = s[..., None, None] * np.eye(n) - self.A
+        bordered[..., n, :n] = -self.C
         found = np.zeros((self.signals, *np.shape(s)), complex)
         for j in np.flatnonzero(self.B.any(axis=0) | self.D.any(axis=0)):  # an empty column has 0
-            bordered[:, :n, n], bordered[:, n, n] = self.B[:, j], self.D[0, j]
-            found[j] = np.linalg.det(bordered).reshape(np.shape(s))
+            bordered[..., :n, n] = self.B[:, j]
+            bordered[..., n, n] = self.D[0, j]
+            found[j] = np.linalg.det(bordered)
         return found
 
     def zeros_at_origin(self, signal: int) -> int | None:
@@ -180,10 +178,11 @@ class StateSpace:
 
         None where it is 0 at one of them.
         """
-        first, second = abs(self.numerators(np.array(GROWTH_READ_AT, dtype=complex))[signal])
+        near, nearer = 1e-6 + 0j, 1e-9 + 0j  # 1/s: there the numerator grows as its lowest power of s
+        first, second = abs(self.numerators(np.array([near, nearer]))[signal])
         if not (first and second):
             return None
-        return max(0, round(math.log(first / second) / math.log(GROWTH_READ_AT[0] / GROWTH_READ_AT[1])))
+        return max(0, round(math.log(first / second) / math.log(abs(near / nearer))))
 
     def times(self, factor: float) -> StateSpace:
         """Return the block times a number."""
@@ -208,32 +207,28 @@ def block_of(key: str, entry: Any) -> tuple[LawBlock, float | None]:
     dt = getattr(entry, "dt", None)  # python-control's: 0 of a continuous-time system, True of an unspecified period
     period = None if dt is None or dt is True or dt == 0 else float(dt)
     if all(hasattr(entry, name) for name in "ABCD"):
-        system = [getattr(entry, name) for name in "ABCD"]
+        system = StateSpace(*(getattr(entry, name) for name in "ABCD"))
         if hasattr(entry, "poles"):  # python-control's, with states of any size
-            system = list(balanced(*(np.asarray(part, dtype=float) for part in system)))
-        return StateSpace(*system), period
+            system = StateSpace(*balanced(*system.matrices()))
+        return system, period
     if hasattr(entry, "num") and hasattr(entry, "den"):
-        num, den = (np.asarray(part[0][0], dtype=float) for part in (entry.num, entry.den))
-        require(
-            len(entry.num) == 1 and len(entry.num[0]) == 1,
-            key,
-            type(entry).__name__,
-            "has several inputs or outputs; give one transfer function a signal, or matrices",
-        )
-        return Rational(tuple(num.tolist()), tuple(den.tolist())), period
+        remedy = "has several inputs or outputs; give one transfer function a signal, or matrices"
+        require(len(entry.num) == len(entry.num[0]) == 1, key, type(entry).__name__, remedy)
+        return Rational(_row(entry.num[0][0]), _row(entry.den[0][0])), period
     if isinstance(entry, dict):
-        unknown = set(entry) - {"zeros", "poles", "gain"}
-        require(
-            not unknown and "gain" in entry,
-            key,
-            sorted(map(str, entry)),
-            "a mapping holds gain, and zeros and poles where there are any",
-        )
+        remedy = "a mapping holds gain, and zeros and poles where there are any"
+        is_known = "gain" in entry and set(entry) <= {"zeros", "poles", "gain"}
+        require(is_known, key, sorted(map(str, entry)), remedy)
         return Rational.of_roots(entry.get("zeros", ()), entry.get("poles", ()), entry["gain"]), None
     if isinstance(entry, tuple | list) and len(entry) == 2:
-        return Rational(*(tuple(np.atleast_1d(np.asarray(part, dtype=float)).tolist()) for part in entry)), None
+        return Rational(*map(_row, entry)), None
     remedy = "a finite number, (num, den), a mapping with zeros, poles and gain, or a python-control system"
     return Rational((number(key, entry, remedy),)), None
+
+
+def _row(part: ArrayLike) -> tuple[float, ...]:
+    """Return the coefficients of a polynomial, also of a single number."""
+    return tuple(np.atleast_1d(np.asarray(part, dtype=float)).tolist())
 
 
 def balanced(A: Real, B: Real, C: Real, D: Real) -> Matrices:
@@ -247,19 +242,14 @@ def balanced(A: Real, B: Real, C: Real, D: Real) -> Matrices:
     return np.asarray(balanced_A), B / scale[:, None], C * scale, D
 
 
-def _polynomial(name: str, values: Iterable[Any]) -> tuple[float, ...]:
+def _polynomial(name: str, values: Any) -> tuple[float, ...]:
     """Return coefficients without leading zeros.  Raises ParameterError where one is not finite."""
     remedy = "numbers in descending powers, such as [1, 0.5]"
-    require(
-        not isinstance(values, str) and isinstance(values, Sequence | np.ndarray) and len(values), name, values, remedy
-    )
+    is_row = isinstance(values, Sequence | np.ndarray) and not isinstance(values, str)
+    require(is_row and len(values), name, values, remedy)
     found = [number(name, each, remedy) for each in values]
-    require(
-        all(math.isfinite(each) and abs(each) <= LARGEST_COEFFICIENT for each in found),
-        name,
-        found,
-        f"finite numbers, at most {LARGEST_COEFFICIENT:g} in size",
-    )
+    most = 1e150  # the square of one is still a double
+    require(all(abs(each) <= most for each in found), name, found, f"finite numbers, at most {most:g} in size")
     while len(found) > 1 and found[0] == 0:
         found.pop(0)
     require(len(found) <= MOST_DEGREE + 1, name, len(found) - 1, f"a degree of at most {MOST_DEGREE}")
@@ -271,16 +261,12 @@ def _of_roots(name: str, roots: ArrayLike) -> Real:
     try:
         found = np.array([complex(*each) if isinstance(each, tuple | list) else complex(each) for each in list(roots)])  # type: ignore[arg-type]
     except (TypeError, ValueError):
-        raise ParameterError(
-            key=name, value=roots, remedy="numbers, complex ones as [re, im], with their conjugates"
-        ) from None
+        remedy = "numbers, complex ones as [re, im], with their conjugates"
+        raise ParameterError(key=name, value=roots, remedy=remedy) from None
     require(len(found) <= MOST_DEGREE, name, len(found), f"at most {MOST_DEGREE}")
     upper = np.sort_complex(found[found.imag > 0])
     lower = np.sort_complex(found[found.imag < 0].conj())
-    require(
-        upper.size == lower.size and not (abs(upper - lower) > REAL_PAIR * abs(upper)).any(),
-        name,
-        [f"{each:g}" for each in found],
-        "a complex root without its conjugate: real coefficients need both",
-    )
+    is_paired = upper.size == lower.size and (abs(upper - lower) <= 1e-9 * abs(upper)).all()
+    remedy = "a complex root without its conjugate: real coefficients need both"
+    require(is_paired, name, [f"{each:g}" for each in found], remedy)
     return np.atleast_1d(np.poly(np.r_[upper, upper.conj(), found[found.imag == 0]]).real)

@@ -5,16 +5,16 @@ By default everything is ideal.  Frozen records, checked once, SI units.
 
 import json
 import math
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, Literal
 
 from tfarm.arm import schema
 from tfarm.arm.checks import check_fields, extended, not_negative, number, positive, whole
-from tfarm.arm.reading import load_tables
+from tfarm.arm.reading import AnyFile, load_tables
 from tfarm.arm.records import Arm
 from tfarm.arm.schema import ArmTable, TomlTable, validated
+from tfarm.arm.stages import are_linear
 from tfarm.arm.writing import to_toml
 from tfarm.errors import ParameterError, must_be_known, naming, require, unknown_key
 from tfarm.schema import Quantity
@@ -171,10 +171,8 @@ class Chain:
 
     @property
     def is_linear(self) -> bool:
-        """Whether there is neither quantisation nor saturation."""
-        c = self.converters
-        ideal = Converters(hub_rate=c.hub_rate, rate_filter=c.rate_filter, arithmetic=c.arithmetic)
-        return c == ideal and math.isinf(self.actuator.torque_limit)
+        """Whether all of its stages are: there is neither quantisation nor saturation."""
+        return are_linear(stated(self))
 
 
 def chain_or_usual(chain: object) -> Chain:
@@ -203,7 +201,7 @@ CHAIN_TABLES: dict[str, type[TomlTable]] = {
 }
 
 
-def load_chain(name_or_path: str | os.PathLike[str]) -> Chain:
+def load_chain(name_or_path: AnyFile) -> Chain:
     """Read the chain of an arm's file (or preset, or a file of its own); ideal without these tables.
 
     Raises ParameterError for an unknown key, a wrong type or an invalid value.

@@ -6,8 +6,9 @@ Each check runs once, where a record is built.  `key` is the name in the TOML fi
 import math
 import re
 from collections.abc import Callable
+from functools import cache
 from numbers import Integral, Real
-from typing import Any, Literal, cast, get_args
+from typing import Annotated, Any, Literal, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -20,12 +21,11 @@ OUT_OF_RANGE = f"beyond any arm ({SMALLEST_NUMBER:g} to {LARGEST_NUMBER:g}); che
 Input = Literal["hub_torque", "motor_voltage", "motor_current", "hub_angle"]
 INPUTS: tuple[Input, ...] = get_args(Input)
 INPUT_UNITS = {"hub_torque": "N m", "motor_voltage": "V", "motor_current": "A", "hub_angle": "rad"}
+Check = Callable[[str, object, str], float]  # of key, value and the legal values in words
 Theory = Literal["timoshenko", "shear", "rayleigh", "euler-bernoulli"]  # of the beam
 THEORIES: tuple[Theory, ...] = get_args(Theory)
 WITH_ROTARY_INERTIA: tuple[Theory, ...] = ("timoshenko", "rayleigh")
 WITH_SHEAR: tuple[Theory, ...] = ("timoshenko", "shear")
-MOST_NAME_BYTES = 200  # in UTF-8: file systems stop at 255, and a temporary file's name is longer than its own
-DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in "0123456789¹²³")}
 
 
 def number(key: str, value: object, meaning: str) -> float:
@@ -80,6 +80,13 @@ def extended(key: str, value: object, meaning: str) -> float:
     return x if x == math.inf else not_negative(key, x, meaning)
 
 
+def above_zero(key: str, value: object, meaning: str) -> float:
+    """Return a positive number or inf."""
+    x = extended(key, value, meaning)
+    require(x, key, x, meaning)
+    return x
+
+
 def on_the_arm(key: str, x: Reals | float, length: float) -> Reals:
     """Return points x [m] of an arm of this length as an array.  Raises ParameterError for points off it and nan."""
     points = np.asarray(x, dtype=float)
@@ -87,22 +94,31 @@ def on_the_arm(key: str, x: Reals | float, length: float) -> Reals:
     return points
 
 
-def check_fields(record: object, kind: str, check: Callable[[str, object, str], float], **meanings: str) -> None:
+def check_fields(record: object, kind: str, check: Check, **meanings: str) -> None:
     """Replace fields of a frozen record by their checked values, each under the key `kind.field`."""
     for name, meaning in meanings.items():
         key = f"{kind}.{name}" if kind else name
         object.__setattr__(record, name, check(key, getattr(record, name), meaning))
 
 
+@cache
+def _annotated(kind: type) -> dict[str, tuple[Check, str]]:
+    """Return check and meaning of each field of a class of records that has both in its annotation."""
+    hints = get_type_hints(kind, include_extras=True)
+    return {name: hint.__metadata__ for name, hint in hints.items() if get_origin(hint) is Annotated}
+
+
+def check_annotated(record: object, kind: str) -> None:
+    """Replace each field of a frozen record that has a check in its annotation by its checked value."""
+    for name, (check, meaning) in _annotated(cast("Any", type(record))).items():
+        object.__setattr__(record, name, check(f"{kind}.{name}", getattr(record, name), meaning))
+
+
 def plain_name(name: Any) -> str:
-    """Return a name that is also a legal folder name on every file system."""
+    """Return a name whose characters are those of a folder's name on every file system."""
     remedy = 'a name has 1 to 80 characters, begins with a letter or digit and has no / \\ : * ? " < > |'
     is_name = isinstance(name, str) and re.fullmatch(r'[^\W_]([^/\\:*?"<>|]{0,78}[^/\\:*?"<>| .])?', name)
     require(is_name and name.isprintable(), "name", name, remedy)
-    size = len(name.encode())
-    require(size <= MOST_NAME_BYTES, "name", name, f"{size} bytes; at most {MOST_NAME_BYTES}")
-    is_device = name.partition(".")[0].rstrip().casefold() in DEVICES
-    require(not is_device, "name", name, "is a device to Windows; give the arm another name")
     return str(name)
 
 

@@ -25,10 +25,8 @@ from tfarm.errors import ParameterError, did_you_mean, must_be_known, require
 from tfarm.records import record
 
 MOST_SIGNALS = 12  # of a law, for time and memory
-CANCELLED = 1e-6  # of its size: distance within which a zero cancels an unstable pole
 REFERENCE = "reference:"  # before the name of a signal: its reference
-NUMBER = re.compile(r"(.*?)(?:\.(gain|num|den)(?:\.(\d+))?)?", re.DOTALL)  # signal, what of it, a coefficient's place
-SAMPLING_RULES = ("tustin", "zoh", "matched")  # by which a continuous-time law is discretised
+NUMBER = re.compile(r"(.*?)(?:\.gain|\.(num|den)\.(\d+))?", re.DOTALL)  # a signal, or one of its coefficients
 
 
 @dataclass(frozen=True)
@@ -78,15 +76,10 @@ class Law:
         require(len(known) <= 1, "period", sorted(known), "the parts of a law have one sampling period in common")
         object.__setattr__(self, "period", known.pop() if known else None)
         object.__setattr__(self, "references", tuple(self.references))
-        require(
-            self.sign in (-1, 1) and self.sign is not True,
-            "sign",
-            self.sign,
-            "-1 (v = -C y, the default) or 1 (v = C y)",
-        )
+        require(self.sign in (-1, 1), "sign", self.sign, "-1 (v = -C y, the default) or 1 (v = C y)")
         if self.input is not None:
             must_be_known("input", self.input, INPUTS)
-        must_be_known("rule", self.rule, SAMPLING_RULES)
+        must_be_known("rule", self.rule, ("tustin", "zoh", "matched"))
         require(len(self.signals) <= MOST_SIGNALS, "signals", len(self.signals), f"at most {MOST_SIGNALS} signals")
         for each in self.references:
             must_be_known("references", each, self.signals)
@@ -97,13 +90,9 @@ class Law:
     def of_matrices(cls, A: Any, B: Any, C: Any, D: Any, signals: Sequence[str], **others: Any) -> Law:
         """Build a law of one state space from several signals, in the order of the columns of B and D."""
         block = StateSpace(A, B, C, D)
-        require(
-            block.signals == len(signals),
-            "signals",
-            list(signals),
-            f"B has {block.signals} columns: name one signal for each",
-        )
-        columns = tuple(name if name == "" else _signal(name, of_reference=True) for name in signals)
+        remedy = f"B has {block.signals} columns: name one signal for each"
+        require(block.signals == len(signals), "signals", list(signals), remedy)
+        columns = tuple(name and _signal(name, of_reference=True) for name in signals)
         law = cls({}, parts=(Part(columns, block),), **others)
         require(law.signals, "signals", list(signals), "name at least one measured signal")
         return law
@@ -122,7 +111,8 @@ class Law:
                 yield ", ".join(part.signals), f"<{block.order} states>"
             else:
                 num, den = (f"[{', '.join(f'{each:.6g}' for each in of)}]" for of in (block.num, block.den))
-                yield part.signals[0], num[1:-1] if len(block.num) == 1 and block.den == (1.0,) else f"({num}, {den})"
+                is_gain = block.is_constant and block.den == (1.0,)
+                yield part.signals[0], num[1:-1] if is_gain else f"({num}, {den})"
 
     @cached_property
     def signals(self) -> tuple[str, ...]:
@@ -153,8 +143,7 @@ class Law:
     @property
     def is_static(self) -> bool:
         """Whether it is a constant gain on each signal, without delay."""
-        plain = all(isinstance(part.block, Rational) and not part.block.order for part in self.parts)
-        return plain and not (self.delay or self.is_discrete or self.is_improper)
+        return all(part.block.is_constant for part in self.parts) and not (self.delay or self.is_discrete)
 
     @property
     def poles(self) -> Complex:
@@ -179,12 +168,16 @@ class Law:
         """
         found = {"gain": 1.0}
         for key, (place, value) in self.part_gains.items():
-            (name,), block = self.parts[place].signals, self.parts[place].block
-            if key == name or isinstance(block, StateSpace) or np.count_nonzero(block.num) > 1:
+            block = self.parts[place].block
+            name = key.removesuffix(".gain")
+            if isinstance(block, StateSpace) or block.is_constant:
                 found[key] = value
-            if isinstance(block, Rational) and key != name:
-                polynomials = {"num": block.num, "den": block.den if block.order else ()}
-                found |= {f"{name}.{of}.{n}": each for of, row in polynomials.items() for n, each in enumerate(row)}
+                continue
+            if np.count_nonzero(block.num) > 1:
+                found[key] = value
+            found |= {f"{name}.num.{n}": each for n, each in enumerate(block.num)}
+            if block.order:
+                found |= {f"{name}.den.{n}": each for n, each in enumerate(block.den)}
         return {name: value for name, value in found.items() if value}
 
     @property
@@ -193,12 +186,13 @@ class Law:
 
         A constant gain has the name of its signal, "hub_angle"; other blocks have a factor of 1, "hub_angle.gain".
         """
-        found, read = {}, [name for part in self.parts for name in part.signals]
+        found = {}
+        every = [name for part in self.parts for name in part.signals]
         for place, part in enumerate(self.parts):
-            (name, *others), block = part.signals, part.block
-            if others or not is_measured(name) or read.count(name) > 1:
+            name, block = part.signals[0], part.block
+            if len(part.signals) > 1 or not is_measured(name) or every.count(name) > 1:
                 continue
-            if isinstance(block, Rational) and len(block.num) == len(block.den) == 1:
+            if isinstance(block, Rational) and block.is_constant:
                 found[name] = place, block.num[0] / block.den[0]
             else:
                 found[f"{name}.gain"] = place, 1.0
@@ -254,13 +248,11 @@ class Law:
         """
         from scipy.linalg import block_diag
 
-        columns = self.signals if columns is None else tuple(columns)
-        blocks = [part.block.matrices() for part in self.parts]
-        chosen = [np.array([[name == each for each in columns] for name in part.signals], float) for part in self.parts]
-        pairs = list(zip(blocks, chosen, strict=True))
-        A, C = block_diag(*(a for a, *_ in blocks)), np.hstack([c for _, _, c, _ in blocks])
-        B, D = np.vstack([b @ own for (_, b, _, _), own in pairs]), sum(d @ own for (*_, d), own in pairs)
-        return A, B, -self.sign * C, -self.sign * D
+        names = [name for part in self.parts for name in part.signals]
+        chosen = np.array([[name == each for each in columns or self.signals] for name in names], float)
+        A, B, C, D = (block_diag(*each) for each in zip(*(part.block.matrices() for part in self.parts), strict=True))
+        C, D = (-self.sign * each.sum(axis=0, keepdims=True) for each in (C, D))
+        return A, B @ chosen, C, D @ chosen
 
     # ------------------------------------------------------------ other laws
 
@@ -326,12 +318,12 @@ def is_measured(name: str) -> bool:
 
 
 def _varied(block: LawBlock, of: str, place: str, value: float, key: str) -> LawBlock:
-    """Return a block with another factor, or another coefficient of its numerator or denominator."""
-    if of in ("", "gain") and not place:
-        is_gain = isinstance(block, Rational) and not block.order and len(block.num) == 1
-        return Rational((value,)) if is_gain else block.times(value)
-    numbers, remedy = list(getattr(block, of, ())), "a number of the law is named signal, signal.num.N or signal.den.N"
-    require(place and int(place) < len(numbers), "law", key, f"{remedy} with N counted from 0")
+    """Return a block with another factor, or another coefficient of its polynomial `of`."""
+    if not of:
+        return Rational((value,)) if block.is_constant else block.times(value)
+    numbers = list(getattr(block, of, ()))
+    remedy = "a number of the law is named signal, signal.num.N or signal.den.N with N counted from 0"
+    require(int(place) < len(numbers), "law", key, remedy)
     numbers[int(place)] = value
     return replace(block, **{of: tuple(numbers)})  # type: ignore[arg-type]  # of a Rational
 
@@ -365,9 +357,9 @@ def of_common_blocks(law: Law) -> Law:
     """Return the law with ratios of the same denominator as one block: apart, each adds poles that no signal shows."""
     alike: dict[object, list[Part]] = {}
     for part in law.parts:
-        alike.setdefault(
-            getattr(part.block, "den", id(part)) if part.block.order and part.block.excess <= 0 else id(part), []
-        ).append(part)
+        is_shared = part.block.order and part.block.excess <= 0
+        key = getattr(part.block, "den", id(part)) if is_shared else id(part)
+        alike.setdefault(key, []).append(part)
     return replace(law, parts=tuple(map(_common, alike.values())))
 
 
@@ -419,8 +411,9 @@ def cancelled(law: Law) -> tuple[str, ...]:
     for part in law.parts:
         zeros = getattr(part.block, "zeros", np.empty(0, complex))
         for pole in part.block.poles:
-            is_cancelled = (abs(zeros - pole) <= CANCELLED * max(abs(pole), 1e-12)).any()
-            if is_cancelled and (abs(pole) >= 1 if law.is_discrete else pole.real >= 0):
+            is_unstable = abs(pole) >= 1 if law.is_discrete else pole.real >= 0
+            if is_unstable and (abs(zeros - pole) <= 1e-6 * max(abs(pole), 1e-12)).any():
                 where = f"z = {pole:.6g}" if law.is_discrete else f"{pole:.6g} 1/s"
-                found.append(f"{where} on {', '.join(part.signals)}")
-    return tuple(f"the law cancels its own unstable pole {each}: it is not stable" for each in found)
+                signals = ", ".join(part.signals)
+                found.append(f"the law cancels its own unstable pole {where} on {signals}: it is not stable")
+    return tuple(found)

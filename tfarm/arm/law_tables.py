@@ -13,14 +13,13 @@
 or `matrices = "file.mat"` with A, B, C, D and `signals = [...]`, a name for each column of B.
 """
 
-import os
 from pathlib import Path
 from typing import Any
 
 from pydantic import Field
 
 from tfarm.arm.law import Law
-from tfarm.arm.reading import load_tables
+from tfarm.arm.reading import AnyFile, load_tables
 from tfarm.arm.schema import StrictTable, validated
 from tfarm.errors import MISSING, ParameterError, close_to, listed, must_be_known, naming, require
 from tfarm.files import read_mat
@@ -67,7 +66,7 @@ class SignalTable(StrictTable):
         return {"zeros": self.zeros or (), "poles": self.poles or (), "gain": self.gain}
 
 
-def load_law(name_or_path: str | os.PathLike[str]) -> Law | None:
+def load_law(name_or_path: AnyFile) -> Law | None:
     """Return the law of a file's [law] table, None where it has none.
 
     Raises ParameterError, naming the file, for an unknown key, a wrong type or an illegal value.
@@ -107,22 +106,21 @@ def law_of_table(table: Any, folder: Path) -> Law:
 
 def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:
     """Return the law of a .mat file with A, B, C and D, or of its structure named `system`."""
-    import numpy as np
-
     signals = head.signals or []
     require(signals, "signals", MISSING, "name a signal for each column of B")
     found, _ = read_mat(folder / str(head.matrices), MOST_MAT_BYTES, key="matrices")
+    place = ""
     if head.system is not None:
         must_be_known("system", head.system, dict.fromkeys(name.split(".")[0] for name in found if "." in name))
-    place = "" if head.system is None else f"{head.system}."
+        place = f"{head.system}."
     missing = [name for name in "ABCD" if f"{place}{name}" not in found]
     remedy = f"holds no {', '.join(missing)}; it has {listed(found, 300)} (system = names a structure)"
     require(not missing, "matrices", head.matrices, remedy)
-    try:
-        A, B, C, D = (np.atleast_2d(np.asarray(found[f"{place}{name}"], dtype=float)) for name in "ABCD")
-    except (TypeError, ValueError):
-        raise ParameterError(key="matrices", value=head.matrices, remedy="A, B, C and D hold numbers") from None
-    if head.scales is not None:
-        require(len(head.scales) == len(signals), "scales", head.scales, "one number for each signal")
-        B, D = B * head.scales, D * head.scales
-    return Law.of_matrices(A, B, C, D, signals, **common)
+    A, B, C, D = (found[f"{place}{name}"] for name in "ABCD")
+    law = Law.of_matrices(A, B, C, D, signals, **common)
+    if head.scales is None:
+        return law
+    require(len(head.scales) == len(signals), "scales", head.scales, "one number for each signal")
+    (part,) = law.parts
+    A, B, C, D = part.block.matrices()  # of finite numbers now
+    return Law.of_matrices(A, B * head.scales, C, D * head.scales, signals, **common)

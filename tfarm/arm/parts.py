@@ -11,19 +11,12 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING as NO_DEFAULT
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal, cast
+from typing import Annotated, Any, Literal, cast
 
-from tfarm.arm.checks import check_fields, extended, not_negative, number, positive, signed
+from tfarm.arm.checks import above_zero, check_annotated, extended, not_negative, number, positive, signed
 from tfarm.errors import MISSING, must_be_known, require
 
-KEY = "link.section"  # before the names of its numbers in messages
-SLENDEREST = 1e9  # length over radius of gyration: above it the units are wrong
-MEANINGS = {
-    "length": "a length is a positive, finite number of metres",
-    "density": "a density is a positive, finite number in kg/m^3",
-    "youngs_modulus": "Young's modulus is a positive, finite number in Pa",
-    "shear_modulus": "a shear modulus is a positive, finite number in Pa",
-}
+MODULUS = "Young's modulus is a positive, finite number in Pa"
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,33 +74,25 @@ class Section:
     """
 
     shape: str
-    area: float
-    second_moment: float
+    area: Annotated[float, positive, "a section has a positive, finite area in m^2"]
+    second_moment: Annotated[float, positive, "a section has a positive, finite second moment in m^4"]
     shear_factor: float | None = None
     dimensions: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
-        check_fields(
-            self,
-            KEY,
-            positive,
-            area="a section has a positive, finite area in m^2",
-            second_moment="a section has a positive, finite second moment in m^4",
-        )
+        check_annotated(self, "link.section")
         if self.shear_factor is not None:
             meaning = "a shear factor multiplies G A: above 0, up to 1 (a form factor of 6/5 is entered as 5/6)"
-            kappa = positive(f"{KEY}.shear_factor", self.shear_factor, meaning)
-            require(kappa <= 1.0, f"{KEY}.shear_factor", kappa, meaning)
+            kappa = positive("link.section.shear_factor", self.shear_factor, meaning)
+            require(kappa <= 1.0, "link.section.shear_factor", kappa, meaning)
             object.__setattr__(self, "shear_factor", kappa)
-        remedy = "a general section needs its own, e.g. 0.8333333333333334 for a rectangle"
-        require(self.shape != "general" or self.shear_factor is not None, f"{KEY}.shear_factor", MISSING, remedy)
-        if self.shape != "general":
-            require(
-                (self.area, self.second_moment) == _properties(self.shape, dict(self.dimensions)),
-                f"{KEY}.area",
-                self.area,
-                f"does not fit this {self.shape}; use Section.{self.shape}() or Section.general()",
-            )
+        if self.shape == "general":
+            remedy = "a general section needs its own, e.g. 0.8333333333333334 for a rectangle"
+            require(self.shear_factor, "link.section.shear_factor", MISSING, remedy)
+        else:
+            remedy = f"does not fit this {self.shape}; use Section.{self.shape}() or Section.general()"
+            is_right = (self.area, self.second_moment) == _properties(self.shape, dict(self.dimensions))
+            require(is_right, "link.section.area", self.area, remedy)
 
     @classmethod
     def rectangle(cls, *, width: float, depth: float, shear_factor: float | None = None) -> Section:
@@ -131,11 +116,10 @@ class Section:
 
     @classmethod
     def _named(cls, shape: str, shear_factor: float | None, **sizes: float) -> Section:
-        meaning = "the {} is a positive, finite number of metres"
-        dimensions = {
-            name: positive(f"{KEY}.{name}", value, meaning.format(name.replace("_", " ")))
-            for name, value in sizes.items()
-        }
+        dimensions = {}
+        for name, value in sizes.items():
+            meaning = f"the {name.replace('_', ' ')} is a positive, finite number of metres"
+            dimensions[name] = positive(f"link.section.{name}", value, meaning)
         area, second_moment = _properties(shape, dimensions)
         return cls(
             shape=shape,
@@ -153,9 +137,8 @@ class Section:
     @property
     def half_depth(self) -> float | None:
         """Distance [m] from the neutral axis to the surface in the plane of bending; None for a general section."""
-        sizes = dict(self.dimensions)
-        depth = sizes.get("depth", sizes.get("diameter", sizes.get("outer_diameter")))
-        return None if depth is None else depth / 2
+        depths = [size for name, size in self.dimensions if name in ("depth", "diameter", "outer_diameter")]
+        return depths[0] / 2 if depths else None
 
     def cowper_factor(self, poissons_ratio: float) -> float:
         """Cowper's shear factor of a named shape, for a Poisson's ratio in (-1, 0.5]."""
@@ -164,19 +147,15 @@ class Section:
 
 def _properties(shape: str, dimensions: Mapping[str, float]) -> tuple[float, float]:
     """Return the area [m^2] and second moment [m^4] of a named shape.  Raises ParameterError for wrong dimensions."""
-    must_be_known(f"{KEY}.shape", shape, [*SHAPES, "general"])
-    names = SHAPES[shape].dimensions
-    require(
-        set(dimensions) == set(names),
-        f"{KEY}.dimensions",
-        tuple(dimensions),
-        f"a {shape} has {' and '.join(names)}: build it with Section.{shape}()",
-    )
+    must_be_known("link.section.shape", shape, [*SHAPES, "general"])
+    known = SHAPES[shape]
+    remedy = f"a {shape} has {' and '.join(known.dimensions)}: build it with Section.{shape}()"
+    require(set(dimensions) == set(known.dimensions), "link.section.dimensions", tuple(dimensions), remedy)
     if shape == "tube":
-        outer, inner = (dimensions[name] for name in names)
+        outer, inner = (dimensions[name] for name in known.dimensions)
         remedy = f"a tube is hollow: less than its outer diameter, {outer:g} m"
-        require(inner < outer, f"{KEY}.inner_diameter", inner, remedy)
-    return SHAPES[shape].area(**dimensions), SHAPES[shape].second_moment(**dimensions)
+        require(inner < outer, "link.section.inner_diameter", inner, remedy)
+    return known.area(**dimensions), known.second_moment(**dimensions)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,35 +166,27 @@ class Link:
     from which G was computed, None where G itself was stated.
     """
 
-    length: float
-    density: float
-    youngs_modulus: float
-    shear_modulus: float
+    length: Annotated[float, positive, "a length is a positive, finite number of metres"]
+    density: Annotated[float, positive, "a density is a positive, finite number in kg/m^3"]
+    youngs_modulus: Annotated[float, positive, MODULUS]
+    shear_modulus: Annotated[float, positive, "a shear modulus is a positive, finite number in Pa"]
     section: Section
-    damping: float = 0.0
+    damping: Annotated[float, not_negative, "damping C is zero or a positive time in seconds, as in E (1 + C s)"] = 0.0
     stated_ratio: float | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.stated_ratio is not None and self.shear_modulus != self.youngs_modulus / (2 * (1 + self.stated_ratio)):
             object.__setattr__(self, "stated_ratio", None)  # of a link with another modulus
-        check_fields(self, "link", positive, **MEANINGS)
-        check_fields(
-            self, "link", not_negative, damping="damping C is zero or a positive time in seconds, as in E (1 + C s)"
-        )
-        require(
-            self.slenderness <= SLENDEREST,
-            "link.length",
-            self.length,
-            f"{self.slenderness:.3g} times the section's radius of gyration is no beam; check the units",
-        )
+        check_annotated(self, "link")
+        remedy = f"{self.slenderness:.3g} times the section's radius of gyration is no beam; check the units"
+        require(self.slenderness <= 1e9, "link.length", self.length, remedy)
         nu = self.poissons_ratio  # the argument of Cowper's factor; the margins allow for a rounded G
-        require(
-            self.section.shear_factor is not None or -1 + 1e-9 <= nu <= 0.5 + 1e-12,
-            "link.shear_modulus",
-            self.shear_modulus,
+        remedy = (
             f"with this Young's modulus it means a Poisson's ratio of {nu:.4g}, outside (-1, 0.5]; "
-            "correct it, or give link.section.shear_factor for a material that is not isotropic",
+            "correct it, or give link.section.shear_factor for a material that is not isotropic"
         )
+        is_right = self.section.shear_factor or -1 + 1e-9 <= nu <= 0.5 + 1e-12
+        require(is_right, "link.shear_modulus", self.shear_modulus, remedy)
 
     @classmethod
     def isotropic(
@@ -229,7 +200,7 @@ class Link:
         damping: float = 0.0,
     ) -> Link:
         """Build the link of an isotropic material: G = E/(2 (1 + nu)), nu Poisson's ratio."""
-        E = positive("link.youngs_modulus", youngs_modulus, MEANINGS["youngs_modulus"])
+        E = positive("link.youngs_modulus", youngs_modulus, MODULUS)
         meaning = "Poisson's ratio lies above -1, up to 0.5 (incompressible); about 0.3 for metals"
         nu = number("link.poissons_ratio", poissons_ratio, meaning)
         require(-1.0 < nu <= 0.5, "link.poissons_ratio", nu, meaning)
@@ -251,8 +222,7 @@ class Link:
     @property
     def shear_factor(self) -> float:
         """kappa [-] of the section, or else Cowper's (1966) from Poisson's ratio."""
-        own = self.section.shear_factor
-        return self.section.cowper_factor(self.poissons_ratio) if own is None else own
+        return self.section.shear_factor or self.section.cowper_factor(self.poissons_ratio)
 
     @property
     def EI(self) -> float:
@@ -307,26 +277,21 @@ class Hub:
     `radius` r [m] is the distance from the axis to the clamp; `stiffness` [N m/rad] is a spring to ground.
     """
 
-    inertia: float
-    friction: float = 0.0
-    radius: float = 0.0
-    stiffness: float = 0.0
+    inertia: Annotated[float, extended, "a hub inertia is zero (free pin), positive in kg m^2, or inf (locked)"]
+    friction: Annotated[float, not_negative, "a hub friction is zero or a positive, finite number in N m s/rad"] = 0.0
+    radius: Annotated[
+        float,
+        not_negative,
+        "a hub radius, from the axis to the clamp, is zero or a positive, finite number of metres",
+    ] = 0.0
+    stiffness: Annotated[
+        float,
+        not_negative,
+        "a spring from hub to ground is zero or positive, finite, in N m/rad (inertia = inf locks)",
+    ] = 0.0
 
     def __post_init__(self) -> None:
-        check_fields(
-            self,
-            "hub",
-            extended,
-            inertia="a hub inertia is zero (free pin), positive in kg m^2, or inf (locked)",
-        )
-        check_fields(
-            self,
-            "hub",
-            not_negative,
-            friction="a hub friction is zero or a positive, finite number in N m s/rad",
-            radius="a hub radius, from the axis to the clamp, is zero or a positive, finite number of metres",
-            stiffness="a spring from hub to ground is zero or positive, finite, in N m/rad (inertia = inf locks)",
-        )
+        check_annotated(self, "hub")
         for name, value in (("friction", self.friction), ("stiffness", self.stiffness)):
             remedy = f"no effect, as inertia = inf locks the hub; leave out the {name}, or give a finite inertia"
             require(math.isfinite(self.inertia) or not value, f"hub.{name}", value, remedy)
@@ -339,25 +304,15 @@ class Hub:
 class RotarySpring:
     """A rotary spring and dashpot in parallel: `stiffness` k [N m/rad] (inf: rigid), `damping` c [s], k (1 + c s)."""
 
-    stiffness: float = math.inf
-    damping: float = 0.0
+    stiffness: Annotated[
+        float, above_zero, "the stiffness of a clamp or joint is positive in N m/rad, or inf (rigid)"
+    ] = math.inf
+    damping: Annotated[float, not_negative, "damping c is zero or a positive time in seconds, as in k (1 + c s)"] = 0.0
 
     def __post_init__(self) -> None:
-        meaning = "the stiffness of a clamp or joint is positive in N m/rad, or inf (rigid)"
-        check_fields(self, "spring", extended, stiffness=meaning)
-        require(self.stiffness != 0.0, "spring.stiffness", self.stiffness, meaning)
-        check_fields(
-            self,
-            "spring",
-            not_negative,
-            damping="damping c is zero or a positive time in seconds, as in k (1 + c s)",
-        )
-        require(
-            not (self.damping and self.is_rigid),
-            "spring.damping",
-            self.damping,
-            "a rigid spring has no damping: give a finite stiffness in N m/rad, or leave the damping out",
-        )
+        check_annotated(self, "spring")
+        remedy = "a rigid spring has no damping: give a finite stiffness in N m/rad, or leave the damping out"
+        require(not (self.damping and self.is_rigid), "spring.damping", self.damping, remedy)
 
     @property
     def is_rigid(self) -> bool:
@@ -374,35 +329,27 @@ class Motor:
     is that from motor to hub: u = eta N Kt i.
     """
 
-    resistance: float
-    torque_constant: float
-    back_emf_constant: float = cast("float", None)  # Kt then
-    inductance: float = 0.0
-    gear_ratio: float = 1.0
-    rotor_inertia: float = 0.0
-    rotor_friction: float = 0.0
-    gear_efficiency: float = 1.0
+    resistance: Annotated[float, positive, "a motor's resistance is a positive, finite number of ohms"]
+    torque_constant: Annotated[float, positive, "a torque constant is a positive, finite number in N m/A"]
+    back_emf_constant: Annotated[
+        float, not_negative, "a back-EMF constant is zero or a positive, finite number in V s/rad"
+    ] = cast("float", None)  # Kt then
+    inductance: Annotated[float, not_negative, "an inductance is zero or a positive, finite number of henries"] = 0.0
+    gear_ratio: Annotated[float, positive, "a gear ratio, motor turns per hub turn, is a positive, finite number"] = 1.0
+    rotor_inertia: Annotated[
+        float, not_negative, "a rotor inertia is zero or a positive, finite number in kg m^2, before the gear"
+    ] = 0.0
+    rotor_friction: Annotated[
+        float, not_negative, "a rotor friction is zero or a positive, finite number in N m s/rad, before the gear"
+    ] = 0.0
+    gear_efficiency: Annotated[float, positive, "an efficiency is above 0"] = 1.0
 
     def __post_init__(self) -> None:
-        meanings = {
-            "resistance": "a motor's resistance is a positive, finite number of ohms",
-            "torque_constant": "a torque constant is a positive, finite number in N m/A",
-            "gear_ratio": "a gear ratio, motor turns per hub turn, is a positive, finite number",
-            "gear_efficiency": "an efficiency is above 0, up to 1 (75 % is entered as 0.75)",
-        }
-        check_fields(self, "motor", positive, **meanings)
-        require(self.gear_efficiency <= 1.0, "motor.gear_efficiency", self.gear_efficiency, meanings["gear_efficiency"])
         if cast("float | None", self.back_emf_constant) is None:
             object.__setattr__(self, "back_emf_constant", self.torque_constant)
-        check_fields(
-            self,
-            "motor",
-            not_negative,
-            back_emf_constant="a back-EMF constant is zero or a positive, finite number in V s/rad",
-            inductance="an inductance is zero or a positive, finite number of henries",
-            rotor_inertia="a rotor inertia is zero or a positive, finite number in kg m^2, before the gear",
-            rotor_friction="a rotor friction is zero or a positive, finite number in N m s/rad, before the gear",
-        )
+        check_annotated(self, "motor")
+        remedy = "an efficiency is above 0, up to 1 (75 % is entered as 0.75)"
+        require(self.gear_efficiency <= 1.0, "motor.gear_efficiency", self.gear_efficiency, remedy)
 
     @property
     def reflected_inertia(self) -> float:
@@ -417,29 +364,22 @@ class Attachment:
     `stiffness` [N/m] is that of its displacement, `rotational_stiffness` [N m/rad] that of its rotation.
     """
 
-    x: float
-    mass: float = 0.0
-    inertia: float = 0.0
-    stiffness: float = 0.0
-    rotational_stiffness: float = 0.0
+    x: Annotated[
+        float,
+        not_negative,
+        "an attachment's place is zero or a positive number of metres from the clamp, up to the tip",
+    ]
+    mass: Annotated[float, not_negative, "an attached mass is zero or a positive, finite number in kg"] = 0.0
+    inertia: Annotated[float, not_negative, "an attached inertia is zero or a positive, finite number in kg m^2"] = 0.0
+    stiffness: Annotated[float, not_negative, "an attached spring to ground is zero or positive, finite, in N/m"] = 0.0
+    rotational_stiffness: Annotated[
+        float, not_negative, "an attached rotary spring to ground is zero or positive, finite, in N m/rad"
+    ] = 0.0
 
     def __post_init__(self) -> None:
-        check_fields(
-            self,
-            "attachment",
-            not_negative,
-            x="an attachment's place is zero or a positive number of metres from the clamp, up to the tip",
-            mass="an attached mass is zero or a positive, finite number in kg",
-            inertia="an attached inertia is zero or a positive, finite number in kg m^2",
-            stiffness="an attached spring to ground is zero or positive, finite, in N/m",
-            rotational_stiffness="an attached rotary spring to ground is zero or positive, finite, in N m/rad",
-        )
-        require(
-            self.mass or self.inertia or self.is_held,
-            "attachment.x",
-            self.x,
-            "an empty attachment: give a mass, an inertia, a stiffness or a rotational_stiffness",
-        )
+        check_annotated(self, "attachment")
+        remedy = "an empty attachment: give a mass, an inertia, a stiffness or a rotational_stiffness"
+        require(self.mass or self.inertia or self.is_held, "attachment.x", self.x, remedy)
 
     @property
     def is_held(self) -> bool:
@@ -454,16 +394,11 @@ class Gauge:
     At a joint of two segments, or at an attachment, it is on the outer side unless `side` is "inner".
     """
 
-    x: float = 0.0
+    x: Annotated[float, not_negative, "a gauge's place is zero or a positive number of metres from the clamp"] = 0.0
     side: Literal["outer", "inner"] = "outer"
 
     def __post_init__(self) -> None:
-        check_fields(
-            self,
-            "gauge",
-            not_negative,
-            x="a gauge's place is zero or a positive number of metres from the clamp",
-        )
+        check_annotated(self, "gauge")
         require(self.side in ("outer", "inner"), "gauge.side", self.side, '"outer" or "inner"')
 
 
@@ -474,24 +409,16 @@ class Payload:
     An infinite inertia locks the tip's rotation; `offset` e [m], of any sign, is that of the centre beyond the tip.
     """
 
-    mass: float = 0.0
-    inertia: float = 0.0
-    offset: float = 0.0
+    mass: Annotated[float, extended, "a payload mass is zero, positive in kg, or inf (tip pinned)"] = 0.0
+    inertia: Annotated[float, extended, "a payload inertia is zero, positive in kg m^2, or inf (tip cannot rotate)"] = (
+        0.0
+    )
+    offset: Annotated[
+        float, signed, "a payload's offset is a finite number of metres beyond the tip, negative before it"
+    ] = 0.0
 
     def __post_init__(self) -> None:
-        check_fields(
-            self,
-            "payload",
-            extended,
-            mass="a payload mass is zero, positive in kg, or inf (tip pinned)",
-            inertia="a payload inertia is zero, positive in kg m^2, or inf (tip cannot rotate)",
-        )
-        check_fields(
-            self,
-            "payload",
-            signed,
-            offset="a payload's offset is a finite number of metres beyond the tip, negative before it",
-        )
+        check_annotated(self, "payload")
 
     def __repr__(self) -> str:
         return brief_repr(self, always=2)

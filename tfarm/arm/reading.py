@@ -1,7 +1,4 @@
-"""Arms of presets and TOML files, and warnings of legal values that may have a wrong unit.
-
-The size and nesting of a file are checked before it is parsed.
-"""
+"""Arms of presets and TOML files, and warnings of legal values that may have a wrong unit."""
 
 import math
 import os
@@ -10,7 +7,7 @@ import tomllib
 from collections.abc import Iterator
 from functools import cache
 from importlib.resources import files
-from typing import Any
+from typing import Any, NamedTuple
 
 from tfarm.arm.parts import Link
 from tfarm.arm.records import Arm
@@ -19,11 +16,6 @@ from tfarm.files import read_file
 
 PRESETS = files("tfarm.arm") / "presets"
 MOST_ARM_BYTES = 64 * 1024  # of an arm's file; that of 64 segments has 15 KB
-# tomllib needs seconds for one dotted key of 40 KB and recurses on every bracket; an arm's file has short lines and a
-# depth of two.
-LONGEST_LINE = 8192  # characters
-MOST_DOTS = 64  # in a line
-MOST_BRACKETS = 16  # brackets open at once
 
 
 @cache
@@ -32,21 +24,29 @@ def presets() -> tuple[str, ...]:
     return tuple(sorted(p.name.removesuffix(".toml") for p in PRESETS.iterdir() if p.name.endswith(".toml")))
 
 
-def load(name_or_path: str | os.PathLike[str]) -> Arm:
+class ArmFile(NamedTuple):
+    """The tables of a TOML file, read and parsed once, and the file's name."""
+
+    tables: dict[str, Any]
+    name: str
+
+
+AnyFile = str | os.PathLike[str] | ArmFile  # a preset's name, a path, or what was read of either
+
+
+def load(name_or_path: AnyFile) -> Arm:
     """Return the arm of a preset's name or of a TOML file's path.  Raises ParameterError, naming the file."""
-    return arm_in(*load_tables(name_or_path))
-
-
-def arm_in(table: dict[str, Any], file: str) -> Arm:
-    """Return the arm of the parsed TOML of a file of that name."""
     from tfarm.arm.schema import arm_of_table  # here, as the import of pydantic is slow
 
-    with naming(file):
-        return arm_of_table(table)
+    tables, name = load_tables(name_or_path)
+    with naming(name):
+        return arm_of_table(tables)
 
 
-def load_tables(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], str]:
-    """Return the parsed TOML of a preset's name or a path, and the file's name."""
+def load_tables(name_or_path: AnyFile) -> ArmFile:
+    """Return the tables of a preset's name or a path; those of a file that was read already as they are."""
+    if isinstance(name_or_path, ArmFile):
+        return name_or_path
     is_named = not isinstance(name_or_path, os.PathLike)
     name: Any = name_or_path if is_named else os.fspath(name_or_path)
     is_text = isinstance(name, str) and bool(name.strip()) and "\0" not in name
@@ -59,7 +59,7 @@ def load_tables(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], s
     else:
         data = read_file(name, MOST_ARM_BYTES, key="arm", what="a .toml file")
     with naming(name):
-        return _table_of(data), name
+        return ArmFile(_table_of(data), name)
 
 
 def decoded(data: bytes, remedy: str) -> str:
@@ -74,27 +74,15 @@ def decoded(data: bytes, remedy: str) -> str:
 def _table_of(data: bytes) -> dict[str, Any]:
     """Return the TOML table of a file.
 
-    Raises ParameterError for lines and brackets that would slow the parser down, and for its errors, each with its
-    line, the last one where the error has none.
+    Raises ParameterError for an error of the parser with its line, the last one where the error has none.
     """
     text = decoded(data, "is not UTF-8; save the file as UTF-8")
-    lines, depth, remedy = (
-        text.split("\n"),
-        0,
-        f"more than {MOST_BRACKETS} brackets open; an arm's file needs no nesting",
-    )
-    for i, line in enumerate(lines, 1):
-        for number, what, most in ((len(line), "characters", LONGEST_LINE), (line.count("."), "dots", MOST_DOTS)):
-            require(number <= most, f"line {i}", line, f"{number} {what} in a line; at most {most}")
-        for bracket in re.findall(r"[\[\]{}]", line):
-            depth = depth + 1 if bracket in "[{" else max(depth - 1, 0)
-            require(depth <= MOST_BRACKETS, f"line {i}", line, remedy)
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         what, _, where = str(error).rstrip(")").partition(" (at ")
         at = re.match(r"line (\d+)", where)
-        line = lines[int(at[1]) - 1 if at else -1]
+        line = text.split("\n")[int(at[1]) - 1 if at else -1]
         raise ParameterError(key=where or "TOML", value=line, remedy=f"is not TOML: {what}") from None
     except (ValueError, RecursionError):
         remedy = "an integer of thousands of digits, or brackets nested too deep"
@@ -105,26 +93,25 @@ def _table_of(data: bytes) -> dict[str, Any]:
 
 # Each bound is far outside the range of materials and mechanisms.  A wrong unit (GPa for Pa, mm for m, g/cm^3 for
 # kg/m^3, a damping ratio for seconds) changes a value by a factor of 50 or more.
-SOFTEST = 1e5  # Pa; soft silicone has 3e5
-STIFFEST = 2e12  # Pa; diamond has 1.2e12
-LIGHTEST = 25.0  # kg/m^3; light foam has 30, and in g/cm^3 everything is below 25
-DENSEST = 25_000.0  # kg/m^3; osmium has 22,600
-LONGEST_ARM = 100.0  # m; the arm of the space station has 17
-MOST_DAMPED = 0.1  # damping ratio of the clamped link; rubber has about 0.05
-MODULUS = (SOFTEST, "softer than any rubber; its unit is Pa, not in GPa",
-           STIFFEST, "stiffer than diamond; its unit is Pa")  # fmt: skip
-USUAL = {  # of a segment: least and largest value, and the warning below and above
+MODULUS = (
+    1e5,  # Pa; soft silicone has 3e5
+    "softer than any rubber; its unit is Pa, not in GPa",
+    2e12,  # diamond has 1.2e12
+    "stiffer than diamond; its unit is Pa",
+)
+USUAL = {  # of a segment: least and largest value, each with the warning beyond it
     "youngs_modulus": MODULUS,
     "shear_modulus": MODULUS,
-    "density": (LIGHTEST, "lighter than foam; its unit is kg/m^3, not in g/cm^3",
-                DENSEST, "denser than osmium; its unit is kg/m^3"),
-    "length": (0.0, "", LONGEST_ARM, "longer than any arm; its unit is m, not in mm"),
-}  # fmt: skip
+    "density": (
+        25.0,  # kg/m^3; light foam has 30, and in g/cm^3 everything is below 25
+        "lighter than foam; its unit is kg/m^3, not in g/cm^3",
+        25_000.0,  # osmium has 22,600
+        "denser than osmium; its unit is kg/m^3",
+    ),
+    "length": (0.0, "", 100.0, "longer than any arm; its unit is m, not in mm"),  # that of the space station has 17
+}
 HEAVIEST = 1e5  # times the link's own mass or inertia
 FARTHEST_OFFSET = 10.0  # times the link's length; a hub's radius and a payload's offset are a fraction of it
-YIELDING = 10.0  # times the link's own flexibility L/(3 EI); a usual clamp has a tenth of it
-MOST_FRICTION = 50.0  # times 2 sqrt(3 EI/L J), beyond which the link cannot turn the hub; a harmonic drive reaches 1
-FIRST_CLAMPED = 1.8751040687119611  # first root of 1 + cos(b) cosh(b) = 0, for the clamped Euler-Bernoulli beam
 
 
 def implausible(arm: Arm) -> tuple[str, ...]:
@@ -147,13 +134,15 @@ def _segment(key: str, link: Link, length: float) -> Iterator[str]:
         value = getattr(link, name)
         if not least <= value <= most:
             yield f"{key}.{name} = {shown(value)}: {below if value < least else above}"
-    sides = link.section.dimensions or (("second_moment", math.sqrt(12) * link.section.radius_of_gyration),)
+    depth = math.sqrt(12) * link.section.radius_of_gyration
+    sides = link.section.dimensions or (("second_moment means a depth of", depth),)
     for name, side in sides:
         if name != "inner_diameter" and side > length:
-            what = "means a depth of" if name == "second_moment" else "is"
-            yield f"{key}.section.{name} {what} {side:.4g} m, above the length of {length:.4g} m: no slender link"
-    ratio = link.damping * (FIRST_CLAMPED / length) ** 2 * math.sqrt(link.EI / link.rhoA) / 2
-    if ratio > MOST_DAMPED:
+            what = name if name.startswith("second_moment") else f"{name} is"
+            yield f"{key}.section.{what} {side:.4g} m, above the length of {length:.4g} m: no slender link"
+    # of the clamped Euler-Bernoulli beam, whose first root of 1 + cos(b) cosh(b) = 0 this is; rubber has about 0.05
+    ratio = link.damping * (1.8751040687119611 / length) ** 2 * math.sqrt(link.EI / link.rhoA) / 2
+    if ratio > 0.1:
         yield (
             f"{key}.damping = {shown(link.damping)}: a damping ratio of {ratio:.2g} in the first mode "
             "of the clamped link; its unit is s, as in E (1 + C s)"
@@ -162,28 +151,45 @@ def _segment(key: str, link: Link, length: float) -> Iterator[str]:
 
 def _parts(arm: Arm) -> Iterator[str]:
     """Yield the warnings of hub, payload, clamp, motor and attachments: values by a ratio to those of the link."""
-    hub, payload, motor, length, mass = arm.hub, arm.payload, arm.motor, arm.length, arm.own_mass
-    beam, bending = mass * length**2 / 3, 3 * arm.bending_scale  # kg m^2, spread evenly from the axis; N m
+    hub, payload, length, mass = arm.hub, arm.payload, arm.length, arm.own_mass
+    beam = mass * length**2 / 3  # kg m^2, spread evenly from the axis
+    bending = 3 * arm.bending_scale  # N m
     radius = math.sqrt(payload.inertia / payload.mass) if 0.0 < payload.mass < math.inf else 0.0
-    critical = 2 * math.sqrt(bending * arm.total_inertia)
-    rotor = (motor.rotor_inertia, motor.reflected_inertia / beam) if motor else (0.0, 0.0)
-    heavy, far = "{:.1g} times the link's; in kg?", "{:.3g} times the link's length; its unit is m, not mm"
-    limits = (  # key, value, its ratio, the largest ratio, and the warning
+    heavy = "{:.1g} times the link's; in kg?"
+    far = "{:.3g} times the link's length; its unit is m, not mm"
+    limits = [  # key, value, its ratio, the largest ratio, and the warning
         ("hub.inertia", hub.inertia, hub.inertia / beam, HEAVIEST, "{:.1g} times the link's; in kg m^2?"),
         ("payload.mass", payload.mass, payload.mass / mass, HEAVIEST, heavy),
-        ("payload.inertia", payload.inertia, radius / length, 1.0,
-         f"a radius of gyration of {radius:.3g} m, above the link's length; in kg m^2?"),
+        (
+            "payload.inertia",
+            payload.inertia,
+            radius / length,
+            1.0,
+            f"a radius of gyration of {radius:.3g} m, above the link's length; in kg m^2?",
+        ),
         ("hub.radius", hub.radius, hub.radius / length, FARTHEST_OFFSET, far),
         ("payload.offset", abs(payload.offset), abs(payload.offset) / length, FARTHEST_OFFSET, far),
-        ("clamp.stiffness", arm.clamp.stiffness, bending / arm.clamp.stiffness, YIELDING,
-         "a clamp {:.2g} times as flexible as its link; its unit is N m/rad"),
-        ("hub.friction", hub.friction, hub.friction / critical, MOST_FRICTION,
-         "{:.2g} times the critical damping of the first mode; its unit is N m s/rad, on the hub's side of a gear"),
-        ("motor.rotor_inertia", *rotor, HEAVIEST,
-         "through the gear {:.1g} times the link's; its unit is kg m^2, before the gear"),
-        *((f"attachment.{i}.mass", each.mass, each.mass / mass, HEAVIEST, heavy)
-          for i, each in enumerate(arm.attachments, 1)),
-    )  # fmt: skip
+        (
+            "clamp.stiffness",
+            arm.clamp.stiffness,
+            bending / arm.clamp.stiffness,
+            10.0,  # a usual clamp has a tenth of the flexibility of its link
+            "a clamp {:.2g} times as flexible as its link; its unit is N m/rad",
+        ),
+        (
+            "hub.friction",
+            hub.friction,
+            hub.friction / (2 * math.sqrt(bending * arm.total_inertia)),
+            50.0,  # beyond it the link cannot turn the hub; a harmonic drive reaches 1
+            "{:.2g} times the critical damping of the first mode; its unit is N m s/rad, on the hub's side of a gear",
+        ),
+    ]
+    if arm.motor is not None:
+        rotor = "through the gear {:.1g} times the link's; its unit is kg m^2, before the gear"
+        own, reflected = arm.motor.rotor_inertia, arm.motor.reflected_inertia
+        limits.append(("motor.rotor_inertia", own, reflected / beam, HEAVIEST, rotor))
+    for i, each in enumerate(arm.attachments, 1):
+        limits.append((f"attachment.{i}.mass", each.mass, each.mass / mass, HEAVIEST, heavy))
     for key, value, ratio, most, text in limits:
         if most < ratio < math.inf:
             yield f"{key} = {shown(value)}: {text.format(ratio)}"

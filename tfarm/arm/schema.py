@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 from tfarm.arm.materials import assumed, filled, materials
 from tfarm.arm.parts import Attachment, Gauge, Hub, Link, Motor, Payload, RotarySpring, Section
 from tfarm.arm.records import MOST_PARTS, Arm
-from tfarm.errors import MISSING, ParameterError, must_be_known, require, unknown_key
+from tfarm.errors import MISSING, ParameterError, require, unknown_key
 from tfarm.files import read_file
 from tfarm.schema import Quantity
 
@@ -26,7 +26,6 @@ _Strict = TypeVar("_Strict", bound="StrictTable")
 _Table = TypeVar("_Table", bound="TomlTable")
 LOOP_TABLES = ("sampling", "converters", "actuator", "slew", "law")  # of the loop: read by other rooms
 OF_INPUT = "N m, V or A"  # unit of a limit of the input
-LINKS = "a table, headed [link], or [[link]] for each of several"
 EXPECTED: dict[Any, str] = {
     float: "a number without quotes, in SI units",
     str: "a text in double quotes",
@@ -47,15 +46,11 @@ class TomlTable(StrictTable):
 
     model_config = ConfigDict(defer_build=True)
     makes: ClassVar[Callable[..., Any]]
-    parameters: ClassVar[frozenset[str]]  # their names, read once: a fit builds a thousand arms
-
-    def given(self) -> dict[str, Any]:
-        """Return the keys of the file alone, without defaults."""
-        return {name: getattr(self, name) for name in self.model_fields_set}
 
     def build(self) -> Any:
         """Return the record of the table.  Raises ParameterError for illegal numbers."""
-        return type(self).makes(**{name: value for name, value in self.given().items() if name in self.parameters})
+        given = self.model_fields_set - {"shape"}  # which has chosen the constructor of a section
+        return type(self).makes(**{name: getattr(self, name) for name in given})
 
 
 def validated(model: type[_Strict], table: Any, place: str) -> _Strict:
@@ -68,16 +63,17 @@ def validated(model: type[_Strict], table: Any, place: str) -> _Strict:
         return model.model_validate(table)
     except ValidationError as error:
         problem = min(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
+    key = ".".join(filter(None, (place, *map(str, problem["loc"]))))
     word, value, known = str(problem["loc"][0]), problem["input"], model.model_fields
     if word not in known:
         is_of_top = place and word in AT_THE_TOP
         remedy = f"unknown key; {word} belongs at the top of the file" if is_of_top else unknown_key(word, known)
-    else:
-        expected = f"a table, headed [{word}]" if word in ARM_TABLES else EXPECTED.get(known[word].annotation)
-        remedy = f"give {expected}" if expected else f"{problem['msg'][:1].lower()}{problem['msg'][1:]}"
-        is_missing = problem["type"] == "missing"
-        value, remedy = (MISSING, remedy) if is_missing else (value, f"wrong type; {remedy}")
-    raise ParameterError(key=".".join(filter(None, (place, *map(str, problem["loc"])))), value=value, remedy=remedy)
+        raise ParameterError(key=key, value=value, remedy=remedy)
+    expected = f"a table, headed [{word}]" if word in ARM_TABLES else EXPECTED.get(known[word].annotation)
+    remedy = f"give {expected}" if expected else problem["msg"]
+    if problem["type"] == "missing":
+        raise ParameterError(key=key, value=MISSING, remedy=remedy)
+    raise ParameterError(key=key, value=value, remedy=f"wrong type; {remedy}")
 
 
 def validated_file(model: type[_Strict], path: str | os.PathLike[str], most: int, *, key: str, what: str) -> _Strict:
@@ -102,14 +98,13 @@ def of(makes: Callable[..., Any]) -> Callable[[type[_Table]], type[_Table]]:
     """
 
     def with_keys(table: type[_Table]) -> type[_Table]:
-        hints, known = get_type_hints(makes), signature(makes).parameters.values()
-        own: dict[str, Any] = {
-            each.name: (hints[each.name], ... if each.default is Parameter.empty else each.default)
-            for each in known
-            if each.name not in (*table.model_fields, "stated_ratio")  # which is poissons_ratio in a file
-        }
+        hints = get_type_hints(makes)
+        own: dict[str, Any] = {}
+        for name, each in signature(makes).parameters.items():
+            if name not in table.model_fields and name != "stated_ratio":  # which is poissons_ratio in a file
+                own[name] = hints[name], ... if each.default is Parameter.empty else each.default
         made: type[_Table] = create_model(table.__name__, __base__=table, __doc__=table.__doc__, **own)
-        made.makes, made.parameters = makes, frozenset(hints) & frozenset(signature(makes).parameters)
+        made.makes = makes
         return made
 
     return with_keys
@@ -135,19 +130,17 @@ class LinkTable(TomlTable):
 
     def build(self) -> Link:
         nu, shape = self.poissons_ratio, self.section.get("shape", MISSING)
-        key, remedy = "link.section.shape", f"give one of {', '.join(SHAPE_TABLES)}"
-        require(shape is not MISSING, key, shape, remedy)
-        must_be_known(key, shape, list(SHAPE_TABLES))
+        require(shape in SHAPE_TABLES, "link.section.shape", shape, f"give one of {', '.join(SHAPE_TABLES)}")
         section = validated(SHAPE_TABLES[shape], self.section, "link.section").build()
-        is_laminate = self.material is not None and not materials()[self.material].is_isotropic
-        if is_laminate and section.shear_factor is None:  # Cowper's needs a Poisson's ratio of at most 0.5
+        is_isotropic = self.material is None or materials()[self.material].is_isotropic
+        if not is_isotropic and section.shear_factor is None:  # Cowper's needs a Poisson's ratio of at most 0.5
             section = replace(section, shear_factor=section.cowper_factor(0.0))
         remedy = "give it in Pa, or give poissons_ratio"
         require(self.shear_modulus is not None or nu is not None, "link.shear_modulus", MISSING, remedy)
         remedy = "shear_modulus is given too, and one follows from the other; leave one out"
         require(self.shear_modulus is None or nu is None, "link.poissons_ratio", nu, remedy)
-        numbers = {key: value for key, value in self.given().items() if key != "material"}
-        return (Link if nu is None else Link.isotropic)(**{**numbers, "section": section})
+        numbers = {name: getattr(self, name) for name in self.model_fields_set - {"material", "section"}}
+        return (Link if nu is None else Link.isotropic)(**numbers, section=section)
 
 
 class ArmTable(StrictTable):
@@ -185,7 +178,7 @@ def arm_of_table(table: dict[str, Any]) -> Arm:
     own = head.model_dump(exclude_unset=True)
     parts = parts_of_tables(own)
     own["assumptions"] = [*head.assumptions, *assumed(_listed(head.link))]
-    return Arm(**{name: value for name, value in own.items() if name in AT_THE_TOP}, **parts)
+    return Arm(**{name: own[name] for name in AT_THE_TOP if name in own}, **parts)
 
 
 def parts_of_tables(tables: Mapping[str, Any]) -> dict[str, Any]:
@@ -195,8 +188,9 @@ def parts_of_tables(tables: Mapping[str, Any]) -> dict[str, Any]:
     """
     found: dict[str, Any] = {}
     if "link" in tables:
-        link, *outer = _built("link", _listed(tables["link"]), LINKS) or [None]
-        require(link, "link", MISSING, f"give {LINKS}")
+        wanted = "a table, headed [link], or [[link]] for each of several"
+        link, *outer = _built("link", _listed(tables["link"]), wanted) or [None]
+        require(link, "link", MISSING, f"give {wanted}")
         found = {"link": link, "outer": tuple(outer)}
     if "attachment" in tables:
         wanted = "a table for each, headed [[attachment]]"

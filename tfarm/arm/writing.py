@@ -5,6 +5,7 @@ The numbers of an arm have keys, those of its TOML file, such as "link.2.section
 
 import json
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,9 +19,6 @@ from tfarm.arm.schema import parts_of_tables
 from tfarm.errors import ParameterError, must_be_known, require
 from tfarm.files import write_file
 
-LAW_DEFAULTS: dict[str, Any] = {  # of the keys of [law]
-    "input": None, "delay": 0.0, "period": None, "sign": -1, "references": (), "rule": "tustin", "prewarp": 0.0,
-}  # fmt: skip
 LINK_NUMBERS = ("length", "density", "youngs_modulus", "shear_modulus", "damping", "poissons_ratio")
 
 
@@ -73,9 +71,15 @@ def law_toml(law: Law) -> str:
     """
     names = [name for part in law.parts for name in part.signals]
     require(len(set(names)) == len(names), "law", law.name, "two blocks on one signal: add them up first")
-    own = {key: getattr(law, key) for key, usual in LAW_DEFAULTS.items() if getattr(law, key) != usual}
     signals = {part.signals[0]: _signal_table(part) for part in law.parts}
-    return toml_text(toml_tables({"name": law.name, **own, **signals}, "law"))
+    return toml_text(toml_tables(law_head(law) | signals, "law"))
+
+
+def law_head(law: Law) -> dict[str, Any]:
+    """Return the keys of [law] but its signals: the name, and what is not at its default."""
+    keys = ("input", "delay", "period", "sign", "references", "rule", "prewarp")
+    head = {key: getattr(law, key) for key in keys if getattr(law, key) != getattr(Law, key)}
+    return {"name": law.name, **head}
 
 
 def save_law(law: Law, path: Path) -> None:
@@ -89,7 +93,7 @@ def _signal_table(part: Part) -> dict[str, Any]:
     if not isinstance(block, Rational) or len(part.signals) > 1:
         remedy = "save a state space as a .mat file: scipy.io.savemat(file, {'A': ..}), matrices = file in [law]"
         raise ParameterError(key="law", value=part.signals[0], remedy=remedy)
-    is_gain = len(block.num) == 1 and block.den == (1.0,)
+    is_gain = block.is_constant and block.den == (1.0,)
     return {"gain": block.num[0]} if is_gain else {"num": block.num, "den": block.den}
 
 
@@ -127,8 +131,11 @@ class KeyedArms:
     """
 
     def __init__(self, arm: Arm, keys: Sequence[str], what: str = "free", alone: Collection[str] = ()) -> None:
-        self.arm, self.keys, self.alone = arm, tuple(keys), alone
-        self._table, self._numbers = arm_table(arm), numbers_of(arm)
+        self.arm = arm
+        self.keys = tuple(keys)
+        self.alone = alone
+        self._table = arm_table(arm)
+        self._numbers = numbers_of(arm)
         for key in keys:
             must_be_known(what, key, self._numbers)
             require(keys.count(key) == 1, what, key, "is named twice; once is enough")
@@ -137,7 +144,7 @@ class KeyedArms:
         """Return the arm with other values of numbers.  Raises ParameterError for an illegal value."""
         # the other parts stay as they are, and so they are not checked again
         changed = {key.partition(".")[0] for key in values}
-        table = {name: _copied(self._table.get(name, {})) for name in changed}
+        table = {name: deepcopy(self._table.get(name, {})) for name in changed}
         for key, value in values.items():
             here, name = _table_of(table, key)
             if name == "youngs_modulus" and "shear_modulus" in here and self.is_shear_scaled(key):
@@ -158,24 +165,20 @@ class KeyedArms:
         return self._numbers[key]
 
 
-def _copied(table: Any) -> Any:
-    """Return a copy of tables in lists and tables."""
-    if isinstance(table, list):
-        return list(map(_copied, table))
-    return {key: _copied(value) for key, value in table.items()} if isinstance(table, dict) else table
-
-
 def numbers_of(arm: Arm) -> dict[str, float]:
     """Return all numbers of an arm by their keys, also those at their defaults."""
-    links = {f"link.{n}" if arm.outer else "link": link for n, link in enumerate(arm.links, 1)}
-    found = {f"{place}.{name}": getattr(link, name) for place, link in links.items() for name in LINK_NUMBERS}
-    sections = {f"{place}.section": _link_table(link)["section"] for place, link in links.items()}
-    names = ("hub", "clamp", "joint", "payload", *(["motor"] if arm.motor else []))
-    parts = {f"attachment.{n}": each for n, each in enumerate(arm.attachments, 1)}
-    parts |= {name: getattr(arm, name) for name in names}
-    tables = sections | {place: differing(part, always=MOST_PARTS) for place, part in parts.items()}
-    return found | {f"{place}.{name}": value for place, table in tables.items() for name, value in table.items()
-                    if name != "shape"}  # fmt: skip
+    found: dict[str, float] = {}
+    for n, link in enumerate(arm.links, 1):
+        place = f"link.{n}" if arm.outer else "link"
+        found |= {f"{place}.{name}": getattr(link, name) for name in LINK_NUMBERS}
+        section = _link_table(link)["section"]
+        found |= {f"{place}.section.{name}": value for name, value in section.items() if name != "shape"}
+    parts = {name: getattr(arm, name) for name in ("hub", "clamp", "joint", "payload", "motor")}
+    parts |= {f"attachment.{n}": each for n, each in enumerate(arm.attachments, 1)}
+    for place, part in parts.items():
+        if part is not None:
+            found |= {f"{place}.{name}": value for name, value in differing(part, always=MOST_PARTS).items()}
+    return found
 
 
 def _table_of(table: dict[str, Any], key: str) -> tuple[dict[str, Any], str]:

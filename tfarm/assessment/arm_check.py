@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple
 from tfarm.arm import Arm, Theory, implausible
 from tfarm.arm.chain import PERIOD, chain_of_tables, load_chain
 from tfarm.arm.law_tables import load_law
-from tfarm.arm.reading import arm_in, load_tables
+from tfarm.arm.reading import load, load_tables
 from tfarm.arm.schema import arm_of_table
 from tfarm.dsp import Chain
 from tfarm.errors import require
@@ -82,10 +82,10 @@ def check_arm(name: str, theory: Theory | None = None) -> ArmCheck:
 
     Raises ParameterError, naming the file and the key, for the first problem.
     """
-    tables, file = load_tables(name)
-    arm = arm_in(tables, file) if theory is None else arm_in(tables, file).under(theory)
-    law = load_law(name)
-    chain = load_chain(name)
+    file = load_tables(name)
+    arm = load(file) if theory is None else load(file).under(theory)
+    law = load_law(file)
+    chain = load_chain(file)
     first = listed_modes(modes(arm, 1)).modes[-1]
     omega = float(first.natural_frequency)
     of_bernoulli = first.theories["euler-bernoulli"]
@@ -98,9 +98,9 @@ def check_arm(name: str, theory: Theory | None = None) -> ArmCheck:
         damping_ratio=None if ratio is None else Percent(ratio), assumptions=arm.assumptions,
         period=chain.sampling.period, torque_limit=chain.actuator.torque_limit, input_unit=arm.input_unit,
         next_command=f"tfarm {'modes' if arm.is_locked else 'margins'} {shlex.quote(name)}",
-        warnings=[Note(*text.split(": ", 1)) for text in _warnings(tables, arm, slenderness, error, chain, omega)],
+        warnings=[Note(*text.split(": ", 1)) for text in _warnings(file.tables, arm, slenderness, error, chain, omega)],
         law=[] if law is None else [Note(*each) for each in law.as_typed()],
-        missing=[Note(f"[{table}]", text) for table, text in DEFAULTS.items() if table not in tables],
+        missing=[Note(f"[{table}]", text) for table, text in DEFAULTS.items() if table not in file.tables],
     )  # fmt: skip
 
 

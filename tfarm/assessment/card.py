@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import AnyLaw, Arm, as_law
+from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex
 from tfarm.digits import general
 from tfarm.dsp import Chain
@@ -34,7 +35,7 @@ from tfarm.loop.circle_crossings import CircleGrid, circle_grid
 from tfarm.loop.curve import LoopCurve, curve_of, gain_margin, lowest_drawn, refined
 from tfarm.loop.margins import LoopMargins, Margins, margins, margins_of_curve
 from tfarm.loop.sampled import Sampled
-from tfarm.loop.sampled_verdict import Analysis, Verdict, sampled
+from tfarm.loop.sampled_verdict import SAMPLED_LOOP, Analysis, Verdict, sampled
 from tfarm.loop.stability import SMALL_GAIN, Stability, stability
 from tfarm.records import record
 from tfarm.schema import Percent, Quantity, Table, Tabled, across, text
@@ -44,6 +45,15 @@ from tfarm.spectrum.table import default_gains
 
 from .comparison import HUB, poles_by_mode
 
+CONTINUOUS = Consumer(
+    "continuous-time column",
+    acts=("law", "hold", "hub damping", "plant"),
+    named=("torque limit",),
+    none=(
+        "reference", "anti-alias filter", "encoder", "hub rate", "amplifier steps", "amplifier range", "arithmetic",
+        "DAC steps", "DAC range", "delay", "volts",
+    ),
+)  # fmt: skip
 GRADES = UNDEFINED, GOOD, LOW, POOR = "-", "good", "low", "poor"  # the first of a margin which is not defined
 GRADED = {  # names of the graded margins in the grade of the loop
     "gain_margin": "gain margin",
@@ -179,7 +189,7 @@ def result_card(
     `continuous` (of `margins`) and `at_samples` (of `sampled`) are what is known of these loops already.  Raises
     ParameterError where there is no loop.
     """
-    law, (arm, chain) = as_law(law), admit("card", arm, chain)
+    law, (arm, chain) = as_law(law), admit(SAMPLED_LOOP, arm, chain)
     _, undamped = graded_arm(arm)
     notes = [SCALED + RECOMMENDED[arm.has_elastic_link]] if law.gains == default_gains(arm) else []
     notes += [undamped] if undamped else []
@@ -197,7 +207,7 @@ def loop_card(loop: str, arm: Arm, law: AnyLaw, chain: Chain, known: Any = None)
 
     Raises ConvergenceError where the loop is not determined.
     """
-    arm, chain = admit("card", arm, chain)
+    arm, chain = admit(SAMPLED_LOOP, arm, chain)
     if loop == "sampled":
         own = sampled_card(known or sampled_of(arm, law, chain))
     else:
@@ -245,7 +255,7 @@ def words_of(verdict: Stability, chain: Chain) -> dict[str, Any]:
     beyond = (
         ", small gain beyond" if verdict.tail == SMALL_GAIN else ", theorem beyond" if verdict.is_known_beyond else ""
     )
-    certainty = f"converged to {verdict.band:.4g} rad/s{beyond}{not_covered('continuous-time column', chain)}"
+    certainty = f"converged to {verdict.band:.4g} rad/s{beyond}{not_covered(CONTINUOUS, chain)}"
     return {"stability": verdict.verdict, "certainty": certainty}
 
 
@@ -327,7 +337,7 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
     ConvergenceError
         Where its stability is not determined.
     """
-    law, (arm, usual) = as_law(law), admit("card", arm, chain)
+    law, (arm, usual) = as_law(law), admit(SAMPLED_LOOP, arm, chain)
     damped, note = graded_arm(arm)
 
     def as_card(curve: LoopCurve, own: str) -> LoopCurve:

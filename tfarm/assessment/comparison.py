@@ -4,15 +4,15 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from tfarm.arm import PLANE, AnyLaw, Arm, HubFeedback, arm_and_law, as_law, must_be_arm, must_have_free_hub
-from tfarm.arm.chain import chain_or_usual
+from tfarm.arm import PLANE, AnyLaw, Arm, HubFeedback, as_law, must_have_free_hub
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
+from tfarm.case import Case
 from tfarm.crossing import Window
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import driven
@@ -34,10 +34,6 @@ from tfarm.spectrum.table import default_gains
 
 MOST_COMPARED = 30  # flexible modes of a table that a person reads
 LONGEST_SIDE_NAME = 60  # characters of a name: of two in one legend
-POLES_BEYOND_MODES = 6  # poles with Im s >= 0 beyond the modes: real ones, those of the hub, the motor and a controller
-REGION_COLUMNS, REGION_ROWS = 80, 40  # of the plane of both gains; its edges upwards are exact
-BEYOND_LAWS = 1.5  # how far the plane reaches beyond the controllers' own gains
-FURTHER_DELAYS = 25  # columns of the plane of further delay and a factor on each controller
 MOST_FACTOR, FACTORS = 4.0, 40  # of a continuous-time controller: where that plane ends, and values that are counted
 FARTHEST = 1.0  # |ln s - ln p|: by more no controller moves a mode here, a factor e of its frequency or 57 deg
 HUB = 0  # the number of the pole below the first mode that no mode of the link is near
@@ -308,15 +304,12 @@ class Comparison:
         laws = [side.gains for side in self.sides if side.gains is not None]
         if len(laws) < 2:
             return None
-        ranges = [ranges_of(side.arm) for side in self.sides]
-        x, y = (
-            between(
-                min([pair[n][0] for pair in ranges] + [BEYOND_LAWS * law[name] for law in laws]),
-                max([pair[n][1] for pair in ranges] + [BEYOND_LAWS * law[name] for law in laws]),
-                number,
-            )
-            for n, (name, number) in enumerate(zip(PLANE, (REGION_COLUMNS, REGION_ROWS), strict=True))
-        )
+        axes = []
+        for n, (name, number) in enumerate(zip(PLANE, (80, 40), strict=True)):  # edges upwards are exact
+            own = [1.5 * law[name] for law in laws]  # the plane reaches that far beyond the controllers' own gains
+            low, high = zip(*(ranges_of(side.arm)[n] for side in self.sides), strict=True)
+            axes.append(between(min(*low, *own), max(*high, *own), number))
+        x, y = axes
         x = np.union1d(x, [1e-6 * x[-1]])  # a column just beyond 0, from which most regions begin
         return [gain_map(side.arm, x, y, law.Kp) for side, law in zip(self.sides, laws, strict=True)]
 
@@ -325,68 +318,71 @@ class Comparison:
         """Further delays [s], to two samples or beyond both margins, and the stable factors on each law there."""
         T = self.one.sampled.period
         longest = max(2.0 * T, *(1.2 * (each.delay_margin or 0.0) for each in self.sides))
-        delay = np.linspace(0.0, min(longest, 10.0 * T), FURTHER_DELAYS)
+        delay = np.linspace(0.0, min(longest, 10.0 * T), 25)
         return delay, [each.reach(delay) for each in self.sides]
 
 
 def compare(
-    arms: Arm | Sequence[Arm], laws: AnyLaw | Sequence[AnyLaw] | None = None, *, names: Sequence[str] = (),
-    modes: int = 10, output: str = "root_moment", chain: Chain | None = None,
-) -> Comparison:  # fmt: skip
-    """Two arms under one law, or each under its own, or one arm under two laws.
+    arms: Arm | Sequence[Arm],
+    laws: AnyLaw | Sequence[AnyLaw] | None = None,
+    *,
+    names: Sequence[str] = (),
+    modes: int = 10,
+    output: str = "root_moment",
+    chain: Chain | None = None,
+) -> Comparison:
+    """Return two arms under one law, or each under its own, or one arm under two laws.
 
     Without a law each arm has its default gains.  `names` are those of the two, if not those of their arms or laws;
     the sampled verdicts are those at the period of `chain`, 10 ms unless given.  Where a law is one in z both loops are
     compared at their samples.  Raises ParameterError where there are not two, or where their laws close through
     different inputs, and what `tfarm.margins`, or then `tfarm.sampled`, raises for either.
     """
-    pairs = _pairs(arms, laws)
+    cases = _cases(arms, laws, chain)
     modes = whole("modes", modes, 1, MOST_COMPARED, f"a whole number from 1 to {MOST_COMPARED}")
-    called = tuple(one_line(name, LONGEST_SIDE_NAME) for name in names) or _names(pairs)
-    require(len(called) == 2, "names", list(called), "two names")
-    (first, _), (second, _) = pairs
+    called = [one_line(name, LONGEST_SIDE_NAME) for name in names or _names(cases)]
+    require(len(called) == 2, "names", called, "two names")
+    first, second = (case.arm for case in cases)
     must_have_free_hub(first)
     must_have_free_hub(second)
     remedy = f"gains of {called[0]} are in another unit, its input being {first.input}: give both one input"
     require(first.input_unit == second.input_unit, "input", second.input, remedy)
-    is_sampled, chain = any(as_law(law).is_discrete for _, law in pairs), chain_or_usual(chain)
-    one, other = (_side(name, *pair, modes, chain, is_sampled) for name, pair in zip(called, pairs, strict=True))
+    is_sampled = any(case.law.is_discrete for case in cases)
+    one, other = (_side(name, case, modes, is_sampled) for name, case in zip(called, cases, strict=True))
     return Comparison(one, other, output)
 
 
-def _pairs(arms: Arm | Sequence[Arm], laws: AnyLaw | Sequence[AnyLaw] | None) -> list[tuple[Arm, AnyLaw]]:
-    """Both arms with their laws."""
+def _cases(arms: Arm | Sequence[Arm], laws: AnyLaw | Sequence[AnyLaw] | None, chain: Chain | None) -> list[Case]:
+    """Return both arms with their laws."""
     given: list[Any] = list(arms) if isinstance(arms, list | tuple) else [arms]
-    for arm in given:
-        must_be_arm(arm)
     some: list[Any] = [] if laws is None else list(laws) if isinstance(laws, list | tuple) else [laws]
     is_two = 1 <= len(given) <= 2 and len(some) <= 2 and max(len(given), len(some)) == 2
-    counts = f"{len(given)} arms, {len(some)} laws"
-    require(is_two, "compare", counts, "give two arms, or one arm and two laws")
+    require(is_two, "compare", f"{len(given)} arms, {len(some)} laws", "give two arms, or one arm and two laws")
     pair = given * (2 // len(given))
-    each = some * (2 // len(some)) if some else [default_gains(arm) for arm in pair]
-    return [arm_and_law(arm, law) for arm, law in zip(pair, each, strict=True)]
+    each = some * (2 // len(some)) if some else map(default_gains, pair)
+    return [Case(arm, law, cast("Any", chain)) for arm, law in zip(pair, each, strict=True)]
 
 
-def _names(pairs: list[tuple[Arm, AnyLaw]]) -> tuple[str, ...]:
-    """The arms' names where they differ, else the laws', else their numbers."""
-    arms = [one_line(arm.name, LONGEST_SIDE_NAME) for arm, _ in pairs]
-    laws = [
-        one_line(", ".join(law.gains.gain_text(n, "{:.4g}".format) for n in PLANE) if law.gains else law.name,
-                 LONGEST_SIDE_NAME)
-        for law in (as_law(each) for _, each in pairs)
-    ]  # fmt: skip
-    return tuple(next((names for names in (arms, laws) if names[0] != names[1]), ["first", "second"]))
+def _names(cases: list[Case]) -> Sequence[str]:
+    """Return the arms' names where they differ, else the laws', else their numbers."""
+    arms = [case.arm.name for case in cases]
+    laws = []
+    for case in cases:
+        gains = case.gains
+        laws.append(", ".join(gains.gain_text(n, "{:.4g}".format) for n in PLANE) if gains else case.law.name)
+    return next((names for names in (arms, laws) if names[0] != names[1]), ("first", "second"))
 
 
-def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_sampled: bool) -> ComparedSide:
-    """All that is compared of one arm under its law; a sampled verdict that cannot be settled is left open."""
-    most, (arm, chain) = count + POLES_BEYOND_MODES, driven(arm, chain)
+def _side(name: str, case: Case, count: int, is_sampled: bool) -> ComparedSide:
+    """Return all that is compared of one case; a sampled verdict that cannot be settled is left open."""
+    law = case.gains or case.law
+    most = count + 6  # poles with Im s >= 0: also real ones, those of the hub, the motor and a controller
+    arm, chain = driven(case.arm, case.chain)
     rows, open_loop = _modes_of_arm(arm, count, most)
     loop: Margins | Analysis
     verdict: Verdict | ConvergenceError
     if is_sampled:
-        loop = Analysis(verdict := sampled_verdict(arm, as_law(law), chain))
+        loop = Analysis(verdict := sampled_verdict(arm, law, chain))
         poles, open_loop = _sampled_poles(loop, most)
     else:
         try:
@@ -414,12 +410,13 @@ def _modes_of_arm(arm: Arm, count: int, most: int) -> tuple[list[ArmMode], dict[
     """
     found, more = modes_of(arm, count), modes_of(arm, most)
     poles = dict(zip(more.index.tolist(), (1j * more.natural_frequency).tolist(), strict=True))
-    ratio: dict[int, float] = dict.fromkeys(range(1, count + 1), 0.0) if arm.is_undamped else {}
+    ratio: dict[int, float] = dict.fromkeys(poles, 0.0) if arm.is_undamped else {}
     with suppress(ConvergenceError):
         for damped in map(damped_modes, [] if arm.is_undamped else [found, more]):
-            known, ratios = damped.is_assigned, damped.damping_ratio
-            ratio = dict(zip(damped.index[known].tolist(), ratios[known].tolist(), strict=True)) | ratio
-            poles |= dict(zip(damped.index[known].tolist(), damped.eigenvalues[known, 0].tolist(), strict=True))
+            known = damped.is_assigned
+            index = damped.index[known].tolist()
+            ratio = dict(zip(index, damped.damping_ratio[known].tolist(), strict=True)) | ratio
+            poles |= dict(zip(index, damped.eigenvalues[known, 0].tolist(), strict=True))
     flexible = zip(found.index.tolist(), found.natural_frequency.tolist(), strict=True)
     rows = [ArmMode(n, omega, Percent(ratio[n]) if n in ratio else None) for n, omega in flexible if n > 0]
     return rows, poles

@@ -28,7 +28,9 @@ from tfarm.arm import AT_HUB, AnyLaw, Arm, Law, as_law, tracked
 from tfarm.arm.chain import PERIOD, TIME_ROUNDING
 from tfarm.arm.checks import number
 from tfarm.arm.law import REFERENCE
+from tfarm.arm.stages import Consumer
 from tfarm.arrays import LEAST_SIZE, Real
+from tfarm.assessment.card import CONTINUOUS
 from tfarm.digits import general
 from tfarm.dsp import Chain, traces
 from tfarm.dsp.plant import sensed_plant
@@ -59,6 +61,14 @@ from tfarm.spectrum.table import first_frequency
 
 from .card import loop_names
 
+CONSUMER = Consumer(
+    "step",
+    acts=(
+        "reference", "anti-alias filter", "encoder", "hub rate", "amplifier steps", "amplifier range", "law",
+        "arithmetic", "DAC steps", "DAC range", "torque limit", "hold", "delay", "hub damping", "plant",
+    ),
+    none=("volts",),
+)  # fmt: skip
 SAMPLED_NAMES = {"reference": "reference", "slew": "slew", "pulse": "pulse", "deflection": "decay"}  # by scenario
 MOMENT, UNSTABLE, GROWS = AT_HUB[-1], "unstable", " (the response grows, its figures are not defined)"
 Curve = tuple[Real, Real, Real, Peak | None]  # times [s], values, bounds of their errors, and the peak where known
@@ -347,7 +357,7 @@ def step(
     must_be_known("scenario", scenario_name, SAMPLED_NAMES)
     band = number("settling_band", settling_band, "a share of the travel, such as 0.02")
     require(0 < band < 1, "settling_band", settling_band, "a share of the travel between 0 and 1, such as 0.02")
-    (arm, chain), is_step = admit("step", arm, chain), scenario_name == "reference"
+    (arm, chain), is_step = admit(CONSUMER, arm, chain), scenario_name == "reference"
     hub, law = followed(law) if is_step else (AT_HUB[0], law)
     arm, law = tracked(arm, law)
     full, of_angle, response = as_law(law), hub == AT_HUB[0], None
@@ -368,7 +378,7 @@ def step(
     t = _times(response, task)
     angle = traces.reference_angle(task, t) if of_angle else np.ones(t.size)
     reference = {hub: angle, tip: arm.reach * angle} if is_step or scenario_name == "slew" else {}
-    omitted = not_covered("continuous-time column", chain)
+    omitted = not_covered(CONTINUOUS, chain)
     found = _Record(arm, (*names[:3], TORQUE), task.busy_until, t, reference, band)
     return Step(
         **vars(found), controller=controller(full, arm), scenario=scenario_name, period=task.period,

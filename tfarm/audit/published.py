@@ -1,7 +1,7 @@
 """Published natural frequencies against the exact ones: their number, ours, the difference, and why there is one.
 
 `literature.toml` has the numbers, with all they need to be computed again.  A row agrees if ours, rounded to the last
-printed digit, is what they printed.  One that does not must give a reason (`Case.why`), and one that does must not.
+printed digit, is what they printed.  One that does not must give a reason (`why`), and one that does must not.
 """
 
 import tomllib
@@ -26,7 +26,7 @@ DATA = tomllib.loads((files("tfarm.audit") / "literature.toml").read_text("utf-8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Case:
+class PrintedColumn:
     """One column of a table: the arm, the theory it was printed for, and what was printed of modes 1, 2, ...
 
     `quantity` is one of those of `computed`, w in rad/s; `why` has a reason for each mode whose printed digits are not
@@ -48,7 +48,7 @@ class Source:
     key: Annotated[str, Quantity("source", key="key", help="short name of the publication")]
     citation: Annotated[str, Quantity("citation", help="publication and table of the printed numbers")]
     reached: Annotated[str, Quantity("read from", help="way by which the printed numbers came here")]
-    cases: tuple[Case, ...]
+    cases: tuple[PrintedColumn, ...]
 
 
 def arm_of_case(case: Mapping[str, Any]) -> Arm:
@@ -64,7 +64,7 @@ def arm_of_case(case: Mapping[str, Any]) -> Arm:
 def _source(table: dict[str, Any]) -> Source:
     """The source of a table, whose theory and quantity are those of its cases but where these have others."""
     cases = tuple(
-        Case(
+        PrintedColumn(
             arm=arm_of_case(case),
             printed=tuple(case["printed"]),
             why=dict.fromkeys(case.get("differs", ()), case.get("why", "")),
@@ -126,7 +126,7 @@ def validate(sources: tuple[Source, ...] = ALL) -> tuple[PublishedRow, ...]:
     return found
 
 
-def case_rows(key: str, case: Case) -> list[PublishedRow]:
+def case_rows(key: str, case: PrintedColumn) -> list[PublishedRow]:
     """The rows of one column of a table."""
     return [
         PublishedRow(
@@ -144,7 +144,7 @@ def case_rows(key: str, case: Case) -> list[PublishedRow]:
     ]
 
 
-def computed(case: Case) -> NDArray[np.float64]:
+def computed(case: PrintedColumn) -> NDArray[np.float64]:
     """The exact solution's numbers for a column, in its quantity."""
     link, count = case.arm.link, len(case.printed)
     table = modes(case.arm, count, theory=case.theory)

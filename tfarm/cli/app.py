@@ -13,19 +13,23 @@ from functools import cache, partial, wraps
 from inspect import Parameter, Signature, getdoc, isfunction, signature
 from pathlib import Path
 from threading import Event, Thread
-from typing import IO, Annotated, Any, cast, get_args, get_origin
+from typing import IO, TYPE_CHECKING, Annotated, Any, cast, get_args, get_origin
 
 import typer
 
 import tfarm
 from tfarm.arm import ANGLE_GAIN, LISTED, MOMENT_GAIN, RATE_GAIN, AnyLaw, Arm, Theory, implausible
+from tfarm.arm.reading import ArmFile, load_tables
 from tfarm.errors import one_line, require
 from tfarm.files import is_standard_output, write_file
-from tfarm.schema import as_csv, curve_table, to_dict, to_json
+from tfarm.schema import Table, as_csv, curve_table, to_dict, to_json
+
+if TYPE_CHECKING:
+    from tfarm.arm.chain import Chain
 
 app = typer.Typer(name="tfarm", rich_markup_mode="rich", pretty_exceptions_enable=False)
 GROUPS = ("Arm", "Loop", "Sampled loop", "Design", "Measurement", "Report")  # of commands in the help, in its order
-PROGRESS_AFTER, PROGRESS_EVERY = 2.0, 4.0  # seconds to the first line of progress, and from one to the next
+PROGRESS_AFTER = 2.0  # seconds to the first line of progress
 
 
 @cache  # some 35 ms, which a process with several commands need not spend on each
@@ -67,6 +71,16 @@ def preset_names(incomplete: str) -> list[str]:
     return [name for name in tfarm.presets() if name.startswith(incomplete)]
 
 
+def read_arm(name: str) -> ArmFile:
+    """Return the tables of a preset or file, for all that a command makes of them."""
+    return load_tables(name)
+
+
+def read_arms(names: Any) -> list[ArmFile]:
+    """Return those of several; none of None."""
+    return [load_tables(name) for name in names or ()]
+
+
 def numbers(form: str, count: int = 0, kind: Callable[[str], Any] = float) -> Callable[[str], tuple[Any, ...]]:
     """Return the parser of numbers that commas separate, `count` of them or any; `form` is that of the option."""
 
@@ -106,12 +120,29 @@ def check_figure(path: Path | None) -> Path | None:
 
 
 CONTROLLER, SAMPLING = "Controller", "Sampling"  # groups of options
-ArmName = Annotated[
-    str, typer.Argument(metavar="ARM", help="preset or TOML file", autocompletion=preset_names, show_default=False)
+ArmName = Annotated[  # in a command the tables of that file, read and parsed once
+    Any,
+    typer.Argument(
+        metavar="ARM",
+        help="preset or TOML file",
+        parser=str,
+        callback=read_arm,
+        autocompletion=preset_names,
+        show_default=False,
+    ),
+]
+ArmNames = Annotated[
+    list[Any],
+    typer.Argument(
+        metavar="ARM [ARM]",
+        help="presets or TOML files",
+        parser=str,
+        callback=read_arms,
+        autocompletion=preset_names,
+        show_default=False,
+    ),
 ]
 TheoryName = Annotated[Theory | None, typer.Option("--theory", help="beam theory; by default that of the arm's file")]
-Json = Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")]
-Csv = Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="write the table to this file")]
 Png = Annotated[
     Path | None,
     typer.Option("--figure", "--png", metavar="FILE", callback=check_figure,
@@ -137,19 +168,6 @@ LawFiles = Annotated[
     typer.Option("--law", metavar="FILE", exists=True, help="TOML file with a [law]; may be repeated",
                  rich_help_panel=CONTROLLER),
 ]  # fmt: skip
-Period = Annotated[
-    float | None,
-    typer.Option("--period", help="sampling period [s]; by default the file's, or 0.01", rich_help_panel=SAMPLING),
-]
-Delay = Annotated[
-    float | None,
-    typer.Option("--delay-samples", help="computational delay in samples, any fraction", rich_help_panel=SAMPLING),
-]
-DspFile = Annotated[
-    str | None,
-    typer.Option("--dsp", metavar="FILE", rich_help_panel=SAMPLING,
-                 help="TOML file with [sampling], [converters], [actuator], [slew]; by default that of the arm"),
-]  # fmt: skip
 Gains = dict[str, float | None]  # by name; None where not given
 DEFAULT_GAINS = {
     RATE_GAIN: "hub rate gain [N m s/rad, V s/rad or A s/rad]; by default 0.00642 J w1 (0.3 on the paper's arm)",
@@ -163,37 +181,28 @@ def gain_option(name: str, text: str, kind: Any = float | None) -> Any:
 
 
 AngleGain = gain_option(ANGLE_GAIN, "hub angle gain", float)
-GAIN_OPTIONS = [
-    Parameter(gain.name, Parameter.KEYWORD_ONLY, default=None, annotation=gain_option(
-        gain.name, DEFAULT_GAINS.get(gain.name, f"{gain.output.replace('_', ' ')} gain [{gain.unit}]; by default 0")
-    ))
-    for gain in LISTED
-]  # fmt: skip
+GAIN_OPTIONS = []
+for each in LISTED:
+    words = DEFAULT_GAINS.get(each.name, f"{each.output.replace('_', ' ')} gain [{each.unit}]; by default 0")
+    kind = gain_option(each.name, words)
+    GAIN_OPTIONS.append(Parameter(each.name, Parameter.KEYWORD_ONLY, default=None, annotation=kind))
 
 
 def add_command(group: str, **how: Any) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Return the decorator that adds a command to a group of the help; `how` are its name and its example.
 
-    Its parameters are its arguments and options.  "name: text" below "Options:" in its docstring is the help of one.  A
-    parameter of type `Gains` has an option for each gain.  One whose default is a function has an option for each of
-    its keywords, and is that function with their values.
+    Its keyword-only parameters are its arguments and options.  "name: text" below "Options:" in its docstring is the
+    help of one.  A parameter of type `Gains` has an option for each gain.  One whose default is a function has an
+    option for each keyword-only parameter of that, and is the function with their values.
     """
 
     def add(command: Callable[..., None]) -> Callable[..., None]:
-        words, helps = help_of(command)
-        own = signature(command).parameters
-        groups = {name: parts for name, each in own.items() if (parts := options_of(each))}
-
         @wraps(command)
         def called(**options: Any) -> None:
-            for name, parts in groups.items():
-                values, default = {each.name: options.pop(each.name) for each in parts}, own[name].default
-                options[name] = partial(default, **values) if isfunction(default) else values
-            command(**options)
+            command(**keywords_of(command, options))
 
-        alone = [_with_help(each, helps.get(name, "")) for name, each in own.items() if name not in groups]
-        called.__signature__ = Signature([*alone, *(each for parts in groups.values() for each in parts)])  # type: ignore[attr-defined]
-        called.__doc__ = words
+        called.__signature__ = Signature(options_of(command))  # type: ignore[attr-defined]
+        called.__doc__ = help_of(command)[0]
         app.command(rich_help_panel=group, **how)(called)
         return command
 
@@ -206,14 +215,36 @@ def help_of(function: Callable[..., Any]) -> tuple[str, dict[str, str]]:
     return words, dict(line.split(": ", 1) for line in re.split(r"\n(?=\w)", lines) if lines)
 
 
-def options_of(parameter: Parameter) -> list[Parameter]:
-    """Return the options that a parameter collects: those of gains, or the keywords of the function that it is."""
-    if parameter.annotation == Gains:
-        return GAIN_OPTIONS
-    if not isfunction(parameter.default):
-        return []
-    known, (_, helps) = signature(parameter.default).parameters.values(), help_of(parameter.default)
-    return [_with_help(each, helps.get(each.name, "")) for each in known if each.kind is Parameter.KEYWORD_ONLY]
+def keyword_only(function: Callable[..., Any]) -> Iterator[Parameter]:
+    """Yield the keyword-only parameters of a function."""
+    return (each for each in signature(function).parameters.values() if each.kind is Parameter.KEYWORD_ONLY)
+
+
+def options_of(function: Callable[..., Any]) -> list[Parameter]:
+    """Return the options of a command, or of a function that has some of them."""
+    helps = help_of(function)[1]
+    found: list[Parameter] = []
+    for each in keyword_only(function):
+        if each.annotation == Gains:
+            found += GAIN_OPTIONS
+        elif isfunction(each.default):
+            found += options_of(each.default)
+        else:
+            found.append(_with_help(each, helps.get(each.name, "")))
+    return found
+
+
+def keywords_of(function: Callable[..., Any], options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keywords of a command, or of a function that has some of its options, by the values of all."""
+    found: dict[str, Any] = {}
+    for each in keyword_only(function):
+        if each.annotation == Gains:
+            found[each.name] = {gain.name: options[gain.name] for gain in LISTED}
+        elif isfunction(each.default):
+            found[each.name] = partial(each.default, **keywords_of(each.default, options))
+        else:
+            found[each.name] = options[each.name]
+    return found
 
 
 def _with_help(option: Parameter, text: str) -> Parameter:
@@ -221,25 +252,22 @@ def _with_help(option: Parameter, text: str) -> Parameter:
     kind, *infos = get_args(option.annotation) if get_origin(option.annotation) is Annotated else [option.annotation]
     info = copy(infos[0]) if infos else typer.Option(f"--{option.name.replace('_', '-')}")
     info.help = " ".join(text.split()) or info.help
-    return option.replace(kind=Parameter.KEYWORD_ONLY, annotation=Annotated[kind, info])
+    return option.replace(annotation=Annotated[kind, info])
 
 
 # ------------------------------------------------------------------------------------------------------------ inputs
 
 
-def load_arm(name: str, theory: Theory | None = None, driven: str | None = None) -> Arm:
-    """Return the arm of a preset or file, under that theory.
+def load_arm(file: ArmFile, theory: Theory | None = None, driven: str | None = None) -> Arm:
+    """Return the arm of a file, under that theory.
 
     Values that look like a wrong unit, and a motor without an input (`driven` or the file's), are named on standard
     error.
     """
-    from tfarm.arm.reading import arm_in, load_tables
-
-    table, file = load_tables(name)
-    arm = arm_in(table, file)
-    if "motor" in table and "input" not in table and driven is None:
+    arm = tfarm.load(file)
+    if "motor" in file.tables and "input" not in file.tables and driven is None:
         print_line(
-            f"warning: {file}: input: not given with a [motor], {arm.input} is assumed. "
+            f"warning: {file.name}: input: not given with a [motor], {arm.input} is assumed. "
             "Set input to hub_torque, motor_voltage or motor_current at the top of the file."
         )
     if theory is not None:
@@ -249,8 +277,10 @@ def load_arm(name: str, theory: Theory | None = None, driven: str | None = None)
     return arm
 
 
-def load_law(arm: Arm, name: str, gains: Gains, file: Path | None = None) -> tuple[AnyLaw, dict[str, Any]]:
-    """Return the law of a file, of the gains given, or of the arm's own [law], and what JSON has of default gains.
+def load_law(
+    file: ArmFile, arm: Arm, gains: Gains, other: Path | ArmFile | None = None
+) -> tuple[AnyLaw, dict[str, Any]]:
+    """Return the law of another file, of the gains given, or of the arm's own [law], and JSON's part of default gains.
 
     `default_gains` names those that are not given and have a default, `default_gains_in_words` is their values.
     """
@@ -258,38 +288,60 @@ def load_law(arm: Arm, name: str, gains: Gains, file: Path | None = None) -> tup
     from tfarm.spectrum.table import default_words
 
     typed = {gain: value for gain, value in gains.items() if value is not None}
-    if file is not None:
-        refuse({f"--{gain}": value for gain, value in typed.items()}, f"the law is that of {file}; leave this out")
-    own = None if typed else read(name if file is None else file)
+    if other is not None:
+        file = load_tables(other)
+        refuse({f"--{gain}": value for gain, value in typed.items()}, f"the law is that of {file.name}; leave this out")
+    own = None if typed else read(file)
     if own is not None:
         return own, {}
-    require(file is None, "--law", str(file), "has no table [law]")
+    require(other is None, "--law", file.name, "has no table [law]")
     missing = [gain for gain in DEFAULT_GAINS if gain not in typed]
     words = default_words(arm, missing) if missing else None
     return replace(tfarm.default_gains(arm), **typed), {"default_gains": missing, "default_gains_in_words": words}
 
 
-def load_loop(name: str, theory: Theory | None, gains: Gains, law: Path | None) -> tuple[Arm, AnyLaw, dict[str, Any]]:
-    """Return arm and law of a command, and what JSON has of default gains."""
-    arm = load_arm(name, theory)
-    return arm, *load_law(arm, name, gains, law)
-
-
-def load_driven_loop(
-    name: str, theory: Theory | None, gains: Gains, law: Path | None
+def load_loop(
+    file: ArmFile, *, law: LawFile = None, theory: TheoryName = None, gains: Gains
 ) -> tuple[Arm, AnyLaw, dict[str, Any]]:
+    """Return arm and law of a command, and JSON's part of default gains."""
+    arm = load_arm(file, theory)
+    return arm, *load_law(file, arm, gains, law)
+
+
+def load_driven_loop(file: ArmFile, *, loop: Any = load_loop) -> tuple[Arm, AnyLaw, dict[str, Any]]:
     """Return the same of a command without sampling, the arm with the analog damping that its file states."""
     from tfarm.dsp.plant import driven
 
-    arm, controller, defaults = load_loop(name, theory, gains, law)
-    return driven(arm, load_chain(name))[0], controller, defaults
+    arm, controller, defaults = loop(file)
+    return driven(arm, load_chain(file))[0], controller, defaults
 
 
-def load_chain(arm: str, *, period: Period = None, delay_samples: Delay = None, dsp: DspFile = None) -> Any:
+def load_chain(
+    file: str | ArmFile,
+    *,
+    period: Annotated[
+        float | None,
+        typer.Option("--period", help="sampling period [s]; by default the file's, or 0.01", rich_help_panel=SAMPLING),
+    ] = None,
+    delay_samples: Annotated[
+        float | None,
+        typer.Option("--delay-samples", help="computational delay in samples, any fraction", rich_help_panel=SAMPLING),
+    ] = None,
+    dsp: Annotated[
+        str | None,
+        typer.Option(
+            "--dsp",
+            metavar="FILE",
+            rich_help_panel=SAMPLING,
+            help="TOML file with [sampling], [converters], [actuator], [slew]; by default that of the arm",
+        ),
+    ] = None,
+) -> "Chain":
     """Return the sampled chain of a file, or of the arm's, with the period and the delay that are given instead."""
     from tfarm.arm.chain import load_chain as read
 
-    chain, typed = read(dsp or arm), {"period": period, "delay_samples": delay_samples}
+    chain = read(dsp or file)
+    typed = {"period": period, "delay_samples": delay_samples}
     sampling = replace(chain.sampling, **{key: value for key, value in typed.items() if value is not None})
     return replace(chain, sampling=sampling, period_from=chain.period_from if period is None else "--period")
 
@@ -310,39 +362,29 @@ def refuse(others: Mapping[str, Any], remedy: str) -> None:
 # ----------------------------------------------------------------------------------------------------------- outputs
 
 
-def emit(
+def emit_record(
     record: Any,
-    json: bool,
     defaults: Mapping[str, Any] | None = None,
-    *,
-    csv: Path | None = None,
-    png: Path | None = None,
     also: Sequence[Path | None] = (),
-    rows: bool = False,
+    rows: Table | None = None,
     summary: Any = None,
-    picture: str | None = None,
+    *,
+    json: Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")] = False,
 ) -> None:
-    """Write the curves or rows of a record to CSV and its `picture` to a file, then print it as JSON or as text.
+    """Print a record as JSON or as text.
 
     `defaults` is what JSON has of default gains; `also` are files that are written already.  The text ends with the
-    `rows` of the CSV file where they are wanted and not written, and begins with the result card `summary`, as the
-    "summary" of JSON.  Nothing is printed where standard output is one of the files.
+    `rows` of a table, and begins with the result card `summary`, as the "summary" of JSON.  Nothing is printed where
+    standard output is one of the files.
     """
-    if csv is not None:
-        write_file(csv, as_csv(curve_table(record), units=True).encode(), key="--csv")
-    if png is not None:
-        from tfarm import plots  # every picture is registered once they are loaded
-
-        plots.style.save_picture(
-            getattr(plots, picture).figure if picture else plots.style.FIGURES[type(record)], record, png
-        )
-    written = [path for path in (*also, csv, png) if path is not None]
+    written = [path for path in also if path is not None]
     if any(map(is_standard_output, written)):
         return
     for path in written:
         print(f"written: {path}", file=sys.stderr)
     if json:
-        print(to_json({**({"summary": to_dict(summary)} if summary else {}), **to_dict(record), **(defaults or {})}))
+        head = {"summary": to_dict(summary)} if summary else {}
+        print(to_json({**head, **to_dict(record), **(defaults or {})}))
         return
     from tfarm.schema.terminal import show, show_table, show_text
 
@@ -351,17 +393,49 @@ def emit(
         show_text("\n".join(summary.notes))
         print()
     words = f"by default {defaults['default_gains_in_words']}" if defaults and defaults["default_gains"] else ""
-    show(record, curve_table(record) if rows and csv is None else None, words)
+    show(record, rows, words)
 
 
-def emit_loop(
-    picture: str, arm: str, theory: Theory | None, gains: Gains, law: Path | None, chain: Any, json: bool, **files: Any
+def emit(
+    record: Any,
+    defaults: Mapping[str, Any] | None = None,
+    also: Sequence[Path | None] = (),
+    rows: bool = False,
+    picture: str | None = None,
+    *,
+    show: Any = emit_record,
+    csv: Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="write the table to this file")] = None,
+    png: Png = None,
 ) -> None:
+    """Write the curves or rows of a record to CSV and its `picture` to a file, then print it.
+
+    The `rows` of the CSV file are printed where they are wanted and not written.
+    """
+    if csv is not None:
+        write_file(csv, as_csv(curve_table(record), units=True).encode(), key="--csv")
+    if png is not None:
+        from tfarm import plots  # every picture is registered once they are loaded
+
+        draw = getattr(plots, picture).figure if picture else plots.style.FIGURES[type(record)]
+        plots.style.save_picture(draw, record, png)
+    show(record, defaults, (*also, csv, png), curve_table(record) if rows and csv is None else None)
+
+
+def emit_loop(picture: str, file: ArmFile, loop: Any, chain: Any, show: Any) -> None:
     """Emit the loop function of a command with that picture of it; of the sampled loop where sampling is given."""
-    is_sampled = any(value is not None for value in chain.keywords.values())
-    subject, controller, defaults = (load_loop if is_sampled else load_driven_loop)(arm, theory, gains, law)
-    found = tfarm.loop_function(subject, controller, chain(arm) if is_sampled else None)
-    emit(found, json, defaults, picture=picture, **files)
+    from tfarm.dsp.plant import driven
+
+    arm, controller, defaults = loop(file)
+    if given(chain):
+        found = tfarm.loop_function(arm, controller, chain(file))
+    else:
+        found = tfarm.loop_function(driven(arm, chain(file))[0], controller)
+    show(found, defaults, picture=picture)
+
+
+def given(options: Any) -> bool:
+    """Return whether one of the options of a function is given."""
+    return any(value is not None for value in options.keywords.values())
 
 
 _state = ["running"]  # of the command, for the lines of progress
@@ -378,7 +452,9 @@ def progress() -> Iterator[Callable[[int, int, str], None]]:
     _state[0], over, began = "running", Event(), time.monotonic()
 
     def speak() -> None:
-        while not over.wait(PROGRESS_EVERY if time.monotonic() - began > PROGRESS_AFTER else PROGRESS_AFTER):
+        pause = PROGRESS_AFTER
+        while not over.wait(pause):
+            pause = 4.0
             if _state[0]:  # none between a question and its answer
                 print_line(f"{_state[0]} ({time.monotonic() - began:.0f} s)")
 

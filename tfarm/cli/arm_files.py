@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from tfarm.arm.parts import SHAPES
-from tfarm.cli.app import SAMPLING, ArmName, Json, TheoryName, add_command, advance, emit, refuse
+from tfarm.cli.app import SAMPLING, TheoryName, add_command, advance, emit_record, preset_names, refuse
 from tfarm.errors import MISSING, must_be_known, require
 from tfarm.files import write_file
 
@@ -77,6 +77,7 @@ def section_table(
     "Arm", epilog="new my-arm.toml --material steel --length 0.8 --width 0.06 --depth 0.004 --hub-inertia 0.05"
 )
 def new(
+    *,
     file: Annotated[Path, typer.Argument(metavar="FILE", help="the file to write, .toml", show_default=False)],
     link: Callable[..., Any] = link_table,
     section: Callable[..., Any] = section_table,
@@ -117,8 +118,13 @@ def new(
 
 
 @add_command("Arm", epilog="check my-arm.toml")
-def check(arm: ArmName, theory: TheoryName = None, json: Json = False) -> None:
+def check(
+    *,
+    arm: Annotated[str, typer.Argument(metavar="ARM", help="preset or TOML file", autocompletion=preset_names)],
+    theory: TheoryName = None,
+    show: Any = emit_record,
+) -> None:
     """Arm file as it is read: mass, inertia, first frequency, warnings, missing tables and their defaults."""
     from tfarm.assessment.arm_check import check_arm
 
-    emit(check_arm(arm, theory), json)
+    show(check_arm(arm, theory))

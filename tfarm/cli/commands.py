@@ -12,12 +12,8 @@ import typer
 import tfarm
 from tfarm.cli.app import (
     ArmName,
-    Csv,
     File,
-    Gains,
     InputName,
-    Json,
-    LawFile,
     Place,
     Png,
     SideName,
@@ -26,15 +22,18 @@ from tfarm.cli.app import (
     advance,
     emit,
     emit_loop,
+    emit_record,
     interval,
     load_arm,
     load_chain,
+    load_loop,
     named,
     numbers,
     outputs_on,
     print_line,
     refuse,
 )
+from tfarm.errors import require
 from tfarm.schema import Quantity
 
 command = partial(add_command, "Arm")
@@ -47,17 +46,8 @@ Compare = Annotated[bool, typer.Option("--compare", help="all three methods and 
 DigitCount = Annotated[
     int | None, typer.Option("--digits", min=1, max=1000, help="certified digits; texts in JSON above 15")
 ]
-ComplexPoints = Annotated[
-    Any,
-    typer.Option(
-        metavar="S,S",
-        parser=numbers("numbers in 1/s such as 0.3+57.1j,10j", kind=lambda text: complex(text.replace("i", "j"))),
-    ),
-]
-Frequencies = Annotated[Any, typer.Option(metavar="W,W", parser=numbers("frequencies in rad/s such as 1,10,100"))]
 pair = named(numbers("KEY=NUMBER,NUMBER", 2))
 OWN_TABLE = "--compare prints a table of its own: ask for one of them"
-MOST_SLOW = 2000  # points by balls or by the appendix, at some milliseconds each
 
 
 @dataclass(frozen=True)
@@ -92,17 +82,20 @@ class Presets:
 
 
 @command(epilog="presets")
-def presets(json: Json = False) -> None:
+def presets(*, show: Any = emit_record) -> None:
     """List the arms that come with tfarm, with their assumptions."""
-    emit(Presets([
-        Preset(arm.name, arm.length, arm.damping, arm.hub.inertia, arm.payload.mass, arm.payload.inertia,
-               arm.assumptions)
-        for arm in map(tfarm.load, tfarm.presets())
-    ]), json)  # fmt: skip
+    rows = []
+    for arm in map(tfarm.load, tfarm.presets()):
+        payload = arm.payload
+        rows.append(
+            Preset(arm.name, arm.length, arm.damping, arm.hub.inertia, payload.mass, payload.inertia, arm.assumptions)
+        )
+    show(Presets(rows))
 
 
 @command(epilog="modes sasaki2012-lab --count 5")
 def modes(
+    *,
     arm: ArmName,
     count: Annotated[int, typer.Option(min=1, max=1000)] = 10,
     digits: DigitCount = None,
@@ -110,7 +103,7 @@ def modes(
     method: MethodName = "closed-form",
     compare: Compare = False,
     theory: TheoryName = None,
-    json: Json = False,
+    show: Any = emit_record,
 ) -> None:
     """Natural frequencies, damping ratios and modes, complete by construction.
 
@@ -125,10 +118,10 @@ def modes(
     check_method(method, len(found), digits, compare)
     if compare:
         refuse({"--certify": certify}, OWN_TABLE)
-        emit(ByMethods(found.arm.name, "natural_frequency", "rad/s", found.index.tolist(), found.by_methods()), json)
+        show(ByMethods(found.arm.name, "natural_frequency", "rad/s", found.index.tolist(), found.by_methods()))
         return
     listed = listed_modes(found, digits, certify, cast("Any", method))
-    emit(listed, json)
+    show(listed)
     if listed.damped_failure:
         print_line(listed.damped_failure)
         raise typer.Exit(3)  # as where nothing could be solved
@@ -136,10 +129,17 @@ def modes(
 
 @command(epilog="response sasaki2012-lab --from 1 --to 100 --csv root.csv")
 def response(
+    *,
     arm: ArmName,
     output: str | None = None,
-    s: ComplexPoints = None,
-    omega: Frequencies = None,
+    s: Annotated[
+        Any,
+        typer.Option(
+            metavar="S,S",
+            parser=numbers("numbers in 1/s such as 0.3+57.1j,10j", kind=lambda text: complex(text.replace("i", "j"))),
+        ),
+    ] = None,
+    omega: Annotated[Any, typer.Option(metavar="W,W", parser=numbers("frequencies in rad/s such as 1,10,100"))] = None,
     start: Annotated[float, typer.Option("--from")] = 0.1,
     stop: Annotated[float, typer.Option("--to")] = 1000.0,
     points: Annotated[int, typer.Option(min=2, max=1_000_000)] = 500,
@@ -149,11 +149,9 @@ def response(
     digits: DigitCount = None,
     method: MethodName = "closed-form",
     compare: Compare = False,
-    csv: Csv = None,
     measured: Annotated[str | None, typer.Option(metavar="OUTPUT/INPUT=FILE")] = None,
-    png: Png = None,
     theory: TheoryName = None,
-    json: Json = False,
+    show: Any = emit,
 ) -> None:
     """Exact frequency response to the arm's input, or its values at points s.
 
@@ -176,20 +174,20 @@ def response(
             {"--s": s, "--omega": omega, "--output": output, "--x": x, "--side": side, "--digits": digits},
             "a measured response has its own outputs and frequencies; leave this out",
         )
-        emit(tfarm.overlay(load_arm(arm, theory), data_of(measured, "--measured")), json, csv=csv, png=png)
+        show(tfarm.overlay(load_arm(arm, theory), data_of(measured, "--measured")))
         return
-    refuse({"--png": png}, "a picture needs --measured; tfarm bode draws the exact response")
+    refuse({"--png": show.keywords["png"]}, "a picture needs --measured; tfarm bode draws the exact response")
     from tfarm.response.transfer import ByMethods, values_at
 
-    (wanted,) = outputs_on(["root_moment" if output is None else output], side)
+    (wanted,) = outputs_on([output or "root_moment"], side)
     G = tfarm.transfer(load_arm(arm, theory, driven), wanted, x=x, method=cast("Any", method), input=driven)
     at = places_of(s, omega, (start, stop), points)
     check_method(method, at.size, digits, compare)
     if compare:
-        refuse({"--csv": csv, "--input": driven if G.load else None}, OWN_TABLE)
-        emit(ByMethods(G.arm.name, G.outputs[0], G.units[0], at.tolist(), G.by_methods(at)), json)
+        refuse({"--csv": show.keywords["csv"], "--input": driven if G.load else None}, OWN_TABLE)
+        show(ByMethods(G.arm.name, G.outputs[0], G.units[0], at.tolist(), G.by_methods(at)))
         return
-    emit(values_at(G, at, digits), json, csv=csv, rows=True)
+    show(values_at(G, at, digits), rows=True)
 
 
 def places_of(s: Any, omega: Any, limits: tuple[float, float], points: int) -> Any:
@@ -207,20 +205,19 @@ def check_method(method: str, number: int, digits: int | None, compare: bool) ->
     """Raise ParameterError for digits, or too many points, by one of the slow methods."""
     if method != "closed-form" or compare:
         refuse({"--digits": digits}, "they are certified by balls in any case: leave --method and --compare out")
-        refuse(
-            {"points": number if number > MOST_SLOW else None},
-            f"at most {MOST_SLOW} by balls or the appendix, which take milliseconds for each",
-        )
+        remedy = "at most 2000 by balls or the appendix, which take milliseconds for each"
+        require(number <= 2000, "points", number, remedy)
 
 
 def check_range(start: float, stop: float) -> None:
     """Raise ParameterError for what is no frequency range [rad/s]."""
-    refuse({"--from": None if 0 < start < math.inf else start}, "a positive frequency in rad/s")
-    refuse({"--to": None if start < stop < math.inf else stop}, f"a frequency above --from, {start:g} rad/s")
+    require(0 < start < math.inf, "--from", start, "a positive frequency in rad/s")
+    require(start < stop < math.inf, "--to", stop, f"a frequency above --from, {start:g} rad/s")
 
 
 @command(epilog="bode sasaki2012-lab --output tip_displacement --png bode.png")
 def bode(
+    *,
     arm: ArmName,
     output: str | None = None,
     start: Annotated[float | None, typer.Option("--from")] = None,
@@ -229,14 +226,9 @@ def bode(
     side: SideName = None,
     driven: InputName = None,
     loop: bool = False,
-    png: Png = None,
-    csv: Csv = None,
-    law: LawFile = None,
+    under: Any = load_loop,
     chain: Any = load_chain,
-    theory: TheoryName = None,
-    json: Json = False,
-    *,
-    gains: Gains,
+    show: Any = emit,
 ) -> None:
     """Bode plot of the exact response to the arm's input, with the poles and zeros of that output.
 
@@ -254,21 +246,24 @@ def bode(
             {"--output": output, "--from": start, "--to": stop, "--x": x, "--side": side, "--input": driven},
             "the loop function has no output and its own frequencies; leave this out",
         )
-        emit_loop("loop", arm, theory, gains, law, chain, json, csv=csv, png=png)
+        emit_loop("loop", arm, under, chain, show)
         return
-    of_loop = {f"--{name}": value for name, value in {**gains, "law": law, **chain.keywords}.items()}
-    refuse({key.replace("_", "-"): value for key, value in of_loop.items()}, "the loop function: give --loop too")
     from tfarm.response.frequency import resonant_band
 
-    subject, (wanted,) = load_arm(arm, theory, driven), outputs_on(["root_moment" if output is None else output], side)
+    of_loop = {**under.keywords["gains"], "law": under.keywords["law"], **chain.keywords}
+    for name, value in of_loop.items():
+        refuse({f"--{name.replace('_', '-')}": value}, "the loop function: give --loop too")
+    subject = load_arm(arm, under.keywords["theory"], driven)
+    (wanted,) = outputs_on([output or "root_moment"], side)
     low, high = resonant_band(tfarm.transfer(subject, wanted, x=x, input=driven).arm)
     band = low if start is None else start, high if stop is None else stop
     check_range(*band)
-    emit(tfarm.bode(subject, wanted, band, x=x, input=driven), json, csv=csv, png=png)
+    show(tfarm.bode(subject, wanted, band, x=x, input=driven))
 
 
 @command(epilog="reduce sasaki2012 --outputs root_moment,hub_rate --order 14")
 def reduce(
+    *,
     arm: ArmName,
     outputs: str = "root_moment,hub_rate",
     order: Annotated[int | None, typer.Option(min=0)] = None,
@@ -279,7 +274,7 @@ def reduce(
     side: SideName = None,
     mat: File = None,
     theory: TheoryName = None,
-    json: Json = False,
+    show: Any = emit_record,
 ) -> None:
     """Reduced state-space model, with its largest error against the exact arm over a frequency range.
 
@@ -297,13 +292,14 @@ def reduce(
         load_arm(arm, theory), outputs_on([name.strip() for name in outputs.split(",")], side),
         order=order, error=error, method=cast("Any", method), band=band, x=x,
     )  # fmt: skip
-    emit(reduced, json, also=() if mat is None else save_mat(reduced, mat, key="--mat"))
+    show(reduced, also=() if mat is None else save_mat(reduced, mat, key="--mat"))
 
 
 @measuring_command(
     epilog="fit rig.toml --data tip_acceleration/hub_angle=sweep.csv --free link.youngs_modulus,delay --json"
 )
 def fit(
+    *,
     arm: ArmName,
     data: Annotated[list[str] | None, typer.Option(metavar="OUTPUT/INPUT=FILE")] = None,
     free: Annotated[str, typer.Option(metavar="KEY,KEY")] = "",
@@ -319,7 +315,7 @@ def fit(
     report: bool = False,
     out: Annotated[Path, typer.Option(metavar="FOLDER")] = Path("reports"),
     theory: TheoryName = None,
-    json: Json = False,
+    show: Any = emit_record,
 ) -> None:
     """Fit of an arm's numbers to measured responses and ring-downs, with confidence intervals.
 
@@ -353,13 +349,14 @@ def fit(
         from tfarm.report import write
 
         page = write([found.arm], out, fits=[found], progress=advance, notice=print_line)
-    emit(found, json, png=png, also=(save, page))
+    emit(found, png=png, also=(save, page), show=show)
     if not found.converged or found.misses:
         raise typer.Exit(3)
 
 
 @measuring_command(epilog="frf record.csv --input hub_torque --output tip_acceleration=acc1 --save measured.csv")
 def frf(
+    *,
     record: RecordName,
     input: str,
     output: str,
@@ -368,7 +365,7 @@ def frf(
     segment: float | None = None,
     overlap: float | None = None,
     csv: Annotated[Path | None, typer.Option("--save", "--csv", metavar="FILE")] = None,
-    json: Json = False,
+    show: Any = emit_record,
 ) -> None:
     """Frequency response of a record over time, by averaged cross-spectra, with coherence.
 
@@ -383,28 +380,35 @@ def frf(
     """
     from tfarm.fitting import recording
 
-    refuse(
-        {"signal": next((text for text in (output, input) if text.endswith("=")), None)},
-        "write NAME=COLUMN, such as tip_acceleration=acc1",
-    )
-    (signal, column), (driven, driven_column) = (text.partition("=")[::2] for text in (output, input))
+    names, columns = [], []
+    for text in (output, input):
+        name, sign, column = text.partition("=")
+        require(column or not sign, "signal", text, "write NAME=COLUMN, such as tip_acceleration=acc1")
+        names.append(name)
+        columns.append(column or name)
     found = recording.frequency_response(
-        recording.read_recording(record), signal, driven, columns=(column or signal, driven_column or driven),
-        estimator=cast("Any", estimator), window=cast("Any", window), segment=segment, overlap=overlap,
-    )  # fmt: skip
-    emit(found, json, csv=csv, rows=True)
+        recording.read_recording(record),
+        *names,
+        columns=cast("Any", columns),
+        estimator=cast("Any", estimator),
+        window=cast("Any", window),
+        segment=segment,
+        overlap=overlap,
+    )
+    emit(found, csv=csv, rows=True, show=show)
     if found.note:
         print_line(found.note)
 
 
 @measuring_command(epilog="ring record.csv --signal root_strain --from 2.5")
 def ring(
+    *,
     record: RecordName,
     signal: str,
     start: Annotated[float | None, typer.Option("--from")] = None,
     stop: Annotated[float | None, typer.Option("--to")] = None,
     modes: Annotated[int, typer.Option(min=1)] = 1,
-    json: Json = False,
+    show: Any = emit_record,
 ) -> None:
     """Frequencies and damping ratios of a decay, with confidence intervals.
 
@@ -416,4 +420,4 @@ def ring(
     """
     from tfarm.fitting import recording, resonances
 
-    emit(resonances.ring(recording.read_recording(record), signal, start=start, stop=stop, modes=modes), json)
+    show(resonances.ring(recording.read_recording(record), signal, start=start, stop=stop, modes=modes))

@@ -12,16 +12,14 @@ from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN
 from tfarm.cli.app import (
     AngleGain,
     ArmName,
-    Csv,
     File,
-    Gains,
-    Json,
     LawFile,
-    Png,
     TheoryName,
     add_command,
     emit,
     emit_loop,
+    emit_record,
+    given,
     interval,
     load_arm,
     load_chain,
@@ -37,7 +35,6 @@ from tfarm.files import mat_content, write_file
 
 command = partial(add_command, "Loop")
 sampled_command = partial(add_command, "Sampled loop")
-DRAWN_BETWEEN = 15  # records between two samples of a picture
 ModeCount = Annotated[
     int | None, typer.Option("--modes", min=1, max=400, help="flexible modes; by default as many as the result takes")
 ]
@@ -45,14 +42,12 @@ ModeCount = Annotated[
 
 @command(epilog="poles sasaki2012-lab --K1 0.3 --K2 0.3 --count 8")
 def poles(
+    *,
     arm: ArmName,
     count: Annotated[int | None, typer.Option(min=1, max=1000)] = None,
     certify: bool = False,
-    law: LawFile = None,
-    theory: TheoryName = None,
-    json: Json = False,
-    *,
-    gains: Gains,
+    loop: Any = load_driven_loop,
+    show: Any = emit_record,
 ) -> None:
     """Closed-loop poles of the exact arm, complete in a printed box.
 
@@ -60,115 +55,79 @@ def poles(
     count: poles with Im s >= 0; by default ten, or those below the shear cut-off
     certify: prove each, and that none is missing
     """
-    subject, controller, defaults = load_driven_loop(arm, theory, gains, law)
+    subject, controller, defaults = loop(arm)
     found = tfarm.closed_loop_poles(subject, controller, count)
-    emit(found.certified() if certify else found, json, defaults)
+    show(found.certified() if certify else found, defaults)
 
 
 @command(epilog="margins sasaki2012-lab --K1 0.3 --K2 0.3")
-def margins(arm: ArmName, law: LawFile = None, theory: TheoryName = None, json: Json = False, *, gains: Gains) -> None:
+def margins(*, arm: ArmName, loop: Any = load_loop, show: Any = emit_record) -> None:
     """Result card, stability, the stability interval of each gain, and the margins of the exact loop function."""
     from tfarm.dsp.plant import driven
 
-    subject, controller, defaults = load_loop(arm, theory, gains, law)
+    subject, controller, defaults = loop(arm)
     subject, chain = driven(subject, load_chain(arm))
     found = tfarm.margins(subject, controller)
-    emit(found, json, defaults, summary=tfarm.result_card(subject, controller, chain, continuous=found))
+    show(found, defaults, summary=tfarm.result_card(subject, controller, chain, continuous=found))
 
 
 @command(epilog="nyquist sasaki2012-lab --K1 0.3 --K2 0.3 --png nyquist.png")
-def nyquist(
-    arm: ArmName,
-    disc: bool = False,
-    png: Png = None,
-    csv: Csv = None,
-    law: LawFile = None,
-    theory: TheoryName = None,
-    json: Json = False,
-    *,
-    gains: Gains,
-) -> None:
+def nyquist(*, arm: ArmName, disc: bool = False, loop: Any = load_driven_loop, show: Any = emit) -> None:
     """Nyquist plot of the exact loop: encirclements of -1, and the unstable poles found in a box.
 
     Options:
     disc: picture of the whole contour in a disc whose rim is infinity, in place of the linear plot with a zoom at -1
     """
-    subject, controller, defaults = load_driven_loop(arm, theory, gains, law)
-    emit(tfarm.nyquist(subject, controller), json, defaults, csv=csv, png=png, picture="disc" if disc else "nyquist")
+    subject, controller, defaults = loop(arm)
+    show(tfarm.nyquist(subject, controller), defaults, picture="disc" if disc else "nyquist")
 
 
 @command(epilog="nichols sasaki2012-lab --K1 0.3 --K2 0.3 --png nichols.png")
-def nichols(
-    arm: ArmName,
-    png: Png = None,
-    csv: Csv = None,
-    law: LawFile = None,
-    chain: Any = load_chain,
-    theory: TheoryName = None,
-    json: Json = False,
-    *,
-    gains: Gains,
-) -> None:
+def nichols(*, arm: ArmName, loop: Any = load_loop, chain: Any = load_chain, show: Any = emit) -> None:
     """Nichols chart of the loop function, with its margins and contours of the closed loop.
 
     With --period, --delay-samples or --dsp of the sampled loop too.
     """
-    emit_loop("nichols", arm, theory, gains, law, chain, json, csv=csv, png=png)
+    emit_loop("nichols", arm, loop, chain, show)
 
 
 @command(epilog="sensitivity sasaki2012-lab --K1 0.3 --K2 0.3 --png sensitivity.png")
-def sensitivity(
-    arm: ArmName,
-    png: Png = None,
-    csv: Csv = None,
-    law: LawFile = None,
-    chain: Any = load_chain,
-    theory: TheoryName = None,
-    json: Json = False,
-    *,
-    gains: Gains,
-) -> None:
+def sensitivity(*, arm: ArmName, loop: Any = load_loop, chain: Any = load_chain, show: Any = emit) -> None:
     """Sensitivity S = 1/(1 + L) and complementary sensitivity T = L/(1 + L), with their peaks Ms and Mt.
 
     With --period, --delay-samples or --dsp of the sampled loop too.
     """
-    emit_loop("sensitivity", arm, theory, gains, law, chain, json, csv=csv, png=png)
+    emit_loop("sensitivity", arm, loop, chain, show)
 
 
 @command(epilog="spill sasaki2012-lab --K1 0.3 --K2 -2")
 def spill(
+    *,
     arm: ArmName,
     modes: Annotated[int, typer.Option(min=1, max=60)] = 20,
-    law: LawFile = None,
-    theory: TheoryName = None,
-    json: Json = False,
-    *,
-    gains: Gains,
+    loop: Any = load_driven_loop,
+    show: Any = emit_record,
 ) -> None:
     """Spillover into modes that a design model leaves out: the exact loop and models of 1, 2, 3 ... modes.
 
     Options:
     modes: modes of the largest model
     """
-    subject, controller, defaults = load_driven_loop(arm, theory, gains, law)
-    emit(tfarm.spill(subject, controller, modes), json, defaults)
+    subject, controller, defaults = loop(arm)
+    show(tfarm.spill(subject, controller, modes), defaults)
 
 
 @command(epilog="locus sasaki2012-lab --vary K2 --from 0 --to 2 --png locus.png")
 def locus(
+    *,
     arm: ArmName,
     vary: str,
     start: Annotated[float, typer.Option("--from")],
     stop: Annotated[float, typer.Option("--to")],
     points: Annotated[int | None, typer.Option(min=2, max=100_000)] = None,
     branches: Annotated[int, typer.Option(min=1, max=200)] = 10,
-    png: Png = None,
-    csv: Csv = None,
-    law: LawFile = None,
-    theory: TheoryName = None,
-    json: Json = False,
-    *,
-    gains: Gains,
+    loop: Any = load_driven_loop,
+    show: Any = emit,
 ) -> None:
     """Root locus of the exact arm along a gain or a parameter, with its crossings of the imaginary axis.
 
@@ -182,25 +141,24 @@ def locus(
     """
     from tfarm.loop.loci import Loci, reduced_of
 
-    subject, controller, defaults = load_driven_loop(arm, theory, gains, law)
+    subject, controller, defaults = loop(arm)
     found = tfarm.locus(subject, controller, vary, start, stop, points, branches)
-    emit(Loci(found, reduced_of(found)), json, defaults, csv=csv, png=png)
+    show(Loci(found, reduced_of(found)), defaults)
 
 
 @command(epilog="map sasaki2012-lab --K1 -1,3 --K2 -2,2 --png map.png", name="map")
 def gain_map(
+    *,
     arm: ArmName,
     k1: Annotated[Any, typer.Option(f"--{RATE_GAIN}", parser=interval, metavar="LO,HI")] = None,
     k2: Annotated[Any, typer.Option(f"--{MOMENT_GAIN}", parser=interval, metavar="LO,HI")] = None,
     kp: AngleGain = 0.0,
     points: Annotated[int | None, typer.Option(min=2, max=2000)] = None,
-    csv: Csv = None,
-    png: Png = None,
     law: LawFile = None,
     vary: Annotated[list[Any] | None, typer.Option(parser=named(interval), metavar="NAME=LO,HI")] = None,
-    chain: Any = load_chain,
     theory: TheoryName = None,
-    json: Json = False,
+    chain: Any = load_chain,
+    show: Any = emit,
 ) -> None:
     """Number of unstable poles over the plane of two gains, or of two numbers of a law, with the exact boundary.
 
@@ -218,69 +176,60 @@ def gain_map(
     from tfarm.loop import sampled_verdict as verdict
     from tfarm.loop.plane import between, ranges_of
 
-    subject, typed = load_arm(arm, theory), {RATE_GAIN: k1, MOMENT_GAIN: k2}
-    of_law, ranges = bool(vary or law), vary or []
-    if of_law:
+    subject = load_arm(arm, theory)
+    typed = {RATE_GAIN: k1, MOMENT_GAIN: k2}
+    if vary or law:
         refuse(
             {f"--{name}": value for name, value in (typed | {ANGLE_GAIN: kp or None}).items()},
             "leave it out: of a law the map is over two of its own numbers, --vary NAME=LO,HI twice",
         )
+        ranges, number = vary or [], points or 60
         refuse(
-            {"--vary": [name for name, _ in ranges] if len(ranges) != 2 else None},
+            {"--vary": [name for name, _ in ranges] if len(dict(ranges)) != 2 else None},
             "give two numbers of the law, such as --vary hub_angle=0,10 --vary delay=0,0.02",
         )
-        controller, _ = load_law(subject, arm, {}, law)
+        controller, _ = load_law(arm, subject, {}, law)
     else:
         ranges = [(name, typed[name] or usual) for name, usual in zip(PLANE, ranges_of(subject), strict=True)]
-        controller = tfarm.HubFeedback(Kp=kp)
-    (first, across), (second, up) = ranges
-    number = points or (60 if of_law else 101)
-    x, y = between(across[0], across[1], number), between(up[0], up[1], number)
-    if all(value is None for value in chain.keywords.values()):
-        subject, _ = driven(subject, chain(arm))
-        found: Any = tfarm.map(subject, x, y, law=controller, vary=(first, second))
+        number = points or 101
+        controller = tfarm.default_gains(subject).having(ANGLE_GAIN, kp)
+    axes = dict(ranges)
+    x, y = (between(low, high, number) for low, high in axes.values())
+    if given(chain):
+        found: Any = crossings.sampled_map(
+            verdict.sampled_verdict(subject, controller, chain(arm)).full, x, y, tuple(axes)
+        )
     else:
-        full = controller if of_law else tfarm.default_gains(subject).having(ANGLE_GAIN, kp)
-        found = crossings.sampled_map(verdict.sampled_verdict(subject, full, chain(arm)).full, x, y, (first, second))
-    emit(found, json, csv=csv, png=png)
+        subject, _ = driven(subject, chain(arm))
+        found = tfarm.map(subject, x, y, law=controller, vary=tuple(axes))
+    show(found)
 
 
 @sampled_command(epilog="sampled sasaki2012-lab --K1 0.3 --K2 0.3 --period 0.01")
 def sampled(
-    arm: ArmName,
-    chain: Any = load_chain,
-    modes: ModeCount = None,
-    law: LawFile = None,
-    theory: TheoryName = None,
-    json: Json = False,
-    *,
-    gains: Gains,
+    *, arm: ArmName, modes: ModeCount = None, loop: Any = load_loop, chain: Any = load_chain, show: Any = emit_record
 ) -> None:
     """Stability of the sampled loop: verdict, intervals, modes, margins.
 
     A law of a file acts with its own period, which has to be that of the chain; one in s is made discrete by its rule.
     """
-    subject, controller, defaults = load_loop(arm, theory, gains, law)
+    subject, controller, defaults = loop(arm)
     sampling = chain(arm)
     found = tfarm.sampled(subject, controller, sampling, count=modes)
-    emit(found, json, defaults, summary=tfarm.result_card(subject, controller, sampling, at_samples=found))
+    show(found, defaults, summary=tfarm.result_card(subject, controller, sampling, at_samples=found))
 
 
 @command(epilog="step sasaki2012-lab --scenario slew --png slew.png")
 def step(
+    *,
     arm: ArmName,
     scenario: str = "reference",
     duration: float | None = None,
-    chain: Any = load_chain,
     output: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
     settling_band: float = 0.02,
-    csv: Csv = None,
-    png: Png = None,
-    law: LawFile = None,
-    theory: TheoryName = None,
-    json: Json = False,
-    *,
-    gains: Gains,
+    loop: Any = load_loop,
+    chain: Any = load_chain,
+    show: Any = emit,
 ) -> None:
     """Time response of the continuous-time and the sampled loop: rise, overshoot, settling, peaks, residual vibration.
 
@@ -291,32 +240,29 @@ def step(
     output: further signal of the CSV file, as strain@0.05; may be repeated
     settling_band: share of the travel within which a signal has settled
     """
-    subject, controller, defaults = load_loop(arm, theory, gains, law)
+    subject, controller, defaults = loop(arm)
+    sampling = chain(arm)
     found = tfarm.step(
-        subject, controller, chain(arm), scenario, duration, outputs=output or (), settling_band=settling_band
+        subject, controller, sampling, scenario, duration, outputs=output or (), settling_band=settling_band
     )
-    emit(found, json, defaults, csv=csv, png=png)
+    show(found, defaults)
 
 
 @sampled_command(epilog="simulate sasaki2012-lab --scenario slew --output tip_rotation --csv slew.csv")
 def simulate(
+    *,
     arm: ArmName,
     scenario: str = "slew",
     duration: float = 3.0,
-    chain: Any = load_chain,
     modes: ModeCount = None,
     output: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
     between: Annotated[int, typer.Option(min=0, max=1000)] = 0,
-    csv: Csv = None,
-    png: Png = None,
     mat: File = None,
     animate: File = None,
     controller: Annotated[Path | None, typer.Option(metavar="FILE", exists=True)] = None,
-    law: LawFile = None,
-    theory: TheoryName = None,
-    json: Json = False,
-    *,
-    gains: Gains,
+    loop: Any = load_loop,
+    chain: Any = load_chain,
+    show: Any = emit,
 ) -> None:
     """Time response of the sampled loop: hub angle, tip, root moment and torque, exact between the samples.
 
@@ -329,21 +275,21 @@ def simulate(
     animate: draw the arm in motion into this file, a GIF
     controller: tuner of `tfarm tune --save`: it sets K2, with its own K1
     """
+    from tfarm.dsp.results import simulated_run
+
     if animate is not None:
         require(animate.suffix.lower() == ".gif", "--animate", str(animate), "give a name that ends in .gif")
-    how: Any = {"count": modes, "between": between or DRAWN_BETWEEN * (png is not None), "outputs": output or ()}
+    is_drawn = show.keywords["png"] is not None
+    how: Any = {"count": modes, "between": between or 15 * is_drawn, "outputs": output or ()}
     defaults = None
     if controller is None:
-        from tfarm.dsp.results import simulated_run
-
-        subject, control, defaults = load_loop(arm, theory, gains, law)
+        subject, control, defaults = loop(arm)
         found = simulated_run(subject, control, chain(arm), scenario, duration, **how)
     else:
         from tfarm.tuner import load_tuner, tuning
 
-        found = tuning.controlled_run(
-            load_arm(arm, theory), load_tuner(controller), chain(arm), scenario, duration, **how
-        )
+        subject, tuner = load_arm(arm, loop.keywords["theory"]), load_tuner(controller)
+        found = tuning.controlled_run(subject, tuner, chain(arm), scenario, duration, **how)
     if mat is not None:
         write_file(mat, mat_content(matlab_signals(found), "column"), key="--mat")
     if animate is not None:
@@ -351,7 +297,7 @@ def simulate(
     if found.stopped_at is not None:
         mode = f"mode {found.growing_mode}" if found.growing_mode else "the hub"
         print_line(f"unstable: stopped at {found.stopped_at:.6g} s, {mode} grows")
-    emit(found, json, defaults, csv=csv, png=png, also=(mat, animate))
+    show(found, defaults, also=(mat, animate))
 
 
 def matlab_signals(found: Any) -> dict[str, Any]:

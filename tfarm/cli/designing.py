@@ -12,15 +12,14 @@ from typer.completion import get_completion_script  # type: ignore[attr-defined]
 
 import tfarm
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, TWO_GAINS, as_law
+from tfarm.arm.reading import ArmFile
 from tfarm.cli.app import (
     CONTROLLER,
     AngleGain,
     ArmName,
-    Csv,
+    ArmNames,
     File,
     Gains,
-    Json,
-    LawFile,
     LawFiles,
     ModeCount,
     Png,
@@ -28,6 +27,7 @@ from tfarm.cli.app import (
     add_command,
     advance,
     emit,
+    emit_record,
     interval,
     load_arm,
     load_chain,
@@ -37,6 +37,7 @@ from tfarm.cli.app import (
     numbers,
     preset_names,
     print_line,
+    read_arms,
     refuse,
 )
 from tfarm.errors import must_be_known, require
@@ -47,10 +48,11 @@ report_command = partial(add_command, "Report")
 
 @command(epilog="design sasaki2012-lab --structure PD+notch --save notch.toml")
 def design(
+    *,
     arm: ArmName,
     objective: str = "damping",
     structure: Annotated[
-        str, typer.Option("--structure", help=f"{TWO_GAINS}, PD, PD+notch, lead, PI, PID, PPF or strain-rate")
+        str, typer.Option("--structure", help="form of the law, such as PD+notch; any other word lists them all")
     ] = TWO_GAINS,
     k1: Annotated[
         Any, typer.Option(f"--{RATE_GAIN}", parser=interval, metavar="LO,HI", help=f"bounds of {RATE_GAIN}")
@@ -61,12 +63,12 @@ def design(
     kp: AngleGain = 0.0,
     modes: ModeCount = 2,
     continuous: bool = False,
-    chain: Any = load_chain,
-    also: Annotated[list[str] | None, typer.Option(metavar="ARM")] = None,
+    also: Annotated[list[Any] | None, typer.Option(metavar="ARM", parser=str, callback=read_arms)] = None,
     over: Annotated[list[Any] | None, typer.Option("--range", parser=named(interval), metavar="KEY=LO,HI")] = None,
     save: File = None,
     theory: TheoryName = None,
-    json: Json = False,
+    chain: Any = load_chain,
+    show: Any = emit_record,
 ) -> None:
     """Law of a structure with the best objective in the sampled loop, at the file's period or else 10 ms.
 
@@ -80,24 +82,29 @@ def design(
     from tfarm.arm.writing import save_law
 
     found = tfarm.design(
-        load_arm(arm, theory), objective, structure=structure, modes=modes,
-        chain=chain(arm), continuous=continuous, progress=partial(advance, 0, 0),
-        also=[load_arm(name, theory) for name in also or []], ranges=dict(over or []),
+        load_arm(arm, theory),
+        objective,
+        structure=structure,
+        modes=modes,
+        chain=chain(arm),
+        continuous=continuous,
+        progress=partial(advance, 0, 0),
+        also=[load_arm(file, theory) for file in also or []],
+        ranges=dict(over or []),
         **{RATE_GAIN: k1, MOMENT_GAIN: k2, ANGLE_GAIN: kp},
-    )  # fmt: skip
+    )
     if save is not None:
         save_law(as_law(found.law), save)
-    emit(found, json, also=(save,))
+    show(found, also=(save,))
 
 
 @command(epilog="export sasaki2012-lab --what controller --as c --out firmware")
 def export(
+    *,
     arm: ArmName,
     what: Annotated[str, typer.Option("--what", help="controller, tuner, plant or loop")],
     form: Annotated[str, typer.Option("--as", help="c (C99), fmu, mat (MATLAB, Octave) or py (python-control)")],
     out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="folder of the files")],
-    law: LawFile = None,
-    chain: Any = load_chain,
     tuned: Annotated[Path | None, typer.Option("--tuned", metavar="FILE", exists=True)] = None,
     precision: str = "double",
     ranges: Annotated[
@@ -105,10 +112,9 @@ def export(
     ] = None,
     name: str = "",
     anyway: Annotated[bool, typer.Option("--anyway")] = False,
-    theory: TheoryName = None,
-    json: Json = False,
-    *,
-    gains: Gains,
+    loop: Any = load_loop,
+    chain: Any = load_chain,
+    show: Any = emit_record,
 ) -> None:
     """Files for another program: C code, a functional mock-up unit, MATLAB, python-control.
 
@@ -121,14 +127,21 @@ def export(
     name: beginning of the identifiers in C
     anyway: also where the loop is not certified stable
     """
-    subject = load_arm(arm, theory)
-    controller, defaults = load_law(subject, arm, gains, law)
+    subject, controller, defaults = loop(arm)
     found = tfarm.export(
-        subject, controller, what=cast("Any", what), form=cast("Any", form), folder=out, chain=chain(arm), tuned=tuned,
-        precision=cast("Any", precision), ranges={signal: size for signal, (size,) in ranges or []}, name=name,
+        subject,
+        controller,
+        what=cast("Any", what),
+        form=cast("Any", form),
+        folder=out,
+        chain=chain(arm),
+        tuned=tuned,
+        precision=cast("Any", precision),
+        ranges={signal: size for signal, (size,) in ranges or []},
+        name=name,
         anyway=anyway,
-    )  # fmt: skip
-    emit(found, json, defaults, also=[out / each for each in found.files])
+    )
+    show(found, defaults, also=[out / each for each in found.files])
 
 
 LearningWord = Annotated[str, typer.Option(rich_help_panel="Learning")]
@@ -190,17 +203,17 @@ def tuner_plan(
 
 @command(epilog="tune sasaki2012-lab --trials 100 --save tuned.json")
 def tune(
+    *,
     arm: ArmName,
     k1: Annotated[float | None, typer.Option(f"--{RATE_GAIN}", rich_help_panel=CONTROLLER)] = None,
     kp: AngleGain = 0.0,
     curves: Annotated[int, typer.Option(min=0, max=10_000)] = 0,
-    chain: Any = load_chain,
     compare: bool = False,
     save: File = None,
     theory: TheoryName = None,
-    json: Json = False,
-    *,
-    plan: Callable[..., Any] = tuner_plan,
+    plan: Any = tuner_plan,
+    chain: Any = load_chain,
+    show: Any = emit_record,
 ) -> None:
     """Neural tuner of the moment gain during a slew, compared with simpler baselines.
 
@@ -215,7 +228,7 @@ def tune(
     from tfarm.tuner import trial, tuning
 
     subject, sampling = load_arm(arm, theory), chain(arm)
-    law, defaults = load_law(subject, arm, {RATE_GAIN: k1, MOMENT_GAIN: 0.0})
+    law, defaults = load_law(arm, subject, {RATE_GAIN: k1, MOMENT_GAIN: 0.0})
     rate = cast("tfarm.HubFeedback", law)[RATE_GAIN]
     if k1 is None and kp:
         rate = trial.usual_rate_gain(subject, kp)
@@ -231,27 +244,22 @@ def tune(
     found = tuner.TuningResult(tuned, drawn, compared)
     if found.stopped is not None:
         print_line(f"{found.stopped}; the tuner is that of the trial before")
-    emit(found, json, defaults, also=(save,))
+    show(found, defaults, also=(save,))
 
 
 @command(epilog="compare sasaki2012 sasaki2012-lab --png both.png")
 def compare(
-    arms: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="ARM [ARM]", help="presets or TOML files", autocompletion=preset_names, show_default=False
-        ),
-    ],
+    *,
+    arms: ArmNames,
     law: LawFiles = None,
     modes: ModeCount = 10,
     output: str = "root_moment",
-    chain: Any = load_chain,
     theory: TheoryName = None,
     png: Png = None,
     out: Annotated[Path | None, typer.Option(metavar="FOLDER")] = None,
-    json: Json = False,
-    *,
     gains: Gains,
+    chain: Any = load_chain,
+    show: Any = emit_record,
 ) -> None:
     """Comparison of two arms, or of two laws on one arm: modes, poles, verdicts, margins.
 
@@ -261,24 +269,27 @@ def compare(
     output: output of the Bode plot of two arms
     out: write a page, compare.html, to this folder
     """
-    files, page = law or [], None
-    refuse({"ARM": arms[2:] or None, "--law": [*map(str, files[2:])] or None}, "two at most can be compared")
+    files = read_arms(law or [])
+    extra = [each.name for each in files[2:]]
+    refuse({"ARM": [each.name for each in arms[2:]] or None, "--law": extra or None}, "two at most can be compared")
     refuse(
-        {"ARM": arms[0] if len(arms) + len(files) < 2 or len(arms) == len(files) == 1 else None},
+        {"ARM": arms[0].name if len(arms) + len(files) < 2 or len(arms) == len(files) == 1 else None},
         "give a second arm, or --law FILE twice",
     )
-    subjects = [load_arm(name, theory) for name in arms]
-    wanted: list[Path | None] = [*files * (2 // len(files))] if files else [None, None]
-    pairs = zip(subjects * (2 // len(arms)), arms * (2 // len(arms)), wanted, strict=True)
-    laws = [load_law(subject, name, gains, file)[0] for subject, name, file in pairs]
-    candidates = ([each.name for each in subjects], [each.stem for each in files], list(map(str, files)))
+    subjects = [load_arm(file, theory) for file in arms]
+    wanted = files * (2 // len(files)) if files else [None, None]
+    pairs = zip(arms * (2 // len(arms)), subjects * (2 // len(arms)), wanted, strict=True)
+    laws = [load_law(source, subject, gains, file)[0] for source, subject, file in pairs]
+    paths = [Path(each.name) for each in files]
+    candidates = ([each.name for each in subjects], [each.stem for each in paths], [each.name for each in files])
     names = next((each for each in candidates if len(set(each)) == 2), ["first", "second"])
     found = tfarm.compare(subjects, laws, names=names, modes=modes, output=output, chain=chain(arms[0]))
+    page = None
     if out is not None:
         from tfarm.report.writing import write_comparison
 
         page = write_comparison(found, out)
-    emit(found, json, png=png, also=(page,))
+    emit(found, png=png, also=(page,), show=show)
 
 
 # ------------------------------------------------------------ studies of uncertain arms
@@ -291,13 +302,6 @@ def varied(text: str) -> dict[str, list[float]]:
     return {kind: list(numbers(form)(values))}
 
 
-Over = Annotated[
-    list[Any] | None,
-    typer.Option("--over", metavar="KEY=KIND:NUMBERS", parser=named(varied), help=""),
-]
-Words = Annotated[str | None, typer.Option("--ask", metavar="QUANTITY,...")]
-
-
 def announce(done: int, total: int, text: str) -> None:
     """Set the line of progress, and print one without a number of tasks: the cost of Sobol' indices."""
     advance(done, total, text)
@@ -306,29 +310,29 @@ def announce(done: int, total: int, text: str) -> None:
 
 
 def study_arguments(
-    name: str, typed: Mapping[str, Any], loop: Callable[[], Any], chain: Callable[[str], Any]
+    file: ArmFile, typed: Mapping[str, Any], loop: Callable[..., Any], chain: Callable[..., Any]
 ) -> tuple[dict[str, Any], dict[str, Any] | None]:
-    """Return the arguments of a study, and of default gains what JSON has: those of its file, or those that are typed.
+    """Return the arguments of a study, and JSON's part of default gains: those of its file, or those that are typed.
 
     Raises ParameterError for both.
     """
-    from tfarm.arm.reading import load_tables
     from tfarm.studies.study import load_study
 
-    if "arm" in load_tables(name)[0]:  # an arm's file names no arm
-        refuse({f"--{key}": value for key, value in typed.items()}, f"the study is that of {name}; leave this out")
-        return load_study(name), None
-    subject, controller, defaults = loop()
-    given = {key: value for key, value in typed.items() if value is not None}
-    return {"arm": subject, "law": controller, "chain": chain(name), **given}, defaults
+    if "arm" in file.tables:  # an arm's file names no arm
+        refuse({f"--{key}": value for key, value in typed.items()}, f"the study is that of {file.name}; leave this out")
+        return load_study(file), None
+    subject, controller, defaults = loop(file)
+    known = {key: value for key, value in typed.items() if value is not None}
+    return {"arm": subject, "law": controller, "chain": chain(file), **known}, defaults
 
 
 @command(epilog="study sasaki2012-lab --over payload.mass=uniform:0,0.2 --ask card --draws 100 --out study")
 def study(
+    *,
     arm: ArmName,
     out: Annotated[Path, typer.Option(metavar="DIR", show_default=False)],
-    over: Over = None,
-    ask: Words = None,
+    over: Annotated[list[Any] | None, typer.Option(metavar="KEY=KIND:NUMBERS", parser=named(varied))] = None,
+    ask: Annotated[str | None, typer.Option(metavar="QUANTITY,...")] = None,
     draws: int | None = None,
     seed: int | None = None,
     rows: Annotated[Path | None, typer.Option("--list", metavar="FILE", exists=True)] = None,
@@ -339,14 +343,9 @@ def study(
     scheduler: str | None = None,
     stop_after: Annotated[float | None, typer.Option(min=0)] = None,
     report: Annotated[bool, typer.Option("--report")] = False,
-    csv: Csv = None,
-    png: Png = None,
-    law: LawFile = None,
+    loop: Any = load_loop,
     chain: Any = load_chain,
-    theory: TheoryName = None,
-    json: Json = False,
-    *,
-    gains: Gains,
+    show: Any = emit,
 ) -> None:
     """Many uncertain arms: stable share with its confidence, distributions, drivers, worst arm.
 
@@ -370,14 +369,20 @@ def study(
     from tfarm.studies.running import cluster
     from tfarm.studies.study import study as run
 
-    typed: dict[str, Any] = {
-        "over": dict(over or []) or None, "ask": ask and ask.split(","), "draws": draws, "seed": seed, "rows": rows,
-        "posterior": posterior, "worst": worst, "sobol": sobol,
-    }  # fmt: skip
     keys = [key for key, _ in over or []]
     for key in keys:
         require(keys.count(key) == 1, "--over", key, "is varied twice; once is enough")
-    arguments, defaults = study_arguments(arm, typed, lambda: load_loop(arm, theory, gains, law), chain)
+    typed = {
+        "over": dict(over or []) or None,
+        "ask": ask and ask.split(","),
+        "draws": draws,
+        "seed": seed,
+        "rows": rows,
+        "posterior": posterior,
+        "worst": worst,
+        "sobol": sobol,
+    }
+    arguments, defaults = study_arguments(arm, typed, loop, chain)
     with nullcontext() if scheduler is None else cluster(scheduler) as client:
         found = run(**arguments, out=out, workers=workers, stop_after=stop_after, progress=announce, client=client)
     page = None
@@ -385,7 +390,7 @@ def study(
         from tfarm.report.writing import write_study
 
         page = write_study(found)
-    emit(found, json, None if any(key.startswith("law.") for key in keys) else defaults, csv=csv, png=png, also=(page,))
+    show(found, None if any(key.startswith("law.") for key in keys) else defaults, also=(page,))
 
 
 # ------------------------------------------------------------ pages and evidence
@@ -393,19 +398,25 @@ def study(
 
 @report_command(epilog="report sasaki2012-lab --out pages")
 def report(
+    *,
     arms: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[ARM ...]", help="presets or files; by default all", autocompletion=preset_names),
+        list[Any] | None,
+        typer.Argument(
+            metavar="[ARM ...]",
+            help="presets or files; by default all",
+            parser=str,
+            callback=read_arms,
+            autocompletion=preset_names,
+        ),
     ] = None,
     out: Annotated[Path, typer.Option(metavar="FOLDER")] = Path("reports"),
     only: str | None = None,
     law: LawFiles = None,
-    chain: Any = load_chain,
     theory: TheoryName = None,
     measured: Annotated[list[str] | None, typer.Option(metavar="OUTPUT/INPUT=FILE")] = None,
     paper: Annotated[bool, typer.Option("--paper")] = False,
-    *,
     gains: Gains,
+    chain: Any = load_chain,
 ) -> None:
     """Pages with pictures, tables and data: open index.html in a browser.
 
@@ -417,47 +428,57 @@ def report(
     measured: measured response; may be repeated
     paper: each figure as a PDF at the width of a paper's column too, which takes about a quarter longer
     """
-    from tfarm.arm import law_tables
+    from tfarm.arm.law_tables import LAW_TABLE
     from tfarm.fitting import data, recording
     from tfarm.report import page, write, writing
 
     if only is not None:
         must_be_known("--only", only, writing.QUESTIONS)
-    names: list[str] = arms or list(tfarm.presets())
-    files: list[Path | None] = [*(law or [])]
-    subjects = [load_arm(name, theory) for name in names]
-    laws = [
-        [
-            page.GivenLaw(
-                load_law(arm, name, gains, file)[0],
-                file.name if file else "",
-                recording.load_run(file) if file else None,
-            )
-            for file in files or [None] * (set(gains.values()) != {None} or law_tables.load_law(name) is not None)
-        ]
-        for arm, name in zip(subjects, names, strict=True)
-    ]
-    print(write(
-        subjects, out, laws=laws, only=None if only is None else (only,), paper=paper, progress=advance,
-        notice=print_line, announce=print_line, chains=[chain(name) for name in names],
+    files = arms or read_arms(tfarm.presets())
+    others = read_arms(law or [])
+    subjects = [load_arm(file, theory) for file in files]
+    laws = []
+    for file, arm in zip(files, subjects, strict=True):
+        if others:
+            runs = [
+                page.GivenLaw(load_law(file, arm, gains, each)[0], Path(each.name).name, recording.load_run(each))
+                for each in others
+            ]
+        elif LAW_TABLE in file.tables or set(gains.values()) != {None}:
+            runs = [page.GivenLaw(load_law(file, arm, gains)[0])]
+        else:
+            runs = []
+        laws.append(runs)
+    index = write(
+        subjects,
+        out,
+        laws=laws,
+        only=None if only is None else (only,),
+        paper=paper,
+        progress=advance,
+        notice=print_line,
+        announce=print_line,
+        chains=[chain(file) for file in files],
         measured=[data.data_of(text, "--measured") for text in measured or []],
-    ))  # fmt: skip
+    )
+    print(index)
 
 
 @report_command(epilog="audit")
-def audit(json: Json = False) -> None:
+def audit(*, show: Any = emit_record) -> None:
     """Every equation of the paper, as printed and as corrected, with the check of each."""
     from tfarm import audit as paper
 
-    emit(paper.Audit(paper.PAPER, paper.audit()), json)
+    show(paper.Audit(paper.PAPER, paper.audit()))
 
 
 @report_command(epilog="assumptions sasaki2012")
 def assumptions(
+    *,
     arm: ArmName,
     count: Annotated[int, typer.Option(min=1, max=100)] = 4,
     theory: TheoryName = None,
-    json: Json = False,
+    show: Any = emit_record,
 ) -> None:
     """Effect of the assumed section and hub inertia: frequencies over the candidates, with exact sensitivities.
 
@@ -466,30 +487,32 @@ def assumptions(
     """
     from tfarm.studies.cases import assumptions as find
 
-    emit(find(load_arm(arm, theory), count), json)
+    show(find(load_arm(arm, theory), count))
 
 
 @report_command(epilog="validate")
-def validate(json: Json = False) -> None:
+def validate(*, show: Any = emit_record) -> None:
     """Natural frequencies of published tables compared with the exact ones, with the reason of each difference."""
     from tfarm.audit import published
 
-    emit(published.Validation(published.validate()), json)
+    show(published.Validation(published.validate()))
 
 
 @report_command(epilog="glossary margin")
 def glossary(
+    *,
     words: Annotated[str | None, typer.Argument(metavar="[TERM]", help="part of a term; by default all")] = None,
-    json: Json = False,
+    show: Any = emit_record,
 ) -> None:
     """Words of certainty, terms, and the quantities of all results with their units."""
     from tfarm.schema.glossary import glossary as find
 
-    emit(find(words), json)
+    show(find(words))
 
 
 @report_command(epilog="completion bash")
 def completion(
+    *,
     shell: Annotated[
         Literal["bash", "zsh", "fish", "powershell"],
         typer.Argument(metavar="SHELL", help="the shell"),

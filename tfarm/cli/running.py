@@ -16,17 +16,9 @@ from tfarm.cli.app import discard, print_line, progress, whole_command
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError, require
 from tfarm.files import STANDARD_OUTPUT
 
-STREAMED = (
-    "--csv",
-    "--figure",
-    "--png",
-    "--mat",
-    "--save",
-)  # of files that may go to standard output instead, called "-"
-ONLY_STREAMED = f"- is standard output, and only {', '.join(STREAMED)} may go there: give a name"
+STREAMED = ("--csv", "--figure", "--png", "--mat", "--save")  # files that may be "-", standard output
 WRITTEN = (*STREAMED, "--animate")
 PATHS = (*WRITTEN, "--out", "--tuned", "--dsp", "--law", "--controller", "--list", "--posterior")  # such as 1_0
-ODD_NUMBER = re.compile(r"(?=.*(_|[^\x00-\x7f]))[-+.\d_eEij]*\d[-+.\d_eEij]*")  # to Python alone: 5_0, or other digits
 
 
 def run(arguments: list[str]) -> int:
@@ -91,17 +83,20 @@ def check_words(arguments: list[str]) -> None:
     takers = [option for option, text in options if text == STANDARD_OUTPUT] + ["--json"] * ("--json" in words)
     files = [text for option, text in options if option in WRITTEN and text != STANDARD_OUTPUT]
     for option, text in options:
-        is_odd = option not in PATHS and any(map(ODD_NUMBER.fullmatch, re.split("[,=]", text)))
-        is_output = text == STANDARD_OUTPUT
-        for is_wrong, remedy in (
-            (is_odd, "write numbers as 50, 0.5 or 5e1"),
-            (option in PATHS and not text.strip(), "give a path"),
-            (is_output and option not in STREAMED, ONLY_STREAMED),
-            (is_output and len(takers) > 1, "standard output takes one thing at a time: name a file"),
-            (option in WRITTEN and files.count(text) > 1, "two results in one file: name another"),
-            (option in WRITTEN and not Path(text).parent.is_dir(), "is in no folder: make that first"),
-        ):
-            require(not is_wrong, option, text, remedy)
+        if option not in PATHS:
+            # numbers to Python alone: 5_0, or other digits
+            number = re.compile(r"(?=.*(_|[^\x00-\x7f]))[-+.\d_eEij]*\d[-+.\d_eEij]*")
+            is_odd = any(map(number.fullmatch, re.split("[,=]", text)))
+            require(not is_odd, option, text, "write numbers as 50, 0.5 or 5e1")
+        else:
+            require(text.strip(), option, text, "give a path")
+        if text == STANDARD_OUTPUT:
+            remedy = f"- is standard output, and only {', '.join(STREAMED)} may go there: give a name"
+            require(option in STREAMED, option, text, remedy)
+            require(len(takers) == 1, option, text, "standard output takes one thing at a time: name a file")
+        if option in WRITTEN:
+            require(files.count(text) <= 1, option, text, "two results in one file: name another")
+            require(Path(text).parent.is_dir(), option, text, "is in no folder: make that first")
 
 
 def usage(error: Any) -> str:

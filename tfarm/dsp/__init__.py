@@ -1,12 +1,10 @@
 """The sampled chain in time: hold, delay, converters, discretisation and simulation at 10 ms or any other period."""
 
-import warnings
-from importlib import import_module
-
 from tfarm.arm.chain import Actuator, Chain, Converters, Sampling, Slew, load_chain
 from tfarm.dsp.plant import PulseTransfer, pulse_transfer
 from tfarm.dsp.scenarios import Scenario, scenario
 from tfarm.dsp.simulate import Measurement, Simulation, Simulator
+from tfarm.moved import moved
 
 __all__ = [
     "Actuator",
@@ -36,10 +34,4 @@ _MOVED = {  # names that this room had up to version 1.0, and their modules
     "sampled_verdict": "tfarm.loop.sampled_verdict",
     "stable_windows": "tfarm.loop.circle_crossings",
 }
-
-
-def __getattr__(name: str) -> object:
-    if name not in _MOVED:
-        raise AttributeError(f"module 'tfarm.dsp' has no attribute {name!r}")
-    warnings.warn(f"tfarm.dsp.{name} has moved: import it from {_MOVED[name]}", DeprecationWarning, stacklevel=2)
-    return getattr(import_module(_MOVED[name]), name)
+__getattr__ = moved(__name__, _MOVED)

@@ -35,9 +35,7 @@ from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import check_gains
 
-SAME_PERIOD = 1e-9  # relative: 1/100 s in two files may differ in its last digits
 ROUNDINGS = 8  # of each term of F: of its product of n factors they add up as the root of n
-VANISHED = 1e-12  # of its terms: a sum over several signals that cancel
 RULE = Quantity("discretisation", help="rule by which the continuous-time controller is made discrete")
 
 
@@ -48,7 +46,8 @@ def discretised(law: Law, period: float) -> Law:
     """
     if law.period is not None:
         remedy = f"the period of the law is {law.period:g} s, that of the chain {period:g} s; make them equal"
-        require(abs(law.period - period) <= SAME_PERIOD * period, "period", law.period, remedy)
+        # 1/100 s in two files may differ in its last digits
+        require(math.isclose(law.period, period, rel_tol=1e-9), "period", law.period, remedy)
         return law
     remedy = f"tustin keeps the values at a frequency below half the sample rate, {math.pi / period:.4g} rad/s"
     is_kept = not law.prewarp or (law.rule == "tustin" and law.prewarp * period < math.pi)
@@ -114,6 +113,12 @@ def by_factors(block: Rational, rule: Literal["tustin", "matched"], period: floa
 
 
 # ------------------------------------------------------------ the law in the computer
+
+
+def system_matrix(law: Law) -> Real:
+    """[A B; C D] of a law of all its columns, signals first."""
+    A, B, C, D = law.matrices((*law.signals, *law.wanted))
+    return np.block([[A, B], [C, D]])
 
 
 def with_all_gains(arm: Arm, law: AnyLaw) -> Law:
@@ -244,7 +249,8 @@ class LawInZ:
 
 
 def _cancel(terms: Sequence[float]) -> bool:
-    return abs(sum(terms)) <= VANISHED * sum(map(abs, terms))
+    """Whether a sum over several signals is 0, to 1e-12 of its terms."""
+    return abs(sum(terms)) <= 1e-12 * sum(map(abs, terms))
 
 
 def lowest_power(roots: Complex) -> tuple[int, float]:

@@ -10,9 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm.chain import Sampling
+from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.dsp.plant import Plant, held_amplitude
 from tfarm.exact.compiled import compiled, inlined
+
+CONSUMER = Consumer(
+    "simulate",
+    acts=(
+        "reference", "anti-alias filter", "encoder", "hub rate", "amplifier steps", "amplifier range", "law",
+        "arithmetic", "DAC steps", "DAC range", "torque limit", "hold", "delay", "hub damping", "plant", "volts",
+    ),
+)  # fmt: skip
 
 ANGLE, RATE, MOMENT = 0, 1, 2  # of the outputs, which begin with what is fed back (`tfarm.arm.FED_BACK`)
 ENCODER, AMPLIFIER, DAC = 0, 1, 2  # rows of the quantisers, and places in `saturated`
@@ -27,11 +36,14 @@ YES = 0.5  # a number above it is true among floats
 class Model(NamedTuple):
     """The arm between the samples: outputs = Re(weights amplitude) + rates rigid + static torque.
 
+    Under a held torque an amplitude circles its rest position, -`rest` torque, `rest` (m,) being 1/p.
+
     `turn`, `push` (pieces, m) are e^{p dt} and (e^{p dt} - 1)/p of each piece of a sample between two switches or
     records, `piece` (pieces, 3) its properties; `weights` (outputs, m), `rates` (outputs, 2), `static` (outputs,);
     `hub` is the row of the hub angle.
     """
 
+    rest: Complex
     turn: Complex
     push: Complex
     piece: Real
@@ -48,6 +60,7 @@ def model_of(plant: Plant, kept: Whole, sampling: Sampling, between: int, hub: i
     ends = np.unique(np.r_[records, [f * T] if f else [], T])
     starts = np.r_[0.0, ends[:-1]]
     return Model(
+        rest=1 / p,
         turn=np.exp(p * (ends - starts)[:, None]),
         push=np.array([held_amplitude(p, float(each)) for each in ends - starts]),
         piece=np.c_[ends - starts, starts >= f * T, np.isin(ends, records)].astype(float),
@@ -62,14 +75,16 @@ class State(NamedTuple):
     """State and record of a simulation.
 
     `amplitude` (m,) one a pole with Im p > 0 or real, a' = p a + u; `rigid` (2,) double integral and integral of the
-    torque; `held` a ring of the last delay + 2 torques; `work` (2,) [J].  Filled sample by sample: `record`
-    (n, outputs), `torque` (n,), `fine` (n, records, outputs) and `saturated` (n, 3).
+    torque; `held` a ring of the last delay + 2 torques; `work` (2,) [J]; `circle` (m,) the square of the largest circle
+    of each amplitude.  Filled sample by sample: `record` (n, outputs), `torque` (n,), `fine` (n, records, outputs) and
+    `saturated` (n, 3).
     """
 
     amplitude: Complex
     rigid: Real
     held: Real
     work: Real
+    circle: Real
     record: Real
     torque: Real
     fine: Real
@@ -102,46 +117,46 @@ class Electronics(NamedTuple):
 
 
 @inlined
-def reading(o: int, rates: Any, weights: Any, amplitude: Any, rigid: Any) -> float:
+def reading(o: int, model: Any, state: Any) -> float:
     """Output o without its static remainder."""
-    value = rates[o, DOUBLY] * rigid[DOUBLY] + rates[o, ONCE] * rigid[ONCE]
-    for i in range(amplitude.size):
-        value += weights[o, i].real * amplitude[i].real - weights[o, i].imag * amplitude[i].imag
+    value = model.rates[o, DOUBLY] * state.rigid[DOUBLY] + model.rates[o, ONCE] * state.rigid[ONCE]
+    for i in range(state.amplitude.size):
+        weight, amplitude = model.weights[o, i], state.amplitude[i]
+        value += weight.real * amplitude.real - weight.imag * amplitude.imag
     return value
 
 
 @compiled
-def read_outputs(weights: Any, rates: Any, static: Any, amplitude: Any, rigid: Any, torque: float, out: Any) -> None:
+def read_outputs(model: Any, state: Any, torque: float, out: Any) -> None:
     """The outputs under the torque that acts now."""
     for o in range(out.size):
-        out[o] = reading(o, rates, weights, amplitude, rigid) + static[o] * torque
+        out[o] = reading(o, model, state) + model.static[o] * torque
 
 
 @compiled
-def advance(
-    turn: Any, push: Any, piece: Any, weights: Any, rates: Any, static: Any, hub: int, amplitude: Any, rigid: Any,
-    work: Any, fine: Any, old: float, new: float, push_on: float,
-) -> None:  # fmt: skip
-    """Advance by one sample: `old` torque up to the switch, `new` after it, `push_on` (a disturbance) throughout.
+def advance(k: int, model: Any, state: Any, old: float, new: float, push_on: float) -> None:
+    """Advance by sample k: `old` torque up to the switch, `new` after it, `push_on` (a disturbance) throughout.
 
-    The first are those of a `Model`.  Fills a row of `fine` at each record, and adds to the work.
+    Fills a row of `fine` at each record, and adds to the work.
     """
     row = 0
-    before = reading(hub, rates, weights, amplitude, rigid)
-    for s in range(piece.shape[0]):
-        torque = (new if piece[s, IS_NEW] > YES else old) + push_on
-        dt = piece[s, DURATION]
-        for i in range(amplitude.size):
-            amplitude[i] = turn[s, i] * amplitude[i] + push[s, i] * torque
-        rigid[DOUBLY] += dt * rigid[ONCE] + 0.5 * dt * dt * torque
-        rigid[ONCE] += dt * torque
-        after = reading(hub, rates, weights, amplitude, rigid)
+    before = reading(model.hub, model, state)
+    for s in range(model.piece.shape[0]):
+        torque = (new if model.piece[s, IS_NEW] > YES else old) + push_on
+        dt = model.piece[s, DURATION]
+        for i in range(state.amplitude.size):
+            about = state.amplitude[i] + model.rest[i] * torque
+            state.circle[i] = max(state.circle[i], about.real * about.real + about.imag * about.imag)
+            state.amplitude[i] = model.turn[s, i] * state.amplitude[i] + model.push[s, i] * torque
+        state.rigid[DOUBLY] += dt * state.rigid[ONCE] + 0.5 * dt * dt * torque
+        state.rigid[ONCE] += dt * torque
+        after = reading(model.hub, model, state)
         done = torque * (after - before)
-        work[DONE] += done
-        work[MOVED] += abs(done)
+        state.work[DONE] += done
+        state.work[MOVED] += abs(done)
         before = after
-        if piece[s, IS_RECORD] > YES and row < fine.shape[0]:
-            read_outputs(weights, rates, static, amplitude, rigid, torque, fine[row])
+        if model.piece[s, IS_RECORD] > YES and row < state.fine.shape[1]:
+            read_outputs(model, state, torque, state.fine[k, row])
             row += 1
 
 
@@ -176,9 +191,8 @@ def converted(record: Any, saturated: Any, memory: Any, of: Any) -> Any:
 
 def before(k: int, model: Any, state: Any, forcing: Any, of: Any) -> bool:
     """Read the outputs just before sample k; return whether the root moment is within its bound."""
-    torque, rigid = state.held[(k - of.delay - 1) % state.held.size], state.rigid
-    torque += forcing.disturbance[k - 1] if k > 0 else 0.0
-    read_outputs(model.weights, model.rates, model.static, state.amplitude, rigid, torque, state.record[k])
+    torque = state.held[(k - of.delay - 1) % state.held.size] + (forcing.disturbance[k - 1] if k > 0 else 0.0)
+    read_outputs(model, state, torque, state.record[k])
     return abs(state.record[k, MOMENT]) <= of.bound
 
 
@@ -191,11 +205,7 @@ def after(k: int, u: float, model: Any, state: Any, forcing: Any, of: Any) -> No
         for i in range(state.amplitude.size):
             state.amplitude[i] += forcing.impulse
         state.rigid[ONCE] += forcing.impulse
-    advance(
-        model.turn, model.push, model.piece, model.weights, model.rates, model.static, model.hub,
-        state.amplitude, state.rigid, state.work, state.fine[k], old, state.held[(k - of.delay) % ring],
-        forcing.disturbance[k],
-    )  # fmt: skip
+    advance(k, model, state, old, state.held[(k - of.delay) % ring], forcing.disturbance[k])
 
 
 _before, _converted, _after = inlined(before), inlined(converted), inlined(after)  # those of Python loops are plain
@@ -216,31 +226,34 @@ def product(row: Any, values: Any, start: float, single: bool) -> float:
     return total
 
 
+@inlined
+def law_step(table: Any, z: Any, feedforward: float, single: bool, out: Any) -> None:
+    """out = table z of z = [x; e]: the next states, and the output, which begins with the feedforward."""
+    for i in range(out.size):
+        out[i] = product(table[i], z, feedforward if i == out.size - 1 else 0.0, single)
+
+
 @compiled
-def run(model: Any, state: Any, forcing: Any, electronics: Any, matrices: Any, sources: Any, references: Any) -> int:
+def run(model: Any, state: Any, forcing: Any, electronics: Any, table: Any, sources: Any, references: Any) -> int:
     """Run a law over all samples; return their number before the root moment passes its bound.
 
-    u = r + C x + D e, x_{k+1} = A x + B e of the errors e = reference - signal, `references` (n, columns); D has a row,
-    or one for each sample.  `sources` (columns,) are the outputs of the columns, hub angle, hub rate and root moment
-    through their converters, or -1 for a reference alone.
+    [x_{k+1}; u - r] = table [x; e] of the errors e = reference - signal, `references` (n, columns).  `sources`
+    (columns,) are the outputs of the columns, hub angle, hub rate and root moment through their converters, or -1 for a
+    reference alone.
     """
-    A, B, C, D = matrices
-    n, single, memory, known = state.torque.size, electronics.is_single, np.zeros(3), np.zeros(3)
-    x, following, e = np.zeros(A.shape[0]), np.zeros(A.shape[0]), np.zeros(B.shape[1])
-    for k in range(n):
+    single, order, memory, known = electronics.is_single, table.shape[0] - 1, np.zeros(3), np.zeros(3)
+    z, following = np.zeros(table.shape[1]), np.zeros(order + 1)
+    for k in range(state.torque.size):
         if not _before(k, model, state, forcing, electronics):
             return k
         record = state.record[k]
         known[ANGLE], known[RATE], known[MOMENT] = _converted(record, state.saturated[k], memory, electronics)
-        for j in range(e.size):
+        for j in range(sources.size):
             source = sources[j]
             value = 0.0 if source < 0 else known[source] if source < known.size else record[source]
-            e[j] = rounded(rounded(references[k, j], single) - rounded(value, single), single)
-        u = rounded(forcing.feedforward[k], single)
-        u = product(D[min(k, D.shape[0] - 1)], e, product(C[0], x, u, single), single)
-        for i in range(x.size):
-            following[i] = product(B[i], e, product(A[i], x, 0.0, single), single)
-        for i in range(x.size):
-            x[i] = following[i]
-        _after(k, u, model, state, forcing, electronics)
-    return n
+            z[order + j] = rounded(rounded(references[k, j], single) - rounded(value, single), single)
+        law_step(table, z, rounded(forcing.feedforward[k], single), single, following)
+        for i in range(order):
+            z[i] = following[i]
+        _after(k, following[order], model, state, forcing, electronics)
+    return state.torque.size

@@ -45,7 +45,6 @@ from tfarm.spectrum.frequencies import LISTS_KEPT
 if TYPE_CHECKING:
     import control
 
-AMPLIFIED = ("M", "Q", "strain", "current")  # quantities of strain gauges, load cells and shunts
 RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")  # of a simulation, not filtered
 MODES_USED = Quantity("flexible modes", help="number of flexible modes of the arm in the model of the sampled loop")
 USUAL_MODES = 20  # flexible, of a sampled loop or a simulation by default
@@ -166,7 +165,9 @@ def is_analog(wanted: Output, chain: Chain) -> bool:
     displacements do not, nor does the hub's rate where it is the difference of an encoder.
     """
     is_encoder = wanted.quantity == "theta" and chain.converters.hub_rate == "difference"
-    return wanted.quantity in AMPLIFIED or (wanted.power > 0 and not is_encoder)
+    # quantities of strain gauges, load cells and shunts
+    is_amplified = wanted.quantity in ("M", "Q", "strain", "current")
+    return is_amplified or (wanted.power > 0 and not is_encoder)
 
 
 def with_filter(plant: Plant, rows: Sequence[int], corner: float) -> Plant:
@@ -478,7 +479,7 @@ def held_amplitude(p: Complex, duration: float) -> Complex:
 Made = TypeVar("Made")
 
 
-def first_distinct(make: Callable[[float], Made], candidates: Sequence[float]) -> Made:
+def first_distinct(make: Callable[[Any], Made], candidates: Sequence[Any]) -> Made:
     """What is made of the first of some candidates at which no two damped modes are one; the error of the last one."""
     *others, last = candidates
     for each in others:

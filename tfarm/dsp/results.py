@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import AnyLaw, Arm, tracked
+from tfarm.arm import AnyLaw, Arm, Law, tracked
 from tfarm.arm.chain import Chain, Converters, chain_or_usual
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.dsp.discretise import RULE, rule_in_words, with_all_gains
@@ -30,10 +30,7 @@ from tfarm.schema import Column, Quantity, Table
 MODE_COUNTS = (10, 20, 40)  # flexible modes; 80 would take a heavily damped arm 8 s of CPU time
 ENOUGH_CHANGE = 1e-4  # of each signal's largest value: the digits of a table of a simulation
 CYCLE_LASTS = 0.7  # a limit cycle keeps at least this much of its amplitude over a quarter of the record
-BEYOND_IDEAL = 2.0  # and is this much larger than the vibration of an ideal chain at that time
 GROWS = 1.02  # in a quarter of the record, of an unstable ideal loop: a smaller change may be one of sampled peaks
-FEWEST_TURNS = 1.0  # of the moment about its mean in a quarter of the record: fewer are a drift and no vibration
-FEWEST_SAMPLES = 40  # samples of a record with limit cycles
 
 
 class Enough(NamedTuple):
@@ -110,17 +107,22 @@ class Run:
     @property
     def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller."""
-        return controller(with_all_gains(self.arm, self.law), self.arm)
+        return controller(self._full_law, self.arm)
+
+    @cached_property
+    def _full_law(self) -> Law:
+        """The law with a part for each gain at the hub."""
+        return with_all_gains(self.arm, self.law)
 
     @property
     def references(self) -> Annotated[list[str], Quantity(help="signals that follow a reference")]:
         """Signals that follow a reference."""
-        return list(with_all_gains(self.arm, self.law).references)
+        return list(self._full_law.references)
 
     @property
     def rule(self) -> Annotated[str, RULE]:
         """The discretisation of the law."""
-        return rule_in_words(with_all_gains(self.arm, self.law))
+        return rule_in_words(self._full_law)
 
     @property
     def reading(self) -> Annotated[str, Quantity(
@@ -160,7 +162,7 @@ class Run:
         run = self.simulation
         if run.chain.is_linear or self.tuner is not None:
             return None
-        law = replace(with_all_gains(self.arm, self.law), delay=0.0)  # that is in the chain of the run
+        law = replace(self._full_law, delay=0.0)  # that is in the chain of the run
         ideal = Simulator(self.arm, ideal_chain(run.chain), run.scenario, law, count=self.used.modes)
         return limit_cycle(run, ideal.run())
 
@@ -210,7 +212,7 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
     loop with ideal converters (`ideal`) has decayed further, or is unstable where signals are clipped.
     """
     n = simulation.t.size
-    if simulation.stopped or simulation.chain.is_linear or n < FEWEST_SAMPLES:
+    if simulation.stopped or simulation.chain.is_linear or n < 40:
         return None
     last, before = slice(n - n // 4, n), slice(n - n // 2, n - n // 4)
     moment = simulation.at_samples.root_moment
@@ -218,9 +220,10 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
     about = moment[last] - moment[last].mean()
     turns = np.count_nonzero(np.diff(np.signbit(about))) / 2
     is_clipped = bool(simulation.saturated_at[last].any())
-    is_transient = is_clipped and (earlier < CYCLE_LASTS * size or turns < FEWEST_TURNS)
+    # fewer turns of the moment about its mean are a drift and no vibration
+    is_transient = is_clipped and (earlier < CYCLE_LASTS * size or turns < 1)
     is_unstable = ideal.stopped is not None or _left(ideal, last) > GROWS * _left(ideal, before)
-    is_own = (is_clipped and is_unstable) or size > BEYOND_IDEAL * _left(ideal, last)
+    is_own = (is_clipped and is_unstable) or size > 2 * _left(ideal, last)
     if size == 0.0 or size < CYCLE_LASTS * earlier or is_transient or not is_own:
         return None
     return LimitCycle(
@@ -265,8 +268,10 @@ def simulate(
     `outputs` are recorded in addition, as "tip_rotation" or "strain@0.05".  Raises ParameterError for a locked hub, an
     algebraic loop, an unknown signal, a law in z whose period is not the chain's, and as `scenario` does.
     """
-    arm, law, chain = *tracked(arm, law), chain_or_usual(chain)
-    return simulated(arm, law, chain, scenario(scenario_name, arm, chain, duration), count, between, outputs)[0]
+    run = simulated_run(
+        arm, law, chain_or_usual(chain), scenario_name, duration, count=count, between=between, outputs=outputs
+    )
+    return run.simulation
 
 
 def drawn(arm: Arm, law: AnyLaw, chain: Chain, scenario_name: str, duration: float) -> Simulation:
@@ -274,8 +279,7 @@ def drawn(arm: Arm, law: AnyLaw, chain: Chain, scenario_name: str, duration: flo
     arm, law = tracked(arm, law)
     task = scenario(scenario_name, arm, chain, duration)
     used = enough_modes(lambda n: Simulator(arm, ideal_chain(chain), task, law, count=n).run())
-    (found,) = resolved(Simulator(arm, chain, task, law, count=used.modes), arm, Simulator.run)
-    return found
+    return resolved(Simulator(arm, chain, task, law, count=used.modes), arm, Simulator.run)[0]
 
 
 def simulated(

@@ -18,13 +18,10 @@ from tfarm.schema import Quantity
 from tfarm.spectrum.table import turning_inertia
 
 MOST_TASK_SAMPLES = 4_000_000  # of a record, a few hundred MB of signals
-STEP_TORQUE, IMPULSE, TIP_OFFSET = 0.1, 0.01, 0.01  # N m, N m s, m: sizes of the scenarios of the paper's arm
-PULSE_SHARE = 0.1  # of the slew's rise time: width of a pulse of torque, in whole samples
 TRIAL_COST = (1.0, 2.6)  # 1/(N m)^2 s: weights a and b of the paper's (23), of vibration and of the law's own share
 TRIAL_SLEWS = 3.0  # times the slew: length of a trial for an arm and its chain
 TRIAL_DURATION = 3.0  # s, of a trial or a simulation by default: three times the paper's slew
 SCENARIOS = ("slew", "step", "decay", "impulse", "pulse")
-PAPER_TORQUE = 3.0  # N m, of the slew of 1.15 m in 1 s of the preset sasaki2012
 
 
 @dataclass(frozen=True)
@@ -111,14 +108,14 @@ def torque_unit(arm: Arm, chain: Chain) -> float:
 
     For an arm without a slew J is its own inertia about the hub, without the held parts.
     """
-    share = abs(turning_inertia(arm) * chain.slew.acceleration(arm.reach)) / PAPER_TORQUE
-    return float(f"{share:.1g}")
+    # the slew of the paper's arm, of 1.15 m in 1 s, takes 3 N m
+    return float(f"{abs(turning_inertia(arm) * chain.slew.acceleration(arm.reach)) / 3:.1g}")
 
 
 def trial_weights(arm: Arm, chain: Chain) -> tuple[float, float]:
     """The weights a and b [1/(N m)^2 s] of the cost of a trial: `TRIAL_COST` in the arm's own unit of torque."""
-    a, b = TRIAL_COST
-    return a / torque_unit(arm, chain) ** 2, b / torque_unit(arm, chain) ** 2
+    a, b = np.array(TRIAL_COST) / torque_unit(arm, chain) ** 2
+    return float(a), float(b)
 
 
 def resting(name: str, arm: Arm, chain: Chain, duration: float, signal: str = "hub_angle") -> Scenario:
@@ -130,16 +127,17 @@ def resting(name: str, arm: Arm, chain: Chain, duration: float, signal: str = "h
     moment of a damped arm would be measured where it grows as t^-1/2, without bound, and no number of modes converges.)
     """
     T, unit = chain.sampling.period, torque_unit(arm, chain)
-    zero = np.zeros(_samples(duration, T))
-    width = max(1, round(PULSE_SHARE * chain.slew.rise_time / T))
+    torque, zero = 0.1 * unit, np.zeros(_samples(duration, T))
+    # of the pulse, in whole samples
+    width = max(1, round(0.1 * chain.slew.rise_time / T))
     sizes: dict[str, dict[str, Any]] = {
         "pulse": {
-            "disturbance": np.where(np.arange(zero.size) < width, STEP_TORQUE * unit, 0.0),
+            "disturbance": np.where(np.arange(zero.size) < width, torque, 0.0),
             "busy_until": width * T,
         },
-        "step": {"feedforward": zero + STEP_TORQUE * unit},
-        "decay": {"tip_offset": TIP_OFFSET * arm.length},
-        "impulse": {"impulse": IMPULSE * unit},
+        "step": {"feedforward": zero + torque},
+        "decay": {"tip_offset": 0.01 * arm.length},
+        "impulse": {"impulse": 0.01 * unit},
         "reference": {signal: zero + 1.0},
     }
     return replace(Scenario(name, T, zero, zero, zero, zero, zero), **sizes[name])

@@ -24,7 +24,7 @@ from tfarm.arm.checks import whole
 from tfarm.arm.law import REFERENCE, Law
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import kernel
-from tfarm.dsp.discretise import acting_law, with_all_gains
+from tfarm.dsp.discretise import acting_law, system_matrix, with_all_gains
 from tfarm.dsp.plant import RECORDED, USUAL_MODES, Plant, sensed_plant, with_held_filter
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.stages import admit
@@ -155,7 +155,8 @@ class Simulation:
 
     `torque` [N m] is the output of the DAC at each sample, `gain` that on the root moment there (None of a controller
     without one), `measured` (n, 3) hub angle, hub rate and root moment behind the analog filters.  `saturated_at`
-    (n, 3): whether the encoder, the strain amplifier and the torque were clipped at each sample.
+    (n, 3): whether the encoder, the strain amplifier and the torque were clipped at each sample.  `rings` are frequency
+    (m,) [rad/s] and largest amplitude in `RECORDED` (4, m) of the modes that ring, with Im p > -Re p.
     `energy_error` is |energy gained - work done| over initial energy and total work, for an arm without damping; None
     with damping.  Moments of the figures are those before the anti-alias filter.
     """
@@ -168,6 +169,7 @@ class Simulation:
     torque: Real
     gain: Real | None
     saturated_at: NDArray[np.bool_]
+    rings: tuple[Real, Real]
     energy_error: Annotated[float | None, Quantity(
             help="energy gained less work done, over initial energy and work, without damping")]  # fmt: skip
     stopped: Stop | None
@@ -244,18 +246,19 @@ class Simulator:
     ) -> None:
         remedy = f"a whole number of records between two samples, 0 to {MOST_BETWEEN}"
         between = whole("between", between, 0, MOST_BETWEEN, remedy)
-        admit("simulate", arm, chain)
+        admit(kernel.CONSUMER, arm, chain)
         given = with_all_gains(arm, law)
         self.gains = given.gains if given.references == AT_HUB else None
         self.law, self.chain = acting_law(arm, given, chain)
         references_of(self.law, scenario)  # raises for one that is missing
-        self.scenario, self.between, self._released = scenario, between, dict[int, complex]()
+        self.scenario, self.between = scenario, between
         self.others = tuple(dict.fromkeys(name for name in outputs if name not in RECORDED))
         self.measured = tuple(dict.fromkeys((*AT_HUB, *self.law.signals)))
         sensed = sensed_plant(arm, chain, self.measured, count)
         self.plant = sensed.together
         for names in filter(None, (RECORDED, self.others)):
             self.plant = self.plant.joined(sensed_plant(arm, chain, names, count).unfiltered)
+        self._first: Complex = np.zeros(self.plant.poles.size, complex)
         if scenario.tip_offset:
             self._release(sensed.unfiltered, scenario.tip_offset)
         self.kept = np.nonzero(self.plant.poles.imag >= 0)[0]
@@ -273,34 +276,24 @@ class Simulator:
 
     def run(self) -> Simulation:
         """Simulate the law over the scenario, from its start."""
-        n, gains = self.scenario.feedforward.size, self.gains
-        return self._driven(self.law, None if gains is None else np.full(n, gains.K2))
+        return self._driven(self.law, self.gains)
 
-    def linear(self, gains: HubFeedback, K2: Real | None = None) -> Simulation:
-        """Simulate u = r + gains . (wanted - measured) instead of the simulator's own law; `K2` (n,) may vary.
+    def linear(self, gains: HubFeedback) -> Simulation:
+        """Simulate u = r + gains . (wanted - measured) instead of the simulator's own law.
 
-        Raises ParameterError for I_h = 0 with moment feedback, and for gains that are not one finite number a sample.
+        Raises ParameterError for I_h = 0 with moment feedback.
         """
-        n = self.scenario.feedforward.size
-        gain = np.full(n, gains.K2) if K2 is None else np.array(K2, dtype=float)
-        is_row = gain.shape == (n,) and np.isfinite(gain).all()
-        require(is_row, "K2", gain.shape, f"one finite gain a sample, {n} in all")
-        return self._driven(with_all_gains(self.plant.arm, gains), gain)
+        return self._driven(with_all_gains(self.plant.arm, gains), gains)
 
-    def _driven(self, law: Law, gain: Real | None) -> Simulation:
-        """A law in z over the scenario; `gain` is that on the root moment, sample by sample."""
+    def _driven(self, law: Law, gains: HubFeedback | None) -> Simulation:
+        """A law in z over the scenario, and its gains at the hub, if it is of these."""
         columns = (*law.signals, *law.wanted)
-        A, B, C, D = law.matrices(columns)
-        if gain is not None:
-            D = np.repeat(D, gain.size, axis=0)
-            D[:, columns.index("root_moment")] = gain
-        matrices = tuple(np.ascontiguousarray(each) for each in (A, B, C, D))
-        if self.electronics.is_single:
-            matrices = tuple(each.astype(np.float32).astype(float) for each in matrices)
+        kind = np.float32 if self.electronics.is_single else float
+        table = system_matrix(law).astype(kind).astype(float)
         sources = np.array([self.measured.index(name) if name in self.measured else -1 for name in columns])
         references, state = references_of(law, self.scenario), self._start()
-        done = kernel.run(self.model, state, self._forcing, self.electronics, matrices, sources, references)
-        return self._result(state, int(done), gain)
+        done = kernel.run(self.model, state, self._forcing, self.electronics, table, sources, references)
+        return self._result(state, int(done), None if gains is None else np.full(state.torque.size, gains.K2))
 
     def controller(self, controller: Controller) -> Simulation:
         """Simulate a callable from a `Measurement` to a torque [N m]; its numbers are float32 if the arithmetic is."""
@@ -322,14 +315,6 @@ class Simulator:
         other.between = between
         vars(other).pop("model", None)
         return other
-
-    def modal(self) -> tuple[Complex, Complex]:
-        """Poles (m,) [1/s] with Im p >= 0, and their weights in hub angle, rate, moment and tip (4, m)."""
-        return self.plant.poles[self.kept], self.model.weights[len(self.measured) :][: len(RECORDED)]
-
-    def first_amplitudes(self) -> Complex:
-        """The modal amplitudes (m,) after the sample at t = 0 and the impulse."""
-        return self._at_first() + self.scenario.impulse
 
     # ------------------------------------------------------------ inside
 
@@ -363,10 +348,11 @@ class Simulator:
     def _start(self) -> kernel.State:
         n, outputs = self.scenario.feedforward.size, len(self.plant.outputs)
         return kernel.State(
-            amplitude=self._at_first(),
+            amplitude=self._first[self.kept],
             rigid=np.zeros(2),
             held=np.zeros(self.chain.sampling.whole_delay + 2),
             work=np.zeros(2),
+            circle=np.zeros(self.kept.size),
             record=np.zeros((n, outputs)),
             torque=np.zeros(n),
             fine=np.zeros((n, self.between, outputs)),
@@ -379,19 +365,10 @@ class Simulator:
         `unfiltered` are the measured signals ahead of the filters.
         """
         first, amplitude = first_mode(self.plant, offset)
-        self._released, held = {first: amplitude}, np.zeros(len(self.plant.outputs))
-        n = len(self.measured)
+        self._first[first], held, n = amplitude, np.zeros(len(self.plant.outputs)), len(self.measured)
         held[:n] = 2 * ((unfiltered.residues[:, first] - self.plant.residues[:n, first]) * amplitude).real
         if held.any():
-            self.plant = with_held_filter(self.plant, held)
-            self._released[self.plant.poles.size - 1] = 1.0
-
-    def _at_first(self) -> Complex:
-        """The modal amplitudes (m,) at t = 0: 0, or those of a displaced tip."""
-        amplitude: Complex = np.zeros(self.plant.poles.size, complex)
-        for pole, value in self._released.items():
-            amplitude[pole] = value
-        return amplitude[self.kept]
+            self.plant, self._first = with_held_filter(self.plant, held), np.r_[self._first, 1.0]
 
     def _energy(self, amplitude: Complex, rate: float) -> float:
         """Energy of an undamped arm [J]: b^2 |a|^2/2 a mode, b^2 twice the residue of the hub rate, and rigid."""
@@ -406,9 +383,12 @@ class Simulator:
             of_root = np.nan_to_num(abs(self.plant.residues[kernel.MOMENT, self.kept] * state.amplitude), nan=np.inf)
             stopped = Stop(done * self.scenario.period, int(self.plant.mode[self.kept][int(np.argmax(of_root))]))
         elif self.plant.arm.is_undamped and not self.chain.actuator.hub_damping > 0:
-            before = self._energy(self.first_amplitudes(), self.scenario.impulse)
+            before = self._energy(self._first[self.kept] + self.scenario.impulse, self.scenario.impulse)
             after, (work, moved) = self._energy(state.amplitude, state.rigid[kernel.ONCE]), state.work
             error = float(abs(after - before - work) / max(before + moved, LEAST_SIZE))
+        p, weights = self.plant.poles[self.kept], self.model.weights[len(self.measured) :][: len(RECORDED)]
+        is_ringing = p.imag > -p.real
+        size = abs(weights[:, is_ringing]) * np.sqrt(state.circle[is_ringing])
         T, m, between = self.scenario.period, self.between, None
         if m:
             at = T * (np.arange(done)[:, None] + (np.arange(m) + 1) / (m + 1))
@@ -422,13 +402,14 @@ class Simulator:
             torque=state.torque[:done],
             gain=None if gain is None else gain[:done],
             saturated_at=state.saturated[:done],
+            rings=(np.asarray(p.imag[is_ringing]), np.asarray(size)),
             energy_error=error,
             stopped=stopped,
         )
 
     def _trace(self, t: Real, record: Real) -> Trace:
         """The recorded outputs."""
-        angle, rate, moment, tip, *more = (np.ascontiguousarray(column) for column in record[:, len(self.measured) :].T)
+        angle, rate, moment, tip, *more = np.ascontiguousarray(record[:, len(self.measured) :].T)
         return Trace(t, angle, rate, moment, tip, dict(zip(self.others, more, strict=True)))
 
 

@@ -1,7 +1,7 @@
 """Signals over time for pictures: resolved for the fastest visible mode, or a band from lowest to highest value.
 
-Under a held torque u a mode circles its rest position, a + u/p, and the circle shrinks with Re p.  The torques of a
-simulation are applied again; the largest circle of every mode, times its weight in an output, is its amplitude there.
+Under a held torque u a mode circles its rest position, a + u/p, and the circle shrinks with Re p.  The largest circle
+of every mode in a simulation, times its weight in an output, is its amplitude there.
 
 So a simulation is made twice: first at its samples, to find the modes that ring visibly, then with at least 20 records
 in each period of the fastest of them.  Where that is too much for a line on a page, the curve is drawn, and written to
@@ -27,42 +27,17 @@ from tfarm.schema import Column
 
 POINTS_A_PERIOD = 20  # of a curve in each period of the fastest visible mode
 VISIBLE = 1 / 300  # of the height of a curve: a pixel of a picture
-
 LEAST_BETWEEN = 3  # records between two samples at least
 MOST_LINE = 6000  # points of a line: at 20 a period still three pixels a period
 PERIODS = 2  # of the fastest mode that each piece of a band holds at least
-BAND_PIECES = 1500  # of a band at most
-MOST_RECORDS = 400_000  # of a simulation for a picture, some 30 MB
 RECORD_LENGTH = 3.0  # times the slew: length of a record
 
 
-def ringing(simulator: Simulator, run: Simulation) -> tuple[Real, Real]:
-    """Return frequency (m,) [rad/s] and amplitude in `RECORDED` (4, m) of the modes that ring, with Im p > -Re p.
-
-    The torques of the simulation, which is one by this simulator, are applied again.
-    """
-    p, weights = simulator.modal()
-    rings = p.imag > -p.real
-    p, weights, amplitude = p[rings], weights[:, rings], simulator.first_amplitudes()[rings]
-    sampling, d = simulator.chain.sampling, simulator.chain.sampling.whole_delay
-    late = sampling.fraction * sampling.period
-    pieces = [(0, np.exp(p * late))] if late else []  # the torque before, and then this one
-    pieces.append((1, np.exp(p * (sampling.period - late))))
-    torque, largest = np.r_[np.zeros(d + 1), run.torque], np.zeros(p.size)
-    for k, extra in enumerate(simulator.scenario.disturbance[: run.torque.size]):
-        for shift, turn in pieces:
-            rest = (torque[k + shift] + extra) / p
-            circle = amplitude + rest
-            largest = np.maximum(largest, abs(circle))
-            amplitude = turn * circle - rest
-    return np.asarray(p.imag, dtype=float), np.asarray(abs(weights) * largest, dtype=float)
-
-
-def records_between(simulator: Simulator, arm: Arm, run: Simulation) -> int:
+def records_between(arm: Arm, run: Simulation) -> int:
     """Number of records between two samples that resolve every visible mode in the drawn curves."""
     if run.t.size < 2:
         return 0
-    frequency, size = ringing(simulator, run)
+    frequency, size = run.rings
     curves = {"root_moment": run.at_samples.root_moment, "tip_displacement": away(arm, run)}
     seen = [size[RECORDED.index(name)] > VISIBLE * np.ptp(curve) for name, curve in curves.items()]
     fastest = frequency[np.any(seen, axis=0)].max(initial=0.0)
@@ -96,8 +71,9 @@ class TimeCurve:
 
 def resolved(simulator: Simulator, arm: Arm, *runs: Callable[[Simulator], Simulation]) -> list[Simulation]:
     """Return the simulations of one picture, with enough records between their samples for its fastest visible mode."""
-    needed = max(records_between(simulator, arm, run(simulator)) for run in runs)
-    most = max(LEAST_BETWEEN, MOST_RECORDS // simulator.scenario.t.size)
+    needed = max(records_between(arm, run(simulator)) for run in runs)
+    # some 30 MB of records
+    most = max(LEAST_BETWEEN, 400_000 // simulator.scenario.t.size)
     finer = simulator.finer(min(max(LEAST_BETWEEN, needed), most))
     return [run(finer) for run in runs]
 
@@ -107,7 +83,7 @@ def points_a_period(arm: Arm, run: Simulation) -> tuple[float, int]:
 
     That number is of records between two samples.
     """
-    needed = records_between(Simulator(arm, run.chain, run.scenario), arm, run)
+    needed = records_between(arm, run)
     there = 0 if run.between is None else run.between.t.size // max(1, run.t.size)
     return (POINTS_A_PERIOD * (there + 1) / (needed + 1) if needed else math.inf), needed
 
@@ -142,7 +118,8 @@ def curve(t: Real, y: Real) -> TimeCurve:
     """A line where it is short enough for a page, else a band."""
     if t.size <= MOST_LINE:
         return TimeCurve(t, y, y, False)
-    step = max(PERIODS * POINTS_A_PERIOD, math.ceil(t.size / BAND_PIECES))
+    # at most 1500 pieces
+    step = max(PERIODS * POINTS_A_PERIOD, math.ceil(t.size / 1500))
     starts = np.arange(0, t.size, step)
     return TimeCurve(t[starts], np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts), True)
 

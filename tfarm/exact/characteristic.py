@@ -90,10 +90,10 @@ def quick_characteristics(k: System, s: Complex, at_zero: int = 0) -> Analytic:
     s = off_rest(np.asarray(s, dtype=complex))
     h = difference_steps(k, s)
     at = np.array([s, s + h, s - h])
-    parts = loop_parts(k, at)
-    values = parts.drive / at**at_zero
-    up, down = values[1:] * np.exp(parts.scale[1:] - parts.scale[0])
-    return Analytic(values[0], (up - down) / (2.0 * h), parts.scale[0])
+    free = free_of(readings(k, (), 0.0), at.ravel())
+    values, scale = free.drive.reshape(at.shape) / at**at_zero, free.scale.reshape(at.shape)
+    up, down = values[1:] * np.exp(scale[1:] - scale[0])
+    return Analytic(values[0], (up - down) / (2.0 * h), scale[0])
 
 
 def has_slope(k: System, s: Complex) -> NDArray[np.bool_]:

@@ -44,8 +44,6 @@ LAYOUTS_KEPT = 256  # of one system: more places than those of a page
 
 W, PSI, M, Q = range(4)  # the fields of a state
 FIELDS = {"W": W, "Y": W, "centre": W, "Psi": PSI, "Phi": PSI, "M": M, "strain": M, "Q": Q}  # of each quantity
-# The outputs of `uniform`, of a uniform link: theta, M and Q at the root, W and W - theta at the tip.
-AT_ENDS: Mapping[Any, int] = {(None, -1, 1): 0, (0, M, 0): 1, (0, Q, 0): 2, (1, W, 0): 3, (1, W, -1): 4}
 
 
 class Reading(NamedTuple):
@@ -127,16 +125,6 @@ class Layout:
         """Rows for `sweep.fill_free`: the numbers of `Reading` in their order, the row of the place first."""
         rows = [(self.marks.get(one.place, -1), *one[1:]) for one in self.each]
         return np.asarray(read_only(np.array(rows, dtype=float).reshape(-1, len(Reading._fields))))
-
-    @cached_property
-    def ends_table(self) -> Real | None:
-        """Rows for `uniform.fill_ends`: number, power of s, unit, C; None if an output is not one at the ends."""
-        shares, drive = [one.place and one.place.share for one in self.each], self.chain.drive
-        which = [AT_ENDS.get((at, one.field, one.theta)) for at, one in zip(shares, self.each, strict=True)]
-        if not self.chain.is_uniform or drive.friction or drive.stiffness or drive.lag or None in which:
-            return None
-        rows = [(n, one.power, one.unit, one.C) for n, one in zip(which, self.each, strict=True)]
-        return np.asarray(read_only(np.array(rows, dtype=float).reshape(-1, 4)))
 
 
 def kernel_row(element: Element) -> list[float]:

@@ -39,14 +39,12 @@ from .waves import (
 )
 
 BLOCK = 32  # points of a block: few for single points, many for the overhead of loops
-# A plane, and next to it the one by series; on the way back of a mark its state, W - r theta and Psi - theta there.
-LIFT, TURN, BY_SERIES, PLANE_SIZE = (BLOCK * j for j in (4, 5, 7, 14))
+# A plane; on the way back of a mark its state, W - r theta and Psi - theta there.
+LIFT, TURN, PLANE_SIZE = (BLOCK * j for j in (4, 5, 6))
 # Of a segment S, d and g S; z, v, t and dt of each wave, then its c, s, e and t + dt; F0..F3, F2 - 1 and F3 - 1.
 S_SQUARED, ONE, TWO, SERIES, WAVES_SIZE = (BLOCK * j for j in (0, 3, 11, 19, 25))
 FUNCTIONS, PHASE = (BLOCK * j for j in (4, 7))  # of a wave
 F1, F2_LESS_1, F3_LESS_1 = (SERIES + BLOCK * j for j in (1, 4, 5))
-SLOW_WAVE = 1.0  # |z_2| below which a wave has little phase along a segment: next to its shear cut-off
-FADED = 1e-140  # |e^{-t}| below which its reciprocal would overflow
 
 
 class Work(NamedTuple):
@@ -85,6 +83,13 @@ def put(buffer: Any, i: int, numbers: tuple[complex, ...]) -> None:
 
 
 @inlined
+def put_where(chosen: bool, buffer: Any, i: int, numbers: tuple[complex, ...]) -> None:
+    """Write the numbers of a chosen point, without a branch."""
+    for j in range(len(numbers)):
+        buffer[BLOCK * j + i] = numbers[j] if chosen else buffer[BLOCK * j + i]
+
+
+@inlined
 def row_at(buffer: Any, i: int) -> Row:
     """Return four numbers of a point."""
     return buffer[i], buffer[BLOCK + i], buffer[2 * BLOCK + i], buffer[3 * BLOCK + i]
@@ -102,39 +107,26 @@ def cross(points: Any, row: Any, j: int, work: Work, lost: Any) -> None:
 
     Scales are added to `work.scale`, lost digits and points next to the shear cut-off are marked.
     """
-    outer, inner, waves, low = work.planes[j], work.planes[j + 1], work.waves[j], work.low[j]
-    slow = mark_slow(points, row, low)
-    if slow < BLOCK:
-        fill_waves(points, row, waves)
-        _by_waves(row, waves, outer, inner)
-        mark_parallel(waves, low, lost)
-        for i in range(BLOCK):
-            if not low[i]:
-                work.scale[i] += waves[ONE + PHASE + i] + waves[TWO + PHASE + i]
-                work.watched[i] = work.watched[i] or magnitude(waves[TWO + i]) < SLOW_WAVE
-    if slow:
-        at = 0 if slow == BLOCK else BY_SERIES
-        _by_series(points, row, waves, outer, inner[at:])
-        take_low(low, inner, at, 5)
-
-
-@inlined
-def mark_slow(points: Any, row: Any, low: Any) -> int:
-    """Mark the points with slow waves (`is_low`), and return their number."""
-    slow = 0
+    outer, inner, waves, low, slow = work.planes[j], work.planes[j + 1], work.waves[j], work.low[j], 0
     for i in range(BLOCK):
         low[i] = is_low(points[i], row)
         slow += low[i]
-    return slow
-
-
-@inlined
-def mark_parallel(waves: Any, low: Any, lost: Any) -> None:
-    """Mark the points where both waves are nearly one (`PARALLEL`)."""
-    for i in range(lost.size):
-        if not low[i]:
+    if slow < BLOCK:
+        fill_waves(points, row, waves)
+        for i in range(BLOCK):
+            one, two, gS, d = waves_at(row, waves, i)
+            gap = one[2] - two[2]
+            put(inner, i, scaled(across_waves(one, two, gS, d, plane_at(outer, i)), reciprocal(gS * d * gap * gap)))
+        for i in range(BLOCK):
             z1, z2 = waves[ONE + i], waves[TWO + i]
-            lost[i] = lost[i] or magnitude(z1 - z2) < PARALLEL * (magnitude(z1) + magnitude(z2))
+            work.scale[i] += 0.0 if low[i] else waves[ONE + PHASE + i] + waves[TWO + PHASE + i]
+            # a wave with little phase along the segment
+            work.watched[i] |= (not low[i]) & (magnitude(z2) < 1.0)
+            lost[i] |= (not low[i]) & (magnitude(z1 - z2) < PARALLEL * (magnitude(z1) + magnitude(z2)))
+    if slow:
+        _fill_series(points, row, waves)
+        for i in range(BLOCK):
+            put_where(low[i], inner, i, across_rows(*rows_at(points[i], row, waves, i), plane_at(outer, i)))
 
 
 @inlined
@@ -152,38 +144,13 @@ def fill_waves(points: Any, row: Any, waves: Any) -> None:
 
 
 @inlined
-def take_low(low: Any, buffer: Any, at: int, parts: int) -> None:
-    """Copy the numbers of the slow points from another place of their buffer."""
-    if at:
-        for j in range(parts):
-            for i in range(BLOCK):
-                if low[i]:
-                    buffer[BLOCK * j + i] = buffer[at + BLOCK * j + i]
-
-
-@inlined
-def waves_at(waves: Any, i: int) -> tuple[Wave, Wave, complex, complex]:
-    """Return both waves of a point, g S and d."""
+def waves_at(row: Any, waves: Any, i: int) -> tuple[Wave, Wave, complex, complex]:
+    """Return both waves of a point, g S and d, in the chain's units."""
     (z1, v1, _, _), (c1, s1, e1, _) = row_at(waves, ONE + i), row_at(waves, ONE + FUNCTIONS + i)
     (z2, v2, _, _), (c2, s2, e2, _) = row_at(waves, TWO + i), row_at(waves, TWO + FUNCTIONS + i)
-    _, d, gS, _ = row_at(waves, S_SQUARED + i)
-    return (c1, s1, z1, v1, e1), (c2, s2, z2, v2, e2), gS, d
-
-
-@inlined
-def _chain_waves(row: Any, waves: Any, i: int) -> tuple[Wave, Wave, complex, complex]:
-    """Return the same in the chain's units."""
-    (one, two, gS, d), l, EI = waves_at(waves, i), row[LENGTH], row[BENDING]
-    return in_chain(one, l), in_chain(two, l), times(gS, EI / (l * l * l * l)), times(d, EI)
-
-
-@inlined
-def _by_waves(row: Any, waves: Any, outer: Any, inner: Any) -> None:
-    """Compute `across_waves` at every point of a block."""
-    for i in range(BLOCK):
-        one, two, gS, d = _chain_waves(row, waves, i)
-        p, gap = across_waves(one, two, gS, d, plane_at(outer, i)), one[2] - two[2]
-        put(inner, i, scaled(p, reciprocal(gS * d * gap * gap)))
+    (_, d, gS, _), l, EI = row_at(waves, S_SQUARED + i), row[LENGTH], row[BENDING]
+    one, two = in_chain((c1, s1, z1, v1, e1), l), in_chain((c2, s2, z2, v2, e2), l)
+    return one, two, times(gS, EI / (l * l * l * l)), times(d, EI)
 
 
 @inlined
@@ -194,16 +161,14 @@ def rows_at(s: complex, row: Any, waves: Any, i: int) -> tuple[Row, Row, Row, Ro
 
 
 @inlined
-def _by_series(points: Any, row: Any, waves: Any, outer: Any, inner: Any) -> None:
-    """Compute F0..F3, F2 - 1 and F3 - 1 of a slow segment in the chain's units, and `across_rows`, in a block."""
+def _fill_series(points: Any, row: Any, waves: Any) -> None:
+    """Compute F0..F3, F2 - 1 and F3 - 1 of a slow segment in the chain's units, at every point of a block."""
     l = row[LENGTH]
     for i in range(BLOCK):
         _, _, z_sum, z_product = wave_sums(points[i], row)
         F0, F1, F2, F3, F2_less_1, F3_less_1 = transition_series(z_sum, z_product)
         own = times(F0, l * l * l), times(F1, l * l), times(F2, l), F3, times(F2_less_1, l), F3_less_1
         put(waves, SERIES + i, own)
-    for i in range(BLOCK):
-        put(inner, i, across_rows(*rows_at(points[i], row, waves, i), plane_at(outer, i)))
 
 
 @inlined
@@ -215,19 +180,16 @@ def cross_back(points: Any, row: Any, j: int, work: Work, scale: Any) -> None:
     back, waves, low, slow = work.back, work.waves[j], work.low[j], 0
     for i in range(BLOCK):
         slow += low[i]
-    if slow:
-        at = 0 if slow == BLOCK else BY_SERIES
-        for i in range(BLOCK):
-            put(back, at + i, row_across(*rows_at(points[i], row, waves, i), row_at(back, i)))
     if slow < BLOCK:
         _fade(waves, low, scale)
         for i in range(BLOCK):
-            one, two, gS, d = _chain_waves(row, waves, i)
+            one, two, gS, d = waves_at(row, waves, i)
             W, Psi, M, Q = row_across_waves(one, two, gS, d, row_at(back, i))
             unit = reciprocal(gS * d * (one[2] - two[2]))
-            put(back, i, (W * unit, Psi * unit, M * unit, Q * unit))
-        if slow:
-            take_low(low, back, at, 4)
+            put_where(not low[i], back, i, (W * unit, Psi * unit, M * unit, Q * unit))
+    if slow:
+        for i in range(BLOCK):
+            put_where(low[i], back, i, row_across(*rows_at(points[i], row, waves, i), row_at(back, i)))
 
 
 @inlined
@@ -238,7 +200,8 @@ def _fade(waves: Any, low: Any, scale: Any) -> None:
         is_first = waves[ONE + PHASE + i].real >= waves[TWO + PHASE + i].real
         fast, slow = (one, two) if is_first else (two, one)
         (_, _, e, t), (c, s, e_slow, t_slow) = row_at(waves, fast), row_at(waves, slow)
-        if magnitude(e_slow) > FADED:
+        # below that a reciprocal would overflow
+        if magnitude(e_slow) > 1e-140:
             ratio = e * reciprocal(e_slow)
         else:
             decay, turn = math.exp(t_slow.real - t.real), t_slow.imag - t.imag

@@ -75,7 +75,6 @@ from .waves import (
     tip_conditions,
 )
 
-OVERFLOW, UNDERFLOW = 1e80, 1e-80  # a plane beyond is rescaled by a power of two
 LN_2 = math.log(2.0)
 POLE = 1e-11  # a drive below this share of its terms is flagged, as it may be a pole
 DIFFERENCE = 0.5  # an output below this share of its terms has lost a bit and is summed from the axis instead,
@@ -109,13 +108,17 @@ def _sweep(points: Any, rows: Any, ends: Any, work: Work, lost: Any) -> None:
         work.scale[i], lost[i], work.watched[i] = 0.0, False, False
     for j in range(len(rows)):
         row, outer, inner = rows[j], work.planes[j], work.planes[j + 1]
+        for i in range(BLOCK):
+            work.powers[j, i] = 0
         if row[ROW_KIND] == SEGMENT:
             cross(points, row, j, work, lost)
+        elif row[ROW_KIND] == MARK:
+            for i in range(BLOCK):
+                put(inner, i, plane_at(outer, i))
+            continue
         else:
             for i in range(BLOCK):
                 put(inner, i, inside(row[ROW_KIND], row, points[i], points[i] * points[i], plane_at(outer, i)))
-        for i in range(BLOCK):
-            work.powers[j, i] = 0
         _brought_back(inner, 5, work.powers[j])
         for i in range(BLOCK):
             work.scale[i] += work.powers[j, i] * LN_2
@@ -146,11 +149,20 @@ def beyond(kind: int, row: Any, s: Number, S: Number, f: Row) -> Row:
 @inlined
 def _brought_back(buffer: Any, parts: int, powers: Any) -> None:
     """Divide each point's numbers by a power of two, added to `powers`, where they are near over- or underflow."""
+    beyond = 0
+    for i in range(BLOCK):
+        size = 0.0
+        for j in range(parts):
+            z = buffer[BLOCK * j + i]
+            size += abs(z.real) + abs(z.imag)
+        beyond += not 1e-80 <= size <= 1e80
+    if beyond == 0:
+        return
     for i in range(BLOCK):
         largest = 0.0
         for j in range(parts):
             largest = max(largest, magnitude(buffer[BLOCK * j + i]))
-        if 0.0 < largest < np.inf and not UNDERFLOW <= largest <= OVERFLOW:
+        if 0.0 < largest < np.inf and not 1e-80 <= largest <= 1e80:
             power = math.frexp(largest)[1]
             powers[i] += power
             for j in range(parts):
@@ -173,7 +185,8 @@ def _go_back(points: Any, rows: Any, outermost: int, work: Work, differs: bool, 
             _meet(work.planes[j + 1], work, is_root, reach, shift)
             for i in range(BLOCK):
                 lost[i] = lost[i] or (work.watched[i] and not is_root)  # there W, M and Q may have lost digits
-        elif row[ROW_KIND] == SEGMENT:
+            continue
+        if row[ROW_KIND] == SEGMENT:
             if differs:
                 _beyond_segment(points, row, j, work, reach, shift)
             cross_back(points, row, j, work, scale)
@@ -196,7 +209,8 @@ def _meet(state: Any, work: Work, is_root: bool, reach: float, shift: Any) -> No
     for i in range(BLOCK):
         put(state, i, met(row_at(back, i), plane_at(state, i)))
         if is_root:
-            state[i] = times(times(work.theta[i], reach) + back[LIFT + i], math.ldexp(1.0, -shift[i]))
+            lifted = times(work.theta[i], reach) + back[LIFT + i]
+            state[i] = times(lifted, math.ldexp(1.0, -shift[i])) if shift[i] else lifted
         state[LIFT + i], state[TURN + i] = back[LIFT + i], back[TURN + i]
 
 
@@ -277,7 +291,8 @@ def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, l
             for j in range(4):
                 work.back[BLOCK * j + i] = axis[j, at]
         _drive(points, segment, ends, work.planes[len(rows)], values[0], lost_here)
-        _go_back(points, rows, outermost, work, differs, lost_here)
+        if len(table):
+            _go_back(points, rows, outermost, work, differs, lost_here)
         for o in range(len(table)):
             _output(points, table[o], work, values[0], values[1 + o], lost_here)
         for i in range(n):
@@ -306,8 +321,12 @@ def _drive(points: Any, segment: Any, ends: Any, plane: Any, drive: Any, lost: A
 
 @inlined
 def _output(points: Any, want: Any, work: Work, drive: Any, value: Any, lost: Any) -> None:
-    """Compute an output of the table at every point of a block; digits are lost where it is a small difference."""
-    j, field, of_theta, of_rate, of_drive = int(want[0]), BLOCK * int(want[1]), want[2], want[6], want[7]
+    """Compute an output of the table at every point of a block; digits are lost where it is a small difference.
+
+    Until its power of s it is times 2^100: at the tip W would underflow where s^2 W does not.
+    """
+    j, field, lift = int(want[0]), BLOCK * int(want[1]), 2.0**100
+    of_theta, of_rate, of_drive = lift * want[2], lift * want[6], lift * want[7]
     for i in range(BLOCK):
         value[i] = times(work.theta[i], of_theta)
     if of_drive != 0.0:
@@ -318,13 +337,16 @@ def _output(points: Any, want: Any, work: Work, drive: Any, value: Any, lost: An
         for i in range(BLOCK):
             at = states[field + i]
             if scale[i] != 0.0 or shift[i]:
-                decay, turn = math.ldexp(math.exp(scale[i].real), shift[i]), scale[i].imag
+                root, turn = math.exp(0.5 * scale[i].real), scale[i].imag
+                decay = math.ldexp(lift * root, shift[i]) * root
                 at *= complex(decay * math.cos(turn), decay * math.sin(turn))
+            else:
+                at = times(at, lift)
             size = magnitude(value[i])
             value[i] += at
             if of_theta != 0.0 and magnitude(value[i]) < DIFFERENCE * size:
                 if np.isfinite(states[LIFT + i].real):
-                    value[i] = states[LIFT + field + i]
+                    value[i] = times(states[LIFT + field + i], lift)
                 else:
                     lost[i] = lost[i] or magnitude(value[i]) < SMALL_DIFFERENCE * size
-    finish(points, value, int(want[3]), want[4], want[5], value)
+    finish(points, value, int(want[3]), want[4] / lift, want[5], value)

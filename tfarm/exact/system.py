@@ -24,6 +24,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from tfarm.arm import THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Arm, Attachment, Link, RotarySpring, Theory
+from tfarm.arm.stages import Consumer
+from tfarm.arm.writing import arm_table
 from tfarm.arrays import Real
 from tfarm.errors import must_be_known
 from tfarm.records import record
@@ -207,6 +209,7 @@ def scaled_inertia(value: float, unit: Fraction) -> Inertia:
     return math.inf if math.isinf(value) else Fraction(value) * unit
 
 
+CONSUMER = Consumer("exact solution", acts=("plant",))
 SYSTEMS_KEPT = 64  # arms whose exact numbers are cached: one page needs those of one arm some thousand times
 
 
@@ -238,11 +241,6 @@ class System:
     def segments(self) -> tuple[Segment, ...]:
         """The uniform pieces, from the outermost inwards."""
         return tuple(each for each in self.elements if isinstance(each, Segment))
-
-    @property
-    def is_uniform(self) -> bool:
-        """Whether it is one uniform link on a hub, with the payload centred on the tip."""
-        return len(self.elements) == 1
 
     @property
     def reads_hub_moment(self) -> bool:
@@ -313,9 +311,13 @@ class System:
 
 @lru_cache(maxsize=SYSTEMS_KEPT)
 def system_of(arm: Arm, theory: Theory | None = None) -> System:
-    """Return the system of an arm under its own theory, or another.  Raises ParameterError for an unknown one."""
+    """Return the system of an arm under its own theory, or another.
+
+    Raises ParameterError for an unknown theory, and for a part of the arm that is not in the equations.
+    """
     theory = theory or arm.theory
     must_be_known("theory", theory, THEORIES)
+    CONSUMER.refuse_others(arm_table(arm))
     unit_length, EI = sum((Fraction(link.length) for link in arm.links), ZERO), stiffness_of(arm.link)
     rotation = unit_length / EI
     translation = rotation * unit_length * unit_length

@@ -31,7 +31,6 @@ from .outputs import Output
 from .series import constant_of, expansion_at_zero
 from .sweep import AXIS, fill_free
 from .system import Place, System
-from .uniform import fill_ends
 
 AT_A_POLE = 4 * float(np.finfo(float).eps)  # of |s|: the distance of a pole within which no digit is right
 _Found = TypeVar("_Found")
@@ -67,18 +66,10 @@ def free_of(layout: Layout, s: Complex) -> Free:
     return Free(found[0], found[2:], found[1], lost)
 
 
-def _filled(
-    layout: Layout, s: Complex, axis: Real = AXIS, *, per_input: bool = False
-) -> tuple[Complex, NDArray[np.bool_]]:
-    """Return drive, scale and outputs (rows), for a unit input if `per_input`; the fast path where it applies."""
+def _filled(layout: Layout, s: Complex, axis: Real = AXIS) -> tuple[Complex, NDArray[np.bool_]]:
+    """Return drive, scale and outputs (rows), and where digits are lost."""
     found, lost = np.empty((2 + len(layout.each), s.size), complex), np.empty(s.size, bool)
-    s, ends = np.ascontiguousarray(s, dtype=complex), layout.ends_table
-    if ends is not None:
-        fill_ends(s, layout.rows, layout.ends, ends, per_input, found, lost)
-        return found, lost
-    fill_free(s, layout.rows, layout.ends, axis, layout.table, found, lost)
-    if per_input:
-        found[2:] /= found[0]
+    fill_free(np.ascontiguousarray(s, dtype=complex), layout.rows, layout.ends, axis, layout.table, found, lost)
     return found, lost
 
 
@@ -135,8 +126,9 @@ def evaluate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float =
     Raises ParameterError at a pole, naming it.
     """
     with np.errstate(all="ignore"):
-        found, lost = _filled(readings(k, tuple(wanted), x), s, per_input=True)
-    return _with_care(k, wanted, s, x, found[2:], lost, of_slope=False)
+        free = free_outputs(k, wanted, s, x)
+        values: Complex = free.outputs / free.drive
+    return _with_care(k, wanted, s, x, values, free.lost, of_slope=False)
 
 
 def differentiate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float = 0.0) -> Complex:

@@ -22,11 +22,12 @@ from tfarm.arm import Law
 from tfarm.arm.chain import Chain
 from tfarm.arm.checks import positive
 from tfarm.arm.law import REFERENCE
+from tfarm.arm.stages import Consumer
 from tfarm.arrays import Real, Whole
-from tfarm.dsp.discretise import discretised
-from tfarm.dsp.kernel import DAC, estimate, product, quantise, rounded
+from tfarm.dsp.discretise import discretised, system_matrix
+from tfarm.dsp.kernel import DAC, estimate, law_step, quantise, rounded
 from tfarm.dsp.simulate import quantisers
-from tfarm.errors import ParameterError, must_be_known, require
+from tfarm.errors import must_be_known, require
 from tfarm.exact.compiled import compiled, inlined
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.exported.result import Export, ExportTask, Name, is_certified, names_of
@@ -41,22 +42,28 @@ from tfarm.exported.word_length import (
     RATE,
     NoiseGain,
     Word,
-    around,
-    coefficient,
     least_noise,
-    system_matrix,
     with_system_matrix,
     word_of,
 )
-from tfarm.loop.sampled import Sampled
 from tfarm.loop.sampled_verdict import Analysis, sampled
 from tfarm.records import record
 from tfarm.schema import Quantity
 
+CONSUMER = Consumer(
+    "export c",
+    acts=(
+        "anti-alias filter", "hub rate", "law", "DAC steps", "DAC range", "torque limit", "hold", "delay",
+        "hub damping", "plant",
+    ),
+    named=("encoder", "amplifier steps", "arithmetic"),
+    partly=("amplifier range",),
+    none=("reference", "volts"),
+)  # fmt: skip
+
 NAME = "controller"  # of identifiers in C
 FILES = ("controller.h", "controller.c", "self_test.c", "example.c")
 RECORDED, REFUSED, SEED = 1000, 500, 1  # samples of the self-test, the one with a NaN, its first random number
-WHOLE_SAMPLE = 1e-9  # of a sample: rounding of a delay
 REAL = {"double": ("double", "", "DBL_MAX"), "float": ("float", "f", "FLT_MAX"), FIXED: ("int32_t", "", "")}  # in C
 INPUT_ERROR, OVERFLOW, SATURATED, STATE_SATURATED = 1, 2, 3, 4  # status of a step, 0 of one without an event
 MINUEND, SUBTRAHEND = 0, 1  # columns of a plan
@@ -158,7 +165,7 @@ def c_controller(task: ExportTask) -> Export:
     law, name, gains = least_noise(in_z(task.law, task.chain), exact.verdict.loop)
     controller = controller_of(law, task)
     word = controller.word
-    found = judged(task, word, exact.verdict.loop)
+    found = judged(task, word)
     details = word_length(controller, name, gains, word.limit_cycle(found.verdict.loop))
     bounds = dict(facts_of(details)) | ({} if details.samples else {"samples of these bounds": "all"})
     contents, names = source_files(task, controller, [*task.facts(word.rounded, found).items()], [*bounds.items()])
@@ -210,7 +217,7 @@ def in_z(law: Law, chain: Chain) -> Law:
     """
     samples = law.delay / chain.sampling.period
     remedy = f"is {samples:.6g} samples: C code has a delay of whole samples; write another one into the law's states"
-    require(abs(samples - round(samples)) <= WHOLE_SAMPLE, "law.delay", law.delay, remedy)
+    require(abs(samples - round(samples)) <= 1e-9, "law.delay", law.delay, remedy)
     law = discretised(law, chain.sampling.period)
     return with_system_matrix(law, system_matrix(law))
 
@@ -244,24 +251,15 @@ def largest_state(precision: str) -> float:
     return 1.0 if precision == FIXED else float(np.finfo(FLOATS[precision][0]).max)
 
 
-def judged(task: ExportTask, word: Word, loop: Sampled) -> Analysis:
+def judged(task: ExportTask, word: Word) -> Analysis:
     """The sampled loop with the coefficients as exported.
 
-    Raises ParameterError where it is not certified stable, unless it is exported anyway, naming the coefficient whose
-    rounding moves the poles most.
+    Raises ParameterError where it is not certified stable, unless it is exported anyway.
     """
     found = sampled(task.arm, word.rounded, task.chain)
-    if task.anyway or is_certified(found):
-        return found
-    exact, rounded, radius = system_matrix(word.law), system_matrix(word.rounded), {}
-    for place in np.ndindex(exact.shape):
-        table = exact.copy()
-        table[place] = rounded[place]
-        matrix = around(with_system_matrix(word.law, table), loop).matrix
-        radius[place] = float(abs(np.linalg.eigvals(matrix)).max())
-    worst = max(radius, key=radius.__getitem__)
     remedy = f"rounded to {task.precision} the loop is not certified stable: {found.verdict.sentence}; take more digits"
-    raise ParameterError(key=coefficient(worst), value=float(exact[worst]), remedy=remedy)
+    require(task.anyway or is_certified(found), "precision", task.precision, remedy)
+    return found
 
 
 # ------------------------------------------------------------ its arithmetic, that of C and of a simulation
@@ -286,8 +284,7 @@ def run_real(table: Any, plan: Any, inputs: Any, dac: Any, hub: Any, single: boo
                 known[-2] = rounded(estimate(known[int(hub[0])], 0.0, memory, True, hub[1], hub[2]), single)
             for j in range(plan.shape[0]):
                 z[n + j] = rounded(known[plan[j, MINUEND]] - known[plan[j, SUBTRAHEND]], single)
-            for i in range(n + 1):
-                following[i] = product(table[i], z, known[forward] if i == n else 0.0, single)
+            law_step(table, z, known[forward], single, following)
             if np.isfinite(following).all():
                 z[:n] = following[:n]
                 outputs[k] = rounded(quantise(following[n], dac, clipped, DAC), single)

@@ -23,6 +23,7 @@ import numpy as np
 
 from tfarm.arm import Law, tracked
 from tfarm.arm.law import REFERENCE
+from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex, Real
 from tfarm.dsp import Simulator, scenario
 from tfarm.dsp.plant import MODES_USED, RECORDED
@@ -38,13 +39,21 @@ from tfarm.files import temporary_folder
 from tfarm.records import record
 from tfarm.schema import Quantity
 
+CONSUMER = Consumer(
+    "export fmu",
+    acts=(
+        "anti-alias filter", "encoder", "hub rate", "amplifier steps", "amplifier range", "law", "arithmetic",
+        "DAC steps", "DAC range", "torque limit", "hold", "delay", "hub damping", "plant",
+    ),
+    none=("reference", "volts"),
+)  # fmt: skip
+
 COMPILERS = ("cc", "gcc", "clang")
 OPTIONS = ("-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")  # no fused operation
 LONGEST_COMPILATION = 60.0  # s
 PLATFORMS = {"linux": ("linux64", ".so"), "darwin": ("darwin64", ".dylib"), "win32": ("win64", ".dll")}
-ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # of every file: same inputs, same bytes
 LARGEST = sys.float_info.max  # of a range without limit
-LONGEST_TEXT, LONGEST_GUID = 400, 32  # characters
+LONGEST_TEXT = 400  # characters
 ERRORS = "logStatusError"  # category of messages
 MEASURED = "measured:"
 AT, STATE, KIND, SELF = ("const fmi2ValueReference *", "size_t"), "fmi2FMUstate", "fmi2StatusKind", "((model *)c)"
@@ -116,7 +125,7 @@ def fmu(task: ExportTask) -> Export:
     modes = prepared.plant.count if has_plant else None
     guid = hashlib.sha256(repr((task.sha256, name, about, modes, variables, version("tfarm"))).encode()).hexdigest()
     head: dict[str, Any] = {"variables": variables, "has_plant": has_plant, "period": period, "about": about}
-    head["guid"], numbers = guid[:LONGEST_GUID], plant_code(prepared)
+    head["guid"], numbers = guid[:32], plant_code(prepared)
     source = render("fmu.c", law=law, functions=FUNCTIONS, errors=ERRORS, sha256=task.sha256, **head, **numbers)
     sources = {"fmi2.h": render("fmi2.h"), "fmu.c": source, **(law.files if law else {})}
     binary, compiler = binary_of(sources, own[name])
@@ -142,15 +151,15 @@ def law_code(task: ExportTask, law: Law, variables: Sequence[Variable]) -> LawCo
     rounded = replace(controller.word.rounded, delay=task.law.delay)
     found = task.analysis(rounded)
     files, (first, *_) = source_files(task, controller, [*task.facts(rounded, found).items()])
-    inputs, outputs = ([each.name for each in variables if each.causality == of] for of in ("input", "output"))
-    place = {name: f"out[{n}]" for n, name in enumerate(outputs)} | {name: f"in[{n}]" for n, name in enumerate(inputs)}
-    signals, wanted = controller.signals, controller.references
-    fields = [*(f"{MEASURED}{each}" for each in signals), *(f"{REFERENCE}{each}" for each in wanted), FEEDFORWARD]
-    return LawCode(
-        first.identifier, [place[each] for each in fields],
-        {each: files[each] for each in ("controller.h", "controller.c")},
-        found.verdict.sentence if is_certified(found) else f"{ANYWAY}: {found.verdict.sentence}",
-    )  # fmt: skip
+    place: dict[str, str] = {}
+    for of, array in (("output", "out"), ("input", "in")):
+        names = [each.name for each in variables if each.causality == of]
+        place |= {name: f"{array}[{n}]" for n, name in enumerate(names)}
+    fields = [f"{MEASURED}{each}" for each in controller.signals]
+    fields += [*(f"{REFERENCE}{each}" for each in controller.references), FEEDFORWARD]
+    verdict = found.verdict.sentence if is_certified(found) else f"{ANYWAY}: {found.verdict.sentence}"
+    code = {each: files[each] for each in ("controller.h", "controller.c")}
+    return LawCode(first.identifier, [place[each] for each in fields], code, verdict)
 
 
 def prepared_simulator(task: ExportTask) -> Simulator:
@@ -296,9 +305,9 @@ def binary_of(sources: Mapping[str, bytes], identifier: str) -> tuple[dict[str, 
 
 
 def archive_of(files: Mapping[str, bytes]) -> bytes:
-    """An archive of files, the same for the same content."""
+    """An archive of files, the same for the same content: without their dates."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
         for name in sorted(files):
-            archive.writestr(zipfile.ZipInfo(name, ZIP_DATE), files[name], zipfile.ZIP_DEFLATED)
+            archive.writestr(zipfile.ZipInfo(name), files[name], zipfile.ZIP_DEFLATED)
     return content.getvalue()

@@ -27,6 +27,7 @@ from tfarm.arm import (
     unit_of,
 )
 from tfarm.arm.blocks import Rational
+from tfarm.arm.stages import Consumer
 from tfarm.arm.writing import law_toml
 from tfarm.arrays import Complex
 from tfarm.assessment.card import (
@@ -58,6 +59,14 @@ from tfarm.loop.windows import windows_of
 from tfarm.response import transfer
 from tfarm.spectrum.table import angle_unit, default_gains
 
+CONSUMER = Consumer(
+    "live page",
+    acts=(
+        "reference", "anti-alias filter", "encoder", "hub rate", "amplifier steps", "amplifier range", "law",
+        "arithmetic", "DAC steps", "DAC range", "torque limit", "hold", "delay", "hub damping", "plant",
+    ),
+    none=("volts",),
+)  # fmt: skip
 LIVE_COLUMNS = 90  # values of the gain across at which the continuous region is cut
 Numbers = dict[str, Any]
 

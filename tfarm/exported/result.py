@@ -211,7 +211,9 @@ def export(
         forms = ", ".join(each for of, each in WRITERS if of == what)
         raise ParameterError(key="as", value=form, remedy=f"a {what} is exported as: {forms}")
     chain = chain_or_usual(chain)
-    admit(f"export {form}", arm, chain)
+    module, _, function = WRITERS[what, form].partition(":")
+    writer = import_module(f"tfarm.exported.{module}")
+    admit(writer.CONSUMER, arm, chain)
     remedy = f"the code is in {precision}: take precision float, or leave this key out"
     is_other = form == "c" and chain.converters.is_single and precision != "float"
     require(not is_other, "converters.arithmetic", "float32", remedy)
@@ -220,7 +222,6 @@ def export(
         what=what, form=form, tuned=None if tuned is None else Path(tuned), precision=precision,
         ranges=dict(ranges or {}), name=name, anyway=anyway,
     )  # fmt: skip
-    module, _, function = WRITERS[what, form].partition(":")
-    found: Export = getattr(import_module(f"tfarm.exported.{module}"), function)(task)
+    found: Export = getattr(writer, function)(task)
     write_into(Path(folder), found.contents)
     return found

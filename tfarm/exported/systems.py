@@ -26,6 +26,7 @@ from scipy.linalg import block_diag
 from tfarm.arm import Arm, Law, arm_and_law
 from tfarm.arm.blocks import Matrices, StateSpace
 from tfarm.arm.law import REFERENCE, Part
+from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex
 from tfarm.dsp import Chain
 from tfarm.dsp.discretise import acting_law, with_all_gains, with_estimate
@@ -42,10 +43,16 @@ from tfarm.reduced.reduction import NORM
 from tfarm.response import transfer
 from tfarm.response.signals import Signals
 
-RESPONSE_POINTS = 1000  # of the exact response in a file, even in ln w
+CONSUMER = Consumer(
+    "export mat, py",
+    acts=("anti-alias filter", "hub rate", "law", "hold", "delay", "hub damping", "plant"),
+    named=("encoder", "amplifier steps", "amplifier range", "DAC steps", "DAC range", "torque limit"),
+    partly=("arithmetic",),
+    none=("reference", "volts"),
+)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 @record
 class NamedSystem:
     """x' = A x + B u, y = C x + D u with named signals; x' is the next x where the period [s] is not 0.
@@ -85,10 +92,8 @@ def controller_system(arm: Arm, law: Law, chain: Chain) -> NamedSystem:
     acting = with_estimate(replace(acting, parts=parts, references=()), chain)
     columns = (*acting.signals, *acting.wanted)
     a, b, c, d = acting.matrices(columns)
-    return NamedSystem(
-        name=law.name, matrices=(a, b, 0.0 - c, 0.0 - d), inputs=columns, outputs=(arm.input,),
-        states=tuple(f"controller{n + 1}" for n in range(len(a))), period=chain.sampling.period,
-    )  # fmt: skip
+    states = tuple(f"controller{n + 1}" for n in range(len(a)))
+    return NamedSystem(law.name, (a, b, 0.0 - c, 0.0 - d), columns, (arm.input,), states, chain.sampling.period)
 
 
 def _with_references(part: Part, references: tuple[str, ...]) -> Part:
@@ -105,10 +110,9 @@ def plant_system(arm: Arm, law: Law, chain: Chain) -> NamedSystem:
     signals = with_estimate(acting, chain).signals
     sensed = sensed_plant(arm, late, list(dict.fromkeys((*signals, "tip_displacement"))), USUAL_MODES)
     A, B, C = PulseTransfer(sensed.together, late.sampling).folded().matrices()
-    return NamedSystem(
-        name=f"{arm.name}, sampled", matrices=(A, B[:, None], C, np.zeros((len(C), 1))), inputs=(arm.input,),
-        outputs=sensed.read.names, states=tuple(f"plant{n + 1}" for n in range(len(A))), period=chain.sampling.period,
-    )  # fmt: skip
+    matrices, states = (A, B[:, None], C, np.zeros((len(C), 1))), tuple(f"plant{n + 1}" for n in range(len(A)))
+    name = f"{arm.name}, sampled"
+    return NamedSystem(name, matrices, (arm.input,), sensed.read.names, states, chain.sampling.period)
 
 
 def loop_system(plant: NamedSystem, controller: NamedSystem) -> NamedSystem:
@@ -117,18 +121,24 @@ def loop_system(plant: NamedSystem, controller: NamedSystem) -> NamedSystem:
     The first outputs of the plant are the first inputs of the controller.
     """
     (A, B, C, _), (a, b, c, d) = plant.matrices, controller.matrices
-    n = len(controller.inputs) - sum(name.startswith(REFERENCE) for name in controller.inputs)
-    y, u = np.pad(C, ((0, 0), (0, len(a)))), np.c_[d[:, :n] @ C[:n], c]  # of the states of both
+    n = sum(not name.startswith(REFERENCE) for name in controller.inputs)
+    # outputs and input by the states of both, and the input by feedforward and references
+    y, u = np.pad(C, ((0, 0), (0, len(a)))), np.c_[d[:, :n] @ C[:n], c]
     through = np.c_[np.ones((1, 1)), d[:, n:]]
+    matrices = (
+        block_diag(A, a) + np.r_[B @ u, b[:, :n] @ y[:n]],
+        np.r_[B @ through, np.pad(b[:, n:], ((0, 0), (1, 0)))],
+        np.r_[y, u],
+        np.pad(through, ((len(C), 0), (0, 0))),
+    )
     return NamedSystem(
-        name=f"{plant.name}, {controller.name}",
-        matrices=(
-            block_diag(A, a) + np.r_[B @ u, b[:, :n] @ y[:n]], np.r_[B @ through, np.pad(b[:, n:], ((0, 0), (1, 0)))],
-            np.r_[y, u], np.pad(through, ((len(C), 0), (0, 0))),
-        ),
-        inputs=("feedforward", *controller.inputs[n:]), outputs=(*plant.outputs, *controller.outputs),
-        states=(*plant.states, *controller.states), period=plant.period,
-    )  # fmt: skip
+        f"{plant.name}, {controller.name}",
+        matrices,
+        ("feedforward", *controller.inputs[n:]),
+        (*plant.outputs, *controller.outputs),
+        (*plant.states, *controller.states),
+        plant.period,
+    )
 
 
 # ------------------------------------------------------------ the arm itself
@@ -136,25 +146,22 @@ def loop_system(plant: NamedSystem, controller: NamedSystem) -> NamedSystem:
 
 def reduced_system(reduced: ReducedModel, outputs: tuple[str, ...]) -> NamedSystem:
     """Return the continuous-time reduced model under these names of its outputs, with its worst error."""
-    return NamedSystem(
-        name=reduced.name, matrices=reduced.matrices(), inputs=(reduced.input,), outputs=outputs, states=reduced.states,
-        facts={"worst_error": reduced.worst_error, "band": np.array(reduced.band)},
-    )  # fmt: skip
+    facts = {"worst_error": reduced.worst_error, "band": np.array(reduced.band)}
+    return NamedSystem(reduced.name, reduced.matrices(), (reduced.input,), outputs, reduced.states, facts=facts)
 
 
 def reduced_systems(arm: Arm, names: tuple[str, ...]) -> dict[str, NamedSystem]:
     """Return modal models with the modes of the sampled plant, one for each place along the arm."""
     read, found = Signals(arm, names), {}
-    along = [place for each, place in zip(read.outputs, read.places, strict=True) if each.place == "x"]
+    own = list(zip(names, read.outputs, read.places, strict=True))
+    along = [place for _, output, place in own if output.place == "x"]
     for n, share in enumerate(dict.fromkeys(along or [0.0])):
-        rows = [
-            row for row, each in enumerate(read.outputs)
-            if (read.places[row] == share if each.place == "x" else n == 0)
-        ]  # fmt: skip
-        outputs, x = [read.outputs[row] for row in rows], share * arm.length if along else None
+        # outputs at an end are with those of the first place
+        here = [each for each in own if (each[2] == share if each[1].place == "x" else n == 0)]
+        outputs, x = [output for _, output, _ in here], share * arm.length if along else None
         order = modal_model(arm, outputs, USUAL_MODES, x).order
         reduced = reduce(arm, outputs, order=order, method="modal", x=x)
-        found[f"reduced_{n + 1}" if n else "reduced"] = reduced_system(reduced, tuple(names[row] for row in rows))
+        found[f"reduced_{n + 1}" if n else "reduced"] = reduced_system(reduced, tuple(name for name, _, _ in here))
     return found
 
 
@@ -162,7 +169,7 @@ def response_data(
     arm: Arm, of: str, outputs: tuple[str, ...], band: tuple[float, float], G: Callable[[Complex], Complex]
 ) -> dict[str, Any]:
     """Return the exact frequency response (outputs, 1, n) over a range [rad/s], clear of the poles on the axis."""
-    omega = np.geomspace(*band, RESPONSE_POINTS)
+    omega = np.geomspace(*band, 1000)
     omega = omega[distance(omega, frequencies_around(arm, band[1])) > CLEAR_OF_POLES * omega]
     return {
         "omega": omega,
@@ -191,7 +198,7 @@ def linear(task: ExportTask) -> Linear:
     """Return the systems of a task.  Raises ParameterError for a loop that is not certified stable."""
     law, chain, what = task.law, task.chain, task.what
     arm, _ = arm_and_law(task.arm, law)
-    own = {"arm": arm.name, "sampled plant": f"linear{not_covered(f'export {task.form}', chain)}"}
+    own = {"arm": arm.name, "sampled plant": f"linear{not_covered(CONSUMER, chain)}"}
     facts, verdict = {**own, "SHA-256 of the inputs": task.sha256, "tfarm": version("tfarm")}, ""
     if what != "plant":
         judged = task.analysis(law)
@@ -203,11 +210,8 @@ def linear(task: ExportTask) -> Linear:
     read = Signals(driven(arm, chain)[0], plant.outputs)
     systems = {"plant": plant, **reduced_systems(read.arm, read.names)}
     if what == "loop":
-        systems = {"loop": loop_system(plant, controller), "controller": controller, **systems}
+        systems = {what: loop_system(plant, controller), "controller": controller, **systems}
     return Linear(systems, head, response_data(read.arm, arm.input, read.names, BAND, read.values), verdict)
-
-
-WRITTEN_BY = "written by tfarm"  # in the first line of every script, load.m
 
 
 def mat(task: ExportTask) -> Export:
@@ -263,7 +267,8 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
     text = ""
     with suppress(OSError):  # a file that cannot be read is not ours
         text = other.read_text("utf-8", errors="replace") if other.is_file() else ""
-    is_ours = not os.path.exists(other) or (WRITTEN_BY in text and matlab_text(path.name) in text)
+    # as in the first line of every script, load.m
+    is_ours = not os.path.exists(other) or ("written by tfarm" in text and matlab_text(path.name) in text)
     remedy = f"{other.name} in that folder is not its script and would be replaced; choose another name"
     require(is_ours, key, str(path), remedy)
     for place in reversed(contents):

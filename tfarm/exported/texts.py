@@ -17,8 +17,6 @@ from tfarm.schema import entries, text
 
 LONGEST_IDENTIFIER = 31  # characters of an identifier that C99 compares
 LONGEST_NAME = 16  # of identifiers in C, before "_step" and the like
-LONGEST_COMMENT = 200
-COMMENT_MARKS = (("\\", "|"), ("*/", "* /"), ("/*", "/ *"), ("??/", "? ?/"))  # of C, and the trigraph of a backslash
 
 
 def identifiers(names: Iterable[str], prefix: str, longest: int = LONGEST_IDENTIFIER) -> dict[str, str]:
@@ -40,9 +38,10 @@ def comment(words: str) -> str:
     """Return one line of printable ASCII that ends no comment of C and continues none."""
     plain = unicodedata.normalize("NFKD", words)
     line = "".join(c if " " <= c <= "~" else " " if c.isspace() else "?" for c in plain if not unicodedata.combining(c))
-    for mark, instead in COMMENT_MARKS:
+    # marks of C, and the trigraph of a backslash
+    for mark, instead in (("\\", "|"), ("*/", "* /"), ("/*", "/ *"), ("??/", "? ?/")):
         line = line.replace(mark, instead)
-    return line[:LONGEST_COMMENT].strip()
+    return line[:200].strip()
 
 
 def matlab_text(words: str) -> str:

@@ -11,18 +11,14 @@ and 2 are those of one and two samples before.  Where an input, or u, e, x, K or
 `largest`, a step returns the kind of the error, holds the torque of the step before and keeps its state.  Below
 `largest` no sum of the network overflows, so that a kept state refuses no later sample.
 
-exp and log of its activation:
+exp of its activation:
 
     e^x = 2^k e^r,   k = x/ln 2 to the nearest whole number,   r = (x - k h) - k l,   |r| <= ln(2)/2
 
 with ln 2 = h + l, h of so few bits that k h is exact (Cody and Waite, Software Manual for the Elementary Functions,
-1980), e^r by Taylor's polynomial, coefficients 1/n!, and 2^k as a product of powers of 1/2.
-
-    ln(1 + y) = n ln 2 + 2 artanh s,   2 artanh s = f - s (f - R),   s = f/(2 + f),   R = 2 s^2/3 + 2 s^4/5 + ...
-
-with n = 0, f = y, or from y = sqrt(2) - 1 on n = 1, f = (y - 1)/2 (the form of FDLIBM's e_log.c).  The coefficients
-are those of the two series, rounded to the precision; what the series leave out is below a tenth of half a unit in the
-last place.  The largest errors are `ULPS` of these units.
+1980), e^r by Taylor's polynomial, coefficients 1/n! rounded to the precision, and 2^k as a product of powers of 1/2.
+What the polynomial leaves out is below a tenth of half a unit in the last place; the largest error is `ULPS` of these
+units.  A tuner without a guard, whose gain has no upper end and no certificate, is not exported.
 
 Every number has one precision: literals of Python would make doubles of single-precision operands.
 """
@@ -36,6 +32,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tfarm.arm import HubFeedback
+from tfarm.arm.stages import Consumer
 from tfarm.arrays import Real, Whole
 from tfarm.dsp import Measurement
 from tfarm.errors import MISSING, ParameterError, must_be_known, require
@@ -48,21 +45,26 @@ from tfarm.loop.sampled import sampled_loop
 from tfarm.tuner.guard import sector_guard
 from tfarm.tuner.trial import TRIAL_MODES, SavedTuner, load_tuner
 
-ULPS = {"exp": 1.5, "log": 2.0}  # bounds of the errors: of e^x, x from `lowest` to 0, and of ln(1 + y), y from 0 to 1
+CONSUMER = Consumer(
+    "export c of a tuner",
+    acts=("anti-alias filter", "hub rate", "law", "hold", "delay", "hub damping", "plant"),
+    named=("encoder", "amplifier steps", "amplifier range", "DAC steps", "DAC range", "torque limit", "arithmetic"),
+    none=("reference", "volts"),
+)
+
+ULPS = 1.5  # bound of the error of e^x, x from `lowest` to 0
 LN_2 = Fraction(math.log(2.0)) + Fraction(2319046813846299558, 10**35)  # 35 digits: math.log(2) and its remainder
 
 ANGLE, RATE, MOMENT, WANTED_ANGLE, WANTED_RATE, WANTED_MOMENT, FORWARD = 0, 1, 2, 3, 4, 5, -1
 U, E, X, K, E_BEFORE, TORQUE = range(6)  # places of the state: the last sample, and e of the one before
-
-
-ZERO, ONE, TWO = np.array([0.0, 1.0, 2.0], np.float32)  # exact, and of either precision with another number
+ZERO, ONE = np.array([0.0, 1.0], np.float32)  # exact, and of either precision with another number
 
 
 class Numbers(NamedTuple):
     """Numbers of a tuner in one precision.
 
     e^x is 0 up to `lowest`; adding and subtracting `shift` rounds to a whole number; `inverse` is 1/ln 2, ln 2 = `high`
-    + `low`; series in ascending order.  Then network, servo and guard, as in `tfarm.tuner.kernel`.
+    + `low`; `taylor` in ascending order.  Then network, servo and guard, as in `tfarm.tuner.kernel`.
     """
 
     half: float
@@ -71,9 +73,7 @@ class Numbers(NamedTuple):
     inverse: float
     high: float
     low: float
-    turn: float
     taylor: Real
-    artanh: Real
     W1: Real
     w2: Real
     scales: Real
@@ -83,19 +83,19 @@ class Numbers(NamedTuple):
     hi: float
     largest: float
     is_total: bool
-    is_free: bool
 
 
 def numbers_of(saved: SavedTuner, real: Any) -> Numbers:
     """The numbers of a tuner in np.float64 or np.float32, the guard rounded inwards.
 
-    Raises ParameterError for a number beyond the range of the precision.
+    Raises ParameterError for a number beyond the range of the precision, and for a tuner without a guard.
     """
-    bits, lowest, terms, odd = (42, -708.0, 14, 10) if real is np.float64 else (16, -87.0, 9, 4)
+    remedy = "a tuner without a guard has no certificate for its gain: train one with --guard time-varying"
+    require(saved.guard is not None, "guard_kind", saved.guard_kind, remedy)
+    bits, lowest, terms = (42, -708.0, 14) if real is np.float64 else (16, -87.0, 9)
     high = Fraction(round(LN_2 * 2**bits), 2**bits)
-    shift = 1.5 * 2 ** np.finfo(real).nmant
-    scalars = 0.5, lowest, shift, 1 / math.log(2.0), high, LN_2 - high, math.sqrt(2.0) - 1
-    series = [1 / math.factorial(n) for n in range(terms)], [2 / (2 * j + 1) for j in range(1, odd + 1)]
+    scalars = 0.5, lowest, 1.5 * 2 ** np.finfo(real).nmant, 1 / math.log(2.0), high, LN_2 - high
+    taylor = np.array([1 / math.factorial(n) for n in range(terms)], dtype=real)
     limits, names = saved.gain().guard, ("W1", "w2", "scales", "K1", "Kp")
     with np.errstate(over="ignore", under="ignore"):
         W1, w2, scales, K1, Kp = rounded = [np.array(getattr(saved, name), dtype=real) for name in names]
@@ -107,10 +107,8 @@ def numbers_of(saved: SavedTuner, real: Any) -> Numbers:
         require(is_usable, name, getattr(saved, name), "beyond the range or the digits of float: export it in double")
     share = float(scales.min()) / (2 * scales.size * max(1.0, float(abs(W1).max())))
     largest = real(min(1.0, share) * float(np.finfo(real).max))
-    return Numbers._make([
-        *(real(float(each)) for each in scalars), *(np.array(each, dtype=real) for each in series),
-        W1, w2, scales, real(K1), real(Kp), lo, hi, largest, saved.signals == "total", saved.guard is None,
-    ])  # fmt: skip
+    own = taylor, W1, w2, scales, real(K1), real(Kp), lo, hi, largest, saved.signals == "total"
+    return Numbers._make([*(real(float(each)) for each in scalars), *own])
 
 
 @inlined
@@ -139,29 +137,10 @@ def exponential(x: float, of: Numbers) -> float:
 
 
 @compiled
-def logarithm(y: float, of: Numbers) -> float:
-    """ln(1 + y) for 0 <= y <= 1."""
-    is_small = y < of.turn
-    f = y if is_small else of.half * (y - ONE)
-    s = f / (TWO + f)
-    square = s * s
-    below = s * (f - square * polynomial(square, of.artanh))
-    return f - below if is_small else of.high + (f - (below - of.low))
-
-
-@compiled
 def sigmoid(z: float, of: Numbers) -> float:
     """1/(1 + e^-z)."""
     small = exponential(-z if z > ZERO else z, of)
     return (ONE if z > ZERO else small) / (ONE + small)
-
-
-@compiled
-def softplus(z: float, of: Numbers) -> float:
-    """ln(1 + e^z)."""
-    is_positive = z > ZERO
-    tail = logarithm(exponential(-z if is_positive else z, of), of)
-    return z + tail if is_positive else tail
 
 
 @inlined
@@ -173,8 +152,6 @@ def network_gain(of: Numbers, row: Real) -> float:
         for i in range(of.scales.size):
             net += of.W1[j, i] * (row[i] / of.scales[i])
         z += of.w2[j] * sigmoid(net, of)
-    if of.is_free:
-        return softplus(z, of)
     gain = of.lo + (of.hi - of.lo) * sigmoid(z, of)  # not below lo; above hi by rounding
     return of.hi if gain > of.hi else gain
 
@@ -263,7 +240,7 @@ def c_tuner(task: ExportTask) -> Export:
     tuner = ExportedTuner(saved, task.precision)
     of = tuner.numbers
     loop = sampled_loop(task.arm, HubFeedback(K1=float(of.K1), K2=1.0, Kp=float(of.Kp)), task.chain, count=TRIAL_MODES)
-    guard = None if of.is_free else sector_guard(loop, float(of.lo), float(of.hi))
+    guard = sector_guard(loop, float(of.lo), float(of.hi))
     certainty = "not certified for a gain that varies" if guard is None else guard.sentence
     is_proven = guard is not None and guard.is_proven
     remedy = f"on this arm the gain is {certainty}; --anyway exports it"
@@ -285,8 +262,7 @@ def c_tuner(task: ExportTask) -> Export:
 def written(task: ExportTask, tuner: ExportedTuner, name: str, facts: dict[str, str]) -> dict[str, bytes]:
     """The files by name; constants have the names of `Numbers`."""
     of, (real, suffix, _) = tuner.numbers, REAL[task.precision]
-    unused = {"lo", "hi"} if of.is_free else {"turn", "artanh"}
-    kept: dict[str, Any] = {key: each for key, each in of._asdict().items() if key not in unused}
+    kept: dict[str, Any] = of._asdict()
     ports = [
         Port(key, f"{meaning} [{unit or task.arm.input_unit}]", 1.0 if "rad" in unit else tuner.scale)
         for key, (_, meaning, unit) in tuner.inputs.items()

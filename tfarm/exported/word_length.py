@@ -25,7 +25,6 @@ A DAC adds half of its step to the rounding of u.  Limits of u keep every bound,
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple
 
@@ -36,25 +35,20 @@ from tfarm.arm import Law
 from tfarm.arm.blocks import StateSpace
 from tfarm.arm.law import REFERENCE, Part
 from tfarm.arrays import Real
-from tfarm.dsp.discretise import with_estimate
+from tfarm.dsp.discretise import system_matrix, with_estimate
 from tfarm.errors import ParameterError, require
+from tfarm.exact.rationals import exact_matrix
 from tfarm.loop.sampled import Sampled
 from tfarm.schema import Quantity
 
 MOST_DOUBLINGS = 40  # of the samples that a sum has: 1e12 of them
 SUMMED = 1e-9  # of a sum of squares: its last terms
 LEAST_SHARE = 1e-12  # of the largest singular value: below it a state is not controllable or not observable
-WORST_CONDITION = 1e8  # of the eigenvectors: beyond it poles are not separated
-NEXT_TO = 1.01  # times the least noise gain: for less a law keeps its states, and an integral its pole z = 1
 GIVEN, SECTIONS, BALANCED = "law as given", "second-order sections", "balanced state space"
 MOST_SUMMED, BLOCK = 20_000, 32  # samples of a sum without a bound on all others, and of one step
-MOST_LOST = 1e-3  # of a sum: lost to the roundings of its terms
-DECAYED = 1e-3  # row sum of |M^n| from which all later samples are bounded
-ON_CIRCLE, UNSEEN = 1e-9, 1e-8  # of 1: modulus of a pole on the unit circle; share of one that no output shows
-FRACTION_BITS, MOST_SHIFT = 31, 62  # of a number in fixed point, and of a sum of products
+FRACTION_BITS = 31  # of a number in fixed point
 HALF_STEP = 2.0 ** -(FRACTION_BITS + 1)  # of the range of a number: its largest rounding
-HEADROOM, LEAST_SCALE = 1 + 2.0**-10, 2.0**-100  # of the range of a state: for roundings, and the least of all
-OF_OUTPUT = 4.0  # ranges of u that a state without a bound reaches before it saturates
+LEAST_SCALE = 2.0**-100  # of the range of a state
 FIXED, OUTPUT, FEEDFORWARD = "q31", "output", "feedforward"  # fixed point; names of u and of r among ranges
 RATE, ANGLE = "hub_rate", "hub_angle"
 FLOATS: dict[str, tuple[Any, float]] = {"double": (np.float64, 2.0**-53), "float": (np.float32, 2.0**-24)}  # roundoff
@@ -93,12 +87,6 @@ class Around(NamedTuple):
     output: Real
     reads: Real
     states: slice
-
-
-def system_matrix(law: Law) -> Real:
-    """[A B; C D] of a law of all its columns, signals first."""
-    A, B, C, D = law.matrices((*law.signals, *law.wanted))
-    return np.block([[A, B], [C, D]])
 
 
 def with_system_matrix(law: Law, S: Real) -> Law:
@@ -152,7 +140,8 @@ def sections(A: Real, K: Real, W: Real) -> Real | None:
     """T of second-order sections, a pair of poles each, and first-order ones, each balanced; None of multiple poles."""
     poles, vectors = np.linalg.eig(A)
     _, modal = cdf2rdf(poles, vectors)
-    if np.linalg.cond(modal / np.linalg.norm(modal, axis=0)) > WORST_CONDITION:
+    # poles are not separated
+    if np.linalg.cond(modal / np.linalg.norm(modal, axis=0)) > 1e8:
         return None
     begins = np.flatnonzero(poles.imag >= 0)[1:]  # of a section, after the first
     blocks, duals = np.split(modal, begins, axis=1), np.split(np.linalg.inv(modal), begins)
@@ -175,21 +164,18 @@ def candidates(law: Law, loop: Sampled) -> list[tuple[NoiseGain, Real]]:
 
 
 def similar(S: Real, T: Real) -> Real:
-    """[A B; C D] of the states T^-1 x, each coefficient rounded once: whole numbers of 256 digits."""
-    n, bits = len(T), 256
-    given = S, block_diag(T, np.eye(S.shape[1] - n)), block_diag(np.linalg.inv(T), np.eye(1))
-    tables = [[[int(Fraction(x) * 2**bits) for x in row] for row in each.tolist()] for each in given]
-    own, change, back = (np.array(each, dtype=object) for each in tables)
-    for _ in range(6):  # Newton's iteration doubles the digits of an inverse
-        error = (change[: n + 1, : n + 1] @ back >> bits) - 2**bits * np.eye(n + 1, dtype=object)
-        back = back - (back @ error >> bits)
-    return np.asarray((back @ own @ change >> 2 * bits) / 2**bits, dtype=float)
+    """[A B; C D] of the states T^-1 x, each coefficient rounded once: rational numbers."""
+    change = exact_matrix(block_diag(T, np.eye(S.shape[1] - len(T))))
+    back = exact_matrix(block_diag(T, np.eye(1))).inv()
+    exact = back * exact_matrix(S) * change
+    return np.array([[int(each.p) / int(each.q) for each in row] for row in exact.tolist()])
 
 
 def least_noise(law: Law, loop: Sampled) -> tuple[Law, str, list[NoiseGain]]:
     """The law in the realisation of least noise, as given if that has hardly more; its name, and all noise gains."""
     found = candidates(law, loop)
-    best, S = min(found, key=lambda each: (each[0].gain or 0.0) * (NEXT_TO if each[0].realisation != GIVEN else 1.0))
+    # for a hundredth less a law keeps its states, and an integral its pole z = 1
+    best, S = min(found, key=lambda each: (each[0].gain or 0.0) * (1.01 if each[0].realisation != GIVEN else 1.0))
     return with_system_matrix(law, S), best.realisation, [gain for gain, _ in found]
 
 
@@ -204,7 +190,7 @@ def absolute_sum(M: Real, left: Real, right: Real, most: int = MOST_SUMMED) -> t
         step = last = np.linalg.matrix_power(M, BLOCK)
         for _ in range(most // BLOCK):
             G, S = G + abs(block).sum(axis=0), S + abs(block @ right).sum(axis=0)
-            if abs(last).sum(axis=1).max(initial=0.0) <= DECAYED:
+            if abs(last).sum(axis=1).max(initial=0.0) <= 1e-3:
                 return S + np.linalg.solve(np.eye(len(M)) - abs(last).T, G.T).T @ abs(last @ right), True
             block, last = block @ step, last @ step
     return np.nan_to_num(S, nan=np.inf), False
@@ -266,7 +252,7 @@ class Word:
         lost = math.inf  # share of a sum that the roundings of its powers in double can change
         if np.isfinite(sums[:n, :n]).all():
             lost = n * FLOATS["double"][1] * max(abs(np.linalg.eigvals(abs(A) @ sums[:n, :n])), default=0.0)
-        if lost > MOST_LOST:
+        if lost > 1e-3:
             return Bounds(np.full(n, np.inf), False, math.inf, math.inf)
         S, X = np.hsplit(sums * (1 + lost), [n])
         largest = X @ self.sizes
@@ -315,7 +301,7 @@ def observed(M: Real, left: Real) -> Real:
     """The matrix without poles on the unit circle that no row of `left` shows, such as z = 1 of a free hub angle."""
     poles, vectors = np.linalg.eig(M)
     seen = abs(left @ vectors).max(axis=0) / abs(left).max()
-    gone = (abs(poles) >= 1 - ON_CIRCLE) & (seen <= UNSEEN)
+    gone = (abs(poles) >= 1 - 1e-9) & (seen <= 1e-8)
     return M - np.real(vectors[:, gone] * poles[gone] @ np.linalg.pinv(vectors)[gone]) if gone.any() else M
 
 
@@ -373,7 +359,8 @@ def _fixed(word: Word) -> Word:
     S, n, one = system_matrix(law), law.order, np.ones(law.order)
     X, is_whole = absolute_sum(S[:n, :n], np.eye(n), S[:n, n:])
     reach = X @ E
-    of_output = np.divide(OF_OUTPUT * U, abs(S[n, :n]), out=np.full(n, np.inf), where=S[n, :n] != 0)
+    # a state without a bound saturates beyond four ranges of u
+    of_output = np.divide(4 * U, abs(S[n, :n]), out=np.full(n, np.inf), where=S[n, :n] != 0)
     if not is_whole:  # a state whose sum still grows has the scale of u
         earlier, _ = absolute_sum(S[:n, :n], np.eye(n), S[:n, n:], MOST_SUMMED // 2)
         of_output[np.isfinite(reach) & (reach <= (1 + SUMMED) * (earlier @ E))] = np.inf
@@ -386,12 +373,13 @@ def _fixed(word: Word) -> Word:
             "in s, or in z as a state space of sections in cascade"
         )
         raise ParameterError(key="law", value=law.name, remedy=remedy)
-    scale = np.exp2(np.ceil(np.log2(HEADROOM * size)))
+    # with room for roundings
+    scale = np.exp2(np.ceil(np.log2((1 + 2.0**-10) * size)))
     scaled = with_system_matrix(law, S * np.r_[scale, np.ones(R.size)] / np.r_[scale, 1.0][:, None])
     table = system_matrix(scaled) * np.r_[one, R] / np.r_[one, U][:, None]
     sums = abs(table) @ np.r_[one, E / R] + np.r_[np.zeros(n), 1.0]  # of u with the feedforward
     most = 2.0**FRACTION_BITS - len(table) - R.size
-    shifts = np.minimum(np.floor(np.log2(most / np.maximum(sums, LEAST_SCALE))).astype(int), MOST_SHIFT)
+    shifts = np.minimum(np.floor(np.log2(most / np.maximum(sums, LEAST_SCALE))).astype(int), 62)
     is_largest = abs(table) == abs(table).max(axis=1)[:, None]
     _check(table, is_largest & (shifts < 1)[:, None], "q31 at these ranges")
     whole = np.rint(np.ldexp(table, shifts[:, None])).astype(np.int64)

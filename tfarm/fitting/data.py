@@ -15,7 +15,6 @@ Values are in SI units, sigma (of the real and of the imaginary part, each) in t
 """
 
 import hashlib
-import itertools
 import math
 import os
 import re
@@ -41,9 +40,9 @@ from tfarm.schema import Column, Quantity, Table
 
 CONFIDENCE = 0.95  # of every interval of a fit: the usual one
 LEAST_SHARE = 1e-5  # of |H|: no measured response is better known than that, whatever its coherence
-SCATTER_NEIGHBOURS = 2  # neighbours on each side that a value is compared with
-SIX, NINE = singly(general, 6), singly(general, 9)  # digits of what was measured, and of the frequencies of its lines
-TYPICAL = 1.17741  # the median of |x + i y| of normal x and y of deviation 1: sqrt(2 ln 2)
+# digits of what was measured, and of the frequencies of its lines
+SIX = singly(general, 6)
+NINE = singly(general, 9)
 
 
 def require_all(key: str, values: Real, is_good: NDArray[np.bool_], remedy: str) -> None:
@@ -81,22 +80,20 @@ class Measured:
             if getattr(self, name) is not None:
                 array: NDArray[Any] = np.atleast_1d(np.asarray(getattr(self, name), dtype=kind))
                 object.__setattr__(self, name, array)
-                require(
-                    array.shape == self.omega.shape,
-                    f"{self.name} {name}",
-                    array.shape,
-                    f"one for each of the {self.omega.size} frequencies",
-                )
-        w, one, nothing = self.omega, np.ones(self.omega.size), "0 everywhere: nothing was measured"
-        sigma, coherence = (one if each is None else each for each in (self.sigma, self.coherence))
+                remedy = f"one for each of the {self.omega.size} frequencies"
+                require(array.shape == self.omega.shape, f"{self.name} {name}", array.shape, remedy)
+        w = self.omega
+        nothing = "0 everywhere: nothing was measured"
         ordered = "repeated or not in ascending order; sort the rows, and average those of one frequency"
         require_all("frequency", w, (w > 0) & np.isfinite(w), "positive and finite; leave other rows out")
         require_all("frequency", w[1:], np.diff(w) > 0, ordered)
         require_all("frequency", w, np.isfinite(self.values), "has a value that is no number; leave the row out")
         require(self.values.any(), f"{self.name} values", 0.0, nothing)
-        require_all("sigma", sigma, (sigma > 0) & np.isfinite(sigma), "a standard deviation is positive")
-        require_all("coherence", coherence, (coherence >= 0) & (coherence <= 1), "between 0 and 1")
-        require(coherence.any(), "coherence", 0.0, f"{nothing}; leave it out")
+        if (sigma := self.sigma) is not None:
+            require_all("sigma", sigma, (sigma > 0) & np.isfinite(sigma), "a standard deviation is positive")
+        if (coherence := self.coherence) is not None:
+            require_all("coherence", coherence, (coherence >= 0) & (coherence <= 1), "between 0 and 1")
+            require(coherence.any(), "coherence", 0.0, f"{nothing}; leave it out")
 
     @property
     def name(self) -> str:
@@ -189,7 +186,8 @@ def noise_of(data: Measured) -> Noise:
         return Noise(sigma=data.sigma, is_known=True, source="sigma of the file")
     if data.coherence is None:
         return Noise(sigma=_scatter(data.values), is_known=False, source="scatter of the values")
-    g, size = data.coherence, abs(data.values)
+    g = data.coherence
+    size = abs(data.values)
     with np.errstate(divide="ignore"):
         share = np.maximum(np.sqrt((1.0 - g) / (2.0 * (data.averages or 1) * g)), LEAST_SHARE)
     sigma = np.where((g == 0) | (size == 0), np.inf, size * share)  # a share of nothing is no deviation
@@ -207,23 +205,22 @@ def _scatter(values: NDArray[Any]) -> Real:
     It is LEAST_SHARE of the value at least.
     """
     size = abs(values)
-    if size.size < 2 * SCATTER_NEIGHBOURS + 1:
+    if size.size < 5:
         return np.maximum(size, LEAST_SHARE * size.max())
     # x_k less the parabola through x_(k-2), x_(k-1), x_(k+1), x_(k+2): weights -1/6, 2/3, 2/3, -1/6 of these
     weights = np.array([1 / 6, -2 / 3, 1.0, -2 / 3, 1 / 6])
-    away = np.convolve(values, weights, mode="valid") / np.sqrt((weights**2).sum())
-    inside = size[SCATTER_NEIGHBOURS:-SCATTER_NEIGHBOURS]
-    relative = abs(away[inside > 0]) / inside[inside > 0]
-    typical = float(np.median(relative)) / TYPICAL if relative.size else 1.0
-    least = max(1e-3 * float(np.median(size)), 1e-6 * float(size.max()))  # which a value of 0 is taken for
+    inside = size[2:-2]
+    away = abs(np.convolve(values, weights, mode="valid"))[inside > 0] / np.sqrt((weights**2).sum())
+    # the median of |x + i y| of normal x and y of deviation 1 is sqrt(2 ln 2)
+    typical = np.median(away / inside[inside > 0]) / 1.17741 if away.size else 1.0
+    least = max(1e-3 * np.median(size), 1e-6 * size.max())  # which a value of 0 is taken for
     return np.maximum(size, least) * max(typical, LEAST_SHARE)
 
 
 MOST_RECORD_BYTES = 256 * 1024 * 1024  # of a record; an hour of two signals at 1 kHz as text has 150 MB
 FREQUENCIES = {"hz": ("Hz", 2 * np.pi), "rad_s": ("rad/s", 1.0)}  # its unit, and rad/s in one
-VALUE_PAIRS = (("re", "im"), ("abs", "deg"), ("db", "deg"))
-KNOWN_COLUMNS = (*FREQUENCIES, "re", "im", "abs", "db", "deg", "coherence", "sigma", "averages")
-DATA_FORM = "OUTPUT/INPUT=FILE, such as tip_acceleration/hub_angle=sweep.csv"
+VALUES = ("re", "im", "abs", "db", "deg")
+KNOWN_COLUMNS = (*FREQUENCIES, *VALUES, "coherence", "sigma", "averages")
 UFF = r"\.uff|\.unv|\.uf"  # ends of its names
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"  # as it is written in a cell or an option
 
@@ -313,7 +310,7 @@ def data_of(text: str, key: str = "--data") -> Measured:
     """
     names, _, path = text.partition("=")
     output, slash, input = (part.strip() for part in names.partition("/"))
-    require(slash and path.strip(), key, text, f"write {DATA_FORM}")
+    require(slash and path.strip(), key, text, "write OUTPUT/INPUT=FILE, such as tip_acceleration/hub_angle=sweep.csv")
     return read_measured(path.strip(), output, input)
 
 
@@ -330,7 +327,9 @@ def read_measured(path: str | os.PathLike[str], output: str, input: str) -> Meas
         return _of_uff(uff[1], uff[2] or "", output, input)
     sheet = read_sheet(path, key=f"{output}/{input}")
     with naming(name):
-        omega, values, averages = _frequencies(sheet), _values(sheet), sheet.columns.get("averages")
+        omega = _frequencies(sheet)
+        values = _values(sheet)
+        averages = sheet.columns.get("averages")
         if averages is not None:
             wrong = (averages != averages[0]) | (averages < 1) | (averages != np.round(averages))
             sheet.refuse("averages", wrong, "a whole number of averages, the same in every row")
@@ -352,7 +351,8 @@ def check_signal(name: str, key: str) -> None:
 
     Its place along the link, and whether the arm has it, are checked when the arm is known.
     """
-    plain, known = name.partition("@")[0], tuple(dict.fromkeys((*OUTPUTS, *INPUTS)))
+    plain = name.partition("@")[0]
+    known = tuple(dict.fromkeys((*OUTPUTS, *INPUTS)))
     require(plain in known, key, name, did_you_mean(plain, known))
 
 
@@ -363,9 +363,11 @@ def _frequencies(sheet: Sheet) -> Real:
         require(name in KNOWN_COLUMNS, "header", name, did_you_mean(name.lower(), KNOWN_COLUMNS))
     found = [name for name in FREQUENCIES if name in sheet.columns]
     require(len(found) == 1, "header", [*sheet.columns], "one column of frequencies: hz or rad_s")
-    name, (unit, scale) = found[0], FREQUENCIES[found[0]]
-    own, frequency = sheet.units[name], sheet.columns[name]
+    (name,) = found
+    unit, scale = FREQUENCIES[name]
+    own = sheet.units[name]
     require(own.lower() in ("", unit.lower()), f"unit of {name}", own, f"{name} is in {unit}")
+    frequency = sheet.columns[name]
     sheet.refuse(name, ~(frequency > 0), "a frequency is positive; leave the row out")
     back = np.r_[False, np.diff(frequency) <= 0]
     again = frequency[back.argmax()] in frequency[: back.argmax()]
@@ -375,21 +377,18 @@ def _frequencies(sheet: Sheet) -> Real:
 
 def _values(sheet: Sheet) -> Complex:
     """The complex response, of whichever two columns there are."""
-    pair = tuple(name for name in KNOWN_COLUMNS if name in sheet.columns and name in itertools.chain(*VALUE_PAIRS))
-    require(
-        pair in VALUE_PAIRS,
-        "header",
-        [*sheet.columns],
-        "one pair of columns for the value: re, im or abs, deg or db, deg; leave others out",
-    )
+    pair = tuple(name for name in VALUES if name in sheet.columns)
+    remedy = "one pair of columns for the value: re, im or abs, deg or db, deg; leave others out"
+    require(pair in (("re", "im"), ("abs", "deg"), ("db", "deg")), "header", [*sheet.columns], remedy)
     first, second = (sheet.columns[name] for name in pair)
-    if pair == ("re", "im"):
-        return np.asarray(first + 1j * second)
-    if pair == ("abs", "deg"):
+    if "re" in pair:
+        return first + 1j * second
+    if "abs" in pair:
         sheet.refuse("abs", first < 0, "a magnitude is not negative; is it db?")
-    with np.errstate(over="ignore"):
-        size = first if pair == ("abs", "deg") else 10.0 ** (first / 20)
-    return np.asarray(size * np.exp(1j * np.radians(second)))
+    else:
+        with np.errstate(over="ignore"):
+            first = 10.0 ** (first / 20)
+    return np.asarray(first * np.exp(1j * np.radians(second)))
 
 
 # ------------------------------------------------------------ UFF
@@ -397,28 +396,20 @@ def _of_uff(path: str, number: str, output: str, input: str) -> Measured:
     """The response of a UFF file: the only one, or that of a number from 1 in their order there."""
     key = f"{output}/{input}"
     data = read_file(path, MOST_RECORD_BYTES, key=key, what="a .uff file")
-    require(
-        find_spec("pyuff"),
-        "package",
-        "pyuff",
-        "is not installed, and reads UFF files: pip install 'tfarm[uff]', or export the response as CSV",
-    )
+    remedy = "is not installed, and reads UFF files: pip install 'tfarm[uff]', or export the response as CSV"
+    require(find_spec("pyuff"), "package", "pyuff", remedy)
     found = read_arrays("uff", path, key=key, remedy="no UFF file that can be read")
     with naming(path):
         count = len(found) // 2  # frequencies and values of each
         require(count, "data set", 58, "the file holds no frequency response function (type 58, function 4)")
-        require(
-            number or count == 1,
-            "data set",
-            MISSING,
-            f"the file holds {count} responses; choose one by its number, as file.uff#2",
-        )
+        remedy = f"the file holds {count} responses; choose one by its number, as file.uff#2"
+        require(number or count == 1, "data set", MISSING, remedy)
         place = int(number or 1)
         require(1 <= place <= count, "data set", place, f"from 1 to {count}, the responses of the file")
         omega = 2 * np.pi * np.asarray(found[f"x{place - 1}"], dtype=float)
         values: NDArray[Any] = np.asarray(found[f"data{place - 1}"], dtype=complex)
         kept = slice(int(omega.size > 0 and omega[0] == 0), None)  # the line at 0 Hz that spectra begin with
-        digest, source = hashlib.sha256(data).hexdigest(), f"{path}#{number}" if number else path
         return Measured(
-            output=output, input=input, omega=omega[kept], values=values[kept], source=source, digest=digest
-        )
+            output=output, input=input, omega=omega[kept], values=values[kept], digest=hashlib.sha256(data).hexdigest(),
+            source=f"{path}#{number}" if number else path,
+        )  # fmt: skip

@@ -16,7 +16,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from scipy.special import gammaincinv
@@ -50,12 +50,9 @@ from .solve import (
 )
 
 LONGEST_NAME = 200  # characters of a file in an assumption
-LONGEST_SYMBOL = 3  # characters at the end of a label: I_h, Kt
-MOST_RESTARTS = 4  # times that a profile may find a lower sum of squares than the search did
 
 
-@dataclass(frozen=True, slots=True)
-class FittedResponse:
+class FittedResponse(NamedTuple):
     """A response of the fit."""
 
     name: Annotated[str, Quantity(help="output/input as on the command line")]
@@ -289,7 +286,8 @@ def fit(
     """
     subject = _problem(arm, data, free, start, bounds, priors, rings)
     found = best_solution(subject)
-    for _ in range(MOST_RESTARTS):
+    # a profile may find a lower sum of squares than the search did, a few times
+    for _ in range(4):
         try:
             fitted, unknown = confidence_intervals(found, profile=profile, progress=progress)
             break
@@ -331,7 +329,8 @@ def is_named(key: str, value: float, text: str) -> bool:
     """Whether a text names a number of an arm: by its label, by its symbol (I_h =), or by its value and unit."""
     of = file_key(key)
     *words, last = of.label.split()
-    symbol = last if len(last) <= LONGEST_SYMBOL else ""
+    # a symbol ends a label: I_h, Kt
+    symbol = last if len(last) <= 3 else ""
     label = " ".join(words) if symbol else of.label
     patterns = [rf"(?i:\b{re.escape(label)}\b)", *([rf"(?<!\d )\b{symbol}(?=,| and | of | =)"] if symbol else [])]
     values = re.findall(rf"({NUMBER}) {re.escape(of.unit)}(?![\w^/]| m\^)", text) if of.unit else []
@@ -359,11 +358,7 @@ def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: An
 
 
 ARMS = 40  # that a report draws
-DRAWS_KEPT = 0.999  # of the draws of a normal distribution: one whose sum of squares is larger is none of them
-DRAWS_EACH = 10  # draws for each arm wanted, at most
-FEWEST_RECORDS = 3  # records of one response, for a scatter
 DRAWS = 40  # of records
-WIDER = 1.5  # times the deviation by the noise: a wider scatter is named
 
 
 def arms_drawn(fit: Fit, count: int) -> tuple[Arm, ...]:
@@ -372,24 +367,25 @@ def arms_drawn(fit: Fit, count: int) -> tuple[Arm, ...]:
     Numbers of sensors follow by the linearised residuals.  Raises ConvergenceError where the curve misses the
     data, or the sum of squares is so far from a parabola that draws of one are none of it.
     """
-    own, J = fit.problem.of_the_arm, fit.jacobian
+    own = fit.problem.of_the_arm
+    J = fit.jacobian
     of_sensors = -np.linalg.pinv(J[:, len(own) :]) @ J[:, : len(own)]
     if fit.misses:
         raise ConvergenceError("the fitted curve misses the data", [], 0)
-    normal = np.random.default_rng(FIT_SEED).standard_normal((DRAWS_EACH * count, len(own)))
-    most = fit.chi_squared + 2.0 * float(gammaincinv(len(own) / 2, DRAWS_KEPT))  # the quantile of chi squared
+    each_time = 10  # draws for each arm wanted, at most
+    normal = np.random.default_rng(FIT_SEED).standard_normal((each_time * count, len(own)))
+    # of draws of a normal distribution: one whose sum of squares is larger is none of them
+    most = fit.chi_squared + 2.0 * gammaincinv(len(own) / 2, 0.999)  # the quantile of chi squared
     kept: list[Arm] = []
     for values in fit.posterior.with_all_determined.draws({}, normal).tolist():
         x = np.array([each.coordinate(value) for each, value in zip(own, values, strict=True)]) - fit.point[: len(own)]
         point = fit.problem.inside(fit.point + np.r_[x, of_sensors @ x])
-        kept += [fit.problem.arm(point)] * (sum_of_squares(fit.problem, point) <= most)
+        if sum_of_squares(fit.problem, point) <= most:
+            kept.append(fit.problem.arm(point))
         if len(kept) == count:
             return tuple(kept)
-    raise ConvergenceError(
-        f"only {len(kept)} of {DRAWS_EACH * count} arms drawn explain the data: their likelihood is not normal",
-        kept,
-        len(kept),
-    )
+    words = f"only {len(kept)} of {len(normal)} arms drawn explain the data: their likelihood is not normal"
+    raise ConvergenceError(words, kept, len(kept))
 
 
 @dataclass(frozen=True)
@@ -425,7 +421,8 @@ class Repeats:
         str, Quantity("finding", key="in_words", help="numbers whose scatter exceeds what the noise explains")
     ]:
         """The numbers whose scatter is larger than the noise explains."""
-        larger = [f"{key} {times:.3g} times" for key, times in self.times_wider.items() if times > WIDER]
+        # a scatter that is 1.5 times that by the noise is named
+        larger = [f"{key} {times:.3g} times" for key, times in self.times_wider.items() if times > 1.5]
         return f"larger than the noise explains: {listed(larger)}" if larger else "as the noise explains"
 
 
@@ -441,13 +438,14 @@ def repeats(fit: Fit, draws: int = DRAWS) -> Repeats | None:
     names = [each.data.label for each in own.responses]
     most = max(names, key=names.count, default="")
     records = [n for n, name in enumerate(names) if name == most]
-    if len(records) < FEWEST_RECORDS:
+    if len(records) < 3:
         return None
     others = [n for n, name in enumerate(names) if name != most]
     identified = {n: each for n, each in enumerate(fit.parameters) if each.identified}
     # a key with a colon is of one record's sensor, which others do not know
     known = {n: each for n, each in identified.items() if each.deviation and ":" not in each.key}
-    keys, start = [each.key for each in known.values()], fit.point
+    keys = [each.key for each in known.values()]
+    start = fit.point
 
     def numbers(chosen: Sequence[int]) -> Real:
         some = replace(own, responses=tuple(own.responses[n] for n in (*chosen, *others)))

@@ -22,9 +22,6 @@ from tfarm.schema import Quantity
 from .model import SENSOR_DELAY, SENSOR_GAIN, Problem, Response, parameters
 from .solve import EXCLUDED, Solution, best_solution, is_explained
 
-TOLERATED = math.log(1.2)  # of ln(computed/measured): a smaller difference is no miss
-AT_BOUND = 0.01  # of a coordinate: a search that ends so near to a bound has ended there
-
 
 @dataclass(frozen=True, kw_only=True)
 @record
@@ -74,12 +71,14 @@ def misses_of(found: Solution) -> tuple[Miss, ...]:
 def _miss(one: Response, computed: Complex) -> Miss | None:
     """Return how one response is missed, None where it is not."""
     kept = np.isfinite(one.noise.sigma) & (one.data.values != 0)
-    omega, ratio = one.data.omega[kept], computed[kept] / one.data.values[kept]
+    omega = one.data.omega[kept]
+    ratio = computed[kept] / one.data.values[kept]
     if omega.size < 2:
         return None
     away = np.log(ratio)
     step = np.log(ratio[1:] / ratio[:-1])
-    limit = max(TOLERATED, 3 * float(np.median(abs(step))))
+    # a difference of less than a fifth is no miss
+    limit = max(math.log(1.2), 3 * np.median(abs(step)))
     # pairs of lines that both miss, the second on the branch of the first: a sign alone is +180 or -180 degrees
     both = np.flatnonzero((abs(away[:-1]) > limit) & (abs(away[:-1] + step) > limit))
     alike = both[abs(step[both]) < abs(away[both]) / 2]
@@ -138,8 +137,10 @@ def _tries(found: Solution) -> Iterator[tuple[str, Solution]]:
 
 def _beyond_bounds(found: Solution) -> Iterator[tuple[str, Solution]]:
     """Yield the solution without the bounds of those of the arm's numbers that were given some or ended at one."""
-    problem, (low, high) = found.problem, found.problem.bounds
-    is_at_end = np.minimum(found.point - low, high - found.point) < AT_BOUND
+    problem = found.problem
+    (low, high) = found.problem.bounds
+    # of a coordinate: a search that ends so near to a bound has ended there
+    is_at_end = np.minimum(found.point - low, high - found.point) < 0.01
     _, unbound = parameters(problem.arm(found.point), problem.family.keys, start={}, bounds={}, priors={})
     numbers = [
         replace(free, prior=each.prior) if at_end or (each.low, each.high) != (free.low, free.high) else each

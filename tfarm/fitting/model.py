@@ -16,11 +16,12 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import KW_ONLY, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple, cast
 
 import numpy as np
+from scipy.optimize import newton
 
 from tfarm.arm import INPUTS, Arm, Input
 from tfarm.arm.writing import KeyedArms
@@ -34,12 +35,8 @@ from tfarm.spectrum.table import first_frequency
 
 from .data import NUMBER, Measured, Noise, in_parts
 
-SIGNED = ("offset",)  # numbers of an arm that may be negative
-UPPER_ENDS = {"gear_efficiency": 1.0, "poissons_ratio": 0.5}  # and those that end somewhere
 FARTHEST_FROM_START = 1e4  # times or a part of it: beyond, a search has lost its way, or the data say nothing
-AT_REACH = 1e-6  # of ln p: a search that comes so near to that has ended there
 COORDINATE_STEP = 2.0**-20  # of a derivative by differences: the rounding of a float over it is 1e-10, its square below
-NUDGE = 1e-6  # of s: for a slope along it by a difference, which is right to about as much
 
 
 @dataclass(frozen=True)
@@ -47,43 +44,42 @@ NUDGE = 1e-6  # of s: for a slope along it by a difference, which is right to ab
 class Parameter:
     """A free number: its key, where the search starts, its bounds, all in SI units, and a prior (mean, deviation).
 
-    With `by_logarithm` the search is for ln(value/start), otherwise for (value - start)/size.
+    The search is for (value - start)/size, or where the size is 0 for ln(value/start).
     """
 
     key: str
     start: float
     low: float
     high: float
-    _: KW_ONLY
-    by_logarithm: bool
-    size: float
+    size: float = 0.0
     prior: tuple[float, float] | None = None
 
     def value(self, coordinate: float) -> float:
         """The number at a coordinate of the search, 0 at the start."""
-        if self.by_logarithm:
-            return self.start * math.exp(coordinate)
-        return self.start + self.size * coordinate
+        return self.start + self.size * coordinate if self.size else self.start * math.exp(coordinate)
 
     def coordinate(self, value: float) -> float:
         """The coordinate of a number."""
-        if self.by_logarithm:
-            return math.log(value / self.start)
-        return (value - self.start) / self.size
+        return (value - self.start) / self.size if self.size else math.log(value / self.start)
+
+    def per_coordinate(self, value: float) -> float:
+        """The change of a number by a coordinate."""
+        return self.size or abs(value)
 
     @property
     def bounds(self) -> tuple[float, float]:
         """Of the coordinate."""
-        if not self.by_logarithm:
+        if self.size:
             return self.coordinate(self.low), self.coordinate(self.high)
         shares = np.clip([self.low / self.start, self.high / self.start], 1 / FARTHEST_FROM_START, FARTHEST_FROM_START)
         return math.log(shares.min()), math.log(shares.max())
 
     def ends(self, coordinates: Sequence[float]) -> list[float | None]:
         """The numbers at the ends of an interval, the lower first; None where only the reach of the search ended it."""
-        farthest = math.log(FARTHEST_FROM_START) - AT_REACH if self.by_logarithm else math.inf
+        # a search that comes nearer to its reach has ended there
+        farthest = math.inf if self.size else math.log(FARTHEST_FROM_START) - 1e-6
         found = [self.value(each) if abs(each) < farthest else None for each in coordinates]
-        return found if self.start > 0 or not self.by_logarithm else found[::-1]
+        return found if self.start > 0 or self.size else found[::-1]
 
 
 def parameters(
@@ -102,12 +98,16 @@ def parameters(
     for known, what in ((start, "start"), (bounds, "bounds"), (priors, "prior")):
         for key in known:
             require(key in keys, what, key, f"is not free; {did_you_mean(key, keys)}")
-    family, found = KeyedArms(arm, keys), []
+    family = KeyedArms(arm, keys)
+    found = []
     for key in family.keys:
-        name, own, prior = key.split(".")[-1], family.value(key), priors.get(key)
+        name = key.split(".")[-1]
+        own = family.value(key)
+        prior = priors.get(key)
         usual = own if key in start or (own and math.isfinite(own)) else _typical(arm, key, own)
-        at, is_signed = start.get(key, usual), name in SIGNED
-        most = arm.length if name == "x" else UPPER_ENDS.get(name, math.inf)
+        at = start.get(key, usual)
+        is_signed = name == "offset"
+        most = {"x": arm.length, "gear_efficiency": 1.0, "poissons_ratio": 0.5}.get(name, math.inf)
         low, high = bounds.get(key, (-math.inf if is_signed else 0.0, most))
         require(
             low <= at <= high and low < high,
@@ -118,24 +118,18 @@ def parameters(
         require(is_signed or at > 0, f"start of {key}", at, "a positive number in SI units")
         is_prior = prior is None or (math.isfinite(prior[0]) and prior[1] > 0)
         require(is_prior, f"prior of {key}", prior, "mean,deviation with a deviation above 0")
-        found.append(
-            Parameter(
-                key,
-                at,
-                low,
-                high,
-                by_logarithm=not is_signed,
-                size=max(abs(at), 0.1 * arm.length) if is_signed else at,
-                prior=prior,
-            )
-        )
+        size = max(abs(at), 0.1 * arm.length) if is_signed else 0.0
+        found.append(Parameter(key, at, low, high, size, prior))
     return family, tuple(found)
 
 
 def _typical(arm: Arm, key: str, own: float) -> float:
     """A hundredth of a typical value, for a number that is 0, or a hundred times it for one that is infinite."""
-    w1, inertia = first_frequency(arm), arm.turned_inertia if math.isfinite(arm.turned_inertia) else arm.carried_inertia
-    EI, length, name = arm.link.EI, arm.length, key.split(".")[-1]
+    w1 = first_frequency(arm)
+    inertia = arm.turned_inertia if math.isfinite(arm.turned_inertia) else arm.carried_inertia
+    EI = arm.link.EI
+    length = arm.length
+    name = key.split(".")[-1]
     of_the_arm = {
         "mass": arm.own_mass,
         "inertia": inertia,
@@ -151,19 +145,6 @@ def _typical(arm: Arm, key: str, own: float) -> float:
     }
     require(name in of_the_arm, f"start of {key}", own, "give the value where the search starts")
     return (0.01 if own == 0 else 100) * of_the_arm[name]
-
-
-FREQUENCY_KNOWN = 2e-3  # of itself: its deviation in a decay by default
-RATIO_KNOWN = 0.1  # of itself, likewise
-EIGENVALUE_STEPS = 30  # of Newton's method, at most: from an undamped frequency on a few do
-EIGENVALUE_FIRM = 1e-12  # of an eigenvalue: a step that is less ends it
-MOST_NUMBER = 100  # number of a mode
-MODE_FORM = "N=FREQUENCY,RATIO such as 1=2.52hz,0.006 (hz or rad_s; a deviation after ~: 2.52hz~0.01)"
-MODE_PATTERN = re.compile(
-    rf"\s*(\d{{1,3}})\s*=\s*({NUMBER})\s*(?:hz|rad_s)\s*(?:~\s*({NUMBER}))?\s*"
-    rf"(?:,\s*({NUMBER})\s*(?:~\s*({NUMBER}))?)?\s*",
-    re.IGNORECASE | re.ASCII,
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,21 +163,32 @@ class RingMode:
 
 
 def mode_of(text: str) -> RingMode:
-    """The decay that the command line means by "1=2.52hz,0.006".  Raises ParameterError for another form."""
-    found = MODE_PATTERN.fullmatch(text)
-    number, w, dw, ratio, spread = found.groups() if found else ("0",) * 5
+    """The decay that the command line means by "1=2.52hz,0.006".  Raises ParameterError for another form.
+
+    The deviation is by default 0.2 % of a frequency, and 10 % of a ratio.
+    """
+    some = rf"({NUMBER})\s*"
+    spread = rf"(?:~\s*{some})?"
+    form = rf"\s*(\d{{1,3}})\s*=\s*{some}(?:hz|rad_s)\s*{spread}(?:,\s*{some}{spread})?"
+    found = re.fullmatch(form, text, re.IGNORECASE | re.ASCII)
+    number, *numbers = found.groups("nan") if found else ("0",) * 5
+    w, dw, ratio, dratio = map(float, numbers)
     unit = 2 * math.pi if "hz" in text.lower() else 1.0
-    frequency = float(w) * unit
     mode = RingMode(
         number=int(number),
-        frequency=frequency,
-        frequency_deviation=float(dw) * unit if dw else FREQUENCY_KNOWN * frequency,
-        ratio=float(ratio) if ratio else None,
-        ratio_deviation=float(spread) if spread else RATIO_KNOWN * float(ratio or math.inf),
+        frequency=w * unit,
+        frequency_deviation=2e-3 * w * unit if math.isnan(dw) else dw * unit,
+        ratio=None if math.isnan(ratio) else ratio,
+        ratio_deviation=0.1 * ratio if math.isnan(dratio) else dratio,
     )
     is_ratio = mode.ratio is None or (0 < mode.ratio < 1 and mode.ratio_deviation > 0)
     is_frequency = mode.frequency_deviation > 0 and 0 < mode.frequency * mode.frequency_deviation < math.inf
-    require(1 <= mode.number <= MOST_NUMBER and is_frequency and is_ratio, "--mode", text, f"write {MODE_FORM}")
+    require(
+        1 <= mode.number <= 100 and is_frequency and is_ratio,
+        "--mode",
+        text,
+        "write N=FREQUENCY,RATIO such as 1=2.52hz,0.006 (hz or rad_s; a deviation after ~: 2.52hz~0.01)",
+    )
     return mode
 
 
@@ -211,26 +203,30 @@ def ring_residuals(arm: Arm, rings: Sequence[RingMode]) -> Real:
 
 
 def eigenvalue(arm: Arm, number: int) -> complex:
-    """The eigenvalue s [1/s] of a flexible mode, by Newton's method on the drive.
+    """The eigenvalue s [1/s] of a flexible mode, by the secant method on the drive.
 
     It starts from the undamped natural frequency; ConvergenceError where a damped mode does not ring near that.
     """
-    s, read = 1j * float(modes(arm, number).natural_frequency[-1]), Signals(arm, ("hub_angle",))
-    for _ in range(EIGENVALUE_STEPS):
-        drive, _, scale = read.parts(np.array([s, s * (1 + NUDGE)]))
-        value, nearby = drive * np.exp(scale - scale[0])
-        step = complex(value / (nearby - value) * s * NUDGE)
-        s -= step
-        if abs(step) < EIGENVALUE_FIRM * abs(s) or not abs(step) < abs(s):
-            break
-    if not (abs(step) < 1e-8 * abs(s) and s.imag > 0):
-        raise ConvergenceError(f"mode {number} of {arm.name} does not ring near its undamped frequency", s, abs(step))
-    return s
+    read = Signals(arm, ("hub_angle",))
+    start = 1j * modes(arm, number).natural_frequency[-1]
+    reference = read.parts(np.array([start]))[2][0]
+
+    def drive(s: complex) -> complex:
+        (value,), _, (scale,) = read.parts(np.array([s]))
+        return complex(value * np.exp(scale - reference))
+
+    s, of = cast("Any", newton)(
+        drive, start, x1=start * (1 + 1e-6), tol=1e-12 * abs(start), maxiter=30, full_output=True, disp=False
+    )
+    if not (of.converged and s.imag > 0):
+        words = f"mode {number} of {arm.name} does not ring near its undamped frequency"
+        raise ConvergenceError(words, s, abs(drive(s)))
+    return complex(s)
 
 
-SENSOR_GAIN, SENSOR_DELAY = "gain", "delay"  # of a sensor, as `Response` has them: free like the arm's numbers
-WALL = 10.0  # times the largest residual of the first point: so high that no search goes on there
-INSIDE_BOUNDS = 1e-9  # of a coordinate: so far inside its bounds a search begins
+# of a sensor, as `Response` has them: free like the arm's numbers
+SENSOR_GAIN = "gain"
+SENSOR_DELAY = "delay"
 
 
 @dataclass(frozen=True)
@@ -245,12 +241,17 @@ class Response:
     @property
     def size(self) -> int:
         """How many real residuals it has: two a frequency at which something was measured."""
-        return 2 * int(np.isfinite(self.noise.sigma).sum())
+        return 2 * np.isfinite(self.noise.sigma).sum()
 
     def over_deviation(self, values: Complex) -> Real:
         """Values at its frequencies over their deviations: real parts, then imaginary ones, of what was measured."""
         kept = np.isfinite(self.noise.sigma)
         return in_parts(values[kept] / self.noise.sigma[kept])
+
+    def at(self, omega: Real, values: Complex, sigma: Real) -> Response:
+        """The response at other frequencies."""
+        data = replace(self.data, omega=omega, values=values, sigma=None, coherence=None)
+        return replace(self, data=data, noise=replace(self.noise, sigma=sigma))
 
 
 class Fraction(NamedTuple):
@@ -286,10 +287,10 @@ class Problem:
         """Where the search starts."""
         return self.inside(np.zeros(len(self.parameters)))
 
-    def inside(self, point: Real) -> Real:
-        """The point, or the nearest one by `INSIDE_BOUNDS` inside the bounds."""
+    def inside(self, point: Real, by: float = 1e-9) -> Real:
+        """The point, or the nearest one by that inside the bounds."""
         low, high = self.bounds
-        return np.clip(point, low + INSIDE_BOUNDS, high - INSIDE_BOUNDS)
+        return np.clip(point, low + by, high - by)
 
     def arm(self, point: Real) -> Arm:
         """The arm at a point."""
@@ -301,68 +302,55 @@ class Problem:
 
     def computed(self, point: Real) -> list[Complex]:
         """Each response at its own frequencies."""
-        return [np.asarray(each.N / each.D) for each in self.fractions(point)]
+        return [(each.N / each.D) for each in self.fractions(point)]
 
     def fractions(self, point: Real, share: float = 0.0) -> list[Fraction]:
         """Each response at s = (i + share) w; those of one grid of frequencies and one drive are computed together."""
-        arm, found = self.arm(point), {}
-        grids: dict[tuple[bytes, str], list[int]] = {}
+        arm = self.arm(point)
+        found: dict[int, Fraction] = {}
+        grids: dict[tuple[bytes, str], dict[int, Measured]] = {}
         for n, each in enumerate(self.responses):
-            driven: str = arm.input  # where the response is over a signal
-            if each.data.input in INPUTS and each.data.input not in OUTPUTS:
-                driven = each.data.input
-            grids.setdefault((each.data.omega.tobytes(), driven), []).append(n)
-        for (_, driven), numbers in grids.items():
-            pairs = [(self.responses[n].data.output, self.responses[n].data.input) for n in numbers]
-            names = tuple(dict.fromkeys(name for pair in pairs for name in pair if name != driven))
-            s = (1j + share) * self.responses[numbers[0]].data.omega
+            # the input of the response, or where that is a signal the arm's own
+            is_driven = each.data.input in INPUTS and each.data.input not in OUTPUTS
+            grid = each.data.omega.tobytes(), each.data.input if is_driven else arm.input
+            grids.setdefault(grid, {})[n] = each.data
+        for (_, driven), own in grids.items():
+            names = tuple(
+                dict.fromkeys(name for of in own.values() for name in (of.output, of.input) if name != driven)
+            )
             under_drive = arm if arm.input == driven else replace(arm, input=cast("Input", driven))
+            s = (1j + share) * next(iter(own.values())).omega
             drive, numerators, scale = Signals(under_drive, names).parts(s)
             known = dict(zip(names, numerators, strict=True)) | {driven: drive}
-            for n, (output, input) in zip(numbers, pairs, strict=True):
-                found[n] = Fraction(known[output] * self._sensor(n, point), known[input], np.asarray(scale.real))
+            for n, of in own.items():
+                found[n] = Fraction(known[of.output] * self._sensor(n, point), known[of.input], np.asarray(scale.real))
         return [found[n] for n in range(len(self.responses))]
 
     def _sensor(self, n: int, point: Real) -> Complex:
         """Gain and delay of the sensor of a response, at its frequencies."""
         one = self.responses[n]
-        gain, delay = (
-            usual if place is None else self.parameters[place].value(float(point[place]))
-            for place, usual in ((one.gain, 1.0), (one.delay, 0.0))
-        )
-        return np.asarray(gain * np.exp(-1j * delay * one.data.omega))
+        gain = 1.0 if one.gain is None else self.parameters[one.gain].value(point[one.gain])
+        delay = 0.0 if one.delay is None else self.parameters[one.delay].value(point[one.delay])
+        return gain * np.exp(-1j * delay * one.data.omega)
 
     def with_sensors(self, free: Sequence[str]) -> Problem:
         """The problem with "gain" or "delay" of each sensor free, too."""
-        own, responses = [*self.parameters], []
+        own = [*self.parameters]
+        responses = []
         for n, each in enumerate(self.responses, start=1):
             places: dict[str, Any] = {}
             which = "" if len(self.responses) == 1 else f":{n}"
-            sensors = (
-                Parameter(SENSOR_GAIN, 1.0, -np.inf, np.inf, by_logarithm=True, size=1.0),
-                Parameter(SENSOR_DELAY, 0.0, -np.inf, np.inf, by_logarithm=False, size=1.0 / each.data.band[1]),
-            )
-            for sensor in (one for one in sensors if one.key in free and getattr(each, one.key) is None):
-                places[sensor.key] = len(own)
-                own.append(replace(sensor, key=sensor.key + which))
+            for key, start, size in ((SENSOR_GAIN, 1.0, 0.0), (SENSOR_DELAY, 0.0, 1.0 / each.data.band[1])):
+                if key in free and getattr(each, key) is None:
+                    places[key] = len(own)
+                    own.append(Parameter(key + which, start, -np.inf, np.inf, size))
             responses.append(replace(each, **places))
         return replace(self, parameters=tuple(own), responses=tuple(responses))
 
     def at(self, number: int, omega: Real) -> Problem:
         """The problem of one of its responses alone, at other frequencies: for curves."""
-        one = self.responses[number]
-        return replace(
-            self,
-            responses=(
-                replace(
-                    one,
-                    data=replace(
-                        one.data, omega=omega, values=np.ones(omega.size, complex), sigma=None, coherence=None
-                    ),
-                ),
-            ),
-            rings=(),
-        )
+        one = self.responses[number].at(omega, np.ones(omega.size, complex), np.ones(omega.size))
+        return replace(self, responses=(one,), rings=())
 
     # ------------------------------------------------------------ residuals
 
@@ -379,7 +367,8 @@ class Problem:
 
     def _slope(self, here: tuple[list[Fraction], Real], point: Real, step: Real) -> Real:
         """The derivatives along one coordinate; from the arm itself where there is none on one side."""
-        sides, width = [here, here], 0.0
+        sides = [here, here]
+        width = 0.0
         for side, to in enumerate((point - step, point + step)):
             with suppress(ParameterError):
                 sides[side] = self._terms(to)
@@ -387,8 +376,10 @@ class Problem:
         (below, low), (above, high) = sides
         slopes = []
         for (N, D, scale), down, up, one in zip(here[0], below, above, self.responses, strict=True):
-            lower, upper = np.exp(down.scale - scale), np.exp(up.scale - scale)
-            dN, dD = up.N * upper - down.N * lower, up.D * upper - down.D * lower
+            lower = np.exp(down.scale - scale)
+            upper = np.exp(up.scale - scale)
+            dN = up.N * upper - down.N * lower
+            dD = up.D * upper - down.D * lower
             slopes.append(one.over_deviation((dN - N / D * dD) / D))
         return np.concatenate([*slopes, high - low]) / max(width, COORDINATE_STEP)
 
@@ -400,9 +391,9 @@ class Problem:
 
 
 def walled(residuals: Callable[[Real], Real], first: Real) -> Callable[[Real], Real]:
-    """The residuals, and where there is no arm (a mass beyond the tip) a wall: `WALL` times the first's largest."""
+    """The residuals, and where there is no arm (a mass beyond the tip) a wall, so high that no search goes on there."""
     near = residuals(first)
-    wall = np.full(near.size, WALL * max(float(abs(near).max(initial=0.0)), 1.0))
+    wall = np.full(near.size, 10.0 * max(abs(near).max(initial=0.0), 1.0))
 
     def found(x: Real) -> Real:
         try:

@@ -43,8 +43,6 @@ from .resonances import (
     resonance_at,
 )
 
-SOMEWHERE = 0.37 + 0.73j  # 1/s: a response that is not 0 throughout is not 0 there
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 @record
@@ -73,7 +71,7 @@ class RatioRoots:
 def _upper(roots: Complex) -> Complex:
     """Those with Im s >= 0 but s = 0, ascending in size: the others are their mirror images."""
     upper = roots[(roots.imag >= 0) & (roots != 0)]
-    return np.asarray(upper[np.argsort(abs(upper), kind="stable")])
+    return upper[np.argsort(abs(upper), kind="stable")]
 
 
 @dataclass(frozen=True)
@@ -89,7 +87,8 @@ class Ratio:
         check_signal(self.input, "input")
         require(self.output != self.input, "input", self.input, "a signal over itself is 1")
         for key, name, each in (("output", self.output, self.above), ("input", self.input, self.below)):
-            is_held = each is not None and each(SOMEWHERE) == 0
+            # a response that is not 0 throughout is not 0 at this s [1/s]
+            is_held = each is not None and each(0.37 + 0.73j) == 0
             require(not is_held, key, name, "does not move on this arm: it is held")
         is_idle = self.is_driven and self.driven.is_locked and self.input != "hub_angle"
         require(
@@ -161,16 +160,13 @@ class Ratio:
 def _transfer(arm: Arm, name: str) -> TransferFunction:
     """To a signal with its place after an @."""
     signals = Signals(arm, (name,))
-    wanted, place = signals.outputs[0], signals.places[0]
+    wanted = signals.outputs[0]
+    place = signals.places[0]
     return transfer(arm, wanted, x=place * arm.length if wanted.place == "x" else None)
 
 
 SAME_MODE = 0.1  # of its frequency: how near a pole of a damped arm is to that mode of the arm without damping
 LARGEST_FACTOR = 3.0  # the factor on a number beyond which it is no explanation
-LEAST_SENSITIVITY = 1e-3  # d ln w/d ln p below which a number does not move a mode
-PEAK_REACH = 0.1  # of ln w, and the damping ratio: a peak farther from all of the arm's is not one of them
-BROADER = 2.0  # times the damping ratio: the largest distance of a broad peak from its pole
-SAME_PEAK = 0.02  # of ln w: peaks of two responses nearer than that are one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,10 +181,10 @@ class Counterpart:
     """
 
     pole: complex
-    peak: float | None
-    measured: Resonance | None
-    frequency_ratio: float | None
-    level: complex | None
+    peak: float | None = None
+    measured: Resonance | None = None
+    frequency_ratio: float | None = None
+    level: complex | None = None
     mode: Annotated[
         int | None,
         Quantity("mode", help="number of the arm's mode; none where the poles of the response are no modes of the arm"),
@@ -197,15 +193,15 @@ class Counterpart:
     frequency: Annotated[
         float | None,
         Quantity("measured", "Hz", 7, "abs(s) of the pole fitted to the peak, or the peak itself", "measured_hz"),
-    ]
+    ] = None
     frequency_std: Annotated[
         float | None,
         Quantity("deviation", "Hz", 2, key="measured_std_hz", help="standard deviation of the fitted pole's frequency"),
-    ]
+    ] = None
     off: Annotated[
         float | None,
         Quantity("difference", "%", 3, "measured over exact frequency, less one", "frequency_residual_percent"),
-    ]
+    ] = None
     measured_damping: Annotated[
         float | None,
         Quantity(
@@ -214,7 +210,7 @@ class Counterpart:
             key="measured_damping_ratio",
             help="of the pole fitted to the measured peak",
         ),
-    ]
+    ] = None
     damping_std: Annotated[
         float | None,
         Quantity(
@@ -223,16 +219,16 @@ class Counterpart:
             key="measured_damping_ratio_std",
             help="standard deviation of the measured damping ratio",
         ),
-    ]
+    ] = None
     level_db: Annotated[
         float | None,
         Quantity("residue, measured over exact", "dB", 3, "gain error of the sensor and shift of the mode shape"),
-    ]
+    ] = None
     level_degrees: Annotated[
         float | None,
         Quantity("turned", "deg", 3, "phase of the residue; 180 deg is a reversed sign", "level_degrees"),
-    ]
-    is_peak_only: Annotated[bool, Quantity(help="whether the lines around the peak determine no pole")]
+    ] = None
+    is_peak_only: Annotated[bool, Quantity(help="whether the lines around the peak determine no pole")] = False
     damping_ratio: Annotated[
         float,
         Quantity("exact damping ratio", digits=4, key="exact_damping_ratio", help="of the pole of the exact response"),
@@ -299,7 +295,8 @@ class Overlay:
     @property
     def csv_table(self) -> Table:
         """A row a frequency: measured and exact."""
-        values, exact = self.measured.values, self.exact
+        values = self.measured.values
+        exact = self.exact
         columns = {"re": values.real, "im": values.imag, "exact_re": exact.real, "exact_im": exact.imag}
         first = Column("hz", "", "Hz", of=self.measured.omega / HERTZ)
         return Table(columns=(first, *(Column(name, name, of=column) for name, column in columns.items())))
@@ -341,11 +338,13 @@ class Overlay:
         ratios = {row.mode: row.frequency_ratio for row in self.modes if row.mode and row.frequency_ratio is not None}
         if not ratios:
             return ()
-        table, found = modes_of(self.ratio.driven, max(ratios)), []
+        table = modes_of(self.ratio.driven, max(ratios))
+        found = []
         for name, slopes in table.sensitivity.items():
             for mode, ratio in ratios.items():
-                slope = float(slopes[table.index == mode][0])
-                exponent = math.log(ratio) / slope if abs(slope) > LEAST_SENSITIVITY else math.inf
+                slope = slopes[table.index == mode][0]
+                # a number with a smaller d ln w/d ln p does not move the mode
+                exponent = math.log(ratio) / slope if abs(slope) > 1e-3 else math.inf
                 if abs(exponent) <= math.log(LARGEST_FACTOR):
                     found.append(RequiredChange(name, mode, 100 * (math.exp(exponent) - 1)))
         return tuple(found)
@@ -359,13 +358,16 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
     """
     must_be_arm(arm)
     must_be_measured(measured)
-    ratio, noise, (low, high) = ratio_of(arm, measured), noise_of(measured), measured.band
+    ratio = ratio_of(arm, measured)
+    noise = noise_of(measured)
+    (low, high) = measured.band
     roots = ratio.roots(PARTNERS_BEYOND * high)
-    places, own = peaks_of(measured, noise.sigma), peaks_among(roots.poles)
+    places = peaks_of(measured, noise.sigma)
+    own = peaks_among(roots.poles)
     own = own[abs(own) >= low / PARTNERS_BEYOND]
     is_inside = (abs(own) >= low) & (abs(own) <= high)
     pairs, _ = matched_peaks(measured.omega[places], abs(own), measured.band)
-    if len(pairs) < max(places.size, int(is_inside.sum())):
+    if len(pairs) < max(places.size, is_inside.sum()):
         check_unit(arm, measured)
     at = {j: int(places[i]) for i, j in pairs}
     shown = [(pole, at.get(j)) for j, pole in enumerate(own.tolist()) if j in at or is_inside[j]]
@@ -377,9 +379,9 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
         noise=noise,
         ratio=ratio,
         roots=roots,
-        exact=np.asarray(ratio(1j * measured.omega)),
+        exact=ratio(1j * measured.omega),
         omega=omega,
-        curve=np.asarray(ratio(1j * omega)),
+        curve=ratio(1j * omega),
         modes=_counterparts(ratio, roots, measured, noise, shown),
         unmatched=np.delete(measured.omega[places], [i for i, _ in pairs]),
     )
@@ -397,36 +399,36 @@ def _counterparts(
     table = modes_of(ratio.driven, up_to=up_to) if are_modes else None
     found = []
     for pole, place in shown:
-        mode, size = None, abs(pole)
+        mode = 0
+        size = abs(pole)
         if table is not None:
             away = abs(table.natural_frequency / size - 1)
-            mode = int(table.index[np.argmin(away)]) if away.min() < SAME_MODE else None
-        peak = None if place is None else float(measured.omega[place])
-        own = None if place is None else resonance_at(measured, noise.sigma, place)
-        residue = ratio.residue(pole, roots)
-        at = abs(own.pole) if own is not None else peak
-        level = own.residue / residue if own is not None and residue else None
-        found.append(
-            Counterpart(
-                pole=pole,
-                peak=peak,
-                measured=own,
-                frequency_ratio=None if at is None else at / size,
-                level=level,
-                mode=mode or None,
-                exact=size / HERTZ,
-                frequency=None if at is None else at / HERTZ,
-                frequency_std=None if own is None else float(own.std[1]) / HERTZ,
-                off=None if at is None else 100 * (at / size - 1),
-                measured_damping=None if own is None else own.damping_ratio,
-                damping_std=None if own is None else float(own.std[0]) / abs(own.pole),
-                level_db=20 * math.log10(abs(level)) if level else None,
-                level_degrees=math.degrees(np.angle(level)) if level else None,
-                is_peak_only=peak is not None and own is None,
-                damping_ratio=-pole.real / size + 0.0,
-            )
-        )
+            mode = int(table.index[np.argmin(away)]) if away.min() < SAME_MODE else 0
+        row = Counterpart(pole=pole, mode=mode or None, exact=size / HERTZ, damping_ratio=-pole.real / size + 0.0)
+        found.append(row if place is None else _seen(row, ratio.residue(pole, roots), measured, noise, place))
     return tuple(found)
+
+
+def _seen(row: Counterpart, residue: complex, measured: Measured, noise: Noise, place: int) -> Counterpart:
+    """The row of a pole with its measured peak, and the pole that is fitted there."""
+    own = resonance_at(measured, noise.sigma, place)
+    peak = float(measured.omega[place])
+    at = peak if own is None else abs(own.pole)
+    share = at / abs(row.pole)
+    row = replace(
+        row, peak=peak, frequency=at / HERTZ, frequency_ratio=share, off=100 * (share - 1), is_peak_only=own is None
+    )
+    if own is None:
+        return row
+    of_damping, of_frequency = own.std.tolist()
+    row = replace(
+        row, measured=own, frequency_std=of_frequency / HERTZ, measured_damping=own.damping_ratio,
+        damping_std=of_damping / at,
+    )  # fmt: skip
+    if not residue or not own.residue:
+        return row
+    level = own.residue / residue
+    return replace(row, level=level, level_db=20 * math.log10(abs(level)), level_degrees=math.degrees(np.angle(level)))
 
 
 class ResonanceShift(NamedTuple):
@@ -450,15 +452,20 @@ def resonance_shifts(before: Arm, after: Arm, responses: Sequence[tuple[Measured
         with suppress(ConvergenceError):
             ratios = [Ratio(arm, data.output, data.input) for arm in (before, after)]
             old, new = (peaks_among(ratio.poles(PARTNERS_BEYOND * data.band[1]).values) for ratio in ratios)
-            peaks, w, first = data.omega[peaks_of(data, noise.sigma)], abs(new), abs(old)
-            places, earlier = dict(matched_peaks(peaks, w, data.band)[0]), dict(matched_peaks(w, first, data.band)[0])
+            peaks = data.omega[peaks_of(data, noise.sigma)]
+            w = abs(new)
+            first = abs(old)
+            places = dict(matched_peaks(peaks, w, data.band)[0])
+            earlier = dict(matched_peaks(w, first, data.band)[0])
             for n, peak in enumerate(peaks.tolist()):
                 row = ResonanceShift(None, None, peak / HERTZ)
                 own = places.get(n, int(np.argmin(abs(np.log(w / peak)))) if w.size else None)
-                if own is not None and abs(math.log(w[own] / peak)) < PEAK_REACH - BROADER * new[own].real / w[own]:
+                # of ln w: a peak farther from all of the arm's is none of them, a broad one by twice its damping ratio
+                if own is not None and abs(math.log(w[own] / peak)) < 0.1 - 2.0 * new[own].real / w[own]:
                     start = float(first[earlier[own]]) / HERTZ if own in earlier else None
                     row = ResonanceShift(start, float(w[own]) / HERTZ, peak / HERTZ)
-                found[data.input, round(math.log(peak) / SAME_PEAK)] = row
+                # peaks of two responses that are nearer, of ln w, are one
+                found[data.input, round(math.log(peak) / 0.02)] = row
     return sorted(found.values(), key=lambda row: row.measured)
 
 
@@ -469,7 +476,7 @@ def check_unit(arm: Arm, measured: Measured) -> None:
     """
     ratio = ratio_of(arm, measured)
     with suppress(ConvergenceError):
-        poles = ratio.poles(PARTNERS_BEYOND * HERTZ * float(measured.omega[-1])).values
+        poles = ratio.poles(PARTNERS_BEYOND * HERTZ * measured.omega[-1]).values
         must_be_in_unit(measured, noise_of(measured).sigma, poles)
 
 

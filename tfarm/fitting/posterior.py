@@ -21,9 +21,7 @@ from tfarm.errors import require
 
 from .solve import OPEN_DEVIATION, Fitted, Solution, principal_axes
 
-MOST_BYTES = 1024 * 1024
 SUFFIX = ".posterior.json"
-LEAST_DEVIATION = 1e-6  # of a coordinate: covariances of doubles keep no smaller one next to `OPEN_DEVIATION`
 NO_VARIANCE = 1e-13  # of the largest variance: a smaller one is rounding
 
 
@@ -74,7 +72,7 @@ class Posterior(StrictTable):
         rest = [n for n, key in enumerate(self.keys) if key not in ranged]
         sizes, axes = np.linalg.eigh(self.information[np.ix_(rest, rest)])
         for axis in axes.T[sizes < 0.5 / OPEN_DEVIATION**2]:  # 0 or at least 1/OPEN_DEVIATION^2
-            key = self.keys[rest[int(abs(axis).argmax())]]
+            key = self.keys[rest[abs(axis).argmax()]]
             require(False, "posterior", key, "the data do not determine it: give a range of its own, "
                     f"--over {key}=uniform:LOW,HIGH")  # fmt: skip
 
@@ -87,7 +85,8 @@ class Posterior(StrictTable):
         known = [n for n, key in enumerate(self.keys) if key in ranged]
         rest = [n for n, key in enumerate(self.keys) if key not in ranged]
         value, size = (np.array([getattr(each, name) for each in self.numbers]) for name in ("value", "size"))
-        P, x_r = self.information, np.empty((len(known), len(normal)))
+        P = self.information
+        x_r = np.empty((len(known), len(normal)))
         for row, n in zip(x_r, known, strict=True):
             p = np.asarray(ranged[self.keys[n]])
             row[:] = (p - value[n]) / size[n] if size[n] else np.log(np.maximum(p / value[n], LEAST_SIZE))
@@ -102,10 +101,10 @@ def posterior_of(found: Solution, fitted: Sequence[Fitted], not_determined: Sequ
     J, of_sensors = np.split(found.jacobian, [len(own)], axis=1)
     sizes, axes = principal_axes(J - of_sensors @ (np.linalg.pinv(of_sensors) @ J))  # residuals that no sensor explains
     known = sizes >= 1.0 / OPEN_DEVIATION
-    spread = axes[known].T * np.maximum(1.0 / sizes[known], LEAST_DEVIATION)
+    # of a coordinate: covariances of doubles keep no smaller deviation next to `OPEN_DEVIATION`
+    spread = axes[known].T * np.maximum(1.0 / sizes[known], 1e-6)
     numbers = [
-        PosteriorNumber(key=each.key, value=each.value, low=each.low, high=each.high,
-                        size=0.0 if of.by_logarithm else of.size)
+        PosteriorNumber(key=each.key, value=each.value, low=each.low, high=each.high, size=of.size)
         for each, of in zip(fitted, own, strict=False)
     ]  # fmt: skip
     return Posterior(format="tfarm posterior 1", arm=arm, numbers=numbers, covariance=(spread @ spread.T).tolist(),
@@ -114,14 +113,16 @@ def posterior_of(found: Solution, fitted: Sequence[Fitted], not_determined: Sequ
 
 def load_posterior(path: str | os.PathLike[str]) -> Posterior:
     """Return the posterior of a file.  Raises ParameterError, naming the file, for anything else."""
-    found = validated_file(Posterior, path, MOST_BYTES, key="posterior", what=f"a {SUFFIX} file of tfarm fit --save")
-    n, covariance = len(found.numbers), found.covariance
+    found = validated_file(Posterior, path, (1024 * 1024), key="posterior", what=f"a {SUFFIX} file of tfarm fit --save")
+    n = len(found.numbers)
+    covariance = found.covariance
     is_legal = (
         0 < n == len(covariance) and all(len(row) == n for row in covariance)
         and np.allclose(covariance, np.transpose(covariance), rtol=1e-9, atol=0.0)
         and np.linalg.eigvalsh(covariance)[0] >= -NO_VARIANCE * np.trace(covariance)
     )  # fmt: skip
-    remedy, file = f"give a symmetric, non-negative matrix of {n} rows and columns", os.fspath(path)
+    remedy = f"give a symmetric, non-negative matrix of {n} rows and columns"
+    file = os.fspath(path)
     require(is_legal, "covariance", covariance, remedy, file)
     for each in found.numbers:
         require(each.size or each.value > 0, each.key, each.value, "give a positive number, as size is 0", file)

@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import AnyLaw, Arm, tracked
 from tfarm.arm.chain import TIME_ROUNDING, Chain
-from tfarm.arm.reading import load_tables
+from tfarm.arm.reading import AnyFile, load_tables
 from tfarm.arm.schema import StrictTable, validated
 from tfarm.arrays import Complex, Real
 from tfarm.dsp.results import enough_modes
@@ -52,15 +52,11 @@ from tfarm.schema import Quantity, Table
 
 from .data import MOST_RECORD_BYTES, Measured, check_signal, read_sheet
 
-TIMES = ("t", "time")  # names of the column of times
-JITTER = 0.1  # of the period: a sample further off its place has been dropped or doubled, or the sampling is uneven
-NOTED_JITTER = 1e-3  # of the period: times written in few digits are off by less
-REFERENCE_COLUMN, ANGLE_COLUMN, MOMENT_COLUMN = "reference:hub_angle", "hub_angle", "root_moment"
+REFERENCE_COLUMN = "reference:hub_angle"
+ANGLE_COLUMN = "hub_angle"
+MOMENT_COLUMN = "root_moment"
 MOST_SAMPLE = 1e70  # of a signal: the fourth power is a number, as spectra are squared
 LEAST_SAMPLES = 8  # of a record and of a segment
-ESTIMATORS, WINDOWS = ("H1", "H2", "Hv"), ("hann", "boxcar")
-USUAL_SEGMENTS = 15  # of a record by default: 8 lengths, half overlapped
-LEAST_POWER = 1e-24  # of the largest line of the input: below it there are rounding errors alone
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,7 +92,8 @@ class Recording:
     @property
     def note(self) -> str:
         """The unevenness of its sampling; nothing where the samples are even."""
-        if self.jitter <= NOTED_JITTER:
+        # times written in few digits are off by less
+        if self.jitter <= 1e-3:
             return ""
         return f"sampled unevenly, by up to {100 * self.jitter:.2g} % of the period"
 
@@ -112,16 +109,18 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
         found, data = read_mat(name, MOST_RECORD_BYTES, key="record")
         held = {each: np.asarray(value, dtype=float) for each, value in found.items()
                 if value.ndim == 2 and value.dtype.kind in "biuf"}  # fmt: skip
-        units, digest = dict.fromkeys(held, ""), hashlib.sha256(data).hexdigest()
+        units = dict.fromkeys(held, "")
+        digest = hashlib.sha256(data).hexdigest()
     else:
         sheet = read_sheet(name, key="record")
-        held, units, digest = sheet.columns, sheet.units, sheet.digest
+        held = sheet.columns
+        units = sheet.units
+        digest = sheet.digest
     with naming(name):
-        columns = _columns(held, next((held[each].size for each in TIMES if each in held), 0))
-        of_times = next((each for each in TIMES if each in columns), "")
-        require(
-            of_times, "t", MISSING, f"a record has a column t, in seconds; this one has {listed(held, 300) or 'none'}"
-        )
+        of_times = next((each for each in ("t", "time") if each in held), "")
+        columns = _columns(held, held[of_times].size) if of_times else {}
+        remedy = f"a record has a column t, in seconds; this one has {listed(held, 300) or 'none'}"
+        require(of_times in columns, "t", MISSING, remedy)
         require(units[of_times] in ("", "s"), f"unit of {of_times}", units[of_times], "times are in seconds")
         start, period, jitter = _timing(columns.pop(of_times))
         require(columns, "signals", MISSING, "a column of times and no other")
@@ -146,7 +145,8 @@ def _timing(times: Real) -> tuple[float, float, float]:
     """Start and period [s] of even samples, and the largest distance from them as a share of the period."""
     require(times.size >= LEAST_SAMPLES, "samples", times.size, f"a record has {LEAST_SAMPLES} samples at least")
     steps = np.diff(times)
-    back, usual = int(np.argmax(steps <= 0)), float(np.median(steps))
+    back = int(np.argmax(steps <= 0))
+    usual = float(np.median(steps))
     require(
         steps[back] > 0,
         f"t of sample {back + 2}",
@@ -157,8 +157,9 @@ def _timing(times: Real) -> tuple[float, float, float]:
     require(period > 1 / MOST_SAMPLE, "period of t", period, "times are in seconds")
     gap = int(np.argmax(abs(steps - usual)))
     jitter = float(abs(times - times[0] - period * np.arange(times.size)).max() / period)
+    # a sample further off its place has been dropped or doubled, or the sampling is uneven
     require(
-        jitter <= JITTER,
+        jitter <= 0.1,
         f"t of sample {gap + 2}",
         float(times[gap + 1]),
         f"{steps[gap]:.6g} s after the one before, where {usual:.6g} s is usual: samples have to be even",
@@ -193,7 +194,8 @@ class MeasuredRun:
         The reference is interpolated linearly between its rows.
         """
         t = period * np.arange(int(self.t[-1] / period * (1 + TIME_ROUNDING)) + 1)
-        reference, none = np.interp(t, self.t, self.reference) - self.reference[0], np.zeros(t.size)
+        reference = np.interp(t, self.t, self.reference) - self.reference[0]
+        none = np.zeros(t.size)
         until = self.t[self.reference != self.reference[-1]].max(initial=0.0)
         return Scenario("measured", period, none, reference, none, none, none, busy_until=float(until))
 
@@ -233,7 +235,7 @@ def overshoot(angle: Real, step: float, end: float) -> float:
     return float(np.max((angle - end) * np.sign(step)) / abs(step)) if step else 0.0
 
 
-def load_run(name_or_path: str | os.PathLike[str]) -> MeasuredRun | None:
+def load_run(name_or_path: AnyFile) -> MeasuredRun | None:
     """The run of a file's [measured] table, None where it has none.
 
     Raises ParameterError for an unknown key, and for a record without these signals or that is none, naming the file.
@@ -336,16 +338,18 @@ def frequency_response(
 
     check_signal(output, "--output")
     check_signal(input, "--input")
-    must_be_known("--estimator", estimator, ESTIMATORS)
-    must_be_known("--window", window, WINDOWS)
+    must_be_known("--estimator", estimator, ("H1", "H2", "Hv"))
+    must_be_known("--window", window, ("hann", "boxcar"))
     names = columns or (output, input)
-    y, x = recording.signal(names[0], "--output"), recording.signal(names[1], "--input")
+    y = recording.signal(names[0], "--output")
+    x = recording.signal(names[1], "--input")
     size, step = _cut(recording, segment, (0.5 if window == "hann" else 0.0) if overlap is None else overlap)
     how = {"window": window, "nperseg": size, "noverlap": size - step}
     lines, values, coherence = _estimated(estimator, x, y, how)
     require(lines.size, "record", names[1], "does not move", recording.source)
     require(coherence.any(), "record", names[0], "does not move", recording.source)
-    count, duration = 1 + (recording.count - size) // step, size * recording.period
+    count = 1 + (recording.count - size) // step
+    duration = size * recording.period
     averages = independent_averages(get_window(window, size), step, count)
     measured = Measured(
         output=output, input=input, omega=np.asarray(2 * np.pi * lines / duration, dtype=float), values=values,
@@ -364,9 +368,12 @@ def _estimated(estimator: str, x: Real, y: Real, how: dict[str, Any]) -> tuple[N
     """
     from scipy.signal import csd, welch
 
-    S_xx, S_xy, S_yy = welch(x, **how)[1], csd(x, y, **how)[1], welch(y, **how)[1]
+    S_xx = welch(x, **how)[1]
+    S_xy = csd(x, y, **how)[1]
+    S_yy = welch(y, **how)[1]
     lines = np.arange(1, S_xx.size - 1)
-    lines = lines[S_xx[lines] > LEAST_POWER * S_xx.max()]
+    # of the largest line of the input: below it there are rounding errors alone
+    lines = lines[S_xx[lines] > 1e-24 * S_xx.max()]
     S_xx, S_xy, S_yy, cross = S_xx[lines], S_xy[lines], S_yy[lines], abs(S_xy[lines])
     with np.errstate(divide="ignore", invalid="ignore"):
         sizes = {"H1": cross / S_xx, "H2": np.where(cross == 0, 0.0, S_yy / cross), "Hv": np.sqrt(S_yy / S_xx)}
@@ -386,7 +393,9 @@ def _cut(recording: Recording, segment: float | None, overlap: float) -> tuple[i
     """Samples of a segment, and from one to the next."""
     require(0 <= overlap < 1, "--overlap", overlap, "a share of a segment from 0 to below 1, such as 0.5")
     whole = recording.count * recording.period
-    least, wanted = LEAST_SAMPLES * recording.period, 2 * whole / (USUAL_SEGMENTS + 1) if segment is None else segment
+    least = LEAST_SAMPLES * recording.period
+    # by default 15 segments, half overlapped
+    wanted = whole / 8 if segment is None else segment
     require(
         least <= wanted <= whole / 2 * (1 + 1e-9),
         "--segment",

@@ -29,7 +29,7 @@ Pereyra 1973), so that only the poles are searched for.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -49,28 +49,10 @@ from .data import CONFIDENCE, Measured, in_parts
 if TYPE_CHECKING:
     from .recording import Recording
 
-PROMINENCE = math.log(2)  # a peak is twice what is around it
-CLEAR_OF_NOISE = 5.0  # deviations of the noise that it exceeds
 UNPAIRED = 0.3  # of ln w: what a peak or a pole in the band costs without a partner; so partners are 1.8 apart at most
-WIDEST_PEAK = 0.5  # damping ratio of a pole that is no peak
 PARTNERS_BEYOND = 1.8  # times the ends of the range: partners are looked for up to there
-WIDTHS = 3.0  # half-widths of a peak around it that its pole is fitted to: tuned with the next, for the least bias
-BACKGROUND = 5  # coefficients c
-CLOSE_IN_UNIT = 0.3  # of ln w, in the mean of the peaks: how well they fit in the other unit before it is named,
-ALIKE_IN_UNIT = 0.15  # and how far they may differ in that
-PEAK_ALONE = math.log(2.0)  # of ln w: farther from every pole a peak has nothing to do with one
-LEAST_PEAKS = 3  # peaks, whose spacing distinguishes one match from another
-MOST_RINGING = 20  # of one decay
 NOT_WHITE = 1e-3  # probability below which residuals are called correlated
-RARE = 1e-9  # a probability below which it is printed as a bound
-RING_ROUNDING = 1e-9  # of the signal and of w: smaller differences are rounding
-HALVES_APART = 4.0  # standard deviations that the two halves of a record differ by before it is noted
-CLEAR_AMPLITUDE = 8.0  # deviations of its amplitude in a half of a record that determines an oscillation: noise has 4
 MOST_ROWS = 160  # of the Hankel matrix of the start; slower oscillations are looked for in means of several samples
-FASTEST = 3.0  # the logarithm by which a pole of the start may grow during the record
-THINNER = 4  # from one such mean to the next
-SPARE_POLES = 4  # further poles of the start, which take up drift and noise
-CLEAR_LAG = 2.5  # deviations of an autocorrelation of white noise, 1/sqrt(n), above which one is significant
 EACH = 4  # parameters of a mode: sigma, w, a, b; the constant c is the last
 
 
@@ -94,9 +76,11 @@ def peaks_of(data: Measured, sigma: Real) -> NDArray[np.intp]:
     from scipy.signal import find_peaks
 
     size = abs(data.values)
-    places, found = find_peaks(np.log(np.maximum(size, np.finfo(float).tiny)), prominence=PROMINENCE)
+    # a peak is twice what is around it
+    places, found = find_peaks(np.log(np.maximum(size, np.finfo(float).tiny)), prominence=math.log(2))
     rise = size[places] * -np.expm1(-found["prominences"])
-    return np.asarray(places[rise > CLEAR_OF_NOISE * sigma[places]])
+    # it exceeds the noise by five deviations
+    return places[rise > 5.0 * sigma[places]]
 
 
 def matched_peaks(
@@ -109,7 +93,8 @@ def matched_peaks(
     """
     from scipy.optimize import linear_sum_assignment
 
-    n, m = measured.size, own.size
+    n = measured.size
+    m = own.size
     cost = np.zeros((n + m, m + n))
     cost[:n, :m] = abs(np.log(measured)[:, None] - np.log(own))
     cost[:n, m:] = UNPAIRED
@@ -122,7 +107,8 @@ def matched_peaks(
 
 def peaks_among(poles: Complex) -> Complex:
     """Those poles (n,) [1/s] that make a peak, Im s > 0, by |s|."""
-    upper = poles[(poles.imag > 0) & (-poles.real < WIDEST_PEAK * abs(poles))]
+    # a pole of a larger damping ratio is no peak
+    upper = poles[(poles.imag > 0) & (-poles.real < 0.5 * abs(poles))]
     return upper[np.argsort(abs(upper))]
 
 
@@ -132,24 +118,30 @@ def must_be_in_unit(data: Measured, sigma: Real, poles: Complex) -> None:
     `poles` are those of the response, complete up to PARTNERS_BEYOND 2 pi times the highest frequency.  They fit as
     they are where no more than two partners are missing; one peak alone decides only where it has no partner.
     """
-    peaks, own = data.omega[peaks_of(data, sigma)], abs(peaks_among(poles))
+    peaks = data.omega[peaks_of(data, sigma)]
+    own = abs(peaks_among(poles))
     if not peaks.size or not own.size:
         return
+    # three peaks have a spacing that distinguishes one match from another; fewer, farther than that of ln w from every
+    # pole, have nothing to do with one
+    has_spacing = peaks.size >= 3
+    is_lonely = (abs(np.log(peaks[:, None] / own)).min(axis=1) > math.log(2.0)).all()
     _, cost = matched_peaks(peaks, own, data.band)
-    lonely = bool((abs(np.log(peaks[:, None] / own)).min(axis=1) > PEAK_ALONE).all())
     for factor, words in ((1 / HERTZ, "are rad/s given as Hz?"), (HERTZ, "are Hz given as rad/s?")):
-        there, fitting = matched_peaks(peaks * factor, own, (data.band[0] * factor, data.band[1] * factor))
-        better = cost - fitting > UNPAIRED if peaks.size >= LEAST_PEAKS else lonely
+        low, high = data.band
+        there, fitting = matched_peaks(peaks * factor, own, (low * factor, high * factor))
+        is_better = cost - fitting > UNPAIRED if has_spacing else is_lonely
         away = np.array([math.log(peaks[i] * factor / own[j]) for i, j in there])
-        fits = away.size == peaks.size and abs(away.mean()) < CLOSE_IN_UNIT and np.ptp(away) < ALIKE_IN_UNIT
+        # of ln w: how well the peaks fit in the other unit, in the mean and in what they differ by
+        fits = away.size == peaks.size and abs(away.mean()) < 0.3 and np.ptp(away) < 0.15
         remedy = f"its peaks are {1 / factor:.3g} times the arm's frequencies: {words}"
-        require(not (better and fits), f"{data.name} first peak", f"{peaks[0] / HERTZ:.4g} Hz", remedy, data.source)
+        require(not (is_better and fits), f"{data.name} first peak", f"{peaks[0] / HERTZ:.4g} Hz", remedy, data.source)
 
 
 def project(columns: Real, y: Real) -> tuple[Real, Real]:
     """The linear numbers of the least squares, and the residuals."""
     linear = np.asarray(np.linalg.lstsq(columns, y, rcond=None)[0], dtype=float)
-    return linear, np.asarray(y - columns @ linear)
+    return linear, y - columns @ linear
 
 
 def least_projected(columns: Callable[[Real], Real], y: Real, start: Real, **how: Any) -> Any:
@@ -165,42 +157,51 @@ def least_projected(columns: Callable[[Real], Real], y: Real, start: Real, **how
 def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
     """The pole and residue of the peak at a place; None where its lines do not determine them."""
     kept = _around(data, place)
-    omega, values, weight = data.omega[kept], data.values[kept], 1 / sigma[kept]
-    background = min(BACKGROUND, 2 * omega.size - 6)
+    omega = data.omega[kept]
+    # the number of coefficients c
+    background = min(5, 2 * omega.size - 6)
     if background < 1:
         return None
-    s, w = 1j * omega, float(data.omega[place])
-    powers, y = [(s / w) ** n for n in range(background)], in_parts(values * weight)
+    s = 1j * omega
+    w = data.omega[place]
+    powers = [(s / w) ** n for n in range(background)]
 
     def columns(x: Real) -> Real:
         """Those of Re r, Im r and the c."""
-        up, down = 1 / (s + x[0] - 1j * x[1]), 1 / (s + x[0] + 1j * x[1])
+        up = 1 / (s + x[0] - 1j * x[1])
+        down = 1 / (s + x[0] + 1j * x[1])
         terms: Complex = np.array([up + down, 1j * (up - down), *powers], dtype=np.complex128)
-        return in_parts(terms * weight).T
+        return in_parts(terms / sigma[kept]).T
 
+    y = in_parts(data.values[kept] / sigma[kept])
     half = max(_half_width(data, place), (omega[-1] - omega[0]) / (4 * omega.size))
     found = least_projected(columns, y, np.array([half, w]))
     sigma_p, w_p = found.x.tolist()
     if not found.success or not omega[0] < w_p < omega[-1] or abs(sigma_p) > w_p:
         return None
     (re, im, *_), e = project(columns(found.x), y)
-    spread = np.linalg.pinv(found.jac.T @ found.jac) * max(1.0, float(e @ e) / (2 * omega.size - 4 - background))
+    spread = np.linalg.pinv(found.jac.T @ found.jac) * max(1.0, (e @ e) / (2 * omega.size - 4 - background))
     return Resonance(pole=complex(-sigma_p, w_p), residue=complex(re, im), std=np.sqrt(np.diag(spread)))
 
 
 def _half_width(data: Measured, place: int) -> float:
     """Half the width [rad/s] of a peak where it has lost 3 dB, to the nearer side."""
-    size, limit = abs(data.values), abs(data.values[place]) / math.sqrt(2)
+    size = abs(data.values)
+    limit = abs(data.values[place]) / math.sqrt(2)
     away = abs(data.omega - data.omega[place])
     return float(away[size < limit].min(initial=data.omega[-1] - data.omega[0]))
 
 
 def _around(data: Measured, place: int) -> slice:
     """The lines from dip to dip around a peak, and no farther than some of its widths, but three to each side."""
-    size, away, reach = abs(data.values), abs(data.omega - data.omega[place]), WIDTHS * _half_width(data, place)
+    size = abs(data.values)
+    away = abs(data.omega - data.omega[place])
+    # half-widths of a peak that its pole is fitted to: tuned with `resonance_at`'s background, for the least bias
+    reach = 3.0 * _half_width(data, place)
 
     def end(way: int) -> int:
-        at, lowest = place, size[place]
+        at = place
+        lowest = size[place]
         while 0 <= at + way < size.size and size[at + way] < 2 * lowest and (away[at] < reach or abs(at - place) < 3):
             at += way
             lowest = min(lowest, size[at])
@@ -295,38 +296,59 @@ def ring(
     Raises ParameterError for a signal or times that are not there and for too few samples, ConvergenceError where the
     oscillations are not found.
     """
-    t, y = _part(recording, name, start, stop, modes)
-    poles = starting_poles(t - t[0], y, modes)
-    found = nearest_sum(t - t[0], y, poles) if poles.size == modes else None
+    y = recording.signal(name, "--signal")
+    times = recording.times
+    low = times[0] if start is None else start
+    high = times[-1] if stop is None else stop
+    rounding = recording.period / 2 * 1e-6
+    kept = (times >= low - rounding) & (times <= high + rounding)
+    most, least = 20, 4 * (EACH * modes + 1)
+    require(1 <= modes <= most, "--modes", modes, f"a whole number from 1 to {most}")
+    found = f"{kept.sum()} samples from {low:g} to {high:g} s; {modes} modes take {least}"
+    remedy = f"{found} (the record goes from {times[0]:g} to {times[-1]:g} s)"
+    require(kept.sum() >= least, "--from", float(low), remedy, recording.source)
+    require(np.ptp(y[kept]) > 0, "--signal", name, "does not move there", recording.source)
+    return ring_of(recording, name, times[kept], y[kept], modes)
+
+
+def ring_of(recording: Recording, name: str, times: Real, y: Real, modes: int) -> Ring:
+    """The modes of a decay of samples y at some of the times of a record."""
+    t = times - times[0]
+    poles = starting_poles(t, y, modes)
+    found = nearest_sum(t, y, poles) if poles.size == modes else None
     if found is None:
         word = "oscillation" if modes == 1 else f"{modes} oscillations"
         raise ConvergenceError(f"no {word} found in the decay: choose other times, or fewer modes", None, None)
     squares = float(found.e @ found.e)
-    is_rounding = squares <= y.size * (RING_ROUNDING * abs(y).max()) ** 2
-    white = 1.0 if is_rounding else whiteness(found.e)
+    rounding = 1e-9  # of the signal and of w: smaller differences are rounding
+    white = 1.0 if squares <= y.size * (rounding * abs(y).max()) ** 2 else whiteness(found.e)
     notes = [recording.note] if recording.note else []
     if white < NOT_WHITE:
-        chance = f"{white:.1g}" if white > RARE else f"below {RARE:g}"
+        rare = 1e-9
+        chance = f"{white:.1g}" if white > rare else f"below {rare:g}"
         notes.append(
             f"the residuals are correlated (probability {chance} if they were white noise): intervals are "
             "by their autocovariance, and may be too narrow, above all if the residuals are no noise"
         )
     spread = found.covariance(is_white=white >= NOT_WHITE)
-    early, late, apart = _halves(t - t[0], y, found.poles)
+    (early, of_early), (late, of_late) = (by_part(t[part], y[part], found.poles) for part in halves(t.size))
     rows = []
     for number, n in enumerate(np.argsort(-found.energy, kind="stable").tolist(), start=1):
-        halves = (float(early[n]) / HERTZ, float(late[n]) / HERTZ) if np.isfinite(apart[n]) else None
-        rows.append(found.mode(n, number, spread, halves))
-        if abs(early[n] - late[n]) > HALVES_APART * apart[n] + RING_ROUNDING * found.poles[n].imag:
+        first, second = early[n] / HERTZ, late[n] / HERTZ
+        apart = math.sqrt(of_early[n] + of_late[n])
+        both = (first, second) if math.isfinite(apart) else (None, None)
+        rows.append(found.mode(n, number, spread, both))
+        # by more than four standard deviations
+        if abs(early[n] - late[n]) > 4.0 * apart + rounding * found.poles[n].imag:
             notes.append(
-                f"mode {number} rings at {early[n] / HERTZ:.4g} Hz in its first half, {late[n] / HERTZ:.4g} Hz in its "
+                f"mode {number} rings at {first:.4g} Hz in its first half, {second:.4g} Hz in its "
                 "second: no linear decay, or friction, or another mode"
             )
     return Ring(
         signal=name,
         source=recording.source,
-        start=float(t[0]),
-        stop=float(t[-1]),
+        start=float(times[0]),
+        stop=float(times[-1]),
         samples=y.size,
         residual=math.sqrt(squares / found.freedom),
         white=white,
@@ -335,44 +357,26 @@ def ring(
     )
 
 
-def _part(recording: Recording, name: str, start: float | None, stop: float | None, modes: int) -> tuple[Real, Real]:
-    """Times and samples between two times, refused where they are too few for the modes."""
-    y, t = recording.signal(name, "--signal"), recording.times
-    low, high = t[0] if start is None else start, t[-1] if stop is None else stop
-    rounding, least = recording.period / 2 * 1e-6, 4 * (EACH * modes + 1)
-    kept = (t >= low - rounding) & (t <= high + rounding)
-    require(1 <= modes <= MOST_RINGING, "--modes", modes, f"a whole number from 1 to {MOST_RINGING}")
-    span = f"the record goes from {t[0]:g} to {t[-1]:g} s"
-    require(
-        kept.sum() >= least,
-        "--from",
-        float(low),
-        f"{kept.sum()} samples from {low:g} to {high:g} s; {modes} modes take {least} ({span})",
-        recording.source,
-    )
-    require(np.ptp(y[kept]) > 0, "--signal", name, "does not move there", recording.source)
-    return t[kept], y[kept]
+def halves(size: int) -> tuple[slice, slice]:
+    """Both halves of a number of samples."""
+    return slice(size // 2), slice(size // 2, None)
 
 
-def _halves(t: Real, y: Real, poles: Complex) -> tuple[Real, Real, Real]:
-    """w by each half of the record, from the whole's poles on, and the deviation of their difference.
+def by_part(t: Real, y: Real, poles: Complex) -> tuple[list[float], list[float]]:
+    """w by a part of the record, from the whole's poles on, and its variance.
 
-    Where a half does not determine it, w of the whole and an infinite deviation.
+    Where the part does not determine it, w of the whole and an infinite variance.
     """
-    middle, count = t.size // 2, poles.size
-    pairs = []
-    for part in (slice(None, middle), slice(middle, None)):
-        w, variance = poles.imag, np.full(count, np.inf)
-        is_long = y[part].size > 2 * (EACH * count + 1)
-        found = nearest_sum(t[part] - t[part][0], y[part], poles) if is_long else None
-        if found is not None:
-            spread = found.covariance(is_white=whiteness(found.e) >= NOT_WHITE)
-            _, of_w, of_a, of_b = np.diag(spread)[:-1].reshape(EACH, count)
-            is_clear = found.amplitude**2 > CLEAR_AMPLITUDE**2 * (of_a + of_b) / 2
-            w, variance = found.poles.imag, np.where(is_clear, of_w, np.inf)
-        pairs.append((w, variance))
-    (early, one), (late, other) = pairs
-    return np.asarray(early), np.asarray(late), np.sqrt(one + other)
+    w = poles.imag
+    variance = np.full(w.size, np.inf)
+    found = nearest_sum(t - t[0], y, poles) if y.size > 2 * (EACH * w.size + 1) else None
+    if found is not None:
+        spread = found.covariance(is_white=whiteness(found.e) >= NOT_WHITE)
+        _, of_w, of_a, of_b = np.diag(spread)[:-1].reshape(EACH, w.size)
+        # deviations of the amplitude of an oscillation that is determined: noise has 4
+        variance = np.where(found.amplitude**2 > 8.0**2 * (of_a + of_b) / 2, of_w, np.inf)
+        w = found.poles.imag
+    return w.tolist(), variance.tolist()
 
 
 def basis(poles: Complex, t: Real) -> Real:
@@ -394,20 +398,25 @@ class DampedSum:
     @cached_property
     def jacobian(self) -> Real:
         """Derivatives of the formula (samples, 4 n + 1) by the sigma, then by the w, the a, the b, and c."""
-        n, columns, by_time = self.poles.size, basis(self.poles, self.t), self.t[:, None]
-        cosines, sines, (a, b) = columns[:, :n], columns[:, n:-1], self.linear[:-1].reshape(2, n)
+        n = self.poles.size
+        columns = basis(self.poles, self.t)
+        by_time = self.t[:, None]
+        cosines = columns[:, :n]
+        sines = columns[:, n:-1]
+        (a, b) = self.linear[:-1].reshape(2, n)
         return np.c_[-by_time * (a * cosines + b * sines), by_time * (b * cosines - a * sines), columns]
 
     @property
     def amplitude(self) -> Real:
         """(n,): (a^2 + b^2)^(1/2)."""
-        return np.asarray(np.hypot(*self.linear[:-1].reshape(2, -1)))
+        return np.hypot(*self.linear[:-1].reshape(2, -1))
 
     @property
     def energy(self) -> Real:
         """(n,): the sum of squares of each mode alone."""
-        n, parts = self.poles.size, (basis(self.poles, self.t) * self.linear)[:, :-1]
-        return np.asarray(((parts[:, :n] + parts[:, n:]) ** 2).sum(axis=0))
+        n = self.poles.size
+        parts = (basis(self.poles, self.t) * self.linear)[:, :-1]
+        return ((parts[:, :n] + parts[:, n:]) ** 2).sum(axis=0)
 
     @property
     def freedom(self) -> int:
@@ -417,27 +426,34 @@ class DampedSum:
     def covariance(self, *, is_white: bool) -> Real:
         """Of the parameters (4 n + 1, 4 n + 1); the Jacobian's columns are scaled for the inverse's sake."""
         scale = np.sqrt((self.jacobian**2).sum(axis=0))
-        J, e = self.jacobian / scale, self.e
+        J = self.jacobian / scale
+        e = self.e
         bread = np.linalg.pinv(J.T @ J)
         meat = J.T @ J * (e @ e) / self.freedom if is_white else _meat(J, e) * e.size / self.freedom
-        return np.asarray(bread @ meat @ bread / np.outer(scale, scale))
+        return bread @ meat @ bread / np.outer(scale, scale)
 
-    def mode(self, n: int, number: int, covariance: Real, halves: tuple[float, float] | None) -> DecayMode:
+    def mode(self, n: int, number: int, covariance: Real, halves: Sequence[float | None]) -> DecayMode:
         """Mode n by its number, with intervals (Student's t); d zeta = (w^2 d sigma - sigma w d w)/|s|^3."""
-        s, places = complex(self.poles[n]), [n, n + self.poles.size]
+        s = complex(self.poles[n])
+        places = [n, n + self.poles.size]
         slope = np.array([s.imag**2, s.real * s.imag]) / abs(s) ** 3
-        own, reach = covariance[np.ix_(places, places)], float(stdtrit(self.freedom, 0.5 + CONFIDENCE / 2))
-        f, df, z, dz = s.imag / HERTZ, math.sqrt(own[1, 1]) / HERTZ, -s.real / abs(s), math.sqrt(slope @ own @ slope)
+        own = covariance[np.ix_(places, places)]
+        reach = float(stdtrit(self.freedom, 0.5 + CONFIDENCE / 2))
+        f = s.imag / HERTZ
+        df = math.sqrt(own[1, 1]) / HERTZ
+        z = -s.real / abs(s)
+        dz = math.sqrt(slope @ own @ slope)
         damping = f",{z:.6g}~{dz:.3g}" if 0 < z < 1 and dz > 0 else ""  # `tfarm fit --mode` takes positive ones alone
         return DecayMode(
             number, f, f - reach * df, f + reach * df, df, abs(s) / HERTZ, z, z - reach * dz, z + reach * dz, dz,
-            float(self.amplitude[n]), f"{f:.8g}hz~{df:.3g}{damping}", *(halves or (None, None)),
+            float(self.amplitude[n]), f"{f:.8g}hz~{df:.3g}{damping}", *halves,
         )  # fmt: skip
 
 
 def nearest_sum(t: Real, y: Real, start: Complex) -> DampedSum | None:
     """The sum with the least squares next to the poles of a start; None where that is no oscillation in the record."""
-    n, period = start.size, t[1] - t[0]
+    n = start.size
+    period = t[1] - t[0]
     first = np.r_[start.real, start.imag]
     found = least_projected(lambda x: basis(x[:n] + 1j * x[n:], t), y, first, xtol=1e-12)
     poles = found.x[:n] + 1j * found.x[n:]
@@ -454,36 +470,44 @@ def starting_poles(t: Real, y: Real, modes: int) -> Complex:
     Of a rate they are ln of the eigenvalues by which the signal subspace of the Hankel matrix moves in one sample.
     There are fewer where not enough poles turn half a turn in the record, and neither die in a sample nor explode.
     """
-    period, duration, thin, found = t[1] - t[0], t[-1] - t[0], 1, []
+    period = t[1] - t[0]
+    duration = t[-1] - t[0]
+    thin = 1
+    found = []
     while thin == 1 or t.size // thin >= MOST_ROWS:
         means = (y - y.mean())[: t.size // thin * thin].reshape(-1, thin).mean(axis=1)
         rows = min(means.size // 2, MOST_ROWS)
         hankel = np.lib.stride_tricks.sliding_window_view(means, rows)
-        V = np.linalg.eigh(hankel.T @ hankel)[1][:, -min(2 * modes + SPARE_POLES, rows - 1) :]
+        # four further poles take up drift and noise
+        V = np.linalg.eigh(hankel.T @ hankel)[1][:, -min(2 * modes + 4, rows - 1) :]
         z = np.linalg.eigvals(np.linalg.lstsq(V[:-1], V[1:], rcond=None)[0])
         found.append(np.log(z[z != 0]) / (thin * period))
-        thin *= THINNER
+        thin *= 4
     s = np.concatenate(found)
-    s = s[(s.imag > math.pi / duration) & (s.real * period > -1) & (s.real * duration < FASTEST)]
+    # a pole of the start may grow by e^3 during the record
+    s = s[(s.imag > math.pi / duration) & (s.real * period > -1) & (s.real * duration < 3.0)]
     chosen = s[:0]
     while chosen.size < min(modes, np.unique(s).size):
         tried = [np.r_[chosen, each] for each in s if each not in chosen]
-        chosen = min(tried, key=lambda poles: float((project(basis(poles, t), y)[1] ** 2).sum()))
+        chosen = min(tried, key=lambda poles: (project(basis(poles, t), y)[1] ** 2).sum())
     return chosen
 
 
 def _meat(J: Real, e: Real) -> Real:
     """J' R J with the residuals' autocovariances r_k, tapered (1 - k/M), M twice the last significant lag."""
-    r, most = _autocovariance(e), max(2, e.size // 3)
-    (clear,) = np.nonzero(abs(r[:most]) > CLEAR_LAG * r[0] / math.sqrt(e.size))
-    lags = min(most, 2 * int(clear.max(initial=0)) + 1)
+    r = _autocovariance(e)
+    most = max(2, e.size // 3)
+    # deviations, 1/sqrt(n), of an autocorrelation of white noise
+    (clear,) = np.nonzero(abs(r[:most]) > 2.5 * r[0] / math.sqrt(e.size))
+    lags = min(most, 2 * clear.max(initial=0) + 1)
     tapered = r[:lags] * (1 - np.arange(lags) / lags)
     return J.T @ np.apply_along_axis(np.convolve, 0, J, np.r_[tapered[:0:-1], tapered], "same")
 
 
 def whiteness(e: Real) -> float:
     """The probability of autocorrelations as large as these in white noise (Ljung and Box 1978), of the first lags."""
-    r, n = _autocovariance(e), e.size
+    r = _autocovariance(e)
+    n = e.size
     if r[0] == 0:
         return 1.0
     lags = np.arange(1, min(20, n // 5) + 1)
@@ -494,4 +518,4 @@ def whiteness(e: Real) -> float:
 def _autocovariance(e: Real) -> Real:
     from scipy.signal import correlate
 
-    return np.asarray(correlate(e, e)[e.size - 1 :] / e.size)
+    return correlate(e, e)[e.size - 1 :] / e.size

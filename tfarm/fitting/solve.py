@@ -38,11 +38,7 @@ from .model import Problem, ring_residuals, walled
 
 DRAWS = 300  # points about one that the equation errors lead to
 STARTS = ((0, (0.1,)), (DRAWS, (0.1,)), (DRAWS, (1.0, 0.3, 0.1)))  # draws, and shares of w one after another
-DRAWN = 2.0  # times the deviation that they know it with
-START_DEVIATION = 50.0  # of ln p, over that of an equation error: what the data do not know stays where it is
 LINES = 400  # of a response, at most
-LOSS = 0.1  # of an equation error: those beyond count less and less
-STEPS = 40  # evaluations, of each share
 FIT_SEED = 852780  # of all that a fit draws: the number of the paper's article, any would do
 
 
@@ -57,16 +53,18 @@ def start_by(problem: Problem, draws: int, shares: Sequence[float]) -> tuple[Pro
         thin = thinned(whole, LINES)
 
         def errors(x: Real, thin: Problem = thin, first: Real = first, share: float = share) -> Real:
-            return np.concatenate([equation_errors(thin, x, share), (x - first) / START_DEVIATION])
+            # of ln p, over that of an equation error: what the data do not know stays where it is
+            return np.concatenate([equation_errors(thin, x, share), (x - first) / 50.0])
 
+        # equation errors beyond 0.1 count less and less
         found = least_squares(
-            walled(errors, first), first, bounds=thin.bounds, loss="soft_l1", f_scale=LOSS, max_nfev=STEPS, xtol=1e-4,
+            walled(errors, first), first, bounds=thin.bounds, loss="soft_l1", f_scale=0.1, max_nfev=40, xtol=1e-4,
             ftol=1e-4,
         )  # fmt: skip
-        point = np.asarray(found.x)
+        point = found.x
     _, sizes, axes = np.linalg.svd(np.asarray(found.jac), full_matrices=False)
     deviation = math.sqrt(2 * found.cost / found.fun.size) / sizes
-    drawn = np.random.default_rng(FIT_SEED).standard_normal((draws, point.size)) * DRAWN * deviation
+    drawn = np.random.default_rng(FIT_SEED).standard_normal((draws, point.size)) * 2.0 * deviation
     return whole, min((point, *map(thin.inside, point + drawn @ axes)), key=partial(sum_of_squares, thin))
 
 
@@ -93,7 +91,8 @@ def equation_errors(problem: Problem, point: Real, share: float) -> Real:
 
 def with_gains(problem: Problem, point: Real) -> tuple[Problem, Real]:
     """The problem with the sign of each sensor's gain as the data have it at a point; the point with its size."""
-    parameters, point = list(problem.parameters), point.copy()
+    parameters = list(problem.parameters)
+    point = point.copy()
     for H, each in zip(problem.computed(point), problem.responses, strict=True):
         ratio = each.data.values / H
         if each.delay is not None:
@@ -104,7 +103,7 @@ def with_gains(problem: Problem, point: Real) -> tuple[Problem, Real]:
             own = parameters[each.gain]
             if np.median(ratio.real / abs(ratio)) < 0:
                 parameters[each.gain] = replace(own, start=-own.start)
-            point[each.gain] += float(np.median(np.log(abs(ratio))))
+            point[each.gain] += np.median(np.log(abs(ratio)))
     return replace(problem, parameters=tuple(parameters)), point
 
 
@@ -113,7 +112,8 @@ def aligning_delay(omega: Real, ratio: Complex) -> float:
 
     Phases wrap between far lines, so that no search comes there from 0.  It maximises abs(sum e^{i (phase + w tau)}).
     """
-    period, count = 2 * math.pi / omega[0], math.ceil(16 * min(omega[-1] / omega[0], LINES))
+    period = 2 * math.pi / omega[0]
+    count = math.ceil(16 * min(omega[-1] / omega[0], LINES))
     delays = np.linspace(-period, period, 2 * count + 1)
     phases = ratio[ratio != 0] / abs(ratio[ratio != 0])
     aligned = abs(np.exp(1j * np.outer(delays, omega[ratio != 0])) @ phases)
@@ -124,29 +124,19 @@ def thinned(problem: Problem, most: int) -> Problem:
     """The problem at a number of each response's frequencies at most."""
     responses = []
     for each in problem.responses:
-        w, values, sigma = each.data.omega, each.data.values, each.noise.sigma
+        w = each.data.omega
+        values = each.data.values
+        sigma = each.noise.sigma
         kept = np.unique(np.linspace(0, w.size - 1, min(w.size, most)).astype(int))
         kept = kept[np.isfinite(sigma[kept]) & (values[kept] != 0)]
-        responses.append(
-            replace(
-                each,
-                data=replace(each.data, omega=w[kept], values=values[kept], sigma=None, coherence=None),
-                noise=replace(each.noise, sigma=sigma[kept]),
-            )
-        )
+        responses.append(each.at(w[kept], values[kept], sigma[kept]))
     return replace(problem, responses=tuple(responses))
 
 
-NOISE_ALONE = 1e-6  # probability of a sum of squares by noise alone below which another start is tried
 MOST_EVALUATIONS = 60  # evaluations from one start
-CONTINUED = 8  # times as many more from the best of the starts: along a narrow valley
-FIRM_POINT = 1e-7  # of the coordinates: a step that changes less ends a search
-FIRM_SUM = 1e-9  # of the sum, likewise
 OPEN_DEVIATION = 1.0  # of ln p: a combination with a larger deviation (a factor of e) is not determined by the data
-WEAK = 0.1  # of ln p: a larger deviation is checked again
 SAME_SUM = 0.1  # of a sum of squares: a smaller difference is none
 EXCLUDED = 16.0  # of a sum of squares: noise alone makes up an effect of four deviations once in 15,000 fits
-RESCALED = 3  # times that a noise known up to a factor takes its factor from the residuals
 
 
 @dataclass(frozen=True)
@@ -200,7 +190,7 @@ class Solution:
     def misfit(self) -> float:
         """Minus ln of the likelihood, but for a constant: with the noise, where that is from the residuals."""
         sigmas = (each.noise.sigma for each in self.problem.responses)
-        return self.chi_squared / 2 + sum(2 * float(np.log(sigma[np.isfinite(sigma)]).sum()) for sigma in sigmas)
+        return self.chi_squared / 2 + sum(2 * np.log(sigma[np.isfinite(sigma)]).sum() for sigma in sigmas)
 
     @property
     def quantile(self) -> float:
@@ -225,7 +215,8 @@ def best_solution(problem: Problem, is_enough: Callable[[Solution], bool | None]
         at_start = _rescaled(nearest_minimum(*with_gains(problem, problem.start)))
         found.append(at_start)
         best = at_start if at_start.misfit < best.misfit - SAME_SUM else best
-    for _ in range(CONTINUED):
+    # as many more evaluations from the best of the starts: along a narrow valley
+    for _ in range(8):
         best = best if best.converged else nearest_minimum(best.problem, best.point)
     return replace(_nearest(best), starts=len(found))
 
@@ -236,7 +227,7 @@ def _nearest(found: Solution) -> Solution:
     A valley may be open where the search began and closed where it ended, where noise exceeds an effect too small to be
     measured (the rotary inertia of E I).  The point moves only where the sum of squares stays what it is.
     """
-    for limit, most in ((OPEN_DEVIATION, SAME_SUM), (WEAK, EXCLUDED)):
+    for limit, most in ((OPEN_DEVIATION, SAME_SUM), (0.1, EXCLUDED)):
         some = open_axes(found.jacobian, limit)
         if not some.size:
             continue
@@ -269,7 +260,8 @@ def is_explained(one: Solution) -> bool | None:
     """Whether noise alone gives such a sum often enough; None where its size was taken from the residuals."""
     if not one.has_known_noise:
         return None
-    return bool(chdtrc(max(one.freedom, 1), one.chi_squared) > NOISE_ALONE)
+    # the probability of a sum of squares by noise alone
+    return bool(chdtrc(max(one.freedom, 1), one.chi_squared) > 1e-6)
 
 
 def nearest_minimum(problem: Problem, start: Real, held: dict[int, float] | None = None) -> Solution:
@@ -277,33 +269,40 @@ def nearest_minimum(problem: Problem, start: Real, held: dict[int, float] | None
     held = held or {}
     point = start.copy()
     point[list(held)] = list(held.values())
-    free = np.delete(np.eye(start.size), list(held), axis=1)  # a column for each of the others
-    fixed = point - free @ free.T @ point
+    free = np.delete(np.arange(start.size), list(held))
     if not free.size:
         residuals = problem.residuals(point)
         return Solution(problem, point, residuals, np.zeros((residuals.size, start.size)), True, 1)
-    first, (low, high) = problem.inside(point) @ free, (each[free.any(axis=1)] for each in problem.bounds)
+
+    def at(x: Real) -> Real:
+        whole = point.copy()
+        whole[free] = x
+        return whole
 
     def jacobian(x: Real) -> Real:
-        return np.asarray(problem.jacobian(fixed + free @ x) @ free)
+        return problem.jacobian(at(x))[:, free]
 
+    first = problem.inside(point)[free]
+    low, high = problem.bounds
     found = least_squares(
-        walled(lambda x: problem.residuals(fixed + free @ x), first), first, jac=jacobian,
-        bounds=(low, high), x_scale="jac", xtol=FIRM_POINT, ftol=FIRM_SUM,
+        walled(lambda x: problem.residuals(at(x)), first), first, jac=jacobian,
+        bounds=(low[free], high[free]), x_scale="jac", xtol=1e-7, ftol=1e-9,
         gtol=None, max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
-    slopes = np.asarray(found.jac) @ free.T
-    return Solution(problem, fixed + free @ found.x, found.fun, slopes, bool(found.status > 0), 1)
+    slopes = np.zeros((found.fun.size, start.size))
+    slopes[:, free] = np.asarray(found.jac)
+    return Solution(problem, at(found.x), found.fun, slopes, bool(found.status > 0), 1)
 
 
 def _rescaled(found: Solution) -> Solution:
     """The solution with each noise that is known up to a factor multiplied by what its residuals say."""
     if found.has_known_noise:
         return found
-    for _ in range(RESCALED):
-        responses, share = [], found.residuals.size / max(found.freedom, 1)
+    for _ in range(3):
+        responses = []
+        share = found.residuals.size / max(found.freedom, 1)
         for each, own in zip(found.problem.responses, found.parts, strict=True):
-            factor = 1.0 if each.noise.is_known else math.sqrt(float(own @ own) / own.size * share)
+            factor = 1.0 if each.noise.is_known else math.sqrt((own @ own) / own.size * share)
             responses.append(replace(each, noise=replace(each.noise, sigma=each.noise.sigma * max(factor, 1e-12))))
         found = nearest_minimum(replace(found.problem, responses=tuple(responses)), found.point)
     return found
@@ -312,10 +311,6 @@ def _rescaled(found: Solution) -> Solution:
 Progress = Callable[[int, int, str], object]
 
 TAKES_PART = 0.1  # of a unit vector: a smaller component has no part in it
-ROUND = 0.02  # a power so near to 1 is written as 1
-LEVEL_REACHED = 0.01  # of a deviation: where a profile has reached its level
-BETTER = 0.05  # of a sum of squares: a profile that falls by more has left the valley of the best
-SECANT_STEPS = 12  # steps of the secant: three do but in a crooked valley
 REACHES = (0.5, 1.0, 2.0, 4.0, 6.0, 9.0)  # of ln p: where a number that does not matter is tried
 
 
@@ -359,7 +354,8 @@ def confidence_intervals(
     Along an open axis nothing changes, so one number of it is held while the others are profiled.  `progress` gets
     (done, total, key) before each.  Raises BetterError where a profile comes to a lower sum than the solution's.
     """
-    parameters, quantile = found.problem.parameters, found.quantile
+    parameters = found.problem.parameters
+    quantile = found.quantile
     sizes, axes = principal_axes(found.jacobian)
     is_open = sizes < 1.0 / OPEN_DEVIATION
     deviations = np.linalg.norm(axes[~is_open] / sizes[~is_open, None], axis=0).tolist()
@@ -373,11 +369,13 @@ def confidence_intervals(
         if progress is not None:
             progress(n, len(parameters), f"interval of {each.key}")
         low = high = deviation = None
-        point, own = float(found.point[n]), deviations[n]
+        point = float(found.point[n])
+        own = deviations[n]
         if not part[:, n].any():
             ends = [_end(found, n, way, own, quantile, held) if profile else point + way * quantile * own
                     for way in (-1, 1)]  # fmt: skip
-            (low, high), deviation = each.ends(ends), own * abs(each.value(point) if each.by_logarithm else each.size)
+            (low, high) = each.ends(ends)
+            deviation = own * each.per_coordinate(each.value(point))
         elif n in alone:
             low, high = _one_sided(found, n, quantile)
             words[alone[n]] = words[alone[n]] if low is None else ""
@@ -398,8 +396,10 @@ def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float | None, 
     A payload of next to nothing has an upper bound, a clamp that is all but rigid a lower one; None, None where there
     is neither.  The others are held: with them free the bound is farther by no more than a factor.
     """
-    each, low, high = found.problem.parameters[n], found.problem.bounds[0][n], found.problem.bounds[1][n]
-    if not each.by_logarithm:
+    each = found.problem.parameters[n]
+    low = found.problem.bounds[0][n]
+    high = found.problem.bounds[1][n]
+    if each.size:
         return None, None
 
     def excess(at: float) -> float:
@@ -408,11 +408,12 @@ def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float | None, 
         return sum_of_squares(found.problem, point) - found.chi_squared - quantile**2
 
     def end(way: int) -> float | None:
-        steps = (float(found.point[n]) + way * reach for reach in REACHES)
+        steps = (found.point[n] + way * reach for reach in REACHES)
         beyond = next((at for at in steps if low <= at <= high and excess(at) > 0), None)
         return None if beyond is None else each.value(float(brentq(excess, found.point[n], beyond, xtol=1e-4)))
 
-    lower, upper = end(-1), end(1)
+    lower = end(-1)
+    upper = end(1)
     return (None, None) if lower is None and upper is None else (lower or 0.0, upper)
 
 
@@ -421,25 +422,30 @@ def _end(found: Solution, n: int, way: int, deviation: float, quantile: float, h
 
     The root of that growth is nearly linear in the coordinate, so a secant finds it in two or three steps.
     """
-    low, high = found.problem.bounds[0][n], found.problem.bounds[1][n]
+    low = found.problem.bounds[0][n]
+    high = found.problem.bounds[1][n]
     rest = [m for m in range(found.point.size) if m != n and m not in held]
     slope = np.zeros(found.point.size)  # of the others where n is held elsewhere
     slope[rest] = -np.linalg.lstsq(found.jacobian[:, rest], found.jacobian[:, n], rcond=None)[0]
     slope[n] = 1.0
-    near, root_near = float(found.point[n]), 0.0
+    near = found.point[n]
+    root_near = 0.0
     at = near + way * quantile * deviation
-    for _ in range(SECANT_STEPS):
-        at = float(np.clip(at, low, high))
+    # three steps do but in a crooked valley
+    for _ in range(12):
+        at = np.clip(at, low, high)
         start = found.point + slope * (at - found.point[n])
         there = nearest_minimum(found.problem, start, held | {n: at})
         growth = there.chi_squared - found.chi_squared
-        if growth < -BETTER:
+        # of a sum of squares: a profile that falls by more has left the valley of the best
+        if growth < -0.05:
             raise BetterError(there)
         root = math.sqrt(max(growth, 0.0))
-        if abs(root - quantile) < LEVEL_REACHED or (at in (low, high) and root < quantile):
+        # of a deviation: there the profile has reached its level
+        if abs(root - quantile) < 0.01 or (at in (low, high) and root < quantile):
             return at
         step = (quantile - root) * (at - near) / (root - root_near) if root != root_near else 2 * (at - near)
-        near, root_near, at = at, root, at + float(np.clip(step, -3 * abs(at - near), 3 * abs(at - near)))
+        near, root_near, at = at, root, at + np.clip(step, -3 * abs(at - near), 3 * abs(at - near))
     return at
 
 
@@ -452,7 +458,8 @@ def _undetermined(axis: Real, keys: Sequence[str]) -> str:
     if len(part) == 2:
         power = -axis[part[0]] / axis[part[1]]  # first * second^power does not change along the axis
         known = f"{names[0]} {'*' if power > 0 else '/'} {names[1]}"
-        known += "" if abs(abs(power) - 1) < ROUND else f"^{abs(power):.3g}"
+        # a power so near to 1 is written as 1
+        known += "" if abs(abs(power) - 1) < 0.02 else f"^{abs(power):.3g}"
         return f"{names[0]} and {names[1]} are not determined by these data: only {known} is"
     shares = ", ".join(f"{name} {axis[n] / abs(axis[part[0]]):+.3g} %" for name, n in zip(names, part, strict=True))
     return f"not determined by these data: {shares} together change nothing"

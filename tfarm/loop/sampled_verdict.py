@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, AnyLaw, Arm, arm_and_law, as_law, cancelled
 from tfarm.arm.chain import Chain, Sampling
 from tfarm.arm.checks import whole
+from tfarm.arm.stages import Consumer
 from tfarm.crossing import Window
 from tfarm.dsp.discretise import RULE, rule_in_words
 from tfarm.dsp.stages import admit, not_covered
@@ -32,6 +33,13 @@ from tfarm.loop.sampled_modes import ModeTable, dominant, mode_table
 from tfarm.records import record
 from tfarm.schema import Quantity
 
+SAMPLED_LOOP = Consumer(
+    "sampled loop",
+    acts=("anti-alias filter", "hub rate", "law", "hold", "delay", "hub damping", "plant"),
+    named=("encoder", "amplifier steps", "amplifier range", "DAC steps", "DAC range", "torque limit"),
+    partly=("arithmetic",),
+    none=("reference", "volts"),
+)
 LAW_DELAY_DIGITS = 4  # of the delay margin of a law that is more than gains at the hub
 UNDAMPED_MODES = 20  # of an undamped arm, whose verdict is of the first modes alone
 FEWEST_COMPARED = 8  # modes of the smallest loop, twice as many in each next
@@ -136,7 +144,7 @@ class Verdict(OfLoop):
     @property
     def omitted(self) -> str:
         """The keys of the chain that the verdict does not cover, as the end of its certainty."""
-        return not_covered("verdict", self.loop.chain)
+        return not_covered(SAMPLED_LOOP, self.loop.chain)
 
     @property
     def time_constant(self) -> Annotated[float | None, Quantity("dominant time constant", "s",
@@ -152,7 +160,7 @@ def sampled_verdict(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count:
     radius that of the loop with every mode of the band.  Raises ParameterError as `sampled_loop` does, and for a count
     outside 1..400.
     """
-    arm, chain = admit("verdict", arm, chain)
+    arm, chain = admit(SAMPLED_LOOP, arm, chain)
     if count is not None:
         count = whole("modes", count, 1, MOST_COUNT, f"a whole number of flexible modes from 1 to {MOST_COUNT}")
         return Verdict(sampled_loop(arm, law, chain, count=count))
@@ -341,7 +349,7 @@ def sampled(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | N
     `count` is the number of flexible modes, by default enough for the verdict.  Raises ParameterError for a locked hub,
     an algebraic loop, an unknown signal, and a law in z whose period is not the chain's.
     """
-    arm, chain = admit("margins", arm, chain)
+    arm, chain = admit(SAMPLED_LOOP, arm, chain)
     arm, law = arm_and_law(arm, law)
     return Analysis(sampled_verdict(arm, law, chain, count=count), count or UNDAMPED_MODES)
 

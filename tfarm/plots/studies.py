@@ -107,9 +107,9 @@ def key_label(key: str, found: Study) -> str:
     """A varied number with its SI unit."""
     plan = found.parts.plan
     if key.startswith("law."):
-        return number_label(key.removeprefix("law."), plan.arm, plan.law)
+        return number_label(key.removeprefix("law."), plan.case.arm, plan.case.law)
     is_known = ".".join(word for word in key.split(".") if not word.isdecimal()) in file_keys()
-    return f"{key} [{unit(file_key(key, plan.arm).unit if is_known else '') or '−'}]"
+    return f"{key} [{unit(file_key(key, plan.case.arm).unit if is_known else '') or '−'}]"
 
 
 def _shown(found: Study, quantity: str | None = None) -> tuple[list[Spread], list[str]]:
@@ -171,4 +171,4 @@ def study_band(found: Study, output: str = "root_moment", *, ax: Axes) -> None:
     for n, curve in enumerate(band.curves[:: max(1, len(band.curves) // 12)]):
         ax.plot(omega, curve, color=GREY, lw=0.5, alpha=0.6, zorder=1.5, label="single arms" * (not n))
     ax.plot(omega, band.median, color=BLUE, lw=1.4, label="median, at each frequency")
-    over_frequency(ax, f"{band.label} [dB re 1 {unit_over(band.unit, found.parts.plan.arm.input_unit)}]")
+    over_frequency(ax, f"{band.label} [dB re 1 {unit_over(band.unit, found.parts.plan.case.arm.input_unit)}]")

@@ -15,7 +15,7 @@ from tfarm.digits import scientific
 from tfarm.dsp import Chain
 from tfarm.dsp.stages import admit
 from tfarm.errors import TfarmError, require
-from tfarm.exported.live_loop import LIVE_COLUMNS, law_data, live_data
+from tfarm.exported.live_loop import CONSUMER, LIVE_COLUMNS, law_data, live_data
 from tfarm.loop.panels import PANEL_SAMPLES
 from tfarm.plots.style import GOOD, LOW, MARGINAL, POOR, STABLE, UNSTABLE
 from tfarm.report.page import (
@@ -65,7 +65,7 @@ def save_live(report: ArmReport, folder: Path) -> None:
     law = next((law for each in laws if has_sliders(law := as_law(each.law))), as_law(default_gains(arm)))
     arm, _ = arm_and_law(arm, law)
     try:
-        admit("live page", arm, chain)
+        admit(CONSUMER, arm, chain)
         numbers = law_data(arm, chain, law) if law.gains is None else live_data(arm, chain, law.gains)
     except TfarmError as error:
         write_text(out, render("live_failed.html", title=title, why=str(error)))
@@ -142,7 +142,7 @@ def explore(arm: Arm, law: AnyLaw | None = None, chain: Chain | None = None) -> 
     ParameterError
         For what is no arm, and one whose hub does not turn freely or has no inertia.
     """
-    report = ArmReport(*admit("live page", arm, chain), () if law is None else (GivenLaw(law),))
+    report = ArmReport(*admit(CONSUMER, arm, chain), () if law is None else (GivenLaw(law),))
     require(is_live(report), "arm", arm.name, "give one whose hub turns freely and has inertia")
     place = Path(mkdtemp(prefix="tfarm-"))
     (folder := place / "arm").mkdir()

@@ -74,16 +74,15 @@ def _quantities(kind: Any) -> dict[str, Quantity]:
             read: Any = member.func if is_lazy else member.fget if isinstance(member, property) else None
             if read is not None and "Annotated" in str(read.__annotations__.get("return")):
                 hints[name] = get_type_hints(read, include_extras=True)["return"]
-    return {
-        name: replace(
-            of,
-            is_number=bool({int, float, complex, At} & {kind, *get_args(kind)}),
-            key=of.key or (f"{name}_{SLUGS[of.unit]}" if of.unit in SLUGS else name),
-        )
-        for name, (kind, *marks) in ((name, get_args(hint) or (hint,)) for name, hint in hints.items())
-        for of in marks
-        if isinstance(of, Quantity)
-    }
+    found = {}
+    for name, hint in hints.items():
+        for of in getattr(hint, "__metadata__", ()):
+            if isinstance(of, Quantity):
+                kind = get_args(hint)[0]
+                is_number = bool({int, float, complex, At} & {kind, *get_args(kind)})
+                key = of.key or (f"{name}_{SLUGS[of.unit]}" if of.unit in SLUGS else name)
+                found[name] = replace(of, is_number=is_number, key=key)
+    return found
 
 
 def quantities_of(record: Any, parent: Any = None) -> dict[str, Quantity]:
@@ -141,9 +140,6 @@ def entries(record: Any, under: str = "") -> Iterator[tuple[str, Quantity, Any]]
 # ------------------------------------------------------------------------------------------------------------- JSON
 
 
-SCALARS = (float, int, str, bool, type(None))  # of JSON
-
-
 def to_dict(record: Any) -> dict[str, Any]:
     """The quantities of a record by their keys, as JSON has them: a complex number is [real, imaginary]."""
     found: dict[str, Any] = {}
@@ -161,7 +157,7 @@ def to_dict(record: Any) -> dict[str, Any]:
 
 def to_json_value(value: Any) -> Any:
     """One entry of `to_dict`.  Infinities stay; they are texts in `to_json`."""
-    if type(value) in SCALARS:
+    if value is None or type(value) in (float, int, str, bool):
         return value
     if is_table(value):
         columns = {of.key: to_json_value(getattr(value, name)) for name, of in quantities(type(value)).items()}

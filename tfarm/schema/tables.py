@@ -206,10 +206,10 @@ def sections(record: Any, title: str = "") -> list[Section]:
     first: list[Section] = []
     later: list[Section] = []
     for value, of, owner in with_flat(record):
-        if not of.label or ((value is None or of.curve) and not of.is_number):
+        if not of.label:
             continue
         if value is None or of.curve:
-            own.pairs.append((of.label, NO_VALUE))
+            own.pairs.extend([(of.label, NO_VALUE)] * of.is_number)
         elif is_table(value) or is_list_of_records(value):
             (first if of.first else later).append(Section(of.label, table=table(value, parent=owner)))
         elif is_declared(value) and not isinstance(value, At) and not hasattr(value, "as_text"):

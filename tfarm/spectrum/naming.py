@@ -18,7 +18,6 @@ from tfarm.exact.compiled import compiled
 from tfarm.exact.layout import Reading, readings
 from tfarm.exact.sweep import AXIS, fill_free
 from tfarm.exact.system import Spring, System
-from tfarm.exact.uniform import fill_ends
 from tfarm.records import read_only
 
 from .box import REAL_SHARE, Function, newton
@@ -31,8 +30,7 @@ HALVINGS = (250, *[80] * 8)  # of steps, after which stray branches are lost and
 LATE_HALVINGS = 8  # after the steps that there are in all: roots that are stray are soon lost
 AROUND = np.array([1, 1.02, 0.98, 1 + 0.02j, 1 - 0.02j, 1.2, 0.8, 1 + 0.2j, 1 - 0.2j])  # starts next to a guess, of it
 NEAR_REAL = 1e-7  # of its size: the imaginary part of a double zero is rounding
-NO_ENDS = np.empty((0, 4))  # the table of no output of a uniform link
-NO_OUTPUT = np.empty((0, len(Reading._fields)))  # and that of a chain
+NO_OUTPUT = np.empty((0, len(Reading._fields)))  # the table of a layout
 
 
 def function_of(k: System) -> Function:
@@ -42,11 +40,8 @@ def function_of(k: System) -> Function:
 
 
 @compiled
-def _newton(s: Any, rows: Any, ends: Any, axis: Any, at_rest: int, singular: Any) -> None:
-    """Replace guesses s (n,) by the zeros of D/s^at_rest next to them, or NaN, as `following.settled` does.
-
-    `axis` is None for a uniform link: numba then compiles neither the sweep of a chain nor, for a chain, the other.
-    """
+def _newton(s: Any, rows: Any, ends: Any, at_rest: int, singular: Any) -> None:
+    """Replace guesses s (n,) by the zeros of D/s^at_rest next to them, or NaN, as `following.settled` does."""
     moving, count = np.empty(s.size, np.int64), 0
     for i in range(s.size):
         if not np.isnan(s[i]):
@@ -61,10 +56,7 @@ def _newton(s: Any, rows: Any, ends: Any, axis: Any, at_rest: int, singular: Any
                 near = min(near, abs(1.0 - here / each))
             h[i] = DIFFERENCE_STEP * max(abs(here) * near, 1e-300)
             at[3 * i], at[3 * i + 1], at[3 * i + 2] = here, here + h[i], here - h[i]
-        if axis is None:
-            fill_ends(at[: 3 * count], rows, ends, NO_ENDS, False, found, lost)
-        else:
-            fill_free(at[: 3 * count], rows, ends, axis, NO_OUTPUT, found, lost)
+        fill_free(at[: 3 * count], rows, ends, AXIS, NO_OUTPUT, found, lost)
         kept = 0
         for i in range(count):
             n, j = moving[i], 3 * i
@@ -110,7 +102,6 @@ class Damping:
         still, layout = (readings(k, (), 0.0) for k in (self.k.with_damping(0.0), self.k))
         self.rows = still.rows, layout.rows - still.rows
         self.ends = still.ends, layout.ends - still.ends
-        self.axis = AXIS if layout.ends_table is None else None
         self.at_rest, self.points = self.k.at_rest, np.array(self.k.singular)
 
     def near(self, values: Real, guess: Complex) -> Complex:
@@ -123,7 +114,7 @@ class Damping:
         rows = read_only(rows + values[:, None, None] * of_rows)  # as those of a layout are
         ends = read_only(ends + values[:, None] * of_ends)
         for n, here in enumerate(found):
-            _newton(here, rows[n], ends[n], self.axis, self.at_rest, self.points / values[n])
+            _newton(here, rows[n], ends[n], self.at_rest, self.points / values[n])
         return found * units
 
     def complete(self, value: float, guess: Complex) -> Complex:

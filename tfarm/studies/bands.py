@@ -32,14 +32,14 @@ def study_band(found: Study, output: str, points: int = 1200, most: int = 100) -
     Raises ParameterError for an unknown output, and where no arm has that response.
     """
     plan, table = found.parts.plan, found.table()
-    omega = np.geomspace(*resonant_band(plan.arm), points)
-    row = transfer(plan.arm, output).rows[0]
+    omega = np.geomspace(*resonant_band(plan.case.arm), points)
+    row = transfer(plan.case.arm, output).rows[0]
     curves = []
     for n in range(0, found.done, 1 + (found.done - 1) // most):
         # of an arm that is illegal there is none
         with suppress(TfarmError):
             one = plan.subjects.at([float(table[key][n]) for key in plan.space.keys])
-            curves.append(decibels(transfer(one.arm, output)(1j * omega)))
+            curves.append(decibels(transfer(one.case.arm, output)(1j * omega)))
     require(curves, "output", output, "no arm of the study has that response")
     low, median, high = np.quantile(curves, [QUANTILES[end] for end in ("low", "median", "high")], axis=0)
     return StudyBand(omega, curves, low, median, high, row.label, row.unit)

@@ -1,4 +1,4 @@
-"""Cases of studies: sections and hubs that the paper leaves open, and the learning curves of the gain tuner.
+"""Candidates: sections and hubs that the paper leaves open, and the learning curves of the gain tuner.
 
 The paper gives an area, 6e-4 m^2, but neither the second moment I nor the hub inertia I_h.  Two studies vary them one
 at a time, everything else being the arm's own.  Both rest on the exact solution, and the sensitivities are exact too
@@ -14,43 +14,26 @@ from typing import Annotated, Any
 import numpy as np
 
 from tfarm import tuner
-from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback, Section
+from tfarm.arm import MOMENT_GAIN, PLANE, Arm, Section, as_law
 from tfarm.arm.checks import whole
 from tfarm.arrays import Real
+from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError, require
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import default_gains
+from tfarm.tuner.tuning import tuned
 
-from .quantities import FREQUENCY, INTERVAL, SENSITIVITY, STABILITY, TRIAL_COST
-from .running import Chunk, Plan, Progress, chunk
-from .space import Distribution, Space
+from .quantities import FAILED, FREQUENCY, INTERVAL, SENSITIVITY, STABILITY, prepare, sources_of, values_of
+from .running import Progress
+from .space import Subject, Subjects
 
 STUDIED_MODES = 4  # flexible modes, by default
-AREA = 6.0e-4  # m^2, the paper's
 DEPTHS = (0.002, 0.003, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.030, 0.040, 0.060)  # m, for that area
 INERTIAS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # kg m^2, about the value assumed for the paper's hub
-HELD = "area, shear factor and all else held: I = A depth^2/12, so one per cent of depth counts twice"
-LIMIT, LIMIT_IS = f"{INTERVAL}.{MOMENT_GAIN}.high", f"{INTERVAL}.{MOMENT_GAIN}.high_is"
 OWN_VALUE = 1e-9  # relative: a candidate nearer to the arm's own value is that value
-MOST_SEEDS = 10_000
-THREADS = 2  # compiled loops let other threads run; a report uses no more cores
-FINAL, ZERO, STOPPED = "tuner.cost", "tuner.is_zero", "tuner.stopped"
-
-
-def results(plan: Plan, first: int, last: int) -> Chunk:
-    """Return the table of rows first to last - 1.  Raises ConvergenceError for the first row without a result."""
-    table = chunk(plan, first, last)
-    for reason in filter(None, table["failed"]):
-        raise ConvergenceError(reason, None, None)
-    return table
-
-
-def over_values(key: str, values: Sequence[float]) -> Space:
-    """Return the space of the values of one number."""
-    return Space(over={key: Distribution("values", tuple(values))})
 
 
 # ------------------------------------------------------------ sections and hubs
@@ -176,14 +159,24 @@ def section_study(arm: Arm, count: int = STUDIED_MODES) -> Candidates:
     Depths are 2 to 60 mm for the paper's area, scaled with the root of the area to two digits, and that of the
     rectangle with the arm's own second moment.  The shear factor is the arm's own throughout.
     """
-    area, own = arm.link.section.area, math.sqrt(12.0) * arm.link.section.radius_of_gyration
-    depths = _with_own([float(f"{each * math.sqrt(area / AREA):.2g}") for each in DEPTHS], own)
+    area = arm.link.section.area
+    own = math.sqrt(12.0) * arm.link.section.radius_of_gyration
+    # the paper's area [m^2]
+    depths = _with_own([float(f"{each * math.sqrt(area / 6.0e-4):.2g}") for each in DEPTHS], own)
     known = {"depth": depths, "width": [area / depth for depth in depths],
              "second_moment": [area * depth**2 / 12 for depth in depths]}  # fmt: skip
     plain = Section.general(area=area, second_moment=area * own**2 / 12, shear_factor=arm.link.shear_factor)
     general = replace(arm, link=replace(arm.link, section=plain))  # whose file has a second moment
     rows = _candidates(general, count, "link.section.second_moment", depths.index(own), known)
-    return Candidates(arm, HELD, np.empty(0), np.empty(0), area, arm.link.shear_factor, rows)
+    return Candidates(
+        arm,
+        "area, shear factor and all else held: I = A depth^2/12, so one per cent of depth counts twice",
+        np.empty(0),
+        np.empty(0),
+        area,
+        arm.link.shear_factor,
+        rows,
+    )
 
 
 def hub_study(arm: Arm, count: int = STUDIED_MODES) -> Candidates:
@@ -204,21 +197,31 @@ def hub_study(arm: Arm, count: int = STUDIED_MODES) -> Candidates:
     return Candidates(arm, "all else held", locked, pinned, arm.link.section.area, arm.link.shear_factor, rows)
 
 
-def _candidates(arm: Arm, count: int, key: str, own: int, known: Mapping[str, Sequence[float]]) -> list[Candidate]:
+def _candidates(arm: Arm, count: int, key: str, own: int, known: Mapping[str, Sequence[Any]]) -> list[Candidate]:
     """Return the rows of a study of that key, whose values are the last of those known; `own` is the arm's own row."""
     parameter, values = list(known.items())[-1]
+    limit = f"{INTERVAL}.{MOMENT_GAIN}.high"
     names = [f"{of}.{n}" for of in (FREQUENCY, f"{SENSITIVITY}.{parameter}") for n in range(1, count + 1)]
-    words = (STABILITY, LIMIT, LIMIT_IS) if has_hub_inertia(arm) else ()  # no loop of a locked hub or a free pin
-    plan = Plan(arm, default_gains(arm), Chain(), over_values(key, values), (*names, *words))
-    table = results(plan, 0, len(values))
-    rows = list(zip(*(table[name] for name in names), strict=True))
-    columns: dict[str, Sequence[Any]] = {**known, "natural_frequency": [[*row[:count]] for row in rows],
-                                         "sensitivity": [[*row[count:]] for row in rows]}  # fmt: skip
-    if words:
-        columns |= {"verdict": table[STABILITY], "K2_below": table[LIMIT],
-                    "K2_below_is_edge": [kind == "edge" for kind in table[LIMIT_IS]]}  # fmt: skip
-    return [Candidate(is_own=n == own, **{name: column[n] for name, column in columns.items()})
-            for n in range(len(values))]  # fmt: skip
+    # no loop of a locked hub or a free pin
+    words = (STABILITY, limit, f"{limit}_is") if has_hub_inertia(arm) else ()
+    family = Subjects(Case(arm, as_law(default_gains(arm))), (key,))
+    subjects: list[Subject] = [family.at((value,)) for value in values]
+    prepare(subjects, names)
+    sources, rows = sources_of((*names, *words)), []
+    for n, one in enumerate(subjects):
+        found = values_of(one, sources)
+        if found[FAILED]:
+            raise ConvergenceError(found[FAILED], None, None)
+        own_numbers = [found[name] for name in names]
+        loop: dict[str, Any] = {}
+        if words:
+            verdict, below, kind = (found[name] for name in words)
+            loop = {"verdict": verdict, "K2_below": below, "K2_below_is_edge": kind == "edge"}
+        rows.append(Candidate(
+            is_own=n == own, natural_frequency=own_numbers[:count], sensitivity=own_numbers[count:], **loop,
+            **{name: column[n] for name, column in known.items()},
+        ))  # fmt: skip
+    return rows
 
 
 def _with_own(candidates: Sequence[float], own: float) -> list[float]:
@@ -236,17 +239,19 @@ def learning_curves(
 
     `progress` gets (done, total, text).  Raises ParameterError for a number of seeds out of range.
     """
-    seeds = whole("seeds", seeds, 1, MOST_SEEDS, f"a whole number of seeds from 1 to {MOST_SEEDS}")
-    costs = [f"{TRIAL_COST}.{n}" for n in range(1, plan.trials + 1)]
-    space = over_values("tuner.seed", range(plan.seed, plan.seed + seeds))
-    own, tables = Plan(arm, HubFeedback(), chain, space, (FINAL, ZERO, STOPPED, *costs), plan), list[dict[str, Any]]()
-    with ThreadPoolExecutor(THREADS) as pool:
-        for table in pool.map(lambda n: results(own, n, n + 1), range(seeds)):
-            tables.append({name: np.inf if value is None else value for name, (value,) in table.items()})
-            progress(len(tables), seeds, "learning curves")
+    most = 10_000
+    seeds = whole("seeds", seeds, 1, most, f"a whole number of seeds from 1 to {most}")
+    costs = np.full((seeds, plan.trials), np.inf)
+    found: list[tuner.Training] = []
+    # compiled loops let other threads run; a report uses no more cores
+    with ThreadPoolExecutor(2) as pool:
+        for training in pool.map(lambda n: tuned(arm, chain, plan, seed=plan.seed + n).training, range(seeds)):
+            costs[len(found), : training.costs.size] = training.costs
+            found.append(training)
+            progress(len(found), seeds, "learning curves")
     return tuner.LearningCurves(
-        costs=np.array([[each[name] for name in costs] for each in tables]),
-        final=np.array([each[FINAL] for each in tables]),
-        diverged=sum(each[STOPPED] != np.inf for each in tables),
-        died=sum(bool(each[ZERO]) for each in tables),
+        costs=costs,
+        final=np.array([np.inf if each.stopped else each.result.cost for each in found]),
+        diverged=sum(each.stopped is not None for each in found),
+        died=sum(each.died for each in found),
     )

@@ -13,14 +13,14 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
 import scipy  # whose statistics take half a second to load
 
-from tfarm.arm import PLANE, as_law
+from tfarm.arm import PLANE
 from tfarm.arrays import Real
 from tfarm.assessment.card import LoopCard, loop_card, words_of, words_of_samples
 from tfarm.assessment.step import LoopResponse, step
@@ -40,20 +40,22 @@ from .space import Subject
 
 FAILED = "failed"  # column of the reason of a missing result
 LISTED = 5  # modes and poles of a row
-LOOPS = ("continuous", "sampled")
-SCENARIO = "slew"  # of the time response
-CARD = "card"  # the result card of both loops
 NO_PARENT = Quantity()
-FREQUENCY, RATIO = "modes.natural_frequency_rad_s", "damped_modes.damping_ratio"
-SENSITIVITY, INTERVAL, STABILITY, TRIAL_COST = "sensitivity", "interval", "interval.verdict", "tuner.trial_cost"
-UNSTABLE, REAL, IMAGINARY = "poles.unstable", "poles.re_1_s", "poles.im_rad_s"
+LOOPS = ("continuous", "sampled")
+CARD = "card"  # the result card of both loops
+FREQUENCY = "modes.natural_frequency_rad_s"
+RATIO = "damped_modes.damping_ratio"
+SENSITIVITY = "sensitivity"
+INTERVAL = "interval"
+STABILITY = "interval.verdict"
+TRIAL_COST = "tuner.trial_cost"
+UNSTABLE = "poles.unstable"
+REAL = "poles.re_1_s"
+IMAGINARY = "poles.im_rad_s"
 
 
 CONFIDENCE = 0.95
 QUANTILES = {"least": 0.0, "low": 0.05, "median": 0.5, "high": 0.95, "largest": 1.0}
-SIGNIFICANT = 0.05  # of a rank correlation: a larger probability of chance names no driver
-FEWEST_RANKED = 10  # rows of a rank correlation
-CERTAINTIES = ("exact", "certified", "converged", "approximate", "not determined")
 STABLE = "stable"
 Values = Callable[[Subject, Set[str]], Mapping[str, Any]]  # of an arm, in these columns
 Asked = tuple[Mapping[str, Quantity], Values]  # columns, and their values
@@ -91,10 +93,13 @@ def entries_of(kind: Any, value: Any, under: str, parent: Quantity = NO_PARENT) 
     The first entry without a label (the value of a graded margin) has the name and the quantity of its parent.
     """
     for name, of in quantities(kind).items():
-        kinds, own = _kinds(kind)[name], None if value is None else getattr(value, name)
-        place, column = f"{under}.{of.key}", replace(of, label=f"{parent.label} {of.label}".strip() * bool(of.label))
+        kinds = _kinds(kind)[name]
+        own = None if value is None else getattr(value, name)
+        place = f"{under}.{of.key}"
+        column = replace(of, label=f"{parent.label} {of.label}".strip() * bool(of.label))
         if issubclass(kind, tuple) and name == kind._fields[0]:
-            place, column = under, replace(parent, help=parent.help or of.help)
+            place = under
+            column = replace(parent, help=parent.help or of.help)
         inner = next(filter(quantities, kinds), None)
         if inner is not None:
             yield from entries_of(inner, own, place, column)
@@ -116,15 +121,15 @@ def _card_of(loop: str) -> Asked:
     """Return the entries of the card of a loop, of which stability and its certainty need the verdict alone."""
 
     def values(one: Subject, names: Set[str]) -> dict[str, Any]:
-        law = as_law(one.law)
-        if loop == "continuous" and law.is_discrete:
+        case = one.case
+        if loop == "continuous" and case.law.is_discrete:
             return {}
         if not names <= {f"{loop}.stability", f"{loop}.certainty"}:
-            card = loop_card(loop, one.arm, law, one.chain)
+            card = loop_card(loop, case.arm, case.law, case.chain)
             return {name: value for name, _, value in entries_of(LoopCard, card, loop)}
         known = (
-            words_of(stability(one.driven_arm, law), one.chain) if loop == "continuous"
-            else words_of_samples(sampled(one.arm, law, one.chain).verdict)
+            words_of(stability(one.driven_arm, case.law), case.chain) if loop == "continuous"
+            else words_of_samples(sampled(case.arm, case.law, case.chain).verdict)
         )  # fmt: skip
         return {f"{loop}.{key}": text for key, text in known.items()}
 
@@ -132,14 +137,14 @@ def _card_of(loop: str) -> Asked:
 
 
 def _step_of(one: Subject, _: Set[str]) -> dict[str, Any]:
-    found = step(one.arm, one.law, one.chain, SCENARIO)
+    found = step(one.case.arm, one.case.law, one.case.chain, "slew")
     return {name: value for loop in LOOPS
             for name, _, value in entries_of(LoopResponse, getattr(found, loop), f"step.{loop}")}  # fmt: skip
 
 
 def _modes_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
     count = _most(names)
-    return _numbered(FREQUENCY, modes(one.arm, count).natural_frequency[-count:])
+    return _numbered(FREQUENCY, modes(one.case.arm, count).natural_frequency[-count:])
 
 
 def prepare(subjects: Sequence[Subject], names: Sequence[str]) -> None:
@@ -150,14 +155,14 @@ def prepare(subjects: Sequence[Subject], names: Sequence[str]) -> None:
     numbers = {name for name in names if first_of(name) == f"{FREQUENCY}.1"}
     alike = defaultdict(list)
     for one in subjects if numbers else ():
-        alike[one.arm.has_rigid_mode].append(system_of(one.arm, one.arm.theory).undamped)
+        alike[one.case.arm.has_rigid_mode].append(system_of(one.case.arm, one.case.arm.theory).undamped)
     for rigid, systems in alike.items():
         list_frequencies(systems, rigid + 1, rigid + _most(numbers))
 
 
 def _sensitivities_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
     count = _most(names)
-    return {name: value for parameter, values in modes(one.arm, count).sensitivity.items()
+    return {name: value for parameter, values in modes(one.case.arm, count).sensitivity.items()
             for name, value in _numbered(f"{SENSITIVITY}.{parameter}", values[-count:] + 0.0).items()}  # fmt: skip
 
 
@@ -165,7 +170,7 @@ def _intervals_of(one: Subject, names: Set[str]) -> dict[str, Any]:
     """Stability and intervals of gains at the hub; undecided, without intervals, where poles cannot be counted."""
     found: dict[str, Any] = {STABILITY: "undecided"}
     with suppress(ConvergenceError):
-        verdict = stability(one.driven_arm, one.law)
+        verdict = stability(one.driven_arm, one.case.law)
         gains = [gain for gain in PLANE if gain in verdict.loop.numbers and any(f".{gain}." in name for name in names)]
         for gain, of in windows_of(verdict, gains).items():
             found |= {f"{INTERVAL}.{gain}.{name}": getattr(of.interval, name, None) for name in Interval._fields}
@@ -174,13 +179,13 @@ def _intervals_of(one: Subject, names: Set[str]) -> dict[str, Any]:
 
 
 def _damped_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
-    found = damped_modes(modes(one.arm, _most(names)))
+    found = damped_modes(modes(one.case.arm, _most(names)))
     s = found.eigenvalues[found.index > 0, 0]
     return _numbered(RATIO, -s.real / abs(s))
 
 
 def _poles_of(one: Subject, _: Set[str]) -> dict[str, float | None]:
-    found = closed_loop_poles(one.driven_arm, one.law)
+    found = closed_loop_poles(one.driven_arm, one.case.law)
     s = found.values
     return {UNSTABLE: float(found.unstable), **_numbered(REAL, s.real), **_numbered(IMAGINARY, s.imag)}
 
@@ -196,7 +201,7 @@ def _columns(name: str, label: str, unit: str, meaning: str) -> dict[str, Quanti
 
 
 def _tuner_of(one: Subject, _: Set[str]) -> dict[str, Any]:
-    tuning = tuned(one.arm, one.chain, one.plan, **one.tuner)
+    tuning = tuned(one.case.arm, one.case.chain, one.plan, **one.tuner)
     training = tuning.training
     return {
         **_numbered(TRIAL_COST, training.costs),
@@ -285,7 +290,8 @@ def sources_of(names: Sequence[str]) -> list[tuple[Set[str], Values]]:
 
 def values_of(one: Subject, sources: Sequence[tuple[Set[str], Values]]) -> dict[str, Any]:
     """Return the values of columns (`sources_of`) for an arm, and under `FAILED` the reason of missing ones."""
-    found, reasons = dict[str, Any](), []
+    found = dict[str, Any]()
+    reasons = []
     for own, values in sources:
         try:
             found |= values(one, own)
@@ -298,8 +304,7 @@ def values_of(one: Subject, sources: Sequence[tuple[Set[str], Values]]) -> dict[
 # ------------------------------------------------------------------------------------------------------------ findings
 
 
-@dataclass(frozen=True, kw_only=True)
-class StableShare:
+class StableShare(NamedTuple):
     """Stable arms of one loop."""
 
     loop: Annotated[str, Quantity("loop", help="continuous-time or sampled")]
@@ -322,8 +327,7 @@ class StableShare:
         return f"{text}: at least {percent:g} % of all with {100 * CONFIDENCE:g} % confidence"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Spread:
+class Spread(NamedTuple):
     """Distribution of a quantity over the arms."""
 
     name: Annotated[str, Quantity(help="column of the table")]
@@ -339,8 +343,7 @@ class Spread:
     correlation: Annotated[float | None, Quantity("rank correlation", "", 2, help="Spearman's, of that number")]
 
 
-@dataclass(frozen=True)
-class Failure:
+class Failure(NamedTuple):
     """A reason of missing results."""
 
     reason: Annotated[str, Quantity("reason", help="error of the first of these arms, without its numbers")]
@@ -359,12 +362,15 @@ def shares_of(table: Mapping[str, Any], names: Sequence[str], is_independent: bo
     found = []
     for loop in [each for each in LOOPS if f"{each}.stability" in names]:
         words = table[f"{loop}.stability"]
-        stable, open_, count = int((words == STABLE).sum()), int((words == "").sum()), len(words)
+        stable = int((words == STABLE).sum())
+        open_ = int((words == "").sum())
+        count = len(words)
         texts = table.get(f"{loop}.certainty", np.full(count, ""))[words == STABLE].tolist()
         known = [text.partition(" ")[0].rstrip(",") for text in texts]
+        weakest = ["exact", "certified", "converged", "approximate", "not determined", ""]
         found.append(StableShare(
             loop=loop.replace("continuous", "continuous-time"), stable=stable, open=open_, other=count - stable - open_,
-            certainty=max(known, key=(*CERTAINTIES, "").index, default=""),
+            certainty=max(known, key=weakest.index, default=""),
             at_least=Percent(least_share(stable, count)) if is_independent else None,
         ))  # fmt: skip
     return tuple(found)
@@ -387,8 +393,9 @@ def spreads_of(table: Mapping[str, Any], names: Sequence[str], keys: Sequence[st
 def _driver(inputs: Mapping[str, Real], values: Real) -> tuple[str | None, float | None]:
     """Return the varied number of the largest significant rank correlation, and that."""
     known = {key: scipy.stats.spearmanr(column, values) for key, column in inputs.items()
-             if len(values) >= FEWEST_RANKED and np.ptp(column) > 0 and np.ptp(values) > 0}  # fmt: skip
-    level = SIGNIFICANT / max(1, len(inputs))  # Bonferroni: of several numbers one is often near it by chance
+             if len(values) >= 10 and np.ptp(column) > 0 and np.ptp(values) > 0}  # fmt: skip
+    # Bonferroni: of several numbers one is often near it by chance
+    level = 0.05 / max(1, len(inputs))  # Bonferroni: of several numbers one is often near it by chance
     found = {key: float(of.statistic) for key, of in known.items() if of.pvalue < level}
     return max(found.items(), key=lambda each: abs(each[1]), default=(None, None))
 

@@ -22,10 +22,9 @@ from typing import Any
 
 import numpy as np
 
-from tfarm.arm import AnyLaw, Arm
 from tfarm.arm.schema import StrictTable, validated_file
 from tfarm.arrays import Real
-from tfarm.dsp import Chain
+from tfarm.case import Case
 from tfarm.errors import ConvergenceError, ParameterError, TfarmError, one_line, require
 from tfarm.files import write_file
 from tfarm.tuner import Plan as TunerPlan
@@ -38,15 +37,20 @@ Chunk = dict[str, list[Any]]  # columns of a range of rows
 Row = dict[str, Any]  # the columns of one
 Task = tuple[int, Callable[[], Chunk]]  # number of a part, and the call that returns its table
 Engine = Callable[[Iterator[Task]], Iterator[tuple[int, Chunk]]]  # yields each task with its table as it comes
-OUT, SCHEDULER = "--out", "--scheduler"  # keys of errors
+# keys of errors
+OUT = "--out"
+SCHEDULER = "--scheduler"
 ROW = "row"  # column of the number of the row, from 0
-FILE, PREFIX, PARQUET, STUDY_FILE = "study.json", "part-", ".parquet", "study.toml"
-MOST_BYTES = 1 << 20  # of that file
-PILOT, CHECKED = 3, 1000  # rows whose cost is measured, and whose arms are built, before the first run
-LEAST_SECONDS, MOST_SECONDS = 5.0, 30.0  # of a chunk
+FILE = "study.json"
+PARQUET = ".parquet"
+STUDY_FILE = "study.toml"
+# rows whose cost is measured, and whose arms are built, before the first run
+PILOT = 3
+CHECKED = 1000
+# of a chunk
+LEAST_SECONDS = 5.0
+MOST_SECONDS = 30.0
 CHUNKS_A_WORKER = 10  # where that leaves them within these
-MOST_ROWS = 50_000  # of a chunk
-LONGEST_REASON = 200  # characters
 BATCH = 32  # arms whose frequencies are found together; the exact numbers of twice as many are kept
 PATIENCE = 20  # seconds for a scheduler to answer, and for its first worker
 PACKAGES = ("tfarm", "numpy", "scipy", "numba")  # versions that all workers have in common
@@ -54,11 +58,9 @@ PACKAGES = ("tfarm", "numpy", "scipy", "numba")  # versions that all workers hav
 
 @dataclass(frozen=True)
 class Plan:
-    """A study: arm, controller and chain, their varied numbers and the columns that are asked for."""
+    """A study: a case, its varied numbers and the columns that are asked for."""
 
-    arm: Arm
-    law: AnyLaw
-    chain: Chain
+    case: Case
     space: Space
     names: tuple[str, ...]
     tuner: TunerPlan | None = None  # the usual one of each arm by default
@@ -82,7 +84,7 @@ class Plan:
     def subjects(self) -> Subjects:
         """The arms and loops of the rows."""
         fitted = self.space.posterior.keys if self.space.posterior else ()
-        return Subjects(self.arm, self.law, self.chain, self.space.keys, self.tuner, fitted)
+        return Subjects(self.case, self.space.keys, self.tuner, fitted)
 
 
 def chunk(plan: Plan, first: int, last: int, listed: Real | None = None) -> Chunk:
@@ -101,7 +103,7 @@ def table_of(plan: Plan, first: int, rows: Real) -> Chunk:
             found: dict[str, Any] = {ROW: number, **dict(zip(plan.space.keys, row, strict=True))}
             own = _attempt(values_of, subject, plan.sources) if isinstance(subject, Subject) else subject
             found |= {FAILED: own} if isinstance(own, str) else own
-            found[FAILED] = found[FAILED] and one_line(found[FAILED], LONGEST_REASON)
+            found[FAILED] = found[FAILED] and one_line(found[FAILED], 200)
             for name, column in table.items():
                 column.append(found.get(name))
     return table
@@ -121,7 +123,8 @@ def _attempt(function: Callable[..., Any], *arguments: Any) -> Any:
 def seconds_an_arm(plan: Plan, rows: Real) -> float:
     """Return the mean time of the first rows of values (rows, keys) [s]."""
     table_of(plan, 0, rows[:1])  # which compiles
-    pilot, began = rows[-PILOT:], time.perf_counter()
+    pilot = rows[-PILOT:]
+    began = time.perf_counter()
     table_of(plan, 0, pilot)
     return (time.perf_counter() - began) / len(pilot)
 
@@ -130,7 +133,7 @@ def rows_a_chunk(cost: float, count: int, workers: int) -> int:
     """Return the rows of a chunk of 5 to 30 s for arms of that cost [s], so that all workers end together."""
     whole = cost * count / workers
     seconds = min(max(whole / CHUNKS_A_WORKER, LEAST_SECONDS), MOST_SECONDS)
-    return min(math.ceil(count / (workers * max(1, round(whole / seconds)))), MOST_ROWS)
+    return min(math.ceil(count / (workers * max(1, round(whole / seconds)))), 50_000)
 
 
 @dataclass(frozen=True)
@@ -143,7 +146,7 @@ class Parts:
     rows: int  # of a part
     suffix: str
     size: int  # rows of all parts
-    prefix: str = PREFIX
+    prefix: str = "part-"
 
     @property
     def count(self) -> int:
@@ -176,10 +179,11 @@ class Parts:
     def write(self, number: int, table: Mapping[str, Sequence[Any]]) -> None:
         """Write the table of a part under a temporary name, then rename it."""
         if self.suffix == PARQUET:
-            module, arrow, binary = parquet("out", "Parquet"), importlib.import_module("pyarrow"), io.BytesIO()
-            texts, kinds = self.plan.texts, (arrow.float64(), arrow.string())
-            arrays = {name: arrow.array(values, kinds[name in texts]) for name, values in table.items()}
-            module.write_table(arrow.table(arrays), binary)
+            module = parquet("out", "Parquet")
+            arrow = importlib.import_module("pyarrow")
+            binary = io.BytesIO()
+            kinds = {name: arrow.string() if name in self.plan.texts else arrow.float64() for name in table}
+            module.write_table(arrow.table({name: arrow.array(of, kinds[name]) for name, of in table.items()}), binary)
             content = binary.getvalue()
         else:
             stream = io.StringIO()
@@ -199,10 +203,13 @@ class Parts:
             with path.open(newline="", encoding="utf-8") as file:
                 rows = list(csv.DictReader(file))
             table = {name: [row[name] for row in rows] for name in names}
-        texts = {*names} & self.plan.texts
-        found = {name: np.array([each or "" for each in table[name]], object) for name in texts}
-        return found | {name: np.array([math.nan if each in ("", None) else float(each) for each in table[name]], float)
-                        for name in names if name not in texts}  # fmt: skip
+        found = {}
+        for name in names:
+            is_text = name in self.plan.texts
+            empty = "" if is_text else math.nan
+            cells = [empty if each in ("", None) else each for each in table[name]]
+            found[name] = np.array(cells, object if is_text else float)
+        return found
 
 
 class StudyRecord(StrictTable):
@@ -217,7 +224,9 @@ def opened(folder: Path, plan: Plan, files: Mapping[str, bytes], workers: int, s
 
     `rows` are the values of the first rows.  Raises ParameterError for a folder that has another study.
     """
-    space, file, suffix = plan.space, folder / FILE, PARQUET if importlib.util.find_spec("pyarrow") else ".csv"
+    space = plan.space
+    file = folder / FILE
+    suffix = PARQUET if importlib.util.find_spec("pyarrow") else ".csv"
     hashes = {name: hashlib.sha256(content).hexdigest() for name, content in files.items() if name != STUDY_FILE}
     inputs = json.loads(json.dumps({
         "over": list(space.over.items()), "columns": plan.names, "draws": space.draws, "seed": space.seed,
@@ -226,7 +235,7 @@ def opened(folder: Path, plan: Plan, files: Mapping[str, bytes], workers: int, s
     }))  # fmt: skip
     if file.exists():
         known = validated_file(
-            StudyRecord, file, MOST_BYTES, key=OUT, what=f"a {FILE} of tfarm study; choose another folder"
+            StudyRecord, file, 1 << 20, key=OUT, what=f"a {FILE} of tfarm study; choose another folder"
         )
         other = sorted(key for key in {*inputs, *known.inputs} if known.inputs.get(key) != inputs.get(key))
         require(
@@ -271,7 +280,8 @@ def run(
     progress: Progress,
 ) -> Parts:
     """Write the missing parts of a study to its folder."""
-    count, listing = min(CHECKED, plan.space.count), plan.space.listing
+    count = min(CHECKED, plan.space.count)
+    listing = plan.space.listing
     rows = plan.space.rows(0, count, None if listing is None else next(listing.blocks([(0, count)])))
     check_rows(plan, rows)
     parts = opened(folder, plan, files, workers, size, rows)
@@ -294,7 +304,8 @@ def complete(
     text: str,
 ) -> None:
     """Write the missing parts by the calls for their ranges of rows; after the deadline [s] none is begun any more."""
-    done, began = set(parts.written()), time.monotonic()
+    done = set(parts.written())
+    began = time.monotonic()
     missing = [number for number in range(parts.count) if number not in done]
     progress(len(done), parts.count, text)
     ends = [(number * parts.rows, min((number + 1) * parts.rows, parts.size)) for number in missing]
@@ -311,7 +322,8 @@ def searched(parts: Parts, search: Callable[[Callable[[Real], Row]], object], de
     Each is written as a part and computed once: an interrupted search goes on where it was.  None where it has no end
     before the deadline [s].
     """
-    columns, seen = parts.column(*parts.plan.columns), list[Row]()
+    columns = parts.column(*parts.plan.columns)
+    seen = list[Row]()
     rows = zip(*columns.values(), strict=True)
     known = {int(values[0]): dict(zip(columns, values, strict=True)) for values in rows}
 
@@ -335,7 +347,9 @@ def searched(parts: Parts, search: Callable[[Callable[[Real], Row]], object], de
 
 def check_rows(plan: Plan, rows: Real) -> None:
     """Raise ParameterError where some of the first rows are illegal, with their number and the first reason."""
-    subjects, errors = plan.subjects, dict[int, ParameterError]()  # which refuse an unknown key, before any row
+    # which refuse an unknown key, before any row
+    subjects = plan.subjects
+    errors = dict[int, ParameterError]()
     for number, row in enumerate(rows.tolist()):
         try:
             subjects.at(row)
@@ -378,7 +392,8 @@ def on_cluster(tasks: Iterator[Task], client: Any) -> Iterator[tuple[int, Chunk]
     A task of a lost worker goes to another one.  Raises ConvergenceError where the scheduler is gone, or the workers of
     one task again and again, and for a worker with other versions than here.
     """
-    queue, running = extra("distributed", "cluster", "client", client).as_completed(loop=client.loop), dict[str, int]()
+    queue = extra("distributed", "cluster", "client", client).as_completed(loop=client.loop)
+    running = dict[str, int]()
     try:
         while True:
             for number, call in islice(tasks, max(not running, len(client.nthreads()) - len(running))):

@@ -21,12 +21,12 @@ from typing import Any, NamedTuple, get_args
 import numpy as np
 import scipy  # whose statistics take half a second to load, and do so where they are used
 
-from tfarm.arm import AnyLaw, Arm
+from tfarm.arm import Arm
 from tfarm.arm.checks import number
 from tfarm.arm.feedback import OUTPUT_OF
 from tfarm.arm.writing import KeyedArms, numbers_of
 from tfarm.arrays import Real
-from tfarm.dsp import Chain
+from tfarm.case import Case
 from tfarm.dsp.plant import driven
 from tfarm.errors import ParameterError, must_be_known, naming, require
 from tfarm.files import open_file
@@ -34,15 +34,14 @@ from tfarm.fitting.posterior import Posterior
 from tfarm.foreign import read_by_child
 from tfarm.tuner import tuning
 
-LAW, TUNER = "law.", "tuner."  # prefixes of the numbers of the controller and of the tuner
+# prefixes of the numbers of the controller and of the tuner
+LAW = "law."
+TUNER = "tuner."
 MOST_ROWS = 10_000_000  # of one study
-MOST_BYTES = 4 << 30  # of a list: these rows, of twenty numbers
 LONGEST_LINE = 1 << 20  # characters, of some ten thousand numbers
 LIST = "a CSV or Parquet file with a column a key"
 MOST_SEED = 2**63
 ENDS = 2.0**-54, 1 - 2.0**-53  # of uniform numbers: at 0 and 1 the inverse of a normal distribution is infinite
-LEAST_PYARROW = (14, 0, 1)  # older ones unpickle what they read (CVE-2023-47248)
-PLAIN_NUMBER = re.compile(r" *[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)? *", re.ASCII)
 FORMS: dict[str, tuple[str, Callable[..., Any]]] = {  # kind of a distribution: its numbers in words, and SciPy's
     "uniform": ("LOW, HIGH", lambda low, high: low < high and scipy.stats.uniform(low, high - low)),
     "loguniform": ("LOW, HIGH, above 0", lambda low, high: 0 < low < high and scipy.stats.loguniform(low, high)),
@@ -73,18 +72,16 @@ class Distribution(NamedTuple):
 
 
 class Subject(NamedTuple):
-    """One arm of a study with its controller, its sampled chain, and numbers and plan of the tuner."""
+    """One case of a study, with numbers and plan of the tuner."""
 
-    arm: Arm
-    law: AnyLaw
-    chain: Chain
+    case: Case
     tuner: dict[str, float]
     plan: tuning.Plan | None = None
 
     @property
     def driven_arm(self) -> Arm:
         """The arm of its continuous-time loop: the analog damping of the chain's actuator is friction of its hub."""
-        return driven(self.arm, self.chain)[0]
+        return driven(self.case.arm, self.case.chain)[0]
 
 
 class Listing(NamedTuple):
@@ -96,7 +93,8 @@ class Listing(NamedTuple):
 
     def blocks(self, ends: Sequence[tuple[int, int]]) -> Iterator[Real]:
         """Yield the rows of each range (first, last), which ascend."""
-        lines, at = islice(lines_of(self.path), 1, None), 0
+        lines = islice(lines_of(self.path), 1, None)
+        at = 0
         for first, last in ends:
             yield np.array(list(islice(lines, first - at, last - at)))
             at = last
@@ -197,7 +195,8 @@ def _distribution(place: str, entry: Any) -> Distribution:
     require(isinstance(entry, Mapping) and len(entry) == 1, place, entry, remedy)
     ((kind, numbers),) = entry.items()
     must_be_known(place, kind, KINDS)
-    remedy, is_finite = f"{kind} needs finite numbers in order: {KINDS[kind][0]}", False
+    remedy = f"{kind} needs finite numbers in order: {KINDS[kind][0]}"
+    is_finite = False
     with suppress(TypeError), np.errstate(all="ignore"):  # TypeError: no list, or another count of numbers
         found = Distribution(kind, tuple(number(place, each, remedy) for each in numbers))
         made = all(map(math.isfinite, found.numbers)) and found.frozen
@@ -215,27 +214,31 @@ class Subjects:
     """
 
     def __init__(
-        self, arm: Arm, law: AnyLaw, chain: Chain, keys: Sequence[str], plan: tuning.Plan | None = None,
-        fitted: Collection[str] = (),
-    ) -> None:  # fmt: skip
-        self.law, self.chain, self.keys, self.plan = law, chain, keys, plan
+        self, case: Case, keys: Sequence[str], plan: tuning.Plan | None = None, fitted: Collection[str] = ()
+    ) -> None:
+        self.case = case
+        self.keys = keys
+        self.plan = plan
+        chain = case.chain
         numbers = {
             f"{table.name}.{each.name}": (table.name, each.name)
             for table in fields(chain) if table.name != "period_from"
             for each in fields(getattr(chain, table.name)) if float in (each.type, *get_args(each.type))
         }  # fmt: skip
         self._of_chain = {key: numbers[key] for key in keys if key in numbers}
-        of_law, of_tuner = ([key.removeprefix(name) for key in keys if key.startswith(name)] for name in (LAW, TUNER))
-        for name in of_law:
-            law.having(name, 1.0)
-        signals = [OUTPUT_OF.get(name, name).removesuffix(".gain") for name in of_law]
-        require(len(set(signals)) == len(signals), "over", of_law, "two keys are one number of the controller")
-        for name in of_tuner:
-            must_be_known("tuner", name, (*tuning.NUMBERS, *tuning.NUMBERS_OF_LEARNING))
+        self._of_law = [key for key in keys if key.startswith(LAW)]
+        signals = []
+        for name in (key.removeprefix(LAW) for key in self._of_law):
+            case.feedback.having(name, 1.0)
+            signals.append(OUTPUT_OF.get(name, name).removesuffix(".gain"))
+        require(len(set(signals)) == len(signals), "over", self._of_law, "two keys are one number of the controller")
+        self._of_tuner = [key for key in keys if key.startswith(TUNER)]
+        for key in self._of_tuner:
+            must_be_known("tuner", key.removeprefix(TUNER), (*tuning.NUMBERS, *tuning.NUMBERS_OF_LEARNING))
         own = [key for key in keys if not key.startswith((LAW, TUNER)) and key not in numbers]
         for key in own:
-            must_be_known("over", key, [*numbers_of(arm), *numbers, f"{LAW}NUMBER", f"{TUNER}NUMBER"])
-        self._arms = KeyedArms(arm, own, "over", alone={*own} - {*fitted})
+            must_be_known("over", key, [*numbers_of(case.arm), *numbers, f"{LAW}NUMBER", f"{TUNER}NUMBER"])
+        self._arms = KeyedArms(case.arm, own, "over", alone={*own} - {*fitted})
 
     @property
     def notes(self) -> list[str]:
@@ -244,15 +247,17 @@ class Subjects:
         return [f"{key}: {words[self._arms.is_shear_scaled(key)]}" for key in self._arms.keys if "youngs" in key]
 
     def at(self, row: Sequence[float]) -> Subject:
-        """Return the arm and loop of a row.  Raises ParameterError for an illegal value."""
-        values, chain, law = dict(zip(self.keys, row, strict=True)), self.chain, self.law
+        """Return the case of a row.  Raises ParameterError for an illegal value."""
+        values = dict(zip(self.keys, row, strict=True))
+        arm = self._arms.at({key: values[key] for key in self._arms.keys}) if self._arms.keys else self._arms.arm
+        law = self.case.feedback
+        for key in self._of_law:
+            law = law.having(key.removeprefix(LAW), values[key])
+        chain = self.case.chain
         for key, (table, name) in self._of_chain.items():
             chain = replace(chain, **{table: replace(getattr(chain, table), **{name: values[key]})})
-        for key in self.keys:
-            law = law.having(key.removeprefix(LAW), values[key]) if key.startswith(LAW) else law
-        own = {key: values[key] for key in self._arms.keys}
-        tuner = {key.removeprefix(TUNER): value for key, value in values.items() if key.startswith(TUNER)}
-        return Subject(self._arms.at(own) if own else self._arms.arm, law, chain, tuner, self.plan)
+        tuner = {key.removeprefix(TUNER): values[key] for key in self._of_tuner}
+        return Subject(Case(arm, law, chain), tuner, self.plan)
 
 
 # ------------------------------------------------------------------------------------------------------------ lists
@@ -280,14 +285,17 @@ def lines_of(path: Path) -> Iterator[Any]:
         for n, row in enumerate(lines):  # from 0, as in the results
             require(len(row) == len(names), f"row {n}", len(row), f"{len(names)} values, one a column")
             for name, cell in zip(names, row, strict=True):
-                is_finite = PLAIN_NUMBER.fullmatch(cell) and math.isfinite(float(cell))
+                is_finite = re.compile(r" *[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)? *", re.ASCII).fullmatch(
+                    cell
+                ) and math.isfinite(float(cell))
                 require(is_finite, f"row {n}, column {name}", cell, "every cell is a finite number")
             yield list(map(float, row))
 
 
 def _cells(path: Path) -> Iterator[Sequence[str]]:
     """Yield names and rows of a CSV file, or of a Parquet one by another process, a few in memory at a time."""
-    with open_file(path, MOST_BYTES, key="list", what=LIST) as file:
+    # of these rows, of twenty numbers
+    with open_file(path, (4 << 30), key="list", what=LIST) as file:
         is_parquet = path.suffix == ".parquet" and parquet("list", str(path))
         try:
             child = partial(read_by_child, "parquet", path, key="list", remedy=f"cannot be read; give {LIST}")
@@ -303,7 +311,8 @@ def parquet(key: str, value: str) -> Any:
     """Return the module of pyarrow for Parquet.  Raises ParameterError where it is missing or old."""
     module = extra("pyarrow.parquet", "study", key, value)
     version = tuple(int(part) for part in import_module("pyarrow").__version__.split(".")[:3])
-    require(version >= LEAST_PYARROW, key, value, "needs pyarrow 14.0.1 or newer: pip install 'tfarm[study]'")
+    # older ones unpickle what they read (CVE-2023-47248)
+    require(version >= (14, 0, 1), key, value, "needs pyarrow 14.0.1 or newer: pip install 'tfarm[study]'")
     return module
 
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import scipy  # whose statistics take half a second to load
@@ -29,10 +29,12 @@ from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arm.chain import Chain, chain_or_usual, file_text, load_chain
 from tfarm.arm.checks import whole
 from tfarm.arm.law_tables import load_law
-from tfarm.arm.reading import arm_in, load_tables, presets
-from tfarm.arm.writing import LAW_DEFAULTS, law_toml, toml_tables, toml_text
+from tfarm.arm.reading import AnyFile, load, load_tables, presets
+from tfarm.arm.schema import StrictTable, validated
+from tfarm.arm.writing import law_head, law_toml, toml_tables, toml_text
 from tfarm.arrays import Real
-from tfarm.errors import ParameterError, must_be_known, naming, require
+from tfarm.case import Case
+from tfarm.errors import ParameterError, naming, require
 from tfarm.files import locked_folder, mat_content, write_file
 from tfarm.fitting.posterior import load_posterior
 from tfarm.processes import shared
@@ -73,19 +75,14 @@ from .running import (
 from .space import ENDS, MOST_SEED, listing_of, space_of
 
 SHARES = "stable arms (confidence one-sided, Clopper-Pearson)"
-FILE_KEYS = {"arm": str, "law": str, "rows": str, "posterior": str, "over": dict, "ask": list, "draws": int,
-             "seed": int, "worst": str, "sobol": int}  # fmt: skip
-KIND_WORDS = {str: "a text", dict: "a table", list: "a list", int: "a whole number"}
 PATHS = "rows", "posterior"
-WORST_FILE, ARM_FILE, MATRICES = "worst.toml", "arm.toml", "law.mat"
-STEPS_A_NUMBER, LEAST_STEPS = 20, 20  # evaluations of the search of the worst arm
-FIRST_STEP = 0.05  # of that search, in the probability of each number
+ARM_FILE = "arm.toml"
+MATRICES = "law.mat"
 BEYOND = 1e9  # in the order of worse arms: above each value of a stable loop
 LARGER_IS_WORSE = (
     "peak", "settling_time_s", "overshoot", "time_constant_s", "residual_rms", "steady_state_error", "cost", "unstable",
     "minimum_damping_s", "rise_time_s", "re_1_s",
 )  # fmt: skip
-SIGNED = "peak", "steady_state_error"  # of these by their size
 BOOTSTRAP = "95 % bootstrap interval; none without any influence"
 
 
@@ -105,8 +102,7 @@ class WorstArm:
     file: Annotated[str, Quantity("arm file", help="file of that arm, with its chain")]
 
 
-@dataclass(frozen=True, kw_only=True)
-class SobolIndex:
+class SobolIndex(NamedTuple):
     """Shares of the variance of a quantity by one varied number (Sobol', 1993; Saltelli et al., 2010)."""
 
     quantity: Annotated[str, Quantity("quantity", help="column of the table")]
@@ -254,7 +250,7 @@ def study(
     ConvergenceError
         Where a worker process or the scheduler was killed; another run goes on.
     """
-    chain, law = chain_or_usual(chain), default_gains(arm) if law is None else law
+    case = Case(arm, as_law(default_gains(arm) if law is None else law), chain_or_usual(chain))
     workers = usual_workers(client) if workers is None else workers
     for key, value in {"draws": draws, "seed": seed, "workers": workers, "part": 1 if part is None else part}.items():
         whole(key, value, int(key != "seed"), MOST_SEED, f"a whole number from {int(key != 'seed')}")
@@ -263,11 +259,11 @@ def study(
         over or {}, draws=draws, seed=seed, posterior=known, listing=None if rows is None else listing_of(Path(rows))
     )
     order = order_of(worst) if worst else ()
-    plan = Plan(arm, law, chain, space, column_names([*ask, *order]))
+    plan = Plan(case, space, column_names([*ask, *order]))
     require(sobol >= 0 and sobol & (sobol - 1) == 0, "sobol", sobol, "a power of 2, such as 256; 0 for no indices")
     is_possible = not sobol or (space.is_independent and posterior is None and len(space.keys) > 1)
     require(is_possible, "sobol", sobol, "needs two or more independent distributions")
-    files = files_of(arm, law, chain, {"over": over or {}, "ask": ask, "draws": draws, "seed": seed, "rows": rows,
+    files = files_of(case, {"over": over or {}, "ask": ask, "draws": draws, "seed": seed, "rows": rows,
                                        "posterior": posterior, "worst": worst, "sobol": sobol})  # fmt: skip
     engine = partial(shared, count=workers) if client is None else partial(on_cluster, client=client)
     deadline = time.monotonic() + (math.inf if stop_after is None else stop_after)
@@ -290,7 +286,22 @@ def usual_workers(client: Any) -> int:
 # ------------------------------------------------------------------------------------------------------------ file
 
 
-def load_study(name_or_path: str) -> dict[str, Any]:
+class StudyFile(StrictTable):
+    """The file of a study: the arguments of `study` that it declares."""
+
+    arm: str
+    law: str = ""
+    rows: str = ""
+    posterior: str = ""
+    over: dict[str, Any] | None = None
+    ask: list[str] | None = None
+    draws: int = 0
+    seed: int = 0
+    worst: str = ""
+    sobol: int = 0
+
+
+def load_study(name_or_path: AnyFile) -> dict[str, Any]:
     """Return the arguments of `study` that a file declares; its paths are relative to its folder.
 
     Raises ParameterError, naming the file.
@@ -298,40 +309,33 @@ def load_study(name_or_path: str) -> dict[str, Any]:
     tables, file = load_tables(name_or_path)
     folder = Path(file).parent
     with naming(file):
-        for key, value in tables.items():
-            must_be_known("study", key, FILE_KEYS)
-            kind = FILE_KEYS[key]
-            require(type(value) is kind, key, value, f"give {KIND_WORDS[kind]}")
-        for word in tables.get("ask", []):
-            require(isinstance(word, str), "ask", word, "give names of quantities")
-    arm = tables["arm"] if tables["arm"] in presets() else str(folder / tables["arm"])
-    law = load_law(folder / tables["law"] if "law" in tables else arm)
-    gains = None if law is None else law.gains
-    same = gains if gains and as_law(gains) == law else law  # as gains, of which one of 0 can be varied
-    own = {key: folder / value if key in PATHS else value for key, value in tables.items()}
-    return {**own, "arm": arm_in(*load_tables(arm)), "law": same, "chain": load_chain(arm)}
+        declared = validated(StudyFile, tables, "").model_dump(exclude_unset=True)
+    arm = load_tables(declared["arm"] if declared["arm"] in presets() else str(folder / declared["arm"]))
+    law = load_law(folder / declared["law"] if "law" in declared else arm)
+    own = {key: folder / value if key in PATHS else value for key, value in declared.items()}
+    return {**own, "arm": load(arm), "law": law, "chain": load_chain(arm)}
 
 
-def files_of(arm: Arm, law: AnyLaw, chain: Chain, declared: Mapping[str, Any]) -> dict[str, bytes]:
+def files_of(case: Case, declared: Mapping[str, Any]) -> dict[str, bytes]:
     """Return the files from which `load_study` has the study again, by their names.
 
     These are the study, the arm with its chain and its [law], and the matrices of a law.  A list and a posterior keep
     their places.
     """
-    own, files = as_law(law), dict[str, bytes]()
+    own = case.law
+    files = dict[str, bytes]()
     try:
         text = law_toml(own)
     except ParameterError:  # of a state space: it has no text
         columns = (*own.signals, *own.wanted)
         files[MATRICES] = mat_content(dict(zip("ABCD", own.matrices(columns), strict=True)), "column")
-        head = {key: getattr(own, key) for key, usual in LAW_DEFAULTS.items() if getattr(own, key) != usual}
-        table = {"name": own.name, **head, "sign": -1, "matrices": MATRICES, "signals": columns}
+        table = {**law_head(own), "sign": -1, "matrices": MATRICES, "signals": columns}
         text = toml_text(toml_tables(table, "law"))
     places = {key: declared[key] and os.path.abspath(declared[key]) for key in PATHS}
     over = {key: {kind: tuple(numbers) for kind, numbers in entry.items()} for key, entry in declared["over"].items()}
     kept = {"arm": ARM_FILE, **declared, **places, "ask": tuple(declared["ask"]), "over": over}
     study = toml_text(toml_tables({key: value for key, value in kept.items() if value or key == "seed"}))
-    return {**files, ARM_FILE: f"{file_text(arm, chain)}\n{text}".encode(), STUDY_FILE: study.encode()}
+    return {**files, ARM_FILE: f"{file_text(case.arm, case.chain)}\n{text}".encode(), STUDY_FILE: study.encode()}
 
 
 # ------------------------------------------------------------------------------------------------------------ worst
@@ -347,54 +351,72 @@ def badness(order: Sequence[str], values: Mapping[str, Any]) -> float:
         return BEYOND
     if value is None or math.isnan(value):
         return -math.inf
-    size = abs(value) if any(name in order[0] for name in SIGNED) else value
+    # of these by their size
+    size = abs(value) if any(name in order[0] for name in ("peak", "steady_state_error")) else value
     return min(max(size if any(name in order[0] for name in LARGER_IS_WORSE) else -size, -BEYOND), BEYOND / 2)
 
 
 def worst_arm(study: Study, order: Sequence[str], deadline: float) -> WorstArm | None:
-    """Return the worst arm in a quantity, by Nelder and Mead's simplex from the worst drawn, and write its file.
+    """Return the worst arm in a quantity, of those drawn and of a search from the worst of them, and write its file.
 
-    The search stays within the range of a bounded distribution of n draws, else within its quantiles 1/(2 n) and
-    1 - 1/(2 n).  None where it has no end before the deadline [s].
+    None where the search has no end before the deadline [s].
     """
-    plan, space, table = study.parts.plan, study.parts.plan.space, study.table()
+    table = study.table()
     columns = {name: table[name].tolist() for name in order}
     ranks = [badness(order, {name: of[n] for name, of in columns.items()}) for n in range(study.done)]
     first = int(np.argmax(ranks))
     require(ranks[first] > -math.inf, "worst", order[0], "no arm has a value of it")
-    drawn, seen = {name: of[first] for name, of in table.items()}, list[Row]()
-    if space.is_independent:
-        start = space.uniform(first)
-        with np.errstate(all="ignore"):
-            is_bounded = np.isfinite(space.values(np.array([0 * start, 0 * start + 1]))).all(axis=0)
-        edge = np.minimum(np.where(is_bounded, 0.0, 0.5 / space.draws), np.minimum(start, 1 - start))
-        steps = np.diag(np.where(start < 0.5, FIRST_STEP, -FIRST_STEP))
-        most = LEAST_STEPS + STEPS_A_NUMBER * len(start)
-
-        def search(result: Callable[[Real], Row]) -> None:
-            scipy.optimize.minimize(  # type: ignore[call-overload]  # bounds as an array
-                lambda u: -badness(order, result(space.values(u[None]))), start, method="Nelder-Mead",
-                bounds=np.array([edge, 1 - edge]).T,
-                options={"maxfev": most, "initial_simplex": [start, *(start + steps)]},
-            )  # fmt: skip
-
-        parts = study.parts.others(f"_worst-{order[0]}-", most, 1, order)
-        if (found := searched(parts, search, deadline)) is None:
-            return None
-        seen = found
-    worst = max([*seen, *[drawn] * (not seen)], key=partial(badness, order))
-    numbers = {key: float(worst[key]) for key in space.keys}
-    file, subject = study.parts.folder / WORST_FILE, plan.subjects.at([*numbers.values()])
-    text = file_text(replace(subject.arm, name=f"{plan.arm.name}-worst"), subject.chain)
-    with suppress(ParameterError):  # of a state space, which has no table
-        text = f"{text}\n{law_toml(as_law(subject.law))}"
-    write_file(file, text.encode(), key=OUT)
+    drawn = {name: of[first] for name, of in table.items()}
+    seen = search_worst(study.parts, order, first, deadline)
+    if seen is None:
+        return None
+    worst = max(seen or [drawn], key=partial(badness, order))
+    numbers = {key: float(worst[key]) for key in study.parts.plan.space.keys}
     values = (each[order[0]] for each in (drawn, worst))
     of_drawn, of_worst = (None if each is None or math.isnan(each) else float(each) for each in values)
     return WorstArm(
         quantity=order[0], row=first, drawn=of_drawn, found=of_worst, evaluations=len(seen), numbers=numbers,
-        file=str(file),
+        file=str(write_case(study.parts, numbers)),
     )  # fmt: skip
+
+
+def search_worst(parts: Parts, order: Sequence[str], first: int, deadline: float) -> list[Row] | None:
+    """Return the rows of a search of the worst arm, by Nelder and Mead's simplex from row `first`.
+
+    It stays within the range of a bounded distribution of n draws, else within its quantiles 1/(2 n) and 1 - 1/(2 n).
+    No rows without independent ranges; None where it has no end before the deadline [s].
+    """
+    space = parts.plan.space
+    if not space.is_independent:
+        return []
+    start = space.uniform(first)
+    with np.errstate(all="ignore"):
+        is_bounded = np.isfinite(space.values(np.array([0 * start, 0 * start + 1]))).all(axis=0)
+    edge = np.minimum(np.where(is_bounded, 0.0, 0.5 / space.draws), np.minimum(start, 1 - start))
+    step = 0.05  # of the probability of each number
+    steps = np.diag(np.where(start < 0.5, step, -step))
+    most = 20 + 20 * len(start)
+
+    def search(result: Callable[[Real], Row]) -> None:
+        scipy.optimize.minimize(  # type: ignore[call-overload]  # bounds as an array
+            lambda u: -badness(order, result(space.values(u[None]))), start, method="Nelder-Mead",
+            bounds=np.array([edge, 1 - edge]).T,
+            options={"maxfev": most, "initial_simplex": [start, *(start + steps)]},
+        )  # fmt: skip
+
+    return searched(parts.others(f"_worst-{order[0]}-", most, 1, order), search, deadline)
+
+
+def write_case(parts: Parts, numbers: Mapping[str, float]) -> Path:
+    """Write the arm with these numbers, its chain and its controller, and return the file."""
+    plan = parts.plan
+    file = parts.folder / "worst.toml"
+    case = plan.subjects.at([*numbers.values()]).case
+    text = file_text(replace(case.arm, name=f"{plan.case.arm.name}-worst"), case.chain)
+    with suppress(ParameterError):  # of a state space, which has no table
+        text = f"{text}\n{law_toml(case.law)}"
+    write_file(file, text.encode(), key=OUT)
+    return file
 
 
 # ------------------------------------------------------------------------------------------------------------ Sobol'
@@ -408,7 +430,8 @@ def sobol_indices(
     The first progress has their number and time.  A quantity without a finite value on each arm has no indices.  None
     where the sample is not complete before the deadline [s].
     """
-    plan, keys = study.plan, study.plan.space.keys
+    plan = study.plan
+    keys = study.plan.space.keys
     names = [name for name in plan.names if quantity_of(name).is_number and quantity_of(name).label]
     A, B = np.hsplit(scipy.stats.qmc.Sobol(2 * len(keys), rng=np.random.default_rng(plan.space.seed)).random(size), 2)
     pages = [np.where(np.arange(len(keys)) == n, B, A) for n in range(len(keys))]  # A with one column of B
@@ -434,7 +457,8 @@ def _indices(name: str, keys: Sequence[str], values: Real) -> Iterator[SobolInde
     no_interval: Any = scipy.stats.DegenerateDataWarning  # of an index that does not vary
     with warnings.catch_warnings(action="ignore", category=no_interval), np.errstate(all="ignore"):
         ends = found.bootstrap(confidence_level=CONFIDENCE)
-    first, total = ends.first_order.confidence_interval, ends.total_order.confidence_interval
+    first = ends.first_order.confidence_interval
+    total = ends.total_order.confidence_interval
     columns = found.first_order, first.low, first.high, found.total_order, total.low, total.high
     for key, S, S_low, S_high, T, T_low, T_high in zip(keys, *(np.ravel(of).tolist() for of in columns), strict=True):
         yield SobolIndex(quantity=name, key=key, first=S, first_interval=(S_low, S_high), total=T,

@@ -13,6 +13,7 @@ import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm, as_law, must_turn
 from tfarm.arm.chain import chain_or_usual
+from tfarm.arm.stages import Consumer
 from tfarm.dsp import Chain
 from tfarm.dsp.stages import admit
 from tfarm.errors import ConvergenceError, must_be_known, require
@@ -28,6 +29,12 @@ from tfarm.synthesis.search import Search, Worst, flat_part, search
 from tfarm.synthesis.structures import Bounds, Structure, check_bounds, structure_of
 from tfarm.synthesis.worst_case import ArmBox, Effort, NamedArm, Tell, WorstCase, arms_of, for_the_worst, same_input
 
+CONSUMER = Consumer(
+    "design",
+    acts=("reference", "anti-alias filter", "hub rate", "law", "hold", "delay", "hub damping", "plant"),
+    partly=("encoder", "amplifier steps", "amplifier range", "DAC steps", "DAC range", "torque limit", "arithmetic"),
+    none=("volts",),
+)
 LoopKind = Literal["sampled", "continuous"]
 
 
@@ -146,7 +153,8 @@ class Design:
         self,
     ) -> Annotated[float | None, Quantity("record of the slew", "s", 6, "duration over which the objective is taken")]:
         """Length of the record of a residual or a cost, for `tfarm simulate --duration`; None of others."""
-        arm, chain = self.verdict.loop.arm, self.chain
+        arm = self.verdict.loop.arm
+        chain = self.chain
         if self.loop == "continuous":
             return None
         tasks = {"residual": lambda: slew_and_after(arm, arm, chain), "cost": lambda: trial_slew(arm, chain)}
@@ -191,9 +199,9 @@ def design(
 ) -> Design:  # fmt: skip
     """Return the law of a structure with the best value of an objective in the sampled loop of a chain (default 10 ms).
 
-    Structures are "K1-K2", gains of rate and moment, within the bounds `K1` and `K2` where given, "PD", "PD+notch",
-    "lead", "PI" and "PID" (with a filtered derivative) of the hub angle, "PPF" of the first `modes` modes and
-    "strain-rate"; `Kp` is chosen where it is 0, but of "K1-K2".
+    Structures are those of `tfarm.synthesis.structures`: "K1-K2", gains of rate and moment, within the bounds `K1` and
+    `K2` where given, "PD", "PD+notch" and others; `modes` is the number of filters, `Kp` is chosen where it is 0, but
+    of "K1-K2".
     Objectives are "damping" of the first `modes` modes, "margin", "sensitivity", "delay", "residual" and "cost" (see
     `objectives`).  The law is stable when sampled, with all gains a quarter larger or smaller, and in continuous time.
     `continuous`: for the continuous-time loop instead; its best law may be unstable when sampled.
@@ -212,16 +220,17 @@ def design(
         must_turn(arm)
     ends = {key: (float(low), float(high)) for key, (low, high) in (ranges or {}).items()}
     box = ArmBox(arm, ends) if ends else None
-    arms, chain = arms_of(arm, also, box), chain_or_usual(chain)
+    arms = arms_of(arm, also, box)
+    chain = chain_or_usual(chain)
     for each in arms:
-        admit("design", each.arm, chain)
+        admit(CONSUMER, each.arm, chain)
     same_input(arms)
     form = structure_of(structure, arm, Kp=Kp, modes=modes, period=chain.sampling.period, bounds={"K1": K1, "K2": K2})
     for each in arms:
         Loop(each.arm, as_law(form.record_at(form.origin)))
         check_bounds(form, each.arm)
     tell = progress or (lambda text: None)
-    task = _Task(arm, objective, form, modes, chain, "continuous" if continuous else "sampled", tell)
+    task = _Task(arm, objective, form, modes, chain, continuous, tell)
     return task.design(*for_the_worst(arms, box, task.find, task.score_on, tell))
 
 
@@ -235,24 +244,24 @@ class _Task:
     form: Structure
     modes: int
     chain: Chain
-    loop: LoopKind
+    continuous: bool
     tell: Tell
 
     def sizes(self, on: Arm) -> list[int]:
         """Numbers of modes of the models of an arm, in turn."""
-        return model_sizes(on, self.chain, self.modes, continuous=self.loop == "continuous")
+        return model_sizes(on, self.chain, self.modes, continuous=self.continuous)
 
     def judge(self, on: Arm, count: int) -> Judge:
         """The judge of laws on an arm, by a model of `count` modes."""
         return judge_of(on, self.arm, self.chain, self.objective, self.form.signals, self.modes, count,
-                        continuous=self.loop == "continuous")  # fmt: skip
+                        continuous=self.continuous)  # fmt: skip
 
     def find(self, named: Sequence[NamedArm], before: _Choice | None, effort: Effort) -> _Choice:
         """Return the best law that is stable on all arms, near the one found `before`, if any.
 
         A sketch has the first models, and no exact verdict.  Raises ConvergenceError where none is found.
         """
-        nearest: tuple[float, Any] | None = None
+        nearest: tuple[float, Any] = (np.inf, None)
         sizes = [self.sizes(each.arm) for each in named]
         near = None if before is None else before.x
         for step in range(max(map(len, sizes))):
@@ -261,15 +270,15 @@ class _Task:
             )
             last_first = Worst(several[::-1])  # corners, and what was worst inside the box: most laws are lost there
             found = search(last_first, self.form, self.tell, near, effort)
-            nearest = min([*([nearest] if nearest else []), found.found[0]], key=itemgetter(0))
+            nearest = min(nearest, found.found[0], key=itemgetter(0))
             for score, x in found.found:
                 law = found.form.record_at(x)
                 if effort == "sketch" or (score < LOST and all(judge.holds(law) for judge in several)):
                     return _Choice(Worst(several), found, score, x, law)
-        assert nearest is not None  # there is at least one judge
-        law = self.form.record_at(nearest[1])
-        chain = self.chain if self.loop == "sampled" else None
-        raise ConvergenceError(_why_none(named, self.form, law, chain, max(map(max, sizes))), law, nearest[0])
+        score, x = nearest
+        law = self.form.record_at(x)
+        chain = None if self.continuous else self.chain
+        raise ConvergenceError(_why_none(named, self.form, law, chain, max(map(max, sizes))), law, score)
 
     def score_on(self, choice: _Choice, on: Arm) -> float:
         """The score of a law on another arm; inf where the loop is unstable."""
@@ -278,7 +287,9 @@ class _Task:
 
     def design(self, choice: _Choice, named: Sequence[NamedArm], case: WorstCase) -> Design:
         """The record of a law for these arms."""
-        law, x, own = choice.law, choice.x, choice.search.form
+        law = choice.law
+        x = choice.x
+        own = choice.search.form
         on_arms = tuple(
             OnArm(each.name, each.numbers, judge.value(law), stability(judge.arm, law),
                   sampled_brief(judge.arm, law, judge.chain))
@@ -291,9 +302,10 @@ class _Task:
             value=OBJECTIVES[self.objective].worst([each.value for each in on_arms]), verdict=on_arms[0].verdict,
             bounds={each.name: each.bounds for each in own.free}, flat=flat_part(choice.worst, own, x, choice.score),
             modes=self.modes, at_bound=tuple(own.names[place] for place, _ in at_ends),
-            at_limit=tuple(own.names[place] for place, end in at_ends if own.is_physical(place, end)),
-            widened=choice.search.widened, loop=self.loop, chain=self.chain, sampled=on_arms[0].sampled, arms=on_arms,
-            starts=choice.search.starts, agreed=choice.search.agreed, worst_case=case,
+            at_limit=tuple(own.names[place] for place, end in at_ends if (place, end) in own.ends(physical=True)),
+            widened=choice.search.widened, loop="continuous" if self.continuous else "sampled", chain=self.chain,
+            sampled=on_arms[0].sampled, arms=on_arms, starts=choice.search.starts, agreed=choice.search.agreed,
+            worst_case=case,
         )  # fmt: skip
 
 
@@ -307,7 +319,7 @@ def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Cha
     if chain is None:
         return f"{text}: widen the bounds"
     verdict = max((sampled_verdict(each.arm, law, chain) for each in arms), key=lambda each: each.log_radius)
-    growth = float(np.expm1(verdict.log_radius))
+    growth = np.expm1(verdict.log_radius)
     nearest = f"{verdict.slowest} grows by {growth:.2g} a sample" if growth > 0 else "there is no reserve"
     text = (
         f"{text} when sampled: under the nearest law {nearest}; widen the bounds, or try another {ANGLE_GAIN} or period"

@@ -39,10 +39,62 @@ from tfarm.records import record
 from tfarm.synthesis.models import Model, Slews, continuous_model, sampled_model, slew_and_after
 from tfarm.synthesis.structures import Entry
 
-REAL_ANGLE = 1e-9  # rad, of ln z or s: a pole at a smaller angle is real
-AS_NEAR = 4.0  # of the least distance to an open-loop pole: up to there a pole may be its own too
 LONGEST_MARGIN = 100.0  # samples, or s: the longest delay margin, and that where |L| is nowhere 1
-TIE = 1e-3  # weight of the damping ratio in a disk margin: without sampling rate feedback alone has margin 2
+RESERVE = 1.25  # factor on all gains with which the loop is stable, up and down: the error of a gauge or motor
+FEWEST_MODES = 8  # of the first model; more where its best laws are unstable
+LOST = 1e30  # score where a loop is unstable, and as much for each later condition: above any value in SI units
+
+
+def damping_of(model: Model, poles: Complex) -> Real:
+    """The least damping ratio (laws,) of oscillating poles (laws, n); 1 where a law has none.
+
+    One of each pair counts.  The poles nearest to those of `higher` modes are left out.
+    """
+    s = model.in_s(poles)
+    counted = poles.imag >= 0
+    rows = np.arange(len(poles))
+    for own in model.higher:
+        gap = np.where(counted, abs(poles - own), np.inf)
+        # up to four times the least distance a pole may be this one too
+        near = counted & (gap <= 4.0 * gap.min(axis=1, keepdims=True))
+        counted[rows, np.where(near, abs(poles), np.inf).argmin(axis=1)] = False
+    # at a smaller angle [rad], of ln z or s, a pole is real
+    counted &= (np.angle(poles) > 1e-9) & (poles != 0) & (s.imag < model.band)
+    return np.where(counted, -s.real / np.maximum(abs(s), LEAST_SIZE), 1.0).min(axis=1, initial=1.0)
+
+
+def disk_of(L: Complex) -> Real:
+    """2 |1 + L|/|1 - L|."""
+    return 2 * abs(1 + L) / np.maximum(abs(1 - L), LEAST_SIZE)
+
+
+def delay(model: Model, L: Complex) -> Real:
+    """The delay [s] that turns L to -1 where |L| passes 1, between two points of the grid along straight lines.
+
+    A law is without limit where `RESERVE` L passes 1 nowhere either: a resonance peaks between two points of the grid.
+    """
+    late = _passing_delay(model, L)
+    return np.where(late < longest_delay(model), late, _passing_delay(model, RESERVE * L))
+
+
+def longest_delay(model: Model) -> float:
+    """The longest delay [s] that is looked for."""
+    return (model.period or 1.0) * LONGEST_MARGIN
+
+
+def _passing_delay(model: Model, L: Complex) -> Real:
+    """That delay [s] by the passages between points of the grid alone, at most the longest."""
+    q = model.angles
+    around = 2 * np.pi
+    size = np.log(np.maximum(abs(L), LEAST_SIZE))
+    turn = np.mod(np.pi + np.unwrap(np.angle(L)), around)
+    here = size[:, :-1]
+    change = np.diff(size)
+    passes = (size[:, 1:] * here <= 0) & (change != 0)
+    share = here / np.where(passes, -change, 1.0)
+    step = np.mod(np.diff(turn) + np.pi, around) - np.pi
+    late = np.mod(turn[:, :-1] + share * step, around) / (q[:-1] + share * np.diff(q))
+    return (model.period or 1.0) * np.where(passes, late, LONGEST_MARGIN).min(axis=1, initial=LONGEST_MARGIN)
 
 
 class Objective(NamedTuple):
@@ -63,98 +115,6 @@ class Objective(NamedTuple):
         return min(values) if self.is_negated else max(values)
 
 
-def damping_of(model: Model, poles: Complex) -> Real:
-    """The least damping ratio (laws,) of oscillating poles (laws, n); 1 where a law has none.
-
-    One of each pair counts.  The poles nearest to those of `higher` modes are left out.
-    """
-    s, counted, rows = model.in_s(poles), poles.imag >= 0, np.arange(len(poles))
-    for own in model.higher:
-        gap = np.where(counted, abs(poles - own), np.inf)
-        near = counted & (gap <= AS_NEAR * gap.min(axis=1, keepdims=True))
-        counted[rows, np.where(near, abs(poles), np.inf).argmin(axis=1)] = False
-    counted &= (np.angle(poles) > REAL_ANGLE) & (poles != 0) & (s.imag < model.band)
-    return np.where(counted, -s.real / np.maximum(abs(s), LEAST_SIZE), 1.0).min(axis=1, initial=1.0)
-
-
-def disk_of(L: Complex) -> Real:
-    """2 |1 + L|/|1 - L|."""
-    return np.asarray(2 * abs(1 + L) / np.maximum(abs(1 - L), LEAST_SIZE))
-
-
-def delay(model: Model, L: Complex) -> Real:
-    """The delay [s] that turns L to -1 where |L| passes 1, between two points of the grid along straight lines.
-
-    A law is without limit where `RESERVE` L passes 1 nowhere either: a resonance peaks between two points of the grid.
-    """
-    longest = (model.period or 1.0) * LONGEST_MARGIN
-    late = _passing_delay(model, L)
-    return np.where(late < longest, late, _passing_delay(model, RESERVE * L))
-
-
-def _passing_delay(model: Model, L: Complex) -> Real:
-    """That delay [s] by the passages between points of the grid alone, at most the longest."""
-    q = model.angles
-    size, turn = np.log(np.maximum(abs(L), LEAST_SIZE)), np.mod(np.pi + np.unwrap(np.angle(L)), 2 * np.pi)
-    passes = (size[:, 1:] * size[:, :-1] <= 0) & (size[:, 1:] != size[:, :-1])
-    share = size[:, :-1] / np.where(passes, size[:, :-1] - size[:, 1:], 1.0)
-    step = np.mod(turn[:, 1:] - turn[:, :-1] + np.pi, 2 * np.pi) - np.pi
-    late = np.mod(turn[:, :-1] + share * step, 2 * np.pi) / (q[:-1] + share * np.diff(q))
-    return (model.period or 1.0) * np.where(passes, late, LONGEST_MARGIN).min(axis=1, initial=LONGEST_MARGIN)
-
-
-def delay_score(model: Model, L: Complex, poles: Complex) -> Real:
-    """Minus that delay, times 1 + damping ratio at the longest one, so that damping decides among such laws."""
-    late = delay(model, L)
-    is_longest = late >= (model.period or 1.0) * LONGEST_MARGIN
-    return np.where(is_longest, -late * (1 + damping_of(model, poles)), -late)
-
-
-OBJECTIVES = {
-    "damping": Objective(
-        lambda judge, entries, poles: -damping_of(judge.model, poles),
-        lambda judge, law: judge.exact_damping(law),
-        is_negated=True,
-        of_poles=True,
-    ),
-    "margin": Objective(
-        lambda judge, entries, poles: (
-            -disk_of(judge.model.loop(entries)).min(axis=1) - TIE * damping_of(judge.model, poles)
-        ),
-        lambda judge, law: judge.lowest(law, disk_of),
-        is_negated=True,
-        of_poles=True,
-    ),
-    "sensitivity": Objective(
-        lambda judge, entries, poles: judge.peak(abs(1 + judge.model.loop(entries)).min(axis=1)),
-        lambda judge, law: float(judge.peak(judge.lowest(law, lambda L: np.asarray(abs(1 + L))))),
-    ),
-    "delay": Objective(
-        lambda judge, entries, poles: delay_score(judge.model, judge.model.loop(entries), poles),
-        lambda judge, law: judge.delay_margin(law),
-        is_negated=True,
-        of_poles=True,
-    ),
-    "residual": Objective(
-        lambda judge, entries, poles: judge.slews.residual(entries),
-        lambda judge, law: judge.simulated_residual(law),
-        of_slew=True,
-    ),
-    "cost": Objective(
-        lambda judge, entries, poles: judge.slews.cost(entries), lambda judge, law: judge.score(law), of_slew=True
-    ),
-}
-
-
-RESERVE = 1.25  # factor on all gains with which the loop is stable, up and down: the error of a gauge or motor
-SEARCH_RESERVE = 1.002 * RESERVE  # in the search: edges of the model's few modes have a smaller error
-FEWEST_MODES = 8  # of the first model; more where its best laws are unstable
-SEARCHED_MODES = 32  # of the largest: with twice as many a law takes eight times as long
-CONTINUOUS_TIMES = 2  # times the modes where the continuous-time loop is designed
-MOST_JUDGES = 64  # kept: those of the arms inside a box, which are the same in each exchange
-LOST = 1e30  # score where a loop is unstable, and as much for each later condition: above any value in SI units
-
-
 @dataclass(frozen=True)
 @record
 class Judge:
@@ -166,7 +126,7 @@ class Judge:
     arm: Arm
     known: Arm
     chain: Chain
-    objective: str
+    objective: Objective
     modes: int
     model: Model
     also: tuple[Model, ...]
@@ -187,8 +147,8 @@ class Judge:
 
         An objective of poles has the model itself.
         """
-        shares = [*((SEARCH_RESERVE, 1 / SEARCH_RESERVE) if self.is_sampled else ())]
-        shares += [] if OBJECTIVES[self.objective].of_poles else [1.0]
+        reserve = 1.002 * RESERVE  # edges of the model's few modes have a smaller error
+        shares = (reserve, 1 / reserve) * self.is_sampled + (1.0,) * (not self.objective.of_poles)
         return [*((self.model, share) for share in shares), *((each, 1.0) for each in self.also)]
 
     # ------------------------------------------------------------ in the model
@@ -199,25 +159,33 @@ class Judge:
 
     def aims(self, entries: Sequence[Entry]) -> Real:
         """The objective by the judge's own model alone; of its poles `LOST` and more where one is unstable."""
-        objective = OBJECTIVES[self.objective]
-        if not objective.of_poles:
+        if not self.objective.of_poles:
             with np.errstate(all="ignore"):  # slews of unstable laws
-                return np.nan_to_num(objective.scores(self, entries, None), nan=np.inf)
+                return np.nan_to_num(self.objective.scores(self, entries, None), nan=np.inf)
         poles = self.model.poles(entries)
         growth = self.model.growth(poles).max(axis=1)
-        scores, stable = lost(1, growth), growth < 0
+        scores = lost(1, growth)
+        stable = growth < 0
         if stable.any():
-            scores[stable] = objective.scores(self, chosen(entries, stable), poles[stable])
+            scores[stable] = self.objective.scores(self, chosen(entries, stable), poles[stable])
         return scores
 
     # ------------------------------------------------------------ beyond it
 
     def value(self, law: AnyLaw) -> float:
         """The objective of one law, by the best available method."""
-        return OBJECTIVES[self.objective].value(self, law)
+        return self.objective.value(self, law)
 
-    def lowest(self, law: AnyLaw, of: Callable[[Complex], Real]) -> float:
-        """The least of a function of the loop function, between the points of the grid too."""
+    def disk_margin(self, law: AnyLaw) -> float:
+        """The disk margin, between the points of the grid too."""
+        return self._lowest(law, disk_of)
+
+    def peak_sensitivity(self, law: AnyLaw) -> float:
+        """The largest |S|, likewise."""
+        return float(self.peak(self._lowest(law, lambda L: np.asarray(abs(1 + L)))))
+
+    def _lowest(self, law: AnyLaw, of: Callable[[Complex], Real]) -> float:
+        """The least of a function of the loop function."""
         entries = entries_of(law)
         return lowest(lambda angles: of(self.model.loop(entries, angles)[0]), self.model.angles)[0]
 
@@ -236,7 +204,7 @@ class Judge:
     def delay_margin(self, law: AnyLaw) -> float:
         """The delay margin [s] by the model; a lower bound where it is the longest that is looked for."""
         late = float(delay(self.model, self.model.loop(entries_of(law)))[0])
-        return late if late < (self.model.period or 1.0) * LONGEST_MARGIN else LowerBound(late)
+        return late if late < longest_delay(self.model) else LowerBound(late)
 
     def simulated_residual(self, law: AnyLaw) -> float:
         """The residual of `tfarm simulate` after the slew [N m], with the converters; inf where it stops."""
@@ -256,6 +224,37 @@ class Judge:
             return False
 
 
+def delay_score(judge: Judge, entries: Sequence[Entry], poles: Complex) -> Real:
+    """Minus the delay margin, times 1 + damping ratio at the longest one, so that damping decides among such laws."""
+    late = delay(judge.model, judge.model.loop(entries))
+    is_longest = late >= longest_delay(judge.model)
+    return np.where(is_longest, -late * (1 + damping_of(judge.model, poles)), -late)
+
+
+def disk_score(judge: Judge, entries: Sequence[Entry], poles: Complex) -> Real:
+    """Minus the disk margin, and a little of the damping ratio: without sampling all rate feedback has margin 2."""
+    return -disk_of(judge.model.loop(entries)).min(axis=1) - 1e-3 * damping_of(judge.model, poles)
+
+
+OBJECTIVES = {
+    "damping": Objective(
+        lambda judge, entries, poles: -damping_of(judge.model, poles),
+        Judge.exact_damping,
+        is_negated=True,
+        of_poles=True,
+    ),
+    "margin": Objective(disk_score, Judge.disk_margin, is_negated=True, of_poles=True),
+    "sensitivity": Objective(
+        lambda judge, entries, _: judge.peak(abs(1 + judge.model.loop(entries)).min(axis=1)), Judge.peak_sensitivity
+    ),
+    "delay": Objective(delay_score, Judge.delay_margin, is_negated=True, of_poles=True),
+    "residual": Objective(
+        lambda judge, entries, _: judge.slews.residual(entries), Judge.simulated_residual, of_slew=True
+    ),
+    "cost": Objective(lambda judge, entries, _: judge.slews.cost(entries), Judge.score, of_slew=True),
+}
+
+
 def model_sizes(arm: Arm, chain: Chain, modes: int, *, continuous: bool) -> list[int]:
     """Numbers of flexible modes of the models of a search, in turn until the best law is stable.
 
@@ -264,25 +263,26 @@ def model_sizes(arm: Arm, chain: Chain, modes: int, *, continuous: bool) -> list
     fewest = modes + FEWEST_MODES // 2
     if continuous or arm.has_elastic_link:
         return [max(FEWEST_MODES if continuous else UNDAMPED_MODES, fewest)]
-    most = min(most_modes(arm, chain), SEARCHED_MODES)
+    # with twice as many modes a law takes eight times as long
+    most = min(most_modes(arm, chain), 32)
     doubled = (max(FEWEST_MODES, fewest) << n for n in range(most.bit_length()))
     return [*(size for size in doubled if size < most), most]
 
 
-@lru_cache(MOST_JUDGES)
+@lru_cache(64)  # those of the arms inside a box, which are the same in each exchange
 def judge_of(
     arm: Arm, known: Arm, chain: Chain, objective: str, signals: tuple[str, ...], modes: int, count: int, *,
     continuous: bool = False,
 ) -> Judge:  # fmt: skip
     """The judge of laws on these signals, with `count` flexible modes; more of the continuous-time loop."""
-    if OBJECTIVES[objective].of_slew and "root_moment" not in signals:
-        signals = (*signals, "root_moment")
-    (known, _), (arm, chain) = driven(known, chain), driven(arm, chain)
-    own = continuous_model(
-        arm, signals, modes, (CONTINUOUS_TIMES if continuous else 1) * count, 2 / chain.sampling.period
-    )
-    models = [own] if continuous else [sampled_model(arm, chain, signals, modes, count), own]
-    return Judge(arm, known, chain, objective, modes, models[0], tuple(models[1:]))
+    aim = OBJECTIVES[objective]
+    signals = tuple(dict.fromkeys((*signals, *("root_moment",) * aim.of_slew)))
+    known, _ = driven(known, chain)
+    arm, chain = driven(arm, chain)
+    own = continuous_model(arm, signals, modes, (2 if continuous else 1) * count, 2 / chain.sampling.period)
+    if continuous:
+        return Judge(arm, known, chain, aim, modes, own, ())
+    return Judge(arm, known, chain, aim, modes, sampled_model(arm, chain, signals, modes, count), (own,))
 
 
 def lost(stage: int, growth: Real) -> Real:
@@ -296,7 +296,8 @@ def scores_of(judges: Sequence[Judge], entries: Sequence[Entry], limits: Real) -
     A law whose score is above its one of the `limits` (laws,) may have any value above it.  Where the limit is the
     score of a stable law, the objective is first: most laws have lost by it.
     """
-    scores, of_stable = np.full(limits.size, -np.inf), limits < LOST
+    scores = np.full(limits.size, -np.inf)
+    of_stable = limits < LOST
     _add_aims(judges, entries, of_stable, scores, limits)
     left = np.flatnonzero(scores <= limits)
     conditions = [each for judge in judges for each in judge.conditions]

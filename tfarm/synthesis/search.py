@@ -25,26 +25,10 @@ from tfarm.synthesis.judge import LOST, Judge, scores_of
 from tfarm.synthesis.structures import Bounds, Structure
 from tfarm.synthesis.worst_case import Effort, Tell
 
-FEWEST_RUNS, MOST_RUNS = 2, 8  # one more than coefficients within these: some minima are found by one of five alone
-USUAL_WORK = 4 * 20**2  # models times squared states of one arm's first model: with twice as much half the runs
-FEWEST_POINTS, POINTS_EACH = 32, 15  # of a run, at least, and for each coefficient: the next power of two
-LAWS_AT_ONCE = 256  # a limit of memory
-LAWS_EACH, MOST_LAWS = 800, 4000  # of a run for each coefficient, and at most; twice as many from the best points
+MOST_RUNS = 8
 STRATEGIES = (("best1bin", 0.7), ("currenttobest1bin", 0.9))  # in turn, and the share of coefficients changed at once
-AROUND = 0.5  # of x: the spread of the points of a run around the best, half as wide in each one after
-MOST_REFINED, WORTH = 5, 2e-3  # such runs, and the relative gain of one after which another follows
 CONVERGED = 1e-9  # of the scores: the spread of a run's points at which it ends
-SIMPLEX = 0.005  # of the region: the first edges of the simplex
-STEPS_EACH = 100  # of the simplex, for each coefficient
-CANDIDATES = 4  # laws for the exact verdicts, the best first
 BEYOND = 4.0  # of x: reach of a search beyond its bounds, a factor e^4 of a coefficient far above its unit
-APART = 0.02  # of the range of x: least distance of two candidates
-AS_GOOD = 1e-4  # relative: a coefficient is at its physical end if the score there is worse by less
-AGREES = 5e-3  # relative: a run agrees if its score is worse than the best by less
-FLAT_WITHIN = 0.01  # laws whose score is worse by less than this share bound the flat part
-FLAT_STEPS = 60  # of the way to the bounds, each 1.4 times the one before
-AT_ORIGIN = 1e-9  # of that way: the first step
-FLAT_HALVINGS = 30  # of the step that leaves the flat part
 
 
 Score = Callable[..., Real]  # of points (n, k), and of limits
@@ -90,17 +74,17 @@ class Worst:
     @property
     def work(self) -> float:
         """The work of a law, relative to that of one arm and its first model."""
-        return (
-            sum((4 if judge.is_sampled else 1) * len(judge.model.plant[0]) ** 2 for judge in self.judges) / USUAL_WORK
-        )
+        squares = sum((4 if judge.is_sampled else 1) * len(judge.model.plant[0]) ** 2 for judge in self.judges)
+        # models times squared states of one arm's first model: with twice as much half the runs
+        return squares / (4 * 20**2)
 
     def scores(self, form: Structure, x: Real, limits: Real | None = None) -> Real:
         """The function to be minimised, at points x (n, laws), any value above the limit of a law (see `scores_of`)."""
         limits = np.full(x.shape[1], np.inf) if limits is None else limits
-        parts = [slice(i, i + LAWS_AT_ONCE) for i in range(0, x.shape[1], LAWS_AT_ONCE)]
-        entries = [form.entries(form.coefficients(x[:, part])) for part in parts]
+        at_once = 256  # a limit of memory
+        parts = (slice(i, i + at_once) for i in range(0, x.shape[1], at_once))
         return np.concatenate(
-            [scores_of(self.judges, each, limits[part]) for each, part in zip(entries, parts, strict=True)]
+            [scores_of(self.judges, form.entries(form.coefficients(x[:, part])), limits[part]) for part in parts]
         )
 
 
@@ -109,21 +93,20 @@ def search(judge: Worst, form: Structure, tell: Tell, near: Real | None = None, 
 
     `near` (n,) is the best point of a judge with fewer arms, with which the first run begins.
     """
-    given = [each.name in form.given for each in form.free]
-    ends = [(place, end) for place in range(form.size) for end in (0, 1)]
-    places = [each for each in ends if not (given[each[0]] or form.is_physical(*each))]
-    region = form.wider(places, BEYOND)
+    movable = form.ends(physical=False)
+    region = form.wider(movable, BEYOND)
     (x, scores), of_runs = minimised(partial(judge.scores, region), form, region.box, judge.work, tell, near, effort)
-    for place, end in (each for each in ends if region.is_physical(*each)):  # there if the score is as good
+    for place, end in region.ends(physical=True):
         moved = x[:, :1].copy()
         moved[place] = region.box[end][place]
-        if judge.scores(region, moved)[0] <= scores[0] + AS_GOOD * abs(scores[0]):
+        # a coefficient is at its physical end if the score there is as good
+        if judge.scores(region, moved)[0] <= scores[0] + 1e-4 * abs(scores[0]):
             x[:, :1] = moved
-    best = x[:, 0]
-    beyond = [each for each in places if (form.box[0] > best, form.box[1] < best)[each[1]][each[0]]]
+    beyond = [(place, end) for place, end in movable if (2 * end - 1) * (x[place, 0] - form.box[end][place]) > 0]
     widened = tuple(dict.fromkeys(form.names[place] for place, _ in beyond))
-    found = [(float(scores[n]), x[:, n]) for n in _apart(region, x, scores, CANDIDATES)]
-    agreed = sum(each <= scores[0] + AGREES * abs(scores[0]) for each in of_runs)
+    found = [(float(scores[n]), x[:, n]) for n in _apart(region, x, scores)]
+    # a run agrees if its score is worse than the best by less
+    agreed = sum(each <= scores[0] + 5e-3 * abs(scores[0]) for each in of_runs)
     return Search(form.wider(beyond, BEYOND), found, len(of_runs), agreed, widened)
 
 
@@ -137,9 +120,11 @@ def minimised(
     the best, and are more where no loop is stable yet: the end of a sketch.  Then follow one with the best points of
     all, not of a search near a point, some near the best as long as that gains, and a simplex at the best of all.
     """
-    runs = min(max(int((form.size + 1) / max(1.0, work)), FEWEST_RUNS), MOST_RUNS) if effort == "whole" else 1
-    number = 1 << (max(FEWEST_POINTS, POINTS_EACH * form.size) - 1).bit_length()
-    rounds = min(LAWS_EACH * form.size, MOST_LAWS) // number
+    # one run more than coefficients: some minima are found by one of five alone
+    runs = min(max(int((form.size + 1) / max(1.0, work)), 2), MOST_RUNS) if effort == "whole" else 1
+    # points of a run: a power of two
+    number = 1 << (max(32, 15 * form.size) - 1).bit_length()
+    rounds = min(800 * form.size, 4000) // number
     ended: list[Points] = []
 
     def run(points: Real, rounds: int) -> None:
@@ -157,11 +142,14 @@ def minimised(
     if effort == "whole":
         run(Points.of(ended).x[:, :number], 2 * rounds)
     if form.size > len(PLANE) and effort != "sketch":
-        for n in range(MOST_REFINED):
-            (best, *_), (least, *_) = Points.of(ended).x.T, Points.of(ended).scores
-            spread = AROUND / 2**n * np.random.default_rng(runs + n).standard_normal((number, form.size))
-            run(np.clip(best + spread, *box).T, rounds)
-            if not ended[-1].scores[0] < least - WORTH * abs(least):
+        for n in range(5):
+            found = Points.of(ended)
+            least = found.scores[0]
+            # the spread of the points of a run around the best, half as wide in each one after
+            spread = 0.5 / 2**n * np.random.default_rng(runs + n).standard_normal((number, form.size))
+            run(np.clip(found.x[:, 0] + spread, *box).T, rounds)
+            # another run follows one with a gain
+            if not ended[-1].scores[0] < least - 2e-3 * abs(least):
                 break
     if effort != "sketch":
         ended.append(simplex(score, box, Points.of(ended)))
@@ -179,7 +167,7 @@ def evolved(score: Score, box: tuple[Real, Real], points: Real, rounds: int, see
         limits[:] = intermediate_result.population_energies
 
     done = cast("Any", differential_evolution)(
-        lambda x: score(x.reshape(len(points), -1), limits), list(zip(*box, strict=True)), init=points.T,
+        lambda x: score(x.reshape(len(points), -1), limits), np.transpose(box), init=points.T,
         strategy=strategy, recombination=recombination, maxiter=rounds, tol=CONVERGED, rng=seed, polish=False,
         vectorized=True, updating="deferred", callback=after,
     )  # fmt: skip
@@ -188,19 +176,18 @@ def evolved(score: Score, box: tuple[Real, Real], points: Real, rounds: int, see
 
 def simplex(score: Score, box: tuple[Real, Real], found: Points) -> Points:
     """The last point of a simplex of Nelder and Mead that begins at the best point found."""
-    (low, high), start, limit = box, found.x[:, 0], found.scores[:1]
-    step = SIMPLEX * (high - low)
-    corners = start + np.vstack([np.zeros(start.size), np.diag(np.where(start + step > high, -step, step))])
+    low, high = box
+    start = found.x[:, 0]
+    limit = found.scores[:1]
+    # of the region: the first edges of the simplex
+    step = 0.005 * (high - low)
+    edges = np.diag(np.where(start + step > high, -step, step))
     options = {
-        "initial_simplex": corners, "maxfev": STEPS_EACH * start.size, "adaptive": start.size > 1,
+        "initial_simplex": [start, *(start + edges)], "maxfev": 100 * start.size, "adaptive": start.size > 1,
         "xatol": CONVERGED * (high - low).max(), "fatol": CONVERGED * abs(limit[0]),
     }  # fmt: skip
     done = cast("Any", minimize)(
-        lambda x: float(score(x[:, None], limit)[0]),
-        start,
-        method="Nelder-Mead",
-        bounds=list(zip(low, high, strict=True)),
-        options=options,
+        lambda x: score(x[:, None], limit)[0], start, method="Nelder-Mead", bounds=np.transpose(box), options=options
     )
     return Points(done.x[:, None], np.array([done.fun]))
 
@@ -209,27 +196,26 @@ def sobol(low: Real, high: Real, number: int, seed: int) -> Real:
     """Points (n, number) of Sobol's sequence in a box, scrambled by a seed; a power of two has no gap."""
     from scipy.stats import qmc  # here, because it takes half a second to load
 
-    return np.asarray((low + qmc.Sobol(low.size, rng=seed).random(number) * (high - low)).T)
+    return (low + qmc.Sobol(low.size, rng=seed).random(number) * (high - low)).T
 
 
-def _apart(form: Structure, points: Real, scores: Real, most: int) -> list[int]:
-    """Indices of the best points, at a distance from each other."""
+def _apart(form: Structure, points: Real, scores: Real, most: int = 4, least: float = 0.02) -> list[int]:
+    """Indices of the best points for the exact verdicts, at a least distance from each other, of the range of x."""
     low, high = form.box
     found: list[int] = []
     for n in np.argsort(scores, kind="stable").tolist():
-        if (abs(points[:, [n]] - points[:, found]) > APART * (high - low)[:, None]).any(axis=0).all():
+        if (abs(points[:, [n]] - points[:, found]) > least * (high - low)[:, None]).any(axis=0).all():
             found.append(n)
-        if len(found) == most:
-            break
-    return found
+    return found[:most]
 
 
 def flat_part(judge: Worst, form: Structure, x: Real, score: float) -> dict[str, Bounds]:
-    """Range of each coefficient in which the score is within `FLAT_WITHIN` of the best, the others constant.
+    """Range of each coefficient in which the score is within one per cent of the best, the others constant.
 
     The search goes outwards in growing steps, then by halving: narrow ranges are found as well as wide ones.
     """
-    n, limit = form.size, score + FLAT_WITHIN * abs(score)
+    n = form.size
+    limit = score + 0.01 * abs(score)
     ways = np.concatenate([np.diag(end - x) for end in form.box]).T
 
     def is_within(shares: Real) -> Any:
@@ -237,19 +223,18 @@ def flat_part(judge: Worst, form: Structure, x: Real, score: float) -> dict[str,
         points = (x[:, None, None] + ways[:, :, None] * shares).reshape(n, -1)
         return (judge.scores(form, points, np.full(shares.size, limit)) <= limit).reshape(shares.shape)
 
-    outwards = np.geomspace(AT_ORIGIN, 1.0, FLAT_STEPS)
+    # each 1.4 times the one before
+    outwards = np.r_[0.0, np.geomspace(1e-9, 1.0, 60)]
     is_beyond = ~is_within(np.tile(outwards, (2 * n, 1)))
     first = is_beyond.argmax(axis=1)
-    low, high = np.where(first > 0, outwards[first - 1], 0.0), outwards[first]
-    for _ in range(FLAT_HALVINGS):
+    low = outwards[first - 1]
+    high = outwards[first]
+    for _ in range(30):
         middle = (low + high) / 2
         inside = is_within(middle[:, None])[:, 0]
-        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
-    ends, found = form.coefficients(x[:, None] + ways * low), {}
-    for place, each in enumerate(form.free):
-        least, largest = (
-            float(ends[place, side]) if is_beyond[side].any() else bound
-            for side, bound in zip((place, n + place), each.bounds, strict=True)
-        )
-        found[each.name] = (least, largest)
-    return found
+        low = np.where(inside, middle, low)
+        high = np.where(inside, high, middle)
+    ends = form.coefficients(x[:, None] + ways * low)
+    bounds = np.transpose([each.bounds for each in form.free])
+    reached = np.where(first.reshape(2, n), [ends[:, :n].diagonal(), ends[:, n:].diagonal()], bounds)
+    return {name: (least, most) for name, (least, most) in zip(form.names, reached.T.tolist(), strict=True)}

@@ -1,16 +1,9 @@
 """Structures of a law: its entries as functions of free coefficients, each with a scale and bounds of its own.
 
-    K1-K2         v = -Kp theta - K1 theta_t - K2 M                              the gains of the paper's law
-    PD            v = -Kp theta - K1 theta_t
-    PD+notch      v = -(Kp + K1 s/(1 + s/pole)) N(s) theta                       of the hub angle alone
-    lead          v = -Kp (1 + s/zero)/(1 + s/pole) theta
-    PI            v = -(Kp + Ki/s) theta                                         for a hub with friction or back-EMF
-    PID           v = -(Kp + Ki/s + Kd s/(1 + s/pole)) theta
-    PPF           PD, and -sum g_i w_i^2/(s^2 + 2 zeta_i w_i s + w_i^2) M        positive position feedback
-    strain-rate   PD, and -g s/(1 + s/pole) M
-
-N(s) = (s^2 + 2 a w s + w^2)/(s^2 + 2 b w s + w^2).  M is the root moment; g and K2 are of either sign.  Kp is fixed: it
-gives the speed of the angle, sqrt(Kp/J), and all objectives are best at small Kp.  Signals enter less their references.
+A structure is one function under `@structure(name, formula)`: the table of the documentation, the refusal of another
+name and the tests follow from `STRUCTURES`.  In the formulas N(s) = (s^2 + 2 a w s + w^2)/(s^2 + 2 b w s + w^2), and M
+is the root moment; g and K2 are of either sign.  Kp is fixed: it gives the speed of the angle, sqrt(Kp/J), and all
+objectives are best at small Kp.  Signals enter less their references.
 Most objectives are best without an integral, so Ki has a lower limit, Kp sqrt(Kp/J)/10.  PI alone stabilises no rigid
 hub without friction: the roots of J s^3 + Kp s + Ki have the sum 0.
 A pole faster than 2/T rings when discretised by Tustin's rule: there the search ends.
@@ -21,7 +14,7 @@ positive one, far above its unit, is searched by decades, and one of either sign
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -37,12 +30,11 @@ from tfarm.spectrum.table import check_gains, first_frequency, rate_unit, turnin
 
 Bounds = tuple[float, float]
 
+Ends = list[tuple[int, int]]  # of bounds: the place of a coefficient, and its lower (0) or upper end (1)
+
 INTEGRAL_SPEED = 0.1  # lower limit of Ki, in Kp sqrt(Kp/J); the search starts at twice as much
-ANGLE_SPEED = 0.1  # of the first frequency, and rad a sample: speed of the angle unless Kp is given
 LOGARITHMIC = 1e-8  # of the usual size: the unit of a positive coefficient
 REACH = np.exp(4.0)  # of a coefficient's usual size, up and down: its first bounds
-FILTER_REACH = np.exp(2.0)  # the same of the frequency and damping of a notch or filter
-AT_END = 1e-3  # of the range of x: a coefficient so near to an end of its bounds is there
 
 
 class Entry(NamedTuple):
@@ -122,11 +114,11 @@ class Structure:
 
     def at(self, coefficients: Any) -> Real:
         """x of these coefficients (n,)."""
-        return np.asarray(np.arcsinh(np.asarray(coefficients) / self.units))
+        return np.arcsinh(np.asarray(coefficients) / self.units)
 
     def coefficients(self, x: Real) -> Real:
         """The coefficients at x (n, laws)."""
-        return np.asarray((self.units * np.sinh(x.T)).T)
+        return (self.units * np.sinh(x.T)).T
 
     def record_at(self, x: Real) -> AnyLaw:
         """The law at x (n,), as a record."""
@@ -137,27 +129,25 @@ class Structure:
         blocks = {each.signal: (tuple(each.num[:, 0].tolist()), tuple(each.den[:, 0].tolist())) for each in entries}
         return Law(blocks, name=self.name, references=tuple(blocks))
 
-    def at_ends(self, x: Real) -> list[tuple[int, int]]:
-        """The indices of coefficients at an end of their bounds, and that end, 0 or 1."""
+    def at_ends(self, x: Real) -> Ends:
+        """The ends of the bounds at which coefficients are: nearer than a thousandth of the range of x."""
         low, high = self.box
-        share = (x - low) / (high - low)
-        found = [*zip(*np.nonzero(np.array([share, 1 - share]).T < AT_END), strict=True)]
-        return [(int(place), int(end)) for place, end in found]
+        is_there = abs(np.array(self.box) - x) < 1e-3 * (high - low)
+        return [(place, end) for place, end in np.argwhere(is_there.T).tolist()]
 
-    def is_physical(self, place: int, end: int) -> bool:
-        """Whether an end of the bounds of a coefficient is a physical one, and not given."""
-        each = self.free[place]
-        return each.name not in self.given and each.bounds[end] == each.ends[end]
+    def ends(self, *, physical: bool) -> Ends:
+        """The ends of the bounds that are not given: the physical ones, or the others."""
+        free = [(place, each) for place, each in enumerate(self.free) if each.name not in self.given]
+        return [(n, end) for n, of in free for end in (0, 1) if (of.bounds[end] == of.ends[end]) == physical]
 
-    def wider(self, ends: list[tuple[int, int]], by: float) -> Structure:
+    def wider(self, ends: Ends, by: float) -> Structure:
         """The same with these bounds farther out, `by` of x, not beyond physical ends."""
-        free, box = list(self.free), self.box
+        free = list(self.free)
         for place, end in ends:
-            each, way = free[place], 1 if end else -1
-            bound = each.unit * np.sinh(box[end][place] + way * by)
-            bound = min(bound, each.ends[1]) if end else max(bound, each.ends[0])
-            low, high = each.bounds
-            free[place] = each._replace(bounds=(low, float(bound)) if end else (float(bound), high))
+            each = free[place]
+            x = self.box[end][place] + (by if end else -by)
+            bound = float(np.clip(each.unit * np.sinh(x), *each.ends))
+            free[place] = each._replace(bounds=(each.bounds[0], bound) if end else (bound, each.bounds[1]))
         return replace(self, free=tuple(free))
 
 
@@ -171,30 +161,29 @@ def structure_of(
     Raises ParameterError for an unknown structure, bad bounds or Kp, and for gains too large for the arm.
     """
     must_be_known("structure", name, STRUCTURES)
-    is_gain = name == TWO_GAINS or 0.0 <= Kp < np.inf
-    require(is_gain, ANGLE_GAIN, Kp, "the hub angle gain is zero (chosen) or positive")
-    speed = ANGLE_SPEED * min(first_frequency(arm), 1 / period)
-    usual = 0.0 if name == TWO_GAINS else float(f"{turning_inertia(arm) * speed**2:.3g}")
-    form = STRUCTURES[name](arm, Kp or usual, modes, period)
+    if name != TWO_GAINS:
+        require(0.0 <= Kp < np.inf, ANGLE_GAIN, Kp, "the hub angle gain is zero (chosen) or positive")
+        speed = 0.1 * min(first_frequency(arm), 1 / period)
+        Kp = Kp or float(f"{turning_inertia(arm) * speed**2:.3g}")
+    free, entries = STRUCTURES[name].of(arm, Kp, modes, period)
+    given = {}
+    for key, pair in bounds.items():
+        if pair is not None:
+            require(name == TWO_GAINS, key, pair, f"goes with the structure {TWO_GAINS} alone")
+            is_range = -np.inf < pair[0] < pair[1] < np.inf
+            require(is_range, key, pair, "bounds are two finite numbers, the lower first")
+            given[key] = (float(pair[0]), float(pair[1]))
+    free = tuple(each._replace(bounds=given.get(each.name, each.bounds)) for each in free)
+    form = Structure(name, free, {ANGLE_GAIN: Kp}, entries, tuple(given))
     if "root_moment" in form.signals:
         must_not_be_algebraic(arm, "structure", name)
-    given = {key: pair for key, pair in bounds.items() if pair is not None}
-    for key, pair in given.items():
-        require(name == TWO_GAINS, key, pair, f"goes with the structure {TWO_GAINS} alone")
-        is_range = -np.inf < pair[0] < pair[1] < np.inf
-        require(is_range, key, pair, "bounds are two finite numbers, the lower first")
-    ends = {key: (float(low), float(high)) for key, (low, high) in given.items()}
-    return replace(
-        form,
-        free=tuple(each._replace(bounds=ends.get(each.name, each.bounds)) for each in form.free),
-        given=tuple(given),
-    )
+    return form
 
 
 def check_bounds(form: Structure, arm: Arm) -> None:
     """Raise ParameterError where the bounds have gains that are too large for the arm."""
-    for bounds in zip(*(each.bounds for each in form.free), strict=True):
-        if form.name == TWO_GAINS:
+    if form.name == TWO_GAINS:
+        for bounds in zip(*(each.bounds for each in form.free), strict=True):
             check_gains(arm, HubFeedback(**form.fixed, **dict(zip(form.names, bounds, strict=True))))
 
 
@@ -213,11 +202,42 @@ def polynomial(*coefficients: Any) -> Real:
 
 
 ONE = np.ones((1, 1))
+Built = tuple[Sequence[Coefficient], Callable[[Real], tuple[Entry, ...]]]  # free coefficients, and their entries
 
 
-def _rate_gain(arm: Arm, Kp: float) -> Coefficient:
+class Declared(NamedTuple):
+    """A structure: its formula in LaTeX, and its coefficients and entries of arm, Kp, number of modes, and period."""
+
+    formula: str
+    of: Callable[[Arm, float, int, float], Built]
+
+
+STRUCTURES: dict[str, Declared] = {}
+
+
+def structure(name: str, formula: str) -> Callable[[Callable[[Arm, float, int, float], Built]], None]:
+    """Declare a structure: `tfarm design`, its documentation and its tests have it from here."""
+
+    def declare(of: Callable[[Arm, float, int, float], Built]) -> None:
+        STRUCTURES[name] = Declared(formula, of)
+
+    return declare
+
+
+def _rate_gain(arm: Arm, Kp: float, name: str = "K1") -> Coefficient:
     """K1, usually that of damping ratio 1/sqrt(2) of the rigid arm under Kp, without friction."""
-    return positive("K1", float(np.sqrt(2 * Kp * turning_inertia(arm))))
+    return positive(name, float(np.sqrt(2 * Kp * turning_inertia(arm))))
+
+
+def _integral_gain(arm: Arm, Kp: float) -> Coefficient:
+    """Ki, from its lower limit on."""
+    least = INTEGRAL_SPEED * Kp * float(np.sqrt(Kp / turning_inertia(arm)))
+    return Coefficient("Ki", LOGARITHMIC * least, (least, REACH * least), (least, np.inf), 2 * least)
+
+
+def _pole(period: float) -> Coefficient:
+    """The pole of a filter, at most the fastest of a sampled signal."""
+    return positive("pole_rad_s", 2 / period, 2 / period)
 
 
 def _servo(Kp: float, K1: Real) -> tuple[Entry, Entry]:
@@ -230,26 +250,29 @@ def _second_order(w: Real, damping: Real) -> Real:
     return polynomial(1.0, 2 * damping * w, w * w)
 
 
-def _two_gains(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
+@structure(TWO_GAINS, r"$v = -K_p \theta - K_1 \theta_t - K_2 M$")
+def _two_gains(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     """The gains of the paper's law, with physical ends: no damping at K1 = 0, a hub at rest at K2 = 1 (of a torque)."""
     unit = arm.input_per_torque
+    rate = rate_unit(arm)
     most = 2.0 * turning_inertia(arm) * band_of(arm, 1)
-    K1 = Coefficient("K1", LOGARITHMIC * rate_unit(arm), (0.0, most), (0.0, np.inf), 0.1 * rate_unit(arm))
-    K2 = Coefficient("K2", unit, (-3.0 * unit, unit), (-np.inf, unit), 0.0)
+    K1 = Coefficient(PLANE[0], LOGARITHMIC * rate, (0.0, most), (0.0, np.inf), 0.1 * rate)
+    K2 = Coefficient(PLANE[1], unit, (-3.0 * unit, unit), (-np.inf, unit), 0.0)
 
     def entries(c: Real) -> tuple[Entry, ...]:
-        angle, rate = _servo(Kp, c[0])
-        return (*((angle,) if Kp else ()), rate, Entry("root_moment", polynomial(c[1]), ONE))
+        moment = Entry("root_moment", polynomial(c[1]), ONE)
+        return (*_servo(Kp, c[0])[0 if Kp else 1 :], moment)
 
-    assert (K1.name, K2.name) == PLANE
-    return Structure(TWO_GAINS, (K1, K2), {ANGLE_GAIN: Kp}, entries)
-
-
-def _pd(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
-    return Structure("PD", (_rate_gain(arm, Kp),), {ANGLE_GAIN: Kp}, lambda c: _servo(Kp, c[0]))
+    return (K1, K2), entries
 
 
-def _pd_notch(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
+@structure("PD", r"$v = -K_p \theta - K_1 \theta_t$")
+def _pd(arm: Arm, Kp: float, modes: int, period: float) -> Built:
+    return (_rate_gain(arm, Kp),), lambda c: _servo(Kp, c[0])
+
+
+@structure("PD+notch", r"$v = -(K_p + K_1 s/(1 + s/p)) \, N(s) \, \theta$")
+def _pd_notch(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     def entries(c: Real) -> tuple[Entry, ...]:
         K1, pole, w, a, b = c
         num = product(polynomial(K1 + Kp / pole, Kp), _second_order(w, a))
@@ -257,89 +280,70 @@ def _pd_notch(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
 
     free = (
         _rate_gain(arm, Kp),
-        positive("pole_rad_s", 2 / period, 2 / period),  # the fastest derivative of a sampled signal
+        _pole(period),
         positive("notch_rad_s", min(first_frequency(arm), 1 / period), 2 / period),
         positive("notch_zero_damping", 0.1),
         positive("notch_pole_damping", 0.7),
     )
-    return Structure("PD+notch", free, {ANGLE_GAIN: Kp}, entries)
+    return free, entries
 
 
-def _lead(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
+@structure("lead", r"$v = -K_p (1 + s/z)/(1 + s/p) \, \theta$")
+def _lead(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     def entries(c: Real) -> tuple[Entry, ...]:
         zero, pole = c
         return (Entry("hub_angle", polynomial(Kp / zero, Kp), polynomial(1 / pole, 1.0)),)
 
-    free = positive("zero_rad_s", Kp / _rate_gain(arm, Kp).start), positive("pole_rad_s", 2 / period, 2 / period)
-    return Structure("lead", free, {ANGLE_GAIN: Kp}, entries)
+    return (positive("zero_rad_s", Kp / _rate_gain(arm, Kp).start), _pole(period)), entries
 
 
-def _integral_gain(arm: Arm, Kp: float) -> Coefficient:
-    """Ki, from its lower limit on."""
-    least = INTEGRAL_SPEED * Kp * float(np.sqrt(Kp / turning_inertia(arm)))
-    return Coefficient("Ki", LOGARITHMIC * least, (least, REACH * least), (least, np.inf), 2 * least)
+@structure("PI", r"$v = -(K_p + K_i/s) \, \theta$, for a hub with friction or back-EMF")
+def _pi(arm: Arm, Kp: float, modes: int, period: float) -> Built:
+    den = polynomial(1.0, 0.0)
+    return (_integral_gain(arm, Kp),), lambda c: (Entry("hub_angle", polynomial(Kp, c[0]), den),)
 
 
-def _pi(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
-    return Structure(
-        "PI",
-        (_integral_gain(arm, Kp),),
-        {ANGLE_GAIN: Kp},
-        lambda c: (Entry("hub_angle", polynomial(Kp, c[0]), polynomial(1.0, 0.0)),),
-    )
-
-
-def _pid(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
+@structure("PID", r"$v = -(K_p + K_i/s + K_d s/(1 + s/p)) \, \theta$")
+def _pid(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     def entries(c: Real) -> tuple[Entry, ...]:
         Ki, Kd, pole = c
         num = polynomial(Kd + Kp / pole, Kp + Ki / pole, Ki)
         return (Entry("hub_angle", num, polynomial(1 / pole, 1.0, 0.0)),)
 
-    free = (
-        _integral_gain(arm, Kp),
-        _rate_gain(arm, Kp)._replace(name="Kd"),
-        positive("pole_rad_s", 2 / period, 2 / period),  # the fastest derivative of a sampled signal
-    )
-    return Structure("PID", free, {ANGLE_GAIN: Kp}, entries)
+    return (_integral_gain(arm, Kp), _rate_gain(arm, Kp, "Kd"), _pole(period)), entries
 
 
-def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
-    frequencies = natural_modes(arm, modes).natural_frequency[-modes:].tolist()
-
+@structure(
+    "PPF",
+    r"PD, and $-\sum_i g_i \omega_i^2/(s^2 + 2 \zeta_i \omega_i s + \omega_i^2) \, M$ (positive position feedback)",
+)
+def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     def entries(c: Real) -> tuple[Entry, ...]:
-        num, den = np.zeros((1, c.shape[1])), ONE
+        num = np.zeros((1, c.shape[1]))
+        den = ONE
         for g, w, zeta in c[1:].reshape(modes, 3, -1):
             own = _second_order(w, zeta)
-            more = product(polynomial(g * w * w), den)
             num = product(num, own)
-            num = np.concatenate([num[: len(num) - len(more)], num[len(num) - len(more) :] + more])
+            num[2:] += g * w * w * den
             den = product(den, own)
         return (*_servo(Kp, c[0]), Entry("root_moment", num, den))
 
+    reach = np.exp(2.0)  # of frequency and damping of a filter
     free = [_rate_gain(arm, Kp)]
-    for n, w in enumerate(frequencies, 1):
+    for n, w in enumerate(natural_modes(arm, modes).natural_frequency[-modes:].tolist(), 1):
         free += [
             signed(f"gain_{n}", 0.1 * arm.input_per_torque),
-            positive(f"filter_rad_s_{n}", min(w, 1 / period), 2 / period, FILTER_REACH),
-            positive(f"filter_damping_{n}", 0.3, reach=FILTER_REACH),
+            positive(f"filter_rad_s_{n}", min(w, 1 / period), 2 / period, reach),
+            positive(f"filter_damping_{n}", 0.3, reach=reach),
         ]
-    return Structure("PPF", tuple(free), {ANGLE_GAIN: Kp}, entries)
+    return free, entries
 
 
-def _strain_rate(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
+@structure("strain-rate", r"PD, and $-g s/(1 + s/p) \, M$")
+def _strain_rate(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     def entries(c: Real) -> tuple[Entry, ...]:
         K1, g, pole = c
         return (*_servo(Kp, K1), Entry("root_moment", polynomial(g, 0.0), polynomial(1 / pole, 1.0)))
 
-    free = (
-        _rate_gain(arm, Kp),
-        signed("gain_s", 0.1 * arm.input_per_torque / first_frequency(arm)),
-        positive("pole_rad_s", 2 / period, 2 / period),
-    )
-    return Structure("strain-rate", free, {ANGLE_GAIN: Kp}, entries)
-
-
-STRUCTURES: dict[str, Callable[[Arm, float, int, float], Structure]] = {
-    TWO_GAINS: _two_gains, "PD": _pd, "PD+notch": _pd_notch, "lead": _lead, "PI": _pi, "PID": _pid, "PPF": _ppf,
-    "strain-rate": _strain_rate,
-}  # fmt: skip
+    gain = signed("gain_s", 0.1 * arm.input_per_torque / first_frequency(arm))
+    return (_rate_gain(arm, Kp), gain, _pole(period)), entries

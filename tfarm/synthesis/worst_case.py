@@ -29,13 +29,7 @@ Tell = Callable[[str], None]  # is called with one line of progress
 
 MOST_RANGES = 4  # 16 corners: a search takes 16 times as long
 MOST_ARMS = 8  # of a list, for the same reason
-DECADE = 10.0  # a range of numbers of one sign whose ends are further apart is one of logarithms
 ARMS_TRIED = 24  # arms at random inside the box
-ARMS_SEED = 0  # of those
-BOX_STEPS = (0.25, 0.125, 0.0625)  # of the box: from the worst of them on, along each of its numbers
-DOTTED = {f"{room}.{field}": name for name, (room, field) in ADJUSTABLE.items()}
-MOST_EXCHANGES = 4  # arms added after a whole search, at most
-MOST_SKETCHED = 2  # before the whole search
 MUCH_WORSE = 0.01  # of a score: an arm inside is added if it is worse by more
 
 
@@ -54,7 +48,7 @@ def varied(arm: Arm, key: str, value: float) -> Arm:
 
     Raises ParameterError for an unknown key, and for a value as its parts do.
     """
-    name = DOTTED.get(key, key)
+    name = {f"{room}.{field}": name for name, (room, field) in ADJUSTABLE.items()}.get(key, key)
     if name in ADJUSTABLE:
         return arm.having(**{name: value})
     return KeyedArms(arm, (key,), "range").at({key: value})
@@ -89,9 +83,11 @@ class ArmBox:
 
     def at(self, shares: Real) -> NamedArm:
         """The arm at these shares (n,) of the ranges, 0 to 1; of logarithms where the ends are far apart."""
-        arm, numbers = self.arm, {}
+        arm = self.arm
+        numbers = {}
         for (key, (low, high)), share in zip(self.ranges.items(), shares.tolist(), strict=True):
-            far = low > 0 and high > DECADE * low
+            # a range of numbers of one sign whose ends are further apart is one of logarithms
+            far = low > 0 and high > 10.0 * low
             inside = low * (high / low) ** share if far else low + share * (high - low)
             numbers[key] = low if share == 0 else high if share == 1 else float(inside)
             arm = varied(arm, key, numbers[key])
@@ -105,7 +101,8 @@ def worst_inside(box: ArmBox, badness: Callable[[Arm], float]) -> tuple[NamedArm
     Arms at random, then smaller and smaller steps along each number from the worst of them.  No proof that none is
     worse.
     """
-    tried, size = 0, len(box.ranges)
+    tried = 0
+    size = len(box.ranges)
 
     def worst_of(places: Sequence[Real]) -> tuple[float, Real]:
         nonlocal tried
@@ -114,8 +111,9 @@ def worst_inside(box: ArmBox, badness: Callable[[Arm], float]) -> tuple[NamedArm
         n = int(np.argmax(scores))
         return scores[n], places[n]
 
-    worst, place = worst_of(list(np.random.default_rng(ARMS_SEED).random((ARMS_TRIED, size))))
-    for step in BOX_STEPS:
+    worst, place = worst_of(list(np.random.default_rng(0).random((ARMS_TRIED, size))))
+    # from the worst of them on, along each of the numbers
+    for step in (0.25, 0.125, 0.0625):
         if math.isinf(worst):
             break
         around = [np.clip(place + step * way, 0.0, 1.0) for way in (*np.eye(size), *-np.eye(size))]
@@ -165,7 +163,10 @@ def for_the_worst(
     `score_on` is the score of one arm, inf where the law is unstable.  Raises ConvergenceError where no law is found
     that is stable on all arms, or where it stays unstable on one inside the box.
     """
-    named, tried, found, added = list(arms), 0, None, 0
+    named = list(arms)
+    tried = 0
+    found = None
+    added = 0
     effort: Effort = "sketch" if box else "whole"
     while True:
         try:
@@ -186,7 +187,7 @@ def for_the_worst(
         is_worse = score > limit + MUCH_WORSE * abs(limit)
         if effort != "sketch" and not is_worse:
             return found, named, WorstCase(box.ranges, tried)
-        if effort != "sketch" and added == MOST_EXCHANGES:
+        if effort != "sketch" and added == 4:
             if math.isinf(score):
                 raise ConvergenceError(f"no law found is stable on {worst.name}: narrow the ranges", None, None)
             return found, named, WorstCase(box.ranges, tried, worst.name)
@@ -196,8 +197,9 @@ def for_the_worst(
             added += 1
         if effort != "sketch":
             effort = "near"
-        elif not is_worse or added == MOST_SKETCHED:
-            effort, added = "whole", 0
+        elif not is_worse or added == 2:
+            effort = "whole"
+            added = 0
 
 
 def same_input(arms: Sequence[NamedArm]) -> None:

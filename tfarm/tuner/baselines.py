@@ -46,16 +46,8 @@ from tfarm.spectrum.table import first_frequency
 from tfarm.tuner.guard import Guard, MovingGain, constant_windows
 from tfarm.tuner.trial import Record, Trial, TunedGain, judged, residual_rms, tip_off
 
-CONSTANT_GAINS = 200  # constant gains of a stability interval that are tried, before the best are refined
-LEAST_GAINS = 20  # of them where trials are long
-GAIN_SAMPLES = 2_000_000  # that the trials of an interval's gains may have together
-BEST_REFINED = 3  # of them
-GAIN_XTOL = 1e-9  # tolerance of the refined gains: the cost is flat there
 Shaper = Literal["ZV", "EI"]
 SHAPERS: tuple[Shaper, ...] = ("ZV", "EI")
-SHAPED_MODES = 2  # which a slew excites most
-TOLERATED = 0.05  # V: the share of the vibration that EI leaves at the mode itself, that of its authors
-NEARLY_PI = 0.999  # of pi rad a sample: the highest frequency of a shaper
 
 
 class BestConstant(NamedTuple):
@@ -67,46 +59,46 @@ class BestConstant(NamedTuple):
 
 def best_constant(trial: Trial) -> BestConstant:
     """Return the best constant gain K >= 0 of a stable loop: a grid, its three lowest costs refined; 0 without one."""
+
+    def cost(K: float) -> float:
+        return trial.with_constant(float(K)).cost
+
     windows = constant_windows(trial.loop)
-    number = min(CONSTANT_GAINS, max(LEAST_GAINS, GAIN_SAMPLES // trial.n))
-    found = [BestConstant(0.0, trial.with_constant(0.0).cost)] if not windows or windows[0][0] == 0.0 else []
+    # fewer gains of an interval where trials are long: 2 million samples together
+    number = min(200, max(20, 2_000_000 // trial.n))
+    found = [BestConstant(0.0, cost(0.0))] if not windows or windows[0][0] == 0.0 else []
     for low, high in windows:
-        gains = np.linspace(low, high, number + 2)[1:-1]
-        costs = np.array([trial.with_constant(float(K)).cost for K in gains])
-        step = (high - low) / (number + 1)
-        for i in np.argsort(costs)[:BEST_REFINED]:
-            done = minimize_scalar(
-                lambda K: trial.with_constant(float(K)).cost,
-                bounds=(max(float(gains[i]) - step, low), min(float(gains[i]) + step, high)),
-                method="bounded",
-                options={"xatol": GAIN_XTOL},
-            )
+        gains = np.linspace(low, high, number + 2).tolist()
+        for i in np.argsort([cost(K) for K in gains[1:-1]])[:3]:
+            # the cost is flat at its minimum
+            done = minimize_scalar(cost, bounds=(gains[i], gains[i + 2]), method="bounded", options={"xatol": 1e-9})
             found.append(BestConstant(float(done.x), float(done.fun)))
     return min(found, key=lambda each: each.cost)
 
 
 def lq_bound(trial: Trial) -> Record:
     """Return the optimal trial; its K is zero, as it has no moment feedback, and its u is e."""
-    A, B, c = trial.model.A, trial.model.B, trial.model.moment
-    r, m = trial.reference.rest, trial.reference.rigid
+    model, m = trial.model, trial.reference.rigid
     a, b = trial.numbers.T * trial.cost.a, trial.numbers.T * trial.cost.b
-    P, q = np.zeros_like(A), np.zeros_like(B)
-    gains, offsets = np.zeros((trial.n, B.size)), np.zeros(trial.n)
-    for k in reversed(range(trial.n)):  # e_k = -gains_k s - offsets_k, the last sample first
-        PB = P @ B
+    # of the states and 1: the last column of A is B r, the last entry of c is -m
+    A, B, c = np.pad(model.A, (0, 1)), np.r_[model.B, 0.0], np.r_[model.moment, 0.0]
+    A[-1, -1], P, gains = 1.0, np.zeros_like(A), np.zeros((trial.n, B.size))
+    # e_k = -gains_k s, the last sample first
+    for k in reversed(range(trial.n)):
+        A[:-1, -1], c[-1], PB = model.B * trial.reference.rest[k], -m[k], P @ B
         if (weight := b + B @ PB) > 0:
-            gains[k], offsets[k] = A.T @ PB / weight, (B @ q + B @ PB * r[k]) / weight
+            gains[k] = A.T @ PB / weight
         closed = A - np.outer(B, gains[k])
-        q = closed.T @ (q + PB * (r[k] - offsets[k])) + b * offsets[k] * gains[k] - a * m[k] * c
         P = closed.T @ P @ closed + b * np.outer(gains[k], gains[k]) + a * np.outer(c, c)
         P = (P + P.T) / 2
     states, e = np.zeros_like(gains), np.zeros(trial.n)
+    states[:, -1] = 1.0
     for k in range(trial.n):
-        e[k] = -gains[k] @ states[k] - offsets[k]
-        states[k + 1 : k + 2] = A @ states[k] + B * (e[k] + r[k])
-    x = states @ c - m
+        e[k] = -gains[k] @ states[k]
+        states[k + 1 : k + 2, :-1] = model.A @ states[k, :-1] + model.B * (e[k] + trial.reference.rest[k])
+    x = states[:, :-1] @ model.moment - m
     cost = float((a * x @ x + b * e @ e) / 2)
-    return Record(trial.task.t, x, e, e, np.zeros(trial.n), states @ trial.model.own, cost, None)
+    return Record(trial.task.t, x, e, e, np.zeros(trial.n), states[:, :-1] @ model.own, cost, None)
 
 
 def zero_vibration(z: complex) -> Real:
@@ -122,14 +114,20 @@ def zero_vibration(z: complex) -> Real:
 
 def extra_insensitive(z: complex) -> Real:
     """Impulses of two such shapers in a row, next to the frequency of z."""
-    d = math.acos((1 - TOLERATED) / (1 + TOLERATED)) / math.pi
-    turns = (min(float(np.angle(z)) * factor, NEARLY_PI * math.pi) for factor in (1 - d, 1 + d))
+    # V, the share of the vibration that is left at the mode itself, is that of its authors
+    V = 0.05
+    d = math.acos((1 - V) / (1 + V)) / math.pi
+    # in rad a sample, below pi
+    turns = (min(float(np.angle(z)) * factor, 0.999 * math.pi) for factor in (1 - d, 1 + d))
     first, second = (zero_vibration(complex(abs(z) * np.exp(1j * turn))) for turn in turns)
     return np.convolve(first, second)
 
 
-def shaper(loop: Sampled, kind: Shaper, modes: int = SHAPED_MODES) -> Real:
-    """Impulses for the first modes below half the sample rate, at the poles of the loop without moment feedback."""
+def shaper(loop: Sampled, kind: Shaper, modes: int = 2) -> Real:
+    """Impulses for the first modes below half the sample rate, at the poles of the loop without moment feedback.
+
+    By default for those two that a slew excites most.
+    """
     impulses, build = np.ones(1), zero_vibration if kind == "ZV" else extra_insensitive
     poles: Any = loop.having(**{MOMENT_GAIN: 0.0}).poles
     for mode in range(1, modes + 1):
@@ -154,18 +152,6 @@ def shaped_trial(trial: Trial, kind: Shaper) -> Trial:
     the unshaped slew is no bound of it.
     """
     return replace(trial, task=shaped(trial.task, shaper(trial.loop, kind)))
-
-
-ADDED_MASSES = (0.06, 0.15, 0.3)  # of the arm's mass, for one without payload: 0.1, 0.25 and 0.5 kg on the paper's
-PAYLOAD_SHARES = (0.5, 1.5, 2.0)  # of the payload, for one that has one
-HUB_SHARES = (0.8, 1.2)  # times the hub's inertia
-DAMPING_SHARES = (0.1, 10.0)  # times the arm's own C
-GIVEN_RATIOS = (3.575e-4, 3.575e-2)  # of critical in mode 1, for an arm without C: 1e-5 and 1e-3 s on the paper's
-ENCODER_COUNTS = 8192  # a turn, of the encoder
-CONVERTER_BITS = 12  # of the other converters
-MOMENT_RANGE = 20.0  # N m, of the paper's arm: times the arm's unit of torque
-TORQUE_RANGE = 10.0  # N m, likewise
-COMPUTER_DELAY = 1.0  # samples of computation, beyond the chain's own
 
 
 class Outcome(NamedTuple):
@@ -220,15 +206,21 @@ class NamedLoop(NamedTuple):
 
 
 def quantised_chain(arm: Arm, chain: Chain) -> Chain:
-    """The chain with its own converters; ideal ones are replaced by 12 bits over ranges for the arm's slew."""
+    """The chain with its own converters; ideal ones are replaced by 12 bits over ranges for the arm's slew.
+
+    These are 20 N m of moment and 10 N m of torque on the paper's arm, in the unit of torque of any other.
+    """
     if not chain.is_linear:
         return chain
     unit = torque_unit(arm, chain)
     converters = Converters(
-        encoder_counts=ENCODER_COUNTS, hub_rate="difference",
-        moment_bits=CONVERTER_BITS, moment_range=MOMENT_RANGE * unit,
-        torque_bits=CONVERTER_BITS, torque_range=TORQUE_RANGE * unit,
-    )  # fmt: skip
+        encoder_counts=8192,
+        hub_rate="difference",
+        moment_bits=12,
+        moment_range=20.0 * unit,
+        torque_bits=12,
+        torque_range=10.0 * unit,
+    )
     return replace(chain, converters=converters)
 
 
@@ -238,23 +230,28 @@ def tried_loops(arm: Arm, chain: Chain, quantised: Chain | None = None) -> list[
     `quantised` is the chain with converters, by default that of `quantised_chain`.
     """
     quantised = quantised_chain(arm, chain) if quantised is None else quantised
-    sampling = replace(chain.sampling, delay_samples=chain.sampling.delay_samples + COMPUTER_DELAY)
-    late = f"one {'more ' * bool(chain.sampling.delay_samples)}sample of delay"
-    chains = {
-        "as trained": chain, "quantised": quantised,
-        late: replace(chain, sampling=sampling), f"quantised, {late}": replace(quantised, sampling=sampling),
-    }  # fmt: skip
-    mass, own = arm.payload_mass, arm.damping
-    masses = [share * mass for share in PAYLOAD_SHARES] if mass else [share * arm.own_mass for share in ADDED_MASSES]
-    payloads = [float(f"{each:.2g}") for each in masses]
-    dampings = [0.0, *(float(f"{share * own:.3g}") for share in DAMPING_SHARES)]
-    if not own:
-        dampings = [float(f"{2 * zeta / first_frequency(arm):.1g}") for zeta in GIVEN_RATIOS]
-    others = {f"payload {each:g} kg": arm.having(payload_mass=each) for each in payloads}
-    others |= {f"hub {share - 1:+.0%}": arm.having(hub_inertia=share * arm.hub_inertia) for share in HUB_SHARES}
-    others |= {f"C = {C:g} s": arm.having(damping=C) for C in dampings}
-    listed = [NamedLoop(name, arm, each) for name, each in chains.items()]
-    return listed + [NamedLoop(name, other, chain) for name, other in others.items()]
+    delay = chain.sampling.delay_samples
+    sampling, late = replace(chain.sampling, delay_samples=delay + 1), f"one {'more ' * bool(delay)}sample of delay"
+    # shares of the payload, or of the arm's mass: 0.1, 0.25 and 0.5 kg on the paper's
+    mass, masses = (arm.payload_mass, (0.5, 1.5, 2.0)) if arm.payload_mass else (arm.own_mass, (0.06, 0.15, 0.3))
+    payloads = [float(f"{share * mass:.2g}") for share in masses]
+    if arm.damping:
+        dampings = [0.0, *(float(f"{share * arm.damping:.3g}") for share in (0.1, 10.0))]
+    else:
+        # by damping ratios of mode 1: 1e-5 and 1e-3 s on the paper's
+        dampings = [float(f"{2 * zeta / first_frequency(arm):.1g}") for zeta in (3.575e-4, 3.575e-2)]
+    return [
+        NamedLoop("as trained", arm, chain),
+        NamedLoop("quantised", arm, quantised),
+        NamedLoop(late, arm, replace(chain, sampling=sampling)),
+        NamedLoop(f"quantised, {late}", arm, replace(quantised, sampling=sampling)),
+        *(NamedLoop(f"payload {each:g} kg", arm.having(payload_mass=each), chain) for each in payloads),
+        *(
+            NamedLoop(f"hub {share - 1:+.0%}", arm.having(hub_inertia=share * arm.hub_inertia), chain)
+            for share in (0.8, 1.2)
+        ),
+        *(NamedLoop(f"C = {C:g} s", arm.having(damping=C), chain) for C in dampings),
+    ]
 
 
 def compare_controllers(
@@ -274,12 +271,12 @@ def compare_controllers(
         found.append(
             Outcomes(
                 condition=condition.name,
-                without=_constant(here, here.task, 0.0),
-                best_constant=_constant(here, here.task, nominal),
-                own_constant=_constant(here, here.task, own.gain),
+                without=_constant(here, 0.0),
+                best_constant=_constant(here, nominal),
+                own_constant=_constant(here, own.gain),
                 own_gain=own.gain,
-                ZV=_constant(here, late["ZV"], 0.0),
-                EI=_constant(here, late["EI"], 0.0),
+                ZV=_constant(here, 0.0, late["ZV"]),
+                EI=_constant(here, 0.0, late["EI"]),
                 tuner=_outcome(gain.run(here.simulator()), here),
                 bound=Outcome(bound.cost, residual_rms(bound, here.task), None),
                 proven=guard.is_proven and _proven(here, guard),
@@ -295,8 +292,8 @@ def _proven(here: Trial, guard: Guard) -> bool:
     return False
 
 
-def _constant(trial: Trial, task: Scenario, K: float) -> Outcome:
-    """The outcome of a constant gain."""
+def _constant(trial: Trial, K: float, task: Scenario | None = None) -> Outcome:
+    """The outcome of a constant gain, on the slew of the trial unless another is given."""
     return _outcome(trial.simulator(task=task).linear(trial.loop.gains.having(MOMENT_GAIN, K)), trial)
 
 

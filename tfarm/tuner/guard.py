@@ -55,15 +55,9 @@ from tfarm.loop.margins import lowest
 from tfarm.loop.sampled import Sampled, sampled_loop
 from tfarm.records import record
 from tfarm.schema import Quantity
-from tfarm.tuner.kernel import Limits
+from tfarm.tuner.kernel import CONSUMER, Limits
 
-SLACKS = (1e-3, 1e-5, 1e-7, 1e-9)  # of the inequality, in balanced states
-BITS_OF_P = 60  # bits that P is rounded to before the proof
-DOUBLINGS = 40  # of the number of samples of a sum: 10^12, after which any mode has decayed
 RADIUS_SHARE = 0.99  # of the radius that the criterion allows: room for the modes left out, and for a strict proof
-POLE_WIDTHS = np.r_[-np.geomspace(100.0, 0.01, 30), 0.0, np.geomspace(0.01, 100.0, 30)]  # around a pole's angle
-NARROWEST_PEAK = 1e-12  # of a pole next to the circle: its distance from the circle has that error
-EVEN_POINTS = 1001  # of half the circle, in addition to those around poles
 
 
 @dataclass(frozen=True)
@@ -90,7 +84,8 @@ class CommonLyapunov:
             return False
         units = 2.0 ** np.round(-np.log2(diagonal) / 2)
         scaled = self.P * units * units[:, None]
-        P, _ = exact_matrix(np.round(np.ldexp(scaled / abs(scaled).max(), BITS_OF_P))).numer_denom()
+        # P is rounded to 60 bits before the proof
+        P, _ = exact_matrix(np.round(np.ldexp(scaled / abs(scaled).max(), 60))).numer_denom()
         ends = (A * units / units[:, None] for A in (self.low, self.high))
         return is_positive_definite(P) and all(falls(P, A) for A in ends)
 
@@ -103,30 +98,24 @@ def common_lyapunov(middle: Real, drive: Real, sense: Real, low: Real, high: Rea
     """
     if not abs(np.linalg.eigvals(middle)).max() < 1.0:
         return None
-    scale = _sizes(middle, drive)
+    # the size of each state after one push: a sum of squares over 2^40 samples, after which any mode has decayed
+    total, power = np.outer(drive, drive), middle
+    for _ in range(40):
+        total, power = total + power @ total @ power.T, power @ power
+    size = np.sqrt(np.diag(total))
+    scale = np.where(size > 0, size, 1.0)
     A, b, c = middle * scale / scale[:, None], (drive / scale)[:, None], (sense * scale)[None]
     found: list[CommonLyapunov] = []
-    for slack in SLACKS:
-        try:
+    # slacks of the inequality, in states of size 1
+    for slack in (1e-3, 1e-5, 1e-7, 1e-9):
+        with suppress(LinAlgError, ValueError):
             P = solve_discrete_are(A, b, c.T @ c + slack * (c @ c.T).item() * np.eye(len(A)), -np.eye(1))
             P = (P + P.T) / 2 / scale / scale[:, None]
             L = np.linalg.cholesky(P)
-        except (LinAlgError, ValueError):
-            continue
-        ends = [solve_triangular(L, (L.T @ each).T, lower=True) for each in (low, high)]
-        rho = float(max(np.linalg.norm(each, 2) for each in ends))
-        if rho < 1.0:
-            found.append(CommonLyapunov(low, high, P, rho))
-    return min(found, key=lambda each: each.contraction, default=None)
-
-
-def _sizes(A: Real, b: Real) -> Real:
-    """Size of each state after one push: the root of its sum of squares over all samples, by doubling."""
-    total, power = np.outer(b, b), A
-    for _ in range(DOUBLINGS):
-        total, power = total + power @ total @ power.T, power @ power
-    size: Real = np.sqrt(np.diag(total))
-    return np.where(size > 0, size, 1.0)
+            rho = max(np.linalg.norm(solve_triangular(L, (L.T @ each).T, lower=True), 2) for each in (low, high))
+            found.append(CommonLyapunov(low, high, P, float(rho)))
+    best = min(found, key=lambda each: each.contraction, default=None)
+    return best if best and best.contraction < 1 else None
 
 
 @dataclass(frozen=True)
@@ -180,9 +169,11 @@ class MovingGain:
 
 def _peak(residues: NDArray[np.complexfloating], poles: NDArray[np.complexfloating]) -> float:
     """max over the unit circle of |sum of residues/(z - poles)|."""
-    angle, width = abs(np.angle(poles)), np.maximum(1 - abs(poles), NARROWEST_PEAK)
-    dense = (angle[:, None] + width[:, None] * POLE_WIDTHS).ravel()
-    theta = np.unique(np.clip(np.r_[np.linspace(0, np.pi, EVEN_POINTS), dense], 0, np.pi))
+    # points around the angle of each pole, whose distance from the circle is known to 1e-12
+    away = np.geomspace(0.01, 100.0, 30)
+    width = np.maximum(1 - abs(poles), 1e-12)[:, None] * np.r_[-away, 0.0, away]
+    dense = (abs(np.angle(poles))[:, None] + width).ravel()
+    theta = np.unique(np.clip(np.r_[np.linspace(0, np.pi, 1001), dense], 0, np.pi))
 
     def negative(theta: Real) -> Real:
         return -np.asarray(abs((residues / (np.exp(1j * theta)[:, None] - poles)).sum(axis=1)))
@@ -191,21 +182,7 @@ def _peak(residues: NDArray[np.complexfloating], poles: NDArray[np.complexfloati
 
 
 GuardKind = Literal["time-varying", "frozen", "none"]
-GUARD_KINDS: tuple[GuardKind, ...] = get_args(GuardKind)
-
-INSIDE = 0.8  # of half the width: largest distance of the best constant gain from the middle
-MOST_GAIN = 10.0  # where the frozen interval has no upper end
-MIDDLE_GAINS = 60  # gains of an interval that a sector is tried around
 NARROWEST_SECTOR = 1e-4  # a sector this narrow is none
-SECTORS_AGREE = 1e-3  # of the width: largest change by more modes
-MIDDLE_HALVINGS = 12  # of the step between two middles, which leaves a part without effect
-TIMES_THE_MODES = (4, 3, 2)  # of a larger loop: the first number at which damped modes are distinguished
-GUARD_MODES_UNDAMPED = 20  # of the larger loop at C = 0
-MOST_GUARD_MODES = 48  # of that at C > 0
-REMEDY_DAMPINGS = np.geomspace(1e-12, 1e-2, 11)  # s, tried for the remedy
-PROVEN = Quantity(
-    "certified for any K(t)", key="proven", help="one quadratic Lyapunov function decreases under every gain in it"
-)
 
 
 @dataclass(frozen=True)
@@ -230,7 +207,16 @@ class Guard:
     omitted: str = ""
 
     @property
-    def is_proven(self) -> Annotated[bool, PROVEN]:
+    def is_proven(
+        self,
+    ) -> Annotated[
+        bool,
+        Quantity(
+            "certified for any K(t)",
+            key="proven",
+            help="one quadratic Lyapunov function decreases under every gain in it",
+        ),
+    ]:
         """Whether the loop is certified stable for every K(t) in it, and not that of its first modes alone."""
         return bool(self.proofs) and self.is_settled
 
@@ -258,31 +244,28 @@ def find_guard(loop: Sampled, kind: GuardKind, best_constant: float) -> Guard:
 
     Raises CertificationError where there is none, with the least damping that has one.
     """
-    must_be_known("guard", kind, GUARD_KINDS)
+    must_be_known("guard", kind, get_args(GuardKind))
     if kind == "none":
         return Guard("none", 0.0, math.inf, loop.plant.count, False)
-    find = _frozen if kind == "frozen" else _moving
-    guard = find(_larger(loop), best_constant)
-    if guard is not None:
+    find, sector = (_frozen, "constant gain") if kind == "frozen" else (_moving, "sector of time-varying gains")
+    if guard := find(_larger(loop), best_constant):
         return guard
-    arm = loop.plant.arm
-    sector = "sector of time-varying gains" if kind == "time-varying" else "constant gain"
-    served = [name for name in (RATE_GAIN, ANGLE_GAIN) if name == RATE_GAIN or loop.number(name)]
-    at = ", ".join(f"{name} = {loop.number(name):g}" for name in served)
+    arm, angle_gain = loop.plant.arm, loop.number(ANGLE_GAIN)
+    at = f"{RATE_GAIN} = {loop.number(RATE_GAIN):g}{f', {ANGLE_GAIN} = {angle_gain:g}' if angle_gain else ''}"
     start = f"{arm.name}: no {sector} is certified stable at {at}, C = {arm.damping:g} s"
-    for C in REMEDY_DAMPINGS[arm.damping < REMEDY_DAMPINGS]:
+    # the least damping with a guard, of a few [s]
+    for C in filter(arm.damping.__lt__, np.geomspace(1e-12, 1e-2, 11).tolist()):
         with suppress(ConvergenceError):
-            damped = sampled_loop(arm.having(damping=float(C)), loop.gains, loop.chain, count=loop.plant.count)
-            other = find(_larger(damped), 0.0)
-            if other is not None and other.is_settled:
+            damped = sampled_loop(arm.having(damping=C), loop.gains, loop.chain, count=loop.plant.count)
+            if (other := find(_larger(damped), 0.0)) and other.is_settled:
                 raise CertificationError(f"{start}; with a damping of C = {C:.1e} s there is one")
     remedy = f"take another {RATE_GAIN}, or a shorter period or delay"
-    raise CertificationError(f"{start}, nor with any damping up to {REMEDY_DAMPINGS[-1]:g} s; {remedy}")
+    raise CertificationError(f"{start}, nor with any damping up to 0.01 s; {remedy}")
 
 
 def constant_windows(loop: Sampled) -> list[tuple[float, float]]:
     """The stability intervals of constant gains K >= 0, up to 10."""
-    return [(max(low, 0.0), min(high, MOST_GAIN)) for low, high in stable_windows(loop, MOMENT_GAIN) if high > 0]
+    return [(max(low, 0.0), min(high, 10.0)) for low, high in stable_windows(loop, MOMENT_GAIN) if high > 0]
 
 
 def _frozen(loops: list[Sampled], best_constant: float) -> Guard | None:
@@ -297,9 +280,7 @@ def _frozen(loops: list[Sampled], best_constant: float) -> Guard | None:
     edge = (1 - RADIUS_SHARE) * (high - low)
     if high - low < NARROWEST_SECTOR:
         return None
-    omitted, count = not_covered("tune", loops[0].chain), loops[-1].plant.count
-    is_settled = _settled(loops, found)
-    return Guard("frozen", low + edge * (low > 0), high - edge, count, is_settled, omitted=omitted)
+    return _guard("frozen", loops, found, low + edge * (low > 0), high - edge)
 
 
 def _moving(loops: list[Sampled], best_constant: float) -> Guard | None:
@@ -308,8 +289,7 @@ def _moving(loops: list[Sampled], best_constant: float) -> Guard | None:
     m = _middle(models[0], best_constant)
     if m is None:
         return None
-    radii = np.array([model.radius(m) for model in models])
-    half = RADIUS_SHARE * float(radii.min())
+    half = RADIUS_SHARE * min(model.radius(m) for model in models)
     return _certified(models, max(0.0, m - half), m + half, m) if half >= NARROWEST_SECTOR else None
 
 
@@ -328,30 +308,42 @@ def _certified(models: list[MovingGain], lo: float, hi: float, middle: float) ->
         return None
     widest = [(middle - radius, middle + radius) for radius in (model.radius(middle) for model in models)]
     loops = [model.loop for model in models]
-    omitted = not_covered("tune", loops[0].chain)
-    return Guard("time-varying", lo, hi, loops[-1].plant.count, _settled(loops, widest), proven, omitted)
+    return _guard("time-varying", loops, widest, lo, hi, proven)
+
+
+def _guard(
+    kind: GuardKind,
+    loops: list[Sampled],
+    found: list[tuple[float, float]],
+    lo: float,
+    hi: float,
+    proofs: tuple[CommonLyapunov, ...] = (),
+) -> Guard:
+    """The guard [lo, hi] of the intervals `found` of some loops, the largest last."""
+    omitted = not_covered(CONSUMER, loops[0].chain)
+    return Guard(kind, lo, hi, loops[-1].plant.count, _settled(loops, found), proofs, omitted)
 
 
 def _middle(model: MovingGain, best_constant: float) -> float | None:
     """The middle gain of the default rule; None where no gain is stable."""
+    # the best constant gain is within this share of half the width of the sector
+    inside = 0.8
     windows = constant_windows(model.loop)
-    middles = np.array([m for low, high in windows for m in np.linspace(low, high, MIDDLE_GAINS + 2)[1:-1]])
-    radii = np.array([model.radius(float(m)) for m in middles])
+    middles = [float(m) for low, high in windows for m in np.linspace(low, high, 62)[1:-1]]
+    radii = np.array([model.radius(m) for m in middles])
     if not (radii > NARROWEST_SECTOR).any():
         return None
-    beyond = abs(best_constant - middles) - INSIDE * radii
-    holds = beyond <= 0
-    if not holds.any():
-        return float(middles[int(np.argmin(beyond))])
-    best = int(np.argmax(np.where(holds, radii, -1.0)))
-    inner, outer = float(middles[best]), float(middles[min(best + 1, middles.size - 1)])
-    for _ in range(MIDDLE_HALVINGS):  # up to where the best constant gain just is inside
+    beyond = abs(best_constant - np.array(middles)) - inside * radii
+    if (beyond > 0).all():
+        return middles[int(np.argmin(beyond))]
+    best = int(np.argmax(np.where(beyond <= 0, radii, -1.0)))
+    inner, outer = middles[best], middles[min(best + 1, len(middles) - 1)]
+    # up to where the best constant gain just is inside
+    for _ in range(12):
         m = (inner + outer) / 2
         radius = model.radius(m)
-        if abs(best_constant - m) <= INSIDE * radius and radius >= radii[best]:
-            inner = m
-        else:
-            outer = m
+        is_inside = abs(best_constant - m) <= inside * radius and radius >= radii[best]
+        inner, outer = (m, outer) if is_inside else (inner, m)
     return inner
 
 
@@ -363,7 +355,7 @@ def _settled(loops: list[Sampled], found: list[tuple[float, float]]) -> bool:
     if loops[0].plant.arm.is_undamped or len(found) < 2:
         return False
     (before_low, before_high), (low, high) = found
-    agree = max(abs(low - before_low), abs(high - before_high)) <= SECTORS_AGREE * (high - low)
+    agree = max(abs(low - before_low), abs(high - before_high)) <= 1e-3 * (high - low)
     return agree and upper_modes_are_quiet(loops[-1], high)
 
 
@@ -381,8 +373,7 @@ def _larger(loop: Sampled) -> list[Sampled]:
 
     A number at which two of the damped modes are not distinguished is left out.
     """
-    arm, count = loop.plant.arm, loop.plant.count
-    wanted = [times * count for times in TIMES_THE_MODES] if arm.damping else [GUARD_MODES_UNDAMPED]
-    numbers = [min(number, MOST_GUARD_MODES) for number in wanted if number > count]
-    larger = first_distinct(lambda number: loop.with_modes(int(number)), [*numbers, count])
+    count = loop.plant.count
+    wanted = [min(times * count, 48) for times in (4, 3, 2)] if loop.plant.arm.damping else [20]
+    larger = first_distinct(loop.with_modes, [*(number for number in wanted if number > count), count])
     return [loop, larger] if larger.plant.count > count else [loop]

@@ -20,10 +20,18 @@ from typing import NamedTuple
 import numpy as np
 
 from tfarm.arm.checks import whole
+from tfarm.arm.stages import Consumer
 from tfarm.arrays import Real
 from tfarm.errors import ParameterError, require
 from tfarm.exact.compiled import compiled, inlined
 from tfarm.records import record
+
+CONSUMER = Consumer(
+    "tune",
+    acts=("reference", "anti-alias filter", "hub rate", "law", "hold", "delay", "hub damping", "plant"),
+    partly=("encoder", "amplifier steps", "amplifier range", "DAC steps", "DAC range", "torque limit", "arithmetic"),
+    none=("volts",),
+)
 
 U_NOW, U_BEFORE, E_BEFORE, E_TWO_BEFORE, X_NOW, X_BEFORE, K_BEFORE = range(7)  # the inputs; the last is optional
 

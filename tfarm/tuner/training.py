@@ -47,16 +47,15 @@ NEVER, ENOUGH = -1, -2  # instead of the sample where a trial was stopped: none 
 X, U, E, K = range(4)  # rows of the derivatives that `derive` carries, of the signals now
 BEFORE = 4  # rows further are those of the sample before, and as many further again those of the one before that
 INPUT_ROWS = (U, U + BEFORE, E + BEFORE, E + 2 * BEFORE, X, X + BEFORE, K + BEFORE)  # of each input of the network
-SHARE_FALLS, SHARE_GROWS = 0.5, 1.2  # times: a step of learning halves at once, and is whole after four good trials
 
 
 class Steps(NamedTuple):
-    """Constants of (21) and (22): learning rates (weights,), momentum, largest norm of a gradient (inf: any).
+    """Constants of (21) and (22): learning rate, momentum, largest norm of a gradient (inf: any).
 
     `enough` is the root mean square of x [N m] over a trial that is small enough to stop.
     """
 
-    rates: Real
+    rate: float
     momentum: float
     longest: float
     enough: float
@@ -80,7 +79,7 @@ def _step(weights: Real, change: Real, gradient: Real, steps: Steps, share: floa
     norm = sqrt(norm)
     cut = steps.longest / norm if norm > steps.longest else 1.0
     for i in range(weights.size):
-        change[i] = -share * steps.rates[i] * cut * gradient[i] + steps.momentum * change[i]
+        change[i] = -share * steps.rate * cut * gradient[i] + steps.momentum * change[i]
         weights[i] += change[i]
 
 
@@ -103,7 +102,7 @@ def learn_by_trials(
         cost = trial_cost(done, setting.numbers, run) if done == n else np.inf
         costs[trial] = cost
         if takes_back and not cost <= best and best < np.inf:
-            share *= SHARE_FALLS
+            share *= 0.5
             copied(kept, weights)
             change.fill(0.0)
             _step(weights, change, slope, steps, share)
@@ -117,7 +116,8 @@ def learn_by_trials(
         copied(weights, kept)
         if takes_back:
             copied(gradient, slope)
-            share = min(1.0, SHARE_GROWS * share)
+            # the step is whole again after four good trials
+            share = min(1.0, 1.2 * share)
             best = cost
         _step(weights, change, gradient, steps, share)
     if takes_back:
@@ -204,15 +204,13 @@ Mode = Literal["trial", "online"]
 Rule = Literal["dynamic", "clipped", "plain"]
 Sensitivity = Literal["one-step", "whole"]
 
-MOST_TRIALS = 1_000_000  # of a tuning
 QUARTILES = (0.25, 0.5, 0.75)  # of learning curves over the seeds
-NO_GAIN = 1e-3  # of K: a network with less throughout a trial has a gain of zero
 
 
 @dataclass(frozen=True, kw_only=True)
 @record
 class Learning:
-    """Options of learning: `eta` (a number, or one a weight in the order of `Network.weights`), `alpha`, mode and rule.
+    """Options of learning: `eta` and `alpha` of (21), mode and rule.
 
     `clip` is the largest norm of the gradient; learning stops once the root mean square of x over a trial is below
     `enough` [N m] (the paper's stopping rule; 0 never stops).
@@ -221,7 +219,7 @@ class Learning:
     mode: Mode = "trial"
     rule: Rule = "dynamic"
     sensitivity: Sensitivity = "one-step"
-    eta: float | Real = 0.8
+    eta: float = 0.8
     alpha: float = 0.6
     clip: float = 0.5
     enough: float = 0.0
@@ -229,18 +227,11 @@ class Learning:
     def __post_init__(self) -> None:
         for key, kind in {"mode": Mode, "rule": Rule, "sensitivity": Sensitivity}.items():
             must_be_known(key, getattr(self, key), get_args(kind))
-        for rate in np.ravel(self.eta).astype(float).tolist():
-            require(0.0 < rate < math.inf, "eta", rate, "a learning rate is positive and finite, 0.8 in the paper")
+        positive("eta", self.eta, "a learning rate is positive and finite, 0.8 in the paper")
         momentum = not_negative("alpha", self.alpha, "the momentum factor lies in [0, 1)")
         require(momentum < 1.0, "alpha", momentum, "the momentum factor lies in [0, 1), below 1")
         positive("clip", self.clip, "the largest norm of a gradient is positive and finite")
         not_negative("enough", self.enough, "the error to stop at is zero or positive, in N m")
-
-    def rates(self, size: int) -> Real:
-        """The learning rate of each of `size` weights."""
-        rates, shape = np.asarray(self.eta, dtype=float), (size,)
-        require(rates.shape in ((), shape), "eta", rates.shape, f"one learning rate, or one a weight, {size}")
-        return np.broadcast_to(rates, shape).copy()
 
 
 @dataclass(frozen=True)
@@ -274,7 +265,7 @@ class Training:
     @property
     def died(self) -> bool:
         """Whether the gain went to zero."""
-        return bool(self.result.K.max(initial=0.0) < NO_GAIN)
+        return bool(self.result.K.max(initial=0.0) < 1e-3)
 
 
 @dataclass(frozen=True)
@@ -322,10 +313,10 @@ def train(trial: Trial, network: Network, guard: Guard, learning: Learning, tria
 
     The same inputs give the same bits.  Raises ParameterError for an invalid number of trials or rates.
     """
-    trials = whole("trials", trials, 1, MOST_TRIALS, f"a whole number of trials from 1 to {MOST_TRIALS}")
+    trials = whole("trials", trials, 1, 1_000_000, "a whole number of trials from 1 to 1000000")
     weights, costs = network.weights, np.zeros(trials)
     longest = math.inf if learning.rule == "plain" else float(learning.clip)
-    steps = Steps(learning.rates(weights.size), float(learning.alpha), longest, float(learning.enough))
+    steps = Steps(float(learning.eta), float(learning.alpha), longest, float(learning.enough))
     common = (trial.setting(network, guard.limits), steps, weights, costs, *trial.room(network))
     if learning.mode == "trial":
         made, sample = learn_by_trials(*common, learning.rule == "dynamic")

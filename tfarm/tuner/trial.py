@@ -45,9 +45,8 @@ from tfarm.records import record
 from tfarm.spectrum.table import default_gains
 from tfarm.tuner import kernel
 from tfarm.tuner.guard import GuardKind
-from tfarm.tuner.kernel import PAPER_INPUTS, Limits, Network
+from tfarm.tuner.kernel import CONSUMER, PAPER_INPUTS, Limits, Network
 
-SILENT = Network(np.zeros((1, PAPER_INPUTS)), np.zeros(1), np.ones(PAPER_INPUTS))  # for a guard of one gain
 TRIAL_MODES = 6  # flexible modes of a trial, by default
 ANGLE_REMEDY = "the hub angle gain is zero or positive, in N m/rad"
 
@@ -60,8 +59,8 @@ class Cost:
     b: float = TRIAL_COST[1]
 
     def __post_init__(self) -> None:
-        meanings = {name: f"the weighting coefficient {name} is zero or positive" for name in ("a", "b")}
-        check_fields(self, "", not_negative, **meanings)
+        remedy = "the weighting coefficient {} is zero or positive".format
+        check_fields(self, "", not_negative, a=remedy("a"), b=remedy("b"))
         require(self.a or self.b, "a", self.a, "a and b are both zero: one of them has to be positive")
 
 
@@ -110,12 +109,13 @@ class Trial:
     @cached_property
     def model(self) -> kernel.Model:
         """The loop from sample to sample, open at the torque, and the rows of the servo and the moment."""
-        A = self.loop.having(Kp=0.0, K1=0.0, K2=0.0).matrix()
-        last = self.loop.pulse.integrals_at + 2  # the state with the torque of the last sample: B is 1 there
-        servo = -self.loop.having(K2=0.0).matrix()[last]
-        moment = -self.loop.having(Kp=0.0, K1=0.0, K2=1.0).matrix()[last]
-        drive, own = self.loop.pulse.matrices()[1], self.loop.sensed.own_moment(self.loop.chain.sampling)
-        drive, own = (np.pad(of, (0, len(A) - of.size)) for of in (drive, own))
+        loop, last = self.loop, self.loop.pulse.integrals_at + 2
+        A = loop.having(Kp=0.0, K1=0.0, K2=0.0).matrix()
+        # the last state is the torque of the last sample: B is 1 there
+        servo = -loop.having(K2=0.0).matrix()[last]
+        moment = -loop.having(Kp=0.0, K1=0.0, K2=1.0).matrix()[last]
+        of_plant = loop.pulse.matrices()[1], loop.sensed.own_moment(loop.chain.sampling)
+        drive, own = (np.pad(of, (0, len(A) - of.size)) for of in of_plant)
         return kernel.Model(*(np.ascontiguousarray(each) for each in (A.T, A, drive, servo, moment, own)))
 
     @cached_property
@@ -149,8 +149,7 @@ class Trial:
     def room(self, network: Network) -> tuple[kernel.Run, kernel.Work]:
         """Empty record and buffers of a trial with that network."""
         (hidden, inputs), n, states = network.W1.shape, self.n, self.model.B.size
-        signals = (np.zeros(n) for _ in range(6))
-        run = kernel.Run(np.zeros((n, inputs)), np.zeros((n, hidden)), *signals)
+        run = kernel.Run(np.zeros((n, inputs)), np.zeros((n, hidden)), *np.zeros((6, n)))
         return run, kernel.Work(np.zeros(states), np.zeros(states), np.zeros(inputs))
 
     # ------------------------------------------------------------ one trial
@@ -158,15 +157,16 @@ class Trial:
     def with_network(self, network: Network, guard: kernel.Limits) -> Record:
         """The trial with a fixed network; the cost is inf where it was stopped."""
         run, work = self.room(network)
-        done = kernel.forward(self.setting(network, guard), network.weights, run, work)
+        done = int(kernel.forward(self.setting(network, guard), network.weights, run, work))
         t, x, u, e, K, moment = (each[:done] for each in (self.task.t, run.x, run.u, run.e, run.K, run.moment))
         if done < self.n:
-            return Record(t, x, u, e, K, moment, np.inf, int(done))
+            return Record(t, x, u, e, K, moment, math.inf, done)
         return Record(t, x, u, e, K, moment, float(kernel.trial_cost(done, self.numbers, run)), None)
 
     def with_constant(self, K: float) -> Record:
-        """The trial with a constant gain: a guard of one gain."""
-        return self.with_network(SILENT, kernel.Limits(K, K))
+        """The trial with a constant gain: a guard of one gain, for any network."""
+        silent = Network(np.zeros((1, PAPER_INPUTS)), np.zeros(1), np.ones(PAPER_INPUTS))
+        return self.with_network(silent, kernel.Limits(K, K))
 
 
 def slew_trial(
@@ -187,7 +187,7 @@ def slew_trial(
     """
     must_be_known("signals", signals, get_args(Reading))
     Kp = not_negative("Kp", Kp, ANGLE_REMEDY)
-    arm, chain = admit("tune", arm, chain)
+    arm, chain = admit(CONSUMER, arm, chain)
     K1 = usual_rate_gain(arm, Kp) if K1 is None else K1
     rate_gain = number("K1", K1, "the hub rate gain is a finite number of N m s/rad")
     length = positive("duration", duration, "a trial lasts a positive number of seconds")
@@ -225,7 +225,6 @@ def residual_rms(record: Record, task: Scenario) -> float | None:
 
 
 FORMAT: Literal["tfarm tuner 1"] = "tfarm tuner 1"
-MOST_TUNER_BYTES = 4_000_000  # bytes of a tuner's file: more than a network of MOST_HIDDEN neurons takes
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -240,7 +239,7 @@ class TunedGain:
     guard: Limits
     servo: HubFeedback
     signals: Reading
-    _past: list[tuple[float, float, float, float]] = field(default_factory=list, init=False)
+    _past: tuple[float, ...] = field(default=(), init=False)
 
     def run(self, simulator: Simulator) -> Simulation:
         """Simulate the servo and this gain."""
@@ -249,12 +248,12 @@ class TunedGain:
     def __call__(self, m: Measurement) -> float:
         """The gain at this sample."""
         if m.k == 0:
-            self._past = [(0.0, 0.0, 0.0, 0.0)] * 2
-        (u1, e1, x1, K_before), (_, e2, _, _) = self._past
+            self._past = (0.0,) * 5
+        (u1, e1, x1, K1, e2), x = self._past, m.vibration
         u = m.servo(self.servo) + (m.feedforward if self.signals == "total" else 0.0)
-        row = [u, u1, e1, e2, m.vibration, x1, K_before][: self.network.scales.size]
-        K = self.network.gain(np.array(row), self.guard)
-        self._past = [(u, u - K * m.vibration, m.vibration, K), self._past[0]]
+        row = np.array([u, u1, e1, e2, x, x1, K1][: self.network.scales.size])
+        K = self.network.gain(row, self.guard)
+        self._past = u, u - K * x, x, K, e1
         return K
 
 
@@ -331,9 +330,9 @@ def save_tuner(tuner: SavedTuner, path: Path) -> None:
 
 def load_tuner(path: str | os.PathLike[str], key: str = "controller") -> SavedTuner:
     """Read the tuner of a file.  Raises ParameterError, in one line, for the first problem of the file."""
-    found = validated_file(
-        SavedTuner, path, MOST_TUNER_BYTES, key=key, what="a tuner's file of tfarm tune ARM --save FILE.json"
-    )
+    # more bytes than a network of the most neurons takes
+    most = 4_000_000
+    found = validated_file(SavedTuner, path, most, key=key, what="a tuner's file of tfarm tune ARM --save FILE.json")
     with naming(path):
         found.gain()  # refuses parts that do not match
         Cost(a=found.a, b=found.b)

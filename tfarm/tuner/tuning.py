@@ -41,11 +41,6 @@ NUMBERS: dict[str, Callable[[float], float]] = {  # of a plan, by which studies 
     "trials": int, "seed": int, "K1": float, "Kp": float, "duration": float, "hidden": int, "scale": float,
 }  # fmt: skip
 NUMBERS_OF_LEARNING = ("eta", "alpha", "clip", "enough")
-SHAPED_NOTE = "no moment feedback; cost of the shaped slew, which arrives later: cost_lq_bound is no bound of it"
-BOUND_NOTES = {
-    "vibration": "the least cost of any control signal e on this slew, with full state and preview",
-    "total": "the least cost of any torque: under this reading it is that of an arm at rest",
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,11 +206,8 @@ class SlewEnd(NamedTuple):
         """The end of the trial of a tuning."""
         simulator, gain = tuning.trial.simulator(), tuning.gain()
         runs = gain.run(simulator), simulator.linear(tuning.constant), simulator.linear(gain.servo)
-        tuned, _, without = runs
-        return cls(
-            tuned.residual_moment, tuned.residual_raw, without.residual_moment,
-            *(tip_off(run, tuning.trial) for run in runs),
-        )  # fmt: skip
+        residuals = runs[0].residual_moment, runs[0].residual_raw, runs[-1].residual_moment
+        return cls(*residuals, *(tip_off(run, tuning.trial) for run in runs))
 
 
 @dataclass(frozen=True)
@@ -276,16 +268,20 @@ class TuningResult:
     def numbers(self) -> Annotated[dict[str, Any], Quantity(flat=True, help="costs of tuner and baselines")]:
         """The same numbers by name."""
         tuning, shaped = self.tuning, self.tuning.shaped
+        bound = "the least cost of any control signal e on this slew, with full state and preview"
+        if tuning.plan.signals == "total":
+            bound = "the least cost of any torque: under this reading it is that of an arm at rest"
         return {
             "cost_tuned": tuning.training.result.cost,
             "cost_without": tuning.without.cost,
             "cost_best_constant": tuning.best_constant.cost,
             "best_constant_gain": tuning.best_constant.gain,
             "cost_lq_bound": tuning.bound.cost,
-            "lq_bound_note": BOUND_NOTES[tuning.plan.signals],
+            "lq_bound_note": bound,
             "cost_shaped": min(each.cost for each in shaped.values()),
             "shaped": {kind: {"cost": each.cost, "arrives_later_by_s": each.later} for kind, each in shaped.items()},
-            "shaped_note": SHAPED_NOTE,
+            "shaped_note": "no moment feedback; cost of the shaped slew, which arrives later: cost_lq_bound is no "
+            "bound of it",
         }
 
     @property
@@ -300,7 +296,7 @@ class TuningResult:
         tuple[float, float], Quantity("moment gain", digits=4, help="least and largest during the tuned slew")
     ]:
         """The least and the largest moment gain."""
-        K = self.tuning.training.result.K
+        K = self.gain["K"]
         return float(K.min()), float(K.max())
 
     @cached_property

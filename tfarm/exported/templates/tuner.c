@@ -20,7 +20,7 @@ static {{ real }} polynomial({{ real }} x, const {{ real }} *coefficients, int s
     return total;
 }
 
-/* e^x for x <= 0, within {{ ulps.exp }} units in the last place: 2^k e^r, x = k ln 2 + r (Cody and Waite), Taylor */
+/* e^x for x <= 0, within {{ ulps }} units in the last place: 2^k e^r, x = k ln 2 + r (Cody and Waite), Taylor */
 static {{ real }} exponential({{ real }} x)
 {
     {{ real }} k, result, power = half;
@@ -41,16 +41,6 @@ static {{ real }} sigmoid({{ real }} z)
     const {{ real }} small = exponential(z > 0 ? -z : z);
     return (z > 0 ? 1 : small) / (1 + small);
 }
-{% if of.is_free %}
-
-/* ln(1 + y) for 0 <= y <= 1, within {{ ulps.log }} units in the last place: f - s (f - R), s = f/(2 + f), series of artanh */
-static {{ real }} logarithm({{ real }} y)
-{
-    const {{ real }} f = y < turn ? y : half * (y - 1), s = f / (2 + f), square = s * s;
-    const {{ real }} below = s * (f - square * polynomial(square, artanh, {{ tables.artanh|length }}));
-    return y < turn ? f - below : high + (f - (below - low));
-}
-{% endif %}
 
 static {{ real }} network(const {{ real }} *row)
 {
@@ -61,13 +51,8 @@ static {{ real }} network(const {{ real }} *row)
             net += W1[{{ of.scales|length }} * j + i] * (row[i] / scales[i]);
         z += w2[j] * sigmoid(net);
     }
-{% if of.is_free %}
-    gain = logarithm(exponential(z > 0 ? -z : z));
-    return z > 0 ? z + gain : gain;
-{% else %}
     gain = lo + (hi - lo) * sigmoid(z);
     return gain > hi ? hi : gain;
-{% endif %}
 }
 
 static int is_small({{ real }} value) /* not NaN, and so small that no sum overflows */

@@ -1,0 +1,42 @@
+"""Public names of version 1.0, of `__all__` of the package and its rooms and of the documentation, are found."""
+
+import warnings
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+NAMES = (Path(__file__).parent / "data" / "names-1.0.txt").read_text(encoding="utf-8").split()
+
+
+def found(name):
+    """What a dotted name is, and the words of the warnings on the way: a module, or an attribute of the last one."""
+    place, _, own = name.rpartition(".")
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        try:
+            value = import_module(name)
+        except ModuleNotFoundError:
+            value = getattr(import_module(place), own)
+    return value, [str(each.message) for each in heard if each.category is DeprecationWarning]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_name_of_version_1_is_found_and_a_moved_one_names_its_place(name):
+    value, words = found(name)
+    if words:
+        (text,) = words
+        head, _, place = text.partition(" has moved: import it from ")
+        assert head == name
+        assert getattr(import_module(place), name.rpartition(".")[2]) is value
+
+
+def test_moved_names_warn_and_unknown_ones_are_none():
+    assert found("tfarm.dsp.chain.load_chain")[1] == [
+        "tfarm.dsp.chain.load_chain has moved: import it from tfarm.arm.chain"
+    ]
+    for name in ("tfarm.dsp.sampled.Sampled", "tfarm.case.result_card", "tfarm.dsp.stable_windows"):
+        assert found(name)[1]
+    assert not found("tfarm.dsp.Chain")[1]
+    with pytest.raises(AttributeError, match=r"module 'tfarm\.dsp\.chain' has no attribute 'Chains'"):
+        found("tfarm.dsp.chain.Chains")

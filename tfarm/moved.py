@@ -1,0 +1,17 @@
+"""Names of former versions: a module that has them no more finds each where it is now, with a DeprecationWarning."""
+
+import warnings
+from collections.abc import Callable, Mapping
+from importlib import import_module
+
+
+def moved(module: str, places: Mapping[str, str]) -> Callable[[str], object]:
+    """Return the `__getattr__` of a module, by the modules that its former names are in."""
+
+    def find(name: str) -> object:
+        if name not in places:
+            raise AttributeError(f"module {module!r} has no attribute {name!r}")
+        warnings.warn(f"{module}.{name} has moved: import it from {places[name]}", DeprecationWarning, stacklevel=2)
+        return getattr(import_module(places[name]), name)
+
+    return find
