@@ -190,25 +190,23 @@ def s_grid(ax: Axes, *, is_named: bool = True) -> None:
     left, right = ax.get_xlim()
     low, high = ax.get_ylim()
     ax.grid(False)
-    ax.plot([], [], **GRID, label="damping ratio ζ; natural frequency, at the right [rad/s]")
-    if left >= 0:
-        return
     bottom = max(low, 0.0)
     # of a side, from one ratio to the next
     apart = 0.17 if is_named else 0.34
     ratios = [m * 10.0**k for k in range(-6, 0) for m in (1, 2, 5)]
-    for ratio in [*ratios, 0.8] if high > 0 else ():
+    for ratio in [*ratios, 0.8] if left < 0 < high else ():
         slope = ratio / np.sqrt(1 - ratio**2)
         x, y = max(left, -high * slope), min(high, -left / slope)
         looks = VALUE | {"xytext": (3, -3), "va": "top" if x > left else "center"}
         is_apart = (high - y) / (high - bottom) - x / (right - left) > apart and y > bottom + 0.1 * (high - bottom)
         if is_apart and note(f"ζ {plain(ratio)}", (x, y), ax, (apart, apart), **looks):
             ax.plot([0.0, x], [0.0, y], **GRID)
-    for omega in MaxNLocator(6).tick_values(bottom, high):
+    for omega in MaxNLocator(6).tick_values(bottom, high) if left < 0 else ():
         if bottom < omega < high:
             angle = np.linspace(0.0, np.arcsin(min(1.0, -left / omega)), 61)
             name = plain(omega, 4) if is_named else ""
             _grid_line(1j * omega * np.exp(1j * angle), name, (right, omega), ax, xytext=(3, 0))
+    ax.plot([], [], **GRID, label="damping ratio ζ; natural frequency, at the right [rad/s]")
 
 
 def z_grid(ax: Axes) -> None:

@@ -9,6 +9,7 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -101,7 +102,7 @@ class Piece:
     name: str
     anchor: str
     make: Callable[[ArmReport], PageSection]
-    suits: Callable[[ArmReport], Any] = lambda report: True
+    suits: Callable[[ArmReport], Any] = bool
     title: str = ""
     on: str = ""
     task: str = ""
@@ -117,6 +118,11 @@ def _in_s(report: ArmReport) -> bool:
     return not report.arm.is_locked and any(not each.law.is_discrete for each in report.controllers)
 
 
+def _of_laws(report: ArmReport) -> bool:
+    """Whether the page is about given laws of a hub that turns."""
+    return bool(report.laws) and not report.arm.is_locked
+
+
 def _of_gains(report: ArmReport) -> bool:
     """Whether the page is about both gains of the arm itself."""
     return not report.laws and has_loop(report.arm)
@@ -130,15 +136,15 @@ PIECES = (
     Piece("response of the root moment", "bode-root-moment", partial(bode_section, output="root_moment"),
           title="Bode plots"),
     Piece("response of the tip", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),
-    Piece("measured responses", "bode-measured", measured_section, lambda report: report.measured),
+    Piece("measured responses", "bode-measured", measured_section, attrgetter("measured")),
     Piece("the arm", "arm", arm_section, on="modes"),
     Piece("modes", "modes", modes_section, title="Arm and modes"),
     Piece("root loci", "locus", locus_section, _in_s, "Root loci", task=LOOP_TASK),
-    Piece("sampled loop", "sampled", sampled_section, lambda report: report.has_loop, "The sampled loop",
+    Piece("sampled loop", "sampled", sampled_section, attrgetter("has_loop"), "The sampled loop",
           task=SAMPLED_TASK),
-    Piece("controllers", "law", law_section, lambda report: report.laws and not report.arm.is_locked, "The controller"),
+    Piece("controllers", "law", law_section, _of_laws, "The controller"),
     Piece("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", task=SAMPLED_TASK),
-    Piece("fit to measurements", "fit", fit_section, lambda report: report.fit, "Fitted numbers"),
+    Piece("fit to measurements", "fit", fit_section, attrgetter("fit"), "Fitted numbers"),
     Piece("assumptions", "assumptions", assumptions_section, title="Assumptions"),
 )  # fmt: skip
 QUESTIONS = {piece.page: piece.title for piece in PIECES if piece.title}  # pages that may be asked for alone
