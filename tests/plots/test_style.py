@@ -13,6 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
 import tfarm
+from tests.plots.labels import linear_rgb
 from tests.shell import refused, run
 from tfarm.plots import column, frequency, style
 from tfarm.plots.regions import SLATE
@@ -75,8 +76,7 @@ def rgb(colour):
 
 def luminance(colour):
     """Relative luminance of sRGB colours, by WCAG 2."""
-    linear = np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
-    return linear @ [0.2126, 0.7152, 0.0722]
+    return linear_rgb(colour) @ [0.2126, 0.7152, 0.0722]
 
 
 def contrast(one, other):

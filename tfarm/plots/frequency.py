@@ -37,7 +37,6 @@ from .style import (
 )
 
 RAD_PER_CYCLE = 2 * np.pi  # rad/s of 1 Hz
-NUMBER_STRIP = 0.085  # height of the strip of mode numbers above the magnitude, as a share of its axes: a line of them
 TICKS_A_DECADE = (1.0, 2.0, 5.0)  # where a measurement covers few of them
 FREQUENCY = "angular frequency [rad/s]"
 FREQUENCY_HZ = "frequency [Hz]"
@@ -78,7 +77,8 @@ def draw_magnitude(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
     low = float(limits[:, 0].min())
     high = float(limits[:, 1].max())
     label = f"|{first.label} / {first.input_label}|\nmagnitude [dB re 1 {first.gain_unit}]".replace("1 −", "1")
-    over_frequency(ax, label, 1.0 + NUMBER_STRIP)
+    # above them a line of mode numbers
+    over_frequency(ax, label, 1.085)
     ax.set(xlim=first.band, ylim=(low, high))
     for (name, one), colour in zip(each.items(), cycle(COLOURS), strict=False):
         edges = np.repeat([high + 20.0, low - 20.0], [one.infinite.size, one.vanishing.size])  # off the picture

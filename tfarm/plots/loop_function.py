@@ -27,7 +27,6 @@ HIGHEST = 60.0
 LOWEST = -80.0
 USUAL_PEAK = 2.0  # Ms that is usual at most
 CLOSED_LOOP = (-20.0, -12.0, -6.0, -3.0, -1.0, 0.25, 0.5, 1.0, 3.0, 6.0)  # dB: |T| of the contours of a Nichols chart
-CONTOURS = ", ".join(f"{size:g}" for size in CLOSED_LOOP if size > 0) + " dB, the larger the nearer to −1"
 AROUND: Complex = np.exp(1j * math.pi * np.linspace(-1, 1, 721) ** 3)  # a circle, dense at 1, where T/(1 - T) is steep
 # |L| at the edge of a linear Nyquist plot: at least as far as the zoom
 MOST_LINEAR = 20.0
@@ -145,9 +144,11 @@ def nichols(found: Margins | LoopCurve, *, ax: Axes) -> None:
         xlabel="phase of L [deg]", ylabel="|L| [dB]",
     )  # fmt: skip
     ax.grid(False)
+    inside = ", ".join(f"{size:g}" for size in CLOSED_LOOP if size > 0)
+    label = f"|T| = |L/(1 + L)|: {inside} dB, the larger the nearer to −1"
     for size in CLOSED_LOOP:
         T = 10 ** (size / 20) * AROUND
-        ax.plot(*_chart(T / (1 - T)), color=GREY, lw=0.6, zorder=1, label="|T| = |L/(1 + L)|: " + CONTOURS)
+        ax.plot(*_chart(T / (1 - T)), color=GREY, lw=0.6, zorder=1, label=label)
     for size in CLOSED_LOOP:
         height = -float(decibels(10 ** (-size / 20) - 1))
         if size < 0 and low <= height <= high:
@@ -205,7 +206,8 @@ def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     controller.  Larger L is cut off; `disc` shows all of it.
     """
     L = np.where(data.is_arc | ~np.isfinite(data.L), np.nan, data.L)
-    edge = float(np.clip(1.1 * np.nanmax(abs(L)), LEAST_LINEAR, MOST_LINEAR))
+    # at least as far as the zoom
+    edge = float(np.clip(1.1 * np.nanmax(abs(L)), 2.2, 20.0))
     zoom = ax.inset_axes((5 / 9, 0, 4 / 9, 1))  # as wide as the plot, a quarter of that between both
     ticks = [tick for tick in MaxNLocator(5, steps=(1, 2, 5, 10)).tick_values(-edge, edge) if abs(tick) <= edge]
     ax.set(

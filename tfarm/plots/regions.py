@@ -55,7 +55,6 @@ SLATE = "#3d5468"  # of contours of damping: no colour of stability
 # edges of a sampled loop, and of a second one
 DASHED = (0, (5, 2.5))
 DASH_DOTTED = (0, (6, 2, 1, 2))
-HATCHES = ("..", "\\\\\\\\", "////")  # of a sampled loop: with more damping, with less, with its own
 
 
 def _title(found: Plane | GainMap) -> str:
@@ -259,7 +258,9 @@ def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes
     ax.set_facecolor(REGIONS[1])
     draw_region(continuous.x, continuous.stable_intervals, "stable, continuous: every mode", ax)
     ax.fill_between([], [], [], color=REGIONS[1], label="unstable, continuous")
-    for plane, hatch in zip(planes, HATCHES[-len(planes) :], strict=True):
+    # with more damping, with less, with its own
+    hatches = ("..", "\\\\\\\\", "////")[-len(planes) :]
+    for plane, hatch in zip(planes, hatches, strict=True):
         C = plane.loop.plant.arm.damping
         hypothesis = "" if continuous.arm.damping == C else f", if C were {scientific(C, 1)} s"
         label = f"stable, sampled every {ms} ms{hypothesis if C else f', C = 0: the first {plane.modes_used} modes'}"

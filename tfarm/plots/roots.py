@@ -11,7 +11,7 @@ from tfarm.arrays import Complex
 from tfarm.digits import kept_digits, plain, significant
 from tfarm.errors import one_line
 from tfarm.loop.loci import POLE_DIGITS, Loci, ReducedLocus, held_branches
-from tfarm.loop.locus import BranchCrossing, Locus, frame, origin_name, rounded, view
+from tfarm.loop.locus import BranchCrossing, Locus, frame, origin_name, view
 from tfarm.loop.sampled_modes import DRAWN_RADIUS, RIM, SampledLoci, SampledLocus
 from tfarm.response.frequency import AXIS_SHARE
 
@@ -59,12 +59,11 @@ def _mosaic(figure: Figure, data: Loci) -> Any:
 def draw_loci(data: Loci, *, ax: Sequence[Axes]) -> None:
     """Draw all branches in one panel, and each mode enlarged in one of its own."""
     exact = data.exact
-    fine = rounded(exact)
     whole, *panels = ax
-    _panel(fine, exact, data.reduced, range(len(exact.branches)), whole)
+    _panel(exact, data.reduced, range(len(exact.branches)), whole)
     whole.set_title("all branches", fontsize=9.0)
     for n, one in zip(zoomed(exact), panels, strict=False):
-        _panel(fine, exact, data.reduced, [n], one)
+        _panel(exact, data.reduced, [n], one)
         one.set_title(origin_name(int(exact.origin[n])), fontsize=9.0)
 
 
@@ -75,13 +74,10 @@ def _title(exact: Locus, *_: object) -> str:
     return f"{exact.arm.name}: closed-loop poles as {values} with {law}"
 
 
-def _panel(fine: Locus, exact: Locus, reduced: ReducedLocus | None, numbers: Sequence[int], ax: Axes) -> None:
-    """Draw some branches, exact and reduced, with marks at a few values and their crossings.
-
-    `fine` is `exact` with the values between that a round line takes.
-    """
+def _panel(exact: Locus, reduced: ReducedLocus | None, numbers: Sequence[int], ax: Axes) -> None:
+    """Draw some branches, exact and reduced, with marks at a few values and their crossings."""
     which = list(numbers)
-    branches = held_branches(fine.branches)
+    branches = held_branches(exact.smooth.branches)
     shown = branches[which]
     everything = len(which) == len(branches)
     left, right, low, high = view(shown, exact.origin) if everything else frame(shown[shown.imag >= 0])
@@ -242,7 +238,7 @@ def locus(exact: Locus, reduced: ReducedLocus | None = None, *, ax: Axes) -> Non
     branches of `reduced` (`tfarm.loop.loci`), which a locus of gains at the hub has.  Faint: lines of constant damping
     ratio and natural frequency.
     """
-    _panel(rounded(exact), exact, reduced, range(len(exact.branches)), ax)
+    _panel(exact, reduced, range(len(exact.branches)), ax)
 
 
 FIGURES[Loci] = lambda data: locus.figure(data.exact, data.reduced)

@@ -27,7 +27,6 @@ from .frequency import over_frequency
 from .motion import OF_STABILITY
 from .style import BLUE, GREY, INK, Axes, number_label, picture, plain_ticks, safe
 
-BINS = 24  # at most, of a histogram
 # axes of distributions side by side, and in all
 ACROSS = 4
 MOST_QUANTITIES = 12
@@ -81,7 +80,7 @@ def study(found: Study, quantity: str | None = None, *, ax: Sequence[Axes]) -> N
         low = min(of.least for of in each)
         high = max(of.largest for of in each)
         room = 0.02 * (abs(high) or 1.0) if high - low <= 1e-9 * abs(high) else 0.0
-        edges = np.linspace(low - room, high + room, min(BINS, 2 + math.isqrt(max(map(len, values)))))
+        edges = np.linspace(low - room, high + room, min(24, 2 + math.isqrt(max(map(len, values)))))
         counts = [np.histogram(own, edges)[0] for own in values]
         for n, (of, own) in enumerate(zip(each, counts, strict=True)):
             looks = LOOKS[loop_of(of.name)]

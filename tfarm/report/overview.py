@@ -18,8 +18,6 @@ from tfarm.spectrum import modes
 from tfarm.spectrum.listing import listed_modes
 
 DIGITS = 4
-SHOWN_MODES = 5  # on the first page; the page of modes has ten
-MODE_COLUMNS = ("index", "natural_frequency", "natural_frequency_hz", "damping_ratio")
 SHORT = {"gain_margin_db": "GM", "phase_margin_deg": "PM", "delay_margin_ms": "DM", "peak_sensitivity": "Ms"}  # a line
 SHOWN = (  # sections of the first page in their order: anchor, name of a picture, which of several; of modes a table
     ("margins-map", "map", 0),
@@ -64,7 +62,9 @@ def save_card(report: ArmReport, folder: Path) -> None:
             notes += found.notes
         except TfarmError as error:
             notes.append(f"{each.name}: not determined, {error}.")
-    first = table([row for row in listed_modes(modes(arm, SHOWN_MODES)).modes if row.index > 0], MODE_COLUMNS)
+    # the first five; the page of modes has ten
+    rows = [row for row in listed_modes(modes(arm, 5)).modes if row.index > 0]
+    first = table(rows, ("index", "natural_frequency", "natural_frequency_hz", "damping_ratio"))
     shown = Card(arm.name, summary(report), picture, tuple(first), tuple(loops), tuple(dict.fromkeys(notes)))
     keep(folder, "card", asdict(shown))
 

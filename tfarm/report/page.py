@@ -65,8 +65,6 @@ PROMISES = (
     "certified", "complete", "converged", "default gains", "enclosed", "Lyapunov region", "not determined", "proven",
     "small gain", "winding number",
 )  # fmt: skip
-IN_PILL = ("stability", "grade", "limited_by", "delay_margin_periods")  # quantities without a cell of their own
-CARD_ROWS = {of.key: of for name, of in quantities(LoopCard).items() if name not in IN_PILL}
 
 
 # ------------------------------------------------------------ texts
@@ -80,6 +78,9 @@ def upper(text: str) -> str:
 @cache
 def templates() -> Environment:
     """All templates; only those of pages escape what is put into them."""
+    # but for those of a pill
+    without = ("stability", "grade", "limited_by", "delay_margin_periods")
+    card_rows = {of.key: of for name, of in quantities(LoopCard).items() if name not in without}
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES),
         autoescape=lambda name: name is not None and name.endswith(".html"),
@@ -90,7 +91,7 @@ def templates() -> Environment:
     )
     environment.globals |= {"inf": math.inf, "rate": RATE_GAIN, "moment": MOMENT_GAIN, "angle": ANGLE_GAIN,
                             "plane": " and ".join(PLANE), "arm_python": arm_python,
-                            "gains_python": gains_python, "card_rows": CARD_ROWS}  # fmt: skip
+                            "gains_python": gains_python, "card_rows": card_rows}  # fmt: skip
     environment.filters.update(
         symbol=with_symbols, text=text, plain=plain, significant=significant, scientific=scientific, upper_first=upper,
         listed=listed, how_many=how_many, as_html=as_html,
