@@ -30,7 +30,7 @@ its sweep, "boxcar" and no overlap, and no window leaks.  A resonance narrower t
 import hashlib
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -228,6 +228,24 @@ def compare_run(arm: Arm, law: AnyLaw, chain: Chain, measured: MeasuredRun) -> R
     task = measured.scenario(chain.sampling.period)
     used = enough_modes(lambda n: Simulator(arm, chain, task, law, count=n).run())
     return RunComparison(measured, Simulator(arm, chain, task, law, count=used.modes).run())
+
+
+def departures(
+    arm: Arm, law: AnyLaw, chain: Chain, measured: MeasuredRun, count: int, longer: float, share: float = 0.05
+) -> list[float]:
+    """Return the times [s] after a measured run at which the computed hub angle is off its end, by a share of the step.
+
+    The reference stays for that much `longer` [s], of 10,000 samples at most; `count` modes are in the loop.
+    """
+    period = chain.sampling.period
+    end = float(measured.t[-1])
+    t = np.append(measured.t, end + min(longer, 10_000 * period))
+    held = replace(measured, t=t, reference=np.append(measured.reference, measured.reference[-1]))
+    arm, law = tracked(arm, law)
+    run = Simulator(arm, chain, held.scenario(period), law, count=count).run().at_samples
+    settled = run.hub_angle[run.t <= end][-1]
+    away = abs(run.hub_angle - settled) > share * abs(measured.step)
+    return [float(t) for t in run.t[away & (run.t > end)]]
 
 
 def overshoot(angle: Real, step: float, end: float) -> float:

@@ -37,24 +37,28 @@ def arm_section(report: ArmReport) -> PageSection:
 
 
 def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
-    """First natural frequencies (at C = 0), total inertia, slenderness, shear cut-off, damping."""
-
-    modes = tfarm.modes(arm, count=3)  # the rigid body's 0 is not shown
+    """Return first natural frequencies (at C = 0), total inertia, slenderness, shear cut-off, damping."""
+    modes = tfarm.modes(arm, count=3)
+    numbered = zip(modes.index.tolist(), modes.natural_frequency.tolist(), strict=True)
+    # the rigid body's 0 is not shown
+    frequencies = [(f"natural frequency {number}", omega) for number, omega in numbered if number > 0]
+    if arm.has_cutoff:
+        frequencies.append(("shear cut-off √(κGA/ρI)", arm.shear_cutoff))
     slenderness = arm.link.slenderness if arm.is_uniform else arm.length / arm.link.section.radius_of_gyration
-    frequencies = {
-        f"natural frequency {number}": omega
-        for number, omega in zip(modes.index, modes.natural_frequency, strict=True)
-        if number > 0
-    }
-    frequencies |= {"shear cut-off √(κGA/ρI)": arm.shear_cutoff} if arm.has_cutoff else {}
     return (
-        *(Fact(label, significant(omega, 8), "rad/s", f"{significant(omega / (2 * math.pi), 8)} Hz")
-          for label, omega in frequencies.items()),
-        Fact("total inertia J about the hub", significant(arm.total_inertia, 8), "kg m²",
-             "the arm cannot turn as a rigid body" * (not arm.has_rigid_mode)),
+        *(
+            Fact(label, significant(omega, 8), "rad/s", f"{significant(omega / (2 * math.pi), 8)} Hz")
+            for label, omega in frequencies
+        ),
+        Fact(
+            "total inertia J about the hub",
+            significant(arm.total_inertia, 8),
+            "kg m²",
+            "the arm cannot turn as a rigid body" * (not arm.has_rigid_mode),
+        ),
         Fact("slenderness L/√(I/A)", significant(slenderness, 5)),
         Fact("damping C", plain(arm.damping), "s", prose("damping_note", arm=arm)),
-    )  # fmt: skip
+    )
 
 
 class Parameter(NamedTuple):

@@ -215,27 +215,28 @@ def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> 
     if isinstance(block, Table):
         files = [f"{DATA}/{name}" for name in save_table(block, folder / DATA)]
         return SavedBlock(block.stem, block.title, shape.table(block, files))
-    pictures = folder / PICTURES
-    save_figure(block.figure, pictures / f"{block.stem}.svg")
+    files = [f"{PICTURES}/{block.stem}.svg"]
+    save_figure(block.figure, folder / files[0])
     again = block.figure.again  # type: ignore[attr-defined]
     narrow = None
     if not block.film:
         with drawn_for("phone"):
             narrow = again()
-            save_figure(narrow, pictures / f"{block.stem}-narrow.svg")
+            save_figure(narrow, folder / PICTURES / f"{block.stem}-narrow.svg")
     if is_paper:
+        files.append(f"{PICTURES}/{block.stem}.pdf")
         with drawn_for("column"):
-            save_figure(again(), pictures / f"{block.stem}.pdf")
-    columns = tuple(
-        replace(each, of=[kept_digits((x,), DRAWN_DIGITS)[0] if isinstance(x, float) else x for x in each.of])
-        for each in block.data
-    )
-    saved = save_table(Table(columns=columns, stem=f"{block.stem}-data"), folder / DATA, ("csv",)) if columns else ()
+            save_figure(again(), folder / files[-1])
     if block.film:
-        (pictures / f"{block.stem}.gif").write_bytes(block.film)
-    kinds = ("svg", *["pdf"] * is_paper, *["gif"] * bool(block.film))
-    drawn = [f"{PICTURES}/{block.stem}.{kind}" for kind in kinds]
-    files = [*drawn, *(f"{DATA}/{name}" for name in saved)]
+        files.append(f"{PICTURES}/{block.stem}.gif")
+        (folder / files[-1]).write_bytes(block.film)
+    if block.data:
+        columns = tuple(
+            replace(each, of=[kept_digits((x,), DRAWN_DIGITS)[0] if isinstance(x, float) else x for x in each.of])
+            for each in block.data
+        )
+        saved = save_table(Table(columns=columns, stem=f"{block.stem}-data"), folder / DATA, ("csv",))
+        files += [f"{DATA}/{name}" for name in saved]
     return SavedBlock(block.stem, block.title, shape.picture(block, files, narrow), shape.image(block, narrow))
 
 

@@ -10,15 +10,15 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, shown_unit, tracked
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, shown_unit
 from tfarm.arm.chain import MOST_DELAY
 from tfarm.assessment.card import margins_of, sampled_of
 from tfarm.assessment.step import Step, step
 from tfarm.digits import plain, significant
-from tfarm.dsp import Chain, Simulation, Simulator, results, traces
+from tfarm.dsp import Chain, Simulation, results, traces
 from tfarm.dsp.film import motion_of
 from tfarm.errors import ParameterError
-from tfarm.fitting.recording import RunComparison, compare_run, overshoot
+from tfarm.fitting.recording import RunComparison, compare_run, departures, overshoot
 from tfarm.loop import sampled_modes as modes
 from tfarm.loop import sampled_verdict as verdict
 from tfarm.loop.regions import StableRegions, stable_regions
@@ -310,20 +310,12 @@ def measured_blocks(report: ArmReport) -> Iterator[Picture | Table]:
 
 def growth_words(each: Controller, found: verdict.Verdict, chain: Chain) -> str:
     """State the growth of an unstable loop; after a measured run also when the hub angle shows it."""
-    T = chain.sampling.period
-    growth = T / found.log_radius
+    growth = chain.sampling.period / found.log_radius
     measured = each.given.measured
     shown: list[float] = []
     if measured is not None:
-        # as much longer as an unstable loop may seem settled: a second of computing at most
-        end = float(measured.t[-1])
-        t = np.append(measured.t, end + min(20 * growth, 10_000 * T))
-        longer = replace(measured, t=t, reference=np.append(measured.reference, measured.reference[-1]))
-        arm, law = tracked(each.arm, each.law)
-        run = Simulator(arm, chain, longer.scenario(T), law, count=found.modes_used).run().at_samples
-        settled = run.hub_angle[run.t <= end][-1]
-        away = abs(run.hub_angle - settled) > 0.05 * abs(measured.step)
-        shown = run.t[away & (run.t > end)].tolist()
+        # as much longer as an unstable loop may seem settled
+        shown = departures(each.arm, each.law, chain, measured, found.modes_used, 20 * growth)
     return prose("growth", name=each.name, found=found, growth=growth, measured=measured, shown=shown)
 
 
