@@ -105,25 +105,31 @@ def ground(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
 
 
 def _counts(found: Plane | GainMap, counts: Whole, ax: Axes) -> None:
-    """The colours of the counts (rows, columns), and in each region, where it has most room, its count."""
+    """Draw the colours of the counts (rows, columns), and in each unstable region its count where it has most room."""
     image = colours(counts)
     ax.pcolormesh(found.x, found.y, image, shading="nearest", rasterized=True, zorder=0.1)
     ax.grid(False)
     most = len(REGIONS) - 1
     for count in np.unique(counts).tolist():
         inside = counts == count
-        label = "infinitely many unstable poles (∞)" if count == INFINITE else how_many(count, "unstable pole")
         if count < most or count == counts.max():
-            label = f"{most} and more unstable poles, at most {count}" if count > most else label
-            ax.fill_between([], [], [], color=image[inside][0], label=label if count else "stable")
+            label = how_many(count, "unstable pole") if count else "stable"
+            if count == INFINITE:
+                label = "infinitely many unstable poles (∞)"
+            elif count > most:
+                label = f"{most} and more unstable poles, at most {count}"
+            ax.fill_between([], [], [], color=image[inside][0], label=label)
+        if not count:
+            continue
         regions, last = ndimage.label(inside)
         room = ndimage.distance_transform_edt(np.pad(inside, 1), np.divide(1, counts.shape))[1:-1, 1:-1]
         middle = room * ndimage.gaussian_filter(room, np.divide(counts.shape, 8))
-        for row, column in np.reshape(ndimage.maximum_position(middle, regions, range(1, last + 1)), (-1, 2)).tolist():
+        places = ndimage.maximum_position(middle, regions, range(1, last + 1))
+        for row, column in np.reshape(places, (-1, 2)).tolist():
             # of the picture's width or height: else there is no room for a number
-            if count and room[row, column] > 0.028:
-                text = "∞" if count == INFINITE else str(count)
-                ax.text(found.x[column], found.y[row], text, fontsize=9.0, ha="center", va="center", clip_on=True)
+            if room[row, column] > 0.028:
+                mark = "∞" if count == INFINITE else str(count)
+                ax.text(found.x[column], found.y[row], mark, fontsize=9.0, ha="center", va="center", clip_on=True)
 
 
 def colours(unstable: Whole) -> Real:
@@ -133,15 +139,16 @@ def colours(unstable: Whole) -> Real:
 
 
 def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
-    """Of the least damping ratio (up, across), where it is a number: inside the stable region.
+    """Draw lines of the least damping ratio (up, across), where it is a number: inside the stable region.
 
     Open lines shorter than a twelfth of the picture are stubs at the edge of the grid, and left out.
     """
-    ends = np.nanmin(damping, initial=np.inf), np.nanmax(damping, initial=0.0)
-    levels = [level for level in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(*ends) if ends[0] < level < ends[1]]
+    least, largest = np.nanmin(damping, initial=np.inf), np.nanmax(damping, initial=0.0)
+    levels = [each for each in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(least, largest) if least < each < largest]
     if not levels:
         return
-    logarithm = np.ma.log(np.ma.masked_invalid(damping))  # by which lines are straighter
+    # of the logarithm lines are straighter
+    logarithm = np.ma.log(np.ma.masked_invalid(damping))
     lines = ax.contour(
         across, up, logarithm, np.log(levels[-5:]), colors=SLATE, linewidths=0.8, linestyles="-", zorder=2.5
     )
@@ -154,11 +161,10 @@ def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
     for level, parts in zip(lines.levels, kept, strict=True):
         longest = max(parts, key=len, default=())
         name = f"{plain(100 * np.exp(level), 3)} %"
-        any(
-            note(name, longest[int(share * len(longest))], ax, ha="center", color=INK, zorder=6)
-            for share in (0.5, 0.35, 0.65, 0.2, 0.8)  # best place first
-            if len(longest) > 12
-        )
+        # best place first
+        for share in (0.5, 0.35, 0.65, 0.2, 0.8) if len(longest) > 12 else ():
+            if note(name, longest[int(share * len(longest))], ax, ha="center", color=INK, zorder=6):
+                break
     ax.plot([], [], color=SLATE, lw=0.8, label="least damping ratio of the first two modes")
 
 
@@ -206,20 +212,16 @@ def _undamped_boundary(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
 def draw_region(
     across: Real, stable: Sequence[Sequence[Window]], label: str, ax: Axes, *, hatch: str = "", ls: Any = "-"
 ) -> None:
-    """The intervals up at each value across, filled, or hatched with a dashed edge, as those of a sampled loop are.
+    """Draw the intervals up at each value across, filled, or hatched with a dashed edge, as those of a sampled loop.
 
     Edges are upright where the region itself begins or ends.
     """
-    line: dict[str, Any] = (
-        {"color": STABLE, "lw": 1.4, "ls": DASHED, "zorder": 4.5}
-        if hatch
-        else {"color": INK, "lw": 1.0, "ls": ls, "zorder": 2.5}
-    )
-    looks: dict[str, Any] = (
-        {"facecolor": "none", "hatch": hatch, "edgecolor": (*to_rgb(STABLE), 0.5), "lw": 0}
-        if hatch
-        else {"facecolor": REGIONS[0], "lw": 0}
-    )
+    line: dict[str, Any] = {"color": INK, "lw": 1.0, "ls": ls, "zorder": 2.5}
+    looks: dict[str, Any] = {"facecolor": REGIONS[0], "lw": 0}
+    key = looks | {"edgecolor": INK, "ls": ls, "lw": 1.0}
+    if hatch:
+        line = {"color": STABLE, "lw": 1.4, "ls": DASHED, "zorder": 4.5}
+        key = looks = {"facecolor": "none", "hatch": hatch, "edgecolor": (*to_rgb(STABLE), 0.5), "lw": 0}
     parts = pieces(across, stable)
     for piece in parts:
         x, low, high = np.array(piece.points).T
@@ -227,7 +229,6 @@ def draw_region(
         ax.plot(x, np.transpose([low, high]), **line)
         ends = np.nonzero([piece.begins and x[0] > across[0], piece.ends])[0]
         ax.vlines(x[-ends], low[-ends], high[-ends], **line)
-    key = looks if hatch else looks | {"edgecolor": INK, "ls": ls, "lw": 1.0}
     ax.fill_between([], [], [], **key, label=safe(label) + ("" if parts else ": nowhere in this picture"))
 
 
