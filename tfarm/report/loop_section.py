@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, cancelled, unit_of
 from tfarm.arm.blocks import Rational
@@ -40,7 +40,6 @@ from tfarm.schema import Column, Quantity, Table, across, curve_table, quantitie
 from tfarm.spectrum.table import default_gains, rate_unit
 
 RECOMMENDED = "Recommended gains (best damping)"
-RANGE_OF_K2 = (-1.0, 1.6)  # of the locus, times what balances a torque: both sides of 0, and beyond 1
 
 
 # ------------------------------------------------------------ margins
@@ -93,18 +92,20 @@ def _bode_picture(each: Controller, found: margins.Margins, chain: Chain) -> Pic
 
 
 def nyquist_section(report: ArmReport) -> PageSection:
-    """The loop function of each controller on a contour that hides nothing, its encirclements counted."""
-    plots = [(each, nyquist.nyquist_of(margins_of(each.arm, each.law).stability)) for each in report.in_s]
-    own = any(found.unstable_open for _, found in plots)
+    """Return the loop function of each controller on a contour that hides nothing, its encirclements counted."""
     blocks: list[Picture | Table] = []
-    for each, found in plots:
-        linear, disc = (plot.figure(found, name=each.name) for plot in (loop_function.nyquist, loop_function.disc))
-        how: dict[str, Any] = {"each": each, "found": found}
+    counts: dict[str, nyquist.Nyquist] = {}
+    for each in report.in_s:
+        counts[each.title] = found = nyquist.nyquist_of(margins_of(each.arm, each.law).stability)
+        linear = loop_function.nyquist.figure(found, name=each.name)
+        disc = loop_function.disc.figure(found, name=each.name)
+        stem = each.stem("nyquist")
         blocks += [
-            picture("nyquist_plot", linear, stem=each.stem("nyquist"), data=curve_table(found), **how),
-            picture("nyquist_disc", disc, stem=each.stem("nyquist-disc"), **how),
+            picture("nyquist_plot", linear, stem=stem, data=curve_table(found), each=each, found=found),
+            picture("nyquist_disc", disc, stem=f"{stem}-disc", each=each, found=found),
         ]
-    blocks.append(sheet("nyquist_count", across({each.title: found for each, found in plots}), own=own))
+    own = any(found.unstable_open for found in counts.values())
+    blocks.append(sheet("nyquist_count", across(counts), own=own))
     return PageSection(title="Nyquist plot: encirclements of −1", words=[prose("nyquist", own=own)], blocks=blocks)
 
 
@@ -159,8 +160,8 @@ def entries_of(each: Controller) -> Iterator[Entry]:
 def map_section(report: ArmReport) -> PageSection:
     """The stability regions of both gains, continuous and sampled."""
     arm = report.arm
-    data = stability_map(report.arm, report.chain)
-    designed = best(report.arm, report.chain)
+    data = stability_map(arm, report.chain)
+    designed = best(arm, report.chain)
     laws = []
     points = [default_gains(arm).point, *([] if designed is None else [designed.law.point])]
     for each, point in zip(report.in_s, points, strict=True):
@@ -197,9 +198,8 @@ def recommended_section(report: ArmReport) -> PageSection:
     answer = prose("best_gains", found=found, modes=DESIGNED_MODES, gains=gains)
     each = report.in_s[-1]
     card = results(result_card(each.arm, each.law, report.chain), each.title)
-    title = (
-        "Gains of best damping" if POOR in (each["grade"] for each in card[-1:]) else RECOMMENDED
-    )  # of the sampled one
+    # the last is the sampled one
+    title = "Gains of best damping" if card[-1]["grade"] == POOR else RECOMMENDED
     return PageSection(title=title, answer=answer, card=card)
 
 
@@ -221,11 +221,12 @@ def locus_section(report: ArmReport) -> PageSection:
     if report.laws:
         return PageSection(title="Closed-loop poles", words=words, blocks=tables)
     arm = report.arm
-    gains = default_gains(report.arm)
+    gains = default_gains(arm)
     blocks: list[Picture | Table] = []
     ranges = {RATE_GAIN: (0.0, 2.0 * rate_unit(arm))}
     if has_loop(arm):
-        ranges[MOMENT_GAIN] = RANGE_OF_K2[0] * arm.input_per_torque, RANGE_OF_K2[1] * arm.input_per_torque
+        # what balances a torque, both sides of 0 and beyond 1
+        ranges[MOMENT_GAIN] = -1.0 * arm.input_per_torque, 1.6 * arm.input_per_torque
     found: dict[str, loci.Loci] = {}
     for name, (start, stop) in ranges.items():
         try:
@@ -238,10 +239,8 @@ def locus_section(report: ArmReport) -> PageSection:
             ]
         except ConvergenceError:
             words.append(prose("not_followed", name=name))
-    others = {
-        name: gains.gain_text(other, partial(plain, digits=4), arm)
-        for name, other in zip(PLANE, reversed(PLANE), strict=True)
-    }
+    first, second = (gains.gain_text(name, partial(plain, digits=4), arm) for name in PLANE)
+    others = dict(zip(PLANE, (second, first), strict=True))
     answer = prose("locus_lead", found=found, gains=others)
     return PageSection(title="Root loci", answer=answer, words=words, blocks=[*blocks, *tables])
 

@@ -28,7 +28,6 @@ from tfarm.spectrum import Modes
 from tfarm.spectrum.listing import SHAPE_DIGITS, beyond_the_box, listed_modes
 from tfarm.spectrum.table import default_gains
 
-TWO_PI = Decimal("6.2831853071795864769252867665590057683943387987502")
 # as `tfarm modes` lists them; shapes in three rows of two
 TABLED_MODES = 10
 DRAWN_MODES = 6
@@ -38,9 +37,9 @@ THEORIES: tuple[Theory, ...] = ("timoshenko", "shear", "rayleigh", "euler-bernou
 def modes_section(report: ArmReport) -> PageSection:
     """Everything about free vibration: at C = 0, and the eigenvalues at the arm's own C."""
     arm = report.arm
-    found = tfarm.modes(report.arm, count=TABLED_MODES)
+    found = tfarm.modes(arm, count=TABLED_MODES)
     words = [prose("complete_modes")]
-    blocks = list[Picture | Table]([modal_table(found)])
+    blocks: list[Picture | Table] = [modal_table(found)]
     if not arm.is_uniform:
         blocks.append(locked_table(found))
         words += [prose("which_is_measured")] * (not arm.is_locked)
@@ -88,8 +87,9 @@ def how_proven(modes: Modes, cells: Sequence[str], cells_hz: Sequence[str]) -> s
     except CertificationError as error:
         return f"The digits are those of double precision, not proven: {error}."
     rows = np.flatnonzero(modes.index > 0).tolist()
+    two_pi = Decimal("6.2831853071795864769252867665590057683943387987502")
     is_proven = all(
-        rounds_to(cells[row], bracket) and rounds_to(cells_hz[row], bracket, TWO_PI)
+        rounds_to(cells[row], bracket) and rounds_to(cells_hz[row], bracket, two_pi)
         for row, bracket in zip(rows, proof.brackets, strict=True)
     )
     return prose("proven_digits", is_proven=is_proven, digits=BRACKET_DIGITS, proof=proof, arm=modes.arm)
