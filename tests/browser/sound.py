@@ -28,7 +28,8 @@ from tfarm.fitting.fit import fit
 from tfarm.report import write, writing
 from tfarm.report.live import ASSETS, save_live, write_assets
 from tfarm.report.page import ArmReport, GivenLaw
-from tfarm.report.writing import PIECES, pieces_of, write_comparison, write_study
+from tfarm.report.study_page import write_study
+from tfarm.report.writing import PIECES, pieces_of, write_comparison
 
 LAB = replace(tfarm.load("sasaki2012-lab"), name=NAME, assumptions=ARM.assumptions)
 LAW = tfarm.Law({"hub_angle": ([2.0, 8.0], [0.02, 1.0]), "hub_rate": 0.4}, name=TEXT)
@@ -74,9 +75,7 @@ def few(tmp_path_factory):
 def _arm_pages(subject: ArmReport, folder: Path) -> None:
     """The first page on a subject, and those of the sections that there are."""
     folder.mkdir()
-    sections = [
-        writing.make_section(piece.name, piece.anchor, piece.make, subject, folder) for piece in pieces_of(subject)
-    ]
+    sections = [writing.make_section(piece, subject, folder) for piece in pieces_of(subject)]
     writing.save_card(subject, folder)
     writing._write_pages(subject, folder, sections, None, "", folder)
 

@@ -47,9 +47,11 @@ Drawn = tuple[Real, Complex, dict[str, Any]]  # a curve over x: its values and l
 
 
 @picture(
-    (Bode, "tfarm.bode returns"), size=(9.0, 6.2), rows=(1.75, 1.0),
+    (Bode, "tfarm.bode returns"),
+    size=(9.0, 6.2),
+    rows=(1.75, 1.0),
     title=lambda data: "{0.arm.name}: {0.input_label} to {0.label}".format(next(iter(by_name(data).values()))),
-)  # fmt: skip
+)
 def bode(data: Bode | Mapping[str, Bode], *, ax: Sequence[Axes]) -> None:
     """Magnitude over phase of a response (from `tfarm.bode`), in two axes, those given or new ones: these axes.
 
@@ -160,12 +162,29 @@ def _mark_roots(data: Bode, ax: Axes) -> None:
     ):
         if roots.size:
             ax.plot(
-                roots, np.full(roots.size, height), marker, transform=ax.get_xaxis_transform(), clip_on=False,
-                mfc="white", mec=INK, ms=6.0, mew=1.0, zorder=5, label=label,
-            )  # fmt: skip
+                roots,
+                np.full(roots.size, height),
+                marker,
+                transform=ax.get_xaxis_transform(),
+                clip_on=False,
+                mfc="white",
+                mec=INK,
+                ms=6.0,
+                mew=1.0,
+                zorder=5,
+                label=label,
+            )
     for number, omega in enumerate(data.resonances.imag, 1):  # that far apart two digits do not touch
-        note(str(number), (omega, ax.get_ylim()[1]), ax, (0.019, 1.0), xytext=(0, 5), ha="center", va="baseline",
-             color=GREY)  # fmt: skip
+        note(
+            str(number),
+            (omega, ax.get_ylim()[1]),
+            ax,
+            (0.019, 1.0),
+            xytext=(0, 5),
+            ha="center",
+            va="baseline",
+            color=GREY,
+        )
 
 
 # ------------------------------------------------------------ measured responses
@@ -191,10 +210,11 @@ def _over_measured(one: Measured, curves: Sequence[Drawn], upper: Axes, lower: A
 
 
 @picture(
-    (Fit, "tfarm.fit returns"), size=lambda fit: (max(7.0, 5.2 * len(fit.responses)), 6.0),
+    (Fit, "tfarm.fit returns"),
+    size=lambda fit: (max(7.0, 5.2 * len(fit.responses)), 6.0),
     title=lambda fit: f"{fit.before.name}: {fit.verdict}",
     grid=lambda figure, fit: figure.subplots(2, max(1, len(fit.responses)), sharex="col", height_ratios=(1.75, 1.0)),
-)  # fmt: skip
+)
 def fitted(fit: Fit, *, ax: Sequence[Axes]) -> None:
     """Draw each measured response with the arm's before and after: magnitude over phase, a column a response.
 
@@ -209,9 +229,10 @@ def fitted(fit: Fit, *, ax: Sequence[Axes]) -> None:
 
 @picture(
     size=(9.0, 4.6),
-    title=lambda fit, _, output, __: f"{fit.before.name}: {signal_words(output)[0]} of the arms "
-                                     "that the data leave possible",
-)  # fmt: skip
+    title=lambda fit, _, output, __: (
+        f"{fit.before.name}: {signal_words(output)[0]} of the arms that the data leave possible"
+    ),
+)
 def draw_band(fit: Fit, band: ResponseBand, output: str, count: int, *, ax: Axes) -> None:
     """Draw the magnitude of a response of the arm that fits best, in the band of `count` possible arms."""
     hertz = band.omega / RAD_PER_CYCLE
@@ -227,7 +248,7 @@ def draw_band(fit: Fit, band: ResponseBand, output: str, count: int, *, ax: Axes
 @picture(
     size=(8.0, 5.0),
     title=lambda fit, *_: f"{fit.before.name}: stabilising gains for the arms that the data leave possible",
-)  # fmt: skip
+)
 def draw_share(fit: Fit, found: ShareOfArms, *, ax: Axes) -> None:
     """Draw the share of the possible arms that each pair of gains stabilises in continuous time."""
     mesh = ax.pcolormesh(*found, cmap="Blues", vmin=0.0, vmax=1.0, shading="nearest", rasterized=True)
@@ -237,9 +258,11 @@ def draw_share(fit: Fit, found: ShareOfArms, *, ax: Axes) -> None:
 
 
 @picture(
-    (Overlay, "tfarm.overlay returns"), size=(9.0, 7.4), rows=(2.2, 1.2, 0.8),
+    (Overlay, "tfarm.overlay returns"),
+    size=(9.0, 7.4),
+    rows=(2.2, 1.2, 0.8),
     title=lambda data: f"{data.arm.name}: {data.measured.label}",
-)  # fmt: skip
+)
 def measured(data: Overlay, *, ax: Sequence[Axes]) -> None:
     """Magnitude, phase and coherence (from `tfarm.overlay`), in three axes, those given or new ones: these.
 
@@ -256,10 +279,12 @@ def measured(data: Overlay, *, ax: Sequence[Axes]) -> None:
     upper.set_ylabel(f"magnitude [{data.ratio.unit}]")
     guides: tuple[tuple[Any, dict[str, Any]], ...] = (
         ([pole for pole, _ in paired], {"color": FAINT, "lw": 0.8, "label": "pole of the arm"}),
-        ([pole * ratio for pole, ratio in paired if ratio is not None],
-         {"color": ORANGE, "lw": 0.7, "ls": (0, (2, 3)), "label": "its measured frequency"}),
+        (
+            [pole * ratio for pole, ratio in paired if ratio is not None],
+            {"color": ORANGE, "lw": 0.7, "ls": (0, (2, 3)), "label": "its measured frequency"},
+        ),
         (np.divide(data.unmatched, RAD_PER_CYCLE), {"color": INK, "lw": 0.8, "ls": ":", "label": "peak of no pole"}),
-    )  # fmt: skip
+    )
     for at, looks in guides:
         for frequency in at:
             upper.axvline(frequency, zorder=0.6, **looks)

@@ -111,8 +111,9 @@ def loop(found: Margins | LoopCurve, *, ax: Sequence[Axes]) -> None:
             gain = [(w, 1.0) for w, _ in each.margins.gain_crossovers]
             phase = [(w, 1 / t) for w, t in each.margins.phase_crossovers if w and t]
             for marker, label, crossed in (
-                (PHASE_MARGIN, "gain crossovers, |L| = 1", gain), (GAIN, "phase crossovers, L < 0", phase)
-            ):  # fmt: skip
+                (PHASE_MARGIN, "gain crossovers, |L| = 1", gain),
+                (GAIN, "phase crossovers, L < 0", phase),
+            ):
                 w, sizes = np.reshape(crossed, (-1, 2)).T
                 upper.plot(w, decibels(sizes), marker, ms=3.0, color=GREY, label=label)
             for omega, L, label, marker in decisive(each.margins):
@@ -140,9 +141,13 @@ def nichols(found: Margins | LoopCurve, *, ax: Axes) -> None:
     sizes = np.concatenate([each.magnitude for each in sides])
     low, high = np.clip((min(*sizes, -7) - 3, max(*sizes, 7) + 3), -40.0, 40.0)
     ax.set(
-        xticks=range(-360, 1, 45), yticks=range(-40, 41, 10), xlim=(-360, 0), ylim=(low, high),
-        xlabel="phase of L [deg]", ylabel="|L| [dB]",
-    )  # fmt: skip
+        xticks=range(-360, 1, 45),
+        yticks=range(-40, 41, 10),
+        xlim=(-360, 0),
+        ylim=(low, high),
+        xlabel="phase of L [deg]",
+        ylabel="|L| [dB]",
+    )
     ax.grid(False)
     inside = ", ".join(f"{size:g}" for size in CLOSED_LOOP if size > 0)
     label = f"|T| = |L/(1 + L)|: {inside} dB, the larger the nearer to −1"
@@ -171,8 +176,9 @@ def sensitivity(found: Margins | LoopCurve, *, ax: Axes) -> None:
     sides = curve_of(found).sides
     for each in sides:
         for name, values, colour, width, marker, size in (
-            ("S", each.sensitivity, BLUE, 1.5, "o", 9.0), ("T", each.complementary, INK, 1.0, "s", 5.0)
-        ):  # fmt: skip
+            ("S", each.sensitivity, BLUE, 1.5, "o", 9.0),
+            ("T", each.complementary, INK, 1.0, "s", 5.0),
+        ):
             ax.plot(each.omega, values, lw=width, **_looks(each, f"|{name}|, ", colour))
             if each.margins is not None:
                 peak, omega = each.margins.sensitivity_peak if name == "S" else each.margins.complementary_peak
@@ -196,9 +202,10 @@ def _words(data: Nyquist, name: str) -> str:
 
 
 @picture(
-    (Nyquist, "tfarm.nyquist returns"), size=(9.6, 5.6),
+    (Nyquist, "tfarm.nyquist returns"),
+    size=(9.6, 5.6),
     title=lambda data: f"{data.verdict.loop.arm.name}: the loop function L(iω)",
-)  # fmt: skip
+)
 def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     """L on the imaginary axis (from `tfarm.nyquist`), linear, and next to it a zoom at -1; the axes of the whole.
 
@@ -211,9 +218,14 @@ def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     zoom = ax.inset_axes((5 / 9, 0, 4 / 9, 1))  # as wide as the plot, a quarter of that between both
     ticks = [tick for tick in MaxNLocator(5, steps=(1, 2, 5, 10)).tick_values(-edge, edge) if abs(tick) <= edge]
     ax.set(
-        aspect="equal", frame_on=False, xticks=ticks, yticks=ticks, xlim=(-edge, 3.5 * edge), ylim=(-edge, edge),
+        aspect="equal",
+        frame_on=False,
+        xticks=ticks,
+        yticks=ticks,
+        xlim=(-edge, 3.5 * edge),
+        ylim=(-edge, edge),
         ylabel="Im L [−]",
-    )  # fmt: skip
+    )
     ax.set_xlabel("Re L [−]", loc="left")
     frame = ax.add_patch(Rectangle((-edge, -edge), 2 * edge, 2 * edge, fill=False, ec=GREY, lw=0.8, clip_on=False))
     zoom.set(xlim=ZOOM[:2], ylim=ZOOM[2:], xlabel="Re L [−], zoom at −1")
@@ -235,9 +247,10 @@ def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
 
 
 @picture(
-    (Nyquist, "tfarm.nyquist returns"), size=(5.0, 6.1),
+    (Nyquist, "tfarm.nyquist returns"),
+    size=(5.0, 6.1),
     title=lambda data: f"{data.verdict.loop.arm.name}: the loop function L(iω)",
-)  # fmt: skip
+)
 def disc(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     """L on all of Nyquist's contour (from `tfarm.nyquist`), stability and encirclements above it; the axes.
 

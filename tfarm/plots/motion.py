@@ -78,9 +78,11 @@ def _grid(figure: Figure, found: Modes) -> None:
 
 
 @picture(
-    (Modes, "tfarm.modes returns"), size=lambda found: (9.0, 0.8 + 1.9 * _rows(found)),
-    grid=_grid, title=lambda found: f"{found.arm.name}: mode shapes",
-)  # fmt: skip
+    (Modes, "tfarm.modes returns"),
+    size=lambda found: (9.0, 0.8 + 1.9 * _rows(found)),
+    grid=_grid,
+    title=lambda found: f"{found.arm.name}: mode shapes",
+)
 def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
     """Draw the shapes of flexible modes (from `tfarm.modes`), an axes each, in those given or in new ones; these.
 
@@ -157,8 +159,11 @@ def sketch(arm: Arm, *, ax: Axes) -> None:
     ax.add_patch(Circle((0, 0), bore, fc="#e9e9e9" if arm.hub.inertia else "white", ec=INK, lw=1.2, zorder=3))
     ax.plot(0, 0, "o", ms=3.5, color=INK, zorder=4)
     ends = np.array([[1.5, -1.0], [-1.0, 1.5]]) * bore
-    ax.add_patch(FancyArrowPatch(*ends, zorder=4, connectionstyle="arc3,rad=0.75", arrowstyle="-|>", mutation_scale=11,
-                                 color=ORANGE, lw=1.3))  # fmt: skip
+    ax.add_patch(
+        FancyArrowPatch(
+            *ends, zorder=4, connectionstyle="arc3,rad=0.75", arrowstyle="-|>", mutation_scale=11, color=ORANGE, lw=1.3
+        )
+    )
     ax.text(ends[1, 0], ends[1, 1], "θ" if arm.is_locked else "u", color=ORANGE, ha="right", va="bottom", fontsize=11)
     ax.set_title("\n".join(_numbers(arm)), fontsize=9.0, color=INK)
 
@@ -182,9 +187,12 @@ def _numbers(arm: Arm) -> Iterator[str]:
 
 
 @picture(
-    (Arm, "tfarm.load returns"), (Simulation, "tfarm.simulate returns"), size=(9.0, 7.0), rows=(1.35, 1.0, 1.0),
+    (Arm, "tfarm.load returns"),
+    (Simulation, "tfarm.simulate returns"),
+    size=(9.0, 7.0),
+    rows=(1.35, 1.0, 1.0),
     title=lambda arm, runs, what="": f"{arm.name}: {what or next(iter(by_name(runs).values())).scenario.name}",
-)  # fmt: skip
+)
 def slew(arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "", *, ax: Sequence[Axes]) -> None:
     """Simulations of one scenario (from `tfarm.simulate`; several by name) in three axes, given or new; these.
 
@@ -196,9 +204,14 @@ def slew(arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "", 
     scenario = first.scenario
     moment, tip, motor = ax
     moment.step(
-        scenario.t - scenario.period, scenario.rigid_moment, where="post", color=GREY, lw=1.0, ls=DASHED,
+        scenario.t - scenario.period,
+        scenario.rigid_moment,
+        where="post",
+        color=GREY,
+        lw=1.0,
+        ls=DASHED,
         label="rigid arm",
-    )  # fmt: skip
+    )
     # several begin with one without feedback: no colours of stability
     colours = ("#a3a3a3", INK, "#0b7f93", "#8a6d3b")[len(each) == 1 :]
     for (name, run), colour in zip(each.items(), cycle(colours), strict=False):
@@ -245,9 +258,11 @@ def _draw_signal(ax: Axes, t: Real, y: Real, looks: tuple[str, str], every: int 
 
 
 @picture(
-    (Step, "tfarm.step returns"), size=(9.0, 10.0), rows=(1.0, 1.0, 1.0, 1.0),
+    (Step, "tfarm.step returns"),
+    size=(9.0, 10.0),
+    rows=(1.0, 1.0, 1.0, 1.0),
     title=lambda found: f"{found.arm.name}: {found.scenario_in_words}",
-)  # fmt: skip
+)
 def step(found: Step, *, ax: Sequence[Axes]) -> None:
     """Draw time responses (from `tfarm.step`) in four axes, given or new; these: hub, tip, root moment [N m], input.
 
@@ -298,7 +313,7 @@ def _measured_rows(each: Mapping[str, RunComparison]) -> int:
     size=lambda each: (max(4.7 * len(each), 6.0), 6.0 if _measured_rows(each) > 1 else 3.6),
     title=lambda _: "Measured steps, and the exact sampled loop",
     grid=lambda figure, each: figure.subplots(_measured_rows(each), len(each), sharex="col", sharey="row"),
-)  # fmt: skip
+)
 def draw_measured_runs(each: Mapping[str, RunComparison], *, ax: Sequence[Axes]) -> None:
     """A column a controller: hub angle above, root moment below where it was measured."""
     axes = np.reshape(np.array(ax), (-1, len(each)))
@@ -321,9 +336,10 @@ def draw_measured_runs(each: Mapping[str, RunComparison], *, ax: Sequence[Axes])
 
 
 @picture(
-    (Tuning, "tfarm.tune returns"), size=(7.0, 4.4),
+    (Tuning, "tfarm.tune returns"),
+    size=(7.0, 4.4),
     title=lambda found: f"{found.trial.arm.name}: the tuner's gain, and where it is proven stable",
-)  # fmt: skip
+)
 def tuned_gain(found: Tuning, *, ax: Axes) -> None:
     """A tuned gain over time (from `tfarm.tune`) in its guard, in the axes given or new ones; the axes."""
     guard = found.training.guard
@@ -341,7 +357,7 @@ def tuned_gain(found: Tuning, *, ax: Axes) -> None:
     size=(9.0, 5.2),
     title=lambda tuning, *_: f"{tuning.trial.arm.name}: the tuner's gain, and where it is proven stable",
     grid=lambda figure, *_: figure.subplots(1, 2, sharey=True, width_ratios=[1.0, 1.35]),
-)  # fmt: skip
+)
 def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap], *, ax: Sequence[Axes]) -> None:
     """Left the map with the guard as a bar and in it the gains that the tuner takes, right the gain over time."""
     left, right = ax
@@ -362,7 +378,7 @@ def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap], *, 
 @picture(
     size=(9.0, 4.4),
     title=lambda curves, tuning: f"{tuning.trial.arm.name}: learning, {how_many(len(curves.costs), 'seed')}",
-)  # fmt: skip
+)
 def draw_curves(curves: LearningCurves, tuning: Tuning, *, ax: Axes) -> None:
     """Learning curves: each seed, median and quartiles, and the baselines; diverged ones leave through the top."""
     trial = np.arange(1, curves.costs.shape[1] + 1)

@@ -236,9 +236,11 @@ def draw_region(
 
 
 @picture(
-    (Plane, "tfarm.map returns of gains at the hub"), (GainMap, "tfarm.dsp.sampled_map returns"), size=(9.0, 5.7),
+    (Plane, "tfarm.map returns of gains at the hub"),
+    (GainMap, "tfarm.dsp.sampled_map returns"),
+    size=(9.0, 5.7),
     title=lambda continuous, _: f"{continuous.arm.name}: gains that keep the loop stable, continuous and sampled",
-)  # fmt: skip
+)
 def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes) -> None:
     """Both regions of the two gains, in the axes given or in new ones; the axes.
 
@@ -365,6 +367,8 @@ def _factors(data: Comparison, ax: Axes) -> None:
     )
     ax.axhline(1.0, color=INK, lw=0.6)
     ax.set(
-        xlabel="further delay [ms]", ylabel="factor on the controller [−]", xlim=(0.0, 1e3 * delay[-1]),
+        xlabel="further delay [ms]",
+        ylabel="factor on the controller [−]",
+        xlim=(0.0, 1e3 * delay[-1]),
         ylim=(0.0, min(ax.get_ylim()[1], 1e3)),
-    )  # fmt: skip
+    )

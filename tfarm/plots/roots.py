@@ -245,10 +245,12 @@ FIGURES[Loci] = lambda data: locus.figure(data.exact, data.reduced)
 
 
 @picture(
-    size=(9.0, 3.6), grid=lambda figure, _: figure.subplots(1, 2),
-    title=lambda data: f"{data.loop.plant.arm.name}: poles of the loop sampled every "
-                       f"{plain(1e3 * data.loop.chain.sampling.period)} ms",
-)  # fmt: skip
+    size=(9.0, 3.6),
+    grid=lambda figure, _: figure.subplots(1, 2),
+    title=lambda data: (
+        f"{data.loop.plant.arm.name}: poles of the loop sampled every {plain(1e3 * data.loop.chain.sampling.period)} ms"
+    ),
+)
 def draw_sampled_loci(data: SampledLoci, *, ax: Sequence[Axes]) -> None:
     """Draw the z-plane with the locus along each gain."""
     for along, one in zip(data.by.values(), ax, strict=True):
@@ -258,9 +260,14 @@ def draw_sampled_loci(data: SampledLoci, *, ax: Sequence[Axes]) -> None:
 def _z_plane(data: SampledLoci, along: SampledLocus, ax: Axes) -> None:
     """Draw one gain's locus in the upper half of the z-plane, marked at its start and at the loop's gains."""
     ax.set(
-        xlim=(-RIM, RIM), xticks=[-1.0, -0.5, 0.0, 0.5, 1.0], ylim=(0.0, RIM), aspect="equal",
-        xlabel="Re z [−]", ylabel="Im z [−]", facecolor=REGIONS[1],
-    )  # fmt: skip
+        xlim=(-RIM, RIM),
+        xticks=[-1.0, -0.5, 0.0, 0.5, 1.0],
+        ylim=(0.0, RIM),
+        aspect="equal",
+        xlabel="Re z [−]",
+        ylabel="Im z [−]",
+        facecolor=REGIONS[1],
+    )
     circle = ax.add_patch(Circle((0, 0), 1.0, fc="white", ec=INK, lw=0.9, zorder=0.5))
     ax.grid(False)
     z_grid(ax)

@@ -64,10 +64,11 @@ def _grid(figure: Any, *of: Any) -> None:
 
 
 @picture(
-    (Study, "tfarm.study returns"), grid=_grid,
+    (Study, "tfarm.study returns"),
+    grid=_grid,
     size=lambda *of: (max(4.5, 2.4 * min(n := len(distributions(*of)), ACROSS)), 0.9 + 2.0 * math.ceil(n / ACROSS)),
     title=lambda found, *_: f"{found.arm}: distributions over {how_many(found.done, 'arm')}",
-)  # fmt: skip
+)
 def study(found: Study, quantity: str | None = None, *, ax: Sequence[Axes]) -> None:
     """Distribution of each quantity of a study (from `tfarm.study`), or of one, in axes of its own; the axes.
 
@@ -119,12 +120,13 @@ def _shown(found: Study, quantity: str | None = None) -> tuple[list[Spread], lis
 
 
 @picture(
-    (Study, "tfarm.study returns"), size=lambda *of: (9.0, 1.0 + 1.9 * len(_shown(*of)[0])),
+    (Study, "tfarm.study returns"),
+    size=lambda *of: (9.0, 1.0 + 1.9 * len(_shown(*of)[0])),
     grid=lambda figure, *of: figure.subplots(
         *(len(each) for each in _shown(*of)), squeeze=False, sharex="col", sharey="row"
     ),
     title=lambda found, *_: f"{found.arm}: quantities over the varied numbers",
-)  # fmt: skip
+)
 def study_scatter(found: Study, quantity: str | None = None, *, ax: Sequence[Axes]) -> None:
     """Values of a study (from `tfarm.study`) over each varied number, of three quantities or of one; the axes.
 
@@ -141,11 +143,20 @@ def study_scatter(found: Study, quantity: str | None = None, *, ax: Sequence[Axe
         for key, one in zip(keys, line, strict=True):
             for word, (colour, mark) in MARKS.items():
                 for own, height, transform in (
-                    (np.isfinite(y), y, one.transData), (~np.isfinite(y), edge, one.get_xaxis_transform()),
-                ):  # fmt: skip
+                    (np.isfinite(y), y, one.transData),
+                    (~np.isfinite(y), edge, one.get_xaxis_transform()),
+                ):
                     if (here := own & (words == word)).any():
-                        one.plot(table[key][here], height[here], mark, color=colour, ms=3.4, alpha=0.75,
-                                 transform=transform, label=word or "not determined")  # fmt: skip
+                        one.plot(
+                            table[key][here],
+                            height[here],
+                            mark,
+                            color=colour,
+                            ms=3.4,
+                            alpha=0.75,
+                            transform=transform,
+                            label=word or "not determined",
+                        )
             one.set(xlabel=_folded(key_label(key, found)) * one.xaxis.get_tick_params()["labelbottom"])
             one.set(ylabel=_folded(f"{of.label} [{of.unit or '−'}]") * one.yaxis.get_tick_params()["labelleft"])
             one.xaxis.set_major_locator(MaxNLocator(4))
@@ -153,9 +164,10 @@ def study_scatter(found: Study, quantity: str | None = None, *, ax: Sequence[Axe
 
 
 @picture(
-    (Study, "tfarm.study returns"), size=(9.0, 4.6),
+    (Study, "tfarm.study returns"),
+    size=(9.0, 4.6),
     title=lambda found, output="root_moment": f"{found.arm}: {signal_words(output)[0]} of the arms of a study",
-)  # fmt: skip
+)
 def study_band(found: Study, output: str = "root_moment", *, ax: Axes) -> None:
     """Exact responses of up to 100 arms of a study (from `tfarm.study`), their 5, 50 and 95 % at each frequency.
 

@@ -21,19 +21,25 @@ def arm_section(report: ArmReport) -> PageSection:
     arm = report.arm
     input = input_words(report.arm)
     words = (
-        prose("units", odd="; ".join(implausible(arm))), prose("rig", arm=arm, input=input),
+        prose("units", odd="; ".join(implausible(arm))),
+        prose("rig", arm=arm, input=input),
         "" if arm.assumptions else "This arm states no assumptions.",
-    )  # fmt: skip
+    )
     return PageSection(
-        title="The arm", facts=headline_numbers(arm), words=list(filter(None, words)),
+        title="The arm",
+        facts=headline_numbers(arm),
+        words=list(filter(None, words)),
         items=arm.assumptions,
         blocks=(
             picture("arm", sketch.figure(arm), arm=arm, input=input),
-            sheet("parameters", table([*parameters(arm, tomllib.loads(file_text(arm, report.chain)))]),
-                  is_rig=not arm.is_uniform),
+            sheet(
+                "parameters",
+                table([*parameters(arm, tomllib.loads(file_text(arm, report.chain)))]),
+                is_rig=not arm.is_uniform,
+            ),
             derived_table(arm),
         ),
-    )  # fmt: skip
+    )
 
 
 def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
@@ -100,25 +106,42 @@ def derived_table(arm: Arm) -> Table:
         for quantity, symbol, value, unit in (
             ("area of the section", "A", link.section.area, "m²"),
             ("second moment of area", "I", link.section.second_moment, "m⁴"),
-            (f"shear factor, {'Cowper (1966)' if link.section.shear_factor is None else 'given'}", "κ",
-             link.shear_factor, ""),
+            (
+                f"shear factor, {'Cowper (1966)' if link.section.shear_factor is None else 'given'}",
+                "κ",
+                link.shear_factor,
+                "",
+            ),
             ("mass", "ρAL", link.rhoA * link.length, "kg"),
             ("bending stiffness", "EI", link.EI, "N m²"),
             ("shear stiffness", "κGA", link.kGA, "N"),
-            ("Poisson's ratio of an isotropic material", "E/2G − 1",
-             -1 < link.poissons_ratio <= 0.5 and link.poissons_ratio, ""),
+            (
+                "Poisson's ratio of an isotropic material",
+                "E/2G − 1",
+                -1 < link.poissons_ratio <= 0.5 and link.poissons_ratio,
+                "",
+            ),
             ("radius of gyration", "√(I/A)", link.section.radius_of_gyration, "m"),
             ("slenderness", "L/√(I/A)", link.slenderness, ""),
         )
     ] + [
         Derived("rotor inertia at the hub", "N² J_m", arm.motor is not None and arm.motor.reflected_inertia, "kg m²"),
-        Derived("root moment per torque at rest", "−(J − I_h)/J" * arm.is_uniform,
-                turns and -arm.gauged_inertia / arm.total_inertia, "N m/(N m)"),
-        Derived("input for a torque of 1 N m", "", arm.input_per_torque != 1.0 and arm.input_per_torque,
-                unit_of(MOMENT_GAIN, arm)),
-        Derived(f"losses at the hub, in {RATE_GAIN}", "", arm.rate_loss != 0.0 and arm.rate_loss,
-                unit_of(RATE_GAIN, arm)),
-    ]  # fmt: skip
+        Derived(
+            "root moment per torque at rest",
+            "−(J − I_h)/J" * arm.is_uniform,
+            turns and -arm.gauged_inertia / arm.total_inertia,
+            "N m/(N m)",
+        ),
+        Derived(
+            "input for a torque of 1 N m",
+            "",
+            arm.input_per_torque != 1.0 and arm.input_per_torque,
+            unit_of(MOMENT_GAIN, arm),
+        ),
+        Derived(
+            f"losses at the hub, in {RATE_GAIN}", "", arm.rate_loss != 0.0 and arm.rate_loss, unit_of(RATE_GAIN, arm)
+        ),
+    ]
     return sheet("derived", table([row for row in rows if row.value is not False]), arm=arm)
 
 

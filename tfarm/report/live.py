@@ -73,9 +73,19 @@ def save_live(report: ArmReport, folder: Path) -> None:
     data = {"name": arm.name, "command_name": argument(arm.name, is_preset(arm, chain)), **numbers}
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False).replace("<", "\\u003c")
     colours = {"stable": STABLE, "marginal": MARGINAL, "unstable": UNSTABLE, "good": GOOD, "low": LOW, "poor": POOR}
-    page = render("live.html", title=title, data=data, text=text, sign=sign_words(arm), columns=LIVE_COLUMNS,
-                  samples=PANEL_SAMPLES * len(data["low"]), error=scientific(data["error"], 1),
-                  assets=f"../{ASSETS}", script=SCRIPT, colours=colours)  # fmt: skip
+    page = render(
+        "live.html",
+        title=title,
+        data=data,
+        text=text,
+        sign=sign_words(arm),
+        columns=LIVE_COLUMNS,
+        samples=PANEL_SAMPLES * len(data["low"]),
+        error=scientific(data["error"], 1),
+        assets=f"../{ASSETS}",
+        script=SCRIPT,
+        colours=colours,
+    )
     styles = " ".join(_source(each) for each in re.findall("<style>(.*?)</style>", page, re.DOTALL))
     policy = f"default-src 'none'; base-uri 'none'; form-action 'none'; style-src {styles}; {SCRIPTS}"
     first = '<meta charset="utf-8">'

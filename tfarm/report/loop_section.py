@@ -116,10 +116,16 @@ def law_section(report: ArmReport) -> PageSection:
     """Each law: its signals and input, its entries, its discretisation, and its warnings."""
     named = report.controllers
     words = [
-        prose("law", each=each, convention=sign_convention(each.law, each.arm), warnings=cancelled(each.law),
-              rule=rule_in_words(each.law), period=report.chain.sampling.period)
+        prose(
+            "law",
+            each=each,
+            convention=sign_convention(each.law, each.arm),
+            warnings=cancelled(each.law),
+            rule=rule_in_words(each.law),
+            period=report.chain.sampling.period,
+        )
         for each in named
-    ]  # fmt: skip
+    ]
     words.append(sign_words(report.arm))
     words.append(prose("not_on_page", discrete=[each.name for each in named if each.law.is_discrete]))
     blocks = [sheet("law_entries", table([entry for each in named for entry in entries_of(each)]))]
@@ -168,12 +174,16 @@ def map_section(report: ArmReport) -> PageSection:
         label = f"{each.title};\n{brief_on(arm, each.law, report.chain).short}"
         laws.append(regions.MarkedLaw(point, label, each.key == "best"))
     drawn = picture(
-        "map", regions.draw_stability_map.figure(data, laws, {} if designed is None else designed.bounds),
-        data=data.columns, found=data, arm=arm, chain=report.chain,
+        "map",
+        regions.draw_stability_map.figure(data, laws, {} if designed is None else designed.bounds),
+        data=data.columns,
+        found=data,
+        arm=arm,
+        chain=report.chain,
         band=loop.band_of(arm, DESIGNED_MODES),
         unit=f"{plain(rate_unit(arm), 4)} {unit_of(RATE_GAIN, arm)}",
         deepest=plane.DEEPEST_MOMENT_GAIN * arm.input_per_torque,
-    )  # fmt: skip
+    )
     return PageSection(title="Stability region of both gains", facts=interval_facts(arm), blocks=(drawn,))
 
 

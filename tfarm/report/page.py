@@ -62,9 +62,17 @@ DRAWN_DIGITS = 7  # of the numbers of a picture in its file: a hundredth of the 
 T = TypeVar("T")
 PART = "\ue000"  # between title and caption, which no name has in it
 PROMISES = (
-    "certified", "complete", "converged", "default gains", "enclosed", "Lyapunov region", "not determined", "proven",
-    "small gain", "winding number",
-)  # fmt: skip
+    "certified",
+    "complete",
+    "converged",
+    "default gains",
+    "enclosed",
+    "Lyapunov region",
+    "not determined",
+    "proven",
+    "small gain",
+    "winding number",
+)
 
 
 # ------------------------------------------------------------ texts
@@ -89,13 +97,27 @@ def templates() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.globals |= {"inf": math.inf, "rate": RATE_GAIN, "moment": MOMENT_GAIN, "angle": ANGLE_GAIN,
-                            "plane": " and ".join(PLANE), "arm_python": arm_python,
-                            "gains_python": gains_python, "card_rows": card_rows}  # fmt: skip
+    environment.globals |= {
+        "inf": math.inf,
+        "rate": RATE_GAIN,
+        "moment": MOMENT_GAIN,
+        "angle": ANGLE_GAIN,
+        "plane": " and ".join(PLANE),
+        "arm_python": arm_python,
+        "gains_python": gains_python,
+        "card_rows": card_rows,
+    }
     environment.filters.update(
-        symbol=with_symbols, text=text, plain=plain, significant=significant, scientific=scientific, upper_first=upper,
-        listed=listed, how_many=how_many, as_html=as_html,
-    )  # fmt: skip
+        symbol=with_symbols,
+        text=text,
+        plain=plain,
+        significant=significant,
+        scientific=scientific,
+        upper_first=upper,
+        listed=listed,
+        how_many=how_many,
+        as_html=as_html,
+    )
     return environment
 
 
@@ -201,9 +223,10 @@ def save_section(section: PageSection, folder: Path, is_paper: bool = False) -> 
     """The section with its blocks saved: what remains to be written are words."""
     for name in (PICTURES, DATA):
         (folder / name).mkdir(exist_ok=True)
-    return replace(section, blocks=[
-        save_block(block, folder, is_paper) for block in section.blocks if getattr(block, "columns", True)
-    ])  # fmt: skip
+    return replace(
+        section,
+        blocks=[save_block(block, folder, is_paper) for block in section.blocks if getattr(block, "columns", True)],
+    )
 
 
 def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> SavedBlock:

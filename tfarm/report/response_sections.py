@@ -116,12 +116,17 @@ def damped_tables(undamped: Modes) -> list[Table]:
     is_there = Column("complete", "list complete", of=np.where(inside, "in the box", "outside")[:number])
     return [
         sheet(
-            "damped_modes", [*table(found.modes[:number], names).columns, is_there], arm=arm, damped=damped,
-            note=found.damped_note, is_inside=bool(inside.all()), beyond=beyond_the_box(arm),
+            "damped_modes",
+            [*table(found.modes[:number], names).columns, is_there],
+            arm=arm,
+            damped=damped,
+            note=found.damped_note,
+            is_inside=bool(inside.all()),
+            beyond=beyond_the_box(arm),
             edges=[plain(round(x)) if abs(x) >= 100 else plain(x, 3) for x in damped.box],
         ),
         *([sheet("unassigned_eigenvalues", table(found.unassigned))] if found.unassigned else []),
-    ]  # fmt: skip
+    ]
 
 
 def locked_table(found: Modes) -> Table:
@@ -140,11 +145,21 @@ def theories(arm: Arm) -> Table:
     differences = {theory: 100 * (omega[theory] / omega["timoshenko"] - 1) for theory in THEORIES[1:]}
     columns = (
         Column("mode", "mode", of=range(1, TABLED_MODES + 1)),
-        *(Column(f"{theory.replace('-', '_')}_rad_s", theory.title(), "rad/s", of=each, digits=lined(8, 7))
-          for theory, each in omega.items()),
-        *(Column(f"{theory.replace('-', '_')}_difference_percent", f"{theory.title()}, difference", "%", of=each,
-                 digits=lined(5, 3)) for theory, each in differences.items()),
-    )  # fmt: skip
+        *(
+            Column(f"{theory.replace('-', '_')}_rad_s", theory.title(), "rad/s", of=each, digits=lined(8, 7))
+            for theory, each in omega.items()
+        ),
+        *(
+            Column(
+                f"{theory.replace('-', '_')}_difference_percent",
+                f"{theory.title()}, difference",
+                "%",
+                of=each,
+                digits=lined(5, 3),
+            )
+            for theory, each in differences.items()
+        ),
+    )
     return sheet("theories", columns, worst=differences["euler-bernoulli"])
 
 
@@ -159,9 +174,18 @@ def sensitivity_table(modes: Modes) -> Table:
     by_mode = zip(modes.index[flexible], np.array(list(shown.values())).T, strict=True)
     columns = (
         Column("parameter", "parameter", of=list(shown)),
-        *(Column(f"mode_{number}", f"mode {number}", "%/%", of=values, digits=partial(fixed, decimals=3),
-                 tint=list(map(tint, values))) for number, values in by_mode),
-    )  # fmt: skip
+        *(
+            Column(
+                f"mode_{number}",
+                f"mode {number}",
+                "%/%",
+                of=values,
+                digits=partial(fixed, decimals=3),
+                tint=list(map(tint, values)),
+            )
+            for number, values in by_mode
+        ),
+    )
     return sheet(
         "sensitivities", columns, is_rig=not modes.arm.is_uniform, dropped=[name for name in rows if name not in shown]
     )
@@ -262,9 +286,10 @@ def measured_section(report: ArmReport) -> PageSection:
         name = found.measured.label
         words.append(prose("measured_response", name=name, found=found, peaks=found.unmatched / (2 * math.pi)))
         blocks += [
-            picture("measured", frequency.measured.figure(found), stem=f"measured{label}", data=found.csv_table,
-                    name=name),
+            picture(
+                "measured", frequency.measured.figure(found), stem=f"measured{label}", data=found.csv_table, name=name
+            ),
             sheet("measured_modes", table(found.modes), stem=f"measured-modes{label}"),
             sheet("measured_required", table(found.required_changes), stem=f"measured-required{label}"),
-        ]  # fmt: skip
+        ]
     return PageSection(title="Measured over exact", words=words, blocks=blocks)

@@ -67,9 +67,11 @@ def proof_tables(proofs: Sequence[ArmProof]) -> list[Table]:
     digits = {proof.name: proof.leading_digits or [""] * PROVEN_MODES for proof in proofs}
     columns = (
         Column("mode", "mode", of=range(1, PROVEN_MODES + 1)),
-        *(Column(f"{name}_rad_s", name, "rad/s", of=own, shown=[f"{text}…" if text else UNPROVEN for text in own])
-          for name, own in digits.items()),
-    )  # fmt: skip
+        *(
+            Column(f"{name}_rad_s", name, "rad/s", of=own, shown=[f"{text}…" if text else UNPROVEN for text in own])
+            for name, own in digits.items()
+        ),
+    )
     return [
         sheet("counts", table(proofs, ("name", "has_rigid_mode", "enclosed", "count", "count_below", "verdict"))),
         sheet("digits", columns, modes=PROVEN_MODES, digits=BRACKET_DIGITS),
@@ -89,8 +91,14 @@ def published_tables(found: published.Validation) -> list[Table]:
 
 
 AUDIT_COLUMNS = (
-    "equation", "verdict", "printed", "corrected", "residual_printed", "residual_corrected", "evidence",
-)  # fmt: skip
+    "equation",
+    "verdict",
+    "printed",
+    "corrected",
+    "residual_printed",
+    "residual_corrected",
+    "evidence",
+)
 TRUST_FOLDER = "trust"
 PACKAGES = (
     "numpy",
@@ -168,32 +176,45 @@ def write_trust(
     accuracy = (
         Column("arm", "arm", of=[proof.name for proof in proofs]),
         Column("band_rad_s", "from … to, rad/s", of=[" … ".join(significant(x, 4) for x in p.band) for p in proofs]),
-        *(Column(output, output.replace("_", " "), of=own,
-                 shown=["zero throughout" if error is None else scientific(error, 2) for error in own])
-          for output, own in worst.items()),
-    )  # fmt: skip
+        *(
+            Column(
+                output,
+                output.replace("_", " "),
+                of=own,
+                shown=["zero throughout" if error is None else scientific(error, 2) for error in own],
+            )
+            for output, own in worst.items()
+        ),
+    )
     columns = Column("package", "package", of=list(versions)), Column("version", "version", of=versions.values())
     again = [sheet("inputs", table(proofs, ("name", "source", "sha256"))), sheet("versions", columns)]
-    blocks = {"proofs": proof_tables(proofs), "accuracy": [sheet("accuracy", accuracy)],
-              "published": published_tables(found), "again": again}  # fmt: skip
+    blocks = {
+        "proofs": proof_tables(proofs),
+        "accuracy": [sheet("accuracy", accuracy)],
+        "published": published_tables(found),
+        "again": again,
+    }
     sections = {name: save_section(PageSection(blocks=own), folder) for name, own in blocks.items()}
     save_table(table(audited, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation"), folder / DATA)
     errors = [error for proof in proofs for _, error in proof.errors]
     names = " ".join(argument(proof.name, proof.source == "preset") for proof in proofs)
-    write_text(folder / "index.html", render(
-        "trust.html",
-        title="Method and proofs",
-        sections=sections,
-        proofs=proofs,
-        digits=BRACKET_DIGITS,
-        points=BAND_POINTS,
-        worst=scientific(max(errors), 2) if errors else "",
-        found=found,
-        equations=[(row, *compared_formulas(row.printed_tex, row.corrected_tex)) for row in audited],
-        anchor=partial(anchor, "eq"),
-        in_letters=in_letters,
-        is_zero=is_zero,
-        glossary=[term for term in GLOSSARY_TERMS if term.name in PROMISES],
-        word_id=partial(anchor, "word"),
-        command=f"tfarm report {names} --out reports",
-    ))  # fmt: skip
+    write_text(
+        folder / "index.html",
+        render(
+            "trust.html",
+            title="Method and proofs",
+            sections=sections,
+            proofs=proofs,
+            digits=BRACKET_DIGITS,
+            points=BAND_POINTS,
+            worst=scientific(max(errors), 2) if errors else "",
+            found=found,
+            equations=[(row, *compared_formulas(row.printed_tex, row.corrected_tex)) for row in audited],
+            anchor=partial(anchor, "eq"),
+            in_letters=in_letters,
+            is_zero=is_zero,
+            glossary=[term for term in GLOSSARY_TERMS if term.name in PROMISES],
+            word_id=partial(anchor, "word"),
+            command=f"tfarm report {names} --out reports",
+        ),
+    )

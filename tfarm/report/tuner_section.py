@@ -61,8 +61,14 @@ def saved_cost(data: TunerNumbers) -> float:
 def tuner_in_short(data: TunerNumbers) -> str:
     """Compare the median cost of the tuner over its seeds with the best constant gain."""
     curves = data.curves
-    return prose("tuner_in_short", gain=saved_cost(data), same=100 * SAME_COST, median=curves.final_quartiles[1],
-                 best=data.tuning.best_constant.cost, final=curves.final)  # fmt: skip
+    return prose(
+        "tuner_in_short",
+        gain=saved_cost(data),
+        same=100 * SAME_COST,
+        median=curves.final_quartiles[1],
+        best=data.tuning.best_constant.cost,
+        final=curves.final,
+    )
 
 
 def tuner_facts(data: TunerNumbers) -> tuple[Fact, ...]:
@@ -96,8 +102,9 @@ def blocks_of(data: TunerNumbers) -> Iterator[Picture | Table]:
     yield picture("tune_gain", motion.draw_gain.figure(tuning, *regions), data=columns, tuning=tuning, gain=gain)
     chain = chain_words(data.arm, data.coarse[WITHOUT].chain)
     for kind, runs, how in (
-        ("tune_slew", data.slews, "ideal converters"), ("tune_dsp", data.coarse, "with converters and delay"),
-    ):  # fmt: skip
+        ("tune_slew", data.slews, "ideal converters"),
+        ("tune_dsp", data.coarse, "with converters and delay"),
+    ):
         figure = motion.slew.figure(data.arm, runs, f"the slew, {how}")
         slews = response_columns(data.arm, dict(zip(("without", "tuner"), runs.values(), strict=True)))
         yield picture(kind, figure, data=slews, runs=runs, piece=piece_of_bands(runs), how=how, chain=chain)

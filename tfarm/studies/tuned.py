@@ -45,9 +45,12 @@ def tuner_numbers(arm: Arm, chain: Chain) -> TunerNumbers:
     late = 3
     listed = tried_loops(arm, trial.loop.chain, quantised_chain(arm, chain))
     rows = compare_controllers(
-        trial, tuning.gain(), tuning.training.guard, listed[: late + 1 if trial.n > LONG_TRIAL else None],
+        trial,
+        tuning.gain(),
+        tuning.training.guard,
+        listed[: late + 1 if trial.n > LONG_TRIAL else None],
         tuning.best_constant.gain,
-    )  # fmt: skip
+    )
     return TunerNumbers(
         arm=arm,
         tuning=tuning,
