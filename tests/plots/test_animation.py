@@ -9,7 +9,7 @@ from PIL import Image
 
 import tfarm
 from tfarm.dsp import Chain, Sampling, load_chain
-from tfarm.dsp.film import MOST_FRAMES, Motion, exaggeration, motion_of
+from tfarm.dsp.traces import MOST_FRAMES, Motion, exaggeration, motion_of
 from tfarm.plots.animation import DOTS, draw_motion, film
 from tfarm.plots.style import settled, style
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import tfarm
+from tfarm.assessment.stability_map import sampled_region
 from tfarm.crossing import pieces
 from tfarm.dsp import load_chain
 from tfarm.loop.locus import locus, rounded
 from tfarm.loop.loop import Loop
 from tfarm.loop.plane import moment_axis, rate_axis
-from tfarm.loop.regions import sampled_region
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_modes import sampled_loci
 from tfarm.plots import locus as locus_plot

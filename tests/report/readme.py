@@ -4,9 +4,9 @@ import sys
 from pathlib import Path
 
 import tfarm
+from tfarm.assessment.stability_map import stable_regions
 from tfarm.digits import plain
 from tfarm.dsp import load_chain
-from tfarm.loop.regions import stable_regions
 from tfarm.plots.frequency import bode as bode_plot
 from tfarm.plots.motion import modes
 from tfarm.plots.regions import overlay

@@ -14,9 +14,9 @@ import tfarm
 from tests.report.written import blocks_of, values_of
 from tfarm.arm import HubFeedback
 from tfarm.arm.chain import Converters, Sampling
+from tfarm.assessment.stability_map import CUT_RANGE, K2_RANGE, stable_regions
 from tfarm.digits import kept_digits
 from tfarm.dsp import Chain, Simulator, scenario
-from tfarm.loop.regions import CUT_RANGE, K2_RANGE, stable_regions
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of

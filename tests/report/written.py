@@ -20,7 +20,7 @@ from tfarm.assessment import stability_map
 from tfarm.audit.published import validate
 from tfarm.exported import live_loop
 from tfarm.loop import circle_crossings as sampled_regions
-from tfarm.loop import loci, regions
+from tfarm.loop import loci
 from tfarm.loop import sampled_modes as sampled_loci
 from tfarm.report import overview, sampled_section, writing
 from tfarm.report.writing import PIECES
@@ -28,15 +28,15 @@ from tfarm.report.writing import PIECES
 COARSE = (
     (stability_map, "GRID_COLUMNS", 48),
     (stability_map, "GRID_ROWS", 40),
-    (regions, "SAMPLED_COLUMNS", 24),
-    (regions, "OVERLAY_COLUMNS", 8),
+    (stability_map, "SAMPLED_COLUMNS", 24),
+    (stability_map, "OVERLAY_COLUMNS", 8),
     (sampled_regions, "MOST_COLUMNS", 0),  # with the corners that so few have
     (loci, "LOCUS_POINTS", 60),
     (sampled_loci, "SAMPLED_LOCUS_VALUES", 31),
     (sampled_section, "FILM_FRAMES", 10),
     (writing, "MOST_WORKERS", 1),  # a second process would have its own grids
-    (stability_map, "sampled_region", regions.sampled_region.__wrapped__),  # what is kept of it is of other grids
-    (live_loop, "sampled_region", regions.sampled_region.__wrapped__),
+    (stability_map, "sampled_region", stability_map.sampled_region.__wrapped__),  # what is kept of it is of other grids
+    (live_loop, "sampled_region", stability_map.sampled_region.__wrapped__),
 )
 
 

@@ -39,6 +39,7 @@ from tfarm.assessment.card import (
     UNDAMPED,
     reference_damping,
 )
+from tfarm.assessment.stability_map import BEYOND_PICTURE, sampled_region
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits
 from tfarm.dsp import Chain, PulseTransfer, Simulator, scenario, traces
@@ -51,7 +52,6 @@ from tfarm.loop.edges import LONGEST_DELAY_SAMPLES
 from tfarm.loop.loop import Loop, steep_places
 from tfarm.loop.panels import Sensor, loop_panels, positions, sensed_places
 from tfarm.loop.plane import Plane, gain_map, moment_axis, rate_axis, rate_columns
-from tfarm.loop.regions import BEYOND_PICTURE, sampled_region
 from tfarm.loop.sampled import Sampled
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import band_of_family, stability

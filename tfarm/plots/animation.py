@@ -16,7 +16,7 @@ from tfarm.arm import Arm
 from tfarm.arrays import Real
 from tfarm.digits import plain
 from tfarm.dsp import Simulation
-from tfarm.dsp.film import RATE, Motion, motion_of
+from tfarm.dsp.traces import RATE, Motion, motion_of
 from tfarm.files import write_file
 from tfarm.records import record
 

@@ -13,15 +13,15 @@ import numpy as np
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, shown_unit
 from tfarm.arm.chain import MOST_DELAY
 from tfarm.assessment.card import margins_of, sampled_of
+from tfarm.assessment.stability_map import StableRegions, stable_regions
 from tfarm.assessment.step import Step, step
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain, Simulation, results, traces
-from tfarm.dsp.film import motion_of
+from tfarm.dsp.traces import motion_of
 from tfarm.errors import ParameterError
 from tfarm.fitting.recording import RunComparison, compare_run, departures, overshoot
 from tfarm.loop import sampled_modes as modes
 from tfarm.loop import sampled_verdict as verdict
-from tfarm.loop.regions import StableRegions, stable_regions
 from tfarm.loop.sampled_verdict import Analysis, sampled_verdict
 from tfarm.plots import animation, motion, regions, roots, style
 from tfarm.report.page import (

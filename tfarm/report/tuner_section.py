@@ -4,15 +4,15 @@ import math
 from collections.abc import Iterator
 
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm
+from tfarm.assessment.stability_map import stable_regions
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain, scenarios, traces
 from tfarm.errors import CertificationError
-from tfarm.loop.regions import stable_regions
 from tfarm.plots import motion
 from tfarm.report.page import ArmReport, Fact, PageSection, Picture, has_loop, picture, prose, sheet
 from tfarm.report.sampled_section import chain_words, piece_of_bands, response_columns
 from tfarm.schema import Column, Table, table
-from tfarm.studies.tuned import WITHOUT, TunerNumbers, tuner_numbers
+from tfarm.studies.cases import WITHOUT, TunerNumbers, tuner_numbers
 
 SAME_COST = 1e-4  # relative difference of two costs below which they are called the same
 TITLE = "The gain tuner against baselines"
