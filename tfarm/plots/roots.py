@@ -36,7 +36,7 @@ from .style import (
 THIN: dict[str, Any] = {"lw": 0.9, "ls": (0, (2, 1.5)), "zorder": 3}  # of the reduced model
 GRID: dict[str, Any] = {"color": FAINT, "lw": 0.7, "zorder": 0.6}
 VALUE: dict[str, Any] = {"fontsize": 7.0, "color": GREY}
-DAMPED_GRID = (0.1, 0.3, 0.5, 0.7, 0.9)  # damping ratios in the z-plane
+Z_RATIOS = (0.1, 0.3, 0.5, 0.7, 0.9)  # damping ratios in the z-plane
 
 
 def zoomed(exact: Locus) -> list[int]:
@@ -208,7 +208,7 @@ def s_grid(ax: Axes, *, is_named: bool = True) -> None:
 def z_grid(ax: Axes) -> None:
     """Draw the same at the samples, z = exp(s T): spirals of constant damping ratio, frequencies in parts of π/T."""
     angle = np.linspace(0.0, np.pi, 181)
-    for ratio in DAMPED_GRID:
+    for ratio in Z_RATIOS:
         z = np.exp((1j - ratio / np.sqrt(1 - ratio**2)) * angle)
         _grid_line(z, f"ζ {ratio}" if ratio < 0.8 else "", (z[90].real, z[90].imag), ax, ha="center")
     for tenths in range(1, 10):

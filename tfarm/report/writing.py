@@ -76,8 +76,16 @@ EXPORTED = [f"{of}{end}" for of in ("controller", "tuner", "plant", "loop") for 
 TRUST_PAGE = f"{TRUST_FOLDER}/index.html"
 COMPARISON_PAGE = "compare.html"
 RESERVED_NAMES = {  # of folders that no arm may have
-    "index.html", "readme.md", "pictures", "bench.json", TRUST_FOLDER, "data", COMPARISON_PAGE, "compare.json", ASSETS,
-}  # fmt: skip
+    "index.html",
+    "readme.md",
+    "pictures",
+    "bench.json",
+    TRUST_FOLDER,
+    "data",
+    COMPARISON_PAGE,
+    "compare.json",
+    ASSETS,
+}
 
 
 # ------------------------------------------------------------ the sections of a page
@@ -126,20 +134,23 @@ PIECES = (
     Piece("recommended gains", "margins-recommended", recommended_section, _of_gains, task=LOOP_TASK),
     Piece("stability margins", "margins", margins_section, _in_s, "Gains and margins", task=LOOP_TASK),
     Piece("Nyquist plot", "margins-nyquist", nyquist_section, _in_s, task=LOOP_TASK),
-    Piece("response of the root moment", "bode-root-moment", partial(bode_section, output="root_moment"),
-          title="Bode plots"),
+    Piece(
+        "response of the root moment",
+        "bode-root-moment",
+        partial(bode_section, output="root_moment"),
+        title="Bode plots",
+    ),
     Piece("response of the tip", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),
     Piece("measured responses", "bode-measured", measured_section, attrgetter("measured")),
     Piece("the arm", "arm", arm_section, on="modes"),
     Piece("modes", "modes", modes_section, title="Arm and modes"),
     Piece("root loci", "locus", locus_section, _in_s, "Root loci", task=LOOP_TASK),
-    Piece("sampled loop", "sampled", sampled_section, attrgetter("has_loop"), "The sampled loop",
-          task=SAMPLED_TASK),
+    Piece("sampled loop", "sampled", sampled_section, attrgetter("has_loop"), "The sampled loop", task=SAMPLED_TASK),
     Piece("controllers", "law", law_section, _of_laws, "The controller"),
     Piece("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", task=SAMPLED_TASK),
     Piece("fit to measurements", "fit", fit_section, attrgetter("fit"), "Fitted numbers"),
     Piece("assumptions", "assumptions", assumptions_section, title="Assumptions"),
-)  # fmt: skip
+)
 QUESTIONS = {piece.page: piece.title for piece in PIECES if piece.title}  # pages that may be asked for alone
 PAGES = {"index": "Overview", "live": "Live loop", **QUESTIONS}
 
