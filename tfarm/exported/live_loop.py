@@ -68,7 +68,7 @@ CONSUMER = Consumer(
     none=("volts",),
 )  # fmt: skip
 LIVE_COLUMNS = 90  # values of the gain across at which the continuous region is cut
-Numbers = dict[str, Any]
+LiveNumbers = dict[str, Any]
 
 
 def packed(values: Any) -> str:
@@ -81,14 +81,14 @@ def packed(values: Any) -> str:
 # ------------------------------------------------------------ of gains at the hub, and of a law of rational parts
 
 
-def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> Numbers:
+def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> LiveNumbers:
     """Return all numbers of a loop of gains at the hub.  `law` is where the page begins, else the default gains.
 
     Raises what `gain_map` and `loop_panels` raise.
     """
     x = rate_axis(arm)
     y = moment_axis(arm, x)
-    axes: dict[str, Numbers] = {
+    axes: dict[str, LiveNumbers] = {
         name: {"low": axis.low, "high": axis.high, "linear": None if axis.is_linear else axis.linear}
         for name, axis in zip(PLANE, (x, y), strict=True)
     }
@@ -123,7 +123,7 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> Numbers
     }
 
 
-def law_data(arm: Arm, chain: Chain, law: Law, reach: float = 10.0) -> Numbers:
+def law_data(arm: Arm, chain: Chain, law: Law, reach: float = 10.0) -> LiveNumbers:
     """Return the same for a law of rational parts: the gain of each part is a number of the page.
 
     `reach` is the range of each gain, up and down.  The slew is of gains at the hub alone.  Raises ParameterError for
@@ -153,7 +153,7 @@ def law_data(arm: Arm, chain: Chain, law: Law, reach: float = 10.0) -> Numbers:
     }
 
 
-def _slider(value: float, reach: float) -> Numbers:
+def _slider(value: float, reach: float) -> LiveNumbers:
     low, high = sorted((value / reach, value * reach))
     return {"low": low, "high": high, "linear": abs(value) / reach}
 
@@ -162,7 +162,7 @@ def _blocks(law: Law) -> list[Rational]:
     return [cast(Rational, part.block) for part in law.parts]
 
 
-def _of_any_law(arm: Arm, chain: Chain, corners: Sequence[Law], law: AnyLaw, unit: Law | None = None) -> Numbers:
+def _of_any_law(arm: Arm, chain: Chain, corners: Sequence[Law], law: AnyLaw, unit: Law | None = None) -> LiveNumbers:
     """Return what every page has: `corners` of its gains, `law` its reference, `unit` one with gains of 1.
 
     Gains at the hub have no `unit`.
@@ -184,7 +184,7 @@ def _of_any_law(arm: Arm, chain: Chain, corners: Sequence[Law], law: AnyLaw, uni
 # ------------------------------------------------------------ in continuous time
 
 
-def _samples(arm: Arm, corners: Sequence[Law], law: Law | None = None) -> tuple[Numbers, bool]:
+def _samples(arm: Arm, corners: Sequence[Law], law: Law | None = None) -> tuple[LiveNumbers, bool]:
     """Return samples of the loop's parts in the band of these laws, and whether small gain holds beyond it.
 
     They are those of hub angle and gauge, or of each part of `law`, whose poles and zeros are steep places too.
@@ -205,7 +205,7 @@ def _samples(arm: Arm, corners: Sequence[Law], law: Law | None = None) -> tuple[
     }, is_quiet
 
 
-def _graded(arm: Arm, corners: Sequence[Law], chain: Chain, law: AnyLaw, unit: Law | None) -> Numbers:
+def _graded(arm: Arm, corners: Sequence[Law], chain: Chain, law: AnyLaw, unit: Law | None) -> LiveNumbers:
     """Return the loop with whose damping an undamped arm is graded, and the words for that: `tfarm.assessment.card`."""
     C = reference_damping(arm)
     damped = arm.having(damping=C)
@@ -219,7 +219,7 @@ def _graded(arm: Arm, corners: Sequence[Law], chain: Chain, law: AnyLaw, unit: L
     }
 
 
-def _known(arm: Arm, is_quiet: bool, are_gains: bool) -> Numbers:
+def _known(arm: Arm, is_quiet: bool, are_gains: bool) -> LiveNumbers:
     """Return theorems on gains at the hub, bounds beyond the frequency range, and the static balance."""
     is_reactive = are_gains and arm.is_reactive
     kind = "reactive" if is_reactive else "quiet" if is_quiet else "band"
@@ -261,7 +261,7 @@ def _areas(plane: Plane | GainMap) -> list[dict[str, float]]:
 # ------------------------------------------------------------ at the samples
 
 
-def _sampled_map(plane: GainMap) -> Numbers:
+def _sampled_map(plane: GainMap) -> LiveNumbers:
     """Return the sampled region, its columns with exact ends, and what it holds for."""
     loop = plane.loop
     modes = "" if loop.plant.arm.damping else f", of the first {plane.modes_used} modes"
@@ -273,7 +273,7 @@ def _sampled_map(plane: GainMap) -> Numbers:
     }
 
 
-def sampled_numbers(loop: Sampled) -> Numbers:
+def sampled_numbers(loop: Sampled) -> LiveNumbers:
     """Return the sampled loop with the modes that it has; `states`: poles at z = 1 that the hub's own motion has.
 
     These are 2, 1 where it is damped or driven through a motor, or 0.
@@ -283,7 +283,7 @@ def sampled_numbers(loop: Sampled) -> Numbers:
     return {**_sampling(loop.chain), **_plant(folded), "states": _orders(plant)[0], "modes": plant.count}
 
 
-def law_in_page(loop: Sampled, names: Sequence[str]) -> Numbers:
+def law_in_page(loop: Sampled, names: Sequence[str]) -> LiveNumbers:
     """Return the sampled loop of a law: `columns` are its parts by name, in delta = z - 1; `ones` poles at z = 1."""
     plant = loop.pulse.plant
     in_z = loop.in_z
@@ -300,7 +300,7 @@ def law_in_page(loop: Sampled, names: Sequence[str]) -> Numbers:
     }
 
 
-def _sampling(chain: Chain) -> Numbers:
+def _sampling(chain: Chain) -> LiveNumbers:
     """Return the period [s], the delay in samples, and how the hub rate is had: `smoothing` is its filter's pole."""
     T = chain.sampling.period
     of = chain.converters
@@ -312,7 +312,7 @@ def _sampling(chain: Chain) -> Numbers:
     }
 
 
-def _plant(plant: Plant) -> Numbers:
+def _plant(plant: Plant) -> LiveNumbers:
     """Return poles (m,) [1/s] but s = 0, the outputs' residues (outputs, m), and their shares of 1/s^2, 1/s and 1."""
     return {
         "eigenvalues": packed(plant.poles.astype(complex)),
@@ -335,7 +335,7 @@ def _pairs(values: Complex) -> list[list[float]]:
 # ------------------------------------------------------------ in time
 
 
-def slew_numbers(arm: Arm, chain: Chain, law: HubFeedback, most: int = 5000) -> Numbers | None:
+def slew_numbers(arm: Arm, chain: Chain, law: HubFeedback, most: int = 5000) -> LiveNumbers | None:
     """Return the slew of the chain for three times as long as it takes, with the modes that it takes under `law`.
 
     None where there is no such slew, and of one of more than `most` samples, 160 kB of references: it is left to
@@ -376,7 +376,7 @@ def _upper(plant: Plant) -> Plant:
     return replace(plant, poles=plant.poles[upper], residues=residues[:, upper], mode=plant.mode[upper])
 
 
-def _shapes(arm: Arm, plant: Plant) -> Numbers:
+def _shapes(arm: Arm, plant: Plant) -> LiveNumbers:
     """Return displacement along the arm over that of the tip, (stations, m) at each pole, that of the clamp first.
 
     The ratio of residues is that of the numerators, whatever drives the hub.
@@ -391,7 +391,7 @@ def _shapes(arm: Arm, plant: Plant) -> Numbers:
 # ------------------------------------------------------------ sensors along the arm
 
 
-def sensor_numbers(arm: Arm) -> Numbers:
+def sensor_numbers(arm: Arm) -> LiveNumbers:
     """Return participation and zeros at every position, by the kind of sensor, without ends that sense nothing.
 
     None where they cannot be had, and then `no_sensor` is the reason.
@@ -402,7 +402,7 @@ def sensor_numbers(arm: Arm) -> Numbers:
         return {"sensor": None, "no_sensor": str(error)}
 
 
-def _positions(arm: Arm, kind: Sensor, modes: int = 6) -> Numbers:
+def _positions(arm: Arm, kind: Sensor, modes: int = 6) -> LiveNumbers:
     """Return the positions of one kind of sensor in six digits, far more than a screen has."""
     x = sensed_places(arm, kind, np.linspace(0.0, arm.length, 17), modes)
     found = positions(arm, kind, x, modes)

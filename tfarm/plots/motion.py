@@ -245,7 +245,7 @@ def _draw_curve(curve: traces.TimeCurve, ax: Axes, colour: str, *, scale: float 
 
 
 def _draw_signal(ax: Axes, t: Real, y: Real, looks: tuple[str, str], every: int = 0, **how: Any) -> None:
-    """Draw a signal at even times; `every` so many of a sampled loop is a sample, marked where these are few."""
+    """Draw a signal at even times; of a sampled loop one of `every` is a sample, marked where these are few."""
     colour, mark = looks
     # rises from point to point that are seen; a line with more turns is a band
     rises = np.diff(y)

@@ -134,7 +134,7 @@ def law_section(report: ArmReport) -> PageSection:
     )
 
 
-class Entry(NamedTuple):
+class LawEntry(NamedTuple):
     """A signal of a law: how it enters, and its numerator and denominator in descending powers."""
 
     law: Annotated[str, Quantity("controller", help="controller that reads the signal")]
@@ -145,7 +145,7 @@ class Entry(NamedTuple):
     denominator: Annotated[list[float] | str, Quantity("denominator", help="coefficients in descending powers")]
 
 
-def entries_of(each: Controller) -> Iterator[Entry]:
+def entries_of(each: Controller) -> Iterator[LawEntry]:
     """Every signal of a law with every digit; matrices are in its file alone."""
     law = each.law
     for part in law.parts:
@@ -157,7 +157,7 @@ def entries_of(each: Controller) -> Iterator[Entry]:
             signal = name.removeprefix(REFERENCE)
             enters = "less its reference" if name in law.references else "as it is"
             enters = enters if is_measured(name) else "its reference alone"
-            yield Entry(each.name, signal, Signals(each.arm, (signal,)).units[0], enters, num, den)
+            yield LawEntry(each.name, signal, Signals(each.arm, (signal,)).units[0], enters, num, den)
 
 
 # ------------------------------------------------------------ the map of both gains
