@@ -23,8 +23,8 @@ from tfarm.arm.law_tables import load_law
 from tfarm.assessment.card import GAIN_LIMITS, PEAK_LIMITS, PERIOD_LIMITS, PHASE_LIMITS
 from tfarm.audit.published import Validation, validate
 from tfarm.digits import general
+from tfarm.fitting.decays import ring
 from tfarm.fitting.recording import compare_run, load_run, overshoot, read_recording
-from tfarm.fitting.resonances import ring
 from tfarm.spectrum.table import hub_locked
 from tfarm.synthesis.structures import STRUCTURES
 

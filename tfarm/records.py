@@ -3,17 +3,18 @@
 A repr begins with the finding: the entries or properties of a record with a name in `SHOWN_FIRST`.
 """
 
-from collections.abc import Iterator
-from dataclasses import MISSING, Field, fields, is_dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
 from fractions import Fraction
-from functools import cached_property, wraps
+from functools import cached_property, partial, wraps
 from html import escape
 from operator import is_
-from typing import Any, TypeVar
+from typing import Any, TypeVar, dataclass_transform, overload
 
 import numpy as np
 
 _Class = TypeVar("_Class", bound=type[Any])
+_Record = TypeVar("_Record")
 
 SHOWN_FIRST = ("verdict", "word", "text", "finding", "unstable", "worst_error")  # the finding
 LONGEST_REPR = 200  # characters of a repr: a line or two of a terminal
@@ -55,6 +56,20 @@ def record(cls: _Class) -> _Class:
     for name, method in methods.items():
         setattr(cls, name, method)
     return cls
+
+
+@overload
+def frozen(cls: type[_Record], /) -> type[_Record]: ...
+
+
+@overload
+def frozen(*, kw_only: bool = False, slots: bool = False) -> Callable[[type[_Record]], type[_Record]]: ...
+
+
+@dataclass_transform(frozen_default=True)
+def frozen(cls: Any = None, /, **how: bool) -> Any:
+    """Decorate a class: a frozen dataclass that is a `record`."""
+    return partial(frozen, **how) if cls is None else dataclass(frozen=True, **how)(record(cls))
 
 
 def read_only(value: Any) -> Any:

@@ -13,7 +13,7 @@ import pytest
 import tfarm
 from tests.exported.tuners import some_tuner
 from tests.shared import docs_module, remembered
-from tfarm.arm.chain import CHAIN_TABLES
+from tfarm.arm.chain import CHAIN_TABLES, stated
 from tfarm.arm.schema import file_keys
 from tfarm.arm.stages import ARM_KEYS, STAGE_OF, STAGES, Consumer, Stage
 from tfarm.assessment import card, step
@@ -37,6 +37,7 @@ from tfarm.tuner.tuning import usual_plan
 ARM, GAINS = tfarm.load("sasaki2012-lab"), tfarm.HubFeedback(K1=0.3, K2=0.3)
 IDEAL = Chain()
 DIFFERENCE, RANGES = {"hub_rate": "difference"}, {"moment_range": 5.0, "torque_range": 5.0}
+QUANTISERS = ("encoder", "amplifier steps", "amplifier range", "DAC steps", "DAC range", "torque limit")
 CHANGES = {  # another value of each key, and what it needs beside it
     "sampling.period": (0.008, IDEAL),
     "sampling.delay_samples": (0.3, IDEAL),
@@ -173,6 +174,15 @@ def test_every_key_has_a_stage_and_every_consumer_states_stages_that_there_are()
     for consumer in ANSWERS:
         stated = [*consumer.acts, *consumer.named, *consumer.partly, *consumer.none]
         assert sorted(stated) == sorted(stage.name for stage in STAGES), consumer.name
+
+
+@pytest.mark.parametrize("key", CHANGES)
+def test_a_chain_is_linear_where_its_stages_are(key):
+    before, after = changed(key)
+    keys = [key, *(f"{table}.{name}" for table, own in stated(before).items() for name in own)]
+    assert after.is_linear == all(STAGE_OF[each].is_linear for each in keys)
+    assert Chain().is_linear
+    assert STAGE_OF[key].is_linear == (STAGE_OF[key].name not in QUANTISERS)
 
 
 def test_the_table_of_the_documentation_has_every_consumer():

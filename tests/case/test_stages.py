@@ -5,7 +5,6 @@ steps of a quantiser.  Signals agree to 1e-12 of their largest value, and every 
 """
 
 import json
-import math
 from dataclasses import asdict, replace
 from functools import cache
 
@@ -13,10 +12,10 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.exported.cases import realised, task_of
+from tests.exported.cases import on_steps, readings, realised, task_of
 from tests.exported.compilers import needed, pumped, run, stepped
 from tests.exported.tuners import exported, some_tuner
-from tests.exported.units import Unit, modes_of_units
+from tests.exported.units import Unit, driven, inputs_of, modes_of_units
 from tests.shared import thinned
 from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import STAGES
@@ -85,26 +84,6 @@ def vector(chain, count=MODES):
     return truth
 
 
-def on_steps(values, chain, row):
-    """Values on the steps and in the range of a quantiser."""
-    step, low, high = quantisers(chain)[row]
-    near = np.rint(values / step) * step if step else values
-    return np.clip(near, low, high)
-
-
-def readings(truth):
-    """Hub angle, hub rate and root moment behind the converters (n,)."""
-    chain = truth.chain
-    angle, rate, moment = truth.measured.T
-    angle, moment = on_steps(angle, chain, ENCODER), on_steps(moment, chain, AMPLIFIER)
-    if chain.converters.hub_rate == "difference":
-        T, a, found = chain.sampling.period, math.exp(-100.0 * chain.sampling.period), [0.0]
-        for step in np.diff(angle) / T:
-            found.append(a * found[-1] + (1 - a) * step)
-        rate = np.array(found)
-    return {"hub_angle": angle, "hub_rate": rate, "root_moment": moment}
-
-
 def assert_equal(found, truth, step=0.0, name=""):
     np.testing.assert_allclose(found, truth, rtol=0, atol=EQUAL * abs(truth).max(), err_msg=name)
     if step:
@@ -141,6 +120,10 @@ def test_a_controller_in_python(stages):
     assert not step or abs(np.array(asked) / step % 1 - 0.5).min() > TIE
     assert_equal(found.torque, on_steps(np.array(asked), chain, DAC), step)
     assert_equal(found.torque, truth.torque, step)
+    for values, row in ((truth.measured[:, 0], ENCODER), (truth.measured[:, 2], AMPLIFIER), (np.array(asked), DAC)):
+        size, low, high = quantisers(chain)[row]
+        near = np.rint(values / size) * size if size else values
+        assert (truth.saturated_at[:, row] == ((near > high) | (near < low))).all()
 
 
 @vectors(fmu.CONSUMER, 3)
@@ -151,16 +134,8 @@ def test_the_functional_mock_up_unit(stages, tmp_path):
     with modes_of_units(MODES):
         tfarm.export(ARM, LAW, what="loop", form="fmu", folder=tmp_path, chain=chain, anyway=True)
     unit = Unit(tmp_path / "loop.fmu", tmp_path / "unpacked")
-    names = ["measured:hub_angle", "measured:hub_rate", "measured:root_moment", *truth.at_samples.names, "torque"]
-    inputs = {f"{REFERENCE}{name}": values for name, values in truth.scenario.references.items()}
-    inputs["feedforward"], rows = truth.scenario.feedforward, []
     unit.start()
-    for k in range(truth.t.size):
-        rows.append(unit.get(names))
-        unit.set({name: values[k] for name, values in inputs.items()})
-        unit.step()
-    rows.append(unit.get(names))
-    found = dict(zip(names, np.array(rows).T, strict=True))
+    found = driven(unit, inputs_of(truth.scenario), truth.t.size)
     steps = quantisers(chain)[:, 0]
     assert_equal(found["torque"][1:], truth.torque, steps[DAC])
     for (name, values), step in zip(readings(truth).items(), (steps[ENCODER], 0.0, steps[AMPLIFIER]), strict=True):

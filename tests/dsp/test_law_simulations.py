@@ -11,7 +11,7 @@ from tests.dsp.independent import radius_of, stepped
 from tests.shared import thinned
 from tfarm import Law, ParameterError
 from tfarm.arm.law_tables import load_law
-from tfarm.dsp import Chain, Converters, Sampling, Simulator, load_chain, scenario
+from tfarm.dsp import Chain, Sampling, Simulator, load_chain, scenario
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_verdict import sampled_verdict
 
@@ -28,14 +28,6 @@ def assert_close(mine, theirs, tolerance=ROUNDED):
         np.testing.assert_allclose(a, b, rtol=0, atol=tolerance * abs(b).max(), err_msg=name)
     np.testing.assert_allclose(mine.torque, theirs.torque, rtol=0, atol=tolerance * abs(theirs.torque).max())
     assert mine.saturated == theirs.saturated
-
-
-def test_in_float32_a_law_differs_by_its_last_bits():
-    law = Law({"hub_angle": ([4.0, -3.6], [1.0, -0.5]), "root_moment": 0.1}, period=T, references=("hub_angle",))
-    chains = [Chain(converters=Converters(arithmetic=each)) for each in ("float32", "float64")]
-    mine, exact = (Simulator(LAB, each, scenario("slew", LAB, each, 2.0), law, count=6).run() for each in chains)
-    assert_close(mine, exact, 200 * np.finfo(np.float32).eps)
-    assert (mine.torque == mine.torque.astype(np.float32)).all()
 
 
 def test_a_law_with_states_is_a_controller_that_remembers():

@@ -12,8 +12,7 @@ from tests.odd_arms import odd_arms
 from tests.strategies import arm_of
 from tfarm.arm import FED_BACK, HubFeedback
 from tfarm.dsp import Actuator, Chain, Sampling, pulse_transfer
-from tfarm.dsp.plant import PulseTransfer, sensed_plant, undelayed_plant, with_filter
-from tfarm.errors import ParameterError
+from tfarm.dsp.plant import PulseTransfer, sensed_plant
 from tfarm.loop.sampled import sampled_loop
 
 T = 0.01
@@ -100,13 +99,6 @@ def test_a_rigid_inertia_is_stable_up_to_its_known_gain(delay):
     for factor, stable in ((0.999, True), (1.001, False)):
         loop = sampled_loop(arm, HubFeedback(K1=factor * edge, K2=0.0), chain, count=2)
         assert loop.poles.is_stable is stable
-
-
-def test_a_filter_is_for_what_does_not_drift(lab):
-    """An angle's 1/(J s^2) is refused: encoders have no analog filter."""
-    plain = undelayed_plant(lab, ("hub_rate", "root_moment", "hub_angle"), 8)
-    with pytest.raises(ParameterError, match="filtered output = 'hub_angle'"):
-        with_filter(plain, [2], 90.0)
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.4])

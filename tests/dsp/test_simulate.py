@@ -1,4 +1,4 @@
-"""Simulations: energy, poles seen in time, two implementations, converters, limit cycles, running away."""
+"""Simulations: energy, poles seen in time, limit cycles, running away."""
 
 import math
 from dataclasses import replace
@@ -50,32 +50,6 @@ def test_energy_is_not_known_where_something_takes_it(lab, lossless):
         assert simulator(arm, "step", 0.1, chain, count=2).linear(GAINS).energy_error is None
 
 
-@pytest.mark.parametrize("hub_rate", ["ideal", "difference"])
-@pytest.mark.parametrize("delay", [0.0, 1.3])
-def test_a_python_controller_does_what_the_compiled_law_does(lab, hub_rate, delay):
-    chain = Chain(
-        sampling=Sampling(delay_samples=delay, antialias_corner=800.0),
-        converters=Converters(
-            encoder_counts=20000, hub_rate=hub_rate, rate_filter=100.0, moment_bits=12, moment_range=20.0,
-            torque_bits=12, torque_range=10.0,
-        ),
-        actuator=Actuator(torque_limit=6.0),
-    )  # fmt: skip
-    loop, K = simulator(lab, chain=chain), 0.3 + 0.1 * np.sin(np.arange(301))
-    compiled = loop.linear(GAINS, K)
-
-    def law(m):
-        return m.feedforward + 0.3 * (m.rate_reference - m.hub_rate) - K[m.k] * m.vibration
-
-    called, scheduled = loop.controller(law), loop.gain_schedule(0.3, lambda m: K[m.k])
-    for other in (called, scheduled):
-        np.testing.assert_allclose(other.torque, compiled.torque, rtol=1e-12, atol=1e-13)
-        assert other.saturated == compiled.saturated
-    assert called.gain is None
-    for other in (compiled, scheduled):
-        np.testing.assert_array_equal(other.gain, K)
-
-
 def test_free_decay_is_the_damping_of_the_first_mode(lab):
     """Without gains the released mode decays with its own eigenvalue, and starts at the given deflection, at rest."""
     run = simulator(lab, "decay", 2.0).linear(HubFeedback(K1=0, K2=0))
@@ -108,22 +82,6 @@ def test_the_decay_in_time_is_the_spectral_radius(lab, K2):
     rate = run.at_samples.hub_rate[-200:]
     slope = np.polyfit(np.arange(200), np.log(abs(rate)), 1)[0]
     assert slope == pytest.approx(loop.poles.log_spectral_radius, rel=1e-6)
-
-
-def test_converters_round_and_saturate(lab):
-    chain = Chain(
-        converters=Converters(moment_bits=8, moment_range=1.0, torque_bits=6, torque_range=2.0, encoder_counts=500),
-        actuator=Actuator(motor_constant=0.5, torque_limit=1.5),
-    )
-    run = simulator(lab, chain=chain).linear(GAINS)
-    steps = run.torque / (4.0 / 64)
-    np.testing.assert_allclose(steps, np.round(steps), atol=1e-12)
-    assert abs(run.torque).max() == 1.5
-    assert run.saturated["torque"] > 10
-    assert run.saturated["moment"] == np.count_nonzero(
-        (np.round(run.at_samples.root_moment * 128) > 127) | (np.round(run.at_samples.root_moment * 128) < -128)
-    )
-    np.testing.assert_array_equal(run.volts, run.torque / 0.5)
 
 
 def test_quantisation_keeps_a_limit_cycle_up(lab):
@@ -252,7 +210,6 @@ PINNED = {"payload_mass": np.inf}
         (lambda lab: simulator(lab, "step", -1.0), "duration"),
         (lambda lab: simulator(lab, between=-1), "0 to 1000"),
         (lambda lab: simulator(lab).controller(lambda m: np.nan), "not finite"),
-        (lambda lab: simulator(lab).linear(GAINS, np.ones(300)), "one finite gain a sample"),
     ],
 )
 def test_what_cannot_be_simulated_is_refused(lab, run, words):

@@ -4,10 +4,14 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+
 import tfarm
 from tfarm.arm.law import arm_and_law
 from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, load_chain
+from tfarm.dsp.kernel import AMPLIFIER, ENCODER
+from tfarm.dsp.simulate import quantisers
 from tfarm.exported.controller import controller_of, in_z
 from tfarm.exported.result import ExportTask
 from tfarm.exported.word_length import least_noise
@@ -60,3 +64,23 @@ def realised(task):
     """The realised controller of a task, and its exact sampled loop."""
     loop = tfarm.sampled(task.arm, task.law, task.chain).verdict.loop
     return controller_of(least_noise(in_z(task.law, task.chain), loop)[0], task), loop
+
+
+def on_steps(values, chain, row):
+    """Values on the steps and in the range of a quantiser."""
+    step, low, high = quantisers(chain)[row]
+    near = np.rint(values / step) * step if step else values
+    return np.clip(near, low, high)
+
+
+def readings(truth):
+    """Hub angle, hub rate and root moment behind the converters (n,)."""
+    chain = truth.chain
+    angle, rate, moment = truth.measured.T
+    angle, moment = on_steps(angle, chain, ENCODER), on_steps(moment, chain, AMPLIFIER)
+    if chain.converters.hub_rate == "difference":
+        T, a, found = chain.sampling.period, np.exp(-chain.converters.rate_filter * chain.sampling.period), [0.0]
+        for step in np.diff(angle) / T:
+            found.append(a * found[-1] + (1 - a) * step)
+        rate = np.array(found)
+    return {"hub_angle": angle, "hub_rate": rate, "root_moment": moment}

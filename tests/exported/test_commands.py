@@ -37,16 +37,15 @@ def test_the_command_writes_what_the_function_does(capsys, tmp_path):
         (("--precision", "q15"), "precision = 'q15': did you mean \"q31\"? known are: double, float, q31"),
         (("--precision", "q31"), "range = 'hub_rate': q31 needs the largest absolute value"),
         (("--range", "hub_rate=x"), "write SIGNAL=VALUE"),
+        (("--what", "plant"), "as = 'c': a plant is exported as: fmu, mat, py"),
+        (("--as", "fmu", "--what", "loop", "--precision", "q31"), "precision = 'q31': a functional mock-up unit has a"),
+        (("--as", "fmu", "--what", "loop", "--K1", "-3"), "the sampled loop is not certified stable: unstable ("),
+        (("--as", "fmu", "--what", "tuner"), "as = 'fmu': a tuner is exported as: c"),
     ],
 )  # fmt: skip
 def test_a_refused_export_leaves_nothing_behind(capsys, tmp_path, options, error):
     assert error in refused(capsys, *CONTROLLER, *options, "--out", str(tmp_path / "new"))
     assert not (tmp_path / "new").exists()
-
-
-def test_what_has_no_such_form_names_those_it_has(capsys, tmp_path):
-    error = refused(capsys, "export", "sasaki2012-lab", "--what", "plant", "--as", "c", "--out", str(tmp_path))
-    assert "as = 'c': a plant is exported as: fmu, mat, py" in error
 
 
 def test_the_hash_is_that_of_arm_law_and_chain():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.exported.cases import CASES, GAINS, IDEAL, LAB, realised, task_of
+from tests.exported.cases import CASES, GAINS, IDEAL, LAB, readings, realised, task_of
 from tests.exported.compilers import build, needed, random_inputs, run, stepped
 from tests.shared import thinned
 from tfarm.dsp.scenarios import scenario
@@ -79,13 +79,7 @@ def test_the_code_is_the_simulation(case, precision):
     slew = scenario("slew", arm, chain, 1.5)
     own = Simulator(arm, chain, slew, controller.word.rounded, count=6)
     done = own.run()
-    angle, rate, moment = done.measured.T
-    if chain.converters.encoder_counts:
-        step = 2 * math.pi / chain.converters.encoder_counts
-        angle = np.rint(angle / step) * step
-        step = 2 * chain.converters.moment_range / 2**chain.converters.moment_bits
-        moment = np.clip(np.rint(moment / step) * step, -2.0, 2.0 - step)
-    signals = {"hub_angle": angle, "hub_rate": rate, "root_moment": moment}
+    signals = readings(done)
     columns = [signals[name] for name in controller.signals]
     columns += [slew.references[name] for name in controller.references]
     kind = np.float64 if precision == "double" else np.float32
@@ -170,39 +164,20 @@ ADVISORY = (  # rules of MISRA C 2012
 TESTS_ONLY = {"self_test.c": {"21.6", "21.16"}, "example.c": {"21.6"}}  # they print, and compare bits
 
 
-@pytest.mark.parametrize(("case", "precision"), thinned(RUNS, 2))
-def test_every_branch_and_loop_has_braces(exported, case, precision):
-    folder, _ = exported(case, precision)
-    for file in ("controller.c", "self_test.c", "example.c"):
-        lines = (folder / file).read_text(encoding="ascii").splitlines()
-        heads = [line for line in lines if re.match(r"\s*(\} )?(if|else|for|while)\b", line)]
-        assert len(heads) >= 1
-        assert [line for line in heads if not line.endswith("{")] == []
-
-
 @pytest.mark.parametrize(("case", "precision"), thinned(RUNS, 4))
-def test_the_required_rules_of_misra_c_are_kept(exported, case, precision):
+def test_the_source_keeps_the_required_rules_of_misra_c(exported, case, precision):
+    """By cppcheck, which finds nothing else; and every branch and loop has braces."""
     folder, _ = exported(case, precision)
-    options = ["--addon=misra", "--std=c99", "--enable=style", "--quiet"]
-    for file in ("controller.c", *(TESTS_ONLY if (case, precision) == RUNS[0] else ())):
-        done = subprocess.run(
-            [needed("cppcheck"), *options, str(folder / file)], capture_output=True, timeout=60, check=False
-        )
+    checks = ("--std=c99", "--quiet", "--enable=warning,performance,portability")
+    files = [folder / name for name in ("controller.c", "self_test.c", "example.c")]
+    run(needed("cppcheck"), *checks, "--error-exitcode=1", *files)
+    for file in files:
+        heads = re.findall(r"^\s*(?:\} )?(?:if|else|for|while)\b.*$", file.read_text(encoding="ascii"), re.MULTILINE)
+        assert heads
+        assert all(line.endswith("{") for line in heads)
+    for file in files if (case, precision) == RUNS[0] else files[:1]:
+        words = ["cppcheck", "--addon=misra", "--std=c99", "--enable=style", "--quiet", str(file)]
+        done = subprocess.run(words, capture_output=True, timeout=60, check=False)
         found = set(re.findall(r"misra-c2012-([\d.]+)\]", done.stderr.decode()))
         assert found & {"12.3", "8.9"}  # it ran
-        assert found - {*ADVISORY.split()} - TESTS_ONLY.get(file, set()) == set()
-
-
-@pytest.mark.parametrize(("case", "precision"), thinned(RUNS, 4))
-def test_cppcheck_finds_nothing(exported, case, precision):
-    folder, _ = exported(case, precision)
-    words = [
-        needed("cppcheck"),
-        "--enable=warning,performance,portability",
-        "--error-exitcode=1",
-        "--std=c99",
-        "--quiet",
-    ]
-    for file in ("controller.c", "self_test.c", "example.c"):
-        done = subprocess.run([*words, str(folder / file)], capture_output=True, timeout=60, check=False)
-        assert done.returncode == 0, done.stderr
+        assert found - {*ADVISORY.split()} - TESTS_ONLY.get(file.name, set()) == set()

@@ -14,18 +14,25 @@ import pytest
 import tfarm
 from tests.exported.cases import CASES, GAINS, IDEAL, LAB, REAL, hinf
 from tests.exported.compilers import COMPILERS, STRICT, needed, run
-from tests.exported.units import DISCARD, DRIVER, ERROR, LAST_SUCCESSFUL_TIME, TERMINATED, Unit, modes_of_units
+from tests.exported.units import (
+    DISCARD,
+    DRIVER,
+    ERROR,
+    LAST_SUCCESSFUL_TIME,
+    TERMINATED,
+    Unit,
+    driven,
+    inputs_of,
+    modes_of_units,
+)
 from tests.hostile import C_TEXTS, NAME
 from tests.odd_arms import odd_arms
 from tests.shared import thinned
-from tests.shell import refused
 from tfarm import Law, ParameterError
-from tfarm.arm.law import REFERENCE
 from tfarm.dsp import Simulator, scenario
 from tfarm.dsp.results import simulated_run
 from tfarm.exported import fmu as module
 
-QUICK = ("late", "single", "impulse", "pulse")
 MODES = 4
 EQUAL = 1e-12  # of the largest value of a signal: roundings in another order
 LATE = replace(REAL, sampling=replace(REAL.sampling, delay_samples=1.3, antialias_corner=400.0))
@@ -52,7 +59,6 @@ LOOPS = {
 }
 
 
-OTHERS = [name for name in LOOPS if name not in (*QUICK, "unstable")]
 FOLDER = TemporaryDirectory(prefix="units-")
 EXPORTED = {}
 
@@ -70,29 +76,14 @@ def made(what, case="gains", **how):
     return Unit(folder / f"{what}.fmu", folder / "unpacked"), found
 
 
-def inputs_of(task):
-    """The inputs of a loop at each sample, by name."""
-    references = {f"{REFERENCE}{name}": values for name, values in task.references.items()}
-    return references | {"feedforward": task.feedforward, "disturbance": task.disturbance}
-
-
-def driven(unit, inputs, n):
-    """Outputs (n, outputs) at each sample by name, just before it, of inputs at each sample."""
-    outputs, rows = [each for each in unit.at if unit.causality[each] == "output"], []
-    for k in range(n):
-        rows.append(unit.get(outputs))
-        unit.set({name: values[k] for name, values in inputs.items() if name in unit.at})
-        unit.step()
-    rows.append(unit.get(outputs))
-    return dict(zip(outputs, np.array(rows).T, strict=True))
-
-
 def assert_equal(found, truth, name=""):
     np.testing.assert_allclose(found, truth, rtol=0, atol=EQUAL * abs(truth).max(), err_msg=name)
 
 
-@pytest.mark.parametrize("case", [*QUICK, *(pytest.param(case, marks=pytest.mark.survey) for case in OTHERS)])
+@pytest.mark.parametrize("case", ["single", "impulse", "pulse", *thinned(["reference", "rig"], 2)])
 def test_a_loop_is_that_of_the_simulation(case):
+    """Laws with states and of another input, references, an impulse and a disturbance; `tests.case.test_stages` has
+    gains under every stage of a chain."""
     arm, law, chain, name = LOOPS[case]
     unit, exported = made("loop", case)
     truth = simulated_run(arm, law, chain, name, 1.5, count=MODES).simulation
@@ -397,20 +388,6 @@ def test_names_of_a_user_reach_c_and_xml_as_text(tmp_path, text, monkeypatch):
     assert head[1].endswith("nor Python. */")
     assert head[2] == "#include <stdlib.h>"
     run(needed("cc"), "-std=c99", "-fsyntax-only", "-Wall", "-Werror", tmp_path / "sources" / "fmu.c")
-
-
-@pytest.mark.parametrize(
-    ("options", "error"),
-    [
-        (("--what", "loop", "--precision", "q31"), "precision = 'q31': a functional mock-up unit has a controller in"),
-        (("--what", "loop", "--K1", "-3"), "the sampled loop is not certified stable: unstable ("),
-        (("--what", "tuner"), "as = 'fmu': a tuner is exported as: c"),
-    ],
-)  # fmt: skip
-def test_a_refused_export_leaves_nothing_behind(capsys, tmp_path, options, error):
-    words = ("export", "sasaki2012-lab", "--as", "fmu", "--out", str(tmp_path / "new"))
-    assert error in refused(capsys, *words, *options)
-    assert not (tmp_path / "new").exists()
 
 
 def test_without_a_compiler_there_is_the_source(tmp_path, monkeypatch):

@@ -17,9 +17,8 @@ from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.arm.law_tables import law_of_table
 from tfarm.dsp import Actuator, Chain
-from tfarm.dsp.scenarios import scenario
-from tfarm.dsp.simulate import Simulator
-from tfarm.exported.systems import save_mat
+from tfarm.exported.result import ExportTask
+from tfarm.exported.systems import linear, save_mat
 from tfarm.reduced import reduce
 from tfarm.response.signals import Signals
 
@@ -104,30 +103,6 @@ def test_a_controller_is_read_again_as_a_law(folder):
     assert inner == law
 
 
-def test_octave_has_the_loop_of_the_simulation(folder):
-    """A slew of the loop by its matrices in Octave is the simulated one; the reduced model is within its error."""
-    task = scenario("slew", LAB, Chain(), 0.5)
-    drive = np.array([task.feedforward, *task.references.values()])
-    scipy.io.savemat(folder / "drive.mat", {"drive": drive})
-    code = (
-        "load_it_s; load_my_arm; load_plant; load_controller; load_loop; load drive.mat; "
-        "x = zeros(size(data.A, 1), 1); y = []; "
-        "for u = drive, y = [y, data.C * x + data.D * u]; x = data.A * x + data.B * u; end; r = data.reduced; G = []; "
-        "for w = data.omega(1:50:end), G = [G, r.C * ((1i * w * eye(size(r.A, 1)) - r.A) \\ r.B) + r.D]; end; "
-        "clear data r"
-    )
-    left, printed = left_by_octave(folder, code)
-    torque = Simulator(LAB, Chain(), task, LAW).run().torque
-    assert left["y"][-1] == pytest.approx(torque, rel=0, abs=1e-10 * abs(torque).max())  # 50 samples, 23 states
-    data = scipy.io.loadmat(folder / "loop.mat", squeeze_me=True)
-    exact, w = data["response"][:, ::50], data["omega"][::50]
-    slope = abs(np.gradient(data["response"], np.log(data["omega"]), axis=1)[:, ::50])
-    error = abs(left["G"] - exact) / (abs(exact) + slope)
-    assert error.max() < float(data["reduced"]["worst_error"]) + 1e-10  # rounding of the solution of order 42
-    assert w.size == 20
-    assert printed.count("no ss and frd are built") in (0, 5)  # 0 where the package is installed
-
-
 def test_octave_builds_each_system_with_its_names(folder, tmp_path):
     for file in folder.iterdir():
         shutil.copy(file, tmp_path)
@@ -140,6 +115,10 @@ def test_octave_builds_each_system_with_its_names(folder, tmp_path):
     inputs, outputs, states, name = left["plant"]["names"].item()
     assert (inputs, outputs[0], states[0], name) == ("hub_torque", "hub_angle", "plant1", "sasaki2012-lab, sampled")
     assert float(left["plant"]["T"]) == 0.01
+    own = linear(ExportTask(arm=LAB, given=LAW, chain=Chain(), what="loop", form="mat")).systems
+    for name, of in own.items():
+        for letter, matrix in zip("ABCD", of.matrices, strict=True):
+            np.testing.assert_array_equal(np.reshape(left[name][letter].item(), matrix.shape), matrix)
 
 
 def test_hostile_names_stay_text(tmp_path):

@@ -17,7 +17,6 @@ from tests.hostile import C_TEXTS, NAME
 from tests.shared import sized, thinned
 from tests.shell import answer, refused
 from tests.survey import tally
-from tests.tuner.plain import plain_gain
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling
 from tfarm.errors import ParameterError
@@ -99,35 +98,6 @@ def test_ends_of_exp_and_sigmoid(real):
 
 
 # ------------------------------------------------------------ the step
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_gains_are_those_of_the_network_in_numpy(seed):
-    """The gain by NumPy's exp and log; the difference is some roundings of sums of the network's size."""
-    rng = rng_of(seed)
-    saved = tuners.some_tuner(rng)
-    small = {
-        name: (np.array(value) / np.abs(value).max()).tolist() for name, value in (("W1", saved.W1), ("w2", saved.w2))
-    }
-    saved = saved.model_copy(update=small)
-    tuner, gain = ExportedTuner(saved), saved.gain()
-    inputs = rng.normal(size=(50, len(tuner.inputs)))
-    past = [np.zeros(4), np.zeros(4)]  # u, e, x, K
-    for row in inputs:
-        m = dict(zip(tuner.inputs, row, strict=True))
-        x = m["y_root_moment"] - m.get("r_root_moment", 0.0)
-        servo = saved.Kp * (m["r_hub_angle"] - m["y_hub_angle"]) + saved.K1 * (m["r_hub_rate"] - m["y_hub_rate"])
-        u = servo + (m["feedforward"] if saved.signals == "total" else 0.0)
-        (u1, e1, x1, K1), (_, e2, _, _) = past
-        full = np.array([u, u1, e1, e2, x, x1, K1])
-        K = plain_gain(full, gain.network.weights, len(saved.w2), gain.network.scales, gain.guard)
-        past = [np.array([u, u - K * x, x, K]), past[0]]
-        torque, status = tuner.run(row[None])
-        sums = abs(np.array(saved.W1)) @ abs(full[: len(saved.scales)] / saved.scales)
-        error = 1e-15 * (1 + 40 * abs(np.array(saved.w2)) @ (1 + sums)) * (1 + abs(x))
-        assert status[0] == 0
-        assert torque[0] == pytest.approx(m["feedforward"] + servo - K * x, rel=1e-14, abs=error)
-        past[0] = tuner.state[[0, 1, 2, 3]]
 
 
 @pytest.mark.parametrize("precision", PRECISIONS)

@@ -1,4 +1,4 @@
-"""Exported tuners: C against Python bit for bit, the simulated slew against tfarm's own tuner, and the time of a step.
+"""Exported tuners: C against Python bit for bit, and the simulated slew against tfarm's own tuner.
 
     python -m tests.exported.tuners SIZE SEED
 
@@ -15,7 +15,7 @@ import numpy as np
 
 import tfarm
 from tests import survey
-from tests.exported.compilers import COMPILERS, build, pumped, run
+from tests.exported.compilers import COMPILERS, pumped
 from tests.survey import Finding
 from tests.tuner.bounded import some_trial
 from tfarm.errors import CertificationError, ConvergenceError
@@ -28,30 +28,6 @@ PRECISIONS = ("double", "float")
 SAMPLES = 1_000_000  # of a survey
 SECTOR = (0.31, 0.63)  # proven on the laboratory arm with K1 = 0.3
 DIFFERENCE = {"double": 1e-13, "float": 1e-4}  # of a slew's torque, over its largest: the stated bound
-STEP_TIME = 500.0  # ns, for a network of 6-6-1
-CLOCK = """
-#include "tuner.h"
-#include <stdio.h>
-#include <time.h>
-
-int main(void)
-{
-    tuner_state state;
-    tuner_input input = { 0 };
-    tuner_number output, sum = 0;
-    clock_t begun = clock();
-    int k;
-    tuner_init(&state);
-    for (k = 0; k < 1000000; ++k) {
-        input.y_root_moment = (tuner_number)(k % 17 - 8);
-        input.r_hub_rate = (tuner_number)(k % 13 - 6);
-        tuner_step(&state, &input, &output);
-        sum += output;
-    }
-    printf("%g %g", 1e3 * (double)(clock() - begun) / CLOCKS_PER_SEC, (double)sum);
-    return 0;
-}
-"""
 
 
 @cache
@@ -61,13 +37,6 @@ def has_program(name):
     if not found:
         print(f"{name} is not installed: its comparisons are left out")
     return found
-
-
-def step_time(folder, compiler):
-    """Time of a step of an exported tuner at -O2 [ns], the least of five runs of 1e6 steps."""
-    (folder / "clock.c").write_text(CLOCK, encoding="ascii")
-    program = build(folder, compiler, "-O2", sources=("tuner.c", "clock.c"), out="clock")
-    return min(float(run(program).split()[0]) for _ in range(5))
 
 
 def some_tuner(rng, **changed):
@@ -130,11 +99,10 @@ def differences(trial, saved):
 
 
 def bits(size, seed):
-    """C against Python; `ns` is the time of a step of 6-6-1 at -O2."""
+    """C against Python."""
     rng = np.random.default_rng(seed)
-    of_paper = {"W1": rng.normal(size=(6, 6)).tolist(), "w2": [0.3] * 6, "scales": [1.0] * 6}
-    for n in range(size):
-        saved = some_tuner(rng, **of_paper if n == 0 else {})
+    for _ in range(size):
+        saved = some_tuner(rng)
         for precision in PRECISIONS:
             with tempfile.TemporaryDirectory() as place:
                 folder = Path(place)
@@ -145,9 +113,6 @@ def bits(size, seed):
                         equal = is_equal(folder, tuner, rows, compiler, level)
                         words = "" if equal else f"{compiler} {level} {precision} {saved}"
                         yield Finding("equal" if equal else "differs", words, not equal)
-                    if n == 0:
-                        time = step_time(folder, compiler)
-                        yield Finding("step", "", time > STEP_TIME, {f"ns, {precision}": time})
 
 
 def slews(size, seed):

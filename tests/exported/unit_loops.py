@@ -16,11 +16,10 @@ import numpy as np
 import tfarm
 from tests import survey
 from tests.exported.laws import some_law
-from tests.exported.units import OK, Unit, modes_of_units
+from tests.exported.units import Unit, driven, inputs_of, modes_of_units
 from tests.strategies import some_arm
 from tests.survey import Finding, each_of
 from tfarm.arm import tracked
-from tfarm.arm.law import REFERENCE
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, Simulator, scenario
 from tfarm.errors import ConvergenceError, ParameterError
 
@@ -62,24 +61,12 @@ def loops(rng):
         truth = Simulator(*tracked(arm, law)[:1], chain, task, tracked(arm, law)[1], count=3).run()
     except (ParameterError, ConvergenceError):
         return None
-    inputs = {f"{REFERENCE}{name}": values for name, values in task.references.items()}
-    inputs |= {"feedforward": task.feedforward, "disturbance": task.disturbance}
-    names, rows, status = truth.at_samples.names, [], OK
     unit.start()
-    for k in range(task.t.size):
-        rows.append(unit.get(names))
-        unit.set({name: values[k] for name, values in inputs.items() if name in unit.at})
-        status = unit.step_status(unit.period)
-        if status != OK:
-            break
-    n, found = truth.t.size, np.array(rows).T
-    is_stopped = truth.stopped is not None
-    is_same_end = len(rows) == n and (status != OK) == is_stopped
-    scale = [max(abs(truth.at_samples.signal(name)).max(initial=0.0), 1e-300) for name in names]
-    off = max(
-        float(abs(values[:n] - truth.at_samples.signal(name)[: len(rows)]).max() / of)
-        for name, values, of in zip(names, found, scale, strict=True)
-    ) if is_same_end else np.inf  # fmt: skip
+    found, n, is_stopped = driven(unit, inputs_of(task), task.t.size), truth.t.size, truth.stopped is not None
+    off = np.inf
+    if found["torque"].size == n + (not is_stopped):
+        signals = [(found[name][:n], truth.at_samples.signal(name)) for name in truth.at_samples.names]
+        off = max(float(abs(own - of).max() / max(abs(of).max(), 1e-300)) for own, of in signals)
     is_wrong = not off <= EQUAL
     outcome = "stopped" if is_stopped else "saturated" if any(truth.saturated.values()) else "ran"
     return Finding(outcome, f"{arm!r} {law!r} {chain!r}: {off:.3g}" if is_wrong else "", is_wrong, {"difference": off})

@@ -10,6 +10,9 @@ from types import SimpleNamespace
 from unittest import mock
 from xml.etree import ElementTree
 
+import numpy as np
+
+from tfarm.arm.law import REFERENCE
 from tfarm.exported import fmu
 
 LOGGER = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
@@ -162,3 +165,23 @@ class Unit:
         value = {"Real": c_double, "Boolean": c_int}[kind]()
         self.call(f"Get{kind}Status", which, byref(value))
         return value.value
+
+
+def inputs_of(task):
+    """The inputs of a loop at each sample of a scenario, by name."""
+    references = {f"{REFERENCE}{name}": values for name, values in task.references.items()}
+    return references | {"feedforward": task.feedforward, "disturbance": task.disturbance}
+
+
+def driven(unit, inputs, n):
+    """Outputs by name (samples,), each just before its sample, of inputs at `n` samples: fewer where the unit stops."""
+    outputs, rows, status = [each for each in unit.at if unit.causality[each] == "output"], [], OK
+    for k in range(n):
+        rows.append(unit.get(outputs))
+        unit.set({name: values[k] for name, values in inputs.items() if name in unit.at})
+        status = unit.step_status(unit.period)
+        if status != OK:
+            break
+    if status == OK:
+        rows.append(unit.get(outputs))
+    return dict(zip(outputs, np.array(rows).T, strict=True))

@@ -91,9 +91,9 @@ def is_called_a_miss(found):
     return bool(misses_of(replace(found, problem=replace(found.problem, responses=tuple(responses)))))
 
 
-def with_noise(rng, pair, omega, H):
+def with_noise(rng, pair, omega, H, least=-2.5):
     """A measured response: H with noise of a known size."""
-    sigma = abs(H) * 10 ** rng.uniform(-2.5, -1.3) + 1e-3 * np.median(abs(H))
+    sigma = abs(H) * 10 ** rng.uniform(least, -1.3) + 1e-3 * np.median(abs(H))
     noise = sigma * (rng.standard_normal(omega.size) + 1j * rng.standard_normal(omega.size))
     return Measured(output=pair[0], input=pair[1], omega=omega, values=H + noise, sigma=sigma)
 
@@ -201,9 +201,7 @@ def planted_pair(rng):
     omega = np.geomspace(0.2 * w1, 12 * w1, POINTS)
     pair = ("tip_acceleration", "hub_angle") if by_ratio else PAIRS[int(rng.integers(1, len(PAIRS)))]
     (H,) = elements_response(arm, omega, [pair])
-    sigma = abs(H) * 10 ** rng.uniform(-2, -1.3) + 1e-3 * np.median(abs(H))
-    values = H + sigma * (rng.standard_normal(POINTS) + 1j * rng.standard_normal(POINTS))
-    data = Measured(output=pair[0], input=pair[1], omega=omega, values=values, sigma=sigma)
+    data = with_noise(rng, pair, omega, H, least=-2.0)
     both = ["link.youngs_modulus", "link.density" if by_ratio else "link.section.second_moment"]
     own = {
         "link.youngs_modulus": link.youngs_modulus, "link.density": link.density, "link.damping": arm.damping,

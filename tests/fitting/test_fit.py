@@ -2,6 +2,7 @@
 
 import math
 import tomllib
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -13,11 +14,9 @@ from tests import chain_elements
 from tests.fitting.planted import chi_squared_at, elements_response, judged, judged_pair, judged_rig
 from tests.shared import thinned
 from tests.shell import answer, refused, run
-from tfarm.arm.writing import KeyedArms
 from tfarm.fitting.data import noise_of
 from tfarm.fitting.fit import fit, is_named
 from tfarm.fitting.model import RingMode, mode_of
-from tfarm.fitting.solve import equation_errors
 
 LAB = tfarm.load("sasaki2012-lab")
 OMEGA = np.geomspace(8.0, 1200.0, 160)
@@ -63,25 +62,8 @@ def test_a_resonance_between_two_lines_is_found():
     found = fit(tfarm.load(HUB_SPRING), [hub_spring_sweep()], free=HUB_SPRING_FREE, profile=False)
     assert found.is_explained
     assert abs(found.arm.link.youngs_modulus - 1.1e11) < 4 * found.parameters[0].deviation
-    elsewhere = chi_squared_at(
-        found, {each.key: each.value for each in found.parameters} | {HUB_SPRING_FREE[0]: 9.09e10}
-    )
-    assert found.chi_squared < elsewhere / 5
-
-
-def test_equation_errors_have_one_minimum_where_squares_have_many():
-    """Along Young's modulus, a factor of two to both sides; a wide `share` changes no minimum but its place."""
-    own = fit(tfarm.load(HUB_SPRING), [hub_spring_sweep()], free=HUB_SPRING_FREE, profile=False)
-    along = [own.point + np.array([ln_E, 0, 0]) for ln_E in np.linspace(-0.7, 0.7, 301)]
-
-    def minima(residuals):
-        sums = np.array([np.sum(residuals(x) ** 2) for x in along])
-        return 1 + np.flatnonzero((sums[1:-1] < sums[:-2]) & (sums[1:-1] < sums[2:]))
-
-    assert len(minima(own.problem.residuals)) > 10
-    for share in (0.1, 0.3):
-        (place,) = minima(lambda x, share=share: equation_errors(own.problem, x, share))
-        assert abs(along[place][0] - own.point[0]) < 0.02
+    elsewhere = {each.key: each.value for each in found.parameters} | {HUB_SPRING_FREE[0]: 9.09e10}
+    assert found.chi_squared < chi_squared_at(found, elsewhere) / 5
 
 
 def test_a_fit_that_leaves_a_number_open_is_tried_from_its_own_start_too(monkeypatch):
@@ -110,11 +92,10 @@ def test_profiles_are_where_the_sum_of_squares_has_grown_by_the_quantile():
     for n, each in enumerate(found.parameters):
         for end in (each.low, each.high):
             held = own.parameters[n].coordinate(end)
-            grid = (
-                best[1 - n] + np.linspace(-4, 4, 401) * found.parameters[1 - n].deviation / own.parameters[1 - n].start
-            )
+            reach = found.parameters[1 - n].deviation / own.parameters[1 - n].start
+            grid = best[1 - n] + np.linspace(-1, 1, 21) * reach
             points = [np.array([held, other] if n == 0 else [other, held]) for other in grid]
-            sums = [float(r @ r) for r in map(own.residuals, points[150:251:5])]
+            sums = [float(r @ r) for r in map(own.residuals, points)]
             assert min(sums) - found.chi_squared == pytest.approx(1.959964**2, rel=0.05)
         assert each.low < each.value < each.high
         assert (each.high - each.low) / (2 * 1.96 * each.deviation) == pytest.approx(1, abs=0.05)  # nearly Gaussian
@@ -173,15 +154,9 @@ def test_a_value_of_0_with_a_coherence_has_no_weight():
     values = tfarm.transfer(LAB.having(hub_inertia=1.1 * LAB.hub_inertia), "root_moment")(1j * omega)
     lost = np.arange(omega.size) == 12
     one = {"output": "root_moment", "input": "hub_torque", "averages": 10}
-    found = [
-        fit(
-            LAB,
-            [tfarm.Measured(omega=w, values=H, coherence=np.full(w.size, 0.99), **one)],
-            ["hub.inertia"],
-            profile=False,
-        )
-        for w, H in ((omega, np.where(lost, 0.0, values)), (omega[~lost], values[~lost]))
-    ]
+    pairs = (omega, np.where(lost, 0.0, values)), (omega[~lost], values[~lost])
+    data = [tfarm.Measured(omega=w, values=H, coherence=np.full(w.size, 0.99), **one) for w, H in pairs]
+    found = [fit(LAB, [each], ["hub.inertia"], profile=False) for each in data]
     assert found[0].freedom == found[1].freedom
     for each in found:
         assert each.parameters[0].value == pytest.approx(1.1 * LAB.hub_inertia, rel=1e-6)
@@ -189,10 +164,7 @@ def test_a_value_of_0_with_a_coherence_has_no_weight():
 
 
 def test_unknown_noise_comes_from_the_residuals():
-    data = [
-        tfarm.Measured(output=e.output, input=e.input, omega=e.omega, values=e.values)
-        for e in measured(pairs=PAIRS[:1])
-    ]
+    data = [replace(each, sigma=None) for each in measured(pairs=PAIRS[:1])]
     free, start = ["link.youngs_modulus", "link.damping"], {"link.youngs_modulus": 6e10}
     found = fit(LAB, data, free=free, start=start, profile=False)
     assert found.is_explained is None
@@ -217,9 +189,8 @@ def test_resonances_before_and_after_are_the_arms_own():
     for before, after, peak in found.resonances:
         own = min([*free, *locked], key=lambda f: abs(f - after))
         assert after == pytest.approx(own, rel=2e-3)  # w of an eigenvalue, damped
-        assert before / after == pytest.approx(
-            math.sqrt(6e10 / found.arm.link.youngs_modulus), rel=4e-3
-        )  # ratio^2/2 = 1.4e-3 each
+        stiffer = math.sqrt(6e10 / found.arm.link.youngs_modulus)
+        assert before / after == pytest.approx(stiffer, rel=4e-3)  # ratio^2/2 = 1.4e-3 each
         assert peak == pytest.approx(after, rel=0.05)  # on a grid of 3 %
 
 
@@ -295,16 +266,6 @@ def test_an_assumption_names_a_number_by_label_symbol_or_value(key, value, text,
 )
 def test_bad_input_is_one_line(arguments, words, capsys):
     assert words in refused(capsys, "fit", "sasaki2012-lab", *arguments)
-
-
-def test_young_s_modulus_takes_the_shear_modulus_along():
-    """Poisson's ratio stays, so that no step leads to a material that there is not."""
-    rig = tfarm.load("tests/rigs/bench-rig.toml")
-    family = KeyedArms(rig, ["link.1.youngs_modulus"])
-    stiff = family.at({"link.1.youngs_modulus": 3 * rig.link.youngs_modulus}).link
-    assert stiff.shear_modulus / stiff.youngs_modulus == pytest.approx(rig.link.shear_modulus / rig.link.youngs_modulus)
-    both = {"link.1.youngs_modulus": 1.1 * rig.link.youngs_modulus, "link.1.shear_modulus": rig.link.shear_modulus}
-    assert KeyedArms(rig, list(both)).at(both).link.shear_modulus == rig.link.shear_modulus
 
 
 def test_a_step_to_no_arm_is_a_wall():

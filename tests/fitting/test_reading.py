@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scipy.io
 
+from tests.shared import refusal
 from tfarm.errors import ParameterError
 from tfarm.fitting.data import data_of, read_measured
 from tfarm.fitting.recording import read_recording
@@ -92,12 +93,9 @@ BAD = {
 def test_a_file_that_is_none_is_one_line_with_the_file(content, tmp_path):
     path = tmp_path / "bad.csv"
     path.write_text(content)
-    with pytest.raises(ParameterError) as error:
-        read_measured(path, *NAMES)
-    message = str(error.value)
+    message = str(refusal(read_measured, path, *NAMES))
     assert message.startswith(f"{path}: ")
     assert BAD[content] in message
-    assert "\n" not in message
 
 
 @pytest.mark.parametrize(
@@ -113,9 +111,7 @@ def test_a_file_that_is_none_is_one_line_with_the_file(content, tmp_path):
     ],
 )
 def test_a_wrong_option_is_refused(options, message):
-    with pytest.raises(ParameterError) as error:
-        data_of(options)
-    assert message in str(error.value)
+    assert message in str(refusal(data_of, options))
 
 
 def uff(values, start, step, function=4):
@@ -137,21 +133,18 @@ def test_a_uff_file_is_read_and_its_responses_are_chosen_by_number(tmp_path):
     path.write_text(uff(VALUES, 1.0, 0.5) + uff(VALUES, 1.0, 0.5, function=6) + uff(2 * VALUES, 1.0, 0.5))
     assert data_of(f"tip_acceleration/hub_angle={path}#2").values == pytest.approx(2 * VALUES, rel=1e-12)
     for options, message in ((path, "holds 2 responses; choose one"), (f"{path}#3", "data set = 3: from 1 to 2")):
-        with pytest.raises(ParameterError, match=message):
-            data_of(f"tip_acceleration/hub_angle={options}")
+        assert message in str(refusal(data_of, f"tip_acceleration/hub_angle={options}"))
 
 
 def test_a_uff_file_without_its_package_or_without_a_response_is_one_line(tmp_path, monkeypatch):
     path = tmp_path / "sweep.uff"
+    named = f"tip_acceleration/hub_angle={path}"
     path.write_text(uff(VALUES, 1.0, 0.5, function=6))
-    with pytest.raises(ParameterError, match="holds no frequency response function"):
-        data_of(f"tip_acceleration/hub_angle={path}")
+    assert "holds no frequency response function" in str(refusal(data_of, named))
     path.write_text("    -1\n    58\nNONE\n    -1\n")
-    with pytest.raises(ParameterError, match="no UFF file that can be read"):
-        data_of(f"tip_acceleration/hub_angle={path}")
+    assert "no UFF file that can be read" in str(refusal(data_of, named))
     monkeypatch.setitem(sys.modules, "pyuff", None)
-    with pytest.raises(ParameterError, match=r"pip install 'tfarm\[uff\]', or export the response as CSV"):
-        data_of(f"tip_acceleration/hub_angle={path}")
+    assert "pip install 'tfarm[uff]', or export the response as CSV" in str(refusal(data_of, named))
 
 
 ODD = (
@@ -231,18 +224,13 @@ BAD_RECORDS = {
 def test_a_record_that_is_none_is_one_line_with_the_file(what, tmp_path):
     names, columns, message = BAD_RECORDS[what]
     path = written(tmp_path / "bad.csv", names, *columns)
-    with pytest.raises(ParameterError) as error:
-        read_recording(path)
-    assert str(error.value).startswith(f"{path}: {message}")
+    assert str(refusal(read_recording, path)).startswith(f"{path}: {message}")
 
 
 def test_mat_files_that_are_none_are_one_line(tmp_path):
     path = tmp_path / "bad.mat"
     path.write_bytes(b"MATLAB 7.3 MAT-file")
-    with pytest.raises(ParameterError, match=r"no \.mat file that can be read"):
-        read_recording(path)
+    assert "no .mat file that can be read" in str(refusal(read_recording, path))
     scipy.io.savemat(path, {"t": T, "x": np.where(T > 1.05, np.nan, X)})
-    with pytest.raises(ParameterError, match="x, sample 27 = nan: no finite number"):
-        read_recording(path)
-    with pytest.raises(ParameterError, match="record = '/nowhere"):
-        read_recording("/nowhere/a.mat")
+    assert "x, sample 27 = nan: no finite number" in str(refusal(read_recording, path))
+    assert "record = '/nowhere" in str(refusal(read_recording, "/nowhere/a.mat"))

@@ -19,7 +19,7 @@ MATERIALS = {  # density [kg/m^3], Young's modulus [Pa], Poisson's ratio
 
 
 @dataclass(frozen=True)
-class Case:
+class PlausibleLoop:
     """One arm of the survey, its first undamped flexible frequency [rad/s], and a law; `rng` draws what a verb asks."""
 
     arm: Arm
@@ -58,7 +58,7 @@ def draw(number, seed):
     first = float(Ritz(arm, 24).natural_frequencies(1)[0])
     if rng.random() >= 0.3:
         arm = replace(arm, link=replace(link, damping=2 * log(rng, 1e-4, 2e-2) / first))
-    return Case(arm, first, _law(rng, arm, first), int(rng.integers(2**62)))
+    return PlausibleLoop(arm, first, _law(rng, arm, first), int(rng.integers(2**62)))
 
 
 def _section(rng, depth, slenderness):

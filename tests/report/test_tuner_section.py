@@ -19,7 +19,7 @@ from tfarm.errors import CertificationError
 from tfarm.report.page import ArmReport, prose
 from tfarm.report.tuner_section import section_of, tuner_in_short, tuner_section
 from tfarm.schema.html import with_symbols
-from tfarm.studies import cases as tuned
+from tfarm.studies import candidates as tuned
 from tfarm.tuner import Learning, LearningCurves, Plan, initial_network, train
 
 LAB = tfarm.load("sasaki2012-lab")

@@ -6,7 +6,6 @@ import os
 import resource
 import signal
 import sys
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -154,7 +153,7 @@ def findings(found):
     """Without the intervals of Sobol' indices, which are SciPy's by chance."""
     return (
         [(each.quantity, each.key, each.first, each.total) for each in found.sobol],
-        replace(found.worst, file=""),
+        found.worst._replace(file=""),
         found.shares,
         found.spreads,
     )

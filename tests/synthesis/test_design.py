@@ -9,10 +9,10 @@ from scipy.optimize import brentq
 
 import tfarm
 from tests.loop.ritz_loop import RitzLoop
-from tests.shared import sized
+from tests.shared import refusal, sized
 from tests.synthesis.judged import judge_of
 from tfarm import HubFeedback
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError
 from tfarm.loop.loop import band_of
 from tfarm.loop.margins import loop_margins
 from tfarm.loop.stability import stability
@@ -174,14 +174,17 @@ def test_gains_that_are_not_stable_never_win() -> None:
         design(BARE, "damping", K1=(0.1, 1.0), K2=(1.1, 3.0), continuous=True)
 
 
-@pytest.mark.parametrize("K1", [(1.0, 1.0), (2.0, 1.0), (float("nan"), 1.0), (0.0, float("inf"))])
-def test_empty_bounds_are_refused(K1) -> None:
-    with pytest.raises(ParameterError, match="K1"):
-        design(LAB, "damping", K1=K1)
+HELD = [(replace(LAB, payload=tfarm.Payload(**{part: float("inf")})), part) for part in ("mass", "inertia")]
+BAD = [
+    *((LAB, {"K1": bounds}, "K1") for bounds in ((1.0, 1.0), (2.0, 1.0), (float("nan"), 1.0), (0.0, float("inf")))),
+    *((arm, {"objective": "residual"}, f"payload.{part} = inf: ") for arm, part in HELD),  # no slew to leave one
+    (LAB, {"structure": "LQG"}, "structure"),
+    (LAB, {"structure": "lead", "objective": "beauty"}, "objective"),
+    (LAB, {"structure": "lead", "K1": (0.0, 1.0)}, "K1"),
+    (LAB, {"structure": "PD", "Kp": -1.0}, "Kp"),
+]
 
 
-@pytest.mark.parametrize("part", ["mass", "inertia"])
-def test_an_arm_that_cannot_turn_has_no_slew_to_leave_a_residual(part) -> None:
-    held = replace(LAB, payload=tfarm.Payload(**{part: float("inf")}))
-    with pytest.raises(ParameterError, match=rf"payload\.{part} = inf: .*no slew"):
-        design(held, "residual")
+@pytest.mark.parametrize(("arm", "options", "words"), BAD)
+def test_what_does_not_go_together_is_refused(arm, options, words) -> None:
+    assert words in str(refusal(design, arm, **options))

@@ -1,9 +1,11 @@
-"""Laws of a structure: their loops by a Galerkin model under a hold with SciPy's Tustin rule, files, and bad input."""
+"""Laws of a structure: their loops by a Galerkin model under a hold with SciPy's Tustin rule, files, integrals."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import control
 import numpy as np
 import pytest
 
@@ -12,17 +14,19 @@ from tests.shared import thinned
 from tests.shell import answer, refused
 from tests.synthesis.held_loop import HeldLoop
 from tests.synthesis.judged import judge_of
-from tfarm import HubFeedback, Law, ParameterError
-from tfarm.arm import as_law
+from tfarm import ConvergenceError, HubFeedback, Law, ParameterError
+from tfarm.arm import TWO_GAINS, as_law
 from tfarm.arm.chain import Converters
 from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Chain
+from tfarm.loop.sampled_verdict import sampled_verdict
+from tfarm.loop.stability import stability
 from tfarm.schema import text
 from tfarm.synthesis import judge, search
 from tfarm.synthesis.design import design
 from tfarm.synthesis.judge import LOST, RESERVE, entries_of
 from tfarm.synthesis.models import in_blocks, squares
-from tfarm.synthesis.structures import STRUCTURES, structure_of
+from tfarm.synthesis.structures import INTEGRAL_SPEED, STRUCTURES, structure_of
 from tfarm.tuner.trial import Cost, slew_trial
 from tfarm.tuner.tuning import usual_plan
 
@@ -114,31 +118,23 @@ def test_it_damps_better_than_where_the_search_began(found):
     assert (-search.Worst((own,)).scores(form, x.T) <= found.value).all()
 
 
-def test_a_design_is_saved_and_read_back(capsys, monkeypatch, tmp_path):
+def lead(c):
+    return (c["Kp"] / c["zero_rad_s"], c["Kp"]), (1 / c["pole_rad_s"], 1.0)
+
+
+def pi(c):  # of a motor with back-EMF
+    return (c["Kp"], c["Ki"]), (1.0, 0.0)
+
+
+@pytest.mark.parametrize(("arm", "name", "block"), [("sasaki2012-lab", "lead", lead), ("quanser-flexlink", "PI", pi)])
+def test_a_design_is_saved_and_read_back(capsys, monkeypatch, tmp_path, arm, name, block):
     monkeypatch.setattr(search, "MOST_RUNS", 1)  # any law that holds will do
-    file = tmp_path / "lead.toml"
-    found = answer(capsys, "design", "sasaki2012-lab", "--structure", "lead", "--save", str(file))
-    law = load_law(file)
-    assert answer(capsys, "sampled", "sasaki2012-lab", "--law", str(file))["stable"] is True
+    file = tmp_path / "law.toml"
+    found = answer(capsys, "design", arm, "--structure", name, "--save", str(file))
+    assert found["sampled"]["stable"] is answer(capsys, "sampled", arm, "--law", str(file))["stable"] is True
     values = {row["name"]: row["value"] for row in found["coefficients"]}
-    zero, pole, Kp = (values[name] for name in ("zero_rad_s", "pole_rad_s", "Kp"))
-    assert law == Law({"hub_angle": ((Kp / zero, Kp), (1 / pole, 1.0))}, name="lead", references=("hub_angle",))
-    assert pole <= 2 / T
-    assert found["sampled"]["stable"] is True
-
-
-@pytest.mark.parametrize(
-    ("options", "key"),
-    [
-        ({"structure": "LQG"}, "structure"),
-        ({"structure": "lead", "objective": "beauty"}, "objective"),
-        ({"structure": "lead", "K1": (0.0, 1.0)}, "K1"),
-        ({"structure": "PD", "Kp": -1.0}, "Kp"),
-    ],
-)
-def test_what_does_not_go_together_is_refused(options, key):
-    with pytest.raises(ParameterError, match=key):
-        design(LAB, **options)
+    assert load_law(file) == Law({"hub_angle": block(values)}, name=name, references=("hub_angle",))
+    assert values.get("pole_rad_s", 0.0) <= 2 / T
 
 
 def test_an_undamped_link_has_a_mode_that_no_lead_law_damps(capsys, monkeypatch):
@@ -315,3 +311,88 @@ def test_positive_position_feedback_is_a_sum_of_filters():
     assert np.polyval(own.num, s) / np.polyval(own.den, s) == pytest.approx(
         sum(g * w**2 / (s**2 + 2 * zeta * w * s + w**2) for g, w, zeta in filters), rel=1e-9
     )
+
+
+@pytest.fixture(scope="module")
+def pid():
+    return {continuous: design(LAB, structure="PID", continuous=continuous) for continuous in (False, True)}
+
+
+def controller(c):
+    """C(s) of PID coefficients, the signs of a textbook."""
+    s = control.tf("s")
+    return c["Kp"] + c["Ki"] / s + c["Kd"] * s / (1 + s / c["pole_rad_s"])
+
+
+@pytest.mark.parametrize("continuous", [False, True])
+def test_the_law_is_that_of_the_textbook_and_stable_in_exact_loops(pid, continuous):
+    law, c = pid[continuous].law, pid[continuous].coefficients
+    s = 1j * np.geomspace(1e-3, 1e4, 50)
+    (part,) = as_law(law).parts
+    own = part.block.numerators(s)[0] / part.block.denominator(s)
+    np.testing.assert_allclose(own, controller(c)(s), rtol=1e-12)
+    assert (part.signals, law.references) == (("hub_angle",), ("hub_angle",))
+    assert pid[continuous].verdict.is_stable
+    assert c["pole_rad_s"] <= 2 / T
+    poles = tfarm.closed_loop_poles(LAB, law, 6).values
+    assert poles.real.max() < 0
+    assert abs(poles).min() > 1e-3  # the integrator has moved off 0
+
+
+def test_the_sampled_loop_is_stable_with_a_reserve_by_another_model(pid):
+    law = pid[False].law
+    assert all(sampled_verdict(LAB, law.times(share), pid[False].chain).is_stable for share in (0.8, 1.0, 1.25))
+    assert tfarm.sampled(LAB, law).verdict.is_stable
+    assert np.log(HELD.radius(law)) == pytest.approx(np.log(pid[False].sampled.spectral_radius), rel=1e-4)
+
+
+def test_a_constant_torque_leaves_no_error_of_the_hub_angle(pid):
+    """S G -> s/Ki at s = 0, of the exact arm; (z - 1)/(T Ki) at z = 1 of the sampled one.  PD leaves 1/Kp."""
+    c, s = pid[True].coefficients, 1e-5j
+    G = tfarm.transfer(LAB, "hub_angle")(s)
+    assert abs(G / (1 + G * controller(c)(s))) == pytest.approx(abs(s) / c["Ki"], rel=1e-3)
+    assert abs(G / (1 + G * c["Kp"])) == pytest.approx(1 / c["Kp"], rel=1e-3)
+    law, Ki, q = pid[False].law, pid[False].coefficients["Ki"], np.array([1e-6])
+    A, B, sense = HELD.parts
+    held = sense[0] @ np.linalg.solve(np.exp(1j * q[0]) * np.eye(len(A)) - A, B)
+    left = abs(held / (1 + HELD.loop(law, q)[0]))
+    assert left == pytest.approx(q[0] / (T * Ki), rel=1e-2)
+    assert left < 1e-3 / pid[False].coefficients["Kp"]
+
+
+def test_the_objective_is_not_worse_than_that_of_pd(pid):
+    """Without sampling; at 10 ms the derivative of the sampled angle lags a rate that is measured."""
+    assert pid[True].value >= design(LAB, structure="PD", continuous=True).value
+    assert pid[False].value >= 0.97 * design(LAB, structure="lead").value  # PD with a filter, of the angle too
+
+
+def test_the_integral_gain_has_a_lower_limit(pid):
+    c = pid[False].coefficients
+    assert pid[False].at_limit == ("Ki",)
+    assert c["Ki"] == pytest.approx(INTEGRAL_SPEED * c["Kp"] * np.sqrt(c["Kp"] / LAB.total_inertia), rel=1e-9)
+
+
+def test_pi_needs_friction(monkeypatch):
+    """The roots of J s^3 + b s^2 + Kp s + Ki of a rigid arm are stable where b Kp > J Ki; without b never."""
+    monkeypatch.setattr(search, "MOST_RUNS", 1)
+    with pytest.raises(ConvergenceError, match="no law PI"):
+        design(LAB, structure="PI")
+    form = structure_of("PI", LAB, Kp=0.0, modes=2, period=T, bounds={})
+    Kp, Ki = form.fixed["Kp"], 3 * form.free[0].bounds[0]
+    for share, is_stable in ((1.1, True), (0.9, False)):
+        rough = replace(LAB, hub=replace(LAB.hub, friction=share * LAB.total_inertia * Ki / Kp))
+        assert np.roots([LAB.total_inertia, rough.hub.friction, Kp, Ki]).real.max() * (-1) ** is_stable > 0
+        law = form.record_at(form.at([Ki]))
+        assert stability(rough, law).is_stable == is_stable
+
+
+def test_a_pinned_tip_has_laws_of_all_structures_and_a_locked_hub_none():
+    """Sizes are those of the finite parts: the inertia of an arm with a pinned tip is infinite."""
+    pinned, locked = LAB.having(payload_mass=np.inf), LAB.having(hub_inertia=np.inf)
+    for name in STRUCTURES.keys() - {TWO_GAINS}:
+        form = structure_of(name, pinned, Kp=0.0, modes=2, period=T, bounds={})
+        assert np.isfinite([form.origin, *form.box]).all()
+        assert 0.0 < form.fixed["Kp"] < np.inf
+        with pytest.raises(ParameterError, match="locked hub"):
+            design(locked, structure=name)
+    assert design(pinned, structure="PD").verdict.is_stable

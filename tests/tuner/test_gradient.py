@@ -76,14 +76,3 @@ def test_the_gradient_of_a_sample_is_that_of_complex_steps(lab, guard, k):
 
     expected = complex_step(error, network.weights)
     np.testing.assert_allclose(gradient, expected, atol=1e-9 * abs(expected).max())
-
-
-def test_the_gradient_of_the_gain_is_that_of_complex_steps():
-    network, row = some_network(8, 7, 4), np.linspace(-2, 3, 7)
-    for guard in (NONE, SECTOR):
-        hidden, gradient, by_input = np.zeros(4), np.zeros(network.weights.size), np.zeros(7)
-        K, slope = kernel.network_gain(network.weights, row / network.scales, hidden, guard)
-        kernel.gain_gradient(network.weights, row / network.scales, hidden, slope, gradient, by_input)
-        expected = complex_step(lambda w, g=guard: plain_gain(row, w, 4, network.scales, g), network.weights)
-        np.testing.assert_allclose(K, plain_gain(row, network.weights, 4, network.scales, guard), rtol=1e-14)
-        np.testing.assert_allclose(gradient, expected, rtol=1e-13, atol=1e-16)

@@ -6,7 +6,6 @@ values of K1 as its corners in a picture of given axes need.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -20,7 +19,7 @@ from tfarm.loop.circle_crossings import GainMap, ends_of_K1, rounded_map, sample
 from tfarm.loop.plane import Axis, Plane, edge, gain_map, moment_axis, rate_axis, rate_columns
 from tfarm.loop.sampled import Sampled
 from tfarm.loop.sampled_verdict import sampled_verdict
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Column
 from tfarm.spectrum.table import default_gains, first_frequency
 from tfarm.synthesis.judge import damping_of
@@ -102,8 +101,7 @@ DESIGNED_MODES = 2  # flexible modes in the band of the damping that is drawn an
 GRID_COLUMNS, GRID_ROWS = 240, 200  # of the coloured grid
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class StabilityMap:
     """The numbers of the map.
 

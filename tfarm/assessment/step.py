@@ -31,6 +31,7 @@ from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.assessment.card import CONTINUOUS
+from tfarm.case import Case
 from tfarm.digits import general
 from tfarm.dsp import Chain, traces
 from tfarm.dsp.plant import sensed_plant
@@ -177,7 +178,7 @@ class _Record:
     def _of_sampled(self, law: AnyLaw, chain: Chain, task: Scenario, names: Sequence[str]) -> LoopResponse:
         """The sampled loop, with the signals of these names."""
         between = round(task.period / self.t[1]) - 1
-        run, used = simulated(self.arm, law, chain, task, between=between, outputs=names)
+        run, used = simulated(Case(self.arm, as_law(law), chain), task, between=between, outputs=names)
         signals = {name: traces.continuous(run, name)[1][: self.t.size] for name in names}
         signals[TORQUE] = traces.held_at(run, run.torque, self.t[: signals[MOMENT].size])
         is_converged = used.change is not None and used.change <= ENOUGH_CHANGE

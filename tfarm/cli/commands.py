@@ -418,6 +418,6 @@ def ring(
     stop: last time [s]
     modes: number of oscillations
     """
-    from tfarm.fitting import recording, resonances
+    from tfarm.fitting import decays, recording
 
-    show(resonances.ring(recording.read_recording(record), signal, start=start, stop=stop, modes=modes))
+    show(decays.ring(recording.read_recording(record), signal, start=start, stop=stop, modes=modes))

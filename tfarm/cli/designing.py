@@ -224,7 +224,7 @@ def tune(
     save: write the tuner to this JSON file
     """
     from tfarm import tuner
-    from tfarm.studies.cases import learning_curves
+    from tfarm.studies.candidates import learning_curves
     from tfarm.tuner import trial, tuning
 
     subject, sampling = load_arm(arm, theory), chain(arm)
@@ -485,7 +485,7 @@ def assumptions(
     Options:
     count: flexible modes
     """
-    from tfarm.studies.cases import assumptions as find
+    from tfarm.studies.candidates import assumptions as find
 
     show(find(load_arm(arm, theory), count))
 

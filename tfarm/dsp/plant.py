@@ -93,6 +93,15 @@ class Plant:
             static=np.r_[self.static, more.static],
         )
 
+    def with_poles(self, poles: Any, residues: Any) -> Plant:
+        """The plant with further poles, which are of no mode."""
+        return replace(
+            self,
+            poles=np.r_[self.poles, poles],
+            residues=np.c_[self.residues, residues],
+            mode=np.r_[self.mode, np.zeros(np.size(poles), np.int64)],
+        )
+
     @property
     def at_rest(self) -> Real:
         """G_o(0) of every output that does not turn with the arm (outputs,), and H_o(1) at any period."""
@@ -140,22 +149,15 @@ def undelayed_plant(arm: Arm, outputs: Sequence[str], count: int, x: float | Non
 def with_modes(model: ModalModel, count: int) -> Plant:
     """The plant with the first `count` modes of a model, and slow real poles for all others where C is large."""
     some, C = model.first(count), model.arm.damping
-    poles, mode = some.eigenvalues.ravel(), np.repeat(some.index, 2)
-    residues = some.residues.reshape(len(some.outputs), poles.size)
-    poles, residues = np.r_[poles, some.single], np.c_[residues, some.single_residues]
-    mode = np.r_[mode, np.zeros(some.single.size, np.int64)]
+    poles = some.eigenvalues.ravel()
+    residues, mode = some.residues.reshape(len(some.outputs), poles.size), np.repeat(some.index, 2)
     plant = Plant(some.arm, some.outputs, poles, residues, some.rigid, some.static, mode, model)
+    plant = plant.with_poles(some.single, some.single_residues)
     if C * some.natural_frequency.max(initial=0.0) < SLOW_POLES_FROM:
         return plant
     exact = transfer(model.arm, model.outputs, x=model.x)
     corners, shares = slow_remainder(C, lambda s: exact(s) - np.array([plant(each) for each in s]).T)
-    return replace(
-        plant,
-        poles=np.r_[plant.poles, -corners],
-        residues=np.c_[plant.residues, shares * corners],
-        static=plant.static - shares.sum(axis=1),
-        mode=np.r_[plant.mode, np.zeros(corners.size, np.int64)],
-    )
+    return replace(plant, static=plant.static - shares.sum(axis=1)).with_poles(-corners, shares * corners)
 
 
 def is_analog(wanted: Output, chain: Chain) -> bool:
@@ -173,21 +175,12 @@ def is_analog(wanted: Output, chain: Chain) -> bool:
 def with_filter(plant: Plant, rows: Sequence[int], corner: float) -> Plant:
     """The plant with wc/(s + wc) after some outputs: a pole at -wc, with the residue wc G(-wc).
 
-    Raises ParameterError for an output with the double integral of the torque, an angle or a displacement: encoders
-    are digital and have no analog filter.
+    None of these has the double integral of the torque, as angles and displacements do (`is_analog`).
     """
-    turning = [plant.outputs[row] for row in rows if plant.rigid[row, 0] != 0.0]
-    remedy = "it turns with the hub; an analog filter is for the gauge and the tachometer"
-    require(not turning, "filtered output", ", ".join(turning), remedy)
     is_filtered = np.isin(np.arange(len(plant.outputs)), rows)
     lag = np.where(is_filtered[:, None], corner / (plant.poles + corner), 1.0)
-    return replace(
-        plant,
-        poles=np.r_[plant.poles, -corner],
-        residues=np.c_[plant.residues * lag, np.where(is_filtered, corner * plant(-corner).real, 0.0)],
-        static=np.where(is_filtered, 0.0, plant.static),
-        mode=np.r_[plant.mode, 0],
-    )
+    late = replace(plant, residues=plant.residues * lag, static=np.where(is_filtered, 0.0, plant.static))
+    return late.with_poles(-corner, np.where(is_filtered, corner * plant(-corner).real, 0.0))
 
 
 def with_held_filter(plant: Plant, held: Real) -> Plant:
@@ -198,9 +191,7 @@ def with_held_filter(plant: Plant, held: Real) -> Plant:
     """
     residues = plant.residues.copy()
     residues[:, -1] -= held
-    return replace(
-        plant, poles=np.r_[plant.poles, plant.poles[-1]], residues=np.c_[residues, held], mode=np.r_[plant.mode, 0]
-    )
+    return replace(plant, residues=residues).with_poles(plant.poles[-1], held)
 
 
 @dataclass(frozen=True)

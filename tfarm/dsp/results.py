@@ -14,10 +14,11 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import AnyLaw, Arm, Law, tracked
+from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arm.chain import Chain, Converters, chain_or_usual
 from tfarm.arrays import LEAST_SIZE, Real
-from tfarm.dsp.discretise import RULE, rule_in_words, with_all_gains
+from tfarm.case import Case
+from tfarm.dsp.discretise import RULE, rule_in_words
 from tfarm.dsp.plant import MODES_USED
 from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, described, scenario
 from tfarm.dsp.simulate import Simulation, Simulator, Trace
@@ -96,8 +97,7 @@ class LimitCycle:
 class Run:
     """A simulated scenario: its signals, and figures of these."""
 
-    arm: Arm
-    law: AnyLaw
+    case: Case
     simulation: Annotated[Simulation, Quantity(flat=True, help="figures of the signals")]
     used: Annotated[Enough, Quantity(flat=True, help="flexible modes of the simulation")]
     scenario_in_words: Annotated[str, Quantity("scenario", key="scenario_in_words",
@@ -107,22 +107,22 @@ class Run:
     @property
     def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller."""
-        return controller(self._full_law, self.arm)
+        return controller(self.case.feedback, self.arm)
 
-    @cached_property
-    def _full_law(self) -> Law:
-        """The law with a part for each gain at the hub."""
-        return with_all_gains(self.arm, self.law)
+    @property
+    def arm(self) -> Arm:
+        """The arm with the input of the controller."""
+        return self.case.arm
 
     @property
     def references(self) -> Annotated[list[str], Quantity(help="signals that follow a reference")]:
         """Signals that follow a reference."""
-        return list(self._full_law.references)
+        return list(self.case.feedback.references)
 
     @property
     def rule(self) -> Annotated[str, RULE]:
         """The discretisation of the law."""
-        return rule_in_words(self._full_law)
+        return rule_in_words(self.case.feedback)
 
     @property
     def reading(self) -> Annotated[str, Quantity(
@@ -162,7 +162,7 @@ class Run:
         run = self.simulation
         if run.chain.is_linear or self.tuner is not None:
             return None
-        law = replace(self._full_law, delay=0.0)  # that is in the chain of the run
+        law = replace(self.case.feedback, delay=0.0)  # that is in the chain of the run
         ideal = Simulator(self.arm, ideal_chain(run.chain), run.scenario, law, count=self.used.modes)
         return limit_cycle(run, ideal.run())
 
@@ -212,6 +212,7 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
     loop with ideal converters (`ideal`) has decayed further, or is unstable where signals are clipped.
     """
     n = simulation.t.size
+    # a shorter record shows no limit cycle
     if simulation.stopped or simulation.chain.is_linear or n < 40:
         return None
     last, before = slice(n - n // 4, n), slice(n - n // 2, n - n // 4)
@@ -223,6 +224,7 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
     # fewer turns of the moment about its mean are a drift and no vibration
     is_transient = is_clipped and (earlier < CYCLE_LASTS * size or turns < 1)
     is_unstable = ideal.stopped is not None or _left(ideal, last) > GROWS * _left(ideal, before)
+    # twice the vibration of an ideal chain at that time
     is_own = (is_clipped and is_unstable) or size > 2 * _left(ideal, last)
     if size == 0.0 or size < CYCLE_LASTS * earlier or is_transient or not is_own:
         return None
@@ -268,41 +270,45 @@ def simulate(
     `outputs` are recorded in addition, as "tip_rotation" or "strain@0.05".  Raises ParameterError for a locked hub, an
     algebraic loop, an unknown signal, a law in z whose period is not the chain's, and as `scenario` does.
     """
-    run = simulated_run(
-        arm, law, chain_or_usual(chain), scenario_name, duration, count=count, between=between, outputs=outputs
-    )
-    return run.simulation
+    return simulated_run(
+        arm, law, chain, scenario_name, duration, count=count, between=between, outputs=outputs
+    ).simulation
 
 
 def drawn(arm: Arm, law: AnyLaw, chain: Chain, scenario_name: str, duration: float) -> Simulation:
     """Simulate the same for a picture: 20 records in each period of the fastest visible mode (`traces.resolved`)."""
-    arm, law = tracked(arm, law)
-    task = scenario(scenario_name, arm, chain, duration)
-    used = enough_modes(lambda n: Simulator(arm, ideal_chain(chain), task, law, count=n).run())
-    return resolved(Simulator(arm, chain, task, law, count=used.modes), arm, Simulator.run)[0]
+    case = Case(arm, as_law(law), chain)
+    task = scenario(scenario_name, case.arm, chain, duration)
+    used = enough_modes(lambda n: simulator(case.through(ideal_chain(chain)), task, count=n).run())
+    return resolved(simulator(case, task, count=used.modes), case.arm, Simulator.run)[0]
+
+
+def simulator(case: Case, task: Scenario, **how: Any) -> Simulator:
+    """The simulator of a case."""
+    return Simulator(case.arm, case.chain, task, case.law, **how)
 
 
 def simulated(
-    arm: Arm,
-    law: AnyLaw,
-    chain: Chain,
+    case: Case,
     task: Scenario,
     count: int | None = None,
     between: int = 0,
     outputs: Sequence[str] = (),
+    run: Callable[[Simulator], Simulation] = Simulator.run,
 ) -> tuple[Simulation, Enough]:
-    """Simulate with `count` modes, or enough, and return that number too.
+    """Simulate with `count` modes, or enough, and return that number too; `run` is what a simulator does.
 
     Gains at the hub follow the references of all their signals.
     """
-    used = enough_modes(lambda n: Simulator(arm, ideal_chain(chain), task, law, count=n, outputs=outputs).run(), count)
-    return Simulator(arm, chain, task, law, count=used.modes, between=between, outputs=outputs).run(), used
+    ideal = case.through(ideal_chain(case.chain))
+    used = enough_modes(lambda n: run(simulator(ideal, task, count=n, outputs=outputs)), count)
+    return run(simulator(case, task, count=used.modes, between=between, outputs=outputs)), used
 
 
 def simulated_run(
     arm: Arm,
     law: AnyLaw,
-    chain: Chain,
+    chain: Chain | None,
     name: str,
     duration: float,
     *,
@@ -314,7 +320,6 @@ def simulated_run(
 
     Raises ParameterError as `simulate` does.
     """
-    arm, law = tracked(arm, law)
-    task = scenario(name, arm, chain, duration)
-    simulation, used = simulated(arm, law, chain, task, count, between, outputs)
-    return Run(arm, law, simulation, used, described(task, arm, chain))
+    case = Case(arm, as_law(law), chain_or_usual(chain))
+    task = scenario(name, case.arm, case.chain, duration)
+    return Run(case, *simulated(case, task, count, between, outputs), described(task, case.arm, case.chain))

@@ -61,9 +61,7 @@ CONSUMER = Consumer(
     none=("reference", "volts"),
 )  # fmt: skip
 
-NAME = "controller"  # of identifiers in C
 FILES = ("controller.h", "controller.c", "self_test.c", "example.c")
-RECORDED, REFUSED, SEED = 1000, 500, 1  # samples of the self-test, the one with a NaN, its first random number
 REAL = {"double": ("double", "", "DBL_MAX"), "float": ("float", "f", "FLT_MAX"), FIXED: ("int32_t", "", "")}  # in C
 INPUT_ERROR, OVERFLOW, SATURATED, STATE_SATURATED = 1, 2, 3, 4  # status of a step, 0 of one without an event
 MINUEND, SUBTRAHEND = 0, 1  # columns of a plan
@@ -169,31 +167,37 @@ def c_controller(task: ExportTask) -> Export:
     details = word_length(controller, name, gains, word.limit_cycle(found.verdict.loop))
     bounds = dict(facts_of(details)) | ({} if details.samples else {"samples of these bounds": "all"})
     contents, names = source_files(task, controller, [*task.facts(word.rounded, found).items()], [*bounds.items()])
-    return Export(
-        what=task.what, form=task.form, contents=contents, names=names, verdict=found.verdict.sentence,
-        details=details, sha256=task.sha256,
-    )  # fmt: skip
+    return task.exported(contents, names, found.verdict.sentence, details)
 
 
 def word_length(controller: Controller, name: str, gains: list[NoiseGain], limit_cycle: float | None) -> WordLength:
     """The record of a controller's arithmetic, in the realisation of this name."""
     word, (low, high), bounds = controller.word, controller.limits, controller.word.bounds
-    until = "" if bounds.is_whole else f", for {MOST_SUMMED} samples"
+    samples = None if bounds.is_whole else MOST_SUMMED
+    excluded = f"excluded for inputs within their ranges{f', for {samples} samples' if samples else ''}"
+    # in fixed point the scale of a state
+    largest = 1.0 if word.precision == FIXED else float(np.finfo(FLOATS[word.precision][0]).max)
     overflow = "not excluded: a state may saturate, and the bounds hold until it does"
     if bounds.output == math.inf:
         overflow = "not determined: the law is unstable or ill-conditioned in z"
-    elif max(bounds.states, default=0.0) < largest_state(word.precision):
-        overflow = f"excluded for inputs within their ranges{until}"
-    reach = bounds.output + bounds.error
+    elif max(bounds.states, default=0.0) < largest:
+        overflow = excluded
     saturation = "no limit" if high == math.inf else f"saturates from {low!r} down and from {high!r} up"
-    if reach <= min(-low, high) < math.inf:
-        saturation = f"excluded for inputs within their ranges{until} (limits {low!r} and {high!r})"
+    if bounds.output + bounds.error <= min(-low, high) < math.inf:
+        saturation = f"{excluded} (limits {low!r} and {high!r})"
+    output, error = (each if each < math.inf else None for each in (bounds.output, bounds.error))
     return WordLength(
-        precision=word.precision, realisation=name, noise_gains=gains, largest_states=tuple(bounds.states.tolist()),
-        overflow=overflow, largest_output=bounds.output if bounds.output < math.inf else None, saturation=saturation,
-        error=bounds.error if bounds.error < math.inf else None, samples=None if bounds.is_whole else MOST_SUMMED,
+        precision=word.precision,
+        realisation=name,
+        noise_gains=gains,
+        largest_states=tuple(bounds.states.tolist()),
+        overflow=overflow,
+        largest_output=output,
+        saturation=saturation,
+        error=error,
+        samples=samples,
         limit_cycle=limit_cycle,
-    )  # fmt: skip
+    )
 
 
 def source_files(
@@ -203,7 +207,7 @@ def source_files(
 
     `bounds` are stated with the ranges of the inputs.
     """
-    name, signals = name_in_c(task.name or NAME), identifiers(controller.signals, "y_")
+    name, signals = name_in_c(task.name or "controller"), identifiers(controller.signals, "y_")
     references = identifiers(controller.references, "r_")
     values = values_of(task, controller, ports_of(task, controller, signals, references))
     values |= {"name": next(iter(name.values())), "facts": facts, "bounds": bounds}
@@ -217,6 +221,7 @@ def in_z(law: Law, chain: Chain) -> Law:
     """
     samples = law.delay / chain.sampling.period
     remedy = f"is {samples:.6g} samples: C code has a delay of whole samples; write another one into the law's states"
+    # but for the rounding of a delay
     require(abs(samples - round(samples)) <= 1e-9, "law.delay", law.delay, remedy)
     law = discretised(law, chain.sampling.period)
     return with_system_matrix(law, system_matrix(law))
@@ -244,11 +249,6 @@ def controller_of(law: Law, task: ExportTask) -> Controller:
     remedy = f"q31 has steps of a DAC that are a power of 2 of its own: output={limit!r}, or this times a power of 2"
     require(task.precision != FIXED or steps.is_integer(), "range.output", word.output, remedy)
     return Controller(word, signals, references, ranges, dac, round(law.delay / T), hub)
-
-
-def largest_state(precision: str) -> float:
-    """The largest absolute value of a state: in fixed point its scale."""
-    return 1.0 if precision == FIXED else float(np.finfo(FLOATS[precision][0]).max)
 
 
 def judged(task: ExportTask, word: Word) -> Analysis:
@@ -360,33 +360,42 @@ def ports_of(task: ExportTask, controller: Controller, *known: dict[str, str]) -
     """The inputs of the C function: signals, references, and the feedforward."""
     word, ranges = controller.word, controller.ranges
     steps = f", at most {ranges[RATE] * controller.hub[1]!r} a sample" if controller.hub and RATE in ranges else ""
-    rows = [
-        (own, f"{title}{name} [{OUTPUTS[name.partition('@')[0]].unit}]{steps * (name == ANGLE)}", ranges.get(name, 1.0))
-        for title, found in zip(("", "reference of "), known, strict=True)
-        for name, own in found.items()
-    ]
-    scales = [*(f", over {size!r}" for *_, size in rows), f", over {word.output!r}"]
-    rows.append((FEEDFORWARD, f"{FEEDFORWARD} [{task.arm.input_unit}]", word.feedforward))
-    is_fixed = word.precision == FIXED
-    return [Port(own, text + scale * is_fixed, size) for (own, text, size), scale in zip(rows, scales, strict=True)]
+    over = ", over {!r}".format if word.precision == FIXED else lambda size: ""
+    found = []
+    for title, names in zip(("", "reference of "), known, strict=True):
+        for name, own in names.items():
+            size = ranges.get(name, 1.0)
+            text = f"{title}{name} [{OUTPUTS[name.partition('@')[0]].unit}]{steps * (name == ANGLE)}{over(size)}"
+            found.append(Port(own, text, size))
+    text = f"{FEEDFORWARD} [{task.arm.input_unit}]{over(word.output)}"
+    return [*found, Port(FEEDFORWARD, text, word.feedforward)]
 
 
 def recorded(
     run: Callable[[NDArray[Any]], tuple[NDArray[Any], Whole]], ports: Sequence[Port], precision: str
 ) -> dict[str, Any]:
     """Values of the template of a self-test, whose inputs are those of a linear congruential generator."""
-    suffix, places = REAL[precision][1], range(RECORDED * len(ports))
-    _, *numbers = accumulate(places, lambda last, _: (1664525 * last + 1013904223) % 2**32, initial=SEED)
-    inputs: NDArray[Any] = np.array(numbers, dtype=np.int64).reshape(RECORDED, -1)
+    # a thousand samples, one of them refused for a NaN
+    samples, refused, seed = 1000, 500, 1
+    places = range(samples * len(ports))
+    _, *numbers = accumulate(places, lambda last, _: (1664525 * last + 1013904223) % 2**32, initial=seed)
+    inputs: NDArray[Any] = np.array(numbers, dtype=np.int64).reshape(samples, -1)
     if precision == FIXED:
         inputs = inputs - 2**31
     else:
         kind = FLOATS[precision][0]
         sizes = np.array([each.size for each in ports], kind)
         inputs = (sizes * ((inputs >> 8) / 2.0**23 - 1).astype(kind)).astype(float)
-        inputs[REFUSED, 0] = np.nan
+        inputs[refused, 0] = np.nan
     outputs, status = run(inputs)
+    sizes_in_c, recorded_in_c = (
+        [literal(each, REAL[precision][1]) for each in values]
+        for values in ([each.size for each in ports], outputs.tolist())
+    )
     return {
-        "sizes": [literal(each.size, suffix) for each in ports], "refused": REFUSED, "seed": SEED,
-        "recorded": [literal(each, suffix) for each in outputs.tolist()], "status": status.tolist(),
-    }  # fmt: skip
+        "sizes": sizes_in_c,
+        "refused": refused,
+        "seed": seed,
+        "recorded": recorded_in_c,
+        "status": status.tolist(),
+    }

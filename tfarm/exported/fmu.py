@@ -21,13 +21,14 @@ from xml.etree.ElementTree import Element, indent, tostring
 
 import numpy as np
 
-from tfarm.arm import Law, tracked
+from tfarm.arm import Law
 from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex, Real
+from tfarm.case import Case
 from tfarm.dsp import Simulator, scenario
 from tfarm.dsp.plant import MODES_USED, RECORDED
-from tfarm.dsp.results import simulated
+from tfarm.dsp.results import simulated, simulator
 from tfarm.dsp.scenarios import TRIAL_DURATION
 from tfarm.errors import ParameterError, one_line, require
 from tfarm.exact.outputs import signal_words
@@ -131,10 +132,8 @@ def fmu(task: ExportTask) -> Export:
     binary, compiler = binary_of(sources, own[name])
     files = {f"sources/{name}": content for name, content in sources.items()} | binary
     files["modelDescription.xml"] = model_description(sources, own[name], **head)
-    return Export(
-        what=task.what, form=task.form, contents={f"{task.what}.fmu": archive_of(files)}, names=names_of(own),
-        verdict=verdict, details=Unit(variables, modes, compiler), sha256=task.sha256,
-    )  # fmt: skip
+    content = {f"{task.what}.fmu": archive_of(files)}
+    return task.exported(content, names_of(own), verdict, Unit(variables, modes, compiler))
 
 
 def law_code(task: ExportTask, law: Law, variables: Sequence[Variable]) -> LawCode:
@@ -167,13 +166,13 @@ def prepared_simulator(task: ExportTask) -> Simulator:
 
     A plant alone has no delay of the law.
     """
-    arm, law = tracked(task.arm, replace(task.law, delay=0.0) if task.what == "plant" else task.law)
+    case = Case(task.arm, replace(task.law, delay=0.0) if task.what == "plant" else task.law, task.chain)
     try:
-        run = scenario("slew", arm, task.chain, TRIAL_DURATION)
+        run = scenario("slew", case.arm, case.chain, TRIAL_DURATION)
     except ParameterError:  # an arm that cannot turn
-        run = scenario("step", arm, task.chain, TRIAL_DURATION)
-    modes = 1 if task.what == "controller" else simulated(arm, law, task.chain, run)[1].modes
-    return Simulator(arm, task.chain, run, law, count=modes)
+        run = scenario("step", case.arm, case.chain, TRIAL_DURATION)
+    modes = 1 if task.what == "controller" else simulated(case, run)[1].modes
+    return simulator(case, run, count=modes)
 
 
 def variables_of(what: What, of: Simulator) -> list[Variable]:

@@ -1,5 +1,7 @@
 """The task of an export, the facts that its files begin with, and the record of the files."""
 
+from __future__ import annotations
+
 import hashlib
 import json
 from collections.abc import Mapping
@@ -82,6 +84,13 @@ class ExportTask:
             remedy = f"the sampled loop is not certified stable: {found.verdict.sentence}; --anyway exports it"
             raise ParameterError(key="law", value=self.law.name, remedy=remedy)
         return found
+
+    def exported(
+        self, contents: Mapping[str, bytes], names: list[Name], verdict: str, details: object = None
+    ) -> Export:
+        """The record of the files of this task."""
+        own = {"what": self.what, "form": self.form, "sha256": self.sha256}
+        return Export(contents=contents, names=names, verdict=verdict, details=details, **own)
 
     def facts(self, law: AnyLaw, found: Analysis) -> dict[str, str]:
         """The facts that a file begins with, by label: arm, law, stability and margins of the sampled loop, version."""

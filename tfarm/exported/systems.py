@@ -68,12 +68,6 @@ class NamedSystem:
     period: float = 0.0
     facts: Mapping[str, Any] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        is_finite = all(np.isfinite(each).all() for each in self.matrices)
-        require(
-            is_finite, "export", self.name, "a matrix has entries that are not finite; change the arm or the period"
-        )
-
     @property
     def title(self) -> str:
         """Name, kind and order of the system, with its worst error, if it is an approximation."""
@@ -217,10 +211,7 @@ def linear(task: ExportTask) -> Linear:
 def mat(task: ExportTask) -> Export:
     """Return the MATLAB file of a task and its script."""
     found = linear(task)
-    return Export(
-        what=task.what, form=task.form, contents=mat_files(f"{task.what}.mat", found), names=[],
-        verdict=found.verdict, sha256=task.sha256,
-    )  # fmt: skip
+    return task.exported(mat_files(f"{task.what}.mat", found), [], found.verdict)
 
 
 def mat_files(name: str, of: Linear) -> dict[str, bytes]:
@@ -282,10 +273,7 @@ def py(task: ExportTask) -> Export:
     content = render("systems.txt", of=found, listed=listed)
     every = [name for each in found.systems.values() for name in (*each.inputs, *each.outputs)]
     changed = {name: new for name, new in zip(every, plain(every), strict=True) if new != name}
-    return Export(
-        what=task.what, form=task.form, contents={f"{task.what}.py": content}, names=names_of(changed),
-        verdict=found.verdict, sha256=task.sha256,
-    )  # fmt: skip
+    return task.exported({f"{task.what}.py": content}, names_of(changed), found.verdict)
 
 
 def plain(names: Iterable[str]) -> list[str]:

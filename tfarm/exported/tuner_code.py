@@ -254,9 +254,7 @@ def c_tuner(task: ExportTask) -> Export:
     }  # fmt: skip
     name = name_in_c(task.name or "tuner")
     contents = written(task, tuner, next(iter(name.values())), facts)
-    return Export(
-        what=task.what, form=task.form, contents=contents, names=names_of(name), verdict=certainty, sha256=task.sha256
-    )
+    return task.exported(contents, names_of(name), certainty)
 
 
 def written(task: ExportTask, tuner: ExportedTuner, name: str, facts: dict[str, str]) -> dict[str, bytes]:

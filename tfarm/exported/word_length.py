@@ -190,6 +190,7 @@ def absolute_sum(M: Real, left: Real, right: Real, most: int = MOST_SUMMED) -> t
         step = last = np.linalg.matrix_power(M, BLOCK)
         for _ in range(most // BLOCK):
             G, S = G + abs(block).sum(axis=0), S + abs(block @ right).sum(axis=0)
+            # all later samples are bounded from here
             if abs(last).sum(axis=1).max(initial=0.0) <= 1e-3:
                 return S + np.linalg.solve(np.eye(len(M)) - abs(last).T, G.T).T @ abs(last @ right), True
             block, last = block @ step, last @ step
@@ -301,6 +302,7 @@ def observed(M: Real, left: Real) -> Real:
     """The matrix without poles on the unit circle that no row of `left` shows, such as z = 1 of a free hub angle."""
     poles, vectors = np.linalg.eig(M)
     seen = abs(left @ vectors).max(axis=0) / abs(left).max()
+    # on the unit circle, with a share that no row shows
     gone = (abs(poles) >= 1 - 1e-9) & (seen <= 1e-8)
     return M - np.real(vectors[:, gone] * poles[gone] @ np.linalg.pinv(vectors)[gone]) if gone.any() else M
 
@@ -379,6 +381,7 @@ def _fixed(word: Word) -> Word:
     table = system_matrix(scaled) * np.r_[one, R] / np.r_[one, U][:, None]
     sums = abs(table) @ np.r_[one, E / R] + np.r_[np.zeros(n), 1.0]  # of u with the feedforward
     most = 2.0**FRACTION_BITS - len(table) - R.size
+    # at most those of a sum of products
     shifts = np.minimum(np.floor(np.log2(most / np.maximum(sums, LEAST_SCALE))).astype(int), 62)
     is_largest = abs(table) == abs(table).max(axis=1)[:, None]
     _check(table, is_largest & (shifts < 1)[:, None], "q31 at these ranges")

@@ -19,7 +19,6 @@ import math
 import os
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Annotated, Any
 
@@ -34,7 +33,7 @@ from tfarm.errors import MISSING, ParameterError, did_you_mean, naming, require
 from tfarm.exact.outputs import OUTPUTS, signal_words, unit_over
 from tfarm.files import read_file
 from tfarm.foreign import read_arrays
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response.frequency import HERTZ
 from tfarm.schema import Column, Quantity, Table
 
@@ -51,8 +50,7 @@ def require_all(key: str, values: Real, is_good: NDArray[np.bool_], remedy: str)
         raise ParameterError(key=key, value=float(values[~is_good][0]), remedy=remedy)
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class Measured:
     """A measured response `output`/`input`: complex `values` (n,) in SI units at ascending `omega` (n,) [rad/s].
 
@@ -145,6 +143,11 @@ def in_parts(values: Complex) -> Real:
     return np.concatenate([values.real, values.imag], axis=-1)
 
 
+def rms(values: NDArray[Any]) -> float:
+    """The root mean square."""
+    return float(np.sqrt((abs(values) ** 2).mean()))
+
+
 def must_be_measured(measured: object) -> None:
     """Raise ParameterError for a path or anything else in the place of a measured response."""
     require(
@@ -155,8 +158,7 @@ def must_be_measured(measured: object) -> None:
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class Noise:
     """The standard deviation `sigma` (n,) of real and imaginary part, each; infinite where nothing was measured.
 
@@ -225,8 +227,7 @@ UFF = r"\.uff|\.unv|\.uf"  # ends of its names
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"  # as it is written in a cell or an option
 
 
-@dataclass(frozen=True, slots=True)
-@record
+@frozen(slots=True)
 class Sheet:
     """Columns of numbers by name, their `units` ("" where there is none), and the line of each row in the file."""
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -28,10 +28,10 @@ from tfarm.arrays import Real
 from tfarm.digits import listed
 from tfarm.errors import ConvergenceError, one_line, require
 from tfarm.files import is_standard_output, write_file
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 
-from .data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of
+from .data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of, rms
 from .misses import Miss, Remedy, misses_of, remedies_of
 from .model import SENSOR_DELAY, SENSOR_GAIN, Problem, Response, RingMode, parameters
 from .overlay import ResonanceShift, ratio_of, resonance_shifts
@@ -69,8 +69,7 @@ class FittedResponse(NamedTuple):
     ]
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class Fit(Solution):
     """The best point of the search with intervals: an arm fitted to measured responses.
 
@@ -120,12 +119,14 @@ class Fit(Solution):
         Quantity("responses", key="responses", help="measured responses with their noise and residuals"),
     ]:
         """A row a response."""
-        pairs = zip(self.problem.responses, self.parts, self.responses, strict=True)
-        return [
-            FittedResponse(of.name, of.label, of.unit, of.source, of.digest, of.points, *of.range_hz,
-                           one.noise.source, float(residuals @ residuals))
-            for one, residuals, of in pairs
-        ]  # fmt: skip
+        rows = []
+        for one, residuals in zip(self.problem.responses, self.parts, strict=True):
+            of = one.data
+            chi_squared = float(residuals @ residuals)
+            rows.append(FittedResponse(
+                of.name, of.label, of.unit, of.source, of.digest, of.points, *of.range_hz, one.noise.source, chi_squared
+            ))  # fmt: skip
+        return rows
 
     @cached_property
     def resonances(
@@ -135,8 +136,7 @@ class Fit(Solution):
         Quantity("resonances", help="measured peaks with the poles of the arm before and after the fit"),
     ]:
         """A row a measured peak."""
-        responses = [(each.data, each.noise) for each in self.problem.responses]
-        return resonance_shifts(self.before, self.arm, responses)
+        return resonance_shifts(self.before, self.arm, self.problem.responses)
 
     @property
     def unexplained(
@@ -179,7 +179,7 @@ class Fit(Solution):
         computed = self.problem.computed(self.point)
         pairs = zip(computed, self.responses, strict=True)
         away = np.concatenate([np.log(H / each.values)[each.values != 0] for H, each in pairs])
-        return float(np.sqrt((abs(away) ** 2).mean()))
+        return rms(away)
 
     @property
     def is_explained(
@@ -388,8 +388,7 @@ def arms_drawn(fit: Fit, count: int) -> tuple[Arm, ...]:
     raise ConvergenceError(words, kept, len(kept))
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Repeats:
     """The fitted numbers by each record of `response` alone, `each` [SI], and by draws of records.
 
@@ -444,28 +443,28 @@ def repeats(fit: Fit, draws: int = DRAWS) -> Repeats | None:
     identified = {n: each for n, each in enumerate(fit.parameters) if each.identified}
     # a key with a colon is of one record's sensor, which others do not know
     known = {n: each for n, each in identified.items() if each.deviation and ":" not in each.key}
-    keys = [each.key for each in known.values()]
-    start = fit.point
 
     def numbers(chosen: Sequence[int]) -> Real:
         some = replace(own, responses=tuple(own.responses[n] for n in (*chosen, *others)))
         sensors = {place for each in some.responses for place in (each.gain, each.delay)}
         used = identified.keys() & (sensors | set(range(len(own.of_the_arm))))
-        held = {n: float(x) for n, x in enumerate(start) if n not in used}
-        point = nearest_minimum(some, start, held).point
-        return np.array([own.parameters[n].value(float(point[n])) for n in known])
+        held = {n: float(x) for n, x in enumerate(fit.point) if n not in used}
+        point = nearest_minimum(some, fit.point, held).point
+        return np.array([own.value(point, n) for n in known])
 
     drawn = bootstrap(
         (records,), numbers, n_resamples=draws, vectorized=False, method="percentile", confidence_level=CONFIDENCE,
         rng=FIT_SEED,
     )  # fmt: skip
-    ends = np.array(drawn.confidence_interval).T
-    wider = drawn.standard_error / np.array([each.deviation for each in known.values()])
+
+    def by_key(values: Real) -> dict[str, Any]:
+        return dict(zip([each.key for each in known.values()], values.tolist(), strict=True))
+
     return Repeats(
         response=most,
-        each=[dict(zip(keys, numbers([n]).tolist(), strict=True)) for n in records],
-        intervals=dict(zip(keys, ends.tolist(), strict=True)),
-        times_wider=dict(zip(keys, wider.tolist(), strict=True)),
+        each=[by_key(numbers([n])) for n in records],
+        intervals=by_key(np.array(drawn.confidence_interval).T),
+        times_wider=by_key(drawn.standard_error / np.array([each.deviation for each in known.values()])),
     )
 
 

@@ -8,24 +8,22 @@ first two alone; their steps are larger than that, six times out of seven.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Annotated
+from dataclasses import replace
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from tfarm.arrays import Complex
 from tfarm.digits import listed
-from tfarm.records import record
 from tfarm.response.frequency import HERTZ
 from tfarm.schema import Quantity
 
+from .data import rms
 from .model import SENSOR_DELAY, SENSOR_GAIN, Problem, Response, parameters
 from .solve import EXCLUDED, Solution, best_solution, is_explained
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
-class Miss:
+class Miss(NamedTuple):
     """A response that the curve misses: by what factor and angle (root mean squares), and in which range."""
 
     response: Annotated[str, Quantity("response missed", help="output/input of a response that the curve misses")]
@@ -41,9 +39,7 @@ class Miss:
         return f"{self.response} misses the data by {by} between {self.low:.4g} and {self.high:.4g} Hz"
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
-class Remedy:
+class Remedy(NamedTuple):
     """A single change of the search that was tried on a curve that misses."""
 
     change: Annotated[str, Quantity("remedy tried", help="change of the search that was tried alone")]
@@ -83,13 +79,13 @@ def _miss(one: Response, computed: Complex) -> Miss | None:
     both = np.flatnonzero((abs(away[:-1]) > limit) & (abs(away[:-1] + step) > limit))
     alike = both[abs(step[both]) < abs(away[both]) / 2]
     is_chance = 2 * alike.size - both.size <= 2 * math.sqrt(both.size)
-    if is_chance or np.sqrt((abs(away) ** 2).mean()) <= limit:
+    if is_chance or rms(away) <= limit:
         return None
     off = away[abs(away) > limit]
     return Miss(
         response=one.data.name,
-        factor=math.exp(np.sqrt((off.real**2).mean())),
-        degrees=math.degrees(np.sqrt((off.imag**2).mean())),
+        factor=math.exp(rms(off.real)),
+        degrees=math.degrees(rms(off.imag)),
         low=float(omega[alike[0]]) / HERTZ,
         high=float(omega[alike[-1] + 1]) / HERTZ,
     )
@@ -122,15 +118,16 @@ def _tries(found: Solution) -> Iterator[tuple[str, Solution]]:
         if problem.with_sensors((key,)) == problem:
             continue
         there = _searched(problem.with_sensors((key,)))
-        places = [getattr(each, key) for each in there.problem.responses]
-        values = [there.problem.parameters[place].value(float(there.point[place])) for place in places]
+        values = [there.problem.value(there.point, getattr(each, key)) for each in there.problem.responses]
         yield f"a free {key} (--free {key}): {listed([f'{each:.4g}{unit}' for each in values])}", there
         if min(values) < 0 and key == SENSOR_GAIN:
-            responses = [
-                replace(each, data=replace(each.data, values=each.data.values * math.copysign(1, value)))
-                for each, value in zip(problem.responses, values, strict=True)
-            ]
-            names = [each.data.name for each, value in zip(problem.responses, values, strict=True) if value < 0]
+            responses, names = [], []
+            for each, value in zip(problem.responses, values, strict=True):
+                data = each.data
+                if value < 0:
+                    names.append(data.name)
+                    data = replace(data, values=-data.values)
+                responses.append(replace(each, data=data))
             yield f"the other sign of {listed(names)}", _searched(replace(problem, responses=tuple(responses)))
     yield from _beyond_bounds(found)
 
@@ -138,7 +135,7 @@ def _tries(found: Solution) -> Iterator[tuple[str, Solution]]:
 def _beyond_bounds(found: Solution) -> Iterator[tuple[str, Solution]]:
     """Yield the solution without the bounds of those of the arm's numbers that were given some or ended at one."""
     problem = found.problem
-    (low, high) = found.problem.bounds
+    low, high = problem.bounds
     # of a coordinate: a search that ends so near to a bound has ended there
     is_at_end = np.minimum(found.point - low, high - found.point) < 0.01
     _, unbound = parameters(problem.arm(found.point), problem.family.keys, start={}, bounds={}, priors={})

@@ -28,7 +28,7 @@ from tfarm.arm.writing import KeyedArms
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError, did_you_mean, require
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response.signals import Signals
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import first_frequency
@@ -39,8 +39,7 @@ FARTHEST_FROM_START = 1e4  # times or a part of it: beyond, a search has lost it
 COORDINATE_STEP = 2.0**-20  # of a derivative by differences: the rounding of a float over it is 1e-10, its square below
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Parameter:
     """A free number: its key, where the search starts, its bounds, all in SI units, and a prior (mean, deviation).
 
@@ -102,22 +101,19 @@ def parameters(
     found = []
     for key in family.keys:
         name = key.split(".")[-1]
-        own = family.value(key)
-        prior = priors.get(key)
-        usual = own if key in start or (own and math.isfinite(own)) else _typical(arm, key, own)
-        at = start.get(key, usual)
         is_signed = name == "offset"
+        at = start.get(key, family.value(key))
+        if key not in start and (at == 0 or not math.isfinite(at)):
+            at = _typical(arm, key, at)
         most = {"x": arm.length, "gear_efficiency": 1.0, "poissons_ratio": 0.5}.get(name, math.inf)
         low, high = bounds.get(key, (-math.inf if is_signed else 0.0, most))
-        require(
-            low <= at <= high and low < high,
-            f"bounds of {key}",
-            (low, high),
-            f"starts at {at:g}; give bounds low,high around it, or another start",
-        )
+        remedy = f"starts at {at:g}; give bounds low,high around it, or another start"
+        require(low <= at <= high and low < high, f"bounds of {key}", (low, high), remedy)
         require(is_signed or at > 0, f"start of {key}", at, "a positive number in SI units")
-        is_prior = prior is None or (math.isfinite(prior[0]) and prior[1] > 0)
-        require(is_prior, f"prior of {key}", prior, "mean,deviation with a deviation above 0")
+        prior = priors.get(key)
+        if prior is not None:
+            is_legal = math.isfinite(prior[0]) and prior[1] > 0
+            require(is_legal, f"prior of {key}", prior, "mean,deviation with a deviation above 0")
         size = max(abs(at), 0.1 * arm.length) if is_signed else 0.0
         found.append(Parameter(key, at, low, high, size, prior))
     return family, tuple(found)
@@ -147,9 +143,7 @@ def _typical(arm: Arm, key: str, own: float) -> float:
     return (0.01 if own == 0 else 100) * of_the_arm[name]
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
-class RingMode:
+class RingMode(NamedTuple):
     """A decay in one mode: its `number` among the flexible ones, and `frequency` w = Im s [rad/s], `ratio` -Re s/|s|.
 
     Each with its standard deviation; a ratio that is None was not measured.
@@ -171,24 +165,20 @@ def mode_of(text: str) -> RingMode:
     spread = rf"(?:~\s*{some})?"
     form = rf"\s*(\d{{1,3}})\s*=\s*{some}(?:hz|rad_s)\s*{spread}(?:,\s*{some}{spread})?"
     found = re.fullmatch(form, text, re.IGNORECASE | re.ASCII)
-    number, *numbers = found.groups("nan") if found else ("0",) * 5
-    w, dw, ratio, dratio = map(float, numbers)
+    number, w, dw, ratio, spread_of_ratio = found.groups() if found else ("0",) * 5
     unit = 2 * math.pi if "hz" in text.lower() else 1.0
+    frequency = float(w) * unit
     mode = RingMode(
         number=int(number),
-        frequency=w * unit,
-        frequency_deviation=2e-3 * w * unit if math.isnan(dw) else dw * unit,
-        ratio=None if math.isnan(ratio) else ratio,
-        ratio_deviation=0.1 * ratio if math.isnan(dratio) else dratio,
+        frequency=frequency,
+        frequency_deviation=float(dw) * unit if dw else 2e-3 * frequency,
+        ratio=float(ratio) if ratio else None,
+        ratio_deviation=float(spread_of_ratio or 0.1 * float(ratio or math.inf)),
     )
     is_ratio = mode.ratio is None or (0 < mode.ratio < 1 and mode.ratio_deviation > 0)
-    is_frequency = mode.frequency_deviation > 0 and 0 < mode.frequency * mode.frequency_deviation < math.inf
-    require(
-        1 <= mode.number <= 100 and is_frequency and is_ratio,
-        "--mode",
-        text,
-        "write N=FREQUENCY,RATIO such as 1=2.52hz,0.006 (hz or rad_s; a deviation after ~: 2.52hz~0.01)",
-    )
+    is_frequency = mode.frequency_deviation > 0 and 0 < frequency * mode.frequency_deviation < math.inf
+    remedy = "write N=FREQUENCY,RATIO such as 1=2.52hz,0.006 (hz or rad_s; a deviation after ~: 2.52hz~0.01)"
+    require(1 <= mode.number <= 100 and is_frequency and is_ratio, "--mode", text, remedy)
     return mode
 
 
@@ -298,6 +288,10 @@ class Problem:
             {each.key: each.value(x) for each, x in zip(self.of_the_arm, point.tolist(), strict=False)}
         )
 
+    def value(self, point: Real, place: int) -> float:
+        """The number of that place in the vector at a point."""
+        return self.parameters[place].value(float(point[place]))
+
     # ------------------------------------------------------------ responses
 
     def computed(self, point: Real) -> list[Complex]:
@@ -329,8 +323,8 @@ class Problem:
     def _sensor(self, n: int, point: Real) -> Complex:
         """Gain and delay of the sensor of a response, at its frequencies."""
         one = self.responses[n]
-        gain = 1.0 if one.gain is None else self.parameters[one.gain].value(point[one.gain])
-        delay = 0.0 if one.delay is None else self.parameters[one.delay].value(point[one.delay])
+        gain = 1.0 if one.gain is None else self.value(point, one.gain)
+        delay = 0.0 if one.delay is None else self.value(point, one.delay)
         return gain * np.exp(-1j * delay * one.data.omega)
 
     def with_sensors(self, free: Sequence[str]) -> Problem:
@@ -387,7 +381,11 @@ class Problem:
         """The responses, and what decays and priors leave."""
         coordinates = zip(self.parameters, point.tolist(), strict=True)
         priors = [(each.value(x) - each.prior[0]) / each.prior[1] for each, x in coordinates if each.prior is not None]
-        return self.fractions(point), np.r_[ring_residuals(self.arm(point), self.rings), priors]
+        return self.fractions(point), np.r_[self.decays(point, self.rings), priors]
+
+    def decays(self, point: Real, rings: Sequence[RingMode]) -> Real:
+        """What decays leave: the arm is made for them alone."""
+        return ring_residuals(self.arm(point), rings) if rings else np.empty(0)
 
 
 def walled(residuals: Callable[[Real], Real], first: Real) -> Callable[[Real], Real]:

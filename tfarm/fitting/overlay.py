@@ -13,7 +13,7 @@ numbers that would explain them.
 import math
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple, cast
 
@@ -23,7 +23,7 @@ from tfarm.arm import INPUTS, Arm, Input, must_be_arm
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError, require
 from tfarm.exact.outputs import unit_over
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response import TransferFunction, transfer
 from tfarm.response.frequency import HERTZ, refined_grid, without_cancelled
 from tfarm.response.signals import Signals
@@ -32,7 +32,8 @@ from tfarm.schema import Column, Quantity, Table
 from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum import modes_below
 
-from .data import Measured, Noise, check_signal, must_be_measured, noise_of
+from .data import Measured, Noise, check_signal, must_be_measured, noise_of, rms
+from .model import Response
 from .resonances import (
     PARTNERS_BEYOND,
     Resonance,
@@ -44,8 +45,7 @@ from .resonances import (
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-@record
+@frozen(slots=True, kw_only=True)
 class RatioRoots:
     """Poles and zeros [1/s] of a ratio with 0 <= Im s <= `up_to` [rad/s], none at s = 0: complete in this range.
 
@@ -74,7 +74,7 @@ def _upper(roots: Complex) -> Complex:
     return upper[np.argsort(abs(upper), kind="stable")]
 
 
-@dataclass(frozen=True)
+@frozen
 class Ratio:
     """The response `output`/`input` of an arm, exact.  Raises ParameterError for signals that the arm does not have."""
 
@@ -169,8 +169,7 @@ SAME_MODE = 0.1  # of its frequency: how near a pole of a damped arm is to that 
 LARGEST_FACTOR = 3.0  # the factor on a number beyond which it is no explanation
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class Counterpart:
     """A pole of the exact response and the resonance that was measured in its place, if one was.
 
@@ -246,8 +245,7 @@ class RequiredChange(NamedTuple):
     ]
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class Overlay:
     """A measured response of an arm and the exact one.
 
@@ -317,7 +315,7 @@ class Overlay:
         kept = (abs(self.measured.values) > self.noise.sigma) & np.isfinite(self.exact) & (self.exact != 0)
         if not kept.any():
             return math.inf
-        return float(np.sqrt((np.log(abs(self.measured.values[kept] / self.exact[kept])) ** 2).mean()))
+        return rms(np.log(abs(self.measured.values[kept] / self.exact[kept])))
 
     @cached_property
     def required_changes(
@@ -360,7 +358,7 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
     must_be_measured(measured)
     ratio = ratio_of(arm, measured)
     noise = noise_of(measured)
-    (low, high) = measured.band
+    low, high = measured.band
     roots = ratio.roots(PARTNERS_BEYOND * high)
     places = peaks_of(measured, noise.sigma)
     own = peaks_among(roots.poles)
@@ -441,31 +439,35 @@ class ResonanceShift(NamedTuple):
     measured: Annotated[float, Quantity("measured", "Hz", help="peak of the measured response")]
 
 
-def resonance_shifts(before: Arm, after: Arm, responses: Sequence[tuple[Measured, Noise]]) -> list[ResonanceShift]:
+def resonance_shifts(before: Arm, after: Arm, responses: Sequence[Response]) -> list[ResonanceShift]:
     """Each measured peak of all responses, with those of the arm before and after a fit.
 
     A peak is a pole of its response: a natural frequency, with the hub held where the response is over the hub's angle.
     Of a response whose poles are not found completely no peak is listed.
     """
     found = {}
-    for data, noise in responses:
+    for one in responses:
+        data = one.data
         with suppress(ConvergenceError):
-            ratios = [Ratio(arm, data.output, data.input) for arm in (before, after)]
-            old, new = (peaks_among(ratio.poles(PARTNERS_BEYOND * data.band[1]).values) for ratio in ratios)
-            peaks = data.omega[peaks_of(data, noise.sigma)]
+            old, new = (
+                peaks_among(Ratio(arm, data.output, data.input).poles(PARTNERS_BEYOND * data.band[1]).values)
+                for arm in (before, after)
+            )
             w = abs(new)
             first = abs(old)
-            places = dict(matched_peaks(peaks, w, data.band)[0])
-            earlier = dict(matched_peaks(w, first, data.band)[0])
+            peaks = data.omega[peaks_of(data, one.noise.sigma)]
+            places, earlier = (
+                dict(matched_peaks(these, those, data.band)[0]) for these, those in ((peaks, w), (w, first))
+            )
             for n, peak in enumerate(peaks.tolist()):
-                row = ResonanceShift(None, None, peak / HERTZ)
+                start = end = None
                 own = places.get(n, int(np.argmin(abs(np.log(w / peak)))) if w.size else None)
                 # of ln w: a peak farther from all of the arm's is none of them, a broad one by twice its damping ratio
                 if own is not None and abs(math.log(w[own] / peak)) < 0.1 - 2.0 * new[own].real / w[own]:
                     start = float(first[earlier[own]]) / HERTZ if own in earlier else None
-                    row = ResonanceShift(start, float(w[own]) / HERTZ, peak / HERTZ)
+                    end = float(w[own]) / HERTZ
                 # peaks of two responses that are nearer, of ln w, are one
-                found[data.input, round(math.log(peak) / 0.02)] = row
+                found[data.input, round(math.log(peak) / 0.02)] = ResonanceShift(start, end, peak / HERTZ)
     return sorted(found.values(), key=lambda row: row.measured)
 
 

@@ -113,7 +113,7 @@ def posterior_of(found: Solution, fitted: Sequence[Fitted], not_determined: Sequ
 
 def load_posterior(path: str | os.PathLike[str]) -> Posterior:
     """Return the posterior of a file.  Raises ParameterError, naming the file, for anything else."""
-    found = validated_file(Posterior, path, (1024 * 1024), key="posterior", what=f"a {SUFFIX} file of tfarm fit --save")
+    found = validated_file(Posterior, path, 1 << 20, key="posterior", what=f"a {SUFFIX} file of tfarm fit --save")
     n = len(found.numbers)
     covariance = found.covariance
     is_legal = (

@@ -30,24 +30,25 @@ its sweep, "boxcar" and no overlap, and no window leaks.  A resonance narrower t
 import hashlib
 import math
 import os
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import AnyLaw, Arm, tracked
+from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arm.chain import TIME_ROUNDING, Chain
 from tfarm.arm.reading import AnyFile, load_tables
 from tfarm.arm.schema import StrictTable, validated
 from tfarm.arrays import Complex, Real
-from tfarm.dsp.results import enough_modes
+from tfarm.case import Case
+from tfarm.dsp.results import simulated
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator
 from tfarm.errors import MISSING, did_you_mean, listed, must_be_known, naming, require
 from tfarm.files import read_mat
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity, Table
 
 from .data import MOST_RECORD_BYTES, Measured, check_signal, read_sheet
@@ -59,8 +60,7 @@ MOST_SAMPLE = 1e70  # of a signal: the fourth power is a number, as spectra are 
 LEAST_SAMPLES = 8  # of a record and of a segment
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-@record
+@frozen(slots=True, kw_only=True)
 class Recording:
     """Signals (n,) by name, sampled every `period` [s] from `start` [s] on.
 
@@ -174,8 +174,7 @@ class RunTable(StrictTable):
     source: str = ""
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class MeasuredRun:
     """A measured run: `t` (n,) [s] from 0 on, the `reference` (n,) [rad] of the hub's angle, and what was read.
 
@@ -205,8 +204,7 @@ class MeasuredRun:
         return float(self.reference[-1] - self.reference[0])
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class RunComparison:
     """A measured run and that of the exact sampled loop under the same reference; `run` is relative to the start."""
 
@@ -224,10 +222,9 @@ def compare_run(arm: Arm, law: AnyLaw, chain: Chain, measured: MeasuredRun) -> R
 
     Raises ParameterError as `simulate` does.
     """
-    arm, law = tracked(arm, law)
-    task = measured.scenario(chain.sampling.period)
-    used = enough_modes(lambda n: Simulator(arm, chain, task, law, count=n).run())
-    return RunComparison(measured, Simulator(arm, chain, task, law, count=used.modes).run())
+    case = Case(arm, as_law(law), chain)
+    run, _ = simulated(case, measured.scenario(chain.sampling.period))
+    return RunComparison(measured, run)
 
 
 def departures(
@@ -241,8 +238,8 @@ def departures(
     end = float(measured.t[-1])
     t = np.append(measured.t, end + min(longer, 10_000 * period))
     held = replace(measured, t=t, reference=np.append(measured.reference, measured.reference[-1]))
-    arm, law = tracked(arm, law)
-    run = Simulator(arm, chain, held.scenario(period), law, count=count).run().at_samples
+    case = Case(arm, as_law(law), chain)
+    run = Simulator(case.arm, chain, held.scenario(period), case.law, count=count).run().at_samples
     settled = run.hub_angle[run.t <= end][-1]
     away = abs(run.hub_angle - settled) > share * abs(measured.step)
     return [float(t) for t in run.t[away & (run.t > end)]]
@@ -275,8 +272,7 @@ def load_run(name_or_path: AnyFile) -> MeasuredRun | None:
     return MeasuredRun(found.times - found.start, reference, angle, moment, table.source)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-@record
+@frozen(slots=True, kw_only=True)
 class Estimate:
     """A response with what it was estimated by: `segments` of `segment` [s], `overlap` as a share of one.
 

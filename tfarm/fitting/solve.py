@@ -19,7 +19,7 @@ Intervals are by the covariance or by the profile of the likelihood; some number
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Annotated
 
@@ -30,11 +30,11 @@ from scipy.special import chdtrc, ndtri, stdtrit
 from tfarm.arm.schema import file_key
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 
 from .data import CONFIDENCE, in_parts
-from .model import Problem, ring_residuals, walled
+from .model import Problem, walled
 
 DRAWS = 300  # points about one that the equation errors lead to
 STARTS = ((0, (0.1,)), (DRAWS, (0.1,)), (DRAWS, (1.0, 0.3, 0.1)))  # draws, and shares of w one after another
@@ -85,8 +85,8 @@ def equation_errors(problem: Problem, point: Real, share: float) -> Real:
         D = each.data.values
         W = (abs(smooth_N) + (abs(D) + each.noise.sigma) * abs(smooth_P)) * np.exp(there - here)
         errors.append(in_parts((N - D * P) / W))
-    frequencies = [replace(each, frequency_deviation=each.frequency, ratio=None) for each in problem.rings]
-    return np.concatenate([*errors, ring_residuals(problem.arm(point), frequencies)])
+    frequencies = [each._replace(frequency_deviation=each.frequency, ratio=None) for each in problem.rings]
+    return np.concatenate([*errors, problem.decays(point, frequencies)])
 
 
 def with_gains(problem: Problem, point: Real) -> tuple[Problem, Real]:
@@ -139,8 +139,7 @@ SAME_SUM = 0.1  # of a sum of squares: a smaller difference is none
 EXCLUDED = 16.0  # of a sum of squares: noise alone makes up an effect of four deviations once in 15,000 fits
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Solution:
     """The best point found, with residuals, their Jacobian, and whether the search ended there in good order."""
 
@@ -314,8 +313,7 @@ TAKES_PART = 0.1  # of a unit vector: a smaller component has no part in it
 REACHES = (0.5, 1.0, 2.0, 4.0, 6.0, 9.0)  # of ln p: where a number that does not matter is tried
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class Fitted:
     """A fitted number: `value` in SI units, the ends of its 95 % interval, its standard deviation by the covariance.
 
@@ -374,7 +372,7 @@ def confidence_intervals(
         if not part[:, n].any():
             ends = [_end(found, n, way, own, quantile, held) if profile else point + way * quantile * own
                     for way in (-1, 1)]  # fmt: skip
-            (low, high) = each.ends(ends)
+            low, high = each.ends(ends)
             deviation = own * each.per_coordinate(each.value(point))
         elif n in alone:
             low, high = _one_sided(found, n, quantile)
@@ -397,10 +395,9 @@ def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float | None, 
     is neither.  The others are held: with them free the bound is farther by no more than a factor.
     """
     each = found.problem.parameters[n]
-    low = found.problem.bounds[0][n]
-    high = found.problem.bounds[1][n]
     if each.size:
         return None, None
+    low, high = (each[n] for each in found.problem.bounds)
 
     def excess(at: float) -> float:
         point = found.point.copy()
@@ -422,8 +419,7 @@ def _end(found: Solution, n: int, way: int, deviation: float, quantile: float, h
 
     The root of that growth is nearly linear in the coordinate, so a secant finds it in two or three steps.
     """
-    low = found.problem.bounds[0][n]
-    high = found.problem.bounds[1][n]
+    low, high = (each[n] for each in found.problem.bounds)
     rest = [m for m in range(found.point.size) if m != n and m not in held]
     slope = np.zeros(found.point.size)  # of the others where n is held elsewhere
     slope[rest] = -np.linalg.lstsq(found.jacobian[:, rest], found.jacobian[:, n], rcond=None)[0]
@@ -443,10 +439,10 @@ def _end(found: Solution, n: int, way: int, deviation: float, quantile: float, h
         root = math.sqrt(max(growth, 0.0))
         # of a deviation: there the profile has reached its level
         if abs(root - quantile) < 0.01 or (at in (low, high) and root < quantile):
-            return at
+            return float(at)
         step = (quantile - root) * (at - near) / (root - root_near) if root != root_near else 2 * (at - near)
         near, root_near, at = at, root, at + np.clip(step, -3 * abs(at - near), 3 * abs(at - near))
-    return at
+    return float(at)
 
 
 def _undetermined(axis: Real, keys: Sequence[str]) -> str:

@@ -2,7 +2,6 @@
 
 import io
 from base64 import b64encode
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from tfarm.digits import plain
 from tfarm.dsp import Simulation
 from tfarm.dsp.traces import RATE, Motion, motion_of
 from tfarm.files import write_file
-from tfarm.records import record
+from tfarm.records import frozen
 
 from .style import BLUE, GREY, INK, check_records, picture, settled, style
 
@@ -56,8 +55,7 @@ def draw_motion(motion: Motion, *, ax: Axes) -> None:
     ax.set_title(motion.words(motion.still), loc="left", fontsize=9.0, color=INK)
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Animation:
     """A film of a run: the bytes of a GIF of `frames` frames, 20 a second; a notebook plays it."""
 

@@ -13,7 +13,7 @@ from tfarm.digits import plain, significant, unit
 from tfarm.plots.motion import sketch
 from tfarm.report.page import ArmReport, Fact, PageSection, picture, prose, sheet
 from tfarm.schema import Quantity, Table, table
-from tfarm.studies.cases import Candidates, has_hub_inertia, hub_study, section_study
+from tfarm.studies.candidates import Candidates, has_hub_inertia, hub_study, section_study
 
 
 def arm_section(report: ArmReport) -> PageSection:

@@ -47,7 +47,7 @@ from tfarm.fitting.recording import MeasuredRun
 from tfarm.loop import sampled_verdict as verdict
 from tfarm.loop.loop import Loop
 from tfarm.plots.style import Figure, drawn_for, gains_words, save_figure
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response.signals import Signals, sign_of
 from tfarm.schema import Column, Table, quantities, save_table, text, to_json
 from tfarm.schema.html import as_html, with_symbols
@@ -309,8 +309,7 @@ def kept(out: Path, kind: str, record: type[T]) -> dict[Path, T]:
 # ------------------------------------------------------------ the report
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class GivenLaw:
     """A law, the name of its `file` where it has one, and a run that was `measured` under it on the rig."""
 
@@ -325,8 +324,7 @@ class GivenLaw:
         return one_line(law.name, 60) if law.gains is None else gains_words(law)
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Controller:
     """A law on an arm: `arm` has the input that `law` drives, `given` is its source.
 

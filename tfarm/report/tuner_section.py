@@ -12,7 +12,7 @@ from tfarm.plots import motion
 from tfarm.report.page import ArmReport, Fact, PageSection, Picture, has_loop, picture, prose, sheet
 from tfarm.report.sampled_section import chain_words, piece_of_bands, response_columns
 from tfarm.schema import Column, Table, table
-from tfarm.studies.cases import WITHOUT, TunerNumbers, tuner_numbers
+from tfarm.studies.candidates import WITHOUT, TunerNumbers, tuner_numbers
 
 SAME_COST = 1e-4  # relative difference of two costs below which they are called the same
 TITLE = "The gain tuner against baselines"

@@ -166,7 +166,7 @@ def _sensitivities_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
             for name, value in _numbered(f"{SENSITIVITY}.{parameter}", values[-count:] + 0.0).items()}  # fmt: skip
 
 
-def _intervals_of(one: Subject, names: Set[str]) -> dict[str, Any]:
+def intervals_of(one: Subject, names: Set[str]) -> dict[str, Any]:
     """Stability and intervals of gains at the hub; undecided, without intervals, where poles cannot be counted."""
     found: dict[str, Any] = {STABILITY: "undecided"}
     with suppress(ConvergenceError):
@@ -223,7 +223,7 @@ ASKED: tuple[Asked, ...] = (
         STABILITY: Quantity("stability", help="of the continuous-time loop"),
         **{f"{INTERVAL}.{gain}.{name}": replace(of, label=f"stability interval of {gain} {of.label}")
            for gain in PLANE for name, of in quantities(Interval).items()},
-    }, _intervals_of),
+    }, intervals_of),
     (_columns(RATIO, "damping ratio, mode", "", "of the arm without controller"), _damped_of),
     ({
         UNSTABLE: Quantity("unstable poles", help="conjugates counted", is_number=True),

@@ -13,7 +13,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from itertools import islice, takewhile
 from logging import getLogger
@@ -27,6 +27,7 @@ from tfarm.arrays import Real
 from tfarm.case import Case
 from tfarm.errors import ConvergenceError, ParameterError, TfarmError, one_line, require
 from tfarm.files import write_file
+from tfarm.records import frozen
 from tfarm.tuner import Plan as TunerPlan
 
 from .quantities import FAILED, Values, prepare, quantity_of, sources_of, values_of
@@ -56,7 +57,7 @@ PATIENCE = 20  # seconds for a scheduler to answer, and for its first worker
 PACKAGES = ("tfarm", "numpy", "scipy", "numba")  # versions that all workers have in common
 
 
-@dataclass(frozen=True)
+@frozen
 class Plan:
     """A study: a case, its varied numbers and the columns that are asked for."""
 
@@ -136,7 +137,7 @@ def rows_a_chunk(cost: float, count: int, workers: int) -> int:
     return min(math.ceil(count / (workers * max(1, round(whole / seconds)))), 50_000)
 
 
-@dataclass(frozen=True)
+@frozen
 class Parts:
     """The folder of a study, with the parts that are written."""
 

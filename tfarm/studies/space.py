@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property, partial
 from importlib import import_module
 from itertools import islice
@@ -32,6 +32,7 @@ from tfarm.errors import ParameterError, must_be_known, naming, require
 from tfarm.files import open_file
 from tfarm.fitting.posterior import Posterior
 from tfarm.foreign import read_by_child
+from tfarm.records import frozen
 from tfarm.tuner import tuning
 
 # prefixes of the numbers of the controller and of the tuner
@@ -100,7 +101,7 @@ class Listing(NamedTuple):
             at = last
 
 
-@dataclass(frozen=True, kw_only=True)
+@frozen(kw_only=True)
 class Space:
     """Numbers that a study varies; `draws` of the distributions, each with every point of the grid.
 

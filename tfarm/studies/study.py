@@ -16,7 +16,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
@@ -38,7 +38,7 @@ from tfarm.errors import ParameterError, naming, require
 from tfarm.files import locked_folder, mat_content, write_file
 from tfarm.fitting.posterior import load_posterior
 from tfarm.processes import shared
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Column, Quantity, Table
 from tfarm.spectrum.table import default_gains
 
@@ -86,9 +86,7 @@ LARGER_IS_WORSE = (
 BOOTSTRAP = "95 % bootstrap interval; none without any influence"
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
-class WorstArm:
+class WorstArm(NamedTuple):
     """The worst arm of a study in one quantity: that drawn, and that of a search from there within the ranges."""
 
     quantity: Annotated[str, Quantity("quantity", help="column of the table")]
@@ -122,8 +120,7 @@ class StudyTable(dict[str, Any]):
         return import_module("pandas").DataFrame(self)
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class Study:
     """Results of a study, as far as it has been run, with its findings."""
 

@@ -5,7 +5,6 @@ has the number of searches that agreed, the width of the optimum, and whether th
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from operator import itemgetter
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -21,7 +20,7 @@ from tfarm.loop.edges import most_modes
 from tfarm.loop.loop import Loop
 from tfarm.loop.sampled_verdict import SampledBrief, sampled_brief, sampled_verdict
 from tfarm.loop.stability import Stability, stability
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.synthesis.judge import LOST, OBJECTIVES, Judge, judge_of, model_sizes
 from tfarm.synthesis.models import slew_and_after, trial_slew
@@ -38,8 +37,7 @@ CONSUMER = Consumer(
 LoopKind = Literal["sampled", "continuous"]
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class OnArm:
     """Value of the objective and both verdicts on one of the arms of a design; `numbers` are those of the box."""
 
@@ -95,8 +93,7 @@ class Coefficient(NamedTuple):
     optimum: Annotated[str, Quantity("optimum", help="place of the value in its bounds; at a bound it is no optimum")]
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Design:
     """The best law of a `structure` and its `coefficients`, the value of the objective, both verdicts, and its width.
 
@@ -153,12 +150,12 @@ class Design:
         self,
     ) -> Annotated[float | None, Quantity("record of the slew", "s", 6, "duration over which the objective is taken")]:
         """Length of the record of a residual or a cost, for `tfarm simulate --duration`; None of others."""
-        arm = self.verdict.loop.arm
-        chain = self.chain
-        if self.loop == "continuous":
+        of_residual = self.objective == "residual"
+        if self.loop == "continuous" or not (of_residual or self.objective == "cost"):
             return None
-        tasks = {"residual": lambda: slew_and_after(arm, arm, chain), "cost": lambda: trial_slew(arm, chain)}
-        return float(tasks[self.objective]().t[-1]) if self.objective in tasks else None
+        arm = self.verdict.loop.arm
+        task = slew_and_after(arm, arm, self.chain) if of_residual else trial_slew(arm, self.chain)
+        return float(task.t[-1])
 
     @property
     def worst_arm(self) -> Annotated[str, Quantity("worst arm", help="the arm that limits the objective")]:
@@ -234,8 +231,7 @@ def design(
     return task.design(*for_the_worst(arms, box, task.find, task.score_on, tell))
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class _Task:
     """A task of design: the arm of the slews, an objective, and a structure with its bounds."""
 
@@ -278,7 +274,10 @@ class _Task:
         score, x = nearest
         law = self.form.record_at(x)
         chain = None if self.continuous else self.chain
-        raise ConvergenceError(_why_none(named, self.form, law, chain, max(map(max, sizes))), law, score)
+        words = _why_none(named, self.form, law, chain, max(map(max, sizes)))
+        if len(named) > 1:
+            words = f"{words}; for {len(named)} arms at once: {'; '.join(each.name for each in named)}"
+        raise ConvergenceError(words, law, score)
 
     def score_on(self, choice: _Choice, on: Arm) -> float:
         """The score of a law on another arm; inf where the loop is unstable."""

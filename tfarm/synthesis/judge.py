@@ -18,15 +18,15 @@ instability of a higher one.  The result is checked by the exact verdicts; a mod
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import AnyLaw, Arm, as_law, tracked
+from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arm.blocks import Rational
 from tfarm.arrays import LEAST_SIZE, Complex, Real
+from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import driven
 from tfarm.dsp.results import simulated
@@ -35,7 +35,7 @@ from tfarm.loop.edges import LowerBound, most_modes
 from tfarm.loop.margins import lowest
 from tfarm.loop.sampled_verdict import UNDAMPED_MODES, sampled_verdict
 from tfarm.loop.stability import stability
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.synthesis.models import Model, Slews, continuous_model, sampled_model, slew_and_after
 from tfarm.synthesis.structures import Entry
 
@@ -115,8 +115,7 @@ class Objective(NamedTuple):
         return min(values) if self.is_negated else max(values)
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Judge:
     """The objective of laws on an arm, by a `model` of few modes; the models `also` have to be stable, too.
 
@@ -210,7 +209,8 @@ class Judge:
         """The residual of `tfarm simulate` after the slew [N m], with the converters; inf where it stops."""
         if not self.is_sampled:
             return self.score(law)
-        run, _ = simulated(*tracked(self.arm, law), self.chain, slew_and_after(self.arm, self.known, self.chain))
+        case = Case(self.arm, as_law(law), self.chain)
+        run, _ = simulated(case, slew_and_after(case.arm, self.known, case.chain))
         return np.inf if run.residual_moment is None else run.residual_moment
 
     def holds(self, law: AnyLaw) -> bool:

@@ -14,7 +14,6 @@ reference has states: its angle, rate and acceleration, constant over each half 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -28,15 +27,14 @@ from tfarm.dsp import Chain, Scenario, scenario
 from tfarm.dsp.plant import PulseTransfer, sensed_plant
 from tfarm.dsp.scenarios import TRIAL_SLEWS, trial_weights
 from tfarm.loop.loop import band_of, grid
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.reduced.modal import ALGEBRAIC, sensed_model
 from tfarm.response.signals import Signals
 from tfarm.spectrum.table import first_frequency
 from tfarm.synthesis.structures import Entry
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Model:
     """A, B, C, D from the input to `signals`, of few modes; at samples of `period` [s], or in continuous time (None).
 
@@ -330,8 +328,7 @@ def trial_slew(known: Arm, chain: Chain) -> Scenario:
     return scenario("slew", known, chain, TRIAL_SLEWS * chain.slew.rise_time)
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Slews:
     """Slews of an arm in a model, with references of the arm `known`."""
 

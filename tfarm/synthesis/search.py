@@ -11,7 +11,6 @@ region is returned.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple, cast
 
@@ -20,7 +19,6 @@ from scipy.optimize import differential_evolution, minimize
 
 from tfarm.arm import PLANE
 from tfarm.arrays import Real
-from tfarm.records import record
 from tfarm.synthesis.judge import LOST, Judge, scores_of
 from tfarm.synthesis.structures import Bounds, Structure
 from tfarm.synthesis.worst_case import Effort, Tell
@@ -49,9 +47,7 @@ class Points(NamedTuple):
         return cls(x[:, order], scores[order])
 
 
-@dataclass(frozen=True)
-@record
-class Search:
+class Search(NamedTuple):
     """Result of a search: points and scores, the lowest first; the structure with the searched bounds.
 
     Of `starts` runs `agreed` reached the best score; `widened` names coefficients.
@@ -64,9 +60,7 @@ class Search:
     widened: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-@record
-class Worst:
+class Worst(NamedTuple):
     """The judges of several arms as one: the largest of their scores."""
 
     judges: tuple[Judge, ...]
@@ -206,7 +200,9 @@ def _apart(form: Structure, points: Real, scores: Real, most: int = 4, least: fl
     for n in np.argsort(scores, kind="stable").tolist():
         if (abs(points[:, [n]] - points[:, found]) > least * (high - low)[:, None]).any(axis=0).all():
             found.append(n)
-    return found[:most]
+        if len(found) == most:
+            break
+    return found
 
 
 def flat_part(judge: Worst, form: Structure, x: Real, score: float) -> dict[str, Bounds]:

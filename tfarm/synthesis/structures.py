@@ -15,7 +15,7 @@ positive one, far above its unit, is searched by decades, and one of either sign
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ from tfarm.arm import ANGLE_GAIN, PLANE, TWO_GAINS, AnyLaw, Arm, HubFeedback, La
 from tfarm.arrays import Real
 from tfarm.errors import must_be_known, require
 from tfarm.loop.loop import band_of
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.spectrum import modes as natural_modes
 from tfarm.spectrum.table import check_gains, first_frequency, rate_unit, turning_inertia
 
@@ -65,8 +65,7 @@ def signed(name: str, size: float) -> Coefficient:
     return Coefficient(name, size, (-REACH * size, REACH * size), (-np.inf, np.inf), 0.0)
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Structure:
     """A law with `free` coefficients, and `fixed` ones, which are not searched.
 
@@ -205,21 +204,21 @@ ONE = np.ones((1, 1))
 Built = tuple[Sequence[Coefficient], Callable[[Real], tuple[Entry, ...]]]  # free coefficients, and their entries
 
 
-class Declared(NamedTuple):
+class Declaration(NamedTuple):
     """A structure: its formula in LaTeX, and its coefficients and entries of arm, Kp, number of modes, and period."""
 
     formula: str
     of: Callable[[Arm, float, int, float], Built]
 
 
-STRUCTURES: dict[str, Declared] = {}
+STRUCTURES: dict[str, Declaration] = {}
 
 
 def structure(name: str, formula: str) -> Callable[[Callable[[Arm, float, int, float], Built]], None]:
     """Declare a structure: `tfarm design`, its documentation and its tests have it from here."""
 
     def declare(of: Callable[[Arm, float, int, float], Built]) -> None:
-        STRUCTURES[name] = Declared(formula, of)
+        STRUCTURES[name] = Declaration(formula, of)
 
     return declare
 

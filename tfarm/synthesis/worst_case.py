@@ -9,9 +9,8 @@ That is no proof over the box: between the arms of the list nothing is certain.
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import Literal, TypeVar
+from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from tfarm.arm.records import ADJUSTABLE
 from tfarm.arm.writing import KeyedArms
 from tfarm.arrays import Real
 from tfarm.errors import ConvergenceError, require
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.synthesis.structures import Bounds
 
 _Found = TypeVar("_Found")
@@ -33,9 +32,7 @@ ARMS_TRIED = 24  # arms at random inside the box
 MUCH_WORSE = 0.01  # of a score: an arm inside is added if it is worse by more
 
 
-@dataclass(frozen=True)
-@record
-class NamedArm:
+class NamedArm(NamedTuple):
     """An arm, its name in the results, and its `numbers` of a box, by key."""
 
     name: str
@@ -54,8 +51,7 @@ def varied(arm: Arm, key: str, value: float) -> Arm:
     return KeyedArms(arm, (key,), "range").at({key: value})
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class ArmBox:
     """The arms with numbers in `ranges` (key: its ends), and all other numbers of `arm`.
 
@@ -128,9 +124,7 @@ def arms_of(arm: Arm, also: Sequence[Arm], box: ArmBox | None) -> list[NamedArm]
     return [*(NamedArm(each.name, each, {}) for each in (arm, *also)), *corners]
 
 
-@dataclass(frozen=True)
-@record
-class WorstCase:
+class WorstCase(NamedTuple):
     """Choice of the arms of a design: the `ranges` of the box, and the number of arms `tried` inside it.
 
     `worse` names an arm inside on which the law is still worse, where the exchange ended before there was none.
@@ -164,40 +158,30 @@ def for_the_worst(
     that is stable on all arms, or where it stays unstable on one inside the box.
     """
     named = list(arms)
-    tried = 0
+    if box is None:
+        return find(named, None, "whole"), named, WorstCase({}, 0)
+    tried = added = 0
     found = None
-    added = 0
-    effort: Effort = "sketch" if box else "whole"
+    effort: Effort = "sketch"
     while True:
-        try:
-            found = find(named, found, effort)
-        except ConvergenceError as error:
-            if len(named) == 1:
-                raise
-            raise ConvergenceError(
-                f"{error.message}; for {len(named)} arms at once: {'; '.join(each.name for each in named)}",
-                error.best,
-                error.residual,
-            ) from None
-        if box is None:
-            return found, named, WorstCase({}, 0)
+        found = find(named, found, effort)
         limit = max(score_on(found, each.arm) for each in named)
         worst, score, number = worst_inside(box, partial(score_on, found))
         tried += number
         is_worse = score > limit + MUCH_WORSE * abs(limit)
-        if effort != "sketch" and not is_worse:
-            return found, named, WorstCase(box.ranges, tried)
-        if effort != "sketch" and added == 4:
-            if math.isinf(score):
+        if effort != "sketch":
+            if not is_worse:
+                return found, named, WorstCase(box.ranges, tried)
+            if added == 4 and math.isinf(score):
                 raise ConvergenceError(f"no law found is stable on {worst.name}: narrow the ranges", None, None)
-            return found, named, WorstCase(box.ranges, tried, worst.name)
+            if added == 4:
+                return found, named, WorstCase(box.ranges, tried, worst.name)
+            effort = "near"
         if is_worse:
             tell(f"{worst.name} is worse than the other {len(named)} arms, and added")
             named.append(worst)
             added += 1
-        if effort != "sketch":
-            effort = "near"
-        elif not is_worse or added == 2:
+        if effort == "sketch" and (not is_worse or added == 2):
             effort = "whole"
             added = 0
 

@@ -355,6 +355,7 @@ def _settled(loops: list[Sampled], found: list[tuple[float, float]]) -> bool:
     if loops[0].plant.arm.is_undamped or len(found) < 2:
         return False
     (before_low, before_high), (low, high) = found
+    # of the width of the interval
     agree = max(abs(low - before_low), abs(high - before_high)) <= 1e-3 * (high - low)
     return agree and upper_modes_are_quiet(loops[-1], high)
 

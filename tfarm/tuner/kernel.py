@@ -22,7 +22,7 @@ import numpy as np
 from tfarm.arm.checks import whole
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import Real
-from tfarm.errors import ParameterError, require
+from tfarm.errors import require
 from tfarm.exact.compiled import compiled, inlined
 from tfarm.records import record
 
@@ -303,12 +303,11 @@ class Network:
     def __post_init__(self) -> None:
         for name in ("W1", "w2", "scales"):
             value = np.array(getattr(self, name), dtype=float)
-            for odd in value[~np.isfinite(value)].tolist():
-                raise ParameterError(key=name, value=odd, remedy="every weight and scale is a finite number")
+            require(np.isfinite(value).all(), name, value.tolist(), "every weight and scale is a finite number")
             object.__setattr__(self, name, value)
         remedy = f"W1 is (hidden, 6 or 7), hidden from 1 to {MOST_HIDDEN}, with as many columns as scales"
-        hidden, *inputs = self.W1.shape or (0,)
-        is_network = inputs in ([PAPER_INPUTS], [PAPER_INPUTS + 1]) and 1 <= hidden <= MOST_HIDDEN
+        hidden, *inputs = self.W1.shape
+        is_network = inputs in ([6], [7]) and 1 <= hidden <= MOST_HIDDEN
         require(is_network, "W1", self.W1.shape, remedy)
         require(self.w2.shape == (hidden,), "w2", self.w2.shape, f"one weight a hidden neuron, {hidden}")
         are_scales = self.scales.shape == (*inputs,) and (self.scales > 0).all()

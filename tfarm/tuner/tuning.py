@@ -9,11 +9,12 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, must_be_arm
+from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, as_law, must_be_arm
 from tfarm.arm.chain import Reading, chain_or_usual
 from tfarm.arrays import Real
-from tfarm.dsp import Chain, Simulator, scenario
-from tfarm.dsp.results import Run, enough_modes, ideal_chain
+from tfarm.case import Case
+from tfarm.dsp import Chain, scenario
+from tfarm.dsp.results import Run, simulated
 from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, described, torque_unit
 from tfarm.dsp.simulate import RESIDUAL
 from tfarm.errors import require
@@ -347,12 +348,11 @@ def controlled_run(
     """
     chain, gain = with_signals(chain, saved.signals), saved.gain()
     task = scenario(name, arm, chain, duration)
-    ideal = ideal_chain(chain)
-    used = enough_modes(lambda n: gain.run(Simulator(arm, ideal, task, count=n, outputs=outputs)), count)
-    run = gain.run(Simulator(arm, chain, task, count=used.modes, between=between, outputs=outputs))
+    case = Case(arm, as_law(gain.servo), chain)
+    run, used = simulated(case, task, count, between, outputs, gain.run)
     trained = {
         "trained_on": saved.arm, "guard_kind": saved.guard_kind, "guard": list(gain.guard), "K1": saved.K1,
         "Kp": saved.Kp, "signals": saved.signals, "period_s": saved.period, "a": saved.a, "b": saved.b,
         "cost_unit_N_m": saved.scales[0],
     }  # fmt: skip
-    return Run(arm, gain.servo, run, used, described(task, arm, chain), tuner=trained)
+    return Run(case, run, used, described(task, arm, chain), tuner=trained)

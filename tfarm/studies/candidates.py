@@ -8,7 +8,7 @@ at a time, everything else being the arm's own.  Both rest on the exact solution
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -19,8 +19,8 @@ from tfarm.arm.checks import whole
 from tfarm.arrays import Real
 from tfarm.case import Case
 from tfarm.dsp import Chain, Simulation, results, traces
-from tfarm.errors import ConvergenceError, require
-from tfarm.records import record
+from tfarm.errors import require
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import default_gains
@@ -28,9 +28,9 @@ from tfarm.tuner import LearningCurves, Tuning, compare_controllers, tried_loops
 from tfarm.tuner.baselines import Outcomes, quantised_chain
 from tfarm.tuner.tuning import tuned, usual_plan
 
-from .quantities import FAILED, FREQUENCY, INTERVAL, SENSITIVITY, STABILITY, prepare, sources_of, values_of
+from .quantities import FREQUENCY, INTERVAL, STABILITY, intervals_of, prepare
 from .running import Progress
-from .space import Subject, Subjects
+from .space import Subjects
 
 STUDIED_MODES = 4  # flexible modes, by default
 DEPTHS = (0.002, 0.003, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.030, 0.040, 0.060)  # m, for that area
@@ -41,7 +41,7 @@ OWN_VALUE = 1e-9  # relative: a candidate nearer to the arm's own value is that 
 # ------------------------------------------------------------ sections and hubs
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@frozen(kw_only=True)
 class Candidate:
     """One candidate section or hub inertia, and the loop under the default gains of the arm itself.
 
@@ -89,8 +89,7 @@ class Candidate:
     ] = False
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Candidates:
     """Candidates of one assumed parameter, and the limits of every frequency where it is the hub's inertia."""
 
@@ -121,7 +120,7 @@ class Candidates:
     ]
 
 
-@dataclass(frozen=True)
+@frozen
 class Assumptions:
     """The effect of the assumed section and hub; no hub where that has no inertia to choose."""
 
@@ -203,24 +202,21 @@ def _candidates(arm: Arm, count: int, key: str, own: int, known: Mapping[str, Se
     """Return the rows of a study of that key, whose values are the last of those known; `own` is the arm's own row."""
     parameter, values = list(known.items())[-1]
     limit = f"{INTERVAL}.{MOMENT_GAIN}.high"
-    names = [f"{of}.{n}" for of in (FREQUENCY, f"{SENSITIVITY}.{parameter}") for n in range(1, count + 1)]
-    # no loop of a locked hub or a free pin
-    words = (STABILITY, limit, f"{limit}_is") if has_hub_inertia(arm) else ()
     family = Subjects(Case(arm, as_law(default_gains(arm))), (key,))
-    subjects: list[Subject] = [family.at((value,)) for value in values]
-    prepare(subjects, names)
-    sources, rows = sources_of((*names, *words)), []
+    subjects = [family.at((value,)) for value in values]
+    prepare(subjects, [f"{FREQUENCY}.{count}"])
+    rows = []
     for n, one in enumerate(subjects):
-        found = values_of(one, sources)
-        if found[FAILED]:
-            raise ConvergenceError(found[FAILED], None, None)
-        own_numbers = [found[name] for name in names]
+        table = modes(one.case.arm, count)
         loop: dict[str, Any] = {}
-        if words:
-            verdict, below, kind = (found[name] for name in words)
-            loop = {"verdict": verdict, "K2_below": below, "K2_below_is_edge": kind == "edge"}
+        # no loop of a locked hub or a free pin
+        if has_hub_inertia(arm):
+            found = intervals_of(one, {limit})
+            is_edge = found.get(f"{limit}_is") == "edge"
+            loop = {"verdict": found[STABILITY], "K2_below": found.get(limit), "K2_below_is_edge": is_edge}
         rows.append(Candidate(
-            is_own=n == own, natural_frequency=own_numbers[:count], sensitivity=own_numbers[count:], **loop,
+            is_own=n == own, natural_frequency=table.natural_frequency[-count:].tolist(),
+            sensitivity=(table.sensitivity[parameter][-count:] + 0.0).tolist(), **loop,
             **{name: column[n] for name, column in known.items()},
         ))  # fmt: skip
     return rows
@@ -267,8 +263,7 @@ CURVE_SAMPLES = 80_000_000  # that the trials of learning curves may have togeth
 LONG_TRIAL = 16_000  # samples: the comparison of a longer one is of the arm itself alone
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class TunerNumbers:
     """One tuning and what is compared with it.
 
