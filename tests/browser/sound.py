@@ -27,8 +27,9 @@ from tfarm.dsp import load_chain
 from tfarm.fitting.fit import fit
 from tfarm.report import write, writing
 from tfarm.report.live import ASSETS, save_live, write_assets
-from tfarm.report.page import Case, GivenLaw
-from tfarm.report.writing import PIECES, pieces_of, write_comparison, write_study
+from tfarm.report.page import ArmReport, GivenLaw
+from tfarm.report.study_page import write_study
+from tfarm.report.writing import PIECES, pieces_of, write_comparison
 
 LAB = replace(tfarm.load("sasaki2012-lab"), name=NAME, assumptions=ARM.assumptions)
 LAW = tfarm.Law({"hub_angle": ([2.0, 8.0], [0.02, 1.0]), "hub_rate": 0.4}, name=TEXT)
@@ -62,8 +63,8 @@ def few(tmp_path_factory):
         seen = tfarm.Measured(output="root_moment", input="hub_torque", omega=omega, values=H, sigma=abs(H))
         found = fit(LAB, [seen], free=["hub.inertia"], profile=False)
         patch.setattr("tfarm.report.writing.PIECES", tuple(piece for piece in PIECES if piece.anchor in ("fit", "arm")))
-        _arm_pages(Case(replace(found.arm, name="fitted"), chain, (), found), out / "fitted")
-    save_live(Case(LAB, chain), out / NAME)
+        _arm_pages(ArmReport(replace(found.arm, name="fitted"), chain, (), found), out / "fitted")
+    save_live(ArmReport(LAB, chain), out / NAME)
     write_assets(out / ASSETS)
     laws_of_gains = [tfarm.HubFeedback(K1=0.3, K2=0.3), tfarm.HubFeedback(K1=14.7, K2=-0.26)]
     write_comparison(tfarm.compare(LAB, laws_of_gains, names=("as in the paper", TEXT), modes=2), out / "compared")
@@ -71,12 +72,10 @@ def few(tmp_path_factory):
     return out
 
 
-def _arm_pages(subject: Case, folder: Path) -> None:
+def _arm_pages(subject: ArmReport, folder: Path) -> None:
     """The first page on a subject, and those of the sections that there are."""
     folder.mkdir()
-    sections = [
-        writing.make_section(piece.name, piece.anchor, piece.make, subject, folder) for piece in pieces_of(subject)
-    ]
+    sections = [writing.make_section(piece, subject, folder) for piece in pieces_of(subject)]
     writing.save_card(subject, folder)
     writing._write_pages(subject, folder, sections, None, "", folder)
 

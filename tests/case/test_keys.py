@@ -22,7 +22,7 @@ from tfarm.dsp.results import simulated_run
 from tfarm.errors import ParameterError
 from tfarm.exact import system
 from tfarm.exact.system import system_of
-from tfarm.exported import controller, fmu, result, systems, tuner_code
+from tfarm.exported import controller, fmu, live_loop, result, systems, tuner_code
 from tfarm.loop import sampled_verdict as verdicts
 from tfarm.loop.sampled_verdict import sampled, sampled_brief, sampled_verdict
 from tfarm.loop.stability import CONTINUOUS
@@ -137,8 +137,9 @@ ANSWERS = {
     tuner_code.CONSUMER: tuner_in_c,
     fmu.CONSUMER: exported("fmu", "loop"),
     systems.CONSUMER: exported("py", "loop"),
-    live.CONSUMER: lambda arm, chain: (
-        live.sampled_numbers(sampled_verdict(arm, GAINS, chain, count=3).loop), live.slew_numbers(arm, chain, GAINS)
+    live_loop.CONSUMER: lambda arm, chain: (
+        live_loop.sampled_numbers(sampled_verdict(arm, GAINS, chain, count=3).loop),
+        live_loop.slew_numbers(arm, chain, GAINS),
     ),
 }  # fmt: skip
 PUBLIC = {  # the functions that users call, which refuse before any work

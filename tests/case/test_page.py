@@ -10,7 +10,7 @@ from tests.hostile import LONG, TEXT, Read, check_drawing, check_page
 from tests.shell import run
 from tfarm.dsp import Chain
 from tfarm.errors import one_line
-from tfarm.report.page import Case
+from tfarm.report.page import ArmReport
 from tfarm.report.writing import _write_pages, write_comparison
 from tfarm.schema import json_value, to_dict
 
@@ -91,7 +91,7 @@ def test_an_index_leads_to_the_comparison_and_back(compared, tmp_path, monkeypat
     check_page(index.read_text(encoding="utf-8"), one_line(HOSTILE, 60))
     assert "prefers-color-scheme: dark" in shown.read_text(encoding="utf-8")
     arm.mkdir()
-    _write_pages(Case(LAB, Chain()), arm, [], ("modes",), "", arm)
+    _write_pages(ArmReport(LAB, Chain()), arm, [], ("modes",), "", arm)
     assert "../compare.html" in _leads_to(arm / "modes.html")
 
 

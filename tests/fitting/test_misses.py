@@ -18,7 +18,7 @@ from tfarm.fitting.fit import arms_drawn, fit
 from tfarm.fitting.misses import Miss, misses_of
 from tfarm.fitting.model import Problem, Response
 from tfarm.fitting.solve import Solution
-from tfarm.report.page import Case
+from tfarm.report.page import ArmReport
 from tfarm.report.response_sections import fit_section
 
 E, INERTIA = "link.youngs_modulus", "hub.inertia"
@@ -106,7 +106,7 @@ def test_the_remedy_is_right(without_gain):
 def test_arms_are_not_drawn_about_a_curve_that_misses(without_gain):
     with pytest.raises(ConvergenceError, match="misses the data"):
         arms_drawn(without_gain, 3)
-    section = fit_section(Case(without_gain.arm, Chain(), (), without_gain), count=3)
+    section = fit_section(ArmReport(without_gain.arm, Chain(), (), without_gain), count=3)
     assert f"Remedy: {without_gain.advice}." in section.words
     assert [block.title for block in section.blocks] == ["Measured over fitted", "Fitted numbers", "Resonances"]
 

@@ -21,9 +21,10 @@ from tests.shell import refused, run
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
 from tfarm.fitting.fit import arms_drawn, fit, repeats, save_fit
+from tfarm.fitting.possible import response_band, stable_share
 from tfarm.fitting.posterior import Posterior, PosteriorNumber, load_posterior
 from tfarm.plots.frequency import draw_band, draw_share
-from tfarm.report.page import Case
+from tfarm.report.page import ArmReport
 from tfarm.report.response_sections import fit_section
 from tfarm.spectrum.table import default_gains
 from tfarm.studies.study import load_study
@@ -259,20 +260,22 @@ def test_of_an_unknown_pair_the_product_hardly_varies():
 def test_gains_and_responses_on_all_of_them(known):
     """The band is that of the drawn arms' own responses, the map the share of those that are stable."""
     arms = arms_drawn(known, count=5)
-    band, best = draw_band.figure(known, arms, "root_moment").axes[0].get_children()[:2]
+    found = response_band(known, arms, "root_moment")
+    band, best = draw_band.figure(known, found, "root_moment", 5).axes[0].get_children()[:2]
     vertices = band.get_paths()[0].vertices
     omega = 2 * np.pi * best.get_xdata()[400]
     sizes = [abs(tfarm.transfer(arm, "root_moment")(1j * omega)) for arm in (known.arm, *arms)]
     at = vertices[np.isclose(vertices[:, 0], best.get_xdata()[400], rtol=1e-12), 1]
     assert (at.min(), at.max(), best.get_ydata()[400]) == pytest.approx((min(sizes[1:]), max(sizes[1:]), sizes[0]))
-    share = draw_share.figure(known, arms[:2], [(0.3, 0.5), (0.3, 3.0)]).axes[0].collections[0].get_array()
+    found = stable_share(arms[:2], [(0.3, 0.5), (0.3, 3.0)])
+    share = draw_share.figure(known, found).axes[0].collections[0].get_array()
     stable = [tfarm.closed_loop_poles(arm, tfarm.HubFeedback(K1=0.3, K2=0.3), 6).unstable == 0 for arm in arms[:2]]
     assert share[0, 0] == np.mean(stable)
     assert share[-1].tolist() == [0.0] * 60
 
 
 def test_the_section_of_a_page(known):
-    section = fit_section(Case(known.arm, Chain(), (), known), count=3)
+    section = fit_section(ArmReport(known.arm, Chain(), (), known), count=3)
     titles = [block.title for block in section.blocks]
     assert titles == [
         "Measured over fitted", "Fitted numbers", "Resonances", "The arms that the data leave possible",

@@ -87,3 +87,9 @@ def _is_on_curve(text: Text, box: Bbox, ax: Axes) -> bool:
 
 def _quoted(text: Text) -> str:
     return repr(text.get_text())
+
+
+def linear_rgb(colour: Any) -> Any:
+    """Linear parts of sRGB colours (..., 3)."""
+    colour = np.asarray(colour)
+    return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)

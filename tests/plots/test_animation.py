@@ -9,7 +9,8 @@ from PIL import Image
 
 import tfarm
 from tfarm.dsp import Chain, Sampling, load_chain
-from tfarm.plots.animation import DOTS, MOST_FRAMES, Motion, draw_motion, exaggeration, film, motion_of
+from tfarm.dsp.traces import MOST_FRAMES, Motion, exaggeration, motion_of
+from tfarm.plots.animation import DOTS, draw_motion, film
 from tfarm.plots.style import settled, style
 
 LAB = tfarm.load("sasaki2012-lab")

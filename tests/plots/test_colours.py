@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex, to_rgb
 
 import tfarm
+from tests.plots.labels import linear_rgb
 from tfarm.loop.circle_crossings import sampled_map
 from tfarm.loop.locus import locus
 from tfarm.loop.stability import stability
@@ -40,18 +41,14 @@ BLIND = {  # of linear sRGB: Machado, Oliveira and Fernandes (2009), severity 1
 XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
 
 
-def linear_rgb(colour):
-    return np.array([c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in to_rgb(colour)])
-
-
 def lightness(colour):
     """CIE 1976 L* of an sRGB colour."""
-    return 116 * np.cbrt(np.dot((0.2126, 0.7152, 0.0722), linear_rgb(colour))) - 16
+    return 116 * np.cbrt(np.dot((0.2126, 0.7152, 0.0722), linear_rgb(to_rgb(colour)))) - 16
 
 
 def seen(colour, eyes):
     """CIE 1976 L*, a* and b* of a colour to eyes without one kind of cones, each above 0.009 of white."""
-    x, y, z = np.cbrt(XYZ @ np.clip(BLIND[eyes] @ linear_rgb(colour), 0.009, 1) / XYZ.sum(axis=1))
+    x, y, z = np.cbrt(XYZ @ np.clip(BLIND[eyes] @ linear_rgb(to_rgb(colour)), 0.009, 1) / XYZ.sum(axis=1))
     return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
 
 

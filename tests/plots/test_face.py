@@ -36,17 +36,8 @@ LAB = tfarm.load("sasaki2012-lab")
 MICRO = Path(__file__).parents[1] / "data" / "reproductions" / "micro2.toml"
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
 LEAD = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_deflection": ([0.5], [0.02, 1.0])})
-AXES = {
-    "comparison": 3,
-    "bode": 2,
-    "loop": 2,
-    "measured": 3,
-    "modes": 3,
-    "slew": 3,
-    "step": 4,
-    "study": 4,
-    "study_scatter": 6,
-}  # of a plot that has several
+AXES = {"comparison": 3, "bode": 2, "loop": 2, "measured": 3, "modes": 3, "slew": 3, "step": 4, "study": 4}
+AXES |= {"study_scatter": 6}  # of a plot that has several
 PICTURES = sorted({*tfarm.plots.__all__} - {"animate", "column"})
 OTHERS = [f"{name} of a rig" for name in ("gain_map", "nyquist", "disc", "bode", "locus", "loop", "nichols")]
 OTHERS += ["locus of a law", "gain_map of a law"]
@@ -60,16 +51,6 @@ def no_figure_left_open():
     left = pyplot.get_fignums()
     pyplot.close("all")
     assert left == []
-
-
-class Made(dict):
-    """What each function makes, at the first call for its name."""
-
-    def __init__(self, makers):
-        self.makers = makers
-
-    def __missing__(self, name):
-        return self.setdefault(name, self.makers[name]())
 
 
 @pytest.fixture(scope="module")
@@ -91,8 +72,7 @@ def records(tmp_path_factory):
         "locus": lambda: [tfarm.locus(LAB, LAW, "K2", -1.0, 1.6, points=60, branches=3)],
         "measured": lambda: [tfarm.overlay(LAB, sweep())],
         "modes": lambda: [tfarm.modes(LAB, count=3)],
-        "nyquist": lambda: [tfarm.nyquist(LAB, LAW)],
-        "disc": lambda: [tfarm.nyquist(LAB, LAW)],
+        **dict.fromkeys(("nyquist", "disc"), lambda: [tfarm.nyquist(LAB, LAW)]),
         "loop": lambda: [tfarm.loop_function(LAB, LAW, Chain())],
         "nichols": lambda: [tfarm.margins(LAB, LAW)],
         "sensitivity": lambda: [tfarm.loop_function(LAB, LAW)],
@@ -100,21 +80,17 @@ def records(tmp_path_factory):
         "sketch": lambda: [LAB],
         "tuned_gain": lambda: [tfarm.tune(LAB, Plan(trials=1))],
         "slew": lambda: [LAB, tfarm.simulate(LAB, LAW, duration=2.0, count=8, between=4)],
-        "study": lambda: [study()],
-        "study_band": lambda: [study()],
-        "study_scatter": lambda: [study()],
+        **dict.fromkeys(("study", "study_band", "study_scatter"), lambda: [study()]),
         "step": lambda: [tfarm.step(LAB, LAW, scenario_name="slew", duration=2.0)],
         "locus of a law": lambda: [tfarm.locus(LAB, LEAD, "gain", 0.0, 2.0, 10, 3)],
         "gain_map of a law": lambda: [tfarm.map(LAB, factors, delays, law=LEAD, vary=("gain", "delay"))],
         "bode of a rig": lambda: [tfarm.bode(rig, "root_moment", (1.0, 1000.0))],
-        "loop of a rig": lambda: [tfarm.loop_function(rig, law)],
-        "nichols of a rig": lambda: [tfarm.loop_function(rig, law)],
-        "disc of a rig": lambda: [tfarm.nyquist(rig, law)],
-        "nyquist of a rig": lambda: [tfarm.nyquist(rig, law)],
+        **dict.fromkeys(("loop of a rig", "nichols of a rig"), lambda: [tfarm.loop_function(rig, law)]),
+        **dict.fromkeys(("nyquist of a rig", "disc of a rig"), lambda: [tfarm.nyquist(rig, law)]),
         "locus of a rig": lambda: [tfarm.locus(rig, law, "K2", -unit, 1.6 * unit, points=40, branches=4)],
         "gain_map of a rig": lambda: [tfarm.map(rig, np.linspace(-1, 4, 40) * law.K1, np.linspace(-1, 1.5, 41) * unit)],
     }
-    return Made(makers)
+    return cache(lambda name: makers[name]())
 
 
 def sweep():
@@ -143,14 +119,14 @@ def test_a_picture_in_given_axes_and_on_its_own(name, records):
     """
     plot, count = getattr(tfarm.plots, name.split()[0]), AXES.get(name.split()[0], 0)
     given = axes_for(count)
-    assert as_tuple(plot(*records[name], ax=given)) == as_tuple(given)
+    assert as_tuple(plot(*records(name), ax=given)) == as_tuple(given)
     assert pyplot.get_fignums() == []
     axes = [axis for ax in as_tuple(given) if ax.axison for axis in (ax.xaxis, ax.yaxis)]
     named = [axis for axis in axes if axis.get_ticklocs().size and axis.get_tick_params().get("labelbottom", True)]
     assert [axis for axis in named if not re.search(r"\w.* \[.+\]", axis.get_label_text())] == []
     theirs = ("xtick.labelsize", "ytick.labelsize", "axes.labelsize", "font.size")
     with mpl.rc_context(dict.fromkeys(theirs, 31.0)):
-        own = as_tuple(plot(*records[name]))
+        own = as_tuple(plot(*records(name)))
         (figure,) = map(pyplot.figure, pyplot.get_fignums())
         assert [ax.get_figure() for ax in own] == [figure] * max(1, count)
         words = drawn(figure)  # matplotlib makes ticks only when it draws
@@ -189,7 +165,7 @@ def test_a_number_of_a_law_has_its_unit(number, label):
 @pytest.mark.parametrize("name", PICTURES)
 def test_a_wrong_argument_of_a_picture_is_refused_with_the_function_to_use(name, records):
     """The first and the last argument of each picture, one at a time; other figures are left alone."""
-    right = records[name]
+    right = records(name)
     for place in {0, len(right) - 1}:
         for wrong in (3, LAW, tfarm.transfer(LAB, "root_moment")):
             given = [wrong if n == place else each for n, each in enumerate(right)]
@@ -212,7 +188,7 @@ def test_overlapping_words_are_reported():
 
 
 def test_bode_draws_the_response(records):
-    (data,) = records["bode"]
+    (data,) = records("bode")
     upper, lower = tfarm.plots.bode(data, ax=axes_for(2))
     (curve,) = (line for line in upper.lines if line.get_label() == "flexible arm, exact")
     assert curve.get_xdata().tolist() == data.omega.tolist()
@@ -225,7 +201,7 @@ def test_bode_draws_the_response(records):
 @pytest.mark.parametrize("name", ["nyquist", "disc"])
 def test_nyquist_draws_the_loop_function_with_its_verdict(name, records):
     """Off the arcs past poles every point of the contour is on a line, in a disc at r/(1 + r) for its size r."""
-    (data,) = records[name]
+    (data,) = records(name)
     ax = getattr(tfarm.plots, name)(data, ax=axes_for(0), name="mine")
     drawn = {complex(x, y) for line in ax.lines for x, y in zip(*line.get_data(), strict=True)}
     upper = (data.L if name == "nyquist" else compressed(data.L))[~data.is_arc]
@@ -238,7 +214,7 @@ def test_nyquist_draws_the_loop_function_with_its_verdict(name, records):
 
 
 def test_modes_draws_the_shapes_with_their_nodes(records):
-    (found,) = records["modes"]
+    (found,) = records("modes")
     axes = tfarm.plots.modes(found, ax=axes_for(3))
     shapes = found.shape(axes[0].lines[1].get_xdata())
     for ax, index in zip(axes, (1, 2, 3), strict=True):
@@ -253,7 +229,7 @@ def test_modes_draws_the_shapes_with_their_nodes(records):
 
 def test_gain_map_draws_the_boundary_and_the_counts(records):
     """Every point of the record's boundary that is in the picture is on the line, and each pixel is a count."""
-    (found,) = records["gain_map"]
+    (found,) = records("gain_map")
     ax = tfarm.plots.gain_map(found, ax=axes_for(0))
     (line,) = (line for line in ax.lines if "exact" in str(line.get_label()))
     K1, K2, _ = found.boundary.T
@@ -284,7 +260,7 @@ def test_numbers_of_crowded_contours_do_not_touch():
 
 def test_locus_draws_the_branches_and_their_crossings(records):
     """To the ten digits of |s| that hold on every processor."""
-    (found,) = records["locus"]
+    (found,) = records("locus")
     ax = tfarm.plots.locus(found, ax=axes_for(0))
     drawn = [line.get_xdata() + 1j * line.get_ydata() for line in ax.lines if line.get_linewidth() == 2.6]
     for line, branch in zip(drawn, found.branches, strict=True):  # with more points between those of the record
@@ -310,7 +286,7 @@ def test_a_reduced_locus_is_drawn_with_the_exact_one(vary, stop):
 
 
 def test_measured_draws_both_curves_and_the_coherence(records):
-    (found,) = records["measured"]
+    (found,) = records("measured")
     upper, middle, lower = tfarm.plots.measured(found, ax=axes_for(3))
     drawn = {line.get_label(): line.get_data() for line in upper.lines}
     data = found.measured
@@ -324,7 +300,7 @@ def test_measured_draws_both_curves_and_the_coherence(records):
 
 
 def test_a_comparison_draws_both_responses_and_both_regions(records):
-    (found,) = records["comparison"]
+    (found,) = records("comparison")
     upper, lower, plane = tfarm.plots.comparison(found, ax=axes_for(3))
     for data, above, below in zip(found.responses, upper.lines, lower.lines, strict=False):
         assert above.get_xdata().tolist() == data.omega.tolist()
@@ -338,7 +314,7 @@ def test_a_comparison_draws_both_responses_and_both_regions(records):
 
 
 def test_overlay_draws_both_regions_edges(records):
-    plane, sampled = records["overlay"]
+    plane, sampled = records("overlay")
     ax = tfarm.plots.overlay(plane, sampled, ax=axes_for(0))
     drawn = {(float(x), float(y)) for line in ax.lines for x, y in zip(*line.get_data(), strict=True)}
     for region in (plane, sampled):
@@ -352,7 +328,7 @@ def test_overlay_draws_both_regions_edges(records):
 
 
 def test_slew_draws_the_records_at_the_samples_and_between(records):
-    arm, run = records["slew"]
+    arm, run = records("slew")
     moment, tip, torque = tfarm.plots.slew(arm, run, ax=axes_for(3))
     (drawn,) = (line for line in moment.lines if line.get_linewidth() == 1.3)
     t, y = (x.tolist() for x in drawn.get_data())
@@ -369,7 +345,7 @@ def test_slew_draws_the_records_at_the_samples_and_between(records):
 
 
 def test_tuned_gain_draws_the_gain_in_its_guard(records):
-    (found,) = records["tuned_gain"]
+    (found,) = records("tuned_gain")
     ax = tfarm.plots.tuned_gain(found, ax=axes_for(0))
     (line,) = (line for line in ax.lines if "K(t)" in str(line.get_label()))
     assert line.get_xdata().tolist() == found.training.result.t.tolist()
@@ -392,7 +368,7 @@ def test_of_more_modes_than_axes_the_first_are_drawn_with_the_digits_of_their_no
 @pytest.mark.parametrize(("name", "number"), [("bode", 2), ("slew", 3)])
 def test_too_few_axes_are_refused_with_how_many_it_takes(name, number, records):
     with pytest.raises(tfarm.ParameterError, match=rf"ax = 1: {number} axes, as figure.subplots\({number}\)"):
-        getattr(tfarm.plots, name)(*records[name], ax=axes_for(0))
+        getattr(tfarm.plots, name)(*records(name), ax=axes_for(0))
 
 
 def test_no_file_takes_the_name_of_a_picture_away():

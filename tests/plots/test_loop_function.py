@@ -1,6 +1,5 @@
 """Pictures of the loop function: labels are the card's, curves those of python-control on a reduced model."""
 
-import math
 import re
 
 import control
@@ -44,19 +43,8 @@ def line(ax, label):
     return next(each for each in ax.get_lines() if str(each.get_label()).startswith(label))
 
 
-def test_the_labels_of_the_loop_are_the_margins_of_python_control(model):
-    """To 1e-3: what a model of forty states leaves out."""
-    found = labels(*tfarm.plots.loop(tfarm.margins(LAB, LAW), ax=Figure().subplots(2)))
-    omega = np.geomspace(0.05, 3e3, 10_000)
-    data = control.FRD(model(1j * omega), omega)
-    gains, phases, _, at_gain, at_phase, _ = control.stability_margins(data, returnall=True)
-    up = min((gain, w) for gain, w in zip(gains, at_gain, strict=True) if gain > 1)
-    phase = min((abs((each + 180) % 360 - 180), w) for each, w in zip(phases, at_phase, strict=True))
-    assert found["GM", False] == pytest.approx((20 * math.log10(up[0]), up[1]), rel=1e-3)
-    assert found["PM", False] == pytest.approx(phase, rel=1e-3)
-
-
 def test_labels_are_the_numbers_of_the_card_of_both_loops(both):
+    """Which are those of python-control on a reduced model (tests/case/test_card.py)."""
     card = tfarm.result_card(LAB, LAW, CHAIN)
     found = labels(*tfarm.plots.loop(both, ax=Figure().subplots(2)))
     found |= labels(tfarm.plots.sensitivity(both, ax=Figure().subplots()))

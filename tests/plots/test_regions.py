@@ -7,11 +7,11 @@ import pytest
 
 import tfarm
 from tfarm.arm import HubFeedback
+from tfarm.assessment.stability_map import sampled_region
 from tfarm.dsp import Chain
+from tfarm.exported.live_loop import live_data
 from tfarm.loop.plane import moment_axis, rate_axis, rate_columns
 from tfarm.loop.stability import stability
-from tfarm.plots.regions import sampled_region
-from tfarm.report.live import live_data
 from tfarm.report.page import prose
 
 LAB = tfarm.load("sasaki2012-lab")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tfarm.assessment.stability_map import sampled_region
 from tfarm.crossing import pieces
 from tfarm.dsp import load_chain
 from tfarm.loop.continuous import ContinuousLoop
@@ -12,7 +13,6 @@ from tfarm.loop.plane import moment_axis, rate_axis
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_modes import sampled_loci
 from tfarm.plots import locus as locus_plot
-from tfarm.plots.regions import sampled_region
 from tfarm.plots.roots import draw_sampled_loci
 from tfarm.spectrum.table import default_gains, rate_unit
 

@@ -4,11 +4,12 @@ import sys
 from pathlib import Path
 
 import tfarm
+from tfarm.assessment.stability_map import stable_regions
 from tfarm.digits import plain
 from tfarm.dsp import load_chain
 from tfarm.plots.frequency import bode as bode_plot
 from tfarm.plots.motion import modes
-from tfarm.plots.regions import overlay, stable_regions
+from tfarm.plots.regions import overlay
 from tfarm.plots.style import save_figure
 from tfarm.response.frequency import bode, resonant_band
 from tfarm.spectrum.table import default_gains
@@ -28,7 +29,7 @@ def write_pictures(out: Path) -> None:
         "mode-shapes": modes.figure(tfarm.modes(lab, count=4)),  # two rows
     }
     for stem, figure in figures.items():
-        save_figure(figure, out, stem, formats=("png",), dpi=DOTS)
+        save_figure(figure, out / f"{stem}.png", DOTS)
 
 
 if __name__ == "__main__":

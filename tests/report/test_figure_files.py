@@ -12,7 +12,7 @@ from tests.report.written import coarsen
 from tfarm.dsp import Chain
 from tfarm.report.arm_section import arm_section
 from tfarm.report.loop_section import locus_section, nyquist_section
-from tfarm.report.page import PICTURES, Case, command_of, save_section
+from tfarm.report.page import PICTURES, ArmReport, command_of, save_section
 from tfarm.report.response_sections import bode_section, modes_section
 
 mpl.use("Agg")
@@ -33,7 +33,7 @@ def pictures():
     """The pictures of an arm's page by stem, on coarse grids."""
     with pytest.MonkeyPatch.context() as patch:
         coarsen(patch.setattr)
-        sections = [make(Case(LAB, Chain())) for make in DRAWN.values()]
+        sections = [make(ArmReport(LAB, Chain())) for make in DRAWN.values()]
     return {block.stem: block for section in sections for block in section.blocks if hasattr(block, "figure")}
 
 
@@ -54,13 +54,13 @@ def test_the_line_of_python_draws_the_picture(stem, pictures):
 
 
 def test_of_an_arm_that_is_no_preset_the_line_reads_the_file_of_its_page(tmp_path):
-    picture = arm_section(Case(OWN, Chain())).blocks[0]
+    picture = arm_section(ArmReport(OWN, Chain())).blocks[0]
     assert picture.python == 'tfarm.plots.sketch(tfarm.load("arm.toml"))'
 
 
 def test_figures_for_a_paper_are_saved_and_linked_where_they_are_wanted(tmp_path):
     """A PDF of one column, 252 points, with SVGs of the page's own size and of a phone's; by default these alone."""
-    section = bode_section(Case(LAB, Chain()), "root_moment")
+    section = bode_section(ArmReport(LAB, Chain()), "root_moment")
     for is_paper, kinds in ((False, ["svg", "svg"]), (True, ["pdf", "svg", "svg"])):
         folder = tmp_path / str(is_paper)
         folder.mkdir()
@@ -71,4 +71,4 @@ def test_figures_for_a_paper_are_saved_and_linked_where_they_are_wanted(tmp_path
         assert sorted(links) == sorted(set(kinds))
         assert "<code>tfarm.plots.bode(" in first.html
     assert re.search(rb"/MediaBox \[ 0 0 252 ", files[0].read_bytes())
-    assert "--paper" in command_of(Case(LAB, Chain(), is_paper=True), "")
+    assert "--paper" in command_of(ArmReport(LAB, Chain(), is_paper=True), "")

@@ -12,7 +12,7 @@ import pytest
 
 import tfarm
 from tests.hostile import check_page
-from tests.report.written import blocks_of, plain_cards, values_of
+from tests.report.written import blocks_of, values_of
 from tests.shared import sized
 from tests.shell import answer, run
 from tfarm import HubFeedback, Law, ParameterError
@@ -25,9 +25,9 @@ from tfarm.fitting.recording import compare_run, load_run, overshoot
 from tfarm.loop.sampled import sampled_loop
 from tfarm.report import writing
 from tfarm.report.loop_section import law_section, margins_section
-from tfarm.report.page import Case, GivenLaw, file_of
+from tfarm.report.page import ArmReport, GivenLaw, file_of
 from tfarm.report.sampled_section import sampled_section, step_rows
-from tfarm.report.writing import PIECES, pieces_of
+from tfarm.report.writing import pieces_of
 from tfarm.schema import to_json
 
 LAB, BARE, PRESET = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "quanser-2dsfl"))
@@ -73,7 +73,7 @@ def table(section, stem):
 
 @pytest.mark.parametrize("rows", sized([1], [0, 1, 2]), ids=str)
 def test_radii_on_the_page_are_those_of_the_command_at_each_delay(capsys, file, given, rows):
-    section = sampled_section(Case(LAB, Chain(), given))
+    section = sampled_section(ArmReport(LAB, Chain(), given))
     shown = table(section, "sampled-delays")
     for row in rows:
         late = (0.0, 0.5, 1.0)[row]
@@ -81,12 +81,12 @@ def test_radii_on_the_page_are_those_of_the_command_at_each_delay(capsys, file, 
         assert shown["further_delay_ms"][row] == 10 * late
         assert (shown["verdict"][row], shown["spectral_radius"][row]) == (found["verdict"], found["spectral_radius"])
     assert len(set(shown["verdict"])) == 2  # half a sample more stabilises this one
-    assert "Tustin" in law_section(Case(LAB, Chain(), given)).words[0]
+    assert "Tustin" in law_section(ArmReport(LAB, Chain(), given)).words[0]
 
 
 def test_the_loop_function_of_an_unstable_loop_has_no_margins(given):
     law = Law({"hub_angle": -5.0, "hub_rate": ([1.0], [0.01, 1.0])}, name="backwards")
-    section = margins_section(Case(LAB, Chain(), (GivenLaw(law),)))
+    section = margins_section(ArmReport(LAB, Chain(), (GivenLaw(law),)))
     assert margins_of(LAB, law).stability.verdict == "unstable"
     assert set(blocks_of(section)) == {"law-bode", "margins", "law-spill", "law-windows"}
     assert "interval" not in table(section, "law-windows")
@@ -95,9 +95,7 @@ def test_the_loop_function_of_an_unstable_loop_has_no_margins(given):
 # ------------------------------------------------------------ pages
 
 
-def test_a_page_is_about_its_law_and_its_file_repeats_it(file, tmp_path, monkeypatch, capsys):
-    plain_cards(monkeypatch.setattr)
-    monkeypatch.setattr("tfarm.report.writing.PIECES", [piece for piece in PIECES if piece.anchor == "law"])
+def test_a_page_is_about_its_law_and_its_file_repeats_it(file, tmp_path, capsys):
     code, out, err = run(
         capsys, "report", LAB.name, "--law", str(file), "--period", "0.004", "--only", "law", "--out", str(tmp_path)
     )
@@ -120,20 +118,20 @@ def test_a_page_is_about_its_law_and_its_file_repeats_it(file, tmp_path, monkeyp
 
 def test_gains_typed_are_in_the_file_of_the_page():
     gains = HubFeedback(K1=0.5, K2=-0.1)
-    text = file_of(Case(LAB, Chain(), (GivenLaw(gains),)))
+    text = file_of(ArmReport(LAB, Chain(), (GivenLaw(gains),)))
     assert "[law.hub_rate]\ngain = 0.5" in text
-    assert "[law]" not in file_of(Case(LAB, Chain()))
+    assert "[law]" not in file_of(ArmReport(LAB, Chain()))
 
 
 def test_a_page_of_laws_has_a_section_on_each_and_none_of_the_arms_gains():
-    subject = Case(LAB, Chain(), (GivenLaw(Law({"hub_rate": ([1.0], [0.01, 1.0])})),))
+    subject = ArmReport(LAB, Chain(), (GivenLaw(Law({"hub_rate": ([1.0], [0.01, 1.0])})),))
     assert [each.page for each in pieces_of(subject) if each.anchor == "law"] == ["law"]
-    discrete = Case(LAB, Chain(), (GivenLaw(Law({"hub_rate": 0.3}, period=0.01)),))
+    discrete = ArmReport(LAB, Chain(), (GivenLaw(Law({"hub_rate": 0.3}, period=0.01)),))
     anchors = {each.anchor for each in pieces_of(discrete)}
     assert not anchors & {"margins", "margins-nyquist", "locus", "margins-map", "tune"}
     assert "sampled loop" in law_section(discrete).words[-1]
     held = replace(LAB, hub=tfarm.Hub(inertia=math.inf))
-    assert {each.page for each in pieces_of(Case(held, Chain(), subject.laws))} == {"bode", "modes", "assumptions"}
+    assert {each.page for each in pieces_of(ArmReport(held, Chain(), subject.laws))} == {"bode", "modes", "assumptions"}
 
 
 @pytest.mark.parametrize(
@@ -205,7 +203,7 @@ def test_what_is_measured_and_computed_of_the_real_controllers():
 
 def test_a_measured_run_is_put_in_the_place_of_the_slew():
     laws = tuple(GivenLaw(*_with_run(name)) for name in ("lqg", "hinf"))
-    section = sampled_section(Case(tfarm.load(DATA / "rig.toml"), load_chain(DATA / "rig.toml"), laws))
+    section = sampled_section(ArmReport(tfarm.load(DATA / "rig.toml"), load_chain(DATA / "rig.toml"), laws))
     blocks = blocks_of(section)
     assert list(blocks) == [
         "sampled", "sampled-delays", "sampled-modes-law-1", "sampled-modes-law-2", "sampled-measured",
@@ -239,8 +237,8 @@ def _with_run(name):
 
 def test_laws_of_one_name_are_numbered_and_a_signal_that_no_arm_has_is_refused():
     two = tuple(GivenLaw(Law({"hub_rate": ([gain], [0.01, 1.0])}, name="PD")) for gain in (0.3, 0.6))
-    assert [each.name for each in Case(LAB, Chain(), two).controllers] == ["PD", "PD (2)"]
-    assert to_json({"rows": law_section(Case(LAB, Chain(), two)).blocks[0]}).count("PD (2)") == 1
+    assert [each.name for each in ArmReport(LAB, Chain(), two).controllers] == ["PD", "PD (2)"]
+    assert to_json({"rows": law_section(ArmReport(LAB, Chain(), two)).blocks[0]}).count("PD (2)") == 1
     with pytest.raises(ParameterError, match="hub_spin"):
         writing.write([LAB], Path("nowhere"), laws=[(GivenLaw(Law({"hub_spin": 1.0})),)])
 
@@ -252,10 +250,7 @@ FILE = "tests/data/sweep/tip.csv"
 GIVEN = f"tip_acceleration/hub_torque={FILE}"
 
 
-def test_the_page_has_the_command_that_makes_it(tmp_path, capsys, monkeypatch):
-    for kept in ("save_proof", "save_card"):  # which have their own tests
-        monkeypatch.setattr(writing, kept, lambda *_: None)
-    monkeypatch.setattr("tfarm.report.writing.PIECES", [each for each in PIECES if each.name == "measured responses"])
+def test_the_page_has_the_command_that_makes_it(tmp_path, capsys):
     given = ("report", "sasaki2012-lab", "--only", "bode", "--measured", GIVEN, "--out", str(tmp_path))
     code, out, _ = run(capsys, *given)
     assert code == 0

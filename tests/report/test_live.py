@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import itertools
 import json
 import math
 import re
@@ -14,21 +13,21 @@ from dataclasses import replace
 import control
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 import tfarm
+from tests.report.written import Unmakeable
 from tests.shared import remember, remembered, thinned
 from tfarm.arm import HubFeedback, Law
 from tfarm.dsp import Chain, Sampling, load_chain
 from tfarm.exact.characteristic import float_units, loop_parts
 from tfarm.exact.system import system_of
+from tfarm.exported.live_loop import law_data, live_data, sensor_numbers, slew_numbers
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.panels import MOST_MISS, loop_panels
 from tfarm.loop.sampled_verdict import sampled_verdict
-from tfarm.loop.stability import stability
 from tfarm.report import live
-from tfarm.report.live import has_sliders, law_data, live_data, save_live, sensor_numbers, slew_numbers
-from tfarm.report.page import Case, GivenLaw
+from tfarm.report.live import has_sliders, save_live
+from tfarm.report.page import ArmReport, GivenLaw
 
 SIGNALS = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
 ARMS = ("sasaki2012-lab", "stocky-steel", "quanser-flexlink")
@@ -83,18 +82,6 @@ def test_the_error_that_the_page_states_is_not_exceeded(case):
         missed = abs(held - factor * exact).max(axis=1) / abs(held).max(axis=1)
         assert missed.max() < 100 * MOST_MISS
     assert data["error"] <= MOST_MISS
-
-
-def test_verdicts_are_the_librarys_counts(case):
-    arm, data, page = case
-    for law in some_gains(data, 9, 12):
-        try:
-            known = stability(arm, law, data["band"])
-        except tfarm.ConvergenceError:
-            continue
-        assert page.verdict(law).startswith("stable") == known.is_stable, law
-        if data["kind"] == "quiet":  # else poles may come from beyond the band
-            assert page.count(law) == known.unstable_roots, law
 
 
 def test_sampled_poles_of_the_plant_in_the_page_are_the_librarys(case):
@@ -159,21 +146,12 @@ def test_a_zero_on_the_axis_has_no_real_part_of_rounding():
     assert not [(re, im) for re, im in zeros if 0 < abs(re) < 1e-9 * abs(im)]
 
 
-def test_zeros_of_sensors_that_are_not_determined_have_their_reason(case, monkeypatch, tmp_path):
-    _, data, _ = case
-
-    def fails(*_):
-        raise tfarm.ConvergenceError("no polynomial follows", 0.0, 1.0)
-
-    monkeypatch.setattr("tfarm.report.live.positions", fails)
-    arm = tfarm.load("sasaki2012-lab")
-    found = sensor_numbers(arm)
-    assert found == {"sensor": None, "no_sensor": "no polynomial follows"}
-    monkeypatch.setattr("tfarm.report.live.live_data", lambda *_: {**data, **found})
-    save_live(Case(arm, Chain()), tmp_path)
-    assert "as its zeros are not determined: no polynomial follows." in (tmp_path / "live.html").read_text(
-        encoding="utf-8"
-    )
+def test_zeros_of_sensors_that_are_not_determined_have_their_reason(monkeypatch, tmp_path):
+    error = tfarm.ConvergenceError("no polynomial follows", 0.0, 1.0)
+    monkeypatch.setattr("tfarm.exported.live_loop.positions", Unmakeable(error))
+    save_live(ArmReport(tfarm.load("sasaki2012-lab"), Chain()), tmp_path)
+    page = (tmp_path / "live.html").read_text(encoding="utf-8")
+    assert "as its zeros are not determined: no polynomial follows." in page
 
 
 def test_a_slew_of_too_many_samples_is_left_to_the_command():
@@ -193,7 +171,7 @@ def policy_of(page):
 def test_the_page_stays_small_and_has_its_text_alone(tmp_path, monkeypatch):
     monkeypatch.setattr("tfarm.report.live.live_data", data_of)
     odd = replace(tfarm.load(ARMS[0]), name=ARMS[0] + ODD)
-    save_live(Case(odd, chain_of(odd)), tmp_path)
+    save_live(ArmReport(odd, chain_of(odd)), tmp_path)
     page = (tmp_path / "live.html").read_text(encoding="utf-8")
     assert len(page) < 3e6
     assert "<h1>sasaki2012-lab &amp; &#39;co&#39;: live loop</h1>" in page
@@ -218,7 +196,7 @@ def test_explore_writes_the_page_that_a_report_has_and_opens_it(tmp_path, monkey
     arm, law, chain = tfarm.load(ARMS[0]), HubFeedback(K1=0.25, K2=0.4), Chain(sampling=Sampling(period=0.005))
     found = tfarm.explore(arm, law, chain)
     (tmp_path / "report").mkdir()
-    save_live(Case(arm, chain, (GivenLaw(law),)), tmp_path / "report")
+    save_live(ArmReport(arm, chain, (GivenLaw(law),)), tmp_path / "report")
     assert found.path.read_bytes() == (tmp_path / "report" / "live.html").read_bytes()
     assert opened == [found.path.as_uri()]
     monkeypatch.setitem(sys.modules, "ipykernel", sys)
@@ -317,7 +295,6 @@ class Page:
         )
         self.series = values @ TO_SERIES.T
         self.series[..., 0] /= 2
-        self.grid = self._grid()
 
     def at(self, omega):
         """d, theta and m (3, n), or d and the parts of a law."""
@@ -331,67 +308,6 @@ class Page:
         """D and N, up to one positive factor for each panel."""
         (d, theta, m), s = self.at(omega), 1j * np.atleast_1d(omega)
         return s ** self.data["order"] * d, (law.Kp + law.K1 * s) * theta + law.K2 * s**2 * m
-
-    def loop(self, omega, law):
-        D, N = self.parts(omega, law)
-        return N / D
-
-    def _grid(self):
-        places, band = np.array(self.data["places"]), self.data["band"]
-        lowest, away = 1e-6 * min(band, places[0]), np.geomspace(1e-10, 0.06, 14)
-        corners = np.r_[lowest, places[places < band], band]
-        between = [np.linspace(a, b, 24, endpoint=False) for a, b in itertools.pairwise(corners)]
-        close = np.outer(places, 1 + np.r_[-away, away]).ravel()
-        omega = np.unique(np.concatenate([close, *between, np.geomspace(lowest, corners[1], 60), [band]]))
-        return omega[(omega >= lowest) & (omega <= band)]
-
-    def zeros(self, f, omega):
-        """Where f changes its sign, and to which."""
-        value = f(omega)
-        omega, value = omega[value != 0], value[value != 0]
-        before = np.nonzero(value[1:] * value[:-1] < 0)[0]
-        places = [brentq(lambda w: float(f(w)[0]), omega[i], omega[i + 1], xtol=1e-300, rtol=1e-15) for i in before]
-        return np.array(places), np.where(value[before] > 0, 2, -2)
-
-    def count(self, law):
-        """Unstable poles: those of the reference and what crosses on the way, Kp last."""
-        data, start = self.data, law.having("Kp", 0.0)
-        start = start.having("K1", data["reference"]["K1"]).having("K2", data["reference"]["K2"])
-        corner, loss = law.having("Kp", 0.0), data["rate_loss"]
-        found = data["reference_count"] + self._crossed(start, corner) + self._crossed(corner, law)
-        way = corner.K1 - start.K1
-        t = -(start.K1 + loss) / way if way else -1.0
-        if 0 < t < 1:
-            found -= int(np.sign(way * (data["inertia"] - (start.K2 + t * (law.K2 - start.K2)) * data["gauged"])))
-        return found + (law.Kp * (law.K1 + loss) < 0)
-
-    def _crossed(self, start, end):
-        way = HubFeedback(**{name: end[name] - start[name] for name in start.by_name})
-
-        def both(w):
-            D, N = self.parts(w, start)
-            return D + N, self.parts(w, way)[1]
-
-        def h(w):
-            A, B = both(w)
-            return (A * B.conj()).imag
-
-        if not any(way.row):
-            return 0
-        places, change = self.zeros(h, self.grid)
-        A, B = both(places) if places.size else (np.empty(0), np.ones(0))
-        t = -(A / B).real
-        return int(change[(t > 0) & (t < 1)].sum())
-
-    def verdict(self, law):
-        data = self.data
-        if data["kind"] == "reactive":
-            low, high = (np.inf * sign if m is None else m for m, sign in zip(data["moments"], (-1, 1), strict=True))
-            return "stable" if law.K1 > 0 and low < law.K2 < high and law.Kp >= 0 else "not"
-        if self.count(law):
-            return "unstable"
-        takes = np.sign(law.K1 + data["rate_loss"]) * np.sign(1 - law.K2 / data["whole"]) if data["by_sign"] else 0
-        return "unstable" if data["kind"] == "band" and takes < 0 and data["hub_alone"] else "stable"
 
 
 def complex_rows(text, rows):

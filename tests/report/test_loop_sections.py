@@ -9,9 +9,10 @@ from matplotlib.contour import QuadContourSet
 
 import tfarm
 from tests.plots.labels import complaints
-from tests.report.written import coarsen, plain_cards
+from tests.report.written import coarsen
 from tfarm.arm import Hub, HubFeedback
 from tfarm.arm.chain import Sampling
+from tfarm.assessment import stability_map
 from tfarm.assessment.card import margins_of
 from tfarm.dsp import Chain, load_chain
 from tfarm.loop import plane as edges
@@ -19,18 +20,14 @@ from tfarm.loop.continuous import band_of
 from tfarm.loop.loci import loci
 from tfarm.loop.nyquist import nyquist
 from tfarm.loop.poles import closed_loop_poles
-from tfarm.report import loop_section as map_room
-from tfarm.report import page as cases
-from tfarm.report import write, writing
+from tfarm.report import write
 from tfarm.report.loop_section import (
-    draw_map_of_arm,
-    map_of_arm,
     map_section,
     margin_table,
     margins_section,
     recommended_section,
 )
-from tfarm.report.page import DESIGNED_MODES, Case, brief_on, has_loop, on_hub, prose
+from tfarm.report.page import ArmReport, brief_on, has_loop, on_hub, prose
 from tfarm.spectrum.table import PAPER_GAINS, default_gains
 
 LAB, PURE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
@@ -39,28 +36,21 @@ EPS = np.finfo(float).eps
 
 @pytest.fixture(scope="module")
 def lab():
-    return map_of_arm(Case(LAB, Chain()))
+    return stability_map.stability_map(LAB, Chain())
 
 
 @pytest.fixture(scope="module")
-def section(lab):
+def section():
     """The map of the lab's gains on its page."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(map_room, "map_of_arm", lambda case: {lab.case: lab}[case])
-        return map_section(Case(LAB, Chain()))
+    return map_section(ArmReport(LAB, Chain()))
 
 
 @pytest.fixture(scope="module")
 def coarse():
-    """The map of the paper's arm on its page: a coarse one, and without the search for the best gains.
-
-    That takes longest and has its own tests.
-    """
+    """The map of the paper's arm on its page: a coarse one."""
     with pytest.MonkeyPatch.context() as patch:
-        for room in (cases, map_room):
-            patch.setattr(room, "best", lambda arm, chain: None)
         coarsen(patch.setattr)
-        return map_section(Case(PURE, Chain()))
+        return map_section(ArmReport(PURE, Chain()))
 
 
 # ------------------------------------------------------------ the map
@@ -82,14 +72,14 @@ def test_no_part_of_the_edge_is_missing(lab):
         for row, column in np.argwhere(np.diff(lab.region.unstable, axis=axis)):
             if axis == 1 and lab.region.K1[column] < 0 < lab.region.K1[column + 1]:
                 continue  # the line K1 = 0 is drawn on its own
-            half = (0.5 / map_room.GRID_COLUMNS) * axis, (0.5 / map_room.GRID_ROWS) * (1 - axis)
+            half = (0.5 / stability_map.GRID_COLUMNS) * axis, (0.5 / stability_map.GRID_ROWS) * (1 - axis)
             middle = across[column] + half[0], up[row] + half[1]
             assert np.hypot(*(edge - middle).T).min() < edges.SHORT_SEGMENT
 
 
-def test_contours_reach_the_frame_and_words_overlap_nothing(lab):
+def test_contours_reach_the_frame_and_words_overlap_nothing(lab, section):
     """A line of equal damping ends at the frame, at the stability boundary, or where it began."""
-    figure = draw_map_of_arm.figure(lab)
+    figure = section.blocks[0].figure.again()
     assert complaints(figure) == []
     assert (*lab.coarse.axes[0][[0, -1]], *lab.coarse.axes[1][[0, -1]]) == (
         lab.x.low,
@@ -111,7 +101,7 @@ def test_the_contours_are_the_damping_of_the_poles(lab):
     for row, column in ((5, 20), (25, 40), (30, 55)):
         law = HubFeedback(K1=float(lab.coarse.axes[0][column]), K2=float(lab.coarse.axes[1][row]))
         poles = closed_loop_poles(LAB, law, 6).values
-        poles = poles[(poles.imag > 0) & (poles.imag < band_of(LAB, DESIGNED_MODES))]
+        poles = poles[(poles.imag > 0) & (poles.imag < band_of(LAB, stability_map.DESIGNED_MODES))]
         expected = (-poles.real / abs(poles)).min()
         assert lab.damping[row, column] == pytest.approx(expected, rel=1e-3, abs=0)  # of a model of eight modes
 
@@ -121,7 +111,7 @@ def test_the_contours_are_the_damping_of_the_poles(lab):
 
 def test_the_verdict_comes_before_any_margin():
     """On the page and in the table; and where the loop is not stable there is no margin at all."""
-    section = margins_section(Case(LAB, Chain()))
+    section = margins_section(ArmReport(LAB, Chain()))
     (table,) = (block for block in section.blocks if block.stem == "margins")
     quantities = table.columns[0].values
     assert quantities.index("stability") < min(n for n, name in enumerate(quantities) if "margin" in name)
@@ -159,9 +149,7 @@ def test_every_pole_on_the_axis_is_passed_on_its_right():
 
 
 @pytest.mark.parametrize(("inertia", "reason"), [(math.inf, "locked"), (0.0, "no inertia")])
-def test_an_arm_without_a_loop_gets_a_sentence(tmp_path, monkeypatch, inertia, reason):
-    monkeypatch.setattr(writing, "save_proof", lambda *_: None)
-    plain_cards(monkeypatch.setattr)
+def test_an_arm_without_a_loop_gets_a_sentence(tmp_path, inertia, reason):
     arm = replace(PURE, name="held", hub=Hub(inertia=inertia))
     assert not has_loop(arm)
     page = write([arm], tmp_path, only=("margins",)).read_text()
@@ -186,31 +174,31 @@ def test_the_map_shows_its_proof(coarse, section):
 # ------------------------------------------------------------ the same gains, sampled
 
 
-def test_the_star_is_stable_at_the_period_of_its_page(lab):
+def test_the_star_is_stable_at_the_period_of_its_page(section):
     """The best gains of a page are those of its own chain: both loops of their card are stable, as by the poles."""
-    assert all(brief_on(LAB, each.law, Chain()).is_stable for each in lab.case.in_s)
-    labels = [text.get_text() for text in draw_map_of_arm.figure(lab).legends[0].get_texts()]
+    assert all(brief_on(LAB, each.law, Chain()).is_stable for each in ArmReport(LAB, Chain()).in_s)
+    labels = [text.get_text() for text in section.blocks[0].figure.legends[0].get_texts()]
     assert any(label.startswith("best damping") and "stable when sampled every 10 ms" in label for label in labels)
     quick = Chain(sampling=Sampling(period=2e-3))
     for chain, period in ((Chain(), "10 ms"), (quick, "2 ms")):
-        section = recommended_section(Case(LAB, chain))
+        section = recommended_section(ArmReport(LAB, chain))
         assert [(each["loop"], each["finding"].split(",")[0]) for each in section.card] == [
             ("continuous-time", "stable"),
             (f"sampled, {period}", "stable"),
         ]
-        gains = Case(LAB, chain).in_s[1].law.gains
+        gains = ArmReport(LAB, chain).in_s[1].law.gains
         assert tfarm.result_card(LAB, gains, chain).sampled.grade == "poor"
         assert section.title == "Gains of best damping"
         assert "`tfarm design --objective margin`" in section.answer
         assert f"K1 = {gains.K1:.4g}" in section.answer
         phase = tfarm.margins(LAB, gains).in_band.phase_margin.value
         assert float(section.card[0]["phase_margin_deg"]["value"]) == pytest.approx(abs(phase), rel=5e-4)
-    slow, fast = (Case(LAB, each).in_s[1].law.gains.K1 for each in (Chain(), quick))
+    slow, fast = (ArmReport(LAB, each).in_s[1].law.gains.K1 for each in (Chain(), quick))
     assert fast > slow
 
 
 def test_gains_without_a_poor_margin_are_recommended():
-    rig = Case(tfarm.load("quanser-flexlink"), load_chain("quanser-flexlink"))
+    rig = ArmReport(tfarm.load("quanser-flexlink"), load_chain("quanser-flexlink"))
     assert tfarm.result_card(rig.arm, rig.in_s[1].law, rig.chain).sampled.grade != "poor"
     assert recommended_section(rig).title == "Recommended gains (best damping)"
 
@@ -224,7 +212,7 @@ def test_intervals_are_short_facts_of_the_map(section):
 
 
 def test_without_recommended_gains_there_is_a_sentence(monkeypatch):
-    monkeypatch.setattr(map_room, "best", lambda arm, chain: None)
-    section = recommended_section(Case(LAB, Chain()))
+    monkeypatch.setattr("tfarm.report.loop_section.best", lambda arm, chain: None)
+    section = recommended_section(ArmReport(LAB, Chain()))
     assert section.answer.startswith("None: the search")
     assert not section.card

@@ -11,6 +11,7 @@ import pytest
 import tfarm
 from tests.odd_arms import odd_arms
 from tests.report import plausible
+from tests.report.written import blocks_of
 from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.arm import implausible
@@ -21,14 +22,13 @@ from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.locus import locus
 from tfarm.loop.poles import poles_below
 from tfarm.report import loop_section
-from tfarm.report import page as cases
 from tfarm.report.arm_section import arm_section, assumptions_section, derived_table
 from tfarm.report.loop_section import (
     locus_section,
     margin_table,
     margins_section,
 )
-from tfarm.report.page import Case, has_loop, on_hub, prose
+from tfarm.report.page import ArmReport, GivenLaw, has_loop, on_hub, prose, sign_words
 from tfarm.report.response_sections import bode_section, damped_tables, modal_table
 from tfarm.report.writing import pieces_of
 from tfarm.spectrum import DampedModes
@@ -52,7 +52,7 @@ def number(text):
 
 
 def test_a_locked_hub_is_not_turned_by_a_torque():
-    captions = {name: arm_section(Case(arm, Chain())).blocks[0].caption for name, arm in ARMS.items()}
+    captions = {name: arm_section(ArmReport(arm, Chain())).blocks[0].caption for name, arm in ARMS.items()}
     assert {name for name, caption in captions.items() if "turns the link by the torque u" in caption} == set(ARMS) - {
         "locked",
         "free-pin",
@@ -91,7 +91,7 @@ def test_rows_outside_the_certified_box_are_marked(name, monkeypatch):
 
 
 def test_a_gauge_on_a_free_pin_reads_the_torque():
-    section = bode_section(Case(ARMS["free-pin"], Chain()), "root_moment")
+    section = bode_section(ArmReport(ARMS["free-pin"], Chain()), "root_moment")
     assert "0 poles" not in section.blocks[0].caption
     assert section.words[0].endswith("There are none.")
     assert "zeros ," not in section.words[0]
@@ -109,11 +109,11 @@ def test_a_ratio_that_no_isotropic_material_has_is_not_called_poissons():
 def test_a_slip_of_units_is_named_on_the_page():
     link = ARMS["boom"].link
     slip = replace(ARMS["boom"], link=replace(link, density=1.6, length=800.0))
-    words = arm_section(Case(slip, Chain())).words
+    words = arm_section(ArmReport(slip, Chain())).words
     assert words[0].startswith("Check the units, ")
     assert all(key in words[0] for key in ("link.density = 1.6", "link.length = 800.0"))
     for arm in ARMS.values():
-        assert len(arm_section(Case(arm, Chain())).words) == (0 if arm.assumptions else 1) + bool(implausible(arm))
+        assert len(arm_section(ArmReport(arm, Chain())).words) == (0 if arm.assumptions else 1) + bool(implausible(arm))
 
 
 def test_a_contradiction_on_a_page_is_found(tmp_path):
@@ -151,15 +151,13 @@ def test_the_interval_of_K2_is_that_of_the_poles(name):
 
 
 @pytest.mark.parametrize("name", LOOPS)
-def test_sentences_about_the_pole_at_0_and_J_are_for_arms_that_turn_freely(name, monkeypatch):
-    monkeypatch.setattr(cases, "best", lambda arm, chain: None)
-    section = margins_section(Case(ARMS[name], Chain()))
-    (windows,) = (block for block in section.blocks if block.stem == "default-windows")
-    (margins,) = (block for block in section.blocks if block.stem == "margins")
+def test_sentences_about_the_pole_at_0_and_J_are_for_arms_that_turn_freely(name):
+    arm = ARMS[name]
+    section = margins_section(ArmReport(arm, Chain(), (GivenLaw(default_gains(arm)),)))
+    windows, margins = (blocks_of(section)[stem] for stem in ("law-windows", "margins"))
     shown = [cell for each in margins.columns for cell in each.cells]
-    words = " ".join([*section.words, *shown, windows.caption, cases.sign_words(ARMS[name])])
-    turns = ARMS[name].has_rigid_mode
-    assert ("free hub angle" in words) == ("(J - I_h)/J" in words) == turns
+    words = " ".join([*section.words, *shown, windows.caption, sign_words(arm)])
+    assert ("free hub angle" in words) == ("(J - I_h)/J" in words) == arm.has_rigid_mode
     for interval, searched in zip(*(column(windows, key).values for key in ("interval", "search_range")), strict=True):
         for side, end in zip(("low", "high"), searched, strict=True):
             assert interval is None or (interval[f"{side}_is"] == "search bound") == (interval[side] == end)
@@ -175,7 +173,7 @@ def test_branches_that_cannot_be_followed_are_left_out_with_a_word(monkeypatch):
         return locus(arm, law, vary, start, stop, points, branches)
 
     monkeypatch.setattr(loci_room, "locus", follow)
-    section = locus_section(Case(arm, Chain()))
+    section = locus_section(ArmReport(arm, Chain()))
     words = " ".join(section.words)
     assert "separated from its neighbours" not in words
     assert "Along K1 the branches of this arm could not be followed" in words
@@ -183,23 +181,22 @@ def test_branches_that_cannot_be_followed_are_left_out_with_a_word(monkeypatch):
     assert [block.stem for block in section.blocks][:3] == stems
 
 
-def test_a_free_pin_has_its_rate_loop(monkeypatch):
+def test_a_free_pin_has_its_rate_loop():
     """K1 at K2 = 0: verdict, windows and locus; no K2, and the gauge as it is."""
     arm = ARMS["free-pin"]
     assert "−u/(1 + C s)" in prose("no_loop", arm=arm)
     assert "at every instant" in prose("no_loop", arm=replace(arm, link=replace(arm.link, damping=0.0)))
-    section = margins_section(Case(arm, Chain()))
+    section = margins_section(ArmReport(arm, Chain()))
     assert margins_of(arm, default_gains(arm)).stability.is_stable
     (windows,) = (block for block in section.blocks if block.stem == "default-windows")
     stable = dict(zip(column(windows, "number").values, column(windows, "intervals").values, strict=True))
     assert (stable["K2"], [len(stable[name]) for name in ("K1", "Kp")]) == ([], [1, 1])
-    pieces = pieces_of(Case(arm, Chain()))
+    pieces = pieces_of(ArmReport(arm, Chain()))
     names = [each.name for each in pieces if each.page in ("margins", "locus", "sampled", "tune")]
     assert names == ["stability margins", "Nyquist plot", "root loci"]
 
 
-def test_a_margin_without_end_has_no_frequency(monkeypatch):
-    monkeypatch.setattr(cases, "best", lambda arm, chain: None)
+def test_a_margin_without_end_has_no_frequency():
     named = on_hub(ARMS["pinned"], HubFeedback(K1=5.0338, K2=-3.0), "default gains", "default")
     found = margins_of(ARMS["pinned"], named.law)
     table = margin_table([(named, found)])
@@ -218,7 +215,7 @@ def test_a_margin_without_end_has_no_frequency(monkeypatch):
 def test_frequencies_over_the_hub_inertia_are_those_of_arms_that_have_it():
     """The arm's own value once."""
     arm = tfarm.load("sasaki2012-lab")
-    _, table = assumptions_section(Case(arm, Chain())).blocks
+    _, table = assumptions_section(ArmReport(arm, Chain())).blocks
     assert table.title == "Candidate hub inertias"
     assert sum(column(table, "is_own").values) == 1
     for inertia, omega in zip(

@@ -17,7 +17,7 @@ from tfarm.loop.circle_crossings import sampled_map
 from tfarm.plots.motion import sketch
 from tfarm.report.arm_section import arm_section, assumptions_section
 from tfarm.report.overview import summary
-from tfarm.report.page import Case, has_loop, sign_words
+from tfarm.report.page import ArmReport, has_loop, sign_words
 from tfarm.report.response_sections import locked_table
 from tfarm.report.tuner_section import why_not
 
@@ -32,7 +32,7 @@ def values_of(table):
 @pytest.mark.parametrize("name", RIGS)
 def test_every_number_of_the_file_is_in_the_table_of_parameters(name):
     arm = RIGS[name]
-    _, given, _ = arm_section(Case(arm, Chain())).blocks
+    _, given, _ = arm_section(ArmReport(arm, Chain())).blocks
     shown = values_of(given)
     numbers = [getattr(link, key) for link in arm.links for key in ("length", "density", "youngs_modulus", "damping")]
     numbers += [arm.hub.inertia, arm.hub.friction, arm.payload.mass, arm.payload.inertia]
@@ -46,7 +46,7 @@ def test_the_page_has_the_gauge_s_place_and_the_shear_cut_off():
     """The second pair of waves travels in Timoshenko's theory alone (tests/spectrum/test_tables.py)."""
     rig = RIGS["bench-rig"]
     for arm in (rig, replace(rig, gauge=Gauge(x=0.013)), rig.under("rayleigh")):
-        section = arm_section(Case(arm, Chain()))
+        section = arm_section(ArmReport(arm, Chain()))
         _, given, derived = section.blocks
         assert values_of(given).get("gauge.x", 0.0) == arm.gauge.x
         labels = [fact.label for fact in section.facts]
@@ -78,12 +78,12 @@ def test_words_of_a_rig_are_true_of_it():
     assert "the motor's voltage [V]" in sign_words(voltage)
     assert "(J − I_h)/J" not in sign_words(voltage) + sign_words(bench)
     assert [written_unit(gain, voltage) for gain in ("K1", "K2")] == [" V s/rad", " V/(N m)"]
-    assert "2 segments" in summary(Case(bench, Chain()))
-    assert ", damped" in summary(Case(voltage, Chain()))
+    assert "2 segments" in summary(ArmReport(bench, Chain()))
+    assert ", damped" in summary(ArmReport(voltage, Chain()))
     assert has_loop(voltage)
     assert "C = 0" in why_not(voltage, Chain())
     assert not why_not(bench, Chain())
-    (section,) = assumptions_section(Case(bench, Chain())).words
+    (section,) = assumptions_section(ArmReport(bench, Chain())).words
     assert "this is a rig" in section
 
 

@@ -14,18 +14,17 @@ import tfarm
 from tests.report.written import blocks_of, values_of
 from tfarm.arm import HubFeedback
 from tfarm.arm.chain import Converters, Sampling
+from tfarm.assessment.stability_map import CUT_RANGE, K2_RANGE, stable_regions
 from tfarm.digits import kept_digits
 from tfarm.dsp import Chain, Simulator, scenario
-from tfarm.loop import sampled_verdict as verdict
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
-from tfarm.plots import regions
-from tfarm.plots.regions import CUT_RANGE, K2_RANGE, overlay, stable_regions
+from tfarm.plots.regions import overlay
 from tfarm.report import sampled_section as page
-from tfarm.report.page import DRAWN_DIGITS, Case, GivenLaw, prose, save_block
+from tfarm.report.page import DRAWN_DIGITS, ArmReport, GivenLaw, prose, save_block
 from tfarm.report.sampled_section import FILM_FRAMES, sampled_section, slews
-from tfarm.schema import across, text
+from tfarm.schema import text
 from tfarm.spectrum.table import default_gains
 
 LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
@@ -36,11 +35,7 @@ analysed = cache(tfarm.sampled)
 
 @pytest.fixture(scope="module")
 def section():
-    """With the map of both regions that the tests of it have."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(regions, "stable_regions", lambda *what: {(LAB, GAINS, Chain()): PLANE()}[what])
-        patch.setattr(verdict, "sampled", analysed)
-        return sampled_section(Case(LAB, Chain()))
+    return sampled_section(ArmReport(LAB, Chain()))
 
 
 def windows(arm, gains=GAINS):
@@ -50,15 +45,13 @@ def windows(arm, gains=GAINS):
 # ------------------------------------------------------------ the overlay
 
 
-def test_the_picture_of_a_rig_is_as_high_as_its_own_gains(monkeypatch):
+def test_the_picture_of_a_rig_is_as_high_as_its_own_gains():
     """Driven by its motor's current, K2 balances a torque at 0.112 A/(N m), and not at 1."""
-    monkeypatch.setattr("tfarm.plots.regions.OVERLAY_COLUMNS", 6)
-    monkeypatch.setattr("tfarm.plots.regions.LITTLE_DAMPINGS", ())
     rig = tfarm.load("quanser-2dsfl")
     data = stable_regions(rig, default_gains(rig), Chain())
     low, high = overlay.figure(*data).axes[0].get_ylim()
     assert 0.112 < high < 0.2
-    (sampled,) = data.sampled
+    *_, sampled = data.sampled
     ((bottom, top),) = sampled.stable_intervals[0]
     assert top - bottom > 0.4 * (high - low)
     assert low < bottom < top < high
@@ -80,9 +73,7 @@ def test_the_map_of_both_regions_is_that_of_the_poles():
             ]
 
 
-def test_without_damping_the_layers_are_nested_and_name_their_number_of_modes(monkeypatch):
-    monkeypatch.setattr("tfarm.plots.regions.OVERLAY_COLUMNS", 8)
-    monkeypatch.setattr("tfarm.loop.circle_crossings.MOST_COLUMNS", 0)
+def test_without_damping_the_layers_are_nested_and_name_their_number_of_modes():
     data = stable_regions(PAPER, GAINS, Chain())
     assert [layer.loop.plant.arm.damping for layer in data.sampled] == [1e-4, 1e-6, 0.0]
     assert data.sampled[-1].modes_used == 20
@@ -121,16 +112,6 @@ def test_a_slew_that_does_not_settle_has_no_settling_time(section):
         "settling time of the root moment",
         "unstable",
     )
-
-
-def test_a_delay_margin_that_is_a_lower_bound_is_shown_so():
-    """That of the 2-DOF rig, which the search of its first 20 modes does not reach."""
-    rig = tfarm.load("quanser-2dsfl")
-    (each, *_), found = Case(rig, Chain()).controllers, tfarm.sampled(rig, default_gains(rig))
-    rows = values_of(across({each.title: found}))
-    shown = dict(zip(rows["quantity"], rows[list(rows)[2]], strict=True))
-    assert found.is_lower_bound
-    assert str(shown["delay margin"]).startswith("≥") or "at least" in str(shown)
 
 
 def test_at_zero_damping_a_little_more_than_the_least_that_is_needed_is_stable():
@@ -186,17 +167,15 @@ def test_the_film_is_of_the_slew_under_the_controller_and_moves_only_where_that_
 
 
 def test_a_loop_that_diverges_has_no_film():
-    pictures, _, _ = slews(Case(LAB, Chain(), (GivenLaw(HubFeedback(K1=0.3, K2=3.0)),)))
+    pictures, _, _ = slews(ArmReport(LAB, Chain(), (GivenLaw(HubFeedback(K1=0.3, K2=3.0)),)))
     assert [each.stem for each in pictures] == ["sampled-slew", "sampled-slew-numbers"]
 
 
 # ------------------------------------------------------------ bytes and odd arms
 
 
-def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
-    monkeypatch.setattr("tfarm.plots.regions.OVERLAY_COLUMNS", 8)
-    monkeypatch.setattr("tfarm.loop.circle_crossings.MOST_COLUMNS", 0)
-    section = sampled_section(Case(replace(LAB, payload=tfarm.Payload(mass=math.inf)), Chain()))
+def test_a_held_tip_has_a_map_but_no_slew():
+    section = sampled_section(ArmReport(replace(LAB, payload=tfarm.Payload(mass=math.inf)), Chain()))
     assert "no slew" in section.words[-1]
     assert "sampled-overlay" in blocks_of(section)
     assert "sampled-slew" not in blocks_of(section)

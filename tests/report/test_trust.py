@@ -4,6 +4,7 @@ import json
 import re
 from dataclasses import replace
 from fractions import Fraction
+from unittest.mock import Mock
 from xml.etree import ElementTree
 
 import numpy as np
@@ -12,17 +13,16 @@ import pytest
 import tfarm
 from tests.report import written
 from tfarm.arm import to_toml
-from tfarm.audit import claims, published
+from tfarm.audit import arm_proofs, claims, published
+from tfarm.audit.arm_proofs import prove
 from tfarm.audit.formulas import tex
 from tfarm.audit.published import PublishedRow
-from tfarm.report import response_sections, write, writing
-from tfarm.report import trust as trust_proofs
+from tfarm.report import write
 from tfarm.report.response_sections import how_proven, modal_table, rounds_to
 from tfarm.report.trust import (
     compared_formulas,
     in_letters,
     proof_tables,
-    prove,
     published_tables,
     save_proof,
     write_trust,
@@ -35,6 +35,7 @@ from tfarm.schema.html import GREEK
 ARM = tfarm.load("stocky-steel")
 BRACKET = ("71.50568246689014371", "71.505682466890143711")
 HELD = replace(ARM, payload=tfarm.Payload(mass=np.inf, inertia=0.1))
+LOCKED = replace(HELD, hub=tfarm.Hub(inertia=np.inf))  # no loop: its proofs are quick
 CHEAP = ("(8)", "Table 1 (rho)", "Table 1 (I_h)", "section 5: inputs", "(22)", "a_ij")
 
 
@@ -42,8 +43,8 @@ CHEAP = ("(8)", "Table 1 (rho)", "Table 1 (I_h)", "section 5: inputs", "(22)", "
 def proof(pages):
     """The proof that a session's report was made with, as it is read again: that of ARM under another name."""
     (found,) = written_proofs(pages)
-    assert found.sha256 == trust_proofs.hash_of(written.ARM)
-    return replace(found, name=ARM.name, sha256=trust_proofs.hash_of(ARM))
+    assert found.sha256 == arm_proofs.hash_of(written.ARM)
+    return replace(found, name=ARM.name, sha256=arm_proofs.hash_of(ARM))
 
 
 @pytest.fixture(scope="module")
@@ -67,12 +68,15 @@ def evidence(audit_rows):
     return rows, tuple(printed)
 
 
-@pytest.fixture
-def page(evidence, proof, tmp_path):
+@pytest.fixture(scope="module")
+def page(evidence, proof, tmp_path_factory):
     """The page of one proven arm and one that is not."""
+    folder = tmp_path_factory.mktemp("page") / "trust"
     unproven = replace(proof, name="other", brackets=(), count=0, below="", failure="a double frequency near 7 rad/s")
-    write_trust(*evidence, [proof, unproven], tmp_path / "trust")
-    return (tmp_path / "trust" / "index.html").read_text(encoding="utf-8")
+    write_trust(*evidence, [proof, unproven], folder)
+    rows = json.loads((folder / "data" / "audit.json").read_text(encoding="utf-8"))["rows"]
+    assert {row["equation"] for row in rows} == set(CHEAP)
+    return (folder / "index.html").read_text(encoding="utf-8")
 
 
 # ------------------------------------------------------------ proofs
@@ -126,37 +130,30 @@ def test_the_modal_table_has_the_proof_of_its_digits(proven_modes, monkeypatch):
         raise tfarm.CertificationError("a double frequency near 7 rad/s")
 
     monkeypatch.setattr(type(modes), "certify", fail)
-    response_sections.proven_modes.cache_clear()
+    arm_proofs.proven_modes.cache_clear()
     assert how_proven(modes, omega, hertz).endswith("not proven: a double frequency near 7 rad/s.")
-    monkeypatch.setattr(trust_proofs, "boxed", lambda *_: ())  # which are proven, or not, apart from these
-    unproven = prove(ARM)
-    assert unproven.failure == "a double frequency near 7 rad/s"
-    assert unproven.brackets == ()
+    unproven = prove(LOCKED)
+    assert (unproven.failure, unproven.brackets) == ("a double frequency near 7 rad/s", ())
 
 
 def test_the_accuracy_is_measured_and_a_wrong_digit_would_show(proof, monkeypatch):
     assert [output for output, _ in proof.errors] == ["root_moment", "tip_displacement"]
     assert all(0 < error < 2e-15 for _, error in proof.errors)
 
-    class Off:
-        """A response with a relative error of 1e-9."""
-
-        def __init__(self, arm, output):
-            self.G = exact(arm, output)
-            self.derivative, self.digits = self.G.derivative, self.G.digits
-
-        def __call__(self, s):
-            return self.G(s) * (1 + 1e-9)
-
     exact = tfarm.transfer
-    monkeypatch.setattr(frequency, "transfer", Off)
+
+    def off(arm, output):
+        """A response with a relative error of 1e-9."""
+        G = exact(arm, output)
+        return Mock(side_effect=lambda s: G(s) * (1 + 1e-9), derivative=G.derivative, digits=G.digits)
+
+    monkeypatch.setattr(frequency, "transfer", off)
     assert 1e-10 < worst_error(ARM, "root_moment", proof.band) <= 1e-9
 
 
 def test_a_response_that_is_zero_throughout_has_no_error():
-    locked = replace(HELD, hub=tfarm.Hub(inertia=np.inf))  # no loop: its proofs are quick
     assert worst_error(HELD, "tip_displacement", (1.0, 10.0)) is None
-    assert [output for output, _ in prove(locked).errors] == ["root_moment"]
+    assert [output for output, _ in prove(LOCKED).errors] == ["root_moment"]
 
 
 # ------------------------------------------------------------ the page
@@ -183,16 +180,15 @@ def test_long_tables_and_claims_are_folded_below_their_answers(page):
     assert unfolded.count('href="#eq-') == len(CHEAP)
 
 
-def test_a_failed_proof_is_noted(page, proof):
-    assert "Not so for other" in page
-    assert "not proven: a double frequency near 7 rad/s" in page
-    assert f"{proof.leading_digits[0]}…" in page
-
-
-def test_published_numbers_stand_with_their_reasons_and_are_text(page):
-    assert "1 of 2 printed natural frequencies agree" in page
-    assert "a misprint" in page
-    assert "pinned &lt;b&gt;" in page
+def test_proofs_published_numbers_versions_and_the_command_are_there(page, proof):
+    for words in (
+        "Not so for other", "not proven: a double frequency near 7 rad/s", f"{proof.leading_digits[0]}…",
+        "1 of 2 printed natural frequencies agree", "a misprint", "pinned &lt;b&gt;", proof.sha256,
+        "<code>tfarm report stocky-steel other.toml --out reports</code>",
+    ):  # fmt: skip
+        assert words in page
+    for name in ("numpy", "scipy", "mpmath", "python-flint", "sympy", "control", "matplotlib"):
+        assert f">{name}</td>" in page
     assert "<b>" not in page
 
 
@@ -206,24 +202,9 @@ def test_every_source_of_a_number_is_named():
     assert sum(columns["numbers"].values) == len(rows)
 
 
-def test_versions_hashes_and_the_command_are_there(page, proof, tmp_path):
-    assert "<code>tfarm report stocky-steel other.toml --out reports</code>" in page
-    assert proof.sha256 in page
-    for name in ("numpy", "scipy", "mpmath", "python-flint", "sympy", "control", "matplotlib"):
-        assert f">{name}</td>" in page
-    rows = json.loads((tmp_path / "trust" / "data" / "audit.json").read_text(encoding="utf-8"))["rows"]
-    assert {row["equation"] for row in rows} == set(CHEAP)
-
-
-def test_one_page_of_an_arm_does_not_wait_for_the_audit(tmp_path, monkeypatch, evidence, proof):
-    """--only has no page on trust, nor a link to it, unless a whole report made it before.
-
-    The page of loci, which for an arm without a loop is made at once.
-    """
-    monkeypatch.setattr(writing, "gather", lambda: pytest.fail("the audit ran"))
-    monkeypatch.setattr(writing, "save_card", lambda *_: None)
-    monkeypatch.setattr(trust_proofs, "prove", lambda arm, chain: replace(proof, name=arm.name))
-    arm = replace(ARM, name="mine", hub=tfarm.Hub(inertia=np.inf))
+def test_one_page_of_an_arm_does_not_wait_for_the_audit(tmp_path, evidence):
+    """--only has no page on trust, nor a link to it, unless a whole report made it before."""
+    arm = replace(LOCKED, name="mine")
     page = write([arm], tmp_path, only=("locus",))
     text = page.read_text(encoding="utf-8")
     assert "Method and proofs" not in text
@@ -239,8 +220,10 @@ def test_one_page_of_an_arm_does_not_wait_for_the_audit(tmp_path, monkeypatch, e
 def test_damped_modes_and_closed_loop_poles_are_counted_and_kept(tmp_path, monkeypatch):
     """Winding numbers in float64, by another code than the balls, count the same; and what was kept is read again."""
     lab, count = tfarm.load("sasaki2012-lab"), 4
-    monkeypatch.setattr(trust_proofs, "PROVEN_MODES", count)
-    proof = prove(lab)
+    monkeypatch.setattr(arm_proofs, "PROVEN_MODES", count)
+    (tmp_path / lab.name).mkdir()
+    save_proof(lab, tmp_path / lab.name)
+    (proof,) = written_proofs(tmp_path)
     damped, loop = proof.boxes
     modes = tfarm.damped_modes(tfarm.modes(lab, count))
     assert (damped.count, damped.failure) == (modes.count, "")
@@ -248,13 +231,11 @@ def test_damped_modes_and_closed_loop_poles_are_counted_and_kept(tmp_path, monke
     assert sum(damped.box[0] < s.real and abs(s.imag) < damped.box[3] for s in eigenvalues) == damped.count
     values = tfarm.closed_loop_poles(lab, tfarm.HubFeedback(K1=0.3, K2=0.3), count).values
     assert loop.count == sum(2 if s.imag > 0 else 1 for s in values)
-    (tmp_path / lab.name).mkdir()
-    monkeypatch.setattr(trust_proofs, "prove", lambda arm, chain: {(lab, None): proof}[arm, chain])
-    save_proof(lab, tmp_path / lab.name)
-    assert written_proofs(tmp_path)[0].boxes == proof.boxes
-    table = proof_tables([proof])[2]
+    table = proof_tables([replace(proof, brackets=())])[2]
     assert table.columns[1].values[0] == "damped modes, C = 0.0001 s"
-    small = proof_tables([replace(proof, boxes=(replace(loop, what="closed loop, K1 = 1.66e-05, K2 = 0.3"),))])[2]
+    small = proof_tables(
+        [replace(proof, brackets=(), boxes=(replace(loop, what="closed loop, K1 = 1.66e-05, K2 = 0.3"),))]
+    )[2]
     assert small.columns[1].cells[0] == "closed loop, K1 = 1.66e-05, K2 = 0.3"
 
 

@@ -2,8 +2,8 @@
 
 import math
 import pickle
+import re
 from dataclasses import replace
-from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,42 +16,32 @@ from tests.shell import answer
 from tfarm.dsp import Chain, Sampling
 from tfarm.dsp.traces import away
 from tfarm.errors import CertificationError
-from tfarm.report import tuner_section as tuner_section_room
-from tfarm.report.page import Case
-from tfarm.report.tuner_section import section_of, tuner_section
+from tfarm.report.page import ArmReport, prose
+from tfarm.report.tuner_section import section_of, tuner_in_short, tuner_section
 from tfarm.schema.html import with_symbols
-from tfarm.tuner import Learning, LearningCurves, Plan, initial_network, train, tune
-from tfarm.tuner import tuning as tuning_room
+from tfarm.studies import candidates as tuned
+from tfarm.tuner import Learning, LearningCurves, Plan, initial_network, train
 
 LAB = tfarm.load("sasaki2012-lab")
 SEEDS = 3
 
 
-@pytest.fixture(scope="module", autouse=True)
-def each_loop_once():
-    """The guard and the best constant gain of a loop, which every tuning needs, are found once."""
-    with pytest.MonkeyPatch.context() as patch:
-        for name in ("find_guard", "best_constant"):
-            patch.setattr(tuning_room, name, cache(getattr(tuning_room, name)))
-        yield
-
-
 @pytest.fixture(scope="module")
-def small(each_loop_once, tmp_path_factory):
+def small(tmp_path_factory):
     """The section and its numbers with few seeds and the first four conditions."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tuner_section_room, "LONG_TRIAL", 300)
-        patch.setattr(tuner_section_room, "CURVE_SAMPLES", SEEDS * Plan().trials * 301)
+        patch.setattr(tuned, "LONG_TRIAL", 300)
+        patch.setattr(tuned, "CURVE_SAMPLES", SEEDS * Plan().trials * 301)
         data = pickle.loads(once(tmp_path_factory, "tuner", save_study).read_bytes())
-        return data, section_of(data)
+    return data, section_of(data)
 
 
 def save_study(file):
-    file.write_bytes(pickle.dumps(tuner_section_room.tuner_numbers(LAB, Chain())))
+    file.write_bytes(pickle.dumps(tuned.tuner_numbers(LAB, Chain())))
 
 
 def test_what_is_drawn_is_the_tuning(small):
-    blocks, guard = blocks_of(small[1]), tune(LAB).training.guard
+    blocks, guard = blocks_of(small[1]), small[0].tuning.training.guard
     assert f"[{guard.lo:.4g}, {guard.hi:.4g}]" in blocks["tune-gain"].caption
     bars = [line for line in blocks["tune-gain"].figure.axes[0].lines if line.get_linewidth() == 9]
     assert [tuple(bar.get_ydata()) for bar in bars] == [(guard.lo, guard.hi)]
@@ -92,7 +82,7 @@ def test_the_words_begin_with_the_answer_and_the_facts_carry_the_numbers(small):
 def test_the_answer_compares_the_costs(tuner, words):
     curves = LearningCurves(np.full((5, 1), tuner), np.full(5, tuner), 0, 0)
     tuning = SimpleNamespace(best_constant=SimpleNamespace(cost=1.0))
-    text = tuner_section_room.tuner_in_short(SimpleNamespace(curves=curves, tuning=tuning))
+    text = tuner_in_short(SimpleNamespace(curves=curves, tuning=tuning))
     assert words in text
     assert text.endswith(f"{5 * (tuner < 1)} of 5 seeds end below that.")
 
@@ -114,7 +104,7 @@ def test_the_angle_that_a_moving_gain_leaves_is_named(small):
     ],
 )
 def test_other_arms_have_the_reason_why_there_is_no_tuner(arm, word):
-    section = tuner_section(Case(arm, Chain()))
+    section = tuner_section(ArmReport(arm, Chain()))
     assert not section.words
     assert word in section.answer
     assert not section.blocks
@@ -122,29 +112,26 @@ def test_other_arms_have_the_reason_why_there_is_no_tuner(arm, word):
 
 def test_a_slew_that_runs_away_and_a_guard_that_fails_are_a_sentence(monkeypatch):
     """Random arms met both: a traceback out of matplotlib, and 3.21e+06 in the middle of a sentence."""
-    runs_away = SimpleNamespace(tuning=SimpleNamespace(without=SimpleNamespace(cost=math.inf)))
-    monkeypatch.setattr(tuner_section_room, "tuner_numbers", lambda *_: runs_away)
-    assert "is unstable" in tuner_section(Case(LAB, Chain())).answer
-
-    def unproven(*_):
-        raise CertificationError("no sector at K1 = 3.21e+06, C = 6.94e-05 s")
-
-    monkeypatch.setattr(tuner_section_room, "tuner_numbers", unproven)
-    words = tuner_section(Case(LAB, Chain())).answer
+    answer = tuner_section(ArmReport(LAB.having(damping=1e-14), Chain())).answer
+    assert answer.startswith("No tuner here: no range of gains is proven stable")
+    assert not re.search(r"\de-?\d", with_symbols(answer))
+    words = prose("tuner_unproven", error=CertificationError("no sector at K1 = 3.21e+06, C = 6.94e-05 s"))
     assert "K1 = 3.21 × 10⁶, C = 6.94 × 10⁻⁵ s" in with_symbols(words)
+    runs_away = SimpleNamespace(tuning=SimpleNamespace(without=SimpleNamespace(cost=math.inf)))
+    monkeypatch.setattr("tfarm.report.tuner_section.tuner_numbers", lambda *_: runs_away)
+    assert "is unstable" in tuner_section(ArmReport(LAB, Chain())).answer
 
 
 @pytest.mark.parametrize(("samples", "seeds"), [(301, 20), (40_000, 20), (60_000, 13), (1_000_000, 1)])
 def test_long_trials_have_fewer_seeds(samples, seeds):
     """At most 80 million samples in all of trainings of 100 trials, but one training always."""
-    assert tuner_section_room.curve_seeds(100 * samples) == seeds
+    assert tuned.curve_seeds(100 * samples) == seeds
 
 
-def test_a_slew_of_too_many_samples_has_no_study_but_its_number(monkeypatch):
-    """600,001 samples of a slew of 3 s at 5 us, and nothing begun."""
-    monkeypatch.setattr(tuner_section_room, "tuner_numbers", lambda *_: pytest.fail("begun"))
+def test_a_slew_of_too_many_samples_has_no_study_but_its_number():
+    """600,001 samples of a slew of 3 s at 5 us."""
     chain = Chain(sampling=Sampling(period=5e-6))
-    words = tuner_section(Case(LAB, chain)).answer
+    words = tuner_section(ArmReport(LAB, chain)).answer
     assert "600,001 samples" in words
     assert "tfarm tune" in words
 

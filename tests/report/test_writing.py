@@ -9,7 +9,6 @@ import sys
 import time
 from collections import defaultdict
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from urllib.parse import unquote
@@ -28,7 +27,6 @@ from tests.report.written import (
     files_of,
     ids_of,
     links_of,
-    plain_cards,
     validated,
 )
 from tfarm.assessment.card import Graded, LoopCard
@@ -38,8 +36,7 @@ from tfarm.plots.style import GOOD, LOW, MARGINAL, POOR, UNSTABLE
 from tfarm.report import overview, write, writing
 from tfarm.report.arm_section import arm_section
 from tfarm.report.overview import Card, results, save_card
-from tfarm.report.page import TEMPLATES, Case, GivenLaw, best, explained, prose, sheet, templates
-from tfarm.report.response_sections import bode_section
+from tfarm.report.page import TEMPLATES, ArmReport, GivenLaw, best, explained, prose, sheet, templates
 from tfarm.report.trust import write_trust, written_proofs
 from tfarm.report.writing import PIECES, QUESTIONS, index_page, kept, make_section, navigation, pieces_of
 from tfarm.schema import Column, quantities, to_dict
@@ -53,10 +50,10 @@ def test_another_process_with_other_hashes_writes_the_same_bytes(pages, audit_ro
     coarsen(monkeypatch.setattr)
     made = tmp_path / "made"
     made.mkdir()
-    case = Case(ARM, Chain())
+    case = ArmReport(ARM, Chain())
     for piece in pieces_of(case):
         if piece.anchor in ("margins-map", "bode-root-moment", "margins", "margins-nyquist"):
-            writing.make_section(piece.name, piece.anchor, piece.make, case, made)
+            make_section(piece, case, made)
     there = files_of(pages / NAME)
     pictures = ("map", "bode-root-moment", "default-nyquist")
     assert {f"pictures/{picture}.svg" for picture in pictures} <= set(files_of(made))
@@ -66,7 +63,7 @@ def test_another_process_with_other_hashes_writes_the_same_bytes(pages, audit_ro
     assert {name: there[name] == content for name, content in files_of(made).items() if there[name] != content} == {}
     write_trust(audit_rows, validated(), written_proofs(pages), tmp_path / "trust")
     assert files_of(tmp_path / "trust") == files_of(pages / "trust")
-    index = index_page(pages, trust="trust/index.html")
+    index = index_page(pages)
     assert (pages / "index.html").read_text(encoding="utf-8") == index
 
 
@@ -252,8 +249,8 @@ def test_without_the_page_of_words_none_is_linked():
 
 def test_a_page_has_a_narrow_picture_for_a_phone(tmp_path):
     """As wide as a screen of 400 pixels less its margins, the other half a page; both of the size that is stated."""
-    make = partial(bode_section, output="root_moment")
-    section = make_section("response", "bode-root-moment", make, Case(tfarm.load("sasaki2012-lab"), Chain()), tmp_path)
+    piece = next(piece for piece in PIECES if piece.anchor == "bode-root-moment")
+    section = make_section(piece, ArmReport(tfarm.load("sasaki2012-lab"), Chain()), tmp_path)
     source, image = re.findall(r"<(?:source|img) ([^>]*)>", section.blocks[0].html)
     assert 'media="(max-width: 40rem)" srcset="pictures/bode-root-moment-narrow.svg"' in source
     for tag, end, least, most in ((source, "-narrow", 360, 370), (image, "", 590, 600)):
@@ -316,16 +313,18 @@ def test_every_cell_of_a_narrow_page_has_its_title(pages):
     assert not re.search(r"<th[^>]*></th>", text)  # no heading without words
 
 
-def test_the_pages_of_an_arm_lead_to_each_other(tmp_path, monkeypatch):
-    piece = next(piece for piece in PIECES if piece.name == "the arm")
-    monkeypatch.setattr("tfarm.report.writing.PIECES", (piece,))
-    monkeypatch.setattr(writing, "save_proof", lambda *_: None)
-    plain_cards(monkeypatch.setattr)
-    write([replace(ARM, name="plain")], tmp_path, only=("modes", "bode"))
-    assert "bode.html" in Links(tmp_path / "plain" / "modes.html").targets
-    assert "modes.html" in Links(tmp_path / "plain" / "bode.html").targets
-    write([replace(ARM, name="plain")], tmp_path, only=("locus",))
-    assert {"bode.html", "modes.html"} <= set(Links(tmp_path / "plain" / "locus.html").targets)
+def test_the_pages_of_an_arm_lead_to_each_other(tmp_path):
+    """To those that are written later too; and an arm that cannot turn nor move its tip is reported on."""
+    held = replace(HELD, name="held", payload=tfarm.Payload(mass=math.inf, inertia=0.1), assumptions=())
+    page = write([held], tmp_path, only=("bode",))
+    assert page == tmp_path / "held" / "bode.html"
+    text = page.read_text(encoding="utf-8")
+    assert "From hub angle to root moment" in text
+    assert "is zero at every frequency" in text
+    assert "states no assumptions" in arm_section(ArmReport(held, Chain())).words[0]
+    write([held], tmp_path, only=("modes", "assumptions"))
+    assert {"bode.html", "assumptions.html"} <= set(Links(tmp_path / "held" / "modes.html").targets)
+    assert {"bode.html", "modes.html"} <= set(Links(tmp_path / "held" / "assumptions.html").targets)
 
 
 def test_the_index_has_a_row_a_loop(pages):
@@ -343,24 +342,7 @@ def test_the_index_has_a_row_a_loop(pages):
         assert f"{omega:.6g}" in rows[0][2]
 
 
-# ------------------------------------------------------------ odd arms, the README
-
-
-def test_an_arm_that_cannot_turn_nor_move_its_tip_is_reported_on_too(tmp_path, monkeypatch):
-    plain_cards(monkeypatch.setattr)
-    arm = replace(
-        ARM,
-        name="held",
-        hub=tfarm.Hub(inertia=math.inf),
-        payload=tfarm.Payload(mass=math.inf, inertia=0.1),
-        assumptions=(),
-    )
-    page = write([arm], tmp_path, only=("bode",))
-    assert page == tmp_path / "held" / "bode.html"
-    text = page.read_text(encoding="utf-8")
-    assert "From hub angle to root moment" in text
-    assert "is zero at every frequency" in text
-    assert "states no assumptions" in arm_section(Case(arm, Chain())).words[0]
+# ------------------------------------------------------------ the README, processes
 
 
 def test_the_pictures_of_the_readme(tmp_path, monkeypatch):
@@ -438,10 +420,10 @@ def rows_of(tmp_path, laws, chain):
     """The rows that the index has of an arm with a page."""
     folder = tmp_path / LAB.name
     folder.mkdir()
-    save_card(Case(LAB, chain, tuple(laws)), folder)
+    save_card(ArmReport(LAB, chain, tuple(laws)), folder)
     (folder / "index.html").write_text("a page")
     (card,) = kept(tmp_path, "card", Card).values()
-    return card.loops, index_page(tmp_path, trust="")
+    return card.loops, index_page(tmp_path)
 
 
 @pytest.mark.parametrize("law", [FAST, SLOW])
@@ -468,11 +450,11 @@ def test_each_law_has_a_row_and_one_in_z_no_continuous_verdict(tmp_path):
 
 def test_an_arm_without_hub_inertia_has_its_loops_and_the_reason_why_there_is_no_other(tmp_path):
     bare = replace(LAB, hub=tfarm.Hub(inertia=0.0))
-    save_card(Case(bare, Chain()), tmp_path)
+    save_card(ArmReport(bare, Chain()), tmp_path)
     card = json.loads((tmp_path / "card.json").read_text(encoding="utf-8"))
     assert [loop["loop"] for loop in card["loops"]] == ["continuous-time", "sampled, 10 ms"]
     assert "The hub of this arm has no inertia" in card["notes"][0]
-    writing._write_pages(Case(bare, Chain()), tmp_path, [], (), "", tmp_path)
+    writing._write_pages(ArmReport(bare, Chain()), tmp_path, [], (), "", tmp_path)
     assert "The hub of this arm has no inertia" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
 

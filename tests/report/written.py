@@ -16,26 +16,27 @@ from types import SimpleNamespace
 import tfarm
 from tests.hostile import LONG, NAME, PRINTED, Read
 from tfarm.arm import to_toml
+from tfarm.assessment import stability_map
 from tfarm.audit.published import validate
+from tfarm.exported import live_loop
 from tfarm.loop import circle_crossings as sampled_regions
 from tfarm.loop import loci
 from tfarm.loop import sampled_modes as sampled_loci
-from tfarm.plots import regions
-from tfarm.report import live, loop_section, overview, sampled_section, writing
+from tfarm.report import overview, sampled_section, writing
 from tfarm.report.writing import PIECES
 
 COARSE = (
-    (loop_section, "GRID_COLUMNS", 48),
-    (loop_section, "GRID_ROWS", 40),
-    (regions, "SAMPLED_COLUMNS", 24),
-    (regions, "OVERLAY_COLUMNS", 8),
+    (stability_map, "GRID_COLUMNS", 48),
+    (stability_map, "GRID_ROWS", 40),
+    (stability_map, "SAMPLED_COLUMNS", 24),
+    (stability_map, "OVERLAY_COLUMNS", 8),
     (sampled_regions, "MOST_COLUMNS", 0),  # with the corners that so few have
     (loci, "LOCUS_POINTS", 60),
     (sampled_loci, "SAMPLED_LOCUS_VALUES", 31),
     (sampled_section, "FILM_FRAMES", 10),
     (writing, "MOST_WORKERS", 1),  # a second process would have its own grids
-    (regions, "sampled_region", regions.sampled_region.__wrapped__),  # what is kept of it is of other grids
-    (live, "sampled_region", regions.sampled_region.__wrapped__),
+    (stability_map, "sampled_region", stability_map.sampled_region.__wrapped__),  # what is kept of it is of other grids
+    (live_loop, "sampled_region", stability_map.sampled_region.__wrapped__),
 )
 
 
@@ -49,7 +50,7 @@ def plain_cards(put):
     """Cards of the index with an empty picture, for tests that are not about it: a response and a drawing each."""
     put(overview, "bode", lambda *_: None)
     put(overview, "draw_card", SimpleNamespace(figure=lambda _: None))
-    put(overview, "save_figure", lambda _, folder, stem, formats: (folder / f"{stem}.svg").write_text("<svg/>"))
+    put(overview, "save_figure", lambda _, file: file.write_text("<svg/>"))
 
 
 ASSUMPTIONS = (PRINTED, "second assumption", LONG)

@@ -20,8 +20,8 @@ from tests.studies.pictured import DRAWS, LAB, planted_study
 from tfarm.plots.motion import OF_STABILITY
 from tfarm.plots.studies import distributions, study, study_band, study_scatter
 from tfarm.plots.style import GREY, column, save_figure
-from tfarm.report import writing
-from tfarm.report.writing import write_study
+from tfarm.report import study_page
+from tfarm.report.study_page import write_study
 from tfarm.response.transfer import transfer
 from tfarm.schema import json_value, text, to_dict
 from tfarm.studies.study import SobolIndex, WorstArm
@@ -119,11 +119,11 @@ def test_a_section_has_the_reason_of_a_missing_response(found, monkeypatch):
     def refused(*_):
         raise tfarm.ParameterError(key="response", value=TEXT, remedy="no arm of the study has it")
 
-    monkeypatch.setattr(writing.studies.study_band, "figure", refused)
-    (section,) = (each for each in writing.study_sections(found) if each.title == "Responses")
+    monkeypatch.setattr(study_page.studies.study_band, "figure", refused)
+    (section,) = (each for each in study_page.study_sections(found) if each.title == "Responses")
     assert list(section.blocks) == []
     assert section.words[0].startswith("root_moment: response = ")
-    page = writing.render("study.html", title="x", sections=[section], explained=writing.explained, found=found)
+    page = study_page.render("study.html", title="x", sections=[section], explained=study_page.explained, found=found)
     check_page(page, "no arm of the study has it")
 
 
@@ -251,7 +251,7 @@ def test_a_band_has_the_curves_of_the_arms(found):
 
 
 def test_an_arm_without_a_response_is_left_out_and_none_at_all_is_an_error(found):
-    refused, place = tfarm.ConvergenceError("no", None, None), "tfarm.plots.studies.transfer"
+    refused, place = tfarm.ConvergenceError("no", None, None), "tfarm.studies.bands.transfer"
     ready = transfer(found.parts.plan.case.arm, "root_moment")
     with mock.patch(place, side_effect=[ready, *[refused] * (DRAWS - 1), lambda s: 0 * s + 10]):
         (line, *_) = study_band.figure(found).axes[0].lines
@@ -275,8 +275,7 @@ def test_no_words_of_a_picture_overlap_in_any_size(found):
 
 def test_the_same_study_is_the_same_drawing_and_names_are_text(found, tmp_path):
     for place in ("one", "other"):
-        (tmp_path / place).mkdir()
-        save_figure(study_scatter.figure(found), tmp_path / place, "scatter", formats=("svg", "png"))
-    one, other = ((tmp_path / place / "scatter.svg").read_bytes() for place in ("one", "other"))
+        save_figure(study_scatter.figure(found), tmp_path / f"{place}.svg")
+    one, other = ((tmp_path / f"{place}.svg").read_bytes() for place in ("one", "other"))
     assert one == other
     check_drawing(one.decode())

@@ -30,6 +30,7 @@ its sweep, "boxcar" and no overlap, and no window leaks.  A resonance narrower t
 import hashlib
 import math
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -44,7 +45,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.case import Case
 from tfarm.dsp.results import simulated
 from tfarm.dsp.scenarios import Scenario
-from tfarm.dsp.simulate import Simulation
+from tfarm.dsp.simulate import Simulation, Simulator
 from tfarm.errors import MISSING, did_you_mean, listed, must_be_known, naming, require
 from tfarm.files import read_mat
 from tfarm.records import frozen
@@ -224,6 +225,24 @@ def compare_run(arm: Arm, law: AnyLaw, chain: Chain, measured: MeasuredRun) -> R
     case = Case(arm, as_law(law), chain)
     run, _ = simulated(case, measured.scenario(chain.sampling.period))
     return RunComparison(measured, run)
+
+
+def departures(
+    arm: Arm, law: AnyLaw, chain: Chain, measured: MeasuredRun, count: int, longer: float, share: float = 0.05
+) -> list[float]:
+    """Return the times [s] after a measured run at which the computed hub angle is off its end, by a share of the step.
+
+    The reference stays for that much `longer` [s], of 10,000 samples at most; `count` modes are in the loop.
+    """
+    period = chain.sampling.period
+    end = float(measured.t[-1])
+    t = np.append(measured.t, end + min(longer, 10_000 * period))
+    held = replace(measured, t=t, reference=np.append(measured.reference, measured.reference[-1]))
+    case = Case(arm, as_law(law), chain)
+    run = Simulator(case.arm, chain, held.scenario(period), case.law, count=count).run().at_samples
+    settled = run.hub_angle[run.t <= end][-1]
+    away = abs(run.hub_angle - settled) > share * abs(measured.step)
+    return [float(t) for t in run.t[away & (run.t > end)]]
 
 
 def overshoot(angle: Real, step: float, end: float) -> float:

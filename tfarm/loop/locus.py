@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, cast
 
@@ -82,6 +83,11 @@ class Locus:
     followed: Complex = field(repr=False, compare=False)
     listed: Whole = field(repr=False, compare=False)
     in_box: bool = False
+
+    @cached_property
+    def smooth(self) -> Locus:
+        """The same with the values between that round lines take."""
+        return rounded(self)
 
     @property
     def finding(self) -> str:

@@ -7,6 +7,7 @@ are counted.  Clockwise ones are closed-loop poles inside the contour, as no pol
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
@@ -18,11 +19,11 @@ from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.records import record
 from tfarm.response.frequency import AXIS_SHARE
-from tfarm.schema import Quantity
+from tfarm.schema import At, Quantity
 from tfarm.spectrum import flexible_frequencies
 from tfarm.spectrum.box import turned
 
-from .continuous import ContinuousLoop, band_of, grid
+from .continuous import band_of, grid
 from .poles import count_with_mirrors
 from .stability import Stability, stability
 
@@ -75,6 +76,11 @@ class Nyquist:
     def unstable_by_nyquist(self) -> Annotated[int, BY_NYQUIST]:
         """Unstable closed-loop poles by Nyquist's criterion."""
         return self.unstable_open - self.encirclements
+
+    @cached_property
+    def sensitivity_peak(self) -> At | None:
+        """The loop's own Ms with its frequency; None of an unstable loop."""
+        return None if self.verdict.in_band is None else self.verdict.in_band.sensitivity_peak
 
 
 def nyquist(arm: Arm, law: AnyLaw) -> Nyquist:

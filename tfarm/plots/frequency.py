@@ -10,15 +10,14 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import MaxNLocator, NullFormatter
 
-from tfarm.arm import PLANE, Arm, HubFeedback
+from tfarm.arm import PLANE, HubFeedback
 from tfarm.arrays import Complex, Real
 from tfarm.exact.outputs import signal_words, unit_over
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.fitting.overlay import Overlay
+from tfarm.fitting.possible import ResponseBand, ShareOfArms, fitted_curves
 from tfarm.loop.curve import decibels
-from tfarm.loop.plane import gain_map
-from tfarm.response import transfer
 from tfarm.response.frequency import Bode
 
 from .style import (
@@ -38,18 +37,21 @@ from .style import (
 )
 
 RAD_PER_CYCLE = 2 * np.pi  # rad/s of 1 Hz
-NUMBER_STRIP = 0.085  # height of the strip of mode numbers above the magnitude, as a share of its axes: a line of them
 TICKS_A_DECADE = (1.0, 2.0, 5.0)  # where a measurement covers few of them
-FREQUENCY, FREQUENCY_HZ, PHASE = "angular frequency [rad/s]", "frequency [Hz]", "phase [deg]"
+FREQUENCY = "angular frequency [rad/s]"
+FREQUENCY_HZ = "frequency [Hz]"
+PHASE = "phase [deg]"
 POINTS: dict[str, Any] = {"ls": "none", "marker": ".", "ms": 3.5, "color": ORANGE, "zorder": 3}
 EXACT = "flexible arm, exact"
 Drawn = tuple[Real, Complex, dict[str, Any]]  # a curve over x: its values and looks
 
 
 @picture(
-    (Bode, "tfarm.bode returns"), size=(9.0, 6.2), rows=(1.75, 1.0),
+    (Bode, "tfarm.bode returns"),
+    size=(9.0, 6.2),
+    rows=(1.75, 1.0),
     title=lambda data: "{0.arm.name}: {0.input_label} to {0.label}".format(next(iter(by_name(data).values()))),
-)  # fmt: skip
+)
 def bode(data: Bode | Mapping[str, Bode], *, ax: Sequence[Axes]) -> None:
     """Magnitude over phase of a response (from `tfarm.bode`), in two axes, those given or new ones: these axes.
 
@@ -74,9 +76,11 @@ def draw_magnitude(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
     each = by_name(data, EXACT)
     first = next(iter(each.values()))
     limits = np.array([magnitude_limits(one) for one in each.values()])
-    low, high = float(limits[:, 0].min()), float(limits[:, 1].max())
+    low = float(limits[:, 0].min())
+    high = float(limits[:, 1].max())
     label = f"|{first.label} / {first.input_label}|\nmagnitude [dB re 1 {first.gain_unit}]".replace("1 −", "1")
-    over_frequency(ax, label, 1.0 + NUMBER_STRIP)
+    # above them a line of mode numbers
+    over_frequency(ax, label, 1.085)
     ax.set(xlim=first.band, ylim=(low, high))
     for (name, one), colour in zip(each.items(), cycle(COLOURS), strict=False):
         edges = np.repeat([high + 20.0, low - 20.0], [one.infinite.size, one.vanishing.size])  # off the picture
@@ -130,8 +134,10 @@ def parted(angle: Real, other: Real) -> tuple[Real, Real]:
 def broken(x: Real, y: Real, at: Real, limit: Real) -> tuple[Real, Real]:
     """The curve broken at each of the places, where it runs to its `limit` from both sides (nan: it just ends)."""
     order = np.argsort(at)
-    at, limit = at[order], limit[order]
-    where, gap = np.repeat(np.searchsorted(x, at), 3), np.full(at.size, np.nan)
+    at = at[order]
+    limit = limit[order]
+    where = np.repeat(np.searchsorted(x, at), 3)
+    gap = np.full(at.size, np.nan)
     return np.insert(x, where, np.c_[at, gap, at].ravel()), np.insert(y, where, np.c_[limit, gap, limit].ravel())
 
 
@@ -156,12 +162,29 @@ def _mark_roots(data: Bode, ax: Axes) -> None:
     ):
         if roots.size:
             ax.plot(
-                roots, np.full(roots.size, height), marker, transform=ax.get_xaxis_transform(), clip_on=False,
-                mfc="white", mec=INK, ms=6.0, mew=1.0, zorder=5, label=label,
-            )  # fmt: skip
+                roots,
+                np.full(roots.size, height),
+                marker,
+                transform=ax.get_xaxis_transform(),
+                clip_on=False,
+                mfc="white",
+                mec=INK,
+                ms=6.0,
+                mew=1.0,
+                zorder=5,
+                label=label,
+            )
     for number, omega in enumerate(data.resonances.imag, 1):  # that far apart two digits do not touch
-        note(str(number), (omega, ax.get_ylim()[1]), ax, (0.019, 1.0), xytext=(0, 5), ha="center", va="baseline",
-             color=GREY)  # fmt: skip
+        note(
+            str(number),
+            (omega, ax.get_ylim()[1]),
+            ax,
+            (0.019, 1.0),
+            xytext=(0, 5),
+            ha="center",
+            va="baseline",
+            color=GREY,
+        )
 
 
 # ------------------------------------------------------------ measured responses
@@ -172,7 +195,8 @@ def _over_measured(one: Measured, curves: Sequence[Drawn], upper: Axes, lower: A
 
     An infinite peak of a curve leaves the picture.
     """
-    hertz, size = one.omega / RAD_PER_CYCLE, abs(one.values)
+    hertz = one.omega / RAD_PER_CYCLE
+    size = abs(one.values)
     upper.plot(hertz, size, label="measured", **POINTS)
     lower.plot(hertz, np.degrees(np.angle(one.values)), **POINTS)
     draw_curves([(omega / RAD_PER_CYCLE, values, looks) for omega, values, looks in curves], np.abs, upper, lower)
@@ -186,42 +210,36 @@ def _over_measured(one: Measured, curves: Sequence[Drawn], upper: Axes, lower: A
 
 
 @picture(
-    (Fit, "tfarm.fit returns"), size=lambda fit: (max(7.0, 5.2 * len(fit.responses)), 6.0),
+    (Fit, "tfarm.fit returns"),
+    size=lambda fit: (max(7.0, 5.2 * len(fit.responses)), 6.0),
     title=lambda fit: f"{fit.before.name}: {fit.verdict}",
     grid=lambda figure, fit: figure.subplots(2, max(1, len(fit.responses)), sharex="col", height_ratios=(1.75, 1.0)),
-)  # fmt: skip
+)
 def fitted(fit: Fit, *, ax: Sequence[Axes]) -> None:
-    """Each measured response with the arm's before and after: magnitude over phase, a column a response.
+    """Draw each measured response with the arm's before and after: magnitude over phase, a column a response.
 
     Phases are broken where they wrap.
     """
-    count, problem = len(fit.responses), fit.problem
-    arms: tuple[tuple[Real, dict[str, Any]], ...] = (
-        (fit.point * 0, {"color": GREY, "lw": 1.0, "label": "start"}),
-        (fit.point, {"color": BLUE, "lw": 1.4, "label": "fitted, exact"}),
-    )
-    for number, (one, upper, lower) in enumerate(zip(fit.responses, ax[:count], ax[count:], strict=False)):
-        omega = np.unique(np.r_[np.geomspace(one.omega[0], one.omega[-1], 1200), one.omega])
-        curves = [(omega, problem.at(number, omega).computed(point)[0], looks) for point, looks in arms]
-        _over_measured(one, curves, upper, lower)
+    count = len(fit.responses)
+    looks = {"color": GREY, "lw": 1.0, "label": "start"}, {"color": BLUE, "lw": 1.4, "label": "fitted, exact"}
+    for one, (omega, *curves), upper, lower in zip(fit.responses, fitted_curves(fit), ax, ax[count:], strict=False):
+        _over_measured(one, [(omega, *each) for each in zip(curves, looks, strict=True)], upper, lower)
         upper.set(title=one.label, xlabel="", ylabel=f"magnitude [{one.unit}]")
 
 
 @picture(
     size=(9.0, 4.6),
-    title=lambda fit, _, output: f"{fit.before.name}: {signal_words(output)[0]} of the arms "
-                                 "that the data leave possible",
-)  # fmt: skip
-def draw_band(fit: Fit, arms: Sequence[Arm], output: str, *, ax: Axes) -> None:
-    """Magnitude of a response of the arm that fits best, in the band of arms that the data leave possible."""
-    ends = [end for each in fit.responses for end in each.omega[[0, -1]]]
-    omega = np.geomspace(min(ends), max(ends), 800)  # about one to a pixel
-    best, *others = (abs(transfer(each, output)(1j * omega)) for each in (fit.arm, *arms))
+    title=lambda fit, _, output, __: (
+        f"{fit.before.name}: {signal_words(output)[0]} of the arms that the data leave possible"
+    ),
+)
+def draw_band(fit: Fit, band: ResponseBand, output: str, count: int, *, ax: Axes) -> None:
+    """Draw the magnitude of a response of the arm that fits best, in the band of `count` possible arms."""
+    hertz = band.omega / RAD_PER_CYCLE
     name, unit = signal_words(output)
-    label = f"all of {len(arms)} arms that the data leave possible"
-    ax.fill_between(omega / RAD_PER_CYCLE, np.min(others, axis=0), np.max(others, axis=0), color=BLUE, alpha=0.3,
-                    lw=0, label=label)  # fmt: skip
-    ax.plot(omega / RAD_PER_CYCLE, best, color=BLUE, lw=1.3, label="the arm that fits best")
+    label = f"all of {count} arms that the data leave possible"
+    ax.fill_between(hertz, band.low, band.high, color=BLUE, alpha=0.3, lw=0, label=label)
+    ax.plot(hertz, band.best, color=BLUE, lw=1.3, label="the arm that fits best")
     ax.set(xscale="log", yscale="log", xlabel=FREQUENCY_HZ)
     ax.set_ylabel(f"|{name}| [{unit_over(unit, fit.arm.input_unit)}]")
     plain_ticks(ax.xaxis, subs=TICKS_A_DECADE)
@@ -230,23 +248,21 @@ def draw_band(fit: Fit, arms: Sequence[Arm], output: str, *, ax: Axes) -> None:
 @picture(
     size=(8.0, 5.0),
     title=lambda fit, *_: f"{fit.before.name}: stabilising gains for the arms that the data leave possible",
-)  # fmt: skip
-def draw_share(fit: Fit, arms: Sequence[Arm], ranges: Sequence[tuple[float, float]], *, ax: Axes) -> None:
-    """The share of the possible arms that each pair of gains stabilises in continuous time; `ranges` of both gains."""
-    across, up = (np.linspace(*ends, 60) for ends in ranges)
-    share = np.mean([gain_map(arm, across, up).unstable == 0 for arm in arms], axis=0)
-    mesh = ax.pcolormesh(
-        across, up, share, cmap="Blues", vmin=0.0, vmax=1.0, shading="nearest", rasterized=True,
-    )  # fmt: skip
+)
+def draw_share(fit: Fit, found: ShareOfArms, *, ax: Axes) -> None:
+    """Draw the share of the possible arms that each pair of gains stabilises in continuous time."""
+    mesh = ax.pcolormesh(*found, cmap="Blues", vmin=0.0, vmax=1.0, shading="nearest", rasterized=True)
     ax.figure.colorbar(mesh, ax=ax).set_label("share of the arms with a stable loop [−]")
     name_axes(PLANE, fit.arm, HubFeedback(), ax)
     ax.grid(False)
 
 
 @picture(
-    (Overlay, "tfarm.overlay returns"), size=(9.0, 7.4), rows=(2.2, 1.2, 0.8),
+    (Overlay, "tfarm.overlay returns"),
+    size=(9.0, 7.4),
+    rows=(2.2, 1.2, 0.8),
     title=lambda data: f"{data.arm.name}: {data.measured.label}",
-)  # fmt: skip
+)
 def measured(data: Overlay, *, ax: Sequence[Axes]) -> None:
     """Magnitude, phase and coherence (from `tfarm.overlay`), in three axes, those given or new ones: these.
 
@@ -255,16 +271,20 @@ def measured(data: Overlay, *, ax: Sequence[Axes]) -> None:
     their measured frequencies, and measured peaks far from every pole.
     """
     upper, middle, lower = ax
-    one, hertz, size = data.measured, data.measured.omega / RAD_PER_CYCLE, abs(data.measured.values)
+    one = data.measured
+    hertz = data.measured.omega / RAD_PER_CYCLE
+    size = abs(data.measured.values)
     _over_measured(one, [(data.omega, data.curve, {"color": BLUE, "label": "exact"})], upper, middle)
     paired = [(abs(row.pole) / RAD_PER_CYCLE, row.frequency_ratio) for row in data.modes]
     upper.set_ylabel(f"magnitude [{data.ratio.unit}]")
     guides: tuple[tuple[Any, dict[str, Any]], ...] = (
         ([pole for pole, _ in paired], {"color": FAINT, "lw": 0.8, "label": "pole of the arm"}),
-        ([pole * ratio for pole, ratio in paired if ratio is not None],
-         {"color": ORANGE, "lw": 0.7, "ls": (0, (2, 3)), "label": "its measured frequency"}),
+        (
+            [pole * ratio for pole, ratio in paired if ratio is not None],
+            {"color": ORANGE, "lw": 0.7, "ls": (0, (2, 3)), "label": "its measured frequency"},
+        ),
         (np.divide(data.unmatched, RAD_PER_CYCLE), {"color": INK, "lw": 0.8, "ls": ":", "label": "peak of no pole"}),
-    )  # fmt: skip
+    )
     for at, looks in guides:
         for frequency in at:
             upper.axvline(frequency, zorder=0.6, **looks)

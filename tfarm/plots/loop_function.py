@@ -23,17 +23,24 @@ from tfarm.loop.nyquist import Nyquist, compressed
 from .frequency import FREQUENCY, Drawn, draw_curves, over_frequency, parted
 from .style import BLUE, FAINT, GREY, INK, UNSTABLE, Axes, arrows, gains_words, note, picture, safe
 
-HIGHEST, LOWEST = 60.0, -80.0  # dB of L that are drawn: so that the part near 0 dB shows
+# dB of L that are drawn: so that the part near 0 dB shows
+HIGHEST = 60.0
+LOWEST = -80.0
 USUAL_PEAK = 2.0  # Ms that is usual at most
 CLOSED_LOOP = (-20.0, -12.0, -6.0, -3.0, -1.0, 0.25, 0.5, 1.0, 3.0, 6.0)  # dB: |T| of the contours of a Nichols chart
-CONTOURS = ", ".join(f"{size:g}" for size in CLOSED_LOOP if size > 0) + " dB, the larger the nearer to −1"
 AROUND: Complex = np.exp(1j * math.pi * np.linspace(-1, 1, 721) ** 3)  # a circle, dense at 1, where T/(1 - T) is steep
-MOST_LINEAR, LEAST_LINEAR = 20.0, 2.2  # |L| at the edge of a linear Nyquist plot: at least as far as the zoom
+# |L| at the edge of a linear Nyquist plot: at least as far as the zoom
+MOST_LINEAR = 20.0
+LEAST_LINEAR = 2.2
 ZOOM = (-2.2, 0.4, -1.3, 1.3)  # of L around -1: Re from and to, Im from and to
 RING_SIZES = (0.2, 0.5, 1.0, 2.0, 5.0, math.inf)  # |L| of the rings
-ARC_RADIUS, REACH = 1.04, 1.35  # of the first arc at infinity, and of the picture
+# of the first arc at infinity, and of the picture
+ARC_RADIUS = 1.04
+REACH = 1.35
 ARCS_ALIKE = math.radians(20.0)  # arcs whose ends are as near as that turn alike
-GAIN, PHASE_MARGIN = "o", "D"  # marks of margins
+# marks of margins
+GAIN = "o"
+PHASE_MARGIN = "D"
 DIGITS = 4  # of a margin, as on a card
 Looks = dict[str, Any]
 
@@ -105,12 +112,14 @@ def loop(found: Margins | LoopCurve, *, ax: Sequence[Axes]) -> None:
             gain = [(w, 1.0) for w, _ in each.margins.gain_crossovers]
             phase = [(w, 1 / t) for w, t in each.margins.phase_crossovers if w and t]
             for marker, label, crossed in (
-                (PHASE_MARGIN, "gain crossovers, |L| = 1", gain), (GAIN, "phase crossovers, L < 0", phase)
-            ):  # fmt: skip
+                (PHASE_MARGIN, "gain crossovers, |L| = 1", gain),
+                (GAIN, "phase crossovers, L < 0", phase),
+            ):
                 w, sizes = np.reshape(crossed, (-1, 2)).T
                 upper.plot(w, decibels(sizes), marker, ms=3.0, color=GREY, label=label)
             for omega, L, label, marker in decisive(each.margins):
-                size, angle = float(decibels(abs(L))), math.degrees(float(np.angle(L)))
+                size = float(decibels(abs(L)))
+                angle = math.degrees(float(np.angle(L)))
                 upper.plot([omega], [size], **_marked(each, label, marker))
                 lower.plot([omega], [angle], **_marked(each, label, marker))
                 place, ends = (upper, (size, 0)) if marker == GAIN else (lower, (math.copysign(180, angle), angle))
@@ -133,13 +142,19 @@ def nichols(found: Margins | LoopCurve, *, ax: Axes) -> None:
     sizes = np.concatenate([each.magnitude for each in sides])
     low, high = np.clip((min(*sizes, -7) - 3, max(*sizes, 7) + 3), -40.0, 40.0)
     ax.set(
-        xticks=range(-360, 1, 45), yticks=range(-40, 41, 10), xlim=(-360, 0), ylim=(low, high),
-        xlabel="phase of L [deg]", ylabel="|L| [dB]",
-    )  # fmt: skip
+        xticks=range(-360, 1, 45),
+        yticks=range(-40, 41, 10),
+        xlim=(-360, 0),
+        ylim=(low, high),
+        xlabel="phase of L [deg]",
+        ylabel="|L| [dB]",
+    )
     ax.grid(False)
+    inside = ", ".join(f"{size:g}" for size in CLOSED_LOOP if size > 0)
+    label = f"|T| = |L/(1 + L)|: {inside} dB, the larger the nearer to −1"
     for size in CLOSED_LOOP:
         T = 10 ** (size / 20) * AROUND
-        ax.plot(*_chart(T / (1 - T)), color=GREY, lw=0.6, zorder=1, label="|T| = |L/(1 + L)|: " + CONTOURS)
+        ax.plot(*_chart(T / (1 - T)), color=GREY, lw=0.6, zorder=1, label=label)
     for size in CLOSED_LOOP:
         height = -float(decibels(10 ** (-size / 20) - 1))
         if size < 0 and low <= height <= high:
@@ -162,8 +177,9 @@ def sensitivity(found: Margins | LoopCurve, *, ax: Axes) -> None:
     sides = found.curve.sides
     for each in sides:
         for name, values, colour, width, marker, size in (
-            ("S", each.sensitivity, BLUE, 1.5, "o", 9.0), ("T", each.complementary, INK, 1.0, "s", 5.0)
-        ):  # fmt: skip
+            ("S", each.sensitivity, BLUE, 1.5, "o", 9.0),
+            ("T", each.complementary, INK, 1.0, "s", 5.0),
+        ):
             ax.plot(each.omega, values, lw=width, **_looks(each, f"|{name}|, ", colour))
             if each.margins is not None:
                 peak, omega = each.margins.sensitivity_peak if name == "S" else each.margins.complementary_peak
@@ -187,9 +203,10 @@ def _words(data: Nyquist, name: str) -> str:
 
 
 @picture(
-    (Nyquist, "tfarm.nyquist returns"), size=(9.6, 5.6),
+    (Nyquist, "tfarm.nyquist returns"),
+    size=(9.6, 5.6),
     title=lambda data: f"{data.verdict.loop.arm.name}: the loop function L(iω)",
-)  # fmt: skip
+)
 def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     """L on the imaginary axis (from `tfarm.nyquist`), linear, and next to it a zoom at -1; the axes of the whole.
 
@@ -197,13 +214,19 @@ def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     controller.  Larger L is cut off; `disc` shows all of it.
     """
     L = np.where(data.is_arc | ~np.isfinite(data.L), np.nan, data.L)
-    edge = float(np.clip(1.1 * np.nanmax(abs(L)), LEAST_LINEAR, MOST_LINEAR))
+    # at least as far as the zoom
+    edge = float(np.clip(1.1 * np.nanmax(abs(L)), 2.2, 20.0))
     zoom = ax.inset_axes((5 / 9, 0, 4 / 9, 1))  # as wide as the plot, a quarter of that between both
     ticks = [tick for tick in MaxNLocator(5, steps=(1, 2, 5, 10)).tick_values(-edge, edge) if abs(tick) <= edge]
     ax.set(
-        aspect="equal", frame_on=False, xticks=ticks, yticks=ticks, xlim=(-edge, 3.5 * edge), ylim=(-edge, edge),
+        aspect="equal",
+        frame_on=False,
+        xticks=ticks,
+        yticks=ticks,
+        xlim=(-edge, 3.5 * edge),
+        ylim=(-edge, edge),
         ylabel="Im L [−]",
-    )  # fmt: skip
+    )
     ax.set_xlabel("Re L [−]", loc="left")
     frame = ax.add_patch(Rectangle((-edge, -edge), 2 * edge, 2 * edge, fill=False, ec=GREY, lw=0.8, clip_on=False))
     zoom.set(xlim=ZOOM[:2], ylim=ZOOM[2:], xlabel="Re L [−], zoom at −1")
@@ -211,7 +234,7 @@ def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
         (0.0, 1.0, {"color": GREY, "ls": "-", "label": "|L| = 1"}),
         (-1.0, 1 / USUAL_PEAK, {"color": INK, "ls": ":", "label": f"Ms = {USUAL_PEAK:g}"}),
     ]
-    for peak in [data.verdict.in_band.sensitivity_peak] if data.verdict.in_band is not None else []:
+    if (peak := data.sensitivity_peak) is not None:
         label = f"radius 1/Ms, Ms {_at(peak.value, '', peak.omega)}"
         circles.append((-1.0, 1 / peak.value, {"color": INK, "ls": "--", "label": label}))
     for place in (ax, zoom):
@@ -225,9 +248,10 @@ def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
 
 
 @picture(
-    (Nyquist, "tfarm.nyquist returns"), size=(5.0, 6.1),
+    (Nyquist, "tfarm.nyquist returns"),
+    size=(5.0, 6.1),
     title=lambda data: f"{data.verdict.loop.arm.name}: the loop function L(iω)",
-)  # fmt: skip
+)
 def disc(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     """L on all of Nyquist's contour (from `tfarm.nyquist`), stability and encirclements above it; the axes.
 

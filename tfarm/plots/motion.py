@@ -47,18 +47,13 @@ from .style import (
 )
 
 SHAPE_POINTS = 401  # of a drawn mode: about one to a pixel of its picture
-ALONG, DISPLACEMENT = "distance from the hub, x [m]", "displacement w(x), largest = 1 [−]"
-HUB_WIDTH = 0.06  # width of the drawn hub, as a share of the length
+ALONG = "distance from the hub, x [m]"
+DISPLACEMENT = "displacement w(x), largest = 1 [−]"
 TIME = "time [s]"
-RUNS = ("#a3a3a3", INK, "#0b7f93", "#8a6d3b")  # several simulations, without feedback first: no colours of stability
-DASHED, DOTTED, LONG_DASHED = (0, (4, 3)), (0, (1, 2)), (0, (5, 3))
+DASHED = (0, (4, 3))
+DOTTED = (0, (1, 2))
+LONG_DASHED = (0, (5, 3))
 OF_STABILITY = {"stable": (STABLE, "o"), "marginal": (MARGINAL, "s"), "unstable": (UNSTABLE, "x")}  # colour, mark
-HATCH = "/////"
-LEAST_RISE = 1 / 3000  # of the height of a curve: rise from point to point that counts
-MOST_TURNS = 400  # of a line; with more it is a band
-FEW_SAMPLES = 60  # of a run: each is marked
-SHOWN_SETTLED = 1.5  # times the last settling time: end of the picture
-OFF_FRAME = 0.3  # of the height of a stable response: margin beyond it for an unstable one
 
 
 def scaled(found: Modes, count: int) -> dict[int, Real]:
@@ -83,28 +78,35 @@ def _grid(figure: Figure, found: Modes) -> None:
 
 
 @picture(
-    (Modes, "tfarm.modes returns"), size=lambda found: (9.0, 0.8 + 1.9 * _rows(found)),
-    grid=_grid, title=lambda found: f"{found.arm.name}: mode shapes",
-)  # fmt: skip
+    (Modes, "tfarm.modes returns"),
+    size=lambda found: (9.0, 0.8 + 1.9 * _rows(found)),
+    grid=_grid,
+    title=lambda found: f"{found.arm.name}: mode shapes",
+)
 def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
-    """The shapes of flexible modes (from `tfarm.modes`), an axes each, in those given or in new ones; these.
+    """Draw the shapes of flexible modes (from `tfarm.modes`), an axes each, in those given or in new ones; these.
 
     Displacement along the arm [m], largest 1, with the places of the nodes [m].  Of more modes than axes the first are
     drawn.
     """
-    payload, length = found.arm.payload, found.arm.length
+    payload = found.arm.payload
+    length = found.arm.length
+    rows = dict(zip(found.index.tolist(), range(found.index.size), strict=True))
     for one, (number, w) in zip(ax, scaled(found, len(ax)).items(), strict=False):
-        row = int(np.flatnonzero(found.index == number)[0])
+        row = rows[number]
+        nodes = found.nodes[row]
+        # width of the hub, as a share of the length
+        hub = 0.06 * length
         one.axhline(0.0, color=GREY, lw=0.8)
         one.plot(np.linspace(0.0, length, w.size), w, color=BLUE, lw=1.8)
-        one.add_patch(Rectangle((-HUB_WIDTH * length, -0.25), HUB_WIDTH * length, 0.5, fc=GREY, ec="none", zorder=3))
+        one.add_patch(Rectangle((-hub, -0.25), hub, 0.5, fc=GREY, ec="none", zorder=3))
         if payload.mass > 0 or payload.inertia > 0:
             one.plot(length, w[-1], "s", ms=8.0, mfc=GREY, mec="none", zorder=3)
-        one.plot(found.nodes[row], 0 * found.nodes[row], "o", ms=5.5, mfc="white", mec=INK, mew=1.3, zorder=4)
+        one.plot(nodes, 0 * nodes, "o", ms=5.5, mfc="white", mec=INK, mew=1.3, zorder=4)
         one.set(xlim=(-0.085 * length, 1.11 * length), ylim=(-1.28, 1.28), yticks=[-1, 0, 1])
         one.locator_params(axis="x", nbins=5)
         omega, hertz = (significant(float(of[row]), 7) for of in (found.natural_frequency, found.natural_frequency_hz))
-        places = ", ".join(plain(float(node), 3) for node in found.nodes[row]) or "none"
+        places = ", ".join(plain(node, 3) for node in nodes.tolist()) or "none"
         one.set_title(f"Mode {number}:  {omega} rad/s  ({hertz} Hz)\nnodes [m]: {places}", fontsize=9.5)
         if not one.figure.get_supylabel():
             one.set(xlabel=ALONG, ylabel=DISPLACEMENT)
@@ -157,15 +159,19 @@ def sketch(arm: Arm, *, ax: Axes) -> None:
     ax.add_patch(Circle((0, 0), bore, fc="#e9e9e9" if arm.hub.inertia else "white", ec=INK, lw=1.2, zorder=3))
     ax.plot(0, 0, "o", ms=3.5, color=INK, zorder=4)
     ends = np.array([[1.5, -1.0], [-1.0, 1.5]]) * bore
-    ax.add_patch(FancyArrowPatch(*ends, zorder=4, connectionstyle="arc3,rad=0.75", arrowstyle="-|>", mutation_scale=11,
-                                 color=ORANGE, lw=1.3))  # fmt: skip
+    ax.add_patch(
+        FancyArrowPatch(
+            *ends, zorder=4, connectionstyle="arc3,rad=0.75", arrowstyle="-|>", mutation_scale=11, color=ORANGE, lw=1.3
+        )
+    )
     ax.text(ends[1, 0], ends[1, 1], "θ" if arm.is_locked else "u", color=ORANGE, ha="right", va="bottom", fontsize=11)
     ax.set_title("\n".join(_numbers(arm)), fontsize=9.0, color=INK)
 
 
 def _numbers(arm: Arm) -> Iterator[str]:
     """Hub, link and payload in numbers, a line each."""
-    payload, inertia = arm.payload, unit("kg m^2")
+    payload = arm.payload
+    inertia = unit("kg m^2")
     free = f"hub  $I_h$ = {plain(arm.hub.inertia, 6)} {inertia}" if arm.hub.inertia else "free pin, no hub inertia"
     hub = "hub locked: driven by its angle" if arm.is_locked else free
     yield hub + (f",  r = {plain(arm.hub.radius, 6)} m" if arm.hub.radius else "")
@@ -181,9 +187,12 @@ def _numbers(arm: Arm) -> Iterator[str]:
 
 
 @picture(
-    (Arm, "tfarm.load returns"), (Simulation, "tfarm.simulate returns"), size=(9.0, 7.0), rows=(1.35, 1.0, 1.0),
+    (Arm, "tfarm.load returns"),
+    (Simulation, "tfarm.simulate returns"),
+    size=(9.0, 7.0),
+    rows=(1.35, 1.0, 1.0),
     title=lambda arm, runs, what="": f"{arm.name}: {what or next(iter(by_name(runs).values())).scenario.name}",
-)  # fmt: skip
+)
 def slew(arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "", *, ax: Sequence[Axes]) -> None:
     """Simulations of one scenario (from `tfarm.simulate`; several by name) in three axes, given or new; these.
 
@@ -195,16 +204,23 @@ def slew(arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "", 
     scenario = first.scenario
     moment, tip, motor = ax
     moment.step(
-        scenario.t - scenario.period, scenario.rigid_moment, where="post", color=GREY, lw=1.0, ls=DASHED,
+        scenario.t - scenario.period,
+        scenario.rigid_moment,
+        where="post",
+        color=GREY,
+        lw=1.0,
+        ls=DASHED,
         label="rigid arm",
-    )  # fmt: skip
-    for (name, run), colour in zip(each.items(), cycle(RUNS[len(each) == 1 :]), strict=False):
+    )
+    # several begin with one without feedback: no colours of stability
+    colours = ("#a3a3a3", INK, "#0b7f93", "#8a6d3b")[len(each) == 1 :]
+    for (name, run), colour in zip(each.items(), cycle(colours), strict=False):
         _draw_curve(traces.curve_of(run, "root_moment"), moment, colour, label=name or None)
         _draw_curve(traces.tip_deviation(arm, run), tip, colour, scale=1e3)
         values = run.torque if run.volts is None else run.volts
         _draw_curve(traces.curve(run.t, values), motor, colour, drawstyle="steps-post")
-    torque = "motor torque [N m]" if arm.input_unit == "N m" else f"motor [{arm.input_unit}]"
-    labels = ("root moment [N m]", "tip − reference [mm]", torque if first.volts is None else "motor [V]")
+    driven = _input_label(arm) if first.volts is None else "motor [V]"
+    labels = ("root moment [N m]", "tip − reference [mm]", driven)
     for axes, label in zip(ax, labels, strict=True):
         axes.axvline(scenario.busy_until, color=INK, lw=0.8, ls=DOTTED)
         axes.axhline(0.0, color=GREY, lw=0.6)
@@ -217,50 +233,51 @@ def slew(arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "", 
 
 
 def _draw_curve(curve: traces.TimeCurve, ax: Axes, colour: str, *, scale: float = 1.0, **looks: Any) -> None:
-    """The line, or the band."""
+    """Draw the line, or the band."""
     low, high = scale * curve.low, scale * curve.high
-    if curve.is_band:
-        is_dashed = looks.get("ls") == DASHED  # of a sampled loop: its band is hatched
-        own = {"fc": "none", "ec": colour, "hatch": HATCH} if is_dashed else {"color": colour, "alpha": 0.55}
-        ax.fill_between(curve.t, low, high, lw=0.8, label=looks.get("label"), **own)
-    else:
+    if not curve.is_band:
         ax.plot(curve.t, low, color=colour, lw=1.3, **looks)
+        return
+    # that of a sampled loop is hatched
+    is_dashed = looks.get("ls") == DASHED
+    own = {"fc": "none", "ec": colour, "hatch": "/////"} if is_dashed else {"color": colour, "alpha": 0.55}
+    ax.fill_between(curve.t, low, high, lw=0.8, label=looks.get("label"), **own)
 
 
 def _draw_signal(ax: Axes, t: Real, y: Real, looks: tuple[str, str], every: int = 0, **how: Any) -> None:
-    """A signal at even times; with `every` that of a sampled loop, with marks at the samples where these are few."""
-    (colour, mark), step = looks, math.ceil(t.size / traces.MOST_LINE)
-    rises = np.diff(y)[abs(np.diff(y)) > LEAST_RISE * np.ptp(y)]
-    if np.count_nonzero(np.diff(np.signbit(rises))) > MOST_TURNS:
-        step = 1  # for a band
+    """Draw a signal at even times; of a sampled loop one of `every` is a sample, marked where these are few."""
+    colour, mark = looks
+    # rises from point to point that are seen; a line with more turns is a band
+    rises = np.diff(y)
+    rises = rises[abs(rises) > np.ptp(y) / 3000]
+    is_line = np.count_nonzero(np.diff(np.signbit(rises))) <= 400
+    step = math.ceil(t.size / traces.MOST_LINE) if is_line else 1
     _draw_curve(traces.curve(t[::step], y[::step]), ax, colour, ls=DASHED if every else "-", **how)
-    if every and t.size <= FEW_SAMPLES * every:
+    if every and t.size <= 60 * every:
         ax.plot(t[::every], y[::every], mark, color=colour, ms=3.0, mew=1.0)
 
 
 @picture(
-    (Step, "tfarm.step returns"), size=(9.0, 10.0), rows=(1.0, 1.0, 1.0, 1.0),
+    (Step, "tfarm.step returns"),
+    size=(9.0, 10.0),
+    rows=(1.0, 1.0, 1.0, 1.0),
     title=lambda found: f"{found.arm.name}: {found.scenario_in_words}",
-)  # fmt: skip
+)
 def step(found: Step, *, ax: Sequence[Axes]) -> None:
-    """Time responses (from `tfarm.step`) in four axes, given or new; these: hub, tip, root moment [N m] and input.
+    """Draw time responses (from `tfarm.step`) in four axes, given or new; these: hub, tip, root moment [N m], input.
 
     The continuous-time loop is solid, the sampled one dashed; references are grey, with the settling band.  Of an
     unstable loop the part within the range of a stable one is drawn.
     """
-    arm = found.arm
-    labels = [
-        f"{of.label.replace('at x', 'of the tip')} [{of.unit}]"
-        for of in (OUTPUTS[name.partition("@")[0]] for name in found.names[:-1])
-    ]
-    labels.append("motor torque [N m]" if arm.input_unit == "N m" else f"motor [{arm.input_unit}]")
-    settled = [  # some time after every signal of a stable loop has settled
-        math.inf if of.at_rest_after is None else SHOWN_SETTLED * of.at_rest_after
-        for loop in found.loops.values()
-        for of in (loop.hub, loop.tip, loop.root_moment, loop.torque)
-        if of
-    ]
-    t, every = found.t[found.t <= max(settled, default=math.inf)], round(found.period / found.t[1])
+    outputs = [OUTPUTS[name.partition("@")[0]] for name in found.names[:-1]]
+    labels = [f"{of.label.replace('at x', 'of the tip')} [{of.unit}]" for of in outputs]
+    labels.append(_input_label(found.arm))
+    loops = found.loops.values()
+    # some time after every signal of a stable loop has settled
+    signals = (of for loop in loops for of in (loop.hub, loop.tip, loop.root_moment, loop.torque) if of)
+    settled = [math.inf if of.at_rest_after is None else 1.5 * of.at_rest_after for of in signals]
+    t = found.t[found.t <= max(settled, default=math.inf)]
+    every = round(found.period / found.t[1])
     for one, name, label in zip(ax, found.names, labels, strict=True):
         one.axhline(0.0, color=GREY, lw=0.6)
         one.set(xlabel=TIME, ylabel=label, xlim=(0.0, t[-1]))
@@ -269,12 +286,20 @@ def step(found: Step, *, ax: Sequence[Axes]) -> None:
             one.axhspan(*ends, color=FAINT, lw=0, alpha=0.6, zorder=0)
             one.plot(t, reference[: t.size], color=GREY, lw=0.8, label=f"reference, {text(found.settling_band)}")
         for loop, each in found.loops.items():
-            y, looks, key = each.signals[name][: t.size], OF_STABILITY[each.stability], f"{loop}, {each.stability}"
-            _draw_signal(one, t[: y.size], y, looks, every if each is found.sampled else 0, label=key)
-        stable = [each.signals[name] for each in found.loops.values() if each.hub]
-        if stable and len(stable) < len(found.loops):
+            y = each.signals[name][: t.size]
+            label = f"{loop}, {each.stability}"
+            samples = every if each is found.sampled else 0
+            _draw_signal(one, t[: y.size], y, OF_STABILITY[each.stability], samples, label=label)
+        stable = [each.signals[name] for each in loops if each.hub]
+        if stable and len(stable) < len(loops):
             low, high = stable[0].min(), stable[0].max()
-            one.set_ylim(low - OFF_FRAME * (high - low), high + OFF_FRAME * (high - low))
+            # beyond a stable response, of its height
+            room = 0.3 * (high - low)
+            one.set_ylim(low - room, high + room)
+
+
+def _input_label(arm: Arm) -> str:
+    return "motor torque [N m]" if arm.input_unit == "N m" else f"motor [{arm.input_unit}]"
 
 
 FIGURES[Run] = lambda run: slew.figure(run.arm, run.simulation, run.scenario_in_words)
@@ -288,12 +313,13 @@ def _measured_rows(each: Mapping[str, RunComparison]) -> int:
     size=lambda each: (max(4.7 * len(each), 6.0), 6.0 if _measured_rows(each) > 1 else 3.6),
     title=lambda _: "Measured steps, and the exact sampled loop",
     grid=lambda figure, each: figure.subplots(_measured_rows(each), len(each), sharex="col", sharey="row"),
-)  # fmt: skip
+)
 def draw_measured_runs(each: Mapping[str, RunComparison], *, ax: Sequence[Axes]) -> None:
     """A column a controller: hub angle above, root moment below where it was measured."""
     axes = np.reshape(np.array(ax), (-1, len(each)))
     for column, (name, found) in zip(axes.T, each.items(), strict=True):
-        measured, run = found.measured, found.run
+        measured = found.measured
+        run = found.run
         column[0].plot(measured.t, np.degrees(measured.reference), color=GREY, lw=1.0, ls=DASHED, label="reference")
         for one, label in zip(column, ("hub angle [deg]", "root moment [N m]"), strict=False):
             one.set(title=safe(name), xlim=(0.0, float(measured.t[-1])), ylabel=label)
@@ -310,12 +336,14 @@ def draw_measured_runs(each: Mapping[str, RunComparison], *, ax: Sequence[Axes])
 
 
 @picture(
-    (Tuning, "tfarm.tune returns"), size=(7.0, 4.4),
+    (Tuning, "tfarm.tune returns"),
+    size=(7.0, 4.4),
     title=lambda found: f"{found.trial.arm.name}: the tuner's gain, and where it is proven stable",
-)  # fmt: skip
+)
 def tuned_gain(found: Tuning, *, ax: Axes) -> None:
     """A tuned gain over time (from `tfarm.tune`) in its guard, in the axes given or new ones; the axes."""
-    guard, result = found.training.guard, found.training.result
+    guard = found.training.guard
+    result = found.training.result
     ax.axhspan(guard.lo, guard.hi, color=REGIONS[0], lw=0, zorder=0.5, label="guard: proven for any K(t) in it")
     ax.step(result.t, result.K, where="post", color=INK, lw=1.4, label="the tuner's gain K(t)")
     best = found.best_constant.gain
@@ -329,14 +357,15 @@ def tuned_gain(found: Tuning, *, ax: Axes) -> None:
     size=(9.0, 5.2),
     title=lambda tuning, *_: f"{tuning.trial.arm.name}: the tuner's gain, and where it is proven stable",
     grid=lambda figure, *_: figure.subplots(1, 2, sharey=True, width_ratios=[1.0, 1.35]),
-)  # fmt: skip
+)
 def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap], *, ax: Sequence[Axes]) -> None:
     """Left the map with the guard as a bar and in it the gains that the tuner takes, right the gain over time."""
     left, right = ax
     overlay(continuous, sampled, ax=left)
     left.set_title("", loc="right")
     left.lines[-1].remove()  # the mark of one controller: the bar is at its rate gain
-    guard, K = tuning.training.guard, tuning.training.result.K
+    guard = tuning.training.guard
+    K = tuning.training.result.K
     at, _ = tuning.trial.loop.gains.point
     for ends, colour, width, alpha in ((guard.lo, guard.hi), STABLE, 9, 0.75), ((K.min(), K.max()), INK, 2.4, None):
         left.plot([at, at], ends, solid_capstyle="butt", zorder=6, color=colour, lw=width, alpha=alpha)
@@ -349,7 +378,7 @@ def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap], *, 
 @picture(
     size=(9.0, 4.4),
     title=lambda curves, tuning: f"{tuning.trial.arm.name}: learning, {how_many(len(curves.costs), 'seed')}",
-)  # fmt: skip
+)
 def draw_curves(curves: LearningCurves, tuning: Tuning, *, ax: Axes) -> None:
     """Learning curves: each seed, median and quartiles, and the baselines; diverged ones leave through the top."""
     trial = np.arange(1, curves.costs.shape[1] + 1)

@@ -4,8 +4,7 @@ Each region is a list of intervals of one gain at each value of the other, with 
 and in `dsp`); nothing is read off a raster.  Edges are rounded as they are seen in a picture of that plane.
 """
 
-from collections.abc import Sequence
-from functools import lru_cache
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,29 +13,23 @@ from matplotlib.path import Path
 from matplotlib.ticker import LogLocator
 from scipy import ndimage
 
-from tfarm.arm import PLANE, Arm, HubFeedback
+from tfarm.arm import MOMENT_GAIN, PLANE
 from tfarm.arrays import Real, Whole
 from tfarm.assessment import Comparison
+from tfarm.assessment.stability_map import StabilityMap
 from tfarm.crossing import Window, pieces
 from tfarm.digits import how_many, plain, scientific, significant
-from tfarm.dsp import Chain
-from tfarm.errors import ConvergenceError
-from tfarm.loop.circle_crossings import GainMap, ends_of_K1, rounded_map, sampled_map, with_both_sides, with_more
+from tfarm.loop.circle_crossings import GainMap
 from tfarm.loop.plane import (
     INFINITE,
     LINEAR_SCALE,
     Axis,
     Plane,
     edge,
-    rate_columns,
     resting_frequencies,
     stable_edge,
     static_edges,
 )
-from tfarm.loop.plane import gain_map as counted
-from tfarm.loop.sampled_verdict import sampled_verdict
-from tfarm.schema import Column
-from tfarm.spectrum.table import default_gains
 
 from .frequency import bode
 from .loop_function import draw_loops
@@ -59,14 +52,9 @@ from .style import (
 )
 
 SLATE = "#3d5468"  # of contours of damping: no colour of stability
-DASHED, DASH_DOTTED = (0, (5, 2.5)), (0, (6, 2, 1, 2))  # edges of a sampled loop, and of a second one
-HATCHES = ("..", "\\\\\\\\", "////")  # of a sampled loop: with more damping, with less, with its own
-K2_RANGE = (-1.0, 1.5)  # of the gain that balances a torque: 1 where the input is one, less for a motor's current
-CUT_RANGE = (-1.02, 1.52)  # of the same: where intervals are cut, just outside the picture: no cut is seen as an edge
-OVERLAY_COLUMNS = 72  # values of the gain across, and either side of upright edges
-LITTLE_DAMPINGS = (1e-4, 1e-6)  # s: drawn too at C = 0
-SAMPLED_COLUMNS = 120  # values of the gain across at which the sampled region is cut, besides its exact ends
-BEYOND_PICTURE = 0.1  # of the gain up the plane, beyond the picture: an edge there is none of the region
+# edges of a sampled loop, and of a second one
+DASHED = (0, (5, 2.5))
+DASH_DOTTED = (0, (6, 2, 1, 2))
 
 
 def _title(found: Plane | GainMap) -> str:
@@ -117,25 +105,31 @@ def ground(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
 
 
 def _counts(found: Plane | GainMap, counts: Whole, ax: Axes) -> None:
-    """The colours of the counts (rows, columns), and in each region, where it has most room, its count."""
+    """Draw the colours of the counts (rows, columns), and in each unstable region its count where it has most room."""
     image = colours(counts)
     ax.pcolormesh(found.x, found.y, image, shading="nearest", rasterized=True, zorder=0.1)
     ax.grid(False)
     most = len(REGIONS) - 1
     for count in np.unique(counts).tolist():
         inside = counts == count
-        label = "infinitely many unstable poles (∞)" if count == INFINITE else how_many(count, "unstable pole")
         if count < most or count == counts.max():
-            label = f"{most} and more unstable poles, at most {count}" if count > most else label
-            ax.fill_between([], [], [], color=image[inside][0], label=label if count else "stable")
+            label = how_many(count, "unstable pole") if count else "stable"
+            if count == INFINITE:
+                label = "infinitely many unstable poles (∞)"
+            elif count > most:
+                label = f"{most} and more unstable poles, at most {count}"
+            ax.fill_between([], [], [], color=image[inside][0], label=label)
+        if not count:
+            continue
         regions, last = ndimage.label(inside)
         room = ndimage.distance_transform_edt(np.pad(inside, 1), np.divide(1, counts.shape))[1:-1, 1:-1]
         middle = room * ndimage.gaussian_filter(room, np.divide(counts.shape, 8))
-        for row, column in np.reshape(ndimage.maximum_position(middle, regions, range(1, last + 1)), (-1, 2)).tolist():
+        places = ndimage.maximum_position(middle, regions, range(1, last + 1))
+        for row, column in np.reshape(places, (-1, 2)).tolist():
             # of the picture's width or height: else there is no room for a number
-            if count and room[row, column] > 0.028:
-                text = "∞" if count == INFINITE else str(count)
-                ax.text(found.x[column], found.y[row], text, fontsize=9.0, ha="center", va="center", clip_on=True)
+            if room[row, column] > 0.028:
+                mark = "∞" if count == INFINITE else str(count)
+                ax.text(found.x[column], found.y[row], mark, fontsize=9.0, ha="center", va="center", clip_on=True)
 
 
 def colours(unstable: Whole) -> Real:
@@ -145,15 +139,16 @@ def colours(unstable: Whole) -> Real:
 
 
 def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
-    """Of the least damping ratio (up, across), where it is a number: inside the stable region.
+    """Draw lines of the least damping ratio (up, across), where it is a number: inside the stable region.
 
     Open lines shorter than a twelfth of the picture are stubs at the edge of the grid, and left out.
     """
-    ends = np.nanmin(damping, initial=np.inf), np.nanmax(damping, initial=0.0)
-    levels = [level for level in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(*ends) if ends[0] < level < ends[1]]
+    least, largest = np.nanmin(damping, initial=np.inf), np.nanmax(damping, initial=0.0)
+    levels = [each for each in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(least, largest) if least < each < largest]
     if not levels:
         return
-    logarithm = np.ma.log(np.ma.masked_invalid(damping))  # by which lines are straighter
+    # of the logarithm lines are straighter
+    logarithm = np.ma.log(np.ma.masked_invalid(damping))
     lines = ax.contour(
         across, up, logarithm, np.log(levels[-5:]), colors=SLATE, linewidths=0.8, linestyles="-", zorder=2.5
     )
@@ -166,11 +161,10 @@ def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
     for level, parts in zip(lines.levels, kept, strict=True):
         longest = max(parts, key=len, default=())
         name = f"{plain(100 * np.exp(level), 3)} %"
-        any(
-            note(name, longest[int(share * len(longest))], ax, ha="center", color=INK, zorder=6)
-            for share in (0.5, 0.35, 0.65, 0.2, 0.8)  # best place first
-            if len(longest) > 12
-        )
+        # best place first
+        for share in (0.5, 0.35, 0.65, 0.2, 0.8) if len(longest) > 12 else ():
+            if note(name, longest[int(share * len(longest))], ax, ha="center", color=INK, zorder=6):
+                break
     ax.plot([], [], color=SLATE, lw=0.8, label="least damping ratio of the first two modes")
 
 
@@ -218,20 +212,16 @@ def _undamped_boundary(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
 def draw_region(
     across: Real, stable: Sequence[Sequence[Window]], label: str, ax: Axes, *, hatch: str = "", ls: Any = "-"
 ) -> None:
-    """The intervals up at each value across, filled, or hatched with a dashed edge, as those of a sampled loop are.
+    """Draw the intervals up at each value across, filled, or hatched with a dashed edge, as those of a sampled loop.
 
     Edges are upright where the region itself begins or ends.
     """
-    line: dict[str, Any] = (
-        {"color": STABLE, "lw": 1.4, "ls": DASHED, "zorder": 4.5}
-        if hatch
-        else {"color": INK, "lw": 1.0, "ls": ls, "zorder": 2.5}
-    )
-    looks: dict[str, Any] = (
-        {"facecolor": "none", "hatch": hatch, "edgecolor": (*to_rgb(STABLE), 0.5), "lw": 0}
-        if hatch
-        else {"facecolor": REGIONS[0], "lw": 0}
-    )
+    line: dict[str, Any] = {"color": INK, "lw": 1.0, "ls": ls, "zorder": 2.5}
+    looks: dict[str, Any] = {"facecolor": REGIONS[0], "lw": 0}
+    key = looks | {"edgecolor": INK, "ls": ls, "lw": 1.0}
+    if hatch:
+        line = {"color": STABLE, "lw": 1.4, "ls": DASHED, "zorder": 4.5}
+        key = looks = {"facecolor": "none", "hatch": hatch, "edgecolor": (*to_rgb(STABLE), 0.5), "lw": 0}
     parts = pieces(across, stable)
     for piece in parts:
         x, low, high = np.array(piece.points).T
@@ -239,71 +229,18 @@ def draw_region(
         ax.plot(x, np.transpose([low, high]), **line)
         ends = np.nonzero([piece.begins and x[0] > across[0], piece.ends])[0]
         ax.vlines(x[-ends], low[-ends], high[-ends], **line)
-    key = looks if hatch else looks | {"edgecolor": INK, "ls": ls, "lw": 1.0}
     ax.fill_between([], [], [], **key, label=safe(label) + ("" if parts else ": nowhere in this picture"))
 
 
 # ------------------------------------------------------------ continuous and sampled regions
 
 
-class StableRegions(NamedTuple):
-    """Both regions of one arm.  `sampled` has the arm's own C; at C = 0 also the regions with a little damping."""
-
-    continuous: Plane
-    sampled: tuple[GainMap, ...]  # most damping first, so that each lies on the one before
-
-
-def stable_regions(arm: Arm, gains: HubFeedback, chain: Chain) -> StableRegions:
-    """The regions around these gains.  Raises ParameterError where the arm has no loop."""
-    dampings = (arm.damping,) if arm.damping else (*LITTLE_DAMPINGS, 0.0)
-    loops = [sampled_verdict(arm.having(damping=C), gains, chain).full for C in dampings]
-    ends = np.unique(np.concatenate([ends_of_K1(loop) for loop in loops]))
-    ends = ends[ends > 0]
-    ends = ends[np.diff(ends, prepend=0.0) > 1e-3 * ends]
-    own, _ = gains.point
-    span, cut = (arm.input_per_torque * np.array(ends) for ends in (K2_RANGE, CUT_RANGE))
-    low, top = own / 15.0, 1.7 * max([own, *ends])  # beyond all that is stable
-    across = with_both_sides(np.geomspace(low, top, OVERLAY_COLUMNS), ends)
-    across = across[(low <= across) & (top >= across)]
-    wide = 1.8 / np.log(top / low)  # about the width of the picture over its height
-    planes = [
-        rounded_map(sampled_map(loop, across, cut), lambda x, y: np.asarray(wide * np.log(x) + 1j * y / np.ptp(span)))
-        for loop in loops
-    ]
-    every = np.unique(np.concatenate([plane.axes[0] for plane in planes]))
-    return StableRegions(counted(arm, every, cut), tuple(with_more(plane, every) for plane in planes))
-
-
-def region_columns(data: StableRegions) -> list[Column]:
-    """The numbers of the picture: at each value of the gain across the ends of the stable intervals of the other."""
-    arm, planes = data.continuous.arm, {plane.loop.plant.arm.damping: plane for plane in data.sampled}
-    each = {"continuous_K2_intervals": data.continuous.stable_intervals} | {
-        "sampled_K2_intervals" if arm.damping == C else f"sampled_at_C_{C:g}_s": plane.stable_intervals
-        for C, plane in planes.items()
-    }
-    return [
-        Column(PLANE[0], of=data.continuous.axes[0]),
-        *(Column(key, of=[tuple(map(float, np.ravel(column))) for column in own]) for key, own in each.items()),
-    ]
-
-
-@lru_cache(maxsize=8)
-def sampled_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> GainMap | None:
-    """Where in the picture the sampled loop is stable, with the modes of the verdict on the default gains."""
-    try:
-        loop = sampled_verdict(arm, default_gains(arm), chain).full
-        across = with_both_sides(rate_columns(arm, x, SAMPLED_COLUMNS), ends_of_K1(loop))
-        across = across[(x.low <= across) & (x.high > across)]
-        plane = sampled_map(loop, across, [y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])
-        return rounded_map(plane, lambda across, up: np.asarray(1.5 * x.place(across) + 1j * y.place(up)))
-    except ConvergenceError:
-        return None
-
-
 @picture(
-    (Plane, "tfarm.map returns of gains at the hub"), (GainMap, "tfarm.dsp.sampled_map returns"), size=(9.0, 5.7),
+    (Plane, "tfarm.map returns of gains at the hub"),
+    (GainMap, "tfarm.dsp.sampled_map returns"),
+    size=(9.0, 5.7),
     title=lambda continuous, _: f"{continuous.arm.name}: gains that keep the loop stable, continuous and sampled",
-)  # fmt: skip
+)
 def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes) -> None:
     """Both regions of the two gains, in the axes given or in new ones; the axes.
 
@@ -324,7 +261,9 @@ def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes
     ax.set_facecolor(REGIONS[1])
     draw_region(continuous.x, continuous.stable_intervals, "stable, continuous: every mode", ax)
     ax.fill_between([], [], [], color=REGIONS[1], label="unstable, continuous")
-    for plane, hatch in zip(planes, HATCHES[-len(planes) :], strict=True):
+    # with more damping, with less, with its own
+    hatches = ("..", "\\\\\\\\", "////")[-len(planes) :]
+    for plane, hatch in zip(planes, hatches, strict=True):
         C = plane.loop.plant.arm.damping
         hypothesis = "" if continuous.arm.damping == C else f", if C were {scientific(C, 1)} s"
         label = f"stable, sampled every {ms} ms{hypothesis if C else f', C = 0: the first {plane.modes_used} modes'}"
@@ -334,6 +273,47 @@ def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes
         ax.axhline(1.0, color=INK, lw=1.1, ls=(0, (5, 3)), zorder=4, label=label)
     law = planes[0].loop.gains
     ax.plot(*law.point, "o", color="white", mec=INK, mew=1.4, ms=7, zorder=6, ls="none", label=gains_words(law))
+
+
+# ------------------------------------------------------------ the map of an arm
+
+
+class MarkedLaw(NamedTuple):
+    """Gains (K1, K2) that are marked in the map, with their label; the best ones by a star."""
+
+    point: tuple[float, float]
+    label: str
+    is_best: bool
+
+
+@picture(size=(9.0, 6.2), title=lambda data, *_: f"{data.arm.name}: stability region of both gains")
+def draw_stability_map(
+    data: StabilityMap, laws: Sequence[MarkedLaw], bounds: Mapping[str, tuple[float, float]], *, ax: Axes
+) -> None:
+    """Draw count, boundary, damping, sampled region, Lyapunov's frame, laws and the bounds of their search."""
+    arm = data.arm
+    x = data.x
+    y = data.y
+    ground(data.region, x, y, ax)
+    contours(*data.coarse.axes, np.where(data.coarse.unstable == 0, data.damping, np.nan), ax)
+    draw_boundary(data.region, data.edge, x, y, ax)
+    if (plane := data.sampled) is not None:
+        ms = plain(1e3 * plane.loop.chain.sampling.period)
+        label = f"stable when sampled every {ms} ms (first {plane.modes_used} modes)"
+        draw_region(plane.x, plane.stable_intervals, label, ax, hatch="////")
+    if arm.is_uniform:
+        # at C > 0 only the line without moment feedback is proven
+        dashes, kind = ("-", "proven") if arm.is_undamped else ((0, (1, 1)), "not a proof here")
+        label = f"Lyapunov ({LYAPUNOV}): {kind}"
+        ax.plot([0, 0, x.high], [y.low, 1, 1], color=GREY, lw=2.2, ls=dashes, label=label)
+        if not arm.is_undamped:
+            ax.plot([0, x.high], [0, 0], color=GREY, lw=1.6, label=f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven")
+    for point, label, is_best in laws:
+        mark, size = ("*", 13.0) if is_best else ("D", 8.0)
+        ax.plot(*point, mark, ms=size, mfc=INK, mec="white", mew=1.0, zorder=7, ls="none", label=label)
+    if bounds:
+        (a, b), (c, d) = (bounds[name] for name in PLANE)
+        ax.plot([a, b, b, a, a], [c, c, d, d, c], color=GREY, lw=0.8, ls=(0, (1, 2)), label="bounds of its search")
 
 
 # ------------------------------------------------------------ two arms, or two laws on one arm
@@ -387,6 +367,8 @@ def _factors(data: Comparison, ax: Axes) -> None:
     )
     ax.axhline(1.0, color=INK, lw=0.6)
     ax.set(
-        xlabel="further delay [ms]", ylabel="factor on the controller [−]", xlim=(0.0, 1e3 * delay[-1]),
+        xlabel="further delay [ms]",
+        ylabel="factor on the controller [−]",
+        xlim=(0.0, 1e3 * delay[-1]),
         ylim=(0.0, min(ax.get_ylim()[1], 1e3)),
-    )  # fmt: skip
+    )

@@ -3,7 +3,6 @@
 import math
 import textwrap
 from collections.abc import Sequence
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -11,14 +10,11 @@ from matplotlib.ticker import MaxNLocator
 
 from tfarm.arm.schema import file_key, file_keys
 from tfarm.digits import how_many, unit
-from tfarm.errors import TfarmError, require
+from tfarm.errors import require
 from tfarm.exact.outputs import signal_words, unit_over
-from tfarm.loop.curve import decibels
-from tfarm.response import transfer
-from tfarm.response.frequency import resonant_band
+from tfarm.studies.bands import study_band as response_band
 from tfarm.studies.quantities import (
     COLUMNS,
-    QUANTILES,
     Spread,
     column_names,
     loop_of,
@@ -31,11 +27,14 @@ from .frequency import over_frequency
 from .motion import OF_STABILITY
 from .style import BLUE, GREY, INK, Axes, number_label, picture, plain_ticks, safe
 
-BINS = 24  # at most, of a histogram
-ACROSS, MOST_QUANTITIES = 4, 12  # axes of distributions side by side, and in all
-MOST_NUMBERS, MOST_ROWS, MOST_MARKS = 4, 3, 1000  # of a scatter picture: axes, and arms
+# axes of distributions side by side, and in all
+ACROSS = 4
+MOST_QUANTITIES = 12
+# of a scatter picture: axes, and arms
+MOST_NUMBERS = 4
+MOST_ROWS = 3
+MOST_MARKS = 1000
 LINE = 24  # letters of a label of such small axes
-POINTS, CURVES, SINGLE = 1200, 100, 12  # of a band: frequencies, arms at most, and curves drawn of these
 FIRST = ("gain_margin_db", "phase_margin_deg", "delay_margin_ms", "peak_sensitivity")  # where there are too many
 LOOKS: dict[str, dict[str, Any]] = {
     "continuous": {"fill": True, "color": BLUE, "alpha": 0.4, "label": "continuous-time"},
@@ -65,10 +64,11 @@ def _grid(figure: Any, *of: Any) -> None:
 
 
 @picture(
-    (Study, "tfarm.study returns"), grid=_grid,
+    (Study, "tfarm.study returns"),
+    grid=_grid,
     size=lambda *of: (max(4.5, 2.4 * min(n := len(distributions(*of)), ACROSS)), 0.9 + 2.0 * math.ceil(n / ACROSS)),
     title=lambda found, *_: f"{found.arm}: distributions over {how_many(found.done, 'arm')}",
-)  # fmt: skip
+)
 def study(found: Study, quantity: str | None = None, *, ax: Sequence[Axes]) -> None:
     """Distribution of each quantity of a study (from `tfarm.study`), or of one, in axes of its own; the axes.
 
@@ -78,12 +78,14 @@ def study(found: Study, quantity: str | None = None, *, ax: Sequence[Axes]) -> N
     table = found.table()
     for one, each in zip(ax, distributions(found, quantity), strict=False):
         values = [table[of.name][np.isfinite(table[of.name])] for of in each]
-        low, high = min(of.least for of in each), max(of.largest for of in each)
+        low = min(of.least for of in each)
+        high = max(of.largest for of in each)
         room = 0.02 * (abs(high) or 1.0) if high - low <= 1e-9 * abs(high) else 0.0
-        edges = np.linspace(low - room, high + room, min(BINS, 2 + math.isqrt(max(map(len, values)))))
+        edges = np.linspace(low - room, high + room, min(24, 2 + math.isqrt(max(map(len, values)))))
         counts = [np.histogram(own, edges)[0] for own in values]
         for n, (of, own) in enumerate(zip(each, counts, strict=True)):
-            looks, height = LOOKS[loop_of(of.name)], np.max(counts) * (1.08 + 0.1 * n)
+            looks = LOOKS[loop_of(of.name)]
+            height = np.max(counts) * (1.08 + 0.1 * n)
             one.stairs(own, edges, **looks)
             one.plot(
                 [of.low, of.median, of.high], [height] * 3, "|-", ms=7, markevery=[1], color=looks["color"], lw=1.2
@@ -118,31 +120,43 @@ def _shown(found: Study, quantity: str | None = None) -> tuple[list[Spread], lis
 
 
 @picture(
-    (Study, "tfarm.study returns"), size=lambda *of: (9.0, 1.0 + 1.9 * len(_shown(*of)[0])),
+    (Study, "tfarm.study returns"),
+    size=lambda *of: (9.0, 1.0 + 1.9 * len(_shown(*of)[0])),
     grid=lambda figure, *of: figure.subplots(
         *(len(each) for each in _shown(*of)), squeeze=False, sharex="col", sharey="row"
     ),
     title=lambda found, *_: f"{found.arm}: quantities over the varied numbers",
-)  # fmt: skip
+)
 def study_scatter(found: Study, quantity: str | None = None, *, ax: Sequence[Axes]) -> None:
     """Values of a study (from `tfarm.study`) over each varied number, of three quantities or of one; the axes.
 
     A mark is an arm, in the colour of the stability of its loop; at the upper edge it has no limit, at the lower edge
     no value.  Of more than a thousand arms as many are drawn, even over the rows.
     """
-    (rows, keys), step = _shown(found, quantity), 1 + (found.done - 1) // MOST_MARKS
+    (rows, keys) = _shown(found, quantity)
+    step = 1 + (found.done - 1) // MOST_MARKS
     table = {name: values[::step] for name, values in found.table().items()}
     for of, line in zip(rows, np.reshape(np.array(ax, dtype=object), (len(rows), len(keys))), strict=True):
         y = table[of.name]
-        words, edge = table.get(stability_of(of.name), np.full(len(y), "arm")), np.where(np.isnan(y), 0.02, 0.98)
+        words = table.get(stability_of(of.name), np.full(len(y), "arm"))
+        edge = np.where(np.isnan(y), 0.02, 0.98)
         for key, one in zip(keys, line, strict=True):
             for word, (colour, mark) in MARKS.items():
                 for own, height, transform in (
-                    (np.isfinite(y), y, one.transData), (~np.isfinite(y), edge, one.get_xaxis_transform()),
-                ):  # fmt: skip
+                    (np.isfinite(y), y, one.transData),
+                    (~np.isfinite(y), edge, one.get_xaxis_transform()),
+                ):
                     if (here := own & (words == word)).any():
-                        one.plot(table[key][here], height[here], mark, color=colour, ms=3.4, alpha=0.75,
-                                 transform=transform, label=word or "not determined")  # fmt: skip
+                        one.plot(
+                            table[key][here],
+                            height[here],
+                            mark,
+                            color=colour,
+                            ms=3.4,
+                            alpha=0.75,
+                            transform=transform,
+                            label=word or "not determined",
+                        )
             one.set(xlabel=_folded(key_label(key, found)) * one.xaxis.get_tick_params()["labelbottom"])
             one.set(ylabel=_folded(f"{of.label} [{of.unit or '−'}]") * one.yaxis.get_tick_params()["labelleft"])
             one.xaxis.set_major_locator(MaxNLocator(4))
@@ -150,24 +164,22 @@ def study_scatter(found: Study, quantity: str | None = None, *, ax: Sequence[Axe
 
 
 @picture(
-    (Study, "tfarm.study returns"), size=(9.0, 4.6),
+    (Study, "tfarm.study returns"),
+    size=(9.0, 4.6),
     title=lambda found, output="root_moment": f"{found.arm}: {signal_words(output)[0]} of the arms of a study",
-)  # fmt: skip
+)
 def study_band(found: Study, output: str = "root_moment", *, ax: Axes) -> None:
     """Exact responses of up to 100 arms of a study (from `tfarm.study`), their 5, 50 and 95 % at each frequency.
 
     The arms are even over the rows.  Raises ParameterError for an unknown output, and where no arm has that response.
     """
-    plan, table, curves = found.parts.plan, found.table(), []
-    omega, row = np.geomspace(*resonant_band(plan.case.arm), POINTS), transfer(plan.case.arm, output).rows[0]
-    for n in range(0, found.done, 1 + (found.done - 1) // CURVES):
-        with suppress(TfarmError):  # of an arm that is illegal
-            one = plan.subjects.at([float(table[key][n]) for key in plan.space.keys])
-            curves.append(decibels(transfer(one.case.arm, output)(1j * omega)))
-    require(curves, "output", output, "no arm of the study has that response")
-    low, median, high = np.quantile(curves, [QUANTILES[end] for end in ("low", "median", "high")], axis=0)
-    ax.fill_between(omega, low, high, color=BLUE, alpha=0.3, lw=0, label="5 to 95 % of the arms, at each frequency")
-    for n, curve in enumerate(curves[:: max(1, len(curves) // SINGLE)]):
+    band = response_band(found, output)
+    omega = band.omega
+    ax.fill_between(
+        omega, band.low, band.high, color=BLUE, alpha=0.3, lw=0, label="5 to 95 % of the arms, at each frequency"
+    )
+    # a dozen single arms at least
+    for n, curve in enumerate(band.curves[:: max(1, len(band.curves) // 12)]):
         ax.plot(omega, curve, color=GREY, lw=0.5, alpha=0.6, zorder=1.5, label="single arms" * (not n))
-    ax.plot(omega, median, color=BLUE, lw=1.4, label="median, at each frequency")
-    over_frequency(ax, f"{row.label} [dB re 1 {unit_over(row.unit, plan.case.arm.input_unit)}]")
+    ax.plot(omega, band.median, color=BLUE, lw=1.4, label="median, at each frequency")
+    over_frequency(ax, f"{band.label} [dB re 1 {unit_over(band.unit, found.parts.plan.case.arm.input_unit)}]")

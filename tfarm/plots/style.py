@@ -26,7 +26,7 @@ from matplotlib.axis import Axis
 from matplotlib.backend_bases import FigureCanvasBase
 from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.figure import Figure as Figure  # which pages name too
-from matplotlib.patheffects import AbstractPathEffect, withStroke
+from matplotlib.patheffects import withStroke
 from matplotlib.text import Annotation, Text
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from matplotlib.transforms import Bbox
@@ -40,21 +40,25 @@ from tfarm.exact.outputs import signal_words, unit_over
 from tfarm.files import write_file
 from tfarm.loop.varied import ARM_PARAMETERS
 
-INK, GREY, FAINT = "#1a1a1a", "#6b6b6b", "#d4d4d4"
-BLUE, ORANGE, GREEN, PURPLE = "#0060a8", "#c4500a", "#00795a", "#8a3b8f"  # distinct for the colour-blind too
+INK = "#1a1a1a"
+GREY = "#6b6b6b"
+FAINT = "#d4d4d4"
+# distinct for the colour-blind too
+BLUE = "#0060a8"
+ORANGE = "#c4500a"
+GREEN = "#00795a"
+PURPLE = "#8a3b8f"
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE)  # of several records in one picture
 # stability, the same in every picture, page and live view; each has a mark of its own too, for grey print
-STABLE, MARGINAL, UNSTABLE = BLUE, PURPLE, "#a81e2b"
+STABLE = BLUE
+MARGINAL = PURPLE
+UNSTABLE = "#a81e2b"
 # regions of a map by the number of unstable poles, 0 first: ever darker in grey; green is kept for good margins
 REGIONS = ("#dcecf9", "#f9cfc0", "#f2ad9b", "#e58a76", "#d46c5a")
 # grades of margins, amber before red, which is kept for what is unstable; with those of a page's dark mode in style.css
-GOOD, LOW, POOR = GREEN, "#735200", ORANGE
-
-
-WIDEST_LEGEND = 0.95  # of a figure's width: letters are a little wider or narrower in a file of other dots an inch
-NUMBER_ROOM = (0.08, 0.045)  # of the width and the height: around a number
-HALO: list[AbstractPathEffect] = [withStroke(linewidth=3.0, foreground="white")]  # around numbers on a line
-
+GOOD = GREEN
+LOW = "#735200"
+POOR = ORANGE
 LYAPUNOV = "{} > 0, {} < 1".format(*PLANE)  # proven by the argument of the paper at C = 0
 OTHER_UNITS = ARM_PARAMETERS | {"delay": "s"}  # of numbers that vary
 
@@ -67,14 +71,15 @@ PICTURE_DOTS = 160  # an inch, of a PNG: lines of 0.6 points are more than a pix
 COORDINATES, LONG_NUMBER, PATH_LETTER = (  # in an SVG
     re.compile(pattern) for pattern in (rb'(?<= [dxy]=")[^"]+', rb"-?\d+\.\d{3,}", rb"\s*([MLQCz])\s*")
 )
-
-
 DARK = Path(__file__).with_name("dark.svg").read_bytes()  # in an SVG: its colours on a dark page
 STYLE, COLUMN, PHONE = (Path(__file__).with_name(f"{name}.mplstyle") for name in ("tfarm", "column", "phone"))
-COLUMN_WIDTH, PAGE_WIDTH, WIDE = 3.5, 7.16, 9.5  # inches: one and both columns of an IEEE paper, and what needs both
-HALF_WIDTH, PHONE_WIDTH = 6.2, 3.83  # inches at 96 pixels: half a page that is 1280 wide, and one that is 400
-COLUMN_POINTS, SMALL_POINTS, THIN = 8.0, 6.5, 0.7  # largest letters, those inside axes; factor on lines and marks
-LONG_LABEL, LINE = 14, 46  # letters of a label up one of several axes, and of a line of a label below the axes
+# inches: one and both columns of an IEEE paper
+COLUMN_WIDTH = 3.5
+PAGE_WIDTH = 7.16
+# inches at 96 pixels: half a page that is 1280 wide, and one that is 400
+HALF_WIDTH = 6.2
+PHONE_WIDTH = 3.83
+SMALL_POINTS = 6.5  # largest letters inside axes
 _place: ContextVar[str] = ContextVar("_place", default="")
 
 
@@ -139,9 +144,12 @@ def check_records(of: Sequence[tuple[Any, str]], found: Sequence[Any]) -> None:
 
 
 def picture(
-    *of: tuple[Any, str], title: Callable[..., str], size: Any = (7.0, 5.4), rows: Sequence[float] = (1.0,),
+    *of: tuple[Any, str],
+    title: Callable[..., str],
+    size: Any = (7.0, 5.4),
+    rows: Sequence[float] = (1.0,),
     grid: Callable[..., Any] | None = None,
-) -> Callable[[Callable[..., None]], Any]:  # fmt: skip
+) -> Callable[[Callable[..., None]], Any]:
     """Make of a function that draws records in `ax` (its axes, or a list of several) one that also makes new axes.
 
     It returns the axes, those given or new ones; its attribute `figure` makes a figure to be saved.
@@ -165,7 +173,8 @@ def picture(
 
         def figure(*found: Any, new: Callable[..., Figure] = Figure, **how: Any) -> Figure:
             bound = signature(draw).bind_partial(*found, **how)  # what is named counts for size, axes and headline too
-            found, how = bound.args, bound.kwargs
+            found = bound.args
+            how = bound.kwargs
             with style():
                 inches = size(*found) if callable(size) else size
                 size_here = placed_size(inches, grid is not None)
@@ -192,7 +201,8 @@ def picture(
                 pyplot.draw_if_interactive()  # type: ignore[no-untyped-call]
                 axes = figure(*found, new=pyplot.figure, **how).axes
             else:
-                axes, count = list(np.ravel(np.asarray(ax, dtype=object))), len(rows)
+                axes = list(np.ravel(np.asarray(ax, dtype=object)))
+                count = len(rows)
                 remedy = f"{count} axes, as figure.subplots({count}) makes them"
                 require(grid or count == len(axes), "ax", len(axes), remedy)
                 with style():
@@ -209,7 +219,9 @@ def picture(
 
 def placed_size(inches: tuple[float, float], is_grid: bool) -> tuple[float, float]:
     """Width and height of a picture at its place, there without its legend; labels need more of a smaller height."""
-    share, is_wide = inches[1] / inches[0], is_grid or inches[0] > WIDE
+    share = inches[1] / inches[0]
+    # which needs both columns
+    is_wide = is_grid or inches[0] > 9.5
     match _place.get():
         case "column" if is_wide:
             return PAGE_WIDTH, PAGE_WIDTH * share
@@ -235,11 +247,11 @@ def make_thin(figure: Figure) -> None:
     """Letters that a picture made larger than those of a column, its lines and marks, made to fit one."""
     inside = [text for ax in figure.axes for text in ax.texts]
     for text in (each for each in figure.findobj() if isinstance(each, Text)):
-        text.set_fontsize(min(text.get_fontsize(), SMALL_POINTS if text in inside else COLUMN_POINTS))
+        text.set_fontsize(min(text.get_fontsize(), SMALL_POINTS if text in inside else 8.0))
     for ax in figure.axes:
         sizes = product(ax.lines, ("linewidth", "markersize", "markeredgewidth"))
         for each, of in (*sizes, *product(ax.collections, ("linewidth",))):
-            each.set(**{of: THIN * np.asarray(getattr(each, f"get_{of}")())})
+            each.set(**{of: 0.7 * np.asarray(getattr(each, f"get_{of}")())})
 
 
 def finish(drawn: Figure, words: str) -> None:
@@ -249,8 +261,8 @@ def finish(drawn: Figure, words: str) -> None:
         make_thin(drawn)
     for ax in drawn.axes if place else ():
         for text in (each for each in (*ax.get_children(), ax.xaxis.label) if isinstance(each, Text)):
-            text.set_text(folded(text.get_text(), LINE))
-        if len(drawn.axes) > 1 and len(label := ax.get_ylabel()) > LONG_LABEL:  # axes that share the height
+            text.set_text(folded(text.get_text(), 46))
+        if len(drawn.axes) > 1 and len(label := ax.get_ylabel()) > 14:  # axes that share the height
             ax.set_ylabel(re.sub(r" +(?=\[)", "\n", label))
     for ax in drawn.axes if place == "phone" else ():
         for each in (ax, *ax.child_axes):
@@ -275,11 +287,17 @@ def legend_below(figure: Figure) -> float:
     labels = [folded(label, 40 if figure.get_figwidth() <= HALF_WIDTH else 100) for label in keys]
     for number in (5, 3, 2, 1)[2 * (_place.get() == "phone") :] if keys else ():
         legend = figure.legend(
-            keys.values(), labels, loc="outside lower left", ncols=number,
-            fontsize=min(8.2, mpl.rcParams["legend.fontsize"]), handlelength=1.8, columnspacing=1.2,
-        )  # fmt: skip
+            keys.values(),
+            labels,
+            loc="outside lower left",
+            ncols=number,
+            fontsize=min(8.2, mpl.rcParams["legend.fontsize"]),
+            handlelength=1.8,
+            columnspacing=1.2,
+        )
         box = legend.get_window_extent()
-        if number == 1 or box.width < WIDEST_LEGEND * figure.bbox.width:
+        # letters are a little wider or narrower in a file of other dots an inch
+        if number == 1 or box.width < 0.95 * figure.bbox.width:
             return float(box.height / figure.dpi)
         legend.remove()
     return 0.0
@@ -290,18 +308,19 @@ def folded(text: str, letters: int) -> str:
     return "\n".join(textwrap.fill(line, letters) for line in text.splitlines())
 
 
-def note(text: str, at: tuple[float, float], ax: Axes, room: tuple[float, float] = NUMBER_ROOM, **looks: Any) -> bool:
-    """A text with a halo at a place where the room around it, of the width and the height, is free of other notes.
+def note(text: str, at: tuple[float, float], ax: Axes, room: tuple[float, float] = (0.08, 0.045), **looks: Any) -> bool:
+    """Write a text with a halo where the room around it, of the width and the height, is free of other notes.
 
-    Returns whether it is.
+    Return whether it is.
     """
     to_view = ax.transData - ax.transAxes
     others = [to_view.transform(each.xy) for each in ax.texts if isinstance(each, Annotation) and each.get_text()]
-    room = (1.6 * room[0], 1.6 * room[1]) if _place.get() == "phone" else room
-    is_free = bool((abs(np.reshape(others, (-1, 2)) - to_view.transform(at)) > room).any(axis=1).all())
+    needed = np.multiply(1.6 if _place.get() == "phone" else 1.0, room)
+    is_free = bool((abs(np.reshape(others, (-1, 2)) - to_view.transform(at)) > needed).any(axis=1).all())
     if is_free:
         own: Any = {"fontsize": 8.0, "textcoords": "offset points", "xytext": (0, 0), "va": "center", "zorder": 5}
-        ax.annotate(text, at, annotation_clip=False, path_effects=HALO, **own | looks)
+        halo = [withStroke(linewidth=3.0, foreground="white")]
+        ax.annotate(text, at, annotation_clip=False, path_effects=halo, **own | looks)
     return is_free
 
 
@@ -383,21 +402,41 @@ def name_axes(vary: Sequence[str], arm: Arm, law: AnyLaw, ax: Axes) -> None:
 # ------------------------------------------------------------ files
 
 
-def save_figure(figure: Figure, folder: Path, stem: str, formats: tuple[str, ...], dpi: int = PICTURE_DOTS) -> None:
-    """The figure as folder/stem.svg and .png, or as one of these."""
-    for kind, content in zip(formats, _drawn(figure, formats, dpi), strict=True):
-        (folder / f"{stem}.{kind}").write_bytes(content)
+def save_figure(figure: Figure, file: Path, dpi: int = PICTURE_DOTS) -> None:
+    """Write a figure to a file of the kind that its name ends in."""
+    file.write_bytes(content_of(figure, file.suffix.removeprefix("."), dpi))
 
 
 def save_picture(draw: Callable[[Any], Figure], record: Any, path: Path) -> None:
-    """The picture of a record as one file, written whole: an SVG or a PDF for a column, else a PNG.
+    """Write the picture of a record as one file, whole: an SVG or a PDF for a column, else a PNG.
 
     Raises ParameterError, naming --figure, where it cannot be written.
     """
     kind = path.suffix.lower().removeprefix(".") or "png"
     with nullcontext() if kind == "png" else column():
-        (content,) = _drawn(draw(record), (kind,), PICTURE_DOTS)
+        content = content_of(draw(record), kind)
     write_file(path, content, key="--figure")
+
+
+def content_of(figure: Figure, kind: str, dpi: int = PICTURE_DOTS) -> bytes:
+    """Return the file of a figure.
+
+    In an SVG coordinates have two decimals of a point, a 60th of a pixel, where matplotlib writes six.
+    """
+    content = io.BytesIO()
+    with style(), warnings.catch_warnings():
+        # an arm's name may hold any letter
+        warnings.filterwarnings("ignore", "Glyph .* missing")
+        settled(figure)
+        with ticks_kept(figure.axes):
+            figure.savefig(content, format=kind, dpi=dpi, metadata=METADATA[kind])
+    drawn = content.getvalue()
+    return COORDINATES.sub(_short, drawn).replace(b"<defs>", DARK, 1) if kind == "svg" else drawn
+
+
+def _short(part: re.Match[bytes]) -> bytes:
+    """Return two decimals, and no space around the letters of a path."""
+    return PATH_LETTER.sub(rb"\1", LONG_NUMBER.sub(lambda number: b"%.2f" % float(number[0]), part[0]))
 
 
 def settled(figure: Figure) -> None:
@@ -417,7 +456,8 @@ def measure_once(ax: Axes) -> None:
     Both would measure; the first has to be near enough for the ticks of the second to be those that are drawn.  Axes of
     a shape of their own are measured in both.
     """
-    place, rounds = ax.get_subplotspec(), count(start=int(ax.get_aspect() != "auto"))
+    place = ax.get_subplotspec()
+    rounds = count(start=int(ax.get_aspect() != "auto"))
 
     def around(*how: Any, **more: Any) -> Any:
         if place is None or next(rounds):
@@ -457,24 +497,3 @@ def once(call: Callable[..., Any]) -> Callable[..., Any]:
         return found[0]
 
     return kept
-
-
-def _drawn(figure: Figure, formats: tuple[str, ...], dpi: int) -> Iterator[bytes]:
-    """The figure in each format, its layout made once for all of them.
-
-    In an SVG coordinates have two decimals of a point, a 60th of a pixel, where matplotlib writes six.
-    """
-    with style(), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing")  # an arm's name may hold any letter
-        settled(figure)
-        for kind in formats:
-            content = io.BytesIO()
-            with ticks_kept(figure.axes):
-                figure.savefig(content, format=kind, dpi=dpi, metadata=METADATA[kind])
-            drawn = content.getvalue()
-            yield COORDINATES.sub(_short, drawn).replace(b"<defs>", DARK, 1) if kind == "svg" else drawn
-
-
-def _short(part: re.Match[bytes]) -> bytes:
-    """Two decimals, and no space around the letters of a path."""
-    return PATH_LETTER.sub(rb"\1", LONG_NUMBER.sub(lambda number: b"%.2f" % float(number[0]), part[0]))

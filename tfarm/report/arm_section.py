@@ -11,49 +11,60 @@ from tfarm.arm.chain import file_text
 from tfarm.arm.schema import file_key
 from tfarm.digits import plain, significant, unit
 from tfarm.plots.motion import sketch
-from tfarm.report.page import Case, Fact, PageSection, picture, prose, sheet
+from tfarm.report.page import ArmReport, Fact, PageSection, picture, prose, sheet
 from tfarm.schema import Quantity, Table, table
 from tfarm.studies.candidates import Candidates, has_hub_inertia, hub_study, section_study
 
 
-def arm_section(case: Case) -> PageSection:
+def arm_section(report: ArmReport) -> PageSection:
     """The first part of every page: headline numbers, slips of units, the theory, and the parameters."""
-    arm, input = case.arm, input_words(case.arm)
+    arm = report.arm
+    input = input_words(report.arm)
     words = (
-        prose("units", odd="; ".join(implausible(arm))), prose("rig", arm=arm, input=input),
+        prose("units", odd="; ".join(implausible(arm))),
+        prose("rig", arm=arm, input=input),
         "" if arm.assumptions else "This arm states no assumptions.",
-    )  # fmt: skip
+    )
     return PageSection(
-        title="The arm", facts=headline_numbers(arm), words=list(filter(None, words)),
+        title="The arm",
+        facts=headline_numbers(arm),
+        words=list(filter(None, words)),
         items=arm.assumptions,
         blocks=(
             picture("arm", sketch.figure(arm), arm=arm, input=input),
-            sheet("parameters", table([*parameters(arm, tomllib.loads(file_text(arm, case.chain)))]),
-                  is_rig=not arm.is_uniform),
+            sheet(
+                "parameters",
+                table([*parameters(arm, tomllib.loads(file_text(arm, report.chain)))]),
+                is_rig=not arm.is_uniform,
+            ),
             derived_table(arm),
         ),
-    )  # fmt: skip
+    )
 
 
 def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
-    """First natural frequencies (at C = 0), total inertia, slenderness, shear cut-off, damping."""
-
-    modes = tfarm.modes(arm, count=3)  # the rigid body's 0 is not shown
+    """Return first natural frequencies (at C = 0), total inertia, slenderness, shear cut-off, damping."""
+    modes = tfarm.modes(arm, count=3)
+    numbered = zip(modes.index.tolist(), modes.natural_frequency.tolist(), strict=True)
+    # the rigid body's 0 is not shown
+    frequencies = [(f"natural frequency {number}", omega) for number, omega in numbered if number > 0]
+    if arm.has_cutoff:
+        frequencies.append(("shear cut-off √(κGA/ρI)", arm.shear_cutoff))
     slenderness = arm.link.slenderness if arm.is_uniform else arm.length / arm.link.section.radius_of_gyration
-    frequencies = {
-        f"natural frequency {number}": omega
-        for number, omega in zip(modes.index, modes.natural_frequency, strict=True)
-        if number > 0
-    }
-    frequencies |= {"shear cut-off √(κGA/ρI)": arm.shear_cutoff} if arm.has_cutoff else {}
     return (
-        *(Fact(label, significant(omega, 8), "rad/s", f"{significant(omega / (2 * math.pi), 8)} Hz")
-          for label, omega in frequencies.items()),
-        Fact("total inertia J about the hub", significant(arm.total_inertia, 8), "kg m²",
-             "the arm cannot turn as a rigid body" * (not arm.has_rigid_mode)),
+        *(
+            Fact(label, significant(omega, 8), "rad/s", f"{significant(omega / (2 * math.pi), 8)} Hz")
+            for label, omega in frequencies
+        ),
+        Fact(
+            "total inertia J about the hub",
+            significant(arm.total_inertia, 8),
+            "kg m²",
+            "the arm cannot turn as a rigid body" * (not arm.has_rigid_mode),
+        ),
         Fact("slenderness L/√(I/A)", significant(slenderness, 5)),
         Fact("damping C", plain(arm.damping), "s", prose("damping_note", arm=arm)),
-    )  # fmt: skip
+    )
 
 
 class Parameter(NamedTuple):
@@ -95,34 +106,52 @@ def derived_table(arm: Arm) -> Table:
         for quantity, symbol, value, unit in (
             ("area of the section", "A", link.section.area, "m²"),
             ("second moment of area", "I", link.section.second_moment, "m⁴"),
-            (f"shear factor, {'Cowper (1966)' if link.section.shear_factor is None else 'given'}", "κ",
-             link.shear_factor, ""),
+            (
+                f"shear factor, {'Cowper (1966)' if link.section.shear_factor is None else 'given'}",
+                "κ",
+                link.shear_factor,
+                "",
+            ),
             ("mass", "ρAL", link.rhoA * link.length, "kg"),
             ("bending stiffness", "EI", link.EI, "N m²"),
             ("shear stiffness", "κGA", link.kGA, "N"),
-            ("Poisson's ratio of an isotropic material", "E/2G − 1",
-             -1 < link.poissons_ratio <= 0.5 and link.poissons_ratio, ""),
+            (
+                "Poisson's ratio of an isotropic material",
+                "E/2G − 1",
+                -1 < link.poissons_ratio <= 0.5 and link.poissons_ratio,
+                "",
+            ),
             ("radius of gyration", "√(I/A)", link.section.radius_of_gyration, "m"),
             ("slenderness", "L/√(I/A)", link.slenderness, ""),
         )
     ] + [
         Derived("rotor inertia at the hub", "N² J_m", arm.motor is not None and arm.motor.reflected_inertia, "kg m²"),
-        Derived("root moment per torque at rest", "−(J − I_h)/J" * arm.is_uniform,
-                turns and -arm.gauged_inertia / arm.total_inertia, "N m/(N m)"),
-        Derived("input for a torque of 1 N m", "", arm.input_per_torque != 1.0 and arm.input_per_torque,
-                unit_of(MOMENT_GAIN, arm)),
-        Derived(f"losses at the hub, in {RATE_GAIN}", "", arm.rate_loss != 0.0 and arm.rate_loss,
-                unit_of(RATE_GAIN, arm)),
-    ]  # fmt: skip
+        Derived(
+            "root moment per torque at rest",
+            "−(J − I_h)/J" * arm.is_uniform,
+            turns and -arm.gauged_inertia / arm.total_inertia,
+            "N m/(N m)",
+        ),
+        Derived(
+            "input for a torque of 1 N m",
+            "",
+            arm.input_per_torque != 1.0 and arm.input_per_torque,
+            unit_of(MOMENT_GAIN, arm),
+        ),
+        Derived(
+            f"losses at the hub, in {RATE_GAIN}", "", arm.rate_loss != 0.0 and arm.rate_loss, unit_of(RATE_GAIN, arm)
+        ),
+    ]
     return sheet("derived", table([row for row in rows if row.value is not False]), arm=arm)
 
 
 # ------------------------------------------------------------ assumptions
 
 
-def assumptions_section(case: Case) -> PageSection:
+def assumptions_section(report: ArmReport) -> PageSection:
     """Frequencies over the sections and the hub inertias that could be chosen, with sensitivities."""
-    arm, found = case.arm, dict[str, Candidates]()
+    arm = report.arm
+    found: dict[str, Candidates] = {}
     if arm.is_uniform:
         found["assumptions_section"] = section_study(arm)
     if arm.is_uniform and has_hub_inertia(arm):

@@ -1,32 +1,25 @@
-"""The continuous loops of a case: margins, Nyquist plots, poles, laws; and of both gains the map and the root loci."""
+"""The continuous loops of a report: margins, Nyquist plots, poles, laws; of both gains the map and the root loci."""
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
-import numpy as np
-
-from tfarm.arm import GAINS, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, cancelled, shown_unit, unit_of
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, cancelled, unit_of
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import REFERENCE, is_measured
-from tfarm.arrays import Real
 from tfarm.assessment.card import POOR, margins_of, result_card
 from tfarm.assessment.card import loop_function as loop_curves
+from tfarm.assessment.stability_map import DESIGNED_MODES, stability_map
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain
 from tfarm.dsp.discretise import rule_in_words
 from tfarm.errors import ConvergenceError, TfarmError
 from tfarm.loop import continuous, loci, margins, nyquist, plane, poles, stability
-from tfarm.loop.circle_crossings import GainMap as SampledMap
-from tfarm.plots import loop_function, regions, roots, style
-from tfarm.plots.style import Axes
-from tfarm.records import record
+from tfarm.plots import loop_function, regions, roots
 from tfarm.report.overview import results
 from tfarm.report.page import (
-    DESIGNED_MODES,
-    Case,
+    ArmReport,
     Controller,
     Fact,
     PageSection,
@@ -43,25 +36,20 @@ from tfarm.report.page import (
 )
 from tfarm.response.signals import Signals, sign_convention
 from tfarm.schema import Column, Quantity, Table, across, curve_table, quantities, roots_table, table, text
-from tfarm.spectrum.table import default_gains, first_frequency, rate_unit
-from tfarm.synthesis import judge, models, structures
+from tfarm.spectrum.table import default_gains, rate_unit
 
-GRID_COLUMNS, GRID_ROWS = 240, 200  # of the coloured grid
-DAMPING_EVERY = 4  # of them, the damping is computed at one in four
-DAMPING_MODES = 8  # of the model whose poles that is of: it is right to a few digits, more than a contour shows
 RECOMMENDED = "Recommended gains (best damping)"
-RANGE_OF_K2 = (-1.0, 1.6)  # of the locus, times what balances a torque: both sides of 0, and beyond 1
 
 
 # ------------------------------------------------------------ margins
 
 
-def margins_section(case: Case) -> PageSection:
+def margins_section(report: ArmReport) -> PageSection:
     """Verdict, margins, crossings and spillover of each controller."""
-    found = [(each, margins_of(each.arm, each.law)) for each in case.in_s]
-    words = [] if case.has_loop else [prose("no_loop", arm=case.arm)]
-    words += [] if case.laws else [sign_words(case.arm)]
-    blocks: list[Picture | Table] = [*(_bode_picture(*pair, case.chain) for pair in found), margin_table(found)]
+    found = [(each, margins_of(each.arm, each.law)) for each in report.in_s]
+    words = [] if report.has_loop else [prose("no_loop", arm=report.arm)]
+    words += [] if report.laws else [sign_words(report.arm)]
+    blocks: list[Picture | Table] = [*(_bode_picture(*pair, report.chain) for pair in found), margin_table(found)]
     for each, it in found:
         crossovers = {"gain_crossovers": it.gain_crossovers, "phase_crossovers": it.phase_crossovers}
         for kind, rows in crossovers.items():
@@ -102,34 +90,42 @@ def _bode_picture(each: Controller, found: margins.Margins, chain: Chain) -> Pic
 # ------------------------------------------------------------ Nyquist
 
 
-def nyquist_section(case: Case) -> PageSection:
-    """The loop function of each controller on a contour that hides nothing, its encirclements counted."""
-    plots = [(each, nyquist.nyquist_of(margins_of(each.arm, each.law).stability)) for each in case.in_s]
-    own = any(found.unstable_open for _, found in plots)
+def nyquist_section(report: ArmReport) -> PageSection:
+    """Return the loop function of each controller on a contour that hides nothing, its encirclements counted."""
     blocks: list[Picture | Table] = []
-    for each, found in plots:
-        linear, disc = (plot.figure(found, name=each.name) for plot in (loop_function.nyquist, loop_function.disc))
-        how: dict[str, Any] = {"each": each, "found": found}
+    counts: dict[str, nyquist.Nyquist] = {}
+    for each in report.in_s:
+        counts[each.title] = found = nyquist.nyquist_of(margins_of(each.arm, each.law).stability)
+        linear = loop_function.nyquist.figure(found, name=each.name)
+        disc = loop_function.disc.figure(found, name=each.name)
+        stem = each.stem("nyquist")
         blocks += [
-            picture("nyquist_plot", linear, stem=each.stem("nyquist"), data=curve_table(found), **how),
-            picture("nyquist_disc", disc, stem=each.stem("nyquist-disc"), **how),
+            picture("nyquist_plot", linear, stem=stem, data=curve_table(found), each=each, found=found),
+            picture("nyquist_disc", disc, stem=f"{stem}-disc", each=each, found=found),
         ]
-    blocks.append(sheet("nyquist_count", across({each.title: found for each, found in plots}), own=own))
+    own = any(found.unstable_open for found in counts.values())
+    blocks.append(sheet("nyquist_count", across(counts), own=own))
     return PageSection(title="Nyquist plot: encirclements of −1", words=[prose("nyquist", own=own)], blocks=blocks)
 
 
 # ------------------------------------------------------------ laws
 
 
-def law_section(case: Case) -> PageSection:
+def law_section(report: ArmReport) -> PageSection:
     """Each law: its signals and input, its entries, its discretisation, and its warnings."""
-    named = case.controllers
+    named = report.controllers
     words = [
-        prose("law", each=each, convention=sign_convention(each.law, each.arm), warnings=cancelled(each.law),
-              rule=rule_in_words(each.law), period=case.chain.sampling.period)
+        prose(
+            "law",
+            each=each,
+            convention=sign_convention(each.law, each.arm),
+            warnings=cancelled(each.law),
+            rule=rule_in_words(each.law),
+            period=report.chain.sampling.period,
+        )
         for each in named
-    ]  # fmt: skip
-    words.append(sign_words(case.arm))
+    ]
+    words.append(sign_words(report.arm))
     words.append(prose("not_on_page", discrete=[each.name for each in named if each.law.is_discrete]))
     blocks = [sheet("law_entries", table([entry for each in named for entry in entries_of(each)]))]
     return PageSection(
@@ -137,7 +133,7 @@ def law_section(case: Case) -> PageSection:
     )
 
 
-class Entry(NamedTuple):
+class LawEntry(NamedTuple):
     """A signal of a law: how it enters, and its numerator and denominator in descending powers."""
 
     law: Annotated[str, Quantity("controller", help="controller that reads the signal")]
@@ -148,7 +144,7 @@ class Entry(NamedTuple):
     denominator: Annotated[list[float] | str, Quantity("denominator", help="coefficients in descending powers")]
 
 
-def entries_of(each: Controller) -> Iterator[Entry]:
+def entries_of(each: Controller) -> Iterator[LawEntry]:
     """Every signal of a law with every digit; matrices are in its file alone."""
     law = each.law
     for part in law.parts:
@@ -160,114 +156,33 @@ def entries_of(each: Controller) -> Iterator[Entry]:
             signal = name.removeprefix(REFERENCE)
             enters = "less its reference" if name in law.references else "as it is"
             enters = enters if is_measured(name) else "its reference alone"
-            yield Entry(each.name, signal, Signals(each.arm, (signal,)).units[0], enters, num, den)
+            yield LawEntry(each.name, signal, Signals(each.arm, (signal,)).units[0], enters, num, den)
 
 
 # ------------------------------------------------------------ the map of both gains
 
 
-@dataclass(frozen=True)
-@record
-class MapOfArm:
-    """The numbers of the map.
-
-    `region` is the exact count on the coloured grid, `edge` (n, 3) the exact boundary, both gains and w, within the
-    picture with rows of nan where it leaves it; `damping` (rows, columns) the least damping ratio of the first
-    `DESIGNED_MODES` modes on the `coarse` grid, of every fourth value of each gain and the frame's.  `sampled` is the
-    region of the loop sampled by the case's chain, None where that is not determined.
-    """
-
-    case: Case
-    x: plane.Axis
-    y: plane.Axis
-    region: plane.Plane
-    edge: Real
-    coarse: plane.Plane
-    damping: Real
-    sampled: SampledMap | None
-
-
-def map_of_arm(case: Case) -> MapOfArm:
-    """The map of an arm, its ranges chosen by J w1 and by its stability intervals."""
-    arm, x = case.arm, plane.rate_axis(case.arm)
-    y = plane.moment_axis(arm, x)
-    found = plane.gain_map(arm, x.grid(GRID_COLUMNS), y.grid(GRID_ROWS))
-    across, up = (
-        np.r_[axis.low, each[DAMPING_EVERY // 2 :: DAMPING_EVERY], axis.high]
-        for axis, each in zip((x, y), found.axes, strict=True)
-    )
-    coarse, sampled = plane.gain_map(arm, across, up), regions.sampled_region(arm, x, y, case.chain)
-    return MapOfArm(case, x, y, found, plane.edge(found, x, y), coarse, damping_over(coarse), sampled)
-
-
-def damping_over(coarse: plane.Plane) -> Real:
-    """The least damping ratio (rows, columns) of the first modes over both gains."""
-    arm, (across, up) = coarse.arm, coarse.axes
-    signals = tuple(each.output for name in PLANE for each in GAINS if each.name == name)
-    model = models.continuous_model(arm, signals, DESIGNED_MODES, DAMPING_MODES, first_frequency(arm))
-    points = np.reshape(np.meshgrid(across, up), (2, -1))
-    parts = np.array_split(points, math.ceil(points.shape[1] / 500), axis=1)  # for memory, whatever the grid
-    laws = (
-        [structures.Entry(name, row[None], structures.ONE) for name, row in zip(signals, part, strict=True)]
-        for part in parts
-    )
-    return np.concatenate([judge.damping_of(model, model.poles(law)) for law in laws]).reshape(up.size, across.size)
-
-
-@style.picture(
-    size=(9.0, 6.2), title=lambda data: f"{data.case.arm.name}: stability region of both gains",
-)  # fmt: skip
-def draw_map_of_arm(data: MapOfArm, *, ax: Axes) -> None:
-    """Both gains: the count, its boundary, the damping, the sampled region, Lyapunov's frame, and the laws."""
-    case, found, x, y = data.case, data.region, data.x, data.y
-    designed = best(case.arm, case.chain)
-    regions.ground(found, x, y, ax)
-    regions.contours(*data.coarse.axes, np.where(data.coarse.unstable == 0, data.damping, np.nan), ax)
-    regions.draw_boundary(found, data.edge, x, y, ax)
-    if (plane := data.sampled) is not None:  # else it could not be settled
-        ms = plain(1e3 * plane.loop.chain.sampling.period)
-        label = f"stable when sampled every {ms} ms (first {plane.modes_used} modes)"
-        regions.draw_region(plane.x, plane.stable_intervals, label, ax, hatch="////")
-    if case.arm.is_uniform:
-        # at C > 0 only the line without moment feedback is proven
-        dashes, kind = ("-", "proven") if case.arm.is_undamped else ((0, (1, 1)), "not a proof here")
-        label = f"Lyapunov ({style.LYAPUNOV}): {kind}"
-        ax.plot([0, 0, x.high], [y.low, 1, 1], color=style.GREY, lw=2.2, ls=dashes, label=label)
-        if not case.arm.is_undamped:
-            label = f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven"
-            ax.plot([0, x.high], [0, 0], color=style.GREY, lw=1.6, label=label)
-    points = (default_gains(case.arm), *([] if designed is None else [designed.law]))
-    for each, gains in zip(case.in_s, points, strict=True):
-        brief = brief_on(case.arm, each.law, case.chain)
-        mark, size = ("*", 13.0) if each.key == "best" else ("D", 8.0)
-        looks: dict[str, Any] = {"ms": size, "mfc": style.INK, "mec": "white", "mew": 1.0, "zorder": 7, "ls": "none"}
-        ax.plot(*gains.point, mark, label=f"{each.title};\n{brief.short}", **looks)
-    if designed is not None:
-        (a, b), (c, d) = (designed.bounds[name] for name in PLANE)
-        ax.plot(
-            [a, b, b, a, a], [c, c, d, d, c], color=style.GREY, lw=0.8, ls=(0, (1, 2)), label="bounds of its search"
-        )
-
-
-def map_data(data: MapOfArm) -> Sequence[Column]:
-    """The grid with counts and damping, then the boundary with its frequencies; the sampled region has its own file."""
-    own = np.meshgrid(*data.coarse.axes)
-    points = zip(*map(np.ravel, (*own, data.coarse.unstable, data.damping)), strict=True)
-    grid = [("grid", K1, K2, math.inf if count < 0 else int(count), damping, "") for K1, K2, count, damping in points]
-    line = [("boundary", K1, K2, "", "", omega) for K1, K2, omega in data.edge.tolist() if not math.isnan(K1)]
-    rate = "_".join([PLANE[0], *shown_unit(PLANE[0], data.case.arm).replace("/", " ").split()])
-    return columns_of(("what", rate, PLANE[1], "unstable_poles", "least_damping_ratio", "omega_rad_s"), [*grid, *line])
-
-
-def map_section(case: Case) -> PageSection:
+def map_section(report: ArmReport) -> PageSection:
     """The stability regions of both gains, continuous and sampled."""
-    arm, data = case.arm, map_of_arm(case)
+    arm = report.arm
+    data = stability_map(arm, report.chain)
+    designed = best(arm, report.chain)
+    laws = []
+    points = [default_gains(arm).point, *([] if designed is None else [designed.law.point])]
+    for each, point in zip(report.in_s, points, strict=True):
+        label = f"{each.title};\n{brief_on(arm, each.law, report.chain).short}"
+        laws.append(regions.MarkedLaw(point, label, each.key == "best"))
     drawn = picture(
-        "map", draw_map_of_arm.figure(data), data=map_data(data), found=data, arm=arm,
+        "map",
+        regions.draw_stability_map.figure(data, laws, {} if designed is None else designed.bounds),
+        data=data.columns,
+        found=data,
+        arm=arm,
+        chain=report.chain,
         band=continuous.band_of(arm, DESIGNED_MODES),
         unit=f"{plain(rate_unit(arm), 4)} {unit_of(RATE_GAIN, arm)}",
         deepest=plane.DEEPEST_MOMENT_GAIN * arm.input_per_torque,
-    )  # fmt: skip
+    )
     return PageSection(title="Stability region of both gains", facts=interval_facts(arm), blocks=(drawn,))
 
 
@@ -280,42 +195,47 @@ def interval_facts(arm: Arm) -> list[Fact]:
     ]
 
 
-def recommended_section(case: Case) -> PageSection:
+def recommended_section(report: ArmReport) -> PageSection:
     """The gains that damp the first modes of the sampled loop best, with their result card.
 
     They are recommended unless a margin of the sampled loop is poor.
     """
-    found = best(case.arm, case.chain)
+    found = best(report.arm, report.chain)
     if found is None:
         return PageSection(title=RECOMMENDED, answer=prose("no_best_gains", modes=DESIGNED_MODES))
-    gains = ", ".join(found.law.gain_text(name, partial(significant, digits=4), case.arm) for name in PLANE)
-    answer, each = prose("best_gains", found=found, modes=DESIGNED_MODES, gains=gains), case.in_s[-1]
-    card = results(result_card(each.arm, each.law, case.chain), each.title)
-    title = (
-        "Gains of best damping" if POOR in (each["grade"] for each in card[-1:]) else RECOMMENDED
-    )  # of the sampled one
+    gains = ", ".join(found.law.gain_text(name, partial(significant, digits=4), report.arm) for name in PLANE)
+    answer = prose("best_gains", found=found, modes=DESIGNED_MODES, gains=gains)
+    each = report.in_s[-1]
+    card = results(result_card(each.arm, each.law, report.chain), each.title)
+    # the last is the sampled one
+    title = "Gains of best damping" if card[-1]["grade"] == POOR else RECOMMENDED
     return PageSection(title=title, answer=answer, card=card)
 
 
 # ------------------------------------------------------------ root loci
 
 
-def locus_section(case: Case) -> PageSection:
+def locus_section(report: ArmReport) -> PageSection:
     """Poles of the controllers; of an arm's own page root loci along each gain too."""
-    words, tables, of = list[str](), list[Table](), quantities(poles.Poles)["values"]
-    for each in case.in_s:
+    words: list[str] = []
+    tables: list[Table] = []
+    of = quantities(poles.Poles)["values"]
+    for each in report.in_s:
         try:
             listed = poles.closed_loop_poles(each.arm, each.law)
             shown = roots_table(listed.values, of)
             tables.append(sheet("poles", shown, stem=each.stem("poles"), each=each, box=listed.box))
         except TfarmError as error:
             words.append(f"{upper(each.name)}: poles not determined, {error}.")
-    if case.laws:
+    if report.laws:
         return PageSection(title="Closed-loop poles", words=words, blocks=tables)
-    arm, gains, blocks = case.arm, default_gains(case.arm), list[Picture | Table]()
+    arm = report.arm
+    gains = default_gains(arm)
+    blocks: list[Picture | Table] = []
     ranges = {RATE_GAIN: (0.0, 2.0 * rate_unit(arm))}
     if has_loop(arm):
-        ranges[MOMENT_GAIN] = RANGE_OF_K2[0] * arm.input_per_torque, RANGE_OF_K2[1] * arm.input_per_torque
+        # what balances a torque, both sides of 0 and beyond 1
+        ranges[MOMENT_GAIN] = -1.0 * arm.input_per_torque, 1.6 * arm.input_per_torque
     found: dict[str, loci.Loci] = {}
     for name, (start, stop) in ranges.items():
         try:
@@ -328,10 +248,8 @@ def locus_section(case: Case) -> PageSection:
             ]
         except ConvergenceError:
             words.append(prose("not_followed", name=name))
-    others = {
-        name: gains.gain_text(other, partial(plain, digits=4), arm)
-        for name, other in zip(PLANE, reversed(PLANE), strict=True)
-    }
+    first, second = (gains.gain_text(name, partial(plain, digits=4), arm) for name in PLANE)
+    others = dict(zip(PLANE, (second, first), strict=True))
     answer = prose("locus_lead", found=found, gains=others)
     return PageSection(title="Root loci", answer=answer, words=words, blocks=[*blocks, *tables])
 

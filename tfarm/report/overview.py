@@ -11,15 +11,13 @@ from tfarm.assessment.card import ResultCard, result_card
 from tfarm.errors import TfarmError
 from tfarm.plots.frequency import draw_card
 from tfarm.plots.style import save_figure
-from tfarm.report.page import PICTURES, Case, PageSection, SavedBlock, keep, prose
+from tfarm.report.page import PICTURES, ArmReport, PageSection, SavedBlock, keep, prose
 from tfarm.response.frequency import bode
 from tfarm.schema import table, text, to_dict
 from tfarm.spectrum import modes
 from tfarm.spectrum.listing import listed_modes
 
 DIGITS = 4
-SHOWN_MODES = 5  # on the first page; the page of modes has ten
-MODE_COLUMNS = ("index", "natural_frequency", "natural_frequency_hz", "damping_ratio")
 SHORT = {"gain_margin_db": "GM", "phase_margin_deg": "PM", "delay_margin_ms": "DM", "peak_sensitivity": "Ms"}  # a line
 SHOWN = (  # sections of the first page in their order: anchor, name of a picture, which of several; of modes a table
     ("margins-map", "map", 0),
@@ -47,29 +45,33 @@ class Card:
     notes: tuple[str, ...]
 
 
-def save_card(case: Case, folder: Path) -> None:
+def save_card(report: ArmReport, folder: Path) -> None:
     """pictures/card.svg and card.json; a picture that cannot be made is left out, as its section on the page is."""
     (folder / PICTURES).mkdir(exist_ok=True)
-    arm, picture = case.arm, ""
+    arm = report.arm
+    picture = ""
     with suppress(TfarmError):
-        save_figure(draw_card.figure(bode(arm, "root_moment")), folder / PICTURES, "card", formats=("svg",))
+        save_figure(draw_card.figure(bode(arm, "root_moment")), folder / PICTURES / "card.svg")
         picture = "card.svg"
-    loops, notes = list[dict[str, Any]](), [] if case.has_loop else [prose("no_loop", arm=arm)]
-    for each in () if arm.is_locked else case.controllers:
+    loops: list[dict[str, Any]] = []
+    notes = [] if report.has_loop else [prose("no_loop", arm=arm)]
+    for each in () if arm.is_locked else report.controllers:
         try:
-            found = result_card(each.arm, each.law, case.chain)
-            loops += results(found, each.name if case.laws else each.title)
+            found = result_card(each.arm, each.law, report.chain)
+            loops += results(found, each.name if report.laws else each.title)
             notes += found.notes
         except TfarmError as error:
             notes.append(f"{each.name}: not determined, {error}.")
-    first = table([row for row in listed_modes(modes(arm, SHOWN_MODES)).modes if row.index > 0], MODE_COLUMNS)
-    shown = Card(arm.name, summary(case), picture, tuple(first), tuple(loops), tuple(dict.fromkeys(notes)))
+    # the first five; the page of modes has ten
+    rows = [row for row in listed_modes(modes(arm, 5)).modes if row.index > 0]
+    first = table(rows, ("index", "natural_frequency", "natural_frequency_hz", "damping_ratio"))
+    shown = Card(arm.name, summary(report), picture, tuple(first), tuple(loops), tuple(dict.fromkeys(notes)))
     keep(folder, "card", asdict(shown))
 
 
-def summary(case: Case) -> str:
+def summary(report: ArmReport) -> str:
     """The arm in one sentence, and the laws that its page is about in another."""
-    return prose("summary", arm=case.arm, laws=[each.name for each in case.laws])
+    return prose("summary", arm=report.arm, laws=[each.name for each in report.laws])
 
 
 def results(found: ResultCard, controller: str) -> list[dict[str, Any]]:

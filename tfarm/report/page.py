@@ -1,4 +1,4 @@
-"""A page: the case that it is about, and what it is made of: texts, pictures and tables, saved before it is written.
+"""A page: the report that it is about, and what it is made of: texts, pictures and tables, saved before it is written.
 
 Texts are in templates/prose.txt, pages in the other templates; here is how both are filled in.
 """
@@ -37,6 +37,7 @@ from tfarm.arm import (
 from tfarm.arm.chain import file_text
 from tfarm.arm.writing import law_toml
 from tfarm.assessment.card import LoopCard
+from tfarm.assessment.stability_map import DESIGNED_MODES
 from tfarm.digits import how_many, kept_digits, listed, plain, scientific, significant
 from tfarm.dsp import Chain, discretise, load_chain
 from tfarm.errors import ConvergenceError, ParameterError, one_line
@@ -46,7 +47,7 @@ from tfarm.fitting.recording import MeasuredRun
 from tfarm.loop import sampled_verdict as verdict
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.plots.style import Figure, drawn_for, gains_words, save_figure
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response.signals import Signals, sign_of
 from tfarm.schema import Column, Table, quantities, save_table, text, to_json
 from tfarm.schema.html import as_html, with_symbols
@@ -54,17 +55,24 @@ from tfarm.spectrum.table import default_gains
 from tfarm.synthesis.design import Design, design
 
 TEMPLATES = Path(__file__).parent / "templates"
-PICTURES, DATA = "pictures", "data"  # folders in that of an arm
+# folders in that of an arm
+PICTURES = "pictures"
+DATA = "data"
 DRAWN_DIGITS = 7  # of the numbers of a picture in its file: a hundredth of the width of a line is four
 T = TypeVar("T")
 PART = "\ue000"  # between title and caption, which no name has in it
 PROMISES = (
-    "certified", "complete", "converged", "default gains", "enclosed", "Lyapunov region", "not determined", "proven",
-    "small gain", "winding number",
-)  # fmt: skip
-IN_PILL = ("stability", "grade", "limited_by", "delay_margin_periods")  # quantities without a cell of their own
-CARD_ROWS = {of.key: of for name, of in quantities(LoopCard).items() if name not in IN_PILL}
-DESIGNED_MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
+    "certified",
+    "complete",
+    "converged",
+    "default gains",
+    "enclosed",
+    "Lyapunov region",
+    "not determined",
+    "proven",
+    "small gain",
+    "winding number",
+)
 
 
 # ------------------------------------------------------------ texts
@@ -78,6 +86,9 @@ def upper(text: str) -> str:
 @cache
 def templates() -> Environment:
     """All templates; only those of pages escape what is put into them."""
+    # but for those of a pill
+    without = ("stability", "grade", "limited_by", "delay_margin_periods")
+    card_rows = {of.key: of for name, of in quantities(LoopCard).items() if name not in without}
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES),
         autoescape=lambda name: name is not None and name.endswith(".html"),
@@ -86,13 +97,27 @@ def templates() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.globals |= {"inf": math.inf, "rate": RATE_GAIN, "moment": MOMENT_GAIN, "angle": ANGLE_GAIN,
-                            "plane": " and ".join(PLANE), "arm_python": arm_python,
-                            "gains_python": gains_python, "card_rows": CARD_ROWS}  # fmt: skip
+    environment.globals |= {
+        "inf": math.inf,
+        "rate": RATE_GAIN,
+        "moment": MOMENT_GAIN,
+        "angle": ANGLE_GAIN,
+        "plane": " and ".join(PLANE),
+        "arm_python": arm_python,
+        "gains_python": gains_python,
+        "card_rows": card_rows,
+    }
     environment.filters.update(
-        symbol=with_symbols, text=text, plain=plain, significant=significant, scientific=scientific, upper_first=upper,
-        listed=listed, how_many=how_many, as_html=as_html,
-    )  # fmt: skip
+        symbol=with_symbols,
+        text=text,
+        plain=plain,
+        significant=significant,
+        scientific=scientific,
+        upper_first=upper,
+        listed=listed,
+        how_many=how_many,
+        as_html=as_html,
+    )
     return environment
 
 
@@ -198,9 +223,10 @@ def save_section(section: PageSection, folder: Path, is_paper: bool = False) -> 
     """The section with its blocks saved: what remains to be written are words."""
     for name in (PICTURES, DATA):
         (folder / name).mkdir(exist_ok=True)
-    return replace(section, blocks=[
-        save_block(block, folder, is_paper) for block in section.blocks if getattr(block, "columns", True)
-    ])  # fmt: skip
+    return replace(
+        section,
+        blocks=[save_block(block, folder, is_paper) for block in section.blocks if getattr(block, "columns", True)],
+    )
 
 
 def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> SavedBlock:
@@ -212,25 +238,28 @@ def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> 
     if isinstance(block, Table):
         files = [f"{DATA}/{name}" for name in save_table(block, folder / DATA)]
         return SavedBlock(block.stem, block.title, shape.table(block, files))
-    save_figure(block.figure, folder / PICTURES, block.stem, formats=("svg",))
+    files = [f"{PICTURES}/{block.stem}.svg"]
+    save_figure(block.figure, folder / files[0])
+    again = block.figure.again  # type: ignore[attr-defined]
     narrow = None
     if not block.film:
         with drawn_for("phone"):
-            narrow = block.figure.again()  # type: ignore[attr-defined]
-            save_figure(narrow, folder / PICTURES, f"{block.stem}-narrow", formats=("svg",))
+            narrow = again()
+            save_figure(narrow, folder / PICTURES / f"{block.stem}-narrow.svg")
     if is_paper:
+        files.append(f"{PICTURES}/{block.stem}.pdf")
         with drawn_for("column"):
-            save_figure(block.figure.again(), folder / PICTURES, block.stem, formats=("pdf",))  # type: ignore[attr-defined]
-    columns = tuple(
-        replace(each, of=[kept_digits((x,), DRAWN_DIGITS)[0] if isinstance(x, float) else x for x in each.of])
-        for each in block.data
-    )
-    saved = save_table(Table(columns=columns, stem=f"{block.stem}-data"), folder / DATA, ("csv",)) if columns else ()
+            save_figure(again(), folder / files[-1])
     if block.film:
-        (folder / PICTURES / f"{block.stem}.gif").write_bytes(block.film)
-    kinds = ("svg", *["pdf"] * is_paper, *["gif"] * bool(block.film))
-    drawn = [f"{PICTURES}/{block.stem}.{kind}" for kind in kinds]
-    files = [*drawn, *(f"{DATA}/{name}" for name in saved)]
+        files.append(f"{PICTURES}/{block.stem}.gif")
+        (folder / files[-1]).write_bytes(block.film)
+    if block.data:
+        columns = tuple(
+            replace(each, of=[kept_digits((x,), DRAWN_DIGITS)[0] if isinstance(x, float) else x for x in each.of])
+            for each in block.data
+        )
+        saved = save_table(Table(columns=columns, stem=f"{block.stem}-data"), folder / DATA, ("csv",))
+        files += [f"{DATA}/{name}" for name in saved]
     return SavedBlock(block.stem, block.title, shape.picture(block, files, narrow), shape.image(block, narrow))
 
 
@@ -277,11 +306,10 @@ def kept(out: Path, kind: str, record: type[T]) -> dict[Path, T]:
     return {folder: each for folder, each in found.items() if getattr(each, "name", "") == folder.name}
 
 
-# ------------------------------------------------------------ the case
+# ------------------------------------------------------------ the report
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class GivenLaw:
     """A law, the name of its `file` where it has one, and a run that was `measured` under it on the rig."""
 
@@ -296,8 +324,7 @@ class GivenLaw:
         return one_line(law.name, 60) if law.gains is None else gains_words(law)
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Controller:
     """A law on an arm: `arm` has the input that `law` drives, `given` is its source.
 
@@ -326,7 +353,7 @@ class Controller:
         return f"{self.key.replace('_', '-')}-{suffix}"
 
 
-class Case(NamedTuple):
+class ArmReport(NamedTuple):
     """An arm, its chain, and the laws that the page is about; without any it is about the default gains.
 
     `fit` is the source of the arm's numbers, if they were fitted to measurements; `measured` are responses that are
@@ -372,14 +399,14 @@ def on_hub(arm: Arm, gains: HubFeedback, name: str, key: str) -> Controller:
     return Controller(arm, as_law(gains), GivenLaw(gains), name, key)
 
 
-def check_laws(case: Case) -> None:
+def check_laws(report: ArmReport) -> None:
     """Raise ParameterError for a law that does not suit this arm or the sampling period of its chain."""
-    for each in case.controllers if case.laws and not case.arm.is_locked else ():
+    for each in report.controllers if report.laws and not report.arm.is_locked else ():
         law = discretise.with_all_gains(*arm_and_law(each.arm, each.law))
         Signals(each.arm, law.signals)
         if not law.is_discrete:
             ContinuousLoop(each.arm, law)
-        discretise.discretised(law, case.chain.sampling.period)
+        discretise.discretised(law, report.chain.sampling.period)
 
 
 def has_loop(arm: Arm) -> bool:
@@ -429,25 +456,25 @@ def argument(name: str, preset: bool) -> str:
     return shlex.quote(name if preset else f"{name}.toml")
 
 
-def file_of(case: Case) -> str:
+def file_of(report: ArmReport) -> str:
     """The arm's file with its chain, and with the law that the page is about where TOML can say that alone."""
-    law = own_law(case)
-    return file_text(case.arm, case.chain) + ("" if law is None else f"\n{law}")
+    law = own_law(report)
+    return file_text(report.arm, report.chain) + ("" if law is None else f"\n{law}")
 
 
-def own_law(case: Case) -> str | None:
+def own_law(report: ArmReport) -> str | None:
     """The table [law] of the one law of a page; None of none or several, or of one with files of its own."""
     with suppress(ParameterError):
-        if len(case.laws) == 1 and case.laws[0].measured is None:
-            return law_toml(as_law(case.laws[0].law))
+        if len(report.laws) == 1 and report.laws[0].measured is None:
+            return law_toml(as_law(report.laws[0].law))
     return None
 
 
-def command_of(case: Case, only: str) -> str:
+def command_of(report: ArmReport, only: str) -> str:
     """The command that writes this page; an arm that is no preset is named by its file, as are laws with theirs."""
-    law = own_law(case)
-    options = [] if law is not None else [f"--law {shlex.quote(each.file or 'FILE')}" for each in case.laws]
-    options += [f"--measured {shlex.quote(f'{each.name}={each.source}')}" for each in case.measured]
-    options += [f"--only {only}"] * bool(only) + ["--paper"] * case.is_paper
-    name = argument(case.arm.name, law is None and is_preset(case.arm, case.chain))
+    law = own_law(report)
+    options = [] if law is not None else [f"--law {shlex.quote(each.file or 'FILE')}" for each in report.laws]
+    options += [f"--measured {shlex.quote(f'{each.name}={each.source}')}" for each in report.measured]
+    options += [f"--only {only}"] * bool(only) + ["--paper"] * report.is_paper
+    name = argument(report.arm.name, law is None and is_preset(report.arm, report.chain))
     return " ".join(["tfarm report", name, *options, "--out reports"])

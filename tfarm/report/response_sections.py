@@ -4,40 +4,42 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from decimal import Decimal, localcontext
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 import tfarm
 from tfarm.arm import Arm, Theory
+from tfarm.audit.arm_proofs import BRACKET_DIGITS, proven_damped_modes, proven_modes
 from tfarm.digits import fixed, kept_digits, lined, listed, plain
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.fitting.fit import ARMS, arms_drawn
 from tfarm.fitting.overlay import overlay
+from tfarm.fitting.possible import response_band, stable_share
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import ranges_of
 from tfarm.plots import frequency, motion
 from tfarm.plots.style import gains_words
-from tfarm.report.page import Case, PageSection, Picture, has_loop, picture, prose, sheet, upper
+from tfarm.report.page import ArmReport, PageSection, Picture, has_loop, picture, prose, sheet, upper
 from tfarm.response.frequency import AXIS_SHARE, Bode, bode
 from tfarm.schema import Column, Table, curve_table, table
-from tfarm.spectrum import DampedModes, Modes, damped_modes, modes
+from tfarm.spectrum import Modes
 from tfarm.spectrum.listing import SHAPE_DIGITS, beyond_the_box, listed_modes
-from tfarm.spectrum.proofs import Certificate
 from tfarm.spectrum.table import default_gains
 
-PROVEN_MODES, BRACKET_DIGITS = 10, 20  # flexible modes of each arm, as its page lists them; beyond a double's digits
-PROVEN_DIGITS = 12  # of an eigenvalue: more than a page prints of any
-TWO_PI = Decimal("6.2831853071795864769252867665590057683943387987502")
-TABLED_MODES, DRAWN_MODES = 10, 6  # as `tfarm modes` lists them; shapes in three rows of two
+# as `tfarm modes` lists them; shapes in three rows of two
+TABLED_MODES = 10
+DRAWN_MODES = 6
 THEORIES: tuple[Theory, ...] = ("timoshenko", "shear", "rayleigh", "euler-bernoulli")
 
 
-def modes_section(case: Case) -> PageSection:
+def modes_section(report: ArmReport) -> PageSection:
     """Everything about free vibration: at C = 0, and the eigenvalues at the arm's own C."""
-    arm, found = case.arm, tfarm.modes(case.arm, count=TABLED_MODES)
-    words, blocks = [prose("complete_modes")], list[Picture | Table]([modal_table(found)])
+    arm = report.arm
+    found = tfarm.modes(arm, count=TABLED_MODES)
+    words = [prose("complete_modes")]
+    blocks: list[Picture | Table] = [modal_table(found)]
     if not arm.is_uniform:
         blocks.append(locked_table(found))
         words += [prose("which_is_measured")] * (not arm.is_locked)
@@ -66,7 +68,8 @@ def modes_section(case: Case) -> PageSection:
 
 def modal_table(modes: Modes) -> Table:
     """Frequencies, hub participation, modal moment and nodes."""
-    decimals, rows = SHAPE_DIGITS - 1 - math.floor(math.log10(modes.arm.length)), []
+    decimals = SHAPE_DIGITS - 1 - math.floor(math.log10(modes.arm.length))
+    rows = []
     for row in listed_modes(modes).modes:  # what depends on a shape to the digits that hold on every processor
         participation, moment = kept_digits((row.hub_participation, row.modal_moment + 0.0), SHAPE_DIGITS)
         nodes = np.round(row.nodes, decimals).tolist()
@@ -77,12 +80,6 @@ def modal_table(modes: Modes) -> Table:
     return sheet("modal_table", columns, arm=modes.arm, proof=proof)
 
 
-@lru_cache(maxsize=8)  # for the arm's page and the page on trust, as the damped ones below
-def proven_modes(arm: Arm, count: int) -> Certificate:
-    """Brackets of the arm's first natural frequencies.  Raises CertificationError where that cannot be proven."""
-    return modes(arm, count).certify(BRACKET_DIGITS)
-
-
 def how_proven(modes: Modes, cells: Sequence[str], cells_hz: Sequence[str]) -> str:
     """Whether every digit of these cells [rad/s] and [Hz] is certified: a sentence or two."""
     try:
@@ -90,8 +87,9 @@ def how_proven(modes: Modes, cells: Sequence[str], cells_hz: Sequence[str]) -> s
     except CertificationError as error:
         return f"The digits are those of double precision, not proven: {error}."
     rows = np.flatnonzero(modes.index > 0).tolist()
+    two_pi = Decimal("6.2831853071795864769252867665590057683943387987502")
     is_proven = all(
-        rounds_to(cells[row], bracket) and rounds_to(cells_hz[row], bracket, TWO_PI)
+        rounds_to(cells[row], bracket) and rounds_to(cells_hz[row], bracket, two_pi)
         for row, bracket in zip(rows, proof.brackets, strict=True)
     )
     return prose("proven_digits", is_proven=is_proven, digits=BRACKET_DIGITS, proof=proof, arm=modes.arm)
@@ -106,21 +104,11 @@ def rounds_to(cell: str, bracket: tuple[str, str], divisor: Decimal = Decimal(1)
 # ------------------------------------------------------------ damped modes, and those of a locked hub
 
 
-@lru_cache(maxsize=8)
-def proven_damped_modes(arm: Arm, count: int) -> DampedModes:
-    """The arm's first damped modes, each enclosed to 12 digits, none missing in their box.
-
-    Raises CertificationError where that cannot be proven, ConvergenceError where they are too near to each other.
-    """
-    found = damped_modes(modes(arm, count))
-    found.certify(PROVEN_DIGITS)
-    return found
-
-
 def damped_tables(undamped: Modes) -> list[Table]:
     """The arm's damped modes, each number certified to 12 digits and printed to fewer; then those of no mode."""
     arm = undamped.arm
-    damped, found = proven_damped_modes(arm, int(undamped.index[-1])), listed_modes(undamped)
+    damped = proven_damped_modes(arm, int(undamped.index[-1]))
+    found = listed_modes(undamped)
     every = np.concatenate([damped.eigenvalues, damped.unassigned_pairs])
     inside = np.all(damped.box.holds(every) | np.isnan(every), axis=1)
     number = len(damped.index)
@@ -128,12 +116,17 @@ def damped_tables(undamped: Modes) -> list[Table]:
     is_there = Column("complete", "list complete", of=np.where(inside, "in the box", "outside")[:number])
     return [
         sheet(
-            "damped_modes", [*table(found.modes[:number], names).columns, is_there], arm=arm, damped=damped,
-            note=found.damped_note, is_inside=bool(inside.all()), beyond=beyond_the_box(arm),
+            "damped_modes",
+            [*table(found.modes[:number], names).columns, is_there],
+            arm=arm,
+            damped=damped,
+            note=found.damped_note,
+            is_inside=bool(inside.all()),
+            beyond=beyond_the_box(arm),
             edges=[plain(round(x)) if abs(x) >= 100 else plain(x, 3) for x in damped.box],
         ),
         *([sheet("unassigned_eigenvalues", table(found.unassigned))] if found.unassigned else []),
-    ]  # fmt: skip
+    ]
 
 
 def locked_table(found: Modes) -> Table:
@@ -152,11 +145,21 @@ def theories(arm: Arm) -> Table:
     differences = {theory: 100 * (omega[theory] / omega["timoshenko"] - 1) for theory in THEORIES[1:]}
     columns = (
         Column("mode", "mode", of=range(1, TABLED_MODES + 1)),
-        *(Column(f"{theory.replace('-', '_')}_rad_s", theory.title(), "rad/s", of=each, digits=lined(8, 7))
-          for theory, each in omega.items()),
-        *(Column(f"{theory.replace('-', '_')}_difference_percent", f"{theory.title()}, difference", "%", of=each,
-                 digits=lined(5, 3)) for theory, each in differences.items()),
-    )  # fmt: skip
+        *(
+            Column(f"{theory.replace('-', '_')}_rad_s", theory.title(), "rad/s", of=each, digits=lined(8, 7))
+            for theory, each in omega.items()
+        ),
+        *(
+            Column(
+                f"{theory.replace('-', '_')}_difference_percent",
+                f"{theory.title()}, difference",
+                "%",
+                of=each,
+                digits=lined(5, 3),
+            )
+            for theory, each in differences.items()
+        ),
+    )
     return sheet("theories", columns, worst=differences["euler-bernoulli"])
 
 
@@ -171,9 +174,18 @@ def sensitivity_table(modes: Modes) -> Table:
     by_mode = zip(modes.index[flexible], np.array(list(shown.values())).T, strict=True)
     columns = (
         Column("parameter", "parameter", of=list(shown)),
-        *(Column(f"mode_{number}", f"mode {number}", "%/%", of=values, digits=partial(fixed, decimals=3),
-                 tint=list(map(tint, values))) for number, values in by_mode),
-    )  # fmt: skip
+        *(
+            Column(
+                f"mode_{number}",
+                f"mode {number}",
+                "%/%",
+                of=values,
+                digits=partial(fixed, decimals=3),
+                tint=list(map(tint, values)),
+            )
+            for number, values in by_mode
+        ),
+    )
     return sheet(
         "sensitivities", columns, is_rig=not modes.arm.is_uniform, dropped=[name for name in rows if name not in shown]
     )
@@ -190,10 +202,11 @@ def tint(x: float) -> str:
 # ------------------------------------------------------------ frequency responses
 
 
-def bode_section(case: Case, output: str) -> PageSection:
+def bode_section(report: ArmReport, output: str) -> PageSection:
     """One output: picture, its meaning, poles and zeros."""
-    data = bode(case.arm, output)
-    stem, what = f"bode-{output.replace('_', '-')}", f"{data.input_label} to {data.label}"
+    data = bode(report.arm, output)
+    stem = f"bode-{output.replace('_', '-')}"
+    what = f"{data.input_label} to {data.label}"
     if data.is_zero:
         none = f"The {data.label} is zero at every frequency: this arm's tip is pinned."
         return PageSection(title=f"From {what}", words=(none,))
@@ -202,7 +215,8 @@ def bode_section(case: Case, output: str) -> PageSection:
         for name, (left, right) in (("poles", data.pole_width), ("zeros", data.zero_width))
         if not math.isinf(left)
     ]
-    roots, facts = table([*data.pole_list, *data.zero_list], parent=data).columns, {"data": data, "boxes": boxes}
+    roots = table([*data.pole_list, *data.zero_list], parent=data).columns
+    facts = {"data": data, "boxes": boxes}
     blocks = (
         picture("bode", frequency.bode.figure(data), stem=stem, data=curve_table(data), **bode_facts(data)),
         sheet("bode_table", roots, stem=f"{stem}-roots", **facts),
@@ -214,16 +228,17 @@ def bode_section(case: Case, output: str) -> PageSection:
 def bode_facts(data: Bode) -> dict[str, Any]:
     """The facts of a caption of a response: its zeros in the right half-plane, and the turn of its phase."""
     right = data.zeros[data.zeros.real > AXIS_SHARE * abs(data.zeros)]
-    count, slowest = int(np.sum(right.imag == 0) + 2 * np.sum(right.imag > 0)), float(abs(right).min(initial=np.inf))
+    count = int(np.sum(right.imag == 0) + 2 * np.sum(right.imag > 0))
+    slowest = float(abs(right).min(initial=np.inf))
     return {"found": data, "right": count, "slowest": slowest, "turned": float(np.ptp(data.phase))}
 
 
 # ------------------------------------------------------------ fitted to measurements
 
 
-def fit_section(case: Case, count: int = ARMS) -> PageSection:
+def fit_section(report: ArmReport, count: int = ARMS) -> PageSection:
     """Measurements, the fitted numbers with their intervals, and the share of possible arms on which a loop holds."""
-    fit = case.fit
+    fit = report.fit
     assert fit is not None
     words = [f"{upper(each)}." for each in fit.not_determined]
     words += [f"Remedy: {fit.advice}."] * bool(fit.misses)
@@ -241,18 +256,17 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
         words.append(f"The loops of the arms that agree with the data are not drawn: {error}.")
     else:
         every = [margins(each, default_gains(fit.arm)) for each in arms if has_loop(fit.arm)]
-        gains, stable = (
-            gains_words(default_gains(fit.arm)),
-            [each.in_band for each in every if each.in_band is not None],
-        )
+        gains = gains_words(default_gains(fit.arm))
+        stable = [each.in_band for each in every if each.in_band is not None]
         if fit.responses:
-            figure = frequency.draw_band.figure(fit, arms, "root_moment")
+            output = "root_moment"
+            figure = frequency.draw_band.figure(fit, response_band(fit, arms, output), output, len(arms))
             blocks.append(picture("fit_band", figure, arms=arms))
         if every:
             words.append(prose("fit_share", gains=gains, every=every))
             columns = table(stable, ("phase_margin", "delay_margin", "disk_margin"))
             blocks += [
-                picture("fit_map", frequency.draw_share.figure(fit, arms, ranges_of(fit.arm))),
+                picture("fit_map", frequency.draw_share.figure(fit, stable_share(arms, ranges_of(fit.arm)))),
                 sheet("fit_margins", columns, gains=gains),
             ]
     answer = prose("fit", verdict=fit.verdict, found=fit.in_words)
@@ -262,17 +276,20 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
 # ------------------------------------------------------------ measured
 
 
-def measured_section(case: Case) -> PageSection:
+def measured_section(report: ArmReport) -> PageSection:
     """Each response over the exact one, with the differences."""
-    blocks, words = list[Picture | Table](), list[str]()
-    for number, one in enumerate(case.measured, start=1):
-        found, label = overlay(case.arm, one), f"-{number}" if len(case.measured) > 1 else ""
+    blocks: list[Picture | Table] = []
+    words: list[str] = []
+    for number, one in enumerate(report.measured, start=1):
+        found = overlay(report.arm, one)
+        label = f"-{number}" if len(report.measured) > 1 else ""
         name = found.measured.label
         words.append(prose("measured_response", name=name, found=found, peaks=found.unmatched / (2 * math.pi)))
         blocks += [
-            picture("measured", frequency.measured.figure(found), stem=f"measured{label}", data=found.csv_table,
-                    name=name),
+            picture(
+                "measured", frequency.measured.figure(found), stem=f"measured{label}", data=found.csv_table, name=name
+            ),
             sheet("measured_modes", table(found.modes), stem=f"measured-modes{label}"),
             sheet("measured_required", table(found.required_changes), stem=f"measured-required{label}"),
-        ]  # fmt: skip
+        ]
     return PageSection(title="Measured over exact", words=words, blocks=blocks)

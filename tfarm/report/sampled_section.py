@@ -1,4 +1,4 @@
-"""The sampled loops of a case: verdict, margins, stability intervals, modes, and motion in time.
+"""The sampled loops of a report: verdict, margins, stability intervals, modes, and motion in time.
 
 In time: slews, and steps that were measured with the exact sampled loop over them.
 """
@@ -10,20 +10,22 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, shown_unit, tracked
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, shown_unit
 from tfarm.arm.chain import MOST_DELAY
 from tfarm.assessment.card import margins_of, sampled_of
+from tfarm.assessment.stability_map import StableRegions, stable_regions
 from tfarm.assessment.step import Step, step
 from tfarm.digits import plain, significant
-from tfarm.dsp import Chain, Simulation, Simulator, results, traces
+from tfarm.dsp import Chain, Simulation, results, traces
+from tfarm.dsp.traces import motion_of
 from tfarm.errors import ParameterError
-from tfarm.fitting.recording import RunComparison, compare_run, overshoot
+from tfarm.fitting.recording import RunComparison, compare_run, departures, overshoot
 from tfarm.loop import sampled_modes as modes
 from tfarm.loop import sampled_verdict as verdict
 from tfarm.loop.sampled_verdict import Analysis, sampled_verdict
 from tfarm.plots import animation, motion, regions, roots, style
 from tfarm.report.page import (
-    Case,
+    ArmReport,
     Controller,
     Fact,
     PageSection,
@@ -37,42 +39,36 @@ from tfarm.report.page import (
 from tfarm.schema import Column, Quantity, Table, across, table, text
 from tfarm.spectrum.table import default_gains
 
-MORE_DELAY = (0.0, 0.5, 1.0)  # samples of further delay for which the verdict is given
-VERDICT_COLUMNS = ("word", "spectral_radius", "time_constant", "slowest", "holds_for")
-WHOLE_LAW_COLUMNS = ("index", "natural_frequency", "band", "aliased", "first_order", "by_damping", "log_radius")
-MOST_SAMPLES = 10_000  # after a record in which an unstable loop may seem settled: a second of computing
-FILM_SLEWS, FILM_FRAMES = 1.5, 80  # length of a film in slews, and frames at most: a second of computing
+FILM_FRAMES = 80  # at most: a second of computing
 
 
-def sampled_section(case: Case) -> PageSection:
-    """The sampled loop of each controller; in time runs measured under the laws, else the slew."""
-    arm, chain = case.arm, case.chain
-    found = [(each, sampled_of(each.arm, each.law, chain)) for each in case.controllers]
-    first = found[0][1]
-    planes, along = list[Picture | Table](), list[Picture | Table]()
-    if not case.laws:
-        planes = [overlay_picture(regions.stable_regions(arm, first.loop.gains, chain), first)]
-        along = [loci_picture(first)]
+def sampled_section(report: ArmReport) -> PageSection:
+    """Return the sampled loop of each controller; in time runs measured under the laws, else the slew."""
+    chain = report.chain
+    found = [(each, sampled_of(each.arm, each.law, chain)) for each in report.controllers]
     numbers = across({each.title: it for each, it in found}, keys=[each.key for each, _ in found])
-    pictures, words, facts = slews(case)
+    blocks: list[Picture | Table] = [sheet("sampled", numbers)]
+    for each, it in found:
+        intervals = table(it.stability_intervals)
+        blocks.append(sheet("sampled_numbers", intervals, stem=_stem("numbers", each), each=each, found=it))
+    blocks.append(delays_table(found, chain))
+    pictures, words, facts = slews(report)
+    if not report.laws:
+        # the gains of the arm itself
+        (_, own), *_ = found
+        blocks = [overlay_picture(stable_regions(report.arm, own.loop.gains, chain), own), *blocks, loci_picture(own)]
+        facts = [*interval_facts(own), *facts]
+    of_whole_law = ("index", "natural_frequency", "band", "aliased", "first_order", "by_damping", "log_radius")
+    for each, it in found:
+        modes = table(it.modes, () if it.loop.is_of_gains else of_whole_law)
+        blocks.append(sheet("sampled_modes", modes, stem=_stem("modes", each), each=each, found=it))
     growths = [growth_words(each, it.verdict, chain) for each, it in found if it.verdict.log_radius > 0]
     return PageSection(
         title=f"The sampled loop, {plain(1e3 * chain.sampling.period)} ms",
-        facts=[*(interval_facts(first) if not case.laws else ()), *facts],
-        words=[" ".join([chain_words(arm, chain), *growths]), *words],
-        blocks=[
-            *planes,
-            sheet("sampled", numbers),
-            *(sheet("sampled_numbers", table(it.stability_intervals), stem=_stem("numbers", each), each=each,
-                    found=it) for each, it in found),
-            delays_table(found, chain),
-            *along,
-            *(sheet("sampled_modes", table(it.modes, () if it.loop.is_of_gains else WHOLE_LAW_COLUMNS),
-                    stem=_stem("modes", each), each=each, found=it) for each, it in found),
-            *measured_blocks(case),
-            *pictures,
-        ],
-    )  # fmt: skip
+        facts=facts,
+        words=[" ".join([chain_words(report.arm, chain), *growths]), *words],
+        blocks=[*blocks, *measured_blocks(report), *pictures],
+    )
 
 
 # ------------------------------------------------------------ verdict
@@ -80,9 +76,11 @@ def sampled_section(case: Case) -> PageSection:
 
 def interval_facts(found: Analysis) -> Iterator[Fact]:
     """The stability intervals of both gains of a sampled loop."""
-    period, modes = plain(1e3 * found.loop.chain.sampling.period), f" (first {found.verdict.modes_used} modes)"
+    period = plain(1e3 * found.loop.chain.sampling.period)
+    modes = f" (first {found.verdict.modes_used} modes)"
     for name in PLANE:
-        unit, shown = shown_unit(name, found.loop.plant.arm), text(list(found.shown[name]), 4) or "no value"
+        unit = shown_unit(name, found.loop.plant.arm)
+        shown = text(list(found.shown[name]), 4) or "no value"
         known = f"{name}, sampled, {period} ms{modes if modes in shown else ''}"
         yield Fact(known, shown.replace(modes, ""), unit)
 
@@ -98,20 +96,21 @@ def _stem(name: str, each: Controller) -> str:
 
 
 def delays_table(found: Sequence[tuple[Controller, Analysis]], chain: Chain) -> Table:
-    """The verdict on each controller as it is, and with half a sample and a whole one of further delay."""
-    T, own = chain.sampling.period, chain.sampling.delay_samples
-    late = {more: replace(chain, sampling=replace(chain.sampling, delay_samples=own + more)) for more in MORE_DELAY[1:]}
-    rows = [
-        (each.name, 1e3 * T * more, sampled_verdict(each.arm, each.law, late[more]) if more else it.verdict)
-        for each, it in found
-        for more in MORE_DELAY
-        if not more or own + more + each.law.delay / T <= MOST_DELAY
-    ]
+    """Return the verdict on each controller as it is, and with half a sample and a whole one of further delay."""
+    sampling = chain.sampling
+    rows = []
+    for each, it in found:
+        rows.append((each.name, 0.0, it.verdict))
+        for more in (0.5, 1.0):
+            delay = sampling.delay_samples + more
+            if delay + each.law.delay / sampling.period <= MOST_DELAY:
+                late = replace(chain, sampling=replace(sampling, delay_samples=delay))
+                rows.append((each.name, 1e3 * sampling.period * more, sampled_verdict(each.arm, each.law, late)))
     names, delays, verdicts = zip(*rows, strict=True)
     columns = (
         Column("law", "controller", of=names),
         Column("further_delay_ms", "further delay", "ms", of=delays),
-        *table(verdicts, VERDICT_COLUMNS).columns,
+        *table(verdicts, ("word", "spectral_radius", "time_constant", "slowest", "holds_for")).columns,
     )
     return sheet("sampled_delays", columns, free=any(verdict.loop.has_free_angle for verdict in verdicts))
 
@@ -119,16 +118,17 @@ def delays_table(found: Sequence[tuple[Controller, Analysis]], chain: Chain) -> 
 # ------------------------------------------------------------ pictures of gains
 
 
-def overlay_picture(both: regions.StableRegions, found: Analysis) -> Picture:
-    """Stability regions of the continuous and of the sampled loop in one plane, with the intervals of K2 below it."""
-    arm, gains = both.continuous.arm, found.loop.gains
+def overlay_picture(both: StableRegions, found: Analysis) -> Picture:
+    """Return the regions of the continuous and of the sampled loop in one plane, with the intervals of K2 below it."""
+    arm = both.continuous.arm
+    gains = found.loop.gains
     rows = [row for row in margins_of(arm, as_law(gains)).stability_intervals if row.name == MOMENT_GAIN]
     return picture(
         "sampled_overlay",
         regions.overlay.figure(*both),
-        data=regions.region_columns(both),
+        data=both.columns,
         arm=arm,
-        low=float(both.continuous.axes[0][0]),
+        low=float(both.continuous.x[0]),
         nested=len(both.sampled) > 1,
         continuous=text([each for row in rows for each in row.intervals], 4) or "no value",
         sampled=text(list(found.shown[MOMENT_GAIN]), 4) or "no value",
@@ -137,72 +137,79 @@ def overlay_picture(both: regions.StableRegions, found: Analysis) -> Picture:
 
 
 def loci_picture(found: Analysis) -> Picture:
-    """Root loci of the sampled loop in the z-plane, along each gain; its data are the poles with Im z >= 0."""
-    loop, arm = found.loop, found.loop.plant.arm
-    turning = arm.hub_side_inertia * arm.input_per_torque  # at the hub, in the unit of the input times s^2
+    """Return root loci of the sampled loop in the z-plane, along each gain; its data are the poles with Im z >= 0."""
+    loop = found.loop
+    arm = loop.plant.arm
     # past the rate gain at which sampling alone makes the hub unstable; K2 over the stable interval of most arms
+    turning = arm.hub_side_inertia * arm.input_per_torque
     top = max(1.25 * 2 * turning / loop.chain.sampling.period, modes.STRONGER * loop.gains[RATE_GAIN])
     loci = modes.sampled_loci(loop, top, (-0.5, 1.5))
-    aliased = int((found.modes.band > 0).sum())
-    rows = []  # a gain and a branch each
+    rows = []
     for name, locus in loci.by.items():
         for value, poles in zip(locus.values.tolist(), locus.z, strict=True):
-            own, each = locus.loop.having(locus.gain, value), zip(locus.mode.tolist(), poles, strict=True)
-            rows += [(name, *map(own.number, PLANE), mode, z.real, z.imag) for mode, z in each if not z.imag < 0]
-    data, figure = (
-        columns_of(("locus", *PLANE, "mode", "real", "imaginary"), rows),
+            own = locus.loop.having(locus.gain, value)
+            gains = [own.number(each) for each in PLANE]
+            upper = [(mode, z) for mode, z in zip(locus.mode.tolist(), poles, strict=True) if not z.imag < 0]
+            rows += [(name, *gains, mode, z.real, z.imag) for mode, z in upper]
+    return picture(
+        "sampled_loci",
         roots.draw_sampled_loci.figure(loci),
+        data=columns_of(("locus", *PLANE, "mode", "real", "imaginary"), rows),
+        half=loci.half_rate,
+        aliased=int((found.modes.band > 0).sum()),
     )
-    return picture("sampled_loci", figure, data=data, half=loci.half_rate, aliased=aliased)
 
 
 # ------------------------------------------------------------ in time
 
 
-def slews(case: Case) -> tuple[list[Picture | Table], list[str], list[Fact]]:
-    """The slew under each controller, reasons of a missing one, settling times; nothing where runs are measured.
+def slews(report: ArmReport) -> tuple[list[Picture | Table], list[str], list[Fact]]:
+    """Return the slew under each controller, reasons of a missing one, settling times; none where runs are measured.
 
     Of an arm's own gains the slew without moment feedback is there too.
     """
-    if not case.arm.has_rigid_mode:
-        return [], [f"{prose('what_holds', arm=case.arm)}: no slew is simulated."], []
-    if all(each.given.measured is not None for each in case.controllers):
+    chain = report.chain
+    if not report.arm.has_rigid_mode:
+        return [], [f"{prose('what_holds', arm=report.arm)}: no slew is simulated."], []
+    if all(each.given.measured is not None for each in report.controllers):
         return [], [], []
-    bare = on_hub(case.arm, default_gains(case.arm).having(MOMENT_GAIN, 0.0), f"{MOMENT_GAIN} = 0", "without")
-    runs, words, task = dict[str, Simulation](), list[str](), case.chain.slew
-    duration = traces.RECORD_LENGTH * task.rise_time
-    candidates = [*([] if case.laws else [bare]), *case.controllers]
-    for each in candidates:
+    runs: dict[str, Simulation] = {}
+    simulated: list[Controller] = []
+    words: list[str] = []
+    bare = on_hub(report.arm, default_gains(report.arm).having(MOMENT_GAIN, 0.0), f"{MOMENT_GAIN} = 0", "without")
+    for each in (*([] if report.laws else [bare]), *report.controllers):
         try:
-            runs[each.name] = results.drawn(each.arm, each.law, case.chain, "slew", duration)
+            duration = traces.RECORD_LENGTH * chain.slew.rise_time
+            runs[each.name] = results.drawn(each.arm, each.law, chain, "slew", duration)
+            simulated.append(each)
         except ParameterError as error:
             words.append(f"No slew of {each.name} is simulated: {error}.")
-    simulated = [each for each in candidates if each.name in runs]
     if len({each.arm.input_unit for each in simulated}) > 1:
         return [], [*words, "The controllers drive inputs of different units: their slews are not drawn together."], []
     if not runs:
         return [], words, []
-    arm, title = simulated[0].arm, prose("slew_title", task=task, reach=case.arm.reach)
+    arm = simulated[0].arm
+    title = prose("slew_title", task=chain.slew, reach=report.arm.reach)
     figure = motion.slew.figure(arm, {style.safe(name): run for name, run in runs.items()}, title)
     columns = response_columns(arm, {each.key: runs[each.name] for each in simulated})
-    moving = [each for each in simulated if each is not bare and runs[each.name].stopped is None]
-    responses = [(each, step(each.arm, each.law, case.chain, "slew")) for each in moving[:1]]
     numbers = (
         Column("law", "controller", of=list(runs)),
         *table(list(runs.values()), ("residual_moment", "settling_time")).columns,
         Column("finding", "finding", of=[run.finding for run in runs.values()]),
     )
-    return (
-        [
-            picture("sampled_slew", figure, data=columns, runs=runs, piece=piece_of_bands(runs), task=title),
-            *(film_picture(each, runs[each.name], task.rise_time) for each in moving[:1]),
-            sheet("slew_numbers", numbers, stem="sampled-slew-numbers"),
-            *(sheet("time_responses", it.table, each=each, found=it) for each, it in responses),
-        ],
-        words,
-        [settling_fact(each, runs[each.name], len(case.laws) > 1) for each in simulated if each is not bare]
-        + [fact for _, it in responses for fact in tip_facts(it)],
-    )
+    own = [each for each in simulated if each is not bare]
+    moving = next((each for each in own if runs[each.name].stopped is None), None)
+    blocks: list[Picture | Table] = [
+        picture("sampled_slew", figure, data=columns, runs=runs, piece=piece_of_bands(runs), task=title),
+        sheet("slew_numbers", numbers, stem="sampled-slew-numbers"),
+    ]
+    facts = [settling_fact(each, runs[each.name], len(report.laws) > 1) for each in own]
+    if moving is not None:
+        found = step(moving.arm, moving.law, chain, "slew")
+        blocks.insert(1, film_picture(moving, runs[moving.name], chain.slew.rise_time))
+        blocks.append(sheet("time_responses", found.table, each=moving, found=found))
+        facts += tip_facts(found)
+    return blocks, words, facts
 
 
 def tip_facts(found: Step) -> Iterator[Fact]:
@@ -217,8 +224,8 @@ def tip_facts(found: Step) -> Iterator[Fact]:
 
 
 def film_picture(each: Controller, run: Simulation, rise: float) -> Picture:
-    """The film of a slew, and of what follows for half as long."""
-    found = animation.motion_of(each.arm, run, FILM_SLEWS * rise, FILM_FRAMES)
+    """Return the film of a slew, and of what follows for half as long."""
+    found = motion_of(each.arm, run, 1.5 * rise, FILM_FRAMES)
     still = picture("slew_film", animation.draw_motion.figure(found), name=each.name, found=found)
     return still._replace(film=animation.film(found).gif)
 
@@ -245,10 +252,12 @@ def response_columns(arm: Arm, each: Mapping[str, Simulation]) -> Sequence[Colum
     Torques are those held at that time, the rigid arm's moment that of the sample after it.
     """
     moments = {key: traces.curve_of(run, "root_moment") for key, run in each.items()}
-    t, first = min((moment.t for moment in moments.values()), key=len), next(iter(each.values()))
+    t = min((moment.t for moment in moments.values()), key=len)
+    first = next(iter(each.values()))
     rigid = np.r_[first.scenario.rigid_moment[1:], first.scenario.rigid_moment[-1:]]
     columns: list[Column] = [Column("t_s", of=t), Column("rigid_moment_N_m", of=traces.held_at(first, rigid, t))]
-    driven, unit = "torque" if arm.input_unit == "N m" else "input", arm.input_unit
+    driven = "torque" if arm.input_unit == "N m" else "input"
+    unit = arm.input_unit
     for key, run in each.items():
         columns += moments[key].at(t).columns(f"root_moment_{key}", "N m")
         columns += traces.tip_deviation(arm, run).at(t).columns(f"tip_error_{key}", "m")
@@ -280,15 +289,16 @@ class StepRow(NamedTuple):
 
 def step_rows(name: str, found: RunComparison) -> Iterator[StepRow]:
     """The measured step, and the computed one."""
-    step, end = found.measured.step, float(found.measured.reference[-1])
+    step = found.measured.step
+    end = float(found.measured.reference[-1])
     for origin, angle in (("measured", found.measured.hub_angle), ("computed", found.hub_angle)):
         yield StepRow(name, origin, 100 * overshoot(angle, step, end), math.degrees(angle[-1] - end))
 
 
-def measured_blocks(case: Case) -> Iterator[Picture | Table]:
+def measured_blocks(report: ArmReport) -> Iterator[Picture | Table]:
     """Each measured run with the exact loop over it, and both in numbers; nothing where none was measured."""
-    runs = [(each, each.given.measured) for each in case.controllers if each.given.measured is not None]
-    found = {each.name: compare_run(each.arm, each.law, case.chain, run) for each, run in runs}
+    runs = [(each, each.given.measured) for each in report.controllers if each.given.measured is not None]
+    found = {each.name: compare_run(each.arm, each.law, report.chain, run) for each, run in runs}
     if not found:
         return
     figure = motion.draw_measured_runs.figure(found)
@@ -299,18 +309,13 @@ def measured_blocks(case: Case) -> Iterator[Picture | Table]:
 
 
 def growth_words(each: Controller, found: verdict.Verdict, chain: Chain) -> str:
-    """The growth of an unstable loop; of one with a measured run also when the hub angle shows it, after that run."""
-    T, measured, shown = chain.sampling.period, each.given.measured, list[float]()
-    growth = T / found.log_radius
+    """State the growth of an unstable loop; after a measured run also when the hub angle shows it."""
+    growth = chain.sampling.period / found.log_radius
+    measured = each.given.measured
+    shown: list[float] = []
     if measured is not None:
-        reference, end = measured.reference, float(measured.t[-1])
-        t = np.append(measured.t, end + min(20 * growth, MOST_SAMPLES * T))
-        longer = replace(measured, t=t, reference=np.append(reference, reference[-1]))
-        arm, law = tracked(each.arm, each.law)
-        run = Simulator(arm, chain, longer.scenario(T), law, count=found.modes_used).run().at_samples
-        settled = run.hub_angle[run.t <= end][-1]
-        away = abs(run.hub_angle - settled) > 0.05 * abs(measured.step)  # which shows
-        shown = run.t[away & (run.t > end)].tolist()
+        # as much longer as an unstable loop may seem settled
+        shown = departures(each.arm, each.law, chain, measured, found.modes_used, 20 * growth)
     return prose("growth", name=each.name, found=found, growth=growth, measured=measured, shown=shown)
 
 
@@ -319,7 +324,8 @@ def compared_data(found: Mapping[str, RunComparison]) -> Iterator[Column]:
     t = min((it.run.t for it in found.values()), key=len)
     yield Column("t_s", of=t)
     for key, it in found.items():
-        measured, run = it.measured, it.run
+        measured = it.measured
+        run = it.run
         for name, at, values in (
             (f"reference_{key}_rad", measured.t, measured.reference),
             (f"hub_angle_measured_{key}_rad", measured.t, measured.hub_angle),

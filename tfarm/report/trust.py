@@ -1,17 +1,14 @@
 """Method and proofs, one page for all reports: proofs, published numbers, the audit, how to make it again, words."""
 
-import hashlib
 import platform
 import re
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
-from decimal import Decimal, localcontext
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from difflib import SequenceMatcher
 from functools import partial
 from importlib.metadata import version
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any
 from xml.etree import ElementTree
 
 from latex2mathml.converter import convert
@@ -19,22 +16,26 @@ from markupsafe import Markup, escape
 
 import tfarm
 from tfarm import audit
-from tfarm.arm import Arm, load, presets
-from tfarm.arm.chain import file_text
+from tfarm.arm import Arm
 from tfarm.audit import AuditRow, published
+from tfarm.audit.arm_proofs import (
+    BRACKET_DIGITS,
+    PROVEN_DIGITS,
+    PROVEN_MODES,
+    PROVEN_OUTPUTS,
+    UNPROVEN,
+    ArmProof,
+    prove,
+)
 from tfarm.audit.rows import is_zero
 from tfarm.digits import powers, scientific, significant, unit
 from tfarm.dsp import Chain
-from tfarm.errors import CertificationError, ConvergenceError
-from tfarm.loop.poles import Poles, closed_loop_poles
-from tfarm.plots.style import gains_words
 from tfarm.report.page import (
     DATA,
     PROMISES,
     PageSection,
     anchor,
     argument,
-    has_loop,
     keep,
     kept,
     render,
@@ -42,148 +43,10 @@ from tfarm.report.page import (
     sheet,
     write_text,
 )
-from tfarm.report.response_sections import (
-    BRACKET_DIGITS,
-    PROVEN_DIGITS,
-    PROVEN_MODES,
-    proven_damped_modes,
-    proven_modes,
-)
-from tfarm.response.frequency import BAND_POINTS, worst_error
-from tfarm.schema import Column, Quantity, Table, save_table, table
+from tfarm.response.frequency import BAND_POINTS
+from tfarm.schema import Column, Table, save_table, table
 from tfarm.schema.glossary import GLOSSARY_TERMS
 from tfarm.schema.html import GREEK, LETTER
-from tfarm.spectrum import DampedModes
-from tfarm.spectrum.table import default_gains
-
-PROVEN_OUTPUTS = ("root_moment", "tip_displacement")
-UNPROVEN = "not proven"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Boxed:
-    """Eigenvalues proven complete in a box: each in a disc, `count` in all.  `failure`: what could not be proven."""
-
-    arm: Annotated[str, Quantity("arm", help="name of the arm")]
-    what: Annotated[str, Quantity("eigenvalues", help="damped modes of the arm, or poles of its default loop")]
-    count: Annotated[
-        int, Quantity("counted", help="eigenvalues in the box by the argument principle, conjugates counted")
-    ] = 0
-    box: Annotated[
-        list[float],
-        Quantity(
-            "box: Re s from, to, Im s from, to", "1/s", 4, help="rectangle of the s-plane in which none is missing"
-        ),
-    ] = field(default_factory=list)
-    failure: str = ""
-
-    @property
-    def verdict(self) -> Annotated[str, Quantity("verdict", help="whether as many are enclosed as counted")]:
-        """Whether they are complete."""
-        return self.failure or "complete, proven"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ArmProof:
-    """Of one arm: brackets (lower, upper) [rad/s] of its first flexible frequencies, the count that completes them.
-
-    `count` frequencies lie below `below` [rad/s], a rigid-body mode included if `has_rigid_mode`.  `errors` has
-    (output, worst |G_64/G - 1| / (1 + |s G'/G|)) over frequencies in `band`.  `failure` is what could
-    not be proven; then there are no brackets.  `boxes` are damped modes and poles of the default loop.  `sha256` is
-    that of the arm's file.
-    """
-
-    name: Annotated[str, Quantity("arm", help="name of the arm")]
-    sha256: Annotated[str, Quantity("SHA-256 of arm.toml", help="hash of the arm's file, on which its page depends")]
-    has_rigid_mode: Annotated[
-        bool, Quantity("rigid body", help="whether the arm turns freely as a rigid body, with natural frequency 0")
-    ]
-    digits: int = BRACKET_DIGITS
-    brackets: tuple[tuple[str, str], ...] = ()
-    count: Annotated[
-        int, Quantity("counted", help="natural frequencies below the next column's, by the proven count")
-    ] = 0
-    below: str = ""
-    failure: str = ""
-    band: tuple[float, float]
-    errors: tuple[tuple[str, float], ...]
-    boxes: tuple[Boxed, ...] = ()
-
-    @property
-    def enclosed(
-        self,
-    ) -> Annotated[int, Quantity("flexible modes enclosed", help="natural frequencies between two proven bounds each")]:
-        """The number of brackets."""
-        return len(self.brackets)
-
-    @property
-    def count_below(
-        self,
-    ) -> Annotated[float | None, Quantity("below", "rad/s", 9, help="frequency at which the count is made")]:
-        """The frequency of the count."""
-        return float(self.below) if self.below else None
-
-    @property
-    def verdict(self) -> Annotated[str, Quantity("verdict", help="whether as many are enclosed as counted")]:
-        """Whether the list is complete."""
-        return f"{UNPROVEN}: {self.failure}" if self.failure else "complete, proven"
-
-    @property
-    def source(self) -> Annotated[str, Quantity("source", help="preset, where the file is that of one byte for byte")]:
-        """Whether the arm's file is, byte for byte, that of a preset."""
-        return "preset" if self.name in presets() and hash_of(load(self.name)) == self.sha256 else "file"
-
-    @property
-    def leading_digits(self) -> list[str]:
-        """The proven digits of each bracket: its lower end cut off, with its zeros."""
-        with localcontext(prec=self.digits + 5):
-            lower = [Decimal(bracket[0]) for bracket in self.brackets]
-            return [f"{each.quantize(Decimal(1).scaleb(each.adjusted() - self.digits + 1)):f}" for each in lower]
-
-
-def prove(arm: Arm, chain: Chain | None = None) -> ArmProof:
-    """Certify the first modes of the arm and measure its responses; a failed proof is noted, not raised."""
-    modes = tfarm.modes(arm, count=PROVEN_MODES)
-    flexible = modes.natural_frequency[modes.index > 0]
-    band = float(0.1 * flexible[0]), float(1.1 * flexible[-1])
-    errors = ((output, worst_error(arm, output, band)) for output in PROVEN_OUTPUTS)
-    try:
-        proof = proven_modes(arm, PROVEN_MODES)
-        found: dict[str, Any] = {"brackets": proof.brackets, "count": proof.count, "below": proof.below}
-    except CertificationError as error:
-        found = {"failure": str(error)}
-    return ArmProof(
-        name=arm.name,
-        sha256=hash_of(arm, chain),
-        has_rigid_mode=arm.has_rigid_mode,
-        band=band,
-        errors=tuple((output, worst) for output, worst in errors if worst is not None),
-        boxes=tuple(boxed(arm)),
-        **found,
-    )
-
-
-def boxed(arm: Arm) -> Iterator[Boxed]:
-    """Damped modes and the default loop's poles, each enclosed and counted; a failed proof is noted."""
-    boxes: dict[str, Callable[[], DampedModes | Poles]] = {}
-    if not arm.is_undamped:
-        boxes[f"damped modes, C = {arm.damping:g} s"] = lambda: proven_damped_modes(arm, PROVEN_MODES)
-    if has_loop(arm):
-        law = default_gains(arm)
-        boxes[f"closed loop, {gains_words(law, 6)}"] = lambda: closed_loop_poles(arm, law, PROVEN_MODES).certified(
-            PROVEN_DIGITS
-        )
-    for what, proven in boxes.items():
-        try:
-            found = proven()
-            yield Boxed(arm=arm.name, what=what, count=found.count, box=list(map(float, found.box)))
-        except (CertificationError, ConvergenceError) as error:
-            yield Boxed(arm=arm.name, what=what, failure=str(error))
-
-
-def hash_of(arm: Arm, chain: Chain | None = None) -> str:
-    """SHA-256 of the arm's file, its chain with it."""
-    return hashlib.sha256(file_text(arm, chain).encode()).hexdigest()
 
 
 def save_proof(arm: Arm, folder: Path, chain: Chain | None = None) -> None:
@@ -204,9 +67,11 @@ def proof_tables(proofs: Sequence[ArmProof]) -> list[Table]:
     digits = {proof.name: proof.leading_digits or [""] * PROVEN_MODES for proof in proofs}
     columns = (
         Column("mode", "mode", of=range(1, PROVEN_MODES + 1)),
-        *(Column(f"{name}_rad_s", name, "rad/s", of=own, shown=[f"{text}…" if text else UNPROVEN for text in own])
-          for name, own in digits.items()),
-    )  # fmt: skip
+        *(
+            Column(f"{name}_rad_s", name, "rad/s", of=own, shown=[f"{text}…" if text else UNPROVEN for text in own])
+            for name, own in digits.items()
+        ),
+    )
     return [
         sheet("counts", table(proofs, ("name", "has_rigid_mode", "enclosed", "count", "count_below", "verdict"))),
         sheet("digits", columns, modes=PROVEN_MODES, digits=BRACKET_DIGITS),
@@ -226,8 +91,14 @@ def published_tables(found: published.Validation) -> list[Table]:
 
 
 AUDIT_COLUMNS = (
-    "equation", "verdict", "printed", "corrected", "residual_printed", "residual_corrected", "evidence",
-)  # fmt: skip
+    "equation",
+    "verdict",
+    "printed",
+    "corrected",
+    "residual_printed",
+    "residual_corrected",
+    "evidence",
+)
 TRUST_FOLDER = "trust"
 PACKAGES = (
     "numpy",
@@ -305,32 +176,45 @@ def write_trust(
     accuracy = (
         Column("arm", "arm", of=[proof.name for proof in proofs]),
         Column("band_rad_s", "from … to, rad/s", of=[" … ".join(significant(x, 4) for x in p.band) for p in proofs]),
-        *(Column(output, output.replace("_", " "), of=own,
-                 shown=["zero throughout" if error is None else scientific(error, 2) for error in own])
-          for output, own in worst.items()),
-    )  # fmt: skip
+        *(
+            Column(
+                output,
+                output.replace("_", " "),
+                of=own,
+                shown=["zero throughout" if error is None else scientific(error, 2) for error in own],
+            )
+            for output, own in worst.items()
+        ),
+    )
     columns = Column("package", "package", of=list(versions)), Column("version", "version", of=versions.values())
     again = [sheet("inputs", table(proofs, ("name", "source", "sha256"))), sheet("versions", columns)]
-    blocks = {"proofs": proof_tables(proofs), "accuracy": [sheet("accuracy", accuracy)],
-              "published": published_tables(found), "again": again}  # fmt: skip
+    blocks = {
+        "proofs": proof_tables(proofs),
+        "accuracy": [sheet("accuracy", accuracy)],
+        "published": published_tables(found),
+        "again": again,
+    }
     sections = {name: save_section(PageSection(blocks=own), folder) for name, own in blocks.items()}
     save_table(table(audited, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation"), folder / DATA)
     errors = [error for proof in proofs for _, error in proof.errors]
     names = " ".join(argument(proof.name, proof.source == "preset") for proof in proofs)
-    write_text(folder / "index.html", render(
-        "trust.html",
-        title="Method and proofs",
-        sections=sections,
-        proofs=proofs,
-        digits=BRACKET_DIGITS,
-        points=BAND_POINTS,
-        worst=scientific(max(errors), 2) if errors else "",
-        found=found,
-        equations=[(row, *compared_formulas(row.printed_tex, row.corrected_tex)) for row in audited],
-        anchor=partial(anchor, "eq"),
-        in_letters=in_letters,
-        is_zero=is_zero,
-        glossary=[term for term in GLOSSARY_TERMS if term.name in PROMISES],
-        word_id=partial(anchor, "word"),
-        command=f"tfarm report {names} --out reports",
-    ))  # fmt: skip
+    write_text(
+        folder / "index.html",
+        render(
+            "trust.html",
+            title="Method and proofs",
+            sections=sections,
+            proofs=proofs,
+            digits=BRACKET_DIGITS,
+            points=BAND_POINTS,
+            worst=scientific(max(errors), 2) if errors else "",
+            found=found,
+            equations=[(row, *compared_formulas(row.printed_tex, row.corrected_tex)) for row in audited],
+            anchor=partial(anchor, "eq"),
+            in_letters=in_letters,
+            is_zero=is_zero,
+            glossary=[term for term in GLOSSARY_TERMS if term.name in PROMISES],
+            word_id=partial(anchor, "word"),
+            command=f"tfarm report {names} --out reports",
+        ),
+    )

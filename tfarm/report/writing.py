@@ -9,20 +9,18 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 from tfarm.arm import Arm
 from tfarm.assessment import Comparison
-from tfarm.digits import how_many
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import driven
-from tfarm.errors import TfarmError, must_be_known, one_line, require
-from tfarm.exact.outputs import signal_words
+from tfarm.errors import TfarmError, must_be_known, require
 from tfarm.files import move_into, place_in, temporary_folder
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
-from tfarm.plots import studies
 from tfarm.plots.regions import comparison
 from tfarm.plots.style import drawn_for
 from tfarm.processes import shared
@@ -38,11 +36,9 @@ from tfarm.report.loop_section import (
 )
 from tfarm.report.overview import SHORT, Card, blocks, save_card, summary
 from tfarm.report.page import (
-    Case,
-    Fact,
+    ArmReport,
     GivenLaw,
     PageSection,
-    anchor,
     check_laws,
     command_of,
     explained,
@@ -63,8 +59,7 @@ from tfarm.report.response_sections import bode_section, fit_section, measured_s
 from tfarm.report.sampled_section import sampled_section
 from tfarm.report.trust import TRUST_FOLDER, gather, save_proof, write_trust, written_proofs
 from tfarm.report.tuner_section import tuner_section
-from tfarm.schema import Column, quantities, table, text
-from tfarm.studies.study import Study
+from tfarm.schema import quantities, table
 
 ReportProgress = Callable[[int, int, str], object]
 Calls = Mapping[str, Sequence[Callable[[], Any]]]  # by task: what one process does in turn
@@ -72,14 +67,25 @@ MOST_WORKERS = 2  # processes that share the pieces of a report: as many cores a
 WORTH_A_PROCESS = 8  # pieces for which a second process, which takes a second or two to start, is worth it
 EVIDENCE = "method and proofs"  # a task of no arm
 MAP = "margins-map"  # anchor of the section that the overview begins with
-LOOP_TASK, SAMPLED_TASK = "continuous loop", "sampled loop"  # each of sections that share a design or damped modes
+# each of sections that share a design or damped modes
+LOOP_TASK = "continuous loop"
+SAMPLED_TASK = "sampled loop"
 LONGEST = (SAMPLED_TASK, LOOP_TASK, EVIDENCE)  # tasks of five seconds and more, which are begun first
 EXPORTS = "export"  # folder in that of an arm, to whose files its pages lead
 EXPORTED = [f"{of}{end}" for of in ("controller", "tuner", "plant", "loop") for end in (".h", ".fmu", ".mat", ".py")]
-TRUST_PAGE, COMPARISON_PAGE = f"{TRUST_FOLDER}/index.html", "compare.html"
+TRUST_PAGE = f"{TRUST_FOLDER}/index.html"
+COMPARISON_PAGE = "compare.html"
 RESERVED_NAMES = {  # of folders that no arm may have
-    "index.html", "readme.md", "pictures", "bench.json", TRUST_FOLDER, "data", COMPARISON_PAGE, "compare.json", ASSETS,
-}  # fmt: skip
+    "index.html",
+    "readme.md",
+    "pictures",
+    "bench.json",
+    TRUST_FOLDER,
+    "data",
+    COMPARISON_PAGE,
+    "compare.json",
+    ASSETS,
+}
 
 
 # ------------------------------------------------------------ the sections of a page
@@ -87,17 +93,17 @@ RESERVED_NAMES = {  # of folders that no arm may have
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A section of an arm's pages: a name for the progress bar, the section's anchor, and how to make it of a case.
+    """A section of an arm's pages: a name for the progress bar, the section's anchor, and how to make it of a report.
 
-    A case that it does not suit has no such section.  The page that has it is called by the first word of its anchor,
+    A report that it does not suit has no such section.  The page that has it is called by the first word of its anchor,
     or `on`; the `title` of the page is that of one of its sections.  The first page shows blocks of some.
     Sections of one `task` are made one after the other in one process.
     """
 
     name: str
     anchor: str
-    make: Callable[[Case], PageSection]
-    suits: Callable[[Case], Any] = lambda case: True
+    make: Callable[[ArmReport], PageSection]
+    suits: Callable[[ArmReport], Any] = bool
     title: str = ""
     on: str = ""
     task: str = ""
@@ -108,14 +114,19 @@ class Piece:
         return self.on or self.anchor.partition("-")[0]
 
 
-def _in_s(case: Case) -> bool:
-    """Whether a controller of the case acts in continuous time."""
-    return not case.arm.is_locked and any(not each.law.is_discrete for each in case.controllers)
+def _in_s(report: ArmReport) -> bool:
+    """Whether a controller of the report acts in continuous time."""
+    return not report.arm.is_locked and any(not each.law.is_discrete for each in report.controllers)
 
 
-def _of_gains(case: Case) -> bool:
+def _of_laws(report: ArmReport) -> bool:
+    """Whether the page is about given laws of a hub that turns."""
+    return bool(report.laws) and not report.arm.is_locked
+
+
+def _of_gains(report: ArmReport) -> bool:
     """Whether the page is about both gains of the arm itself."""
-    return not case.laws and has_loop(case.arm)
+    return not report.laws and has_loop(report.arm)
 
 
 PIECES = (
@@ -123,42 +134,45 @@ PIECES = (
     Piece("recommended gains", "margins-recommended", recommended_section, _of_gains, task=LOOP_TASK),
     Piece("stability margins", "margins", margins_section, _in_s, "Gains and margins", task=LOOP_TASK),
     Piece("Nyquist plot", "margins-nyquist", nyquist_section, _in_s, task=LOOP_TASK),
-    Piece("response of the root moment", "bode-root-moment", partial(bode_section, output="root_moment"),
-          title="Bode plots"),
+    Piece(
+        "response of the root moment",
+        "bode-root-moment",
+        partial(bode_section, output="root_moment"),
+        title="Bode plots",
+    ),
     Piece("response of the tip", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),
-    Piece("measured responses", "bode-measured", measured_section, lambda case: case.measured),
+    Piece("measured responses", "bode-measured", measured_section, attrgetter("measured")),
     Piece("the arm", "arm", arm_section, on="modes"),
     Piece("modes", "modes", modes_section, title="Arm and modes"),
     Piece("root loci", "locus", locus_section, _in_s, "Root loci", task=LOOP_TASK),
-    Piece("sampled loop", "sampled", sampled_section, lambda case: case.has_loop, "The sampled loop",
-          task=SAMPLED_TASK),
-    Piece("controllers", "law", law_section, lambda case: case.laws and not case.arm.is_locked, "The controller"),
+    Piece("sampled loop", "sampled", sampled_section, attrgetter("has_loop"), "The sampled loop", task=SAMPLED_TASK),
+    Piece("controllers", "law", law_section, _of_laws, "The controller"),
     Piece("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", task=SAMPLED_TASK),
-    Piece("fit to measurements", "fit", fit_section, lambda case: case.fit, "Fitted numbers"),
+    Piece("fit to measurements", "fit", fit_section, attrgetter("fit"), "Fitted numbers"),
     Piece("assumptions", "assumptions", assumptions_section, title="Assumptions"),
-)  # fmt: skip
+)
 QUESTIONS = {piece.page: piece.title for piece in PIECES if piece.title}  # pages that may be asked for alone
 PAGES = {"index": "Overview", "live": "Live loop", **QUESTIONS}
 
 
-def pieces_of(case: Case) -> list[Piece]:
-    """The sections of a case, in their order."""
-    return [piece for piece in PIECES if piece.suits(case)]
+def pieces_of(report: ArmReport) -> list[Piece]:
+    """The sections of a report, in their order."""
+    return [piece for piece in PIECES if piece.suits(report)]
 
 
-def make_section(name: str, anchor: str, make: Callable[[Case], PageSection], case: Case, folder: Path) -> PageSection:
-    """A section saved in the arm's folder, or in its place why tfarm could not make it; a bug of ours stays loud."""
+def make_section(piece: Piece, report: ArmReport, folder: Path) -> PageSection:
+    """Return a section saved in the arm's folder, or the reason why tfarm could not make it; a bug of ours is loud."""
     try:
         with drawn_for("page"):
-            section = replace(make(case), anchor=anchor)
+            section = replace(piece.make(report), anchor=piece.anchor)
     except TfarmError as error:
         section = PageSection(
-            anchor=anchor,
-            title=upper(name),
+            anchor=piece.anchor,
+            title=upper(piece.name),
             answer=f"This section could not be made for this arm: {error}.",
             failure=str(error),
         )
-    return save_section(section, folder, case.is_paper)
+    return save_section(section, folder, report.is_paper)
 
 
 # ------------------------------------------------------------ a report
@@ -193,14 +207,17 @@ def write(
     written, two arms share a name or there is none, or an arm or its chain does not suit a law; ConvergenceError if a
     process dies.  If the work itself fails, the other pages in `out` are as they were.
     """
-    out, n, names, only = Path(out), len(arms), [arm.name for arm in arms], only or ()
+    out = Path(out)
+    n = len(arms)
+    names = [arm.name for arm in arms]
+    only = only or ()
     _check(names, only)
     each = zip(arms, chains or [Chain()] * n, laws or [()] * n, fits or [None] * n, strict=True)
-    cases = [Case(*driven(arm, chain), tuple(own), fit, tuple(measured), paper) for arm, chain, own, fit in each]
-    for case in cases:
-        check_laws(case)
+    reports = [ArmReport(*driven(arm, chain), tuple(own), fit, tuple(measured), paper) for arm, chain, own, fit in each]
+    for report in reports:
+        check_laws(report)
     with place_in(out, "out", names + [TRUST_FOLDER, ASSETS] * (not only)) as place:
-        sections = _written(cases, out, place, only, progress, announce)
+        sections = _written(reports, out, place, only, progress, announce)
     for name, section in sections:
         if section.failure and notice is not None:
             notice(f"{name}: the page leaves out “{section.title}”: {section.failure}")
@@ -219,7 +236,7 @@ def _check(names: Sequence[str], only: tuple[str, ...]) -> None:
 
 
 def _written(
-    cases: Sequence[Case],
+    reports: Sequence[ArmReport],
     out: Path,
     place: Path,
     only: tuple[str, ...],
@@ -228,27 +245,27 @@ def _written(
 ) -> list[tuple[str, PageSection]]:
     """Make all pages in `place` and move them to `out`, the index last; every section with the name of its arm."""
     tasks: dict[str, Sequence[Callable[[], Any]]] = {} if only else {EVIDENCE: [gather]}
-    own = [tasks_of(case, place / case.arm.name, only, out, announce) for case in cases]
+    own = [tasks_of(report, place / report.arm.name, only, out, announce) for report in reports]
     for each in own:
         tasks |= each
     done = make_all(tasks, progress)
-    trust = TRUST_PAGE if not only or (out / TRUST_PAGE).is_file() else ""
+    trust = TRUST_PAGE if not only else trust_in(out)
     sections = []
-    for case, each in zip(cases, own, strict=True):
+    for report, each in zip(reports, own, strict=True):
         made = [section for task in each for section in done[task] if section is not None]
-        _write_pages(case, place / case.arm.name, made, only, trust, out / case.arm.name)
-        sections += [(case.arm.name, section) for section in made]
+        _write_pages(report, place / report.arm.name, made, only, trust, out / report.arm.name)
+        sections += [(report.arm.name, section) for section in made]
     move_into(place, out)
     if not only:
         audited, printed = done[EVIDENCE][0]
         write_trust(audited, printed, written_proofs(out), place / TRUST_FOLDER)
-    write_text(place / "index.html", index_page(out, trust=trust))
-    move_into(place, out)
+        move_into(place, out)
+    write_index(out, place)
     return sections
 
 
 def tasks_of(
-    case: Case, folder: Path, only: tuple[str, ...], out: Path, announce: Callable[[str], object] | None
+    report: ArmReport, folder: Path, only: tuple[str, ...], out: Path, announce: Callable[[str], object] | None
 ) -> Calls:
     """What is to be made of one arm: its sections, its card and proof, and of a full report its first pages.
 
@@ -258,35 +275,34 @@ def tasks_of(
     folder.mkdir()
     tasks: dict[str, list[Callable[[], Any]]] = defaultdict(list)
     if not only:
-        tasks[LOOP_TASK].append(partial(first_pages, case, folder, out, announce))
-    for piece in pieces_of(case):
+        tasks[LOOP_TASK].append(partial(first_pages, report, folder, out, announce))
+    for piece in pieces_of(report):
         if piece.page in only or (not only and piece.anchor != MAP):
-            make = partial(make_section, piece.name, piece.anchor, piece.make, case, folder)
-            tasks[piece.task or piece.name].append(make)
+            tasks[piece.task or piece.name].append(partial(make_section, piece, report, folder))
     if only:
-        tasks[LOOP_TASK if LOOP_TASK in tasks else "card"].append(partial(save_card, case, folder))
-    if not (only and case.laws):
-        tasks["modes"].append(partial(save_proof, case.arm, folder, case.chain))
-    return {f"{case.arm.name}: {task}": calls for task, calls in tasks.items()}
+        tasks[LOOP_TASK if LOOP_TASK in tasks else "card"].append(partial(save_card, report, folder))
+    if not (only and report.laws):
+        tasks["modes"].append(partial(save_proof, report.arm, folder, report.chain))
+    return {f"{report.arm.name}: {task}": calls for task, calls in tasks.items()}
 
 
-def first_pages(case: Case, folder: Path, out: Path, announce: Callable[[str], object] | None) -> PageSection | None:
+def first_pages(
+    report: ArmReport, folder: Path, out: Path, announce: Callable[[str], object] | None
+) -> PageSection | None:
     """Write map, card, live page and overview of an arm to `out` at once, and to `folder` for its report: the map."""
-    name = case.arm.name
+    name = report.arm.name
     with temporary_folder(folder.parent) as stage:
         own = stage / name
         own.mkdir()
-        pieces = [piece for piece in pieces_of(case) if piece.anchor == MAP]
-        made = [make_section(piece.name, piece.anchor, piece.make, case, own) for piece in pieces]
-        save_card(case, own)
-        if is_live(case):
-            save_live(case, own)
+        made = [make_section(piece, report, own) for piece in pieces_of(report) if piece.anchor == MAP]
+        save_card(report, own)
+        if is_live(report):
+            save_live(report, own)
             write_assets(stage / ASSETS)
-        _write_pages(case, own, made, ("index",), "", out / name)
+        _write_pages(report, own, made, ("index",), "", out / name)
         shutil.copytree(stage, folder.parent, dirs_exist_ok=True)
         move_into(stage, out)
-        write_text(stage / "index.html", index_page(out, trust=TRUST_PAGE if (out / TRUST_PAGE).is_file() else ""))
-        move_into(stage, out)
+        write_index(out, stage)
     if announce is not None:
         pages = [page for page in (out / name / "index.html", out / name / LIVE_PAGE) if page.is_file()]
         announce(f"written first: {' and '.join(map(str, pages))}; the other pages follow")
@@ -318,21 +334,23 @@ def _in_turn(calls: Sequence[Callable[[], Any]]) -> list[Any]:
 
 
 def _write_pages(
-    case: Case, folder: Path, made: Sequence[PageSection], only: Sequence[str], trust: str, earlier: Path
+    report: ArmReport, folder: Path, made: Sequence[PageSection], only: Sequence[str], trust: str, earlier: Path
 ) -> None:
     """The arm's file with its chain, its first page and those of its sections, or `only` some.
 
     These lead to each other, to what is in the `earlier` folder of the arm, and to the page on `trust`, if any.
     """
-    file, by_anchor, own = file_of(case), {section.anchor: section for section in made}, defaultdict(list)
+    file = file_of(report)
+    by_anchor = {section.anchor: section for section in made}
+    own = defaultdict(list)
     write_text(folder / "arm.toml", file)
-    for piece in pieces_of(case):
+    for piece in pieces_of(report):
         if piece.anchor in by_anchor:
             own[piece.page].append(by_anchor[piece.anchor])
     written = only or ("index", *own)
-    pages = navigation(case.arm, pages_in(earlier, folder, written=written), trust, earlier)
+    pages = navigation(report.arm, pages_in(earlier, folder, written=written), trust, earlier)
     shared = {
-        "card": kept_in(folder, "card", Card) or Card(case.arm.name, summary(case), "", (), (), ()),
+        "card": kept_in(folder, "card", Card) or Card(report.arm.name, summary(report), "", (), (), ()),
         "short": SHORT,
         "pages": pages,
         "titles": dict(pages),
@@ -347,8 +365,8 @@ def _write_pages(
         "explained": partial(explained, words=f"../{trust}" if trust else ""),
     }
     for name in written:
-        title = f"{case.arm.name}: {QUESTIONS[name]}" if name in QUESTIONS else case.arm.name
-        command = command_of(case, name if name in QUESTIONS else "")
+        title = f"{report.arm.name}: {QUESTIONS[name]}" if name in QUESTIONS else report.arm.name
+        command = command_of(report, name if name in QUESTIONS else "")
         page = render("arm.html", title=title, sections=own[name], here=f"{name}.html", command=command, **shared)
         write_text(folder / f"{name}.html", page)
 
@@ -371,13 +389,22 @@ def pages_in(*folders: Path, written: Sequence[str] = ()) -> list[tuple[str, str
 # ------------------------------------------------------------ the index
 
 
-def index_page(out: Path, *, trust: str) -> str:
-    """The page that leads to all others in a folder of reports."""
+def index_page(out: Path) -> str:
+    """Return the page that leads to all others in a folder of reports."""
     cards = [(card, pages) for folder, card in kept(out, "card", Card).items() if (pages := pages_in(folder))]
-    return render(
-        "index.html", title="tfarm reports", cards=cards, trust=trust, compared=kept_comparison(out)["title"],
-        short=SHORT,
-    )  # fmt: skip
+    compared = kept_comparison(out)["title"]
+    return render("index.html", title="tfarm reports", cards=cards, trust=trust_in(out), compared=compared, short=SHORT)
+
+
+def trust_in(out: Path) -> str:
+    """Return the page on method and proofs in a folder of reports, if there is one."""
+    return TRUST_PAGE if (out / TRUST_PAGE).is_file() else ""
+
+
+def write_index(out: Path, stage: Path) -> None:
+    """Write the index of a folder of reports, through a folder next to it."""
+    write_text(stage / "index.html", index_page(out))
+    move_into(stage, out)
 
 
 # ------------------------------------------------------------ a comparison
@@ -412,67 +439,5 @@ def write_comparison(found: Comparison, out: Path) -> Path:
         keep(made, "compare", {"title": title, "arms": arms})
         move_into(made, out)
         if (out / "index.html").is_file():
-            write_text(made / "index.html", index_page(out, trust=TRUST_PAGE if (out / TRUST_PAGE).is_file() else ""))
-            move_into(made, out)
+            write_index(out, made)
     return out / COMPARISON_PAGE
-
-
-# ------------------------------------------------------------ a study
-
-
-def write_study(found: Study) -> Path:
-    """Write index.html with its pictures and tables to the folder of a study: the page.
-
-    Raises ParameterError where it cannot be written.
-    """
-    folder = found.parts.folder
-    with place_in(folder, "--out") as made:
-        with drawn_for("page"):
-            sections = [save_section(each, made) for each in study_sections(found)]
-        title = f"{found.arm}: study of {how_many(found.rows, 'arm')}"
-        page = render("study.html", title=title, sections=sections, explained=explained, found=found)
-        write_text(made / "index.html", page)
-        move_into(made, folder)
-    return folder / "index.html"
-
-
-def study_sections(found: Study) -> list[PageSection]:
-    """Findings, distributions, drivers, responses, worst arm and failures of a study, as far as it has them."""
-    worst, missing, bands = found.worst, list[str](), list[Any]()
-    facts = [
-        *(Fact(each.loop, f"{each.stable:,}", f"of {found.done:,} arms stable", each.finding) for each in found.shares),
-        Fact("arms computed", f"{found.done:,}", note=f"of {found.rows:,}"),
-    ]
-    pictures = [picture(name, draw.figure(found), found=found) for name, draw in (
-        ("study_distributions", studies.study), ("study_scatter", studies.study_scatter)) if found.spreads]  # fmt: skip
-    for output in ("root_moment", "tip_displacement"):
-        try:
-            figure, stem = studies.study_band.figure(found, output), f"study-{output.replace('_', '-')}"
-            bands.append(picture("study_band", figure, stem=stem, name=signal_words(output)[0]))
-        except TfarmError as error:
-            missing.append(f"{output}: {error}.")
-    sections: tuple[tuple[str, list[str], list[Any]], ...] = (
-        ("Findings", [prose("study", found=found)], [sheet("study_ranges", table(found.spreads)),
-         sheet("study_numbers", _numbers(found), found=found)]),
-        ("Distributions", [], pictures[:1]),
-        ("Drivers", [], [*pictures[1:], sheet("study_sobol", table(found.sobol))]),
-        ("Responses", missing, bands),
-        ("Worst arm", [] if worst is None else [prose("study_worst", worst=worst)], []),
-        ("Arms without a result", [], [sheet("study_failures", table(found.failures))]),
-    )  # fmt: skip
-    return [
-        PageSection(anchor=anchor("study", title), title=title, facts=facts[: len(facts) * (title == "Findings")],
-                    words=words, blocks=blocks)
-        for title, words, blocks in sections if words or any(getattr(each, "columns", True) for each in blocks)
-    ]  # fmt: skip
-
-
-def _numbers(found: Study) -> list[Column]:
-    """A row a varied number: its distribution or grid, and its value of the worst arm where that was searched."""
-    space, worst = found.parts.plan.space, [] if found.worst is None else list(found.worst.numbers.values())
-    kinds = {key: one_line(f"{each.kind} {', '.join(map(text, each.numbers))}", 60) for key, each in space.over.items()}
-    columns = [
-        Column("key", "number", of=space.keys),
-        Column("distribution", "distribution", of=[kinds.get(key, "list or posterior") for key in space.keys]),
-    ]
-    return columns + [Column("worst", "worst arm", of=worst, shown=list(map(text, worst)))] * bool(worst)

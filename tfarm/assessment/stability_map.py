@@ -1,0 +1,162 @@
+"""Stability of both gains of an arm: regions of the continuous-time and the sampled loop, and their map.
+
+Each region is a list of intervals of K2 at values of K1, with exact edges (D-decomposition); its outline has as many
+values of K1 as its corners in a picture of given axes need.
+"""
+
+import math
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tfarm.arm import GAINS, PLANE, Arm, HubFeedback, shown_unit
+from tfarm.arrays import Complex, Real
+from tfarm.dsp import Chain
+from tfarm.errors import ConvergenceError
+from tfarm.loop.circle_crossings import GainMap, ends_of_K1, rounded_map, sampled_map, with_both_sides, with_more
+from tfarm.loop.plane import Axis, Plane, edge, gain_map, moment_axis, rate_axis, rate_columns
+from tfarm.loop.sampled import Sampled
+from tfarm.loop.sampled_verdict import sampled_verdict
+from tfarm.records import frozen
+from tfarm.schema import Column
+from tfarm.spectrum.table import default_gains, first_frequency
+from tfarm.synthesis.judge import damping_of
+from tfarm.synthesis.models import continuous_model
+from tfarm.synthesis.structures import ONE, Entry
+
+K2_RANGE = (-1.0, 1.5)  # of the gain that balances a torque: 1 where the input is one, less for a motor's current
+CUT_RANGE = (-1.02, 1.52)  # of the same: where intervals are cut, just outside the picture: no cut is seen as an edge
+OVERLAY_COLUMNS = 72  # values of the gain across, and either side of upright edges
+SAMPLED_COLUMNS = 120  # values of the gain across at which the sampled region is cut, besides its exact ends
+BEYOND_PICTURE = 0.1  # of the gain up the plane, beyond the picture: an edge there is none of the region
+
+
+class StableRegions(NamedTuple):
+    """Both regions of one arm.  `sampled` has the arm's own C; at C = 0 also the regions with a little damping."""
+
+    continuous: Plane
+    sampled: tuple[GainMap, ...]  # most damping first, so that each lies on the one before
+
+    @property
+    def columns(self) -> list[Column]:
+        """At each value of the gain across the ends of the stable intervals of the other."""
+        own = self.continuous.arm.damping
+        regions = {"continuous_K2_intervals": self.continuous.stable_intervals}
+        for plane in self.sampled:
+            C = plane.loop.plant.arm.damping
+            regions["sampled_K2_intervals" if own == C else f"sampled_at_C_{C:g}_s"] = plane.stable_intervals
+        return [
+            Column(PLANE[0], of=self.continuous.x),
+            *(Column(key, of=[tuple(map(float, np.ravel(x))) for x in each]) for key, each in regions.items()),
+        ]
+
+
+def stable_regions(arm: Arm, gains: HubFeedback, chain: Chain) -> StableRegions:
+    """Return the regions around these gains.  Raises ParameterError where the arm has no loop."""
+    # at C = 0 with a little damping too
+    dampings = (arm.damping,) if arm.damping else (1e-4, 1e-6, 0.0)
+    loops = [sampled_verdict(arm.having(damping=C), gains, chain).full for C in dampings]
+    ends = np.unique(np.concatenate([ends_of_K1(loop) for loop in loops]))
+    ends = ends[ends > 0]
+    ends = ends[np.diff(ends, prepend=0.0) > 1e-3 * ends]
+    span, cut = (arm.input_per_torque * np.array(ends) for ends in (K2_RANGE, CUT_RANGE))
+    # beyond all that is stable
+    low, top = gains.K1 / 15.0, 1.7 * max([gains.K1, *ends])
+    across = with_both_sides(np.geomspace(low, top, OVERLAY_COLUMNS), ends)
+    # about the width of the picture over its height
+    wide = 1.8 / np.log(top / low)
+
+    def drawn(K1: Real, K2: Real) -> Complex:
+        return np.asarray(wide * np.log(K1) + 1j * K2 / np.ptp(span))
+
+    planes = [outlined(loop, across[(low <= across) & (top >= across)], cut, drawn) for loop in loops]
+    every = np.unique(np.concatenate([plane.x for plane in planes]))
+    return StableRegions(gain_map(arm, every, cut), tuple(with_more(plane, every) for plane in planes))
+
+
+@lru_cache(maxsize=8)
+def sampled_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> GainMap | None:
+    """Return where in the picture the sampled loop is stable, with the modes of the verdict on the default gains."""
+    try:
+        loop = sampled_verdict(arm, default_gains(arm), chain).full
+        across = with_both_sides(rate_columns(arm, x, SAMPLED_COLUMNS), ends_of_K1(loop))
+        across = across[(x.low <= across) & (x.high > across)]
+        up = np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])
+        return outlined(loop, across, up, lambda K1, K2: np.asarray(1.5 * x.place(K1) + 1j * y.place(K2)))
+    except ConvergenceError:
+        return None
+
+
+def outlined(loop: Sampled, across: Real, up: Real, drawn: Callable[[Real, Real], Complex]) -> GainMap:
+    """Return the sampled region cut at these K1, and between them where its outline as it is `drawn` has corners."""
+    return rounded_map(sampled_map(loop, across, up), drawn)
+
+
+# ------------------------------------------------------------ the map
+
+
+DESIGNED_MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
+GRID_COLUMNS, GRID_ROWS = 240, 200  # of the coloured grid
+
+
+@frozen
+class StabilityMap:
+    """The numbers of the map.
+
+    `region` is the exact count on the coloured grid, `edge` (n, 3) the exact boundary, both gains and w, within the
+    picture with rows of nan where it leaves it; `damping` (rows, columns) the least damping ratio of the first
+    `DESIGNED_MODES` modes on the `coarse` grid, of every fourth value of each gain and the frame's.  `sampled` is the
+    region of the loop sampled by a chain, None where that is not determined.
+    """
+
+    arm: Arm
+    x: Axis
+    y: Axis
+    region: Plane
+    edge: Real
+    coarse: Plane
+    damping: Real
+    sampled: GainMap | None
+
+    @property
+    def columns(self) -> list[Column]:
+        """The coarse grid with counts and damping, then the boundary with its frequencies."""
+        values = *np.meshgrid(*self.coarse.axes), self.coarse.unstable, self.damping
+        rows: list[tuple[Any, ...]] = [
+            ("grid", K1, K2, math.inf if count < 0 else int(count), ratio, "")
+            for K1, K2, count, ratio in zip(*map(np.ravel, values), strict=True)
+        ]
+        rows += [("boundary", K1, K2, "", "", omega) for K1, K2, omega in self.edge.tolist() if not math.isnan(K1)]
+        rate = "_".join([PLANE[0], *shown_unit(PLANE[0], self.arm).replace("/", " ").split()])
+        keys = "what", rate, PLANE[1], "unstable_poles", "least_damping_ratio", "omega_rad_s"
+        return [Column(key, of=of) for key, of in zip(keys, zip(*rows, strict=True), strict=True)]
+
+
+def stability_map(arm: Arm, chain: Chain) -> StabilityMap:
+    """Return the map of an arm, its ranges chosen by J w1 and by its stability intervals."""
+    x = rate_axis(arm)
+    y = moment_axis(arm, x)
+    found = gain_map(arm, x.grid(GRID_COLUMNS), y.grid(GRID_ROWS))
+    # damping at one in four of its values
+    across, up = (np.r_[axis.low, each[2::4], axis.high] for axis, each in zip((x, y), found.axes, strict=True))
+    coarse = gain_map(arm, across, up)
+    sampled = sampled_region(arm, x, y, chain)
+    return StabilityMap(arm, x, y, found, edge(found, x, y), coarse, least_damping(coarse), sampled)
+
+
+def least_damping(plane: Plane) -> Real:
+    """Return the least damping ratio (rows, columns) of the first modes over both gains.
+
+    It is that of a model of eight modes: right to a few digits, more than a contour shows.
+    """
+    signals = tuple(each.output for name in PLANE for each in GAINS if each.name == name)
+    model = continuous_model(plane.arm, signals, DESIGNED_MODES, 8, first_frequency(plane.arm))
+    points = np.reshape(np.meshgrid(*plane.axes), (2, -1))
+    found = []
+    # five hundred points at a time for memory, whatever the grid
+    for part in np.array_split(points, math.ceil(points.shape[1] / 500), axis=1):
+        law = [Entry(name, row[None], ONE) for name, row in zip(signals, part, strict=True)]
+        found.append(damping_of(model, model.poles(law)))
+    return np.concatenate(found).reshape(plane.y.size, plane.x.size)
