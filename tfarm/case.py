@@ -9,7 +9,7 @@ each of the three, also for 0 (`feedback`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import cast
 
@@ -19,13 +19,12 @@ from tfarm.arm.law import AnyLaw, Law, as_law, full_law
 from tfarm.arm.records import Arm, must_be_arm
 from tfarm.exact.system import System
 from tfarm.moved import moved
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response.signals import Signals
 from tfarm.spectrum import Modes, modes
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Case:
     """An arm with the input of its controller, the controller in its normal form, and the chain between both.
 

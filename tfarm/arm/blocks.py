@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from tfarm.arm.checks import number
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError, require
-from tfarm.records import record
+from tfarm.records import frozen
 
 Matrices = tuple[Real, Real, Real, Real]
 
@@ -103,8 +103,7 @@ class Rational:
         return balanced(A, np.eye(self.order, 1), C[None], num[:1, None])
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class StateSpace:
     """x' = A x + B y, v = C x + D y from m signals y to the input v; for a discrete-time law x' is the next x.
 

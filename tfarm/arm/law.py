@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Annotated, Any
 
@@ -22,15 +22,14 @@ from tfarm.arm.feedback import AT_HUB, GAINS, ON, OUTPUT_OF, HubFeedback
 from tfarm.arm.records import Arm
 from tfarm.arrays import Complex
 from tfarm.errors import ParameterError, did_you_mean, must_be_known, require
-from tfarm.records import record
+from tfarm.records import frozen
 
 MOST_SIGNALS = 12  # of a law, for time and memory
 REFERENCE = "reference:"  # before the name of a signal: its reference
 NUMBER = re.compile(r"(.*?)(?:\.gain|\.(num|den)\.(\d+))?", re.DOTALL)  # a signal, or one of its coefficients
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Part:
     """One block of a law and its signals: names of outputs, with "@x" [m] for those along the link.
 
@@ -41,8 +40,7 @@ class Part:
     block: LawBlock
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Law:
     """A linear law from named signals to the rig's input.
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from typing import Annotated, Any, NamedTuple
 
@@ -32,7 +32,7 @@ from tfarm.loop.margins import Margins, margins
 from tfarm.loop.poles import HUB
 from tfarm.loop.sampled_verdict import SAMPLED_LOOP, Analysis, sampled
 from tfarm.loop.stability import stability
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Percent, Quantity, Table, Tabled, across, text
 from tfarm.schema.html import as_html, with_symbols
 from tfarm.spectrum import modes
@@ -91,8 +91,7 @@ def loop_names(period: float) -> tuple[str, str]:
     return "continuous-time", f"sampled, {1e3 * period:g} ms"
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class LoopCard:
     """The numbers of one loop; its margins are not defined unless it is stable."""
 
@@ -129,8 +128,7 @@ class LoopCard:
         return f"{self.stability}, {self.grade}: {', '.join(self.limited_by)}"
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class ResultCard(Tabled):
     """The card of an arm under a controller: the continuous-time loop, None under a law in z, and the sampled one."""
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple, cast
 
@@ -23,7 +22,7 @@ from tfarm.loop.margins import margins as margins_of
 from tfarm.loop.plane import Plane, between, gain_map, plane, ranges_of
 from tfarm.loop.poles import HUB, closed_loop_poles, poles_by_mode
 from tfarm.loop.sampled_verdict import Analysis, SampledBrief, Verdict, brief_of, sampled_verdict
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response.frequency import Bode, bode, resonant_band
 from tfarm.schema import Difference, Percent, Quantity
 from tfarm.schema import compare as compare_records
@@ -53,8 +52,7 @@ class PoleOfMode(NamedTuple):
     pole: complex
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class ComparedSide:
     """One of the two: its name, arm and law, the modes of the arm, and poles, verdicts and margins of the loop.
 
@@ -151,8 +149,7 @@ class LonePole(NamedTuple):
     pole: Annotated[complex, Quantity("pole", "1/s", 8, "closed-loop pole with Im s > 0")]
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Comparison:
     """Two sides, the first the one that differences are from.  `output` is that of the Bode plot of two arms."""
 

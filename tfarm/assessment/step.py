@@ -53,7 +53,7 @@ from tfarm.loop.time_response import (
     time_response,
     usual_poles,
 )
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response.signals import Controller, controller, placed
 from tfarm.schema import Column, Percent, Quantity, Table, across
 from tfarm.schema.html import as_html
@@ -121,8 +121,7 @@ class SignalFigures:
         return "mm" if isinstance(self.residual_rms, Millimetres) else self.unit
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class LoopResponse:
     """Figures of one loop, not defined of an unstable one, and its signals by name, "torque" being the input."""
 
@@ -262,8 +261,7 @@ class _Record:
         return np.concatenate(found)
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class Step(_Record):
     """Time responses of an arm under a controller, continuous-time and sampled, at the times `t` [s].
 

@@ -14,7 +14,6 @@ Over a plane of two gains the counts beyond the curve follow column by column, f
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple, Protocol
@@ -25,7 +24,7 @@ from scipy.optimize.elementwise import find_minimum, find_root
 
 from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
 from tfarm.errors import require
-from tfarm.records import record
+from tfarm.records import frozen
 
 Parts = Callable[[Real], tuple[Complex, Complex]]  # A and B at places of a curve
 
@@ -42,8 +41,7 @@ class Crossing(NamedTuple):
     change: int
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Crossings:
     """Every `Crossing` along one gain: `gain` (n,), ascending, the place `at` (n,) and the `change` (n,) of each."""
 
@@ -145,8 +143,7 @@ class Curve(Protocol):
         """The steps from the points of these numbers to the next."""
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Grid:
     """A curve with a grid of `places` (n,), and its terms at a place."""
 

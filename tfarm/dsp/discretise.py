@@ -18,7 +18,7 @@ encoder, where a chain estimates the hub rate, is (1 - a)/T (z - 1)/(z - a) time
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -31,7 +31,7 @@ from tfarm.arm.law import Law, Part, is_measured
 from tfarm.arrays import MACHINE_EPS, Complex, Real
 from tfarm.errors import ParameterError, require
 from tfarm.exact.rationals import block_factors
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import check_gains
 
@@ -207,8 +207,7 @@ def _differenced(part: Part, a: float, T: float) -> Part:
 Column = tuple[int, int, float, Complex]  # part, row of the signal, and g and zeros of g prod(delta - zeros)
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class LawInZ:
     """The parts of a law in z, with the sign of u = -sum, over `signals`: factors, and states.
 

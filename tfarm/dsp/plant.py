@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache, reduce
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -34,7 +34,7 @@ from tfarm.arm.chain import Chain, Sampling
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, require
 from tfarm.exact.outputs import Output
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.reduced import ModalModel, modal_model
 from tfarm.reduced.modal import SLOW_POLES_FROM, slow_remainder
 from tfarm.response import transfer
@@ -54,8 +54,7 @@ OVERDAMPED = 2.5  # C w from which on a mode surely is: following it further cos
 FORGOTTEN = 40.0  # e^-40 = 4e-18: such a pole has settled before the next sample
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Plant:
     """Poles (m,) [1/s] other than s = 0, conjugates listed too; residues (outputs, m), rigid (outputs, 2), static
     (outputs,).
@@ -194,8 +193,7 @@ def with_held_filter(plant: Plant, held: Real) -> Plant:
     return replace(plant, residues=residues).with_poles(plant.poles[-1], held)
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class SensedPlant:
     """An arm's signals with `count` modes: a plant for each place of signals, and one of all together.
 
@@ -251,8 +249,7 @@ def sensed_plant(arm: Arm, chain: Chain, names: Sequence[str], count: int) -> Se
 # ------------------------------------------------------------ at the samples
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class PulseTransfer:
     """H_o(z), the pulse transfer functions from the torque computed at a sample to the next samples.
 

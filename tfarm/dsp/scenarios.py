@@ -1,7 +1,7 @@
 """Scenarios of a sampled loop: references, feedforward, disturbances and initial state."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from tfarm.arm.checks import positive
 from tfarm.arrays import Real
 from tfarm.dsp.plant import driven
 from tfarm.errors import must_be_known, require
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import turning_inertia
 
@@ -24,8 +24,7 @@ TRIAL_DURATION = 3.0  # s, of a trial or a simulation by default: three times th
 SCENARIOS = ("slew", "step", "decay", "impulse", "pulse")
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Scenario:
     """One row for each sample: `feedforward` r [N m], `hub_angle` and `hub_rate` references, `rigid_moment` [N m] at
     the root of the rigid arm on them, `disturbance` [N m] at the hub (held over the sample, not delayed).

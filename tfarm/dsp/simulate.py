@@ -30,7 +30,7 @@ from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.stages import admit
 from tfarm.errors import must_be_known, require
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 
 FOLDED_UP = 10.0  # rad: the simulation stops at the root moment EI/L times this, far beyond small deflections
@@ -104,8 +104,7 @@ class Measurement(NamedTuple):
 Controller = Callable[[Measurement], float]
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Trace:
     """Signals, not filtered, at `t` [s]: hub angle [rad], hub rate [rad/s], root moment [N m], tip displacement [m].
 
@@ -148,8 +147,7 @@ class Stop:
     mode: int
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Simulation:
     """A simulated loop: `at_samples` just before each update, `between` the records between the samples, if any.
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +23,7 @@ from tfarm.dsp.plant import RECORDED
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator
 from tfarm.errors import require
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Column
 from tfarm.spectrum import modes
 
@@ -49,8 +48,7 @@ def records_between(arm: Arm, run: Simulation) -> int:
     return max(0, math.ceil(POINTS_A_PERIOD * fastest * run.scenario.period / (2 * math.pi)) - 1)
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class TimeCurve:
     """A signal over time: a line where `low` is `high`, else the band between them from each `t` [s] to the next."""
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
 from itertools import takewhile
@@ -28,7 +28,7 @@ from tfarm.arm.stages import Consumer
 from tfarm.arm.writing import arm_table
 from tfarm.arrays import Complex, Real
 from tfarm.errors import must_be_known
-from tfarm.records import record
+from tfarm.records import frozen
 
 from .outputs import Side
 
@@ -212,8 +212,7 @@ CONSUMER = Consumer("exact solution", acts=("plant",))
 SYSTEMS_KEPT = 64  # arms whose exact numbers are cached: one page needs those of one arm some thousand times
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class System:
     """An arm or rig: its elements from the payload inwards, the conditions of both ends, and the units.
 

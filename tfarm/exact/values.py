@@ -10,7 +10,6 @@ appendix      the paper's 4x4 determinant and Cramer's rule with mpmath, at a pr
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from itertools import count, takewhile
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, cast, get_args
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, Theory
 from tfarm.arrays import Complex, Real
 from tfarm.errors import CertificationError, ParameterError, must_be_known, require
-from tfarm.records import read_only, record
+from tfarm.records import frozen, read_only
 from tfarm.schema import Quantity
 
 from .balls import Ball, Sweep, first_success, nearest_float, point, rational
@@ -285,8 +284,7 @@ class MethodRow(NamedTuple):
     ]
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class ByMethod:
     """The same numbers by each method that has them (`values`), and the reason for a missing one (`left_out`)."""
 

@@ -47,7 +47,7 @@ from tfarm.exported.word_length import (
     word_of,
 )
 from tfarm.loop.sampled_verdict import Analysis, sampled
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 
 CONSUMER = Consumer(
@@ -68,8 +68,7 @@ MINUEND, SUBTRAHEND = 0, 1  # columns of a plan
 LARGEST = 2147483647  # of 32 bits
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class WordLength:
     """Arithmetic of an exported controller: realisation, noise gains, bounds on states, errors and limit cycles."""
 

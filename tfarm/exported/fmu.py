@@ -13,7 +13,7 @@ import sys
 import tempfile
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -37,7 +37,7 @@ from tfarm.exported.result import ANYWAY, Export, ExportTask, What, is_certified
 from tfarm.exported.texts import identifiers, literal, render
 from tfarm.exported.word_length import FEEDFORWARD, FIXED
 from tfarm.files import temporary_folder
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 
 CONSUMER = Consumer(
@@ -94,8 +94,7 @@ class Variable(NamedTuple):
     description: Annotated[str, Quantity("description", help="meaning of the variable")]
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Unit:
     """A functional mock-up unit: its variables in the order of their references, flexible modes, and binary."""
 

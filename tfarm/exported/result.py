@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 from functools import cached_property
 from importlib import import_module
 from importlib.metadata import version
@@ -22,7 +22,7 @@ from tfarm.errors import ConvergenceError, ParameterError, must_be_known, requir
 from tfarm.exported.texts import facts_of
 from tfarm.files import move_into, place_in
 from tfarm.loop.sampled_verdict import Analysis, sampled
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import default_gains
 
@@ -39,8 +39,7 @@ class Name(NamedTuple):
     identifier: Annotated[str, Quantity("identifier", help="its identifier in the exported files")]
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class ExportTask:
     """What to export, and how: an arm, a law (by default the default gains), and the chain of its sampled loop.
 
@@ -114,8 +113,7 @@ def is_certified(found: Analysis) -> bool:
     return found.verdict.is_settled and found.verdict.is_stable
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class Export:
     """Exported files, with the verdict on the loop as its numbers are rounded there.
 

@@ -15,7 +15,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -36,7 +36,7 @@ from tfarm.errors import require
 from tfarm.exported.result import Export, ExportTask, names_of
 from tfarm.exported.texts import comment, matlab_text, render
 from tfarm.files import is_standard_output, mat_content, write_file
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.reduced import BAND, ReducedModel, modal_model, reduce
 from tfarm.reduced.partial_fractions import CLEAR_OF_POLES, distance, frequencies_around
 from tfarm.reduced.reduction import NORM
@@ -52,8 +52,7 @@ CONSUMER = Consumer(
 )
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class NamedSystem:
     """x' = A x + B u, y = C x + D u with named signals; x' is the next x where the period [s] is not 0.
 

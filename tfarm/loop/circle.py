@@ -50,7 +50,7 @@ from tfarm.arrays import MACHINE_EPS, Complex, Real
 from tfarm.dsp.plant import SLOW, phi
 from tfarm.errors import ConvergenceError
 from tfarm.loop.sampled import Sampled, resized
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.spectrum import modes
 from tfarm.spectrum.box import TOWARD_SINGULAR, Box, winding_number
 from tfarm.spectrum.naming import function_of
@@ -72,8 +72,7 @@ SURE = 0.1  # by which two quadratures of an absolute value may differ; the larg
 MOST_MIDPOINTS = 200_000  # of a quadrature, which has not converged if that is not enough
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Discs:
     """Discs in the complex plane, `middle` and `radius` arrays of one shape: results contain those of every point."""
 
@@ -279,8 +278,7 @@ def _to_the_axis(angle: float) -> float:
     return angle - np.pi * round(angle / np.pi)
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Band:
     """The poles `kept` (poles,) of a loop's plant in a band up to `top` [rad/s].
 

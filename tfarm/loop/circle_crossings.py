@@ -10,7 +10,7 @@ z = -1 a single pole crosses (see also Ackermann, Robust Control, 1993, ch. 4).
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -34,7 +34,7 @@ from tfarm.crossing.shown import PlaneOfCounts
 from tfarm.crossing.turning import loose_columns
 from tfarm.loop.sampled import OfLoop, Sampled
 from tfarm.loop.sampled_rig import CircleGrid
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import most_gain
 
@@ -127,8 +127,7 @@ def around(windows: list[Window], gain: float) -> Window | None:
 # ------------------------------------------------------------ planes
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class GainMap(OfLoop, PlaneOfCounts):
     """`unstable` (len(x), len(y)): number of unstable poles, without z = 1 of a free hub angle; stable where it is 0.
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property, lru_cache
 from typing import Annotated, Any, cast
 
@@ -38,7 +38,7 @@ from tfarm.errors import require
 from tfarm.exact.characteristic import Analytic, Feedback, LoopParts, deflated, difference_steps, feedback
 from tfarm.exact.system import System
 from tfarm.loop.loop import Loop
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response.signals import Controller, Signals, controller
 from tfarm.schema import Quantity
 from tfarm.spectrum import flexible_frequencies, modes, modes_below
@@ -63,8 +63,7 @@ LONG_PATH = 1000  # points, and three at each: a contour that the loops of other
 MOST_BAND_MODES = 150  # flexible: in a band; beyond, poles are not determined without a theorem or small gain
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class ContinuousLoop(Loop):
     """A rig under a law in s, gains at the hub among them; `signals` are those fed back, made unless given.
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, ClassVar
 
@@ -19,7 +18,7 @@ from tfarm.arm.stages import Consumer
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.loop.loop import Loop
 from tfarm.loop.loop_margins import LoopMargins, PhaseCrossover, margins_along
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import At, Quantity
 from tfarm.spectrum.table import first_frequency
 
@@ -28,8 +27,7 @@ IN_RANGE = Quantity(
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class LoopCurve:
     """The loop function L(i w), or L(e^{i w T}) of a sampled loop, on a grid that resolves it: `omega`, `L` (n,).
 

@@ -26,7 +26,7 @@ from tfarm.dsp.plant import FORGOTTEN, OVERDAMPED, first_distinct, held_amplitud
 from tfarm.loop.circle import Band, complete_band
 from tfarm.loop.circle_crossings import stable_windows
 from tfarm.loop.sampled import Sampled, resized, sampled_loop
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.table import first_frequency
@@ -42,8 +42,7 @@ Test = Callable[[float], Proof]
 Found = TypeVar("Found")
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class DelayMargin:
     """The smallest destabilising delay in `samples`; `is_bound` where no delay up to there destabilises the loop."""
 
@@ -150,8 +149,7 @@ def whole_loop(arm: Arm, law: AnyLaw, chain: Chain) -> Sampled:
     return sampled_loop(arm, law, chain, count=1 if criticals > 5.0 else max(1, most))
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Figure:
     """A number with its significant `digits`: certified up to `band` [rad/s], or converged for the first `modes` modes.
 

@@ -8,14 +8,13 @@ Errors measured at each run: the difference from a sum that ends at half of that
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import maximum_filter1d
 
 from tfarm.arrays import MACHINE_EPS, Complex, Real
-from tfarm.records import record
+from tfarm.records import frozen
 
 POINTS = 2**15  # of the sum
 PERIODS, ALIASED = 4.0, 36.0  # P is four times the times that are wanted; e^-36 of what follows is added
@@ -23,8 +22,7 @@ FINER = 4  # times the points of the sum: even times, 4 in a period of its last 
 NEAR = 32  # of these times to either side, whose largest error is taken: the difference of two sums has zeros
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Inversion:
     """Signals at even times `t` [s] from 0 to an end, their measured errors (signals, n), and their splines."""
 

@@ -7,7 +7,6 @@ loop at a few values.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
@@ -19,7 +18,7 @@ from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.loop.locus import ORIGIN, Locus, locus, origin_name
 from tfarm.loop.varied import OF_THE_LAW, Title
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.reduced import modal_model
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
@@ -44,8 +43,7 @@ BRANCHES_NOTE = (
 )
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class ReducedLocus:
     """Poles of a reduced closed loop of that `order`, paired with the exact branches, at the values `gain` (m,).
 
@@ -124,8 +122,7 @@ def _closed(arm: Arm, fixed: Real, count: int, moving: Real) -> tuple[Matrices, 
     return model.closed(fixed[used]), moving[None, used]
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class MostDamped:
     """The `gain` at which mode 1 has its largest `damping_ratio`; from there on it oscillates (`swings_on`) or not."""
 
@@ -183,8 +180,7 @@ class Branch(NamedTuple):
     titles: dict[str, Title]
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Loci:
     """The exact locus and the reduced one."""
 

@@ -31,7 +31,7 @@ from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.lines import line_crossings
 from tfarm.loop.varied import ARM_PARAMETERS, OF_THE_LAW, Title, Varied
 from tfarm.loop.windows import without_losses
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.response.signals import Controller, controller
 from tfarm.schema import Quantity
@@ -57,8 +57,7 @@ def origin_name(origin: int) -> str:
     return ORIGINS.get(origin, f"mode {origin}")
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Locus:
     """The closed-loop poles of an arm under a law, as one number varies.
 

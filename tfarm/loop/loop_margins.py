@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -19,7 +18,7 @@ import numpy as np
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.crossing import brackets, crossed, zeros_between
 from tfarm.loop.loop import Loop
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import At, Quantity
 
 CROSSOVER_DIGITS = 12  # of the value at each crossover, at most: more than any table rounds to
@@ -46,8 +45,7 @@ class PhaseCrossover(NamedTuple):
     factor: Annotated[float, Quantity("gain margin (factor)", help="-1/L: this factor on L puts a pole there")]
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class LoopMargins:
     """Margins of L(i w) for 0 < w <= `band` [rad/s]; inf where there is no limit.
 

@@ -7,7 +7,7 @@ to a band are listed in addition, with the band.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Annotated
 
@@ -25,15 +25,14 @@ from tfarm.loop.loop_margins import (
 from tfarm.loop.stability import Stability, is_quiet, stability
 from tfarm.loop.theorem import Lyapunov, Signs, lyapunov, signs_of_loop, theorem_of
 from tfarm.loop.windows import Windows, reach_words, windows_of
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 
 EXACT_PEAK = replace(PEAK_SENSITIVITY, label=f"{PEAK_SENSITIVITY.label}, exact")
 GAIN_CROSSOVERS = Quantity("gain crossovers, abs(L) = 1", help="all in the frequency range, ascending")
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Margins:
     """Verdict and margins of a loop; `windows` are the stability intervals of each number of the law, by its name.
 

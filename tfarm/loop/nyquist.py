@@ -6,7 +6,6 @@ are counted.  Clockwise ones are closed-loop poles inside the contour, as no pol
 """
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated
 
@@ -17,13 +16,13 @@ from tfarm.arm import AnyLaw, Arm
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.schema import At, Quantity
 from tfarm.spectrum import flexible_frequencies
 from tfarm.spectrum.box import turned
 
-from .continuous import band_of, grid
+from .continuous import ContinuousLoop, band_of, grid
 from .poles import count_with_mirrors
 from .stability import Stability, stability
 
@@ -42,8 +41,7 @@ ON_AXIS = Quantity("poles on the axis to working precision", help="closed-loop p
 BY_NYQUIST = Quantity("unstable poles by Nyquist's criterion", help="unstable poles of L less the encirclements of -1")
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Nyquist:
     """L on the contour for Im s >= 0: `s` (n,), `L` (n,), `is_arc` where the contour passes a pole on the axis.
 

@@ -15,7 +15,6 @@ changes the drive alone.
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Literal
 
@@ -26,7 +25,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, require
 from tfarm.exact.characteristic import float_units, loop_parts
 from tfarm.exact.system import system_of
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response import transfer
 from tfarm.spectrum import Modes, modes
 
@@ -46,8 +45,7 @@ SENSOR_ZERO_ERROR = 1e-8  # of the size of a zero: a smaller real or imaginary p
 NOT_SENSED = 1e-9  # of a mode's largest: a reading no larger of any mode is none
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Panels:
     """Samples of d, theta and m, `values` (3, panels, PANEL_SAMPLES), on panels of the axis up to `band` [rad/s].
 
@@ -122,8 +120,7 @@ def _panel(rows: Callable[[Complex], Complex], low: float, high: float) -> tuple
     return values, float((missed.max(axis=1) / abs(values).max(axis=1)).max())
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Positions:
     """Sensor positions `x` (n,) [m] from the clamp, and `participation` (modes, n) of the first flexible modes there.
 

@@ -44,7 +44,7 @@ from tfarm.loop.lines import (
 )
 from tfarm.loop.stability import band_of_family, verdict_on
 from tfarm.loop.windows import theorem_edges, theorem_windows
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response.signals import Controller, controller
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
@@ -62,8 +62,7 @@ LONG_SEGMENT = 0.03  # of the picture: a piece longer than that after all cuts i
 ROWS_FROM_EDGE = 1.5  # beyond this many rows from the boundary the count must have changed
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Plane(PlaneOfCounts):
     """Unstable poles over a grid of two numbers: `unstable` (len(y), len(x)), -1 where they are infinitely many.
 

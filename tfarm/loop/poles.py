@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
@@ -20,7 +20,7 @@ from tfarm.arm.checks import whole
 from tfarm.arrays import Complex
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, require
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.reduced.modal import closed, in_series, pade
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.schema import Quantity
@@ -62,8 +62,7 @@ def count_with_mirrors(zeros: Complex) -> int:
     return int(np.where(zeros.imag > 0, 2, 1).sum())
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Poles:
     """Closed-loop poles [1/s] with Im >= 0, ascending in Im, with their multiplicity: all there are in `box`.
 

@@ -24,7 +24,7 @@ rounding error of F in W that bounds the error of the root: where |ln|z|| is les
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Annotated, Any
 
@@ -53,7 +53,7 @@ from tfarm.dsp.plant import (
 from tfarm.errors import ParameterError, did_you_mean
 from tfarm.loop.loop import Loop
 from tfarm.loop.sampled_rig import SampledRig
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response.signals import Controller
 from tfarm.schema import Quantity
 
@@ -67,8 +67,7 @@ FADED_RADIUS = 0.2  # a pole nearer to z = 0 is stable and not polished
 OUTPUT_OF = {gain.name: gain.output for gain in GAINS}
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class SampledPoles:
     """Closed-loop poles `z` and `log_radius` ln|z| of each, without z = 1 of a free hub angle.
 
@@ -102,8 +101,7 @@ class SampledPoles:
         return self.log_spectral_radius < 0.0
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Sampled(Loop):
     """A rig under a law at the samples of a chain.
 

@@ -12,7 +12,6 @@ enough values to be smooth, and each branch is named after the mode where it beg
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Annotated
 
@@ -24,7 +23,7 @@ from tfarm.arm import PLANE, RATE_GAIN
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.crossing.turning import loose
 from tfarm.loop.sampled import Sampled
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
@@ -36,8 +35,7 @@ DRAWN_RADIUS = 1.2 * RIM  # and up to which a branch is drawn, so that its line 
 RATE_DECADES, STRONGER = 3, 10.0  # of the rate gain: below the end of its locus, and above its own value
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class ModeTable:
     """One row for each mode that does not decay within a sample.
 
@@ -165,8 +163,7 @@ def _matched(ahead: Complex, z: Complex) -> NDArray[np.int64]:
 # ------------------------------------------------------------ loci
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class SampledLocus:
     """The locus of one number of a law, the others those of `loop`: `z` (values, branches), and each branch's mode.
 
@@ -180,8 +177,7 @@ class SampledLocus:
     mode: NDArray[np.int64]
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class SampledLoci:
     """Loci of a loop along each of both gains, `by` the gain's name."""
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -22,7 +21,7 @@ from tfarm.arrays import Complex, Real, Whole
 from tfarm.crossing import Steps
 from tfarm.dsp.discretise import LawInZ, lowest_power, root_product
 from tfarm.dsp.plant import Plant, PulseTransfer, SensedPlant, is_analog
-from tfarm.records import record
+from tfarm.records import frozen
 
 STATIC_ZERO = 1e-11  # of its terms: a static gain that is 0, summed over 400 modes
 NARROWEST_WIDTH = 1e-17  # rad, of a pole: closer to it angles are not distinct
@@ -30,8 +29,7 @@ WIDTH_SHARE = 1e-2  # of the distance of a pole from the circle: the grid begins
 BRIGHT = 1e-2  # poles and roots nearer to z = 0 have no narrow feature on the circle
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class SampledRig:
     """A rig at the samples of a chain, which has the law's delay too, and the parts of a law in z.
 
@@ -121,8 +119,7 @@ class SampledRig:
         return np.block([[A, np.zeros((len(A), len(own)))], [Bk @ C, own]]), np.r_[B, np.zeros(len(own))]
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class CircleGrid:
     """Points z = e^{iq}, 0 < q < pi, each as a pole `base` and an angle `shift` from it."""
 

@@ -35,7 +35,7 @@ from tfarm.loop.edges import (
 from tfarm.loop.loop_margins import LoopMargins, PhaseCrossover
 from tfarm.loop.sampled import OfLoop, Sampled, resized, sampled_loop
 from tfarm.loop.sampled_modes import ModeTable, dominant, mode_table
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
@@ -56,8 +56,7 @@ MOST_COUNT = 400  # modes that may be asked for
 DEFAULT_PERIOD, LAWS_PERIOD = "tfarm's default period", "the controller's period"  # origins of a sampling period
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Verdict(OfLoop, LoopVerdict):
     """Whether a sampled loop is stable, without z = 1 of a free hub angle.
 
@@ -244,8 +243,7 @@ class SampledNumber(NamedTuple):
     interval: Annotated[Window | None, Quantity(help="the interval that contains the present value")]
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Analysis:
     """A sampled loop: its verdict, and, computed when first read, its limits of stability and its modes.
 

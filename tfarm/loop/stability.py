@@ -19,7 +19,6 @@ Spillover: a law is designed on a model of a few modes, and may destabilise a mo
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, NamedTuple
 
@@ -32,7 +31,7 @@ from tfarm.arm.checks import whole
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError, require
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.reduced.modal import modal_model, sensed_model
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes, modes_below
@@ -79,8 +78,7 @@ KNOWN_BEYOND = Quantity(
 )
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Stability(LoopVerdict):
     """Verdict on a loop, "stable", "marginal" or "unstable", its poles in the band, and its stability beyond (`tail`).
 
@@ -311,8 +309,7 @@ class SpillModel(NamedTuple):
     rightmost: Annotated[complex, Quantity("rightmost pole", "1/s", help="apart from poles at 0")]
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Spill:
     """The verdict on the exact loop, and models of `modes` (n,) flexible modes: `unstable` (n,) and `rightmost` (n,).
 

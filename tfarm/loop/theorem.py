@@ -38,14 +38,14 @@ below the cut-off frequency).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
 from tfarm.arm import Arm, HubFeedback, Law, as_law
 from tfarm.arm.blocks import Rational
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response import transfer
 from tfarm.schema import Quantity
 
@@ -59,8 +59,7 @@ KIND = Quantity("kind", help="from the hub's angle or rate to its torque; none w
 TAKES, CONSERVES, GIVES = 1, 0, -1  # energy that a law takes from every mode with motion of the hub: its sign
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Signs:
     """The `kind` of a law in s on hub angle and hub rate, and the `reason`.
 
@@ -203,8 +202,7 @@ def _positive_real(num: Poly, den: Poly) -> Signs | None:
 # ------------------------------------------------------------ by energy
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Lyapunov:
     """Lyapunov's proof by V about an arm and a law with constant gains.
 

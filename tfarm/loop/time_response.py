@@ -34,7 +34,7 @@ from scipy.sparse.csgraph import connected_components
 from tfarm.arm.law import of_common_blocks
 from tfarm.arrays import LEAST_SIZE, MACHINE_EPS, Complex, Real
 from tfarm.errors import require
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response.signals import Signals
 from tfarm.spectrum.table import first_frequency
 
@@ -125,8 +125,7 @@ class Part:
         return np.where(t < self.end, early, late)
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class TimeResponse:
     """Signals over time by name, "torque" being the input; `parts` are the responses to the excitation by delay."""
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -25,7 +25,7 @@ from tfarm.exact.outputs import OUTPUTS
 from tfarm.loop.continuous import NEAREST_TO_ORIGIN, ORDER_READ_AT, ContinuousLoop, band_of, by_differences
 from tfarm.loop.lines import LawTerms
 from tfarm.loop.poles import box_of, poles_below, slow_poles
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.spectrum.box import Box, winding_number
 from tfarm.spectrum.following import settled
 from tfarm.spectrum.table import first_frequency
@@ -40,8 +40,7 @@ FACTORS = {"all": "factor on all gains", "gain": "factor on the controller"}  # 
 Title = tuple[str, str]  # label and unit
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Varied:
     """The loops of an arm and a law, with the number `vary` from `start` to `stop`.
 

@@ -7,7 +7,6 @@ of the hub.  A real pole passes through 0 where stiffness or inertia vanishes.  
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
@@ -19,7 +18,7 @@ from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.lines import LEADING, Along, LawTerms, critical, crossed, static_edge, unstable_below
 from tfarm.loop.stability import Stability, band_of_family, is_known_without, verdict_on
 from tfarm.loop.theorem import TAKES, absorbed, theorem_of
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import first_frequency, gain_unit, most_gain
 
@@ -50,8 +49,7 @@ class Interval(NamedTuple):
         return f"({low}, {high})"
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Windows:
     """Stability intervals of one number of a law, the others constant, at its `value` in the law.
 

@@ -9,7 +9,7 @@ random arms).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from tfarm.arm.blocks import Matrices
 from tfarm.arrays import Complex, Real
 from tfarm.errors import require
 from tfarm.exact.outputs import Output
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.spectrum import modes, modes_below
 
@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     import control
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class PartialFractions:
     """G_o(s) ~ rigid[o,0]/s^2 + rigid[o,1]/s + static[o] + sum of residues[o,k,i]/(s - eigenvalues[k,i]).
 

@@ -6,7 +6,6 @@ The norm of an error is |dG| / (|G| + |w G'|).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple, get_args
 
@@ -19,7 +18,7 @@ from tfarm.arm.checks import positive, whole
 from tfarm.arrays import Complex, Real
 from tfarm.errors import MISSING, ConvergenceError, require
 from tfarm.exact.outputs import Output
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.response import Wanted, transfer
 from tfarm.response.frequency import known_band
 from tfarm.schema import Quantity
@@ -54,8 +53,7 @@ class Channel(NamedTuple):
     worst_at: Annotated[float, Quantity("at", "rad/s", help="frequency of the worst error")]
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class ReducedModel:
     """A reduced model and its error.
 

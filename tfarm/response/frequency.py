@@ -17,7 +17,7 @@ import itertools
 import math
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from typing import Annotated, Any, NamedTuple
 
@@ -29,7 +29,7 @@ from tfarm.arrays import Complex, Real, Whole
 from tfarm.errors import CertificationError, ConvergenceError, require
 from tfarm.exact.outputs import Output, unit_over
 from tfarm.exact.rigid import rigid_response
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
@@ -172,8 +172,7 @@ NEAREST = 1e-6  # relative distance of the nearest point to a root on the axis
 AXIS_SHARE = 1e-12  # |Re s|/|s| below which a root is on the imaginary axis
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-@record
+@frozen(slots=True, kw_only=True)
 class Bode:
     """A frequency response with its poles and zeros.  omega in rad/s, `value` in SI units, `phase` in degrees.
 

@@ -21,12 +21,11 @@ from tfarm.exact.outputs import output as known_output
 from tfarm.exact.series import order_at_zero
 from tfarm.exact.system import System, system_of
 from tfarm.exact.values import free_outputs
-from tfarm.records import read_only, record
+from tfarm.records import frozen, read_only
 from tfarm.schema import Quantity
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Signals:
     """Outputs of an arm by name, those along the link with their place in m: "hub_rate", "strain@0.05".
 

@@ -40,15 +40,14 @@ from tfarm.exact.values import (
     slow_values,
     why_no_appendix,
 )
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Column, Quantity, Table, roots_table
 from tfarm.spectrum import flexible_frequencies
 from tfarm.spectrum.box import REAL_SHARE, TOWARD_SINGULAR, Box, Function, complete
 from tfarm.spectrum.starts import damped_starts
 
 
-@dataclass(frozen=True, slots=True)
-@record
+@frozen(slots=True)
 class Roots:
     """Poles or zeros `values` [1/s], with multiplicity, ascending in |Im s|: all there are in `box`.
 
@@ -356,8 +355,7 @@ def _finite(s: ArrayLike) -> Complex:
     return points
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Points:
     """G(s) of one output at `s`; `value` are pairs of texts for more than 15 digits."""
 

@@ -7,7 +7,7 @@ modes is complete in a box only, and no box contains -1/C.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
 from typing import Annotated, NamedTuple
@@ -22,7 +22,7 @@ from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import loop_parts
 from tfarm.exact.system import System
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 
 from .box import TOWARD_SINGULAR, Box, complete_box, filled_box, is_among
@@ -54,8 +54,7 @@ class Unassigned(NamedTuple):
     discs: Annotated[tuple[Disc, ...] | None, Quantity(help="its certified enclosure")] = None
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class DampedModes:
     """The modes of an arm with its damping, in the order of the undamped modes from which they continue.
 

@@ -38,7 +38,7 @@ from tfarm.errors import CertificationError
 from tfarm.exact.balls import Ball, exact_middle, first_success, point, precision, rational
 from tfarm.exact.characteristic import Feedback, characteristic_over, tangent
 from tfarm.exact.system import System
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 
 from .box import Box
@@ -49,8 +49,7 @@ MOST_DECIMALS = 20_000  # of an exact decimal: more than any bracket has
 COUNTING_BITS = (128, 512, 4096)  # of working precision there: a count is certain unless it is on a half wave
 
 
-@dataclass(frozen=True, slots=True)
-@record
+@frozen(slots=True)
 class Certificate:
     """Brackets (lower, upper) as decimal strings, and the count below a frequency that proves them complete."""
 

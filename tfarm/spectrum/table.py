@@ -6,7 +6,7 @@ hub and w1 its first flexible frequency.
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
 
@@ -40,7 +40,7 @@ from tfarm.exact.values import (
     must_be_of_appendix,
     why_no_appendix,
 )
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Column, Table, Tabled
 
 from .frequencies import ARMS_KEPT, count_below, natural_frequencies, refine
@@ -50,8 +50,7 @@ from .shapes import Shapes, sensitivities
 MOST_TABLE_MODES = 10_000  # of one table
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Modes(Tabled):
     """The undamped modes of an arm, in ascending order, complete up to the last one.
 

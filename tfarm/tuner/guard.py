@@ -36,7 +36,6 @@ least a tenth of its width away from its ends, or the one nearest to it.
 
 import math
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Literal, get_args
 
@@ -53,15 +52,14 @@ from tfarm.exact.rationals import exact_matrix, falls, is_positive_definite
 from tfarm.loop.circle_crossings import around, stable_windows
 from tfarm.loop.loop_margins import lowest
 from tfarm.loop.sampled import Sampled, sampled_loop
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.tuner.kernel import CONSUMER, Limits
 
 RADIUS_SHARE = 0.99  # of the radius that the criterion allows: room for the modes left out, and for a strict proof
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class CommonLyapunov:
     """V = s^T P s falls with both matrices `low` and `high` (n, n), and with all between them.
 
@@ -118,8 +116,7 @@ def common_lyapunov(middle: Real, drive: Real, sense: Real, low: Real, high: Rea
     return best if best and best.contraction < 1 else None
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class MovingGain:
     """A sampled loop with a varying moment gain K: A(K) = open - K drive sense^T, without the free hub angle."""
 
@@ -185,8 +182,7 @@ GuardKind = Literal["time-varying", "frozen", "none"]
 NARROWEST_SECTOR = 1e-4  # a sector this narrow is none
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Guard:
     """The interval [lo, hi] of K (inf: no upper end), from models of up to `modes_used` flexible modes.
 

@@ -13,7 +13,6 @@ inputs are the two values before: e(t-1), e(t-2).  Then x(t), x(t-1), and option
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import exp, inf, log1p
 from typing import NamedTuple
 
@@ -24,7 +23,7 @@ from tfarm.arm.stages import Consumer
 from tfarm.arrays import Real
 from tfarm.errors import require
 from tfarm.exact.compiled import compiled, inlined
-from tfarm.records import record
+from tfarm.records import frozen
 
 CONSUMER = Consumer(
     "tune",
@@ -288,8 +287,7 @@ PAPER_INPUTS, PAPER_HIDDEN = 6, 6  # of the paper's network; one input more, the
 HALF_WIDTH = 0.5  # of the uniform distribution of the initial weights
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Network:
     """Weights `W1` (hidden, inputs) and `w2` (hidden,); `scales` (inputs,) divide the inputs, in N m (K in 1).
 

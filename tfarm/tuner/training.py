@@ -24,7 +24,7 @@ from tfarm.arm.checks import not_negative, positive, whole
 from tfarm.arrays import Real
 from tfarm.errors import must_be_known, require
 from tfarm.exact.compiled import compiled, inlined
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.tuner.guard import Guard
 from tfarm.tuner.kernel import (
@@ -207,8 +207,7 @@ Sensitivity = Literal["one-step", "whole"]
 QUARTILES = (0.25, 0.5, 0.75)  # of learning curves over the seeds
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class Learning:
     """Options of learning: `eta` and `alpha` of (21), mode and rule.
 
@@ -247,8 +246,7 @@ class Stopped:
         return f"diverged in {where}: the root moment passed {self.bound:.4g} N m, the end of small deflections"
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Training:
     """`costs` of the trials in their order, the trained network, and the `result` of a trial with it.
 
@@ -268,8 +266,7 @@ class Training:
         return bool(self.result.K.max(initial=0.0) < 1e-3)
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class LearningCurves:
     """Trainings from several seeds: `costs` (seeds, trials) in their order, inf from a divergence on.
 

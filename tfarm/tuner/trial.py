@@ -41,7 +41,7 @@ from tfarm.dsp.stages import admit
 from tfarm.errors import must_be_known, naming, require
 from tfarm.files import write_file
 from tfarm.loop.sampled import Sampled, sampled_loop
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.spectrum.table import default_gains
 from tfarm.tuner import kernel
 from tfarm.tuner.guard import GuardKind
@@ -63,8 +63,7 @@ class Cost:
         require(self.a or self.b, "a", self.a, "a and b are both zero: one of them has to be positive")
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Record:
     """The signals of a trial at its samples: `x`, `u`, `e` [N m], gain `K`; `stopped`: the sample where it diverged.
 
@@ -82,8 +81,7 @@ class Record:
     stopped: int | None
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Trial:
     """An arm's loop with `K1` and `Kp`, a chain whose converters are taken as ideal, a slew `task` and a cost.
 

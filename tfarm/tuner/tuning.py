@@ -18,7 +18,7 @@ from tfarm.dsp.results import Run, simulated
 from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, described, torque_unit
 from tfarm.dsp.simulate import RESIDUAL
 from tfarm.errors import require
-from tfarm.records import record
+from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import default_gains
 from tfarm.tuner.baselines import SHAPERS, BestConstant, Outcomes, best_constant, lq_bound, shaped_trial
@@ -44,8 +44,7 @@ NUMBERS: dict[str, Callable[[float], float]] = {  # of a plan, by which studies 
 NUMBERS_OF_LEARNING = ("eta", "alpha", "clip", "enough")
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
+@frozen(kw_only=True)
 class Plan:
     """Plan of a tuning, with the paper's figures by default.
 
@@ -85,8 +84,7 @@ class Plan:
         )
 
 
-@dataclass(frozen=True)
-@record
+@frozen
 class Tuning:
     """A trained tuner and its baselines, all of one trial.
 
