@@ -25,10 +25,9 @@ from tfarm.arm.stages import ARM_KEYS, STAGES
 from tfarm.assessment import step
 from tfarm.cli.app import whole_command
 from tfarm.dsp import kernel
-from tfarm.exported import controller, fmu, systems, tuner_code
+from tfarm.exported import controller, fmu, live_loop, systems, tuner_code
 from tfarm.fitting.recording import RunTable
 from tfarm.loop import sampled_verdict, stability
-from tfarm.report import live
 from tfarm.schema.glossary import CERTAINTY, declared_records
 from tfarm.synthesis import design
 from tfarm.tuner import kernel as tuner_kernel
@@ -119,7 +118,7 @@ def arm_file_page() -> str:
 
 CONSUMERS = (
     stability.CONTINUOUS, sampled_verdict.SAMPLED_LOOP, step.CONSUMER, kernel.CONSUMER, design.CONSUMER,
-    tuner_kernel.CONSUMER, controller.CONSUMER, tuner_code.CONSUMER, fmu.CONSUMER, systems.CONSUMER, live.CONSUMER,
+    tuner_kernel.CONSUMER, controller.CONSUMER, tuner_code.CONSUMER, fmu.CONSUMER, systems.CONSUMER, live_loop.CONSUMER,
 )  # fmt: skip
 
 

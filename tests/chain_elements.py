@@ -8,6 +8,7 @@ number of K only (as least squares without normal equations: Higham 2002, chapte
 
 import math
 from dataclasses import dataclass
+from functools import cache, cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -15,8 +16,11 @@ from numpy.polynomial import legendre
 from scipy.linalg import eigvals, qr, solve_triangular, svdvals
 from scipy.optimize import brentq
 
+from tests.transition import ALIASES
+
 DEGREE = 8  # p; with at most `ARC` radians of a wave on an element it leaves some 1e-11 of a frequency
 ARC = 2.5
+FINER = 4  # times the frequency for which a response has its elements, since it is read from derivatives too
 HUB, LINK_SIDE = 0, 1  # the angles before and behind the joint; then w at every node, then psi
 
 
@@ -52,42 +56,77 @@ def eigenvalues(arm, up_to):
     return np.sort_complex(s[(abs(s) < up_to) & (s.imag >= 0)])
 
 
+def frequency_response(arm, s, outputs, input=None):
+    """The outputs (n,) per unit of the input at one s [1/s], both named as in `tests.transition.response`."""
+    loads = input[1:] if isinstance(input, tuple) else ()
+    system = System(assemble(arm, FINER * abs(s), held=_is_held(arm, input), loads=loads), max(_slowest(arm), abs(s)))
+    return system.response(s, outputs, input)
+
+
 @dataclass(frozen=True)
 class Model:
-    """Rows of stiffness, damping and mass over the unknowns."""
+    """Rows of stiffness, damping and mass over the unknowns; `by_angle` over the hub's angle where that is held."""
 
     arm: object
     stiffness: np.ndarray
     damping: np.ndarray
     mass: np.ndarray
     full: np.ndarray  # all motions from the unknowns
+    by_angle: dict  # of each of the four the column of a held angle, else of zeros
     pieces: tuple  # (link, left, right) from the clamp to the tip
 
-    def reading(self, x, kind):
-        """The row over all motions of "w", "psi" or "psi'" at x [m] from the clamp (on the outer element)."""
+    @cached_property
+    def reading(self):
+        """`_reading`, each worked out once: it is the same at every s."""
+        return cache(self._reading)
+
+    def _reading(self, x, kind):
+        """The row over all motions of "w", "w'", "psi" or "psi'" at x [m] from the clamp (on the outer element)."""
         n = max(i for i, (_, left, _) in enumerate(self.pieces) if left <= x or i == 0)
         _, left, right = self.pieces[n]
-        degree = DEGREE + (kind == "w")
+        degree = DEGREE + kind.startswith("w")
         shape, slope = _shapes(degree, np.array([2 * (x - left) / (right - left) - 1]), right - left)
         row = np.zeros(len(self.full))
         first = _first(kind[0], len(self.pieces)) + n * degree
         row[first : first + degree + 1] = (slope if kind.endswith("'") else shape)[0]
-        return row
+        return row, self.pieces[n][0]
 
-    def gauge(self, x):
-        """The row over all motions of E I psi' at x [m] (of the outer element)."""
-        link = next(link for link, _, right in self.pieces if x < right or right == self.pieces[-1][2])
-        return link.EI * self.reading(x, "psi'")
+    def output(self, wanted, s):
+        """The row over all motions of an output."""
+        end, radius = self.arm.length, self.arm.hub.radius
+        hub, link_side = np.eye(2, len(self.full))
+        named = {"hub_angle": hub, "hub_rate": s * hub, "link_angle": link_side}
+        if wanted in named:
+            return named[wanted]
+        if wanted == "payload_displacement":
+            return self.reading(end, "w")[0] + self.arm.payload.offset * self.reading(end, "psi")[0]
+        quantity, x, *_ = ALIASES.get(wanted, wanted)
+        x = min(x, end)
+        (w, link), (psi, _) = self.reading(x, "w"), self.reading(x, "psi")
+        bent = self.reading(x, "psi'")[0]
+        return {
+            "displacement": w,
+            "velocity": s * w,
+            "acceleration": s * s * w,
+            "rotation": psi,
+            "deflection": w - (radius + x) * hub,
+            "twist": psi - hub,
+            "curvature": bent,
+            "gauge": link.EI * bent,
+            "moment": link.EI * (1 + link.damping * s) * bent,
+            "shear": link.kGA * (self.reading(x, "w'")[0] - psi),
+        }[quantity]
 
 
 class System:
-    """K, D, M of a model in the basis that makes K + a D + a^2 M the identity."""
+    """K, D, M of a model in the basis that makes K + a D + a^2 M the identity, with its inputs and outputs."""
 
     def __init__(self, model, a):
         self.model, self.arm = model, model.arm
-        self.basis = _basis(model.stiffness, math.sqrt(a) * model.damping, a * model.mass)
-        rows = (_over(each, self.basis) for each in (model.stiffness, model.damping, model.mass))
-        self.K, self.D, self.M = (each.T @ each for each in rows)
+        rows = (model.stiffness, math.sqrt(a) * model.damping, a * model.mass)
+        self.basis = _basis(*rows)
+        self.rows = [_over(each, self.basis) for each in (model.stiffness, model.damping, model.mass)]
+        self.K, self.D, self.M = (each.T @ each for each in self.rows)
         self.full = _over(model.full, self.basis)
 
     def with_current(self):
@@ -103,13 +142,45 @@ class System:
         D[n, :n], D[n, n] = emf * hub, motor.inductance
         return K, D, M
 
+    def response(self, s, outputs, input):
+        """The outputs per unit of the input at s."""
+        loaded = isinstance(input, tuple)
+        held = _is_held(self.arm, input)
+        drive = self.arm.input if input is None or loaded else input
+        Z, hub = s * s * self.M + s * self.D + self.K, self.full[HUB]
+        force, angle, own = self._force(input), float(held and not loaded), float(not held and not loaded)
+        if drive in ("motor_voltage", "motor_current") and not held:
+            motor = self.arm.motor
+            volts = motor.inductance * s + motor.resistance if drive == "motor_voltage" else 1.0
+            own *= _gain(motor) / volts
+            if drive == "motor_voltage":
+                Z = Z + _gain(motor) * motor.gear_ratio * motor.back_emf_constant * s / volts * np.outer(hub, hub)
+        by_angle = self.model.by_angle
+        stiffness, damping, mass = (
+            rows.T @ by_angle[name] for rows, name in zip(self.rows, ("stiffness", "damping", "mass"), strict=True)
+        )
+        y = np.linalg.solve(Z, force + own * hub - angle * (stiffness + s * damping + s * s * mass))
+        motions = self.full @ y + angle * by_angle["full"]
+        return np.array([self.model.output(each, s) @ motions for each in outputs])
 
-def assemble(arm, up_to, *, held):
-    """The rig's rows on elements short enough for frequencies up to `up_to`, the hub at rest where it is `held`."""
-    pieces = tuple(_pieces(arm, up_to, [each.x for each in arm.attachments]))
+    def _force(self, input):
+        """The load of a force, positive with w, or of a pair of moments, +1 with psi at the second place."""
+        row = np.zeros(len(self.full))
+        if isinstance(input, tuple):
+            kind, *places = input
+            if kind == "force":
+                row = self.model.reading(places[0], "w")[0]
+            else:
+                row = self.model.reading(places[1], "psi")[0] - self.model.reading(places[0], "psi")[0]
+        return row @ self.full
+
+
+def assemble(arm, up_to, *, held, loads=()):
+    """The rig's rows on elements short enough for frequencies up to `up_to`; `held` takes the hub's angle as given."""
+    pieces = tuple(_pieces(arm, up_to, [*loads, *(each.x for each in arm.attachments)]))
     size = _first("p", len(pieces)) + len(pieces) * DEGREE + 1
     one = np.eye(size)
-    full = _allowed(arm, one, len(pieces), held)
+    full, angle = _allowed(arm, one, len(pieces), held)
     rows = {"stiffness": [], "damping": [], "mass": []}
     for n, (link, left, right) in enumerate(pieces):
         w, psi = (
@@ -118,11 +189,12 @@ def assemble(arm, up_to, *, held):
         )
         for name, row in _element(link, right - left, w, psi):
             rows[name].append(row)
-    probe = Model(arm, one, one, one, one, pieces)
+    probe = Model(arm, one, one, one, one, {}, pieces)
     for name, row in _lumped(arm, probe):
         rows[name].append(row[None])
     every = {name: np.vstack([*each, np.zeros((1, size))]) for name, each in rows.items()}
-    return Model(arm, *(every[name] @ full for name in rows), full, pieces)
+    by_angle = {**{name: each @ angle for name, each in every.items()}, "full": angle}
+    return Model(arm, *(every[name] @ full for name in rows), full, by_angle, pieces)
 
 
 def _pieces(arm, up_to, places):
@@ -151,7 +223,7 @@ def _first(kind, pieces):
 
 
 def _allowed(arm, one, pieces, held):
-    """All motions from the unknowns: what is rigid or infinite binds them."""
+    """All motions from the unknowns, and from a held hub's angle: what is rigid or infinite binds them."""
     root, turn = _first("w", pieces), _first("p", pieces)
     last_w, last_psi = turn - 1, len(one) - 1
     motions = one.copy()  # row i: motion i in terms of the independent ones
@@ -163,8 +235,9 @@ def _allowed(arm, one, pieces, held):
         motions[last_psi] = 0.0
     if math.isinf(arm.payload.mass):
         motions[last_w] = -arm.payload.offset * motions[last_psi]
+    angle = motions[:, HUB] if held else np.zeros(len(one))
     free = [i for i in range(len(one)) if motions[:, i].any() and not (held and i == HUB)]
-    return motions[:, free]
+    return motions[:, free], angle
 
 
 def _element(link, h, w, psi):
@@ -184,18 +257,18 @@ def _element(link, h, w, psi):
 def _lumped(arm, model):
     """Rows of what is not a link: hub, rotor, motor, springs, attachments, payload."""
     hub, link_side = model.full[HUB], model.full[LINK_SIDE]
-    tip = model.reading(arm.length, "w"), model.reading(arm.length, "psi")
+    tip = model.reading(arm.length, "w")[0], model.reading(arm.length, "psi")[0]
     inertia, friction = _hub(arm)
     yield "mass", math.sqrt(inertia) * hub
     yield "damping", math.sqrt(friction) * hub
     yield "stiffness", math.sqrt(arm.hub.stiffness) * hub
-    turned = ((arm.joint, link_side - hub), (arm.clamp, model.reading(0.0, "psi") - link_side))
+    turned = ((arm.joint, link_side - hub), (arm.clamp, model.reading(0.0, "psi")[0] - link_side))
     for spring, row in turned:
         if math.isfinite(spring.stiffness):
             yield "stiffness", math.sqrt(spring.stiffness) * row
             yield "damping", math.sqrt(spring.stiffness * spring.damping) * row
     for each in arm.attachments:
-        w, psi = model.reading(each.x, "w"), model.reading(each.x, "psi")
+        w, psi = model.reading(each.x, "w")[0], model.reading(each.x, "psi")[0]
         yield "mass", math.sqrt(each.mass) * w
         yield "mass", math.sqrt(each.inertia) * psi
         yield "stiffness", math.sqrt(each.stiffness) * w
@@ -220,9 +293,10 @@ def _gain(motor):
     return motor.gear_efficiency * motor.gear_ratio * motor.torque_constant
 
 
-def _is_held(arm):
+def _is_held(arm, input=None):
     """Whether the hub's angle is given: that is the input, or the hub is locked."""
-    return math.isinf(arm.hub.inertia) or arm.input == "hub_angle"
+    own = arm.input if input is None or isinstance(input, tuple) else input
+    return math.isinf(arm.hub.inertia) or own == "hub_angle"
 
 
 def _slowest(arm):

@@ -159,8 +159,9 @@ def _is_default(self: Any, entry: Field[Any]) -> bool:
 
 
 def _found(self: Any) -> list[str]:
-    """Return the names in `SHOWN_FIRST` of a record's fields and properties."""
-    return [name for name in SHOWN_FIRST if hasattr(type(self), name) or name in self.__dataclass_fields__]
+    """Return the names in `SHOWN_FIRST` of a record's fields, and of its properties that are no records themselves."""
+    own = self.__dataclass_fields__
+    return [name for name in SHOWN_FIRST if name in own or not is_dataclass(getattr(self, name, self))]
 
 
 def _shown(value: Any, longest: int = 60) -> str:

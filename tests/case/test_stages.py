@@ -23,11 +23,10 @@ from tfarm.dsp import Actuator, Chain, Converters, Sampling, Simulator, Slew, ke
 from tfarm.dsp.kernel import AMPLIFIER, DAC, ENCODER
 from tfarm.dsp.simulate import quantisers
 from tfarm.dsp.traces import RECORD_LENGTH
-from tfarm.exported import controller, fmu, tuner_code
+from tfarm.exported import controller, fmu, live_loop, tuner_code
 from tfarm.exported.controller import c_controller
 from tfarm.exported.result import write_into
 from tfarm.loop.sampled import sampled_loop
-from tfarm.report import live
 from tfarm.report.page import TEMPLATES
 from tfarm.tuner import kernel as tuner
 from tfarm.tuner.trial import Cost, Trial
@@ -192,14 +191,14 @@ console.log(JSON.stringify({ torque: [...torque], moment, angle, tip }));
 """
 
 
-@vectors(live.CONSUMER)
+@vectors(live_loop.CONSUMER)
 def test_the_page_in_javascript(stages):
     chain = chain_of(stages)
-    data = live.slew_numbers(ARM, chain, LAW)
+    data = live_loop.slew_numbers(ARM, chain, LAW)
     truth = vector(chain, data["modes"])
     task = truth.scenario
     ideal = [task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference, task.rigid_moment]
-    given = {"slew": data | {"ideal": live.packed(np.stack(ideal, axis=1))}, "law": asdict(LAW)}
+    given = {"slew": data | {"ideal": live_loop.packed(np.stack(ideal, axis=1))}, "law": asdict(LAW)}
     scripts = [TEMPLATES / name for name in ("live_loop.js", "live_sampled.js")]
     found = json.loads(run(needed("node"), "-e", NODE, *scripts, input=json.dumps(given).encode()))
     seen = truth.at_samples

@@ -166,7 +166,7 @@ def test_an_integral_can_overflow_and_a_servo_cannot():
         (task_of((LAB, GAINS, REAL), "q31"), 'converters.hub_rate = \'difference\': with q31 the hub rate is an input'),
         (task_of((LAB, replace(PI, delay=0.015), IDEAL)), "law.delay = 0.015: is 1.5 samples: C code has a delay"),
         (task_of((LAB, UNSTABLE, IDEAL)), "law = 'gains at the hub': the sampled loop is not certified stable"),
-        (task_of((LAB, tfarm.Law({"hub_rate": 0.3, "root_moment": 1e-50}), IDEAL), "float"),
+        (task_of((LAB, tfarm.Law({"hub_rate": 0.3, "tip_deflection": 1e-50}), IDEAL), "float"),
          r"ABCD\[0\]\[1\] = 1e-50: this coefficient is beyond the numbers of float32"),
     ],
 )  # fmt: skip

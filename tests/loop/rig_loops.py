@@ -24,7 +24,7 @@ class RigLoop:
         free = self.system.K.shape[0]
         self.hub, self.gauge, self.works = (np.zeros(len(self.K)) for _ in range(3))
         self.hub[:free] = self.system.full[HUB]
-        self.gauge[:free] = self.system.model.gauge(arm.gauge.x) @ self.system.full
+        self.gauge[:free] = self.system.model.output(("gauge", arm.gauge.x), 0.0) @ self.system.full
         if free < len(self.K):
             self.works[-1] = 1.0  # the voltage's own equation
         else:

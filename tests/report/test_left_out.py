@@ -141,7 +141,7 @@ def test_what_cannot_be_written_is_named(tmp_path, arms, only, key):
 
 
 def test_a_name_too_long_for_a_folder_is_refused(tmp_path):
-    with pytest.raises(tfarm.ParameterError, match="File name too long"):
+    with pytest.raises(tfarm.ParameterError, match="320 bytes; at most 200"):
         write([replace(HELD, name="𝒳" * 80)], tmp_path / "new" / "folder", only=("locus",))
     assert not (tmp_path / "new").exists()
 

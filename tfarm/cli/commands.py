@@ -184,7 +184,7 @@ def response(
     refuse({"--png": show.keywords["png"]}, "a picture needs --measured; tfarm bode draws the exact response")
     from tfarm.response.transfer import ByMethods, values_at
 
-    (wanted,), x = along([output or "root_moment"])
+    (wanted,), x = along(["root_moment" if output is None else output])
     method = how.keywords["method"]
     G = tfarm.transfer(load_arm(arm, theory, driven), wanted, x=x, method=method, input=driven)
     at = places_of(s, omega, (start, stop), points)
@@ -250,7 +250,7 @@ def bode(
     for name, value in of_loop.items():
         refuse({f"--{name.replace('_', '-')}": value}, "the loop function: give --loop too")
     subject = load_arm(arm, under.keywords["theory"], driven)
-    (wanted,), x = along([output or "root_moment"])
+    (wanted,), x = along(["root_moment" if output is None else output])
     low, high = resonant_band(tfarm.transfer(subject, wanted, x=x, input=driven).arm)
     band = low if start is None else start, high if stop is None else stop
     check_range(*band)
