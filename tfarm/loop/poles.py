@@ -222,7 +222,7 @@ def quiet_edge(loop: ContinuousLoop, right: float, height: float) -> float:
 def slow_poles(loop: ContinuousLoop, below: float) -> Complex:
     """Return poles [1/s] but 0 of size up to `below`, from the power series of D at 0, corrected on D.
 
-    D is evaluated on a circle that is small beside the first frequency, 1/C and 1/delay: there the series converges.
+    D is evaluated on a circle that is small compared with w1, 1/C and 1/delay: there the series converges.
     """
     radius = 0.2 / (1 / first_frequency(loop.arm) + loop.arm.damping + loop.law.delay)
     points = 32
