@@ -9,6 +9,7 @@ import pytest
 
 import tfarm
 from tfarm.errors import ParameterError
+from tfarm.loop.circle_crossings import crossings_along, line_of
 
 
 def refusal(call, *given, kind=ParameterError, **named):
@@ -74,3 +75,9 @@ def docs_module(name):
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+def circle_crossings(loop, name):
+    """The crossings of the unit circle by poles of a sampled loop along one number of its law."""
+    (found,) = crossings_along(loop.rig.grid, [line_of(loop, name)])
+    return found

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.shared import circle_crossings
 from tfarm.arm import FED_BACK, HubFeedback, Law
 from tfarm.dsp import Chain, Converters, Sampling, pulse_transfer
 from tfarm.loop import circle as circle_module
 from tfarm.loop.circle import Arcs, Circle, Discs, complete_band, product
-from tfarm.loop.circle_crossings import FACTOR, crossings_of
+from tfarm.loop.circle_crossings import FACTOR
 from tfarm.loop.edges import delay_limit, whole_loop
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_verdict import sampled_verdict
@@ -55,7 +56,7 @@ def test_a_law_without_zeros_at_rest_is_seen_to_cross_however_slowly():
     friction, T = 0.3, 0.01
     arm = replace(LAB, hub=replace(LAB.hub, friction=friction))
     law = Law({"hub_rate": -1.0, "hub_angle": 1e-10 * arm.total_inertia / friction})
-    (found,) = [each for each in crossings_of(sampled_loop(arm, law, Chain(), count=2), FACTOR) if each.at < 1e-3]
+    (found,) = [each for each in circle_crossings(sampled_loop(arm, law, Chain(), count=2), FACTOR) if each.at < 1e-3]
     assert found.t == pytest.approx(friction, rel=1e-6)
     assert found.at == pytest.approx(1e-5 * T / math.sqrt(1 + friction * T / 2 / arm.total_inertia), rel=1e-6)
     assert found.change == 2

@@ -10,12 +10,13 @@ import tfarm
 from tests.dsp.independent import stepped
 from tests.dsp.law_orders import some_case
 from tests.odd_arms import odd_arms
+from tests.shared import circle_crossings
 from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.dsp import Chain, Sampling
 from tfarm.dsp.discretise import discretised
 from tfarm.loop.circle import complete_band
-from tfarm.loop.circle_crossings import FACTOR, crossings_of, stable_windows
+from tfarm.loop.circle_crossings import FACTOR, stable_windows
 from tfarm.loop.edges import damping_limit, whole_loop
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_verdict import sampled_verdict
@@ -80,7 +81,7 @@ def test_a_real_pole_crosses_where_the_law_s_stiffness_is_the_hub_spring_s(entry
     """2 N m/rad hold the hub: k + g C(0) = 0, and one pole passes z = 1, out or in."""
     held = replace(LAB, hub=replace(LAB.hub, stiffness=2.0))
     loop = sampled_loop(held, Law({"hub_angle": entry}), Chain(), count=6)
-    (found,) = [each for each in crossings_of(loop, FACTOR) if each.at == 0.0]
+    (found,) = [each for each in circle_crossings(loop, FACTOR) if each.at == 0.0]
     before, after = (int((loop.times(factor * k).poles.log_radius > 0).sum()) for k in (1 - 1e-7, 1 + 1e-7))
     assert found.t == pytest.approx(factor, rel=1e-9)
     assert found.change == after - before == change
@@ -91,7 +92,7 @@ def test_a_law_whose_factor_moves_no_pole_across_is_stable_or_not_for_all(stiffn
     arm = replace(LAB, hub=replace(LAB.hub, stiffness=stiffness))
     loop = sampled_loop(arm, Law({"hub_angle": entry}), Chain(), count=6)
     assert stable_windows(loop, FACTOR) == windows
-    assert len(crossings_of(loop, FACTOR)) == 0
+    assert len(circle_crossings(loop, FACTOR)) == 0
 
 
 def test_margins_end_where_the_verdict_turns():
@@ -209,7 +210,7 @@ def test_between_crossings_along_one_part_the_count_is_theirs():
             own = loop.number(name)
             values = own * np.r_[1.0, -(10 ** rng.uniform(-4, 3, 3)), 10 ** rng.uniform(-4, 3, 3)]
             loops = [loop.having(name, value) for value in values.tolist()]
-            passed = crossings_of(loop, name).passed(values)
+            passed = circle_crossings(loop, name).passed(values)
             counts = np.array([(each.poles.log_radius > 0).sum() for each in loops])
             assert (counts - counts[0] == passed - passed[0]).all(), name
             compared += 1

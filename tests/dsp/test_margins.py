@@ -13,13 +13,13 @@ import tfarm
 from tests.odd_arms import odd_arms
 from tests.plausible.arms import draw
 from tests.rigs import some_rig
-from tests.shared import thinned
+from tests.shared import circle_crossings, thinned
 from tests.similar import EITHER
 from tfarm import HubFeedback, Law, modes
 from tfarm.arm import as_law
 from tfarm.dsp import Chain, Converters, Sampling
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.loop.circle_crossings import ENDS_AT, around, crossings_of, ends_of_K1, sampled_map, stable_windows
+from tfarm.loop.circle_crossings import ENDS_AT, around, ends_of_K1, sampled_map, stable_windows
 from tfarm.loop.edges import DelayMargin, Figure, delay_margin, required_damping
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_verdict import Analysis, Verdict, sampled_verdict
@@ -61,7 +61,7 @@ def test_where_the_feedback_outweighs_no_fast_modes_damping_all_delays_are_looke
 def test_a_long_delay_hides_no_crossing_between_two_points_of_the_grid(lab):
     """Sixty samples turn the loop's phase sixty times round the circle; a grid ten times coarser loses a pair."""
     loop = sampled_loop(lab, GAINS, Chain(sampling=Sampling(delay_samples=60.0)), count=6)
-    found = crossings_of(loop.having("K1", 0.0).having("K2", 0.3), "K1")
+    found = circle_crossings(loop.having("K1", 0.0).having("K2", 0.3), "K1")
     edges = found.gain[np.diff(found.gain, append=np.inf) > 1e-6]
     middles = np.r_[edges[0] - 1, (edges[1:] + edges[:-1]) / 2, edges[-1] + 1]
     counts = [(loop.having("K1", middle).poles.log_radius > 0).sum() for middle in middles]

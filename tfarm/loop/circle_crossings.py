@@ -81,12 +81,6 @@ def crossings_along(grid: CircleGrid, lines: Sequence[Line]) -> list[Crossings]:
     return found
 
 
-def crossings_of(loop: Sampled, name: str) -> Crossings:
-    """Return the crossings of the circle along one number of the law, or along `FACTOR`."""
-    (found,) = crossings_along(loop.rig.grid, [line_of(loop, name)])
-    return found
-
-
 def _lowest(terms: Sequence[tuple[int, float]]) -> tuple[float, float]:
     """The lowest power of x in a sum of c x^n, and its coefficient."""
     lowest = min((order for order, _ in terms), default=math.inf)

@@ -59,7 +59,6 @@ LINEAR_SHARE = LINEAR_SCALE / (1 - 1 / 10)  # factor on values there
 DEEPEST_MOMENT_GAIN = -50.0  # and the lowest value at which unstable gains are searched
 SHORT_SEGMENT = 0.008  # of the picture: longer pieces of the boundary look straight, and are cut
 LONG_SEGMENT = 0.03  # of the picture: a piece longer than that after all cuts is a jump through infinity, and not drawn
-ROWS_FROM_EDGE = 1.5  # beyond this many rows from the boundary the count must have changed
 
 
 @frozen

@@ -29,9 +29,6 @@ LOWEST = -80.0
 USUAL_PEAK = 2.0  # Ms that is usual at most
 CLOSED_LOOP = (-20.0, -12.0, -6.0, -3.0, -1.0, 0.25, 0.5, 1.0, 3.0, 6.0)  # dB: |T| of the contours of a Nichols chart
 AROUND: Complex = np.exp(1j * math.pi * np.linspace(-1, 1, 721) ** 3)  # a circle, dense at 1, where T/(1 - T) is steep
-# |L| at the edge of a linear Nyquist plot: at least as far as the zoom
-MOST_LINEAR = 20.0
-LEAST_LINEAR = 2.2
 ZOOM = (-2.2, 0.4, -1.3, 1.3)  # of L around -1: Re from and to, Im from and to
 RING_SIZES = (0.2, 0.5, 1.0, 2.0, 5.0, math.inf)  # |L| of the rings
 # of the first arc at infinity, and of the picture
