@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.dsp.law_orders import BITS, Case, law_in_balls, laws, truth
+from tests.loop.law_orders import BITS, Case, law_in_balls, laws, truth
 from tests.shared import sized
 from tests.survey import each_of, tally
 from tfarm import Law

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import quad
 
 import tfarm
-from tests.dsp.settled import HoldModel, hurting, ordinary
+from tests.loop.settled import HoldModel, hurting, ordinary
 from tests.shared import thinned
 from tests.survey import each_of, tally
 from tfarm.arm import FED_BACK, Arm, Hub, HubFeedback, Link, Section
@@ -141,7 +141,7 @@ def test_only_a_count_on_the_circle_that_the_poles_agree_with_settles(lab, K2, c
 
 @pytest.mark.parametrize(("draw", "size"), [(hurting, 1), (ordinary, 4)])
 def test_a_small_survey(draw, size):
-    """Of `python -m tests.dsp.settled 2000`."""
+    """Of `python -m tests.loop.settled 2000`."""
     outcomes, _, wrong = tally(each_of(draw), size, 3)
     assert wrong == 0
     assert outcomes["settled stable"] + outcomes["settled unstable"] == size

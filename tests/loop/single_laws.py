@@ -1,6 +1,6 @@
 """Laws in float32: the certified poles are those of the numbers that run, and the simulation grows or decays by them.
 
-    python -m tests.dsp.single_laws SIZE SEED
+    python -m tests.loop.single_laws SIZE SEED
 
 Random laws of order 3 to 6 with poles next to z = 1 at 1 ms, in z or by Tustin's rule.  The truth is the rounded state
 space by hand (controllable form, every number to float32), closed around the sampled plant, its eigenvalues in 200 bits

@@ -8,7 +8,7 @@ import pytest
 
 import tfarm
 from tests.dsp.independent import stepped
-from tests.dsp.law_orders import some_case
+from tests.loop.law_orders import some_case
 from tests.odd_arms import odd_arms
 from tests.shared import circle_crossings
 from tests.shell import run

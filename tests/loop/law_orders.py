@@ -1,6 +1,6 @@
 """Sampled verdicts under laws of order 1 to 12, against state transitions at 160 digits:
 
-    python -m tests.dsp.law_orders SIZE SEED
+    python -m tests.loop.law_orders SIZE SEED
 
 Random rigs (`tests.rigs`) and arms (`tests.loop.arms`), periods of 0.1 to 20 ms; clusters of poles near s = 0,
 integrators, double integrators and notches on one or two signals, in s under each rule or in z.  The truth is the

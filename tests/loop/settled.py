@@ -1,6 +1,6 @@
 """Verdicts called settled, on loops drawn to hurt and on ordinary ones, against a hold model.
 
-    python -m tests.dsp.settled 2000 [SEED]
+    python -m tests.loop.settled 2000 [SEED]
 
 To hurt: hubs of 1e-4 to 1e-1 of the beam's inertia or none, first modes with 1e-6 to 1e-3 of critical damping, periods
 that put one of the modes 10 to 60 where sampled rate feedback destabilises it, delays.  Two sizes of the hold model

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.dsp.single_laws import ARM, SINGLE, T, judge
+from tests.loop.single_laws import ARM, SINGLE, T, judge
 from tests.survey import each_of, tally
 from tfarm import Law, ParameterError
 from tfarm.arm.blocks import Rational
