@@ -16,6 +16,7 @@ import pytest
 import tfarm
 from tests.hostile import Read
 from tfarm import HubFeedback
+from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.dsp.scenarios import slew
 from tfarm.dsp.simulate import Simulator
@@ -155,7 +156,7 @@ def test_a_law_is_shown_as_it_is_typed() -> None:
         ["deflection@0.3", "0.5"],
         ["delay", "0.002"],
     ]
-    assert "law=Law(hub_angle=([2, 1], [0.01, 1]), deflection@0.3=0.5, delay=0.002)" in repr(ContinuousLoop(LAB, LEAD))
+    assert "law=Law(hub_angle=([2, 1], [0.01, 1]), deflection@0.3=0.5, delay=0.002)" in repr(Case(LAB, LEAD))
 
 
 def test_every_record_with_arrays_is_one() -> None:

@@ -38,6 +38,7 @@ from tfarm.arm.chain import file_text
 from tfarm.arm.writing import law_toml
 from tfarm.assessment.card import LoopCard
 from tfarm.assessment.stability_map import DESIGNED_MODES
+from tfarm.case import Case
 from tfarm.digits import how_many, kept_digits, listed, plain, scientific, significant
 from tfarm.dsp import Chain, discretise, load_chain
 from tfarm.errors import ConvergenceError, ParameterError, one_line
@@ -405,7 +406,7 @@ def check_laws(report: ArmReport) -> None:
         law = discretise.with_all_gains(*arm_and_law(each.arm, each.law))
         Signals(each.arm, law.signals)
         if not law.is_discrete:
-            ContinuousLoop(each.arm, law)
+            ContinuousLoop(Case(each.arm, law))
         discretise.discretised(law, report.chain.sampling.period)
 
 
