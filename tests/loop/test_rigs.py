@@ -105,7 +105,7 @@ def test_the_sampled_loop_is_that_of_the_elements_under_a_hold(period, K2, stabl
     """The largest |z|, of the loop stable and not, the free angle's z = 1 apart."""
     arm = REAL["bench-rig"]
     law = default_gains(arm).having("K2", K2)
-    verdict = sampled_verdict(arm, law, Chain(sampling=Sampling(period=period)))
+    verdict = sampled_verdict(Case(arm, law, Chain(sampling=Sampling(period=period))))
     z = RigLoop(arm, reached(arm, 8)).sampled(law, period)
     radius = np.log(abs(np.delete(z, abs(z - 1).argmin())).max())
     assert verdict.log_radius == pytest.approx(radius, rel=1e-5)

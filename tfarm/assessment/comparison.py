@@ -350,14 +350,15 @@ def _side(name: str, case: Case, count: int, is_sampled: bool) -> ComparedSide:
     most = count + 6  # poles with Im s >= 0: also real ones, those of the hub, the motor and a controller
     arm, chain = driven(case.arm, case.chain)
     rows, open_loop = _modes_of_arm(arm, count, most)
+    case = Case(arm, law, chain)
     loop: Margins | Analysis
     verdict: Verdict | ConvergenceError
     if is_sampled:
-        loop = Analysis(verdict := sampled_verdict(arm, law, chain))
+        loop = Analysis(verdict := sampled_verdict(case))
         poles, open_loop = _sampled_poles(loop, most)
     else:
         try:
-            verdict = sampled_verdict(arm, law, chain)
+            verdict = sampled_verdict(case)
         except ConvergenceError as error:
             verdict = error
         loop = margins_of(arm, law)
@@ -370,7 +371,7 @@ def _side(name: str, case: Case, count: int, is_sampled: bool) -> ComparedSide:
         poles=poles,
         open_loop={n: s for n, s in open_loop.items() if n and s.imag > 0},
         loop=loop,
-        sampled=brief_of(verdict, law, chain),
+        sampled=brief_of(verdict, case),
     )
 
 

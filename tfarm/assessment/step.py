@@ -175,7 +175,7 @@ class _Record:
         signals = {name: traces.continuous(run, name)[1][: self.t.size] for name in names}
         signals[TORQUE] = traces.held_at(run, run.torque, self.t[: signals[MOMENT].size])
         is_converged = used.change is not None and used.change <= ENOUGH_CHANGE
-        word = UNSTABLE if run.stopped else sampled_verdict(self.arm, law, chain).word
+        word = UNSTABLE if run.stopped else sampled_verdict(Case(self.arm, law, chain)).word
         curves = {name: (self.t[: y.size], y, 0 * y, None) for name, y in signals.items()}
         return self._loop(word, is_converged, f"{used.modes} modes", curves)
 
