@@ -7,15 +7,16 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from tfarm.arm import AnyLaw, Arm
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import LEAST_SIZE, Complex, Real
+from tfarm.crossing import Window
 from tfarm.loop.loop import Loop
 from tfarm.loop.loop_margins import LoopMargins, PhaseCrossover, margins_along
 from tfarm.records import frozen
@@ -157,6 +158,31 @@ class LoopVerdict(ABC):
             L=L,
             margins=self.in_band,
         )
+
+
+class LoopAnalysis(ABC):
+    """Verdict, margins and limits of stability of a loop over either curve."""
+
+    verdict: LoopVerdict
+
+    @property
+    def curve(self) -> LoopCurve:
+        """The loop function on a grid that resolves it."""
+        return self.verdict.curve
+
+    @property
+    @abstractmethod
+    def stability_intervals(self) -> Sequence[Any]:
+        """A row for each number of the law: the intervals in which the loop is stable, the others constant."""
+
+    @property
+    @abstractmethod
+    def delay_margin_seconds(self) -> float | None:
+        """The smallest further delay [s] that destabilises the loop, as far as it is known."""
+
+    @abstractmethod
+    def factor_intervals(self, delays: Real) -> list[Sequence[Window]]:
+        """Return the intervals of a factor on the law in which the loop is stable, at each further delay [s] (n,)."""
 
 
 def next_limits(factors: Iterable[float]) -> tuple[float, float]:

@@ -20,7 +20,7 @@ from tfarm.dsp.stages import admit_case, not_covered
 from tfarm.errors import ConvergenceError
 from tfarm.loop.circle import Band, complete_band
 from tfarm.loop.circle_crossings import FACTOR, around, stable_windows, windows_of
-from tfarm.loop.curve import LoopCurve, LoopVerdict, next_limits
+from tfarm.loop.curve import LoopAnalysis, LoopVerdict, next_limits
 from tfarm.loop.edges import (
     DelayMargin,
     Figure,
@@ -245,7 +245,7 @@ class SampledNumber(NamedTuple):
 
 
 @frozen
-class Analysis:
+class Analysis(LoopAnalysis):
     """A sampled loop: its verdict, and, computed when first read, its limits of stability and its modes.
 
     `shown`, `delay` and `damping` are limits with their certified digits, or those that other modes confirm; the
@@ -254,11 +254,6 @@ class Analysis:
 
     verdict: Annotated[Verdict, Quantity(flat=True, help="stability of the loop")]
     damping_modes: int = UNDAMPED_MODES
-
-    @property
-    def curve(self) -> LoopCurve:
-        """The loop function on a grid that resolves it."""
-        return self.verdict.curve
 
     @property
     def in_band(self) -> LoopMargins | None:
@@ -372,6 +367,12 @@ class Analysis:
     def damping_limit(self) -> Figure | Limit | None:
         """The same with a test of its digits, which takes as long as the search."""
         return damping_limit(self.loop, self.damping_modes) if self.loop.is_of_gains else None
+
+    def factor_intervals(self, delays: Real) -> list[Sequence[Window]]:
+        """Return the intervals of a positive factor on the law at each further delay [s] (n,)."""
+        sampling = self.loop.chain.sampling
+        late = sampling.delay_samples + delays / sampling.period
+        return [stable_windows(self.loop.with_delay(each), FACTOR) for each in late.tolist()]
 
     @property
     def stable_gain_factors(self) -> Annotated[list[Window] | None, Quantity("stable factors on the controller",

@@ -26,7 +26,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import AnyLaw, Arm
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN, AnyLaw, Arm
 from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
 from tfarm.arm.stages import Consumer
@@ -172,12 +172,11 @@ class Stability(LoopVerdict):
         Without damping all modes may reach it at one factor, where rounding alone decides whether L < 0.  There the
         factor follows from a theorem.
         """
-        gains, arm = self.loop.gains, self.loop.arm
-        if gains is None or not arm.loses_at_hub_alone or self.loop.theorem.energy is None:
+        if not self.loop.is_moved_at_hub_alone or self.loop.theorem.energy is None:
             return next_limits(t for _, t in by_phase)
-        found = [t for w, t in by_phase if w == 0]
-        found += [arm.input_per_torque / gains.K2] if gains.K2 else []
-        return next_limits(found + ([-arm.rate_loss / gains.K1] if gains.K1 and arm.rate_loss else []))
+        arm, numbers = self.loop.arm, self.loop.numbers
+        ends = (arm.input_per_torque, numbers[MOMENT_GAIN]), (-arm.rate_loss, numbers[RATE_GAIN])
+        return next_limits([*(t for w, t in by_phase if w == 0), *(end / gain for end, gain in ends if end and gain)])
 
 
 def stability(case: Case, band: float | None = None) -> Stability:
