@@ -4,7 +4,7 @@ import json
 import re
 from dataclasses import replace
 from importlib import import_module
-from itertools import pairwise
+from itertools import pairwise, product
 from types import SimpleNamespace
 
 import control
@@ -17,9 +17,12 @@ from tests.loop.law_counts import judge, some_delay, some_law
 from tests.shared import remember, sized, thinned
 from tests.shell import run
 from tfarm import ConvergenceError, HubFeedback, Law, ParameterError
+from tfarm.case import Case
 from tfarm.loop.lines import through_infinity, with_numbers
+from tfarm.loop.nyquist import nyquist_of
 from tfarm.loop.plane import between, plane
 from tfarm.loop.poles import poles_below
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import Spill
 from tfarm.loop.theorem import absorbed, definite, is_hurwitz, on_axis, polynomial, signs_of
 from tfarm.reduced.modal import closed, sensed_model
@@ -267,6 +270,26 @@ def test_turns_around_the_point_are_the_poles_that_were_found(arm, law):
     assert plot.unstable_open == (law.poles.real > 0).sum()
     assert plot.encirclements == plot.unstable_open - plot.unstable_by_nyquist
     assert np.isfinite(plot.L[~plot.is_arc]).all()
+
+
+SAMPLED = {  # poles of L on the circle: of the rigid body, of all modes, of a resonator; and an unstable one of a law
+    "gains": HubFeedback(K1=0.3, K2=-0.3),
+    "late": Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002),
+    "resonator": Law({"hub_rate": ([0.3, 0.0], [1.0, 0.0, 900.0]), "root_moment": 0.2}),
+    "unstable by itself": Law(UNSTABLE),
+}
+
+
+@pytest.mark.parametrize(("arm", "name"), [*product((LAB, BARE), SAMPLED)])
+def test_around_the_circle_turns_are_the_eigenvalues_outside(arm, name):
+    """Of the closed-loop matrix; one that is on the circle to nine digits counts either way."""
+    plot = nyquist_of(sampled_verdict(Case(arm, SAMPLED[name])))
+    radii = abs(np.linalg.eigvals(plot.verdict.full.matrix()))
+    outside = int((radii > 1 + 1e-9).sum())
+    assert outside <= plot.unstable_by_nyquist <= (radii > 1 - 1e-9).sum()
+    assert plot.unstable_open == (name == "unstable by itself")
+    assert plot.encirclements == plot.unstable_open - plot.unstable_by_nyquist
+    assert plot.s.imag.max() <= np.pi / plot.verdict.full.period
 
 
 def test_parts_on_the_axis_are_those_of_the_quotient_there():

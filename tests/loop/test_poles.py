@@ -17,10 +17,11 @@ from tfarm import Hub, HubFeedback, Law
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.continuous import band_of
 from tfarm.loop.locus import BranchCrossing, Locus
-from tfarm.loop.nyquist import compressed, poles_on_axis
+from tfarm.loop.nyquist import compressed
 from tfarm.loop.panels import CHEBYSHEV, Positions, loop_panels, positions, sensed_places
 from tfarm.loop.plane import Axis, moment_axis, rate_axis, stable_edge
 from tfarm.loop.poles import Poles, closed_loop_poles, count_with_mirrors, first_poles, poles_below, starting_points
+from tfarm.loop.stability import poles_on_axis
 from tfarm.spectrum.box import Box
 from tfarm.spectrum.table import rate_unit
 

@@ -9,7 +9,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -88,6 +88,24 @@ class LoopCurve:
         return (self,) if self.continuous is None else (self.continuous, self)
 
 
+class LoopContour(NamedTuple):
+    """What Nyquist's criterion reads of a loop: its contour runs up the curve, and closes through points `closing`.
+
+    `grid` are frequencies [rad/s] that resolve L, `on_curve` those of the poles of L on the curve, `closed` the
+    closed-loop poles s [1/s], Im s >= 0, apart from those at rest.  `unstable_open` poles of L are unstable, and
+    `unstable` of the loop, `clear` of them by more than rounding; `near_axis` more may be on the curve.
+    """
+
+    grid: Real
+    on_curve: Real
+    closed: Complex
+    closing: Complex
+    unstable_open: int
+    unstable: int
+    clear: int
+    near_axis: int
+
+
 class LoopVerdict(ABC):
     """The verdict on a loop over either curve, with margins of a stable loop, and the curve of its loop function.
 
@@ -132,6 +150,11 @@ class LoopVerdict(ABC):
     @abstractmethod
     def margins_end(self) -> float:
         """The end of the frequency range of margins [rad/s]."""
+
+    @property
+    @abstractmethod
+    def contour(self) -> LoopContour:
+        """Nyquist's contour of the loop, with the poles on both sides of the curve."""
 
     @abstractmethod
     def gain_limits(self, by_phase: tuple[PhaseCrossover, ...]) -> tuple[float, float]:
