@@ -117,7 +117,7 @@ class ComparedSide:
         if isinstance(self.loop, Analysis):
             return ""
         verdict = self.loop.stability
-        is_open = verdict.verdict != "unstable" and not verdict.is_known_beyond
+        is_open = verdict.word != "unstable" and not verdict.is_known_beyond
         return f"up to {verdict.band:.4g} rad/s, not determined beyond" if is_open else ""
 
     def reach(self, delay: Real) -> list[Sequence[Window]]:
@@ -126,7 +126,7 @@ class ComparedSide:
             sampling, late = self.loop.loop.chain.sampling, self.loop.loop.with_delay
             now = [late(sampling.delay_samples + more) for more in (delay / sampling.period).tolist()]
             return [stable_windows(each, FACTOR) for each in now]
-        loop, factors = ContinuousLoop(self.arm, as_law(self.law)), between(0.0, MOST_FACTOR, FACTORS)
+        loop, factors = ContinuousLoop(Case(self.arm, as_law(self.law))), between(0.0, MOST_FACTOR, FACTORS)
         return [*plane(loop, ("delay", "gain"), loop.law.delay + delay, factors).stable_intervals]
 
 

@@ -139,14 +139,14 @@ class Sampled(Loop):
         return self.rig.pulse
 
     @cached_property
-    def arm(self) -> Arm:  # type: ignore[override]
+    def arm(self) -> Arm:
         """The arm, without the actuator's damping."""
         return self.plant.arm
 
     # ------------------------------------------------------------ its numbers, and other loops
 
     @cached_property
-    def law(self) -> Law:  # type: ignore[override]
+    def law(self) -> Law:
         """The law with its weights."""
         return self.unit_law.weighted(self.weights)
 

@@ -122,7 +122,7 @@ class Verdict(OfLoop, LoopVerdict):
         return self.loop if self.band is None else self.band.full
 
     @property
-    def word(self) -> Annotated[str, Quantity("stability", key="verdict",
+    def word(self) -> Annotated[str, Quantity("stability", key="verdict",  # type: ignore[override]
             help="stable, marginal (largest |z| = 1 within its rounding error) or unstable")]:  # fmt: skip
         """stable, marginal or unstable."""
         growth = self.log_radius
