@@ -19,7 +19,6 @@ from tests.shared import thinned
 from tests.similar import EITHER
 from tests.transition import response as transition
 from tfarm import Hub, HubFeedback, Law
-from tfarm.arm import as_law
 from tfarm.loop.continuous import grid
 from tfarm.loop.loop_margins import lowest
 from tfarm.loop.plane import gain_map
@@ -106,7 +105,7 @@ def test_the_disk_margin_is_that_of_python_control_for_a_modal_model(arm, law) -
 def test_the_loop_bears_just_less_than_the_delay_margin(arm, law) -> None:
     """By the poles of the delayed loop, complete in their box by the winding number."""
     found = margins(arm, law)
-    late = [replace(as_law(law), delay=found.exact_delay * share) for share in (1 - 1e-5, 1 + 1e-5)]
+    late = [replace(loop_of(arm, law).law, delay=found.exact_delay * share) for share in (1 - 1e-5, 1 + 1e-5)]
     assert [verdict_of(arm, each).unstable_roots for each in late] == [0, 2]
 
 
