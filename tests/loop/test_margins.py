@@ -109,6 +109,15 @@ def test_the_loop_bears_just_less_than_the_delay_margin(arm, law) -> None:
     assert [verdict_of(arm, each).unstable_roots for each in late] == [0, 2]
 
 
+@pytest.mark.parametrize("ask", [tfarm.margins, tfarm.sampled])
+def test_up_to_the_delay_margin_the_law_itself_is_among_the_stable_factors(ask) -> None:
+    """Of both loops: crossovers and a map on one side, a scan and intervals of the circle on the other."""
+    found = ask(LAB, LAW)
+    delays = found.delay_margin_seconds * np.array([0.0, 0.99, 1.01])
+    inside = [any(low < 1 < high for low, high in each) for each in found.factor_intervals(delays)]
+    assert inside == [True, True, False]
+
+
 def test_what_nothing_bounds_beyond_the_band_is_not_called_exact() -> None:
     """A pin without inertia: |L| falls through 1 beyond its band, where the delay margin is smaller.
 

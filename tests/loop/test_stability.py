@@ -59,6 +59,13 @@ def test_what_lyapunov_proves_is_stable_however_slowly_it_decays(K1) -> None:
     assert found.word == "stable"
 
 
+def test_the_word_of_a_verdict_has_its_former_name_too() -> None:
+    found = verdict_of(BARE, HubFeedback(K1=0.3))
+    with pytest.warns(DeprecationWarning, match=r"it is Stability\.word"):
+        assert found.verdict == found.word == "stable"
+    assert repr(found).startswith("Stability(word='stable'")
+
+
 HELD_TIPS = (Payload(mass=math.inf), Payload(inertia=math.inf), Payload(mass=math.inf, inertia=math.inf))
 
 
