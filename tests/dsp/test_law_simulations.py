@@ -43,12 +43,8 @@ def test_a_law_with_states_is_a_controller_that_remembers():
         return m.feedforward - out - 0.1 * m.root_moment
 
     mine = Simulator(Case(LAB, law, Chain()), task, count=8).run()
-    assert_close(
-        mine,
-        Simulator(Case(LAB, HubFeedback(), Chain(sampling=Sampling(delay_samples=0.4))), task, count=8).controller(
-            controller
-        ),
-    )
+    late = Case(LAB, HubFeedback(), Chain(sampling=Sampling(delay_samples=0.4)))
+    assert_close(mine, Simulator(late, task, count=8).controller(controller))
 
 
 def test_a_servo_follows_as_in_python_control():
