@@ -292,14 +292,13 @@ class PulseTransfer:
     @cached_property
     def early(self) -> Complex:
         """Share of u_{k-d} in an amplitude within a sample."""
-        return held_amplitude(self.poles, (1 - self.sampling.fraction) * self.sampling.period)
+        return held_amplitude(self.poles, self.sampling.remaining)
 
     @cached_property
     def late(self) -> Complex:
         """Share of u_{k-d-1}, from before the switch."""
-        T = self.sampling.period
-        f = self.sampling.fraction
-        return np.exp(self.poles * ((1 - f) * T)) * held_amplitude(self.poles, f * T)
+        sampling = self.sampling
+        return np.exp(self.poles * sampling.remaining) * held_amplitude(self.poles, sampling.late)
 
     @property
     def slopes_at_one(self) -> Real:
@@ -431,7 +430,7 @@ class PulseTransfer:
     def _integrate(self, A: Real, newest: Real, p: float, at: tuple[int, int]) -> None:
         """Put the integral of the amplitude of a slow real pole p into a row; `at`: that pole, and the row."""
         T = self.sampling.period
-        late = self.sampling.fraction * self.sampling.period
+        late = self.sampling.late
         place, row = at
         now = T - late
         A[row, :-1] = 0.0
