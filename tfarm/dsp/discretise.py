@@ -123,13 +123,15 @@ def system_matrix(law: Law) -> Real:
     return np.block([[A, B], [C, D]])
 
 
-def acting_law(case: Case) -> tuple[Law, Chain]:
-    """Return the feedback of a case in z in the numbers of its chain's arithmetic, and the chain with its delay.
+def acting_law(case: Case, law: Law | None = None) -> tuple[Law, Chain]:
+    """Return the controller of a case in z in the numbers of its chain's arithmetic, and the chain with its delay.
+
+    `law` is its form, by default that of a computer.
 
     Raises ParameterError for a delay that is too long, for a gain that is too large, for a massless hub whose moment is
     fed back (an algebraic loop), and as `discretised` and `in_single` do.
     """
-    law = case.feedback
+    law = case.in_computer if law is None else law
     gains = case.gains
     sampling = case.chain.sampling
     if law.part_gains.get("root_moment", (0, 1.0))[1] and "root_moment" in law.signals:

@@ -444,7 +444,7 @@ def sampled_loop(case: Case, *, count: int = USUAL_MODES) -> Sampled:
     is fed back (an algebraic loop), and as `discretised` does.
     """
     law = case.feedback
-    acting, chain = acting_law(case)
+    acting, chain = acting_law(case, law)
     weights = [1.0] * len(law.parts)
     units = acting.part_gains
     for name, (place, value) in units.items():
