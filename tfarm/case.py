@@ -60,6 +60,11 @@ class Case:
         """The controller in the loop: of gains at the hub a part for each, also for 0."""
         return full_law(self.law)
 
+    @property
+    def in_computer(self) -> Law:
+        """The controller as a computer runs it: gains that do not follow all their references read their signals."""
+        return self.feedback if self.feedback.references == AT_HUB else self.law
+
     @cached_property
     def signals(self) -> Signals:
         """The outputs that are fed back."""

@@ -104,13 +104,8 @@ def test_torques_applied_again_let_a_mode_ring_as_far_as_in_the_simulation(name,
     """Without feedback or damping, by the range of the moment within the sample where it is largest."""
     arm = replace(STEEL, link=replace(STEEL.link, damping=0.0))
     chain = Chain(sampling=Sampling(delay_samples=delay))
-    simulator = Simulator(
-        Case(arm, HubFeedback(), chain),
-        scenario(name, arm, chain, 0.3 if name == "step" else 1.5),
-        count=1,
-        between=400,
-    )
-    run = simulator.linear(HubFeedback(K1=0.0, K2=0.0))
+    task = scenario(name, arm, chain, 0.3 if name == "step" else 1.5)
+    run = Simulator(Case(arm, HubFeedback(), chain), task, count=1, between=400).run()
     moment = run.between.root_moment.reshape(-1, 400)[math.ceil(delay) :]  # 96 records a period, four periods a sample
     frequency, size = run.rings
     assert frequency == pytest.approx(tfarm.modes(arm, 1).natural_frequency[-1:])

@@ -10,9 +10,9 @@ import tfarm
 from tests.dsp.independent import radius_of, stepped
 from tests.shared import thinned
 from tfarm import Law, ParameterError
-from tfarm.arm import HubFeedback
+from tfarm.arm import FED_BACK, HubFeedback
 from tfarm.arm.law_tables import load_law
-from tfarm.case import Case
+from tfarm.case import Case, tracked
 from tfarm.dsp import Chain, Sampling, Simulator, load_chain, scenario
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_verdict import sampled_verdict
@@ -43,12 +43,8 @@ def test_a_law_with_states_is_a_controller_that_remembers():
         return m.feedforward - out - 0.1 * m.root_moment
 
     mine = Simulator(Case(LAB, law, Chain()), task, count=8).run()
-    assert_close(
-        mine,
-        Simulator(Case(LAB, HubFeedback(), Chain(sampling=Sampling(delay_samples=0.4))), task, count=8).controller(
-            controller
-        ),
-    )
+    late = Case(LAB, HubFeedback(), Chain(sampling=Sampling(delay_samples=0.4)))
+    assert_close(mine, Simulator(late, task, count=8).controller(controller))
 
 
 def test_a_servo_follows_as_in_python_control():
@@ -66,6 +62,18 @@ def test_a_servo_follows_as_in_python_control():
     led = task.feedforward + control.forced_response(by_angle, t, task.hub_angle).outputs
     found = control.forced_response(loop, t, led).outputs[0]
     np.testing.assert_allclose(mine.at_samples.hub_angle, found, atol=1e-9 * abs(found).max())
+
+
+def test_gains_without_references_are_the_loop_of_gains_and_follow_none():
+    """The feedback has all three parts, the controller in the computer reads its own signals alone."""
+    gains, law = tfarm.HubFeedback(K1=0.3, K2=0.2), Law({"root_moment": 0.2, "hub_rate": 0.3})
+    one, other = (sampled_loop(Case(LAB, each), count=6) for each in (gains, law))
+    assert (one.weights, one.gains) == (other.weights, other.gains) == ((0.0, 0.3, 0.2), gains)
+    np.testing.assert_array_equal(one.poles.z, other.poles.z)
+    assert (tracked(LAB, law)[1], tracked(LAB, Law.of_gains(gains))[1]) == (law, gains)
+    assert (Case(LAB, law).in_computer, Case(LAB, gains).in_computer.signals) == (law, FED_BACK)
+    mine = Simulator(Case(LAB, law), scenario("slew", LAB, Chain(), 2.0), count=6)
+    assert_close(mine.run(), mine.controller(lambda m: m.feedforward - 0.3 * m.hub_rate - 0.2 * m.root_moment))
 
 
 def test_no_reference_is_made_up():

@@ -13,11 +13,7 @@ from tfarm.arm import HubFeedback
 from tfarm.case import Case
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, Simulator, scenario
 from tfarm.dsp.kernel import estimate
-from tfarm.dsp.results import (
-    ideal_chain,
-    limit_cycle,
-    simulated_run,
-)
+from tfarm.dsp.results import ideal_chain, limit_cycle, simulated_run
 from tfarm.dsp.scenarios import SCENARIOS
 from tfarm.dsp.simulate import settling_time
 from tfarm.errors import ParameterError
@@ -32,11 +28,9 @@ GAINS = HubFeedback(K1=0.3, K2=0.3)
 ROUNDED = 16 * np.finfo(float).eps  # of the largest moment: 20 modes and 40 are one there, but for sums
 
 
-def simulator(arm, name="slew", duration=3.0, chain=None, count=8, between=0):
-    chain = Chain() if chain is None else chain
-    return Simulator(
-        Case(arm, HubFeedback(), chain), scenario(name, arm, chain, duration), count=count, between=between
-    )
+def simulator(arm, name="slew", duration=3.0, chain=None, **how):
+    case = Case(arm, HubFeedback(), chain)
+    return Simulator(case, scenario(name, arm, case.chain, duration), **{"count": 8} | how)
 
 
 @pytest.mark.parametrize("name", list(SCENARIOS))
@@ -90,9 +84,8 @@ def test_the_decay_in_time_is_the_spectral_radius(lab, K2):
 def test_quantisation_keeps_a_limit_cycle_up(lab):
     """A stable loop whose rate comes in counts a sample: it never quite stops, and finer counts make it smaller."""
     gains = HubFeedback(K1=1.0, K2=0.3)
-    chain = Chain(
-        sampling=Sampling(delay_samples=1.0), converters=Converters(encoder_counts=2000, hub_rate="difference")
-    )
+    counted = Converters(encoder_counts=2000, hub_rate="difference")
+    chain = Chain(sampling=Sampling(delay_samples=1.0), converters=counted)
     run = simulator(lab, "impulse", 20.0, chain).linear(gains)
     ideal = simulator(lab, "impulse", 20.0, ideal_chain(chain)).linear(gains)
     assert sampled_loop(Case(lab, gains, chain), count=8).poles.is_stable
@@ -115,10 +108,8 @@ def test_an_unstable_loop_that_its_motor_limits_rings_for_ever(lab):
     for size in (1.0, 2.0):
         chain = Chain(actuator=Actuator(torque_limit=3.0 * size))
         task = replace(scenario("impulse", lab, chain, 20.0), impulse=0.01 * size)
-        run, ideal = (
-            Simulator(Case(lab, HubFeedback(), each), task, count=8).linear(gains)
-            for each in (chain, ideal_chain(chain))
-        )
+        case = Case(lab, gains, chain)
+        run, ideal = (Simulator(each, task, count=8).run() for each in (case, case.through(ideal_chain(chain))))
         cycles.append(limit_cycle(run, ideal))
         assert run.saturated["torque"] > 100
         assert limit_cycle(ideal, ideal) is None

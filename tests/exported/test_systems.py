@@ -1,6 +1,7 @@
 """The exported state spaces against the analysis, the simulator, python-control's interconnection and aliasing."""
 
 import math
+from zipfile import ZipFile
 
 import control
 import numpy as np
@@ -114,3 +115,12 @@ def test_references_of_gains_are_those_of_their_signals():
     assert controller.inputs == (*AT_HUB, *(f"reference:{name}" for name in AT_HUB))
     assert loop.outputs[-1] == "hub_torque"
     assert controller.matrices[3][0] == pytest.approx([-0.5, -0.3, -0.3, 0.5, 0.3, 0.3])
+
+
+def test_gains_without_references_are_exported_with_their_own_signals(tmp_path):
+    law = Law({"root_moment": 0.2, "hub_rate": 0.3})
+    assert systems(law, Chain())[1].inputs == law.signals
+    tfarm.export(LAB, law, what="controller", form="fmu", folder=tmp_path, anyway=True)
+    with ZipFile(next(tmp_path.iterdir())) as unit:
+        described = unit.read("modelDescription.xml").decode()
+    assert [name in described for name in AT_HUB] == [False, True, True]

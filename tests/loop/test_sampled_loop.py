@@ -38,9 +38,8 @@ def test_small_gains_follow_the_law(lossless, delay):
 @pytest.mark.parametrize("Kp", [0.0, 0.7])
 def test_the_polished_poles_are_the_eigenvalues_of_the_matrix(lab, Kp):
     """All of them, apart from the z = 1 of a free hub angle, which the whole matrix has."""
-    loop = sampled_loop(
-        Case(lab, HubFeedback(K1=0.3, K2=0.3, Kp=Kp), Chain(sampling=Sampling(delay_samples=1.5))), count=10
-    )
+    late = Chain(sampling=Sampling(delay_samples=1.5))
+    loop = sampled_loop(Case(lab, HubFeedback(K1=0.3, K2=0.3, Kp=Kp), late), count=10)
     whole = np.linalg.eigvals(loop.matrix())
     ours = loop.poles.z[abs(loop.poles.z) > 0.2]
     assert (min(abs(whole - 1)) < 1e-12) == loop.has_free_angle == (Kp == 0)
@@ -125,9 +124,8 @@ def test_a_locked_hub_has_no_loop_and_a_free_pin_none_by_moment(lab):
 @pytest.mark.parametrize("period", [0.003, 0.01, 0.04])
 def test_each_mode_is_seen_where_its_samples_turn(lossless, period):
     """Samples have cos(w T) of a mode alone: it appears at arccos(cos(w T))/T, the aliased frequency."""
-    table = mode_table(
-        sampled_loop(Case(lossless, HubFeedback(K1=0.1), Chain(sampling=Sampling(period=period))), count=8)
-    )
+    chain = Chain(sampling=Sampling(period=period))
+    table = mode_table(sampled_loop(Case(lossless, HubFeedback(K1=0.1), chain), count=8))
     turned = table.natural_frequency * period
     np.testing.assert_allclose(table.aliased, np.arccos(np.cos(turned)) / period, rtol=1e-6)
     folded = np.where(table.band % 2 == 0, table.aliased * period, np.pi - table.aliased * period)
@@ -141,9 +139,7 @@ GAINS = HubFeedback(K1=0.3, K2=0.3)
 
 @pytest.fixture(scope="module")
 def found():
-    return sampled_loci(
-        sampled_loop(Case(LAB, GAINS, Chain(sampling=Sampling(period=0.01))), count=6), 25.0, (-0.5, 1.5)
-    )
+    return sampled_loci(sampled_loop(Case(LAB, GAINS), count=6), 25.0, (-0.5, 1.5))
 
 
 def test_each_point_of_a_locus_is_a_pole_of_its_loop(found):

@@ -96,13 +96,11 @@ def test_the_required_damping_is_where_the_verdict_turns(lossless):
 @pytest.mark.parametrize(("K1", "K2", "ratio"), [(0.3, -0.2, 0.02), (20.0, 0.3, 0.15)])
 def test_a_required_damping_next_to_overdamped_modes_is_that_of_a_loop_with_all_of_them(lossless, K1, K2, ratio):
     """The search has few modes that outlive a sample: eigenvalues of 20 turn there."""
-    law, chain = HubFeedback(K1=K1, K2=K2), Chain()
-    C = required_damping(Case(lossless, law, chain))
+    case = Case(lossless, HubFeedback(K1=K1, K2=K2))
+    C = required_damping(case)
     assert ratio / 10 < C * tfarm.modes(lossless, 1).natural_frequency[1] / 2 < ratio
-    sides = [
-        sampled_loop(Case(lossless.having(damping=C * side), law, chain), count=20) for side in (1 - 1e-4, 1 + 1e-4)
-    ]
-    radii = [abs(loop.eigenvalues).max() for loop in sides]
+    arms = [lossless.having(damping=C * side) for side in (1 - 1e-4, 1 + 1e-4)]
+    radii = [abs(sampled_loop(case.on(arm), count=20).eigenvalues).max() for arm in arms]
     assert radii[0] > 1 > radii[1]
 
 
@@ -141,13 +139,10 @@ def test_the_verdict_settles_with_damping_and_names_its_modes_without(lab, lossl
 
 def test_the_verdict_is_converged_where_only_fewer_modes_agree(lab, monkeypatch):
     monkeypatch.setattr(room, "complete_band", lambda loop: None)
-    assert re.fullmatch(
-        r"converged for the first \d+ modes, not determined beyond", sampled_verdict(Case(lab, GAINS)).holds_for
-    )
-    monkeypatch.setattr(room, "RADIUS_AGREES", -1.0)
-    assert re.fullmatch(
-        r"model of the first \d+ modes, not determined beyond", sampled_verdict(Case(lab, GAINS)).holds_for
-    )
+    for word, agrees in (("converged for", room.RADIUS_AGREES), ("model of", -1.0)):
+        monkeypatch.setattr(room, "RADIUS_AGREES", agrees)
+        words = sampled_verdict(Case(lab, GAINS)).holds_for
+        assert re.fullmatch(rf"{word} the first \d+ modes, not determined beyond", words)
 
 
 def test_margins_of_a_certified_loop_have_the_digits_that_are_shown(lab):
@@ -207,9 +202,8 @@ SEEDS = [STILL_RIG, *((6, n) for n in range(24))]
 def test_a_sampled_loop_has_the_same_windows_delay_and_poles(seed, units):
     arm, law, chain = some_sampled(seed)
     sampling = chain.sampling
-    other = replace(
-        sampling, period=sampling.period * units.time, antialias_corner=sampling.antialias_corner / units.time
-    )
+    corner = sampling.antialias_corner / units.time
+    other = replace(sampling, period=sampling.period * units.time, antialias_corner=corner)
     here = answers(arm, law, chain, HubFeedback(K1=1.0, K2=1.0))
     ones = units.law(arm, HubFeedback(K1=1.0, K2=1.0))
     there = answers(units.arm(arm), units.law(arm, law), replace(chain, sampling=other), ones)

@@ -87,10 +87,8 @@ def test_the_band_holds_every_pole_of_twice_as_many_modes_there():
 def test_poles_left_of_the_line_weigh_no_more_than_the_bound(delay):
     """Pulse transfer functions of the band's poles, and those of sixty modes, on the circle."""
     gains, chain = HubFeedback(K1=0.3, K2=0.3), Chain(sampling=Sampling(delay_samples=delay))
-    band, many = (
-        complete_band(whole_loop(Case(RINGING, gains, chain))),
-        sampled_loop(Case(RINGING, gains, chain), count=60),
-    )
+    case = Case(RINGING, gains, chain)
+    band, many = complete_band(whole_loop(case)), sampled_loop(case, count=60)
     circle = band.circle
     z = np.exp(0.5j * (circle.low + circle.high))
     F = circle.characteristic(band.loop.weights).middle / (1 - 1 / z)  # of K1, whose plant has a simple pole at z = 1

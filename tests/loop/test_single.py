@@ -38,11 +38,8 @@ def test_rounded_laws_have_their_own_poles_and_growth():
 
 def test_gains_at_the_hub_are_rounded_too():
     gains = tfarm.HubFeedback(K1=0.3, K2=0.7)
-    assert sampled_verdict(Case(ARM, gains, SINGLE)).loop.weights == (
-        0.0,
-        float(np.float32(0.3)),
-        float(np.float32(0.7)),
-    )
+    weights = sampled_verdict(Case(ARM, gains, SINGLE)).loop.weights
+    assert weights == (0.0, float(np.float32(0.3)), float(np.float32(0.7)))
 
 
 @pytest.mark.parametrize(

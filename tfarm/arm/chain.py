@@ -58,6 +58,16 @@ class Sampling:
         """f in [0, 1): the remainder of the delay, in samples."""
         return self.delay_samples - self.whole_delay
 
+    @property
+    def late(self) -> float:
+        """f T [s]: time within a sample under the torque from before."""
+        return self.fraction * self.period
+
+    @property
+    def remaining(self) -> float:
+        """(1 - f) T [s]: time within a sample under the new torque."""
+        return (1 - self.fraction) * self.period
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Converters:

@@ -123,13 +123,15 @@ def system_matrix(law: Law) -> Real:
     return np.block([[A, B], [C, D]])
 
 
-def acting_law(case: Case) -> tuple[Law, Chain]:
-    """Return the feedback of a case in z in the numbers of its chain's arithmetic, and the chain with its delay.
+def acting_law(case: Case, law: Law | None = None) -> tuple[Law, Chain]:
+    """Return the controller of a case in z in the numbers of its chain's arithmetic, and the chain with its delay.
+
+    `law` is its form, by default that of a computer.
 
     Raises ParameterError for a delay that is too long, for a gain that is too large, for a massless hub whose moment is
     fed back (an algebraic loop), and as `discretised` and `in_single` do.
     """
-    law = case.feedback
+    law = case.in_computer if law is None else law
     gains = case.gains
     sampling = case.chain.sampling
     if law.part_gains.get("root_moment", (0, 1.0))[1] and "root_moment" in law.signals:
@@ -284,7 +286,7 @@ def _factors(part: Part, law: Law, chain: Chain) -> tuple[Complex, list[tuple[st
 
 def root_product(start: Complex, roots: Complex, more: Any = 0.0) -> Complex:
     """prod(delta - roots) at delta = start + more (n,), without loss where a root is the start."""
-    return np.asarray(((start[:, None] - roots) + np.reshape(more, (-1, 1))).prod(axis=1))
+    return ((start[:, None] - roots) + np.reshape(more, (-1, 1))).prod(axis=1)
 
 
 def root_product_error(start: Complex, roots: Complex, more: Any) -> Real:
@@ -293,4 +295,4 @@ def root_product_error(start: Complex, roots: Complex, more: Any) -> Real:
     sizes = abs(away + np.reshape(more, (-1, 1)))
     blur = np.where(away == 0, 0.0, MACHINE_EPS * (abs(start)[:, None] + abs(roots)))
     most = (sizes + blur).prod(axis=1)
-    return np.asarray(most - sizes.prod(axis=1) + MACHINE_EPS * ROUNDINGS * most)
+    return most - sizes.prod(axis=1) + MACHINE_EPS * ROUNDINGS * most

@@ -103,7 +103,7 @@ class Plant:
     @property
     def at_rest(self) -> Real:
         """G_o(0) of every output that does not turn with the arm (outputs,), and H_o(1) at any period."""
-        return np.asarray(self.static - (self.residues / self.poles).sum(axis=1).real)
+        return self.static - (self.residues / self.poles).sum(axis=1).real
 
     def braked(self, slower_than: float) -> int | None:
         """The pole of a hub that friction brings to rest, if |p| is below `slower_than` [1/s]; else None.
@@ -229,7 +229,7 @@ class SensedPlant:
         """The row of C that reads the arm's own root moment, one of the signals, ahead of the anti-alias filter."""
         alone = self.unfiltered.rows([self.read.names.index("root_moment")], ("root_moment",))
         pulse = PulseTransfer(self.together.joined(alone), sampling).folded()
-        return np.asarray(pulse.matrices()[2][-1])
+        return pulse.matrices()[2][-1]
 
     def with_modes(self, count: int) -> SensedPlant:
         """The same with another number of modes; cheap where the models have as many."""
@@ -292,14 +292,13 @@ class PulseTransfer:
     @cached_property
     def early(self) -> Complex:
         """Share of u_{k-d} in an amplitude within a sample."""
-        return held_amplitude(self.poles, (1 - self.sampling.fraction) * self.sampling.period)
+        return held_amplitude(self.poles, self.sampling.remaining)
 
     @cached_property
     def late(self) -> Complex:
         """Share of u_{k-d-1}, from before the switch."""
-        T = self.sampling.period
-        f = self.sampling.fraction
-        return np.exp(self.poles * ((1 - f) * T)) * held_amplitude(self.poles, f * T)
+        sampling = self.sampling
+        return np.exp(self.poles * sampling.remaining) * held_amplitude(self.poles, sampling.late)
 
     @property
     def slopes_at_one(self) -> Real:
@@ -431,7 +430,7 @@ class PulseTransfer:
     def _integrate(self, A: Real, newest: Real, p: float, at: tuple[int, int]) -> None:
         """Put the integral of the amplitude of a slow real pole p into a row; `at`: that pole, and the row."""
         T = self.sampling.period
-        late = self.sampling.fraction * self.sampling.period
+        late = self.sampling.late
         place, row = at
         now = T - late
         A[row, :-1] = 0.0

@@ -249,7 +249,7 @@ class Simulator:
         chain = case.chain
         admit(kernel.CONSUMER, arm, chain)
         self.case = case
-        self.gains = case.gains if case.feedback.references == AT_HUB else None
+        self.gains = case.gains if case.in_computer.references == AT_HUB else None
         self.law, self.chain = acting_law(case)
         references_of(self.law, scenario)  # raises for one that is missing
         self.scenario = scenario

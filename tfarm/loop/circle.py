@@ -41,7 +41,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, reduce
 from itertools import takewhile
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -191,14 +191,13 @@ class Circle:
         pulse = self.loop.pulse
         order = self.orders[row]
         twice, once = plant.rigid[row]
-        f = pulse.sampling.fraction
         T = pulse.sampling.period
         x = arcs.x
         late = arcs.turned(1)
         at_rest = float(plant.static[row] - (plant.residues[row] / plant.poles)[~self.kept].real.sum())
         held = of_poles + late.times(at_rest) + Discs(0 * x.middle, self.missing[row])
         total = power(x, order) * held
-        push = arcs.polynomial((1 - f) * T, f * T)
+        push = arcs.polynomial(pulse.sampling.remaining, pulse.sampling.late)
         if order == 2:  # then there is no 1/s: an arm that turns freely has no friction at the hub
             total = total + ((push * late).times(T) + x * arcs.polynomial(*pulse.ramps)).times(twice) * late
         elif order == 1:
@@ -210,17 +209,17 @@ class Circle:
     def _cut(self, rough: NDArray[np.bool_]) -> None:
         """Cut some arcs into shorter ones."""
         ends = np.linspace(self.low[rough], self.high[rough], PIECES_OF_ARC + 1)
-        new_low = ends[:-1].ravel()
-        new_high = ends[1:].ravel()
-        new = self._parts(new_low, new_high)
-        all_low = np.r_[self.low[~rough], new_low]
-        order = np.argsort(all_low)
-        self.high = np.r_[self.high[~rough], new_high][order]
-        self.low = all_low[order]
-        old = self.parts
-        self.parts = Discs(
-            np.c_[old.middle[:, ~rough], new.middle][:, order], np.c_[old.radius[:, ~rough], new.radius][:, order]
-        )
+        low = ends[:-1].ravel()
+        high = ends[1:].ravel()
+        new = self._parts(low, high)
+        order = np.argsort(np.r_[self.low[~rough], low])
+
+        def merged(old: Any, new: Any) -> Any:
+            return np.concatenate([old[..., ~rough], new], axis=-1)[..., order]
+
+        self.low = merged(self.low, low)
+        self.high = merged(self.high, high)
+        self.parts = Discs(merged(self.parts.middle, new.middle), merged(self.parts.radius, new.radius))
 
     @cached_property
     def weights(self) -> Complex:
@@ -232,7 +231,7 @@ class Circle:
         sampling = self.loop.chain.sampling
         p = plant.poles
         T = sampling.period
-        late = sampling.fraction * sampling.period
+        late = sampling.late
         is_braked = np.arange(p.size) == (-1 if self.braked is None else self.braked)
         share = (plant.residues + np.outer(plant.rigid[:, 1], is_braked)) / p  # the rest is in `_braked_pair`
         now = np.expm1(p * (T - late))
@@ -248,7 +247,7 @@ class Circle:
     def _braked_pair(self, arcs: Arcs) -> Discs:
         """(c0 + c1/z + c2/z^2): x times the pulse transfer function of 1/s - 1/(s - p), without -p/(z - e^{pT})."""
         T = self.loop.chain.sampling.period
-        late = self.loop.chain.sampling.fraction * self.loop.chain.sampling.period
+        late = self.loop.chain.sampling.late
         p = float(self.loop.plant.poles[self.braked].real)
         first = (T - late) ** 2 * phi(p * (T - late))
         last = late**2 * np.exp(p * T) * phi(-p * late)
@@ -331,7 +330,7 @@ def complete_band(loop: Sampled) -> Band | None:
     plant = loop.plant
     sampling = loop.chain.sampling
     C = plant.arm.damping
-    remaining = sampling.period * (1 - sampling.fraction)
+    remaining = sampling.remaining
     if C == 0.0:
         return None
     # e^-30 = 1e-13 is left over a sample of the poles on the line
@@ -375,7 +374,7 @@ def _left_of(loop: Sampled, line: float, top: float) -> Real | None:
     exact = loop.rig.exact
     analog = np.array(loop.rig.analog)[:, None]
     T = sampling.period
-    remaining = sampling.period * (1 - sampling.fraction)
+    remaining = sampling.remaining
 
     def sizes(s: Complex) -> Real:
         damped = np.exp(s.real * remaining) / -np.expm1(s.real * T)
