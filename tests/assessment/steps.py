@@ -1,10 +1,10 @@
 """Figures of `tfarm step` against inverse Laplace transforms by two methods:
 
-    python -m tests.case.steps SIZE SEED
+    python -m tests.assessment.steps SIZE SEED
 
 Steps of a reference, slews and pulses; arms of `tests.plausible` and the paper's, mode 1 damped 0 to 20 %, a few with a
 spring to ground or a motor; laws of hub angle, hub rate and root moment with a delay of 0 to 10 ms and filters of order
-0 to 3.  True signals are those of `tests.case.step_truth`; where its two methods differ by more than `AGREES` of the
+0 to 3.  True signals are those of `tests.assessment.step_truth`; where its two methods differ by more than `AGREES` of the
 peak there, or `ENOUGH` elsewhere, there is no truth.
 
 A figure is wrong where it differs by more than 1 %, whatever its bound, or by 1e-6 under the word "converged"; a
@@ -22,7 +22,7 @@ import numpy as np
 
 import tfarm
 from tests import survey
-from tests.case.step_truth import Case, Truth, loop_function
+from tests.assessment.step_truth import Case, Truth, loop_function
 from tests.plausible.arms import draw, log
 from tests.survey import Finding
 from tfarm.arm import Motor

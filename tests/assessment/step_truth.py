@@ -1,4 +1,4 @@
-"""True signals of `tfarm step`: the loop closed by hand, and inverted by two methods (`tests.case.inversion`).
+"""True signals of `tfarm step`: the loop closed by hand, and inverted by two methods (`tests.assessment.inversion`).
 
 From the arm's transfer functions G and the coefficients C of the law
 
@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 import tfarm
-from tests.case.inversion import DeHoog, durbin, inverse
+from tests.assessment.inversion import DeHoog, durbin, inverse
 from tfarm.arm import to_toml
 from tfarm.arm.writing import law_toml
 from tfarm.assessment.step import PARTS

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.case.inversion import DeHoog, durbin, inverse
-from tests.case.step_truth import Case, Truth
-from tests.case.steps import FIGURES, PARTS, Signal, answered, grows, judge
+from tests.assessment.inversion import DeHoog, durbin, inverse
+from tests.assessment.step_truth import Case, Truth
+from tests.assessment.steps import FIGURES, PARTS, Signal, answered, grows, judge
 from tfarm.arm.chain import Sampling
 from tfarm.dsp import Chain
 
