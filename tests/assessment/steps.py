@@ -4,8 +4,8 @@
 
 Steps of a reference, slews and pulses; arms of `tests.plausible` and the paper's, mode 1 damped 0 to 20 %, a few with a
 spring to ground or a motor; laws of hub angle, hub rate and root moment with a delay of 0 to 10 ms and filters of order
-0 to 3.  True signals are those of `tests.assessment.step_truth`; where its two methods differ by more than `AGREES` of the
-peak there, or `ENOUGH` elsewhere, there is no truth.
+0 to 3.  True signals are those of `tests.assessment.step_truth`; where its two methods differ by more than `AGREES` of
+the peak there, or `ENOUGH` elsewhere, there is no truth.
 
 A figure is wrong where it differs by more than 1 %, whatever its bound, or by 1e-6 under the word "converged"; a
 settling or a rise time where no signal so near has it, a peak time where the signal is not the peak.  A bound that a

@@ -15,6 +15,7 @@ from tfarm.arm.chain import MOST_DELAY
 from tfarm.assessment.card import margins_of, sampled_of
 from tfarm.assessment.stability_map import StableRegions, stable_regions
 from tfarm.assessment.step import Step, step
+from tfarm.case import Case
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain, Simulation, results, traces
 from tfarm.dsp.traces import motion_of
@@ -56,7 +57,11 @@ def sampled_section(report: ArmReport) -> PageSection:
     if not report.laws:
         # the gains of the arm itself
         (_, own), *_ = found
-        blocks = [overlay_picture(stable_regions(report.arm, own.loop.gains, chain), own), *blocks, loci_picture(own)]
+        blocks = [
+            overlay_picture(stable_regions(Case(report.arm, own.loop.law, chain)), own),
+            *blocks,
+            loci_picture(own),
+        ]
         facts = [*interval_facts(own), *facts]
     of_whole_law = ("index", "natural_frequency", "band", "aliased", "first_order", "by_damping", "log_radius")
     for each, it in found:

@@ -49,6 +49,8 @@ from .quantities import (
     Failure,
     Spread,
     StableShare,
+    StudyBand,
+    band_of,
     column_names,
     failures_of,
     order_of,
@@ -164,6 +166,15 @@ class Study:
     def failures(self) -> Annotated[tuple[Failure, ...], Quantity("without a result", help="arms by reason")]:
         """Arms without a result by reason."""
         return failures_of(self._table)
+
+    def band(self, output: str, most: int = 100) -> StudyBand:
+        """Return the responses of an output of at most that many arms, even over the rows, and their quantiles.
+
+        Raises ParameterError for an unknown output, and where no arm has that response.
+        """
+        plan = self.parts.plan
+        rows = np.column_stack([self._table[key] for key in plan.space.keys])
+        return band_of(plan.subjects, rows[:: max(1, -(-self.done // most))].tolist(), output)
 
     @property
     def shear(self) -> Annotated[str, Quantity("shear modulus", help="with a varied Young's modulus; else empty")]:
