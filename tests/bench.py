@@ -219,7 +219,11 @@ def plane(law):
 def simulator(subject):
     """A slew of 300 samples on a model of 20 modes."""
     _, chain = subject.arm, subject.chain
-    return Simulator(subject.arm, chain, scenario("slew", subject.arm, chain, 300 * chain.sampling.period), count=20)
+    return Simulator(
+        Case(subject.arm, HubFeedback(), chain),
+        scenario("slew", subject.arm, chain, 300 * chain.sampling.period),
+        count=20,
+    )
 
 
 def another_law(subject):
@@ -278,7 +282,7 @@ CALLS = {  # what a call is, what it prepares for a subject, and how many points
     "result card": (lambda subject: lambda: to_dict(tfarm.result_card(*subject)), 1),
     "map of gains": (lambda subject: lambda: gain_map(subject.arm, *plane(subject.law)), 40_000),
     "sampled map of gains": (
-        lambda subject: lambda: sampled_map(sampled_verdict(*subject).loop, *plane(subject.law)),
+        lambda subject: lambda: sampled_map(sampled_verdict(Case(*subject)).loop, *plane(subject.law)),
         40_000,
     ),
     "slew of 300 samples, 20 modes": (lambda subject: lambda: simulator(subject).linear(subject.law), 1),

@@ -13,6 +13,7 @@ from tests.loop.rig_loops import RigLoop
 from tests.rigs import some_rig
 from tests.shared import thinned
 from tfarm import HubFeedback
+from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling
 from tfarm.loop.continuous import ContinuousLoop, band_of
 from tfarm.loop.plane import INFINITE, gain_map
@@ -104,7 +105,7 @@ def test_the_sampled_loop_is_that_of_the_elements_under_a_hold(period, K2, stabl
     """The largest |z|, of the loop stable and not, the free angle's z = 1 apart."""
     arm = REAL["bench-rig"]
     law = default_gains(arm).having("K2", K2)
-    verdict = sampled_verdict(arm, law, Chain(sampling=Sampling(period=period)))
+    verdict = sampled_verdict(Case(arm, law, Chain(sampling=Sampling(period=period))))
     z = RigLoop(arm, reached(arm, 8)).sampled(law, period)
     radius = np.log(abs(np.delete(z, abs(z - 1).argmin())).max())
     assert verdict.log_radius == pytest.approx(radius, rel=1e-5)

@@ -5,6 +5,7 @@ import pytest
 
 import tfarm
 from tfarm.assessment.stability_map import sampled_region
+from tfarm.case import Case
 from tfarm.crossing import pieces
 from tfarm.dsp import load_chain
 from tfarm.loop.continuous import ContinuousLoop
@@ -45,7 +46,9 @@ def of_gains(arm, vary, start, stop):
 
 
 def sampled():
-    return draw_sampled_loci.figure(sampled_loci(sampled_loop(LAB, default_gains(LAB), count=3), 25.0, (-0.5, 1.5)))
+    return draw_sampled_loci.figure(
+        sampled_loci(sampled_loop(Case(LAB, default_gains(LAB)), count=3), 25.0, (-0.5, 1.5))
+    )
 
 
 @pytest.mark.parametrize(

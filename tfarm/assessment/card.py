@@ -25,7 +25,7 @@ from tfarm.arm import AnyLaw, Arm
 from tfarm.case import Case
 from tfarm.digits import general
 from tfarm.dsp import Chain
-from tfarm.dsp.stages import admit, not_covered
+from tfarm.dsp.stages import admit_case, not_covered
 from tfarm.errors import ConvergenceError
 from tfarm.loop.curve import LoopCurve, LoopVerdict, gain_margin
 from tfarm.loop.loop_margins import LoopMargins
@@ -170,7 +170,7 @@ def result_card(
     `continuous` (of `margins`) and `at_samples` (of `sampled`) are what is known of these loops already.  Raises
     ParameterError where there is no loop.
     """
-    case = admitted(Case(arm, law, chain))
+    case = admit_case(SAMPLED_LOOP, Case(arm, law, chain))
     _, undamped = graded_arm(case.arm)
     notes = [SCALED + RECOMMENDED[case.arm.has_elastic_link]] if case.gains == default_gains(case.arm) else []
     notes += [undamped] if undamped else []
@@ -184,12 +184,6 @@ def result_card(
     return ResultCard(**cards, period=case.chain.sampling.period, notes=tuple(notes))
 
 
-def admitted(case: Case) -> Case:
-    """Return the case as its loops have it: analog damping of the actuator is friction of the hub."""
-    arm, chain = admit(SAMPLED_LOOP, case.arm, case.chain)
-    return Case(arm, case.law, chain)
-
-
 def analysis_of(name: str, case: Case) -> Margins | Analysis:
     """Return the margins of the continuous loop of a case, or the analysis of its sampled one."""
     return sampled_of(case.arm, case.law, case.chain) if name == "sampled" else margins_of(case.arm, case.law)
@@ -200,7 +194,7 @@ def loop_card(name: str, case: Case, known: Margins | Analysis | None = None) ->
 
     Raises ConvergenceError where the loop is not determined.
     """
-    case = admitted(case)
+    case = admit_case(SAMPLED_LOOP, case)
     is_own = known is not None and known.verdict.full.arm.hub == case.arm.hub
     found = known if known is not None and is_own else analysis_of(name, case)
     damped, _ = graded_arm(case.arm)
@@ -268,7 +262,7 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
     ConvergenceError
         Where its stability is not determined.
     """
-    case = admitted(Case(arm, law, chain))
+    case = admit_case(SAMPLED_LOOP, Case(arm, law, chain))
     damped, note = graded_arm(case.arm)
 
     def as_card(name: str) -> LoopCurve:

@@ -10,10 +10,10 @@ import numpy as np
 from tfarm.arm import PLANE, AnyLaw, Arm, HubFeedback, must_have_free_hub
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
-from tfarm.assessment.card import admitted
 from tfarm.case import Case
 from tfarm.crossing import Window
 from tfarm.dsp import Chain
+from tfarm.dsp.stages import admit_case
 from tfarm.errors import ConvergenceError, one_line, require
 from tfarm.loop.circle_crossings import FACTOR, stable_windows
 from tfarm.loop.continuous import ContinuousLoop
@@ -21,7 +21,7 @@ from tfarm.loop.margins import Margins
 from tfarm.loop.margins import margins as margins_of
 from tfarm.loop.plane import Plane, between, gain_map, plane, ranges_of
 from tfarm.loop.poles import HUB, closed_loop_poles, poles_by_mode
-from tfarm.loop.sampled_verdict import Analysis, SampledBrief, brief_of, sampled_brief, sampled_verdict
+from tfarm.loop.sampled_verdict import SAMPLED_LOOP, Analysis, SampledBrief, brief_of, sampled_brief, sampled_verdict
 from tfarm.records import frozen
 from tfarm.response.frequency import Bode, bode, resonant_band
 from tfarm.schema import Difference, Percent, Quantity
@@ -360,16 +360,16 @@ def _names(cases: list[Case]) -> Sequence[str]:
 def _side(name: str, case: Case, count: int, is_sampled: bool) -> ComparedSide:
     """Return all that is compared of one case; a sampled verdict that is not determined is left open."""
     most = count + 6  # poles with Im s >= 0: also real ones, those of the hub, the motor and a controller
-    case = admitted(case)
+    case = admit_case(SAMPLED_LOOP, case)
     rows, open_loop = _modes_of_arm(case.arm, count, most)
     range_words = ""
     loop: Margins | Analysis
     if is_sampled:
-        loop = Analysis(sampled_verdict(case.arm, case.law, case.chain))
-        sampled = brief_of(loop.verdict, case.law, case.chain)
+        loop = Analysis(sampled_verdict(case))
+        sampled = brief_of(loop.verdict, case)
         poles, open_loop = _sampled_poles(loop, most)
     else:
-        sampled = sampled_brief(case.arm, case.law, case.chain)
+        sampled = sampled_brief(case)
         loop = margins_of(case.arm, case.law)
         verdict = loop.stability
         if verdict.word != "unstable" and not verdict.is_known_beyond:

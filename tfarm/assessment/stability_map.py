@@ -61,7 +61,7 @@ def stable_regions(case: Case) -> StableRegions:
     arm = case.arm
     # at C = 0 with a little damping too
     dampings = (arm.damping,) if arm.damping else (1e-4, 1e-6, 0.0)
-    loops = [sampled_verdict(arm.having(damping=C), gains, case.chain).full for C in dampings]
+    loops = [sampled_verdict(case.on(arm.having(damping=C))).full for C in dampings]
     ends = np.unique(np.concatenate([ends_of_K1(loop) for loop in loops]))
     ends = ends[ends > 0]
     ends = ends[np.diff(ends, prepend=0.0) > 1e-3 * ends]
@@ -84,7 +84,7 @@ def stable_regions(case: Case) -> StableRegions:
 def sampled_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> GainMap | None:
     """Return where in the picture the sampled loop is stable, with the modes of the verdict on the default gains."""
     try:
-        loop = sampled_verdict(arm, default_gains(arm), chain).full
+        loop = sampled_verdict(Case(arm, default_gains(arm), chain)).full
         across = with_both_sides(rate_columns(arm, x, SAMPLED_COLUMNS), ends_of_K1(loop))
         across = across[(x.low <= across) & (x.high > across)]
         up = np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])

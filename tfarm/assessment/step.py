@@ -37,7 +37,7 @@ from tfarm.dsp.plant import sensed_plant
 from tfarm.dsp.results import ENOUGH_CHANGE, simulated
 from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, described, resting, scenario
 from tfarm.dsp.simulate import MOST_BETWEEN, SETTLING_BAND, final_value, first_mode, settling_time
-from tfarm.dsp.stages import admit, not_covered
+from tfarm.dsp.stages import admit_case, not_covered
 from tfarm.errors import must_be_known, require
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.poles import Poles
@@ -175,7 +175,7 @@ class _Record:
         signals = {name: traces.continuous(run, name)[1][: self.t.size] for name in names}
         signals[TORQUE] = traces.held_at(run, run.torque, self.t[: signals[MOMENT].size])
         is_converged = used.change is not None and used.change <= ENOUGH_CHANGE
-        word = UNSTABLE if run.stopped else sampled_verdict(case.arm, case.law, case.chain).word
+        word = UNSTABLE if run.stopped else sampled_verdict(case).word
         curves = {name: (self.t[: y.size], y, 0 * y, None) for name, y in signals.items()}
         return self._loop(word, is_converged, f"{used.modes} modes", curves)
 
@@ -359,11 +359,13 @@ def step(
     must_be_known("scenario", scenario_name, SAMPLED_NAMES)
     band = number("settling_band", settling_band, "a share of the travel, such as 0.02")
     require(0 < band < 1, "settling_band", settling_band, "a share of the travel between 0 and 1, such as 0.02")
-    case = Case(arm, law, chain)
-    arm, chain = admit(CONSUMER, case.arm, case.chain)
+    case = admit_case(CONSUMER, Case(arm, law, chain))
     is_step = scenario_name == "reference"
-    hub, law = followed(case.law) if is_step else (AT_HUB[0], case.law)
-    case = Case(arm, law, chain)
+    hub = AT_HUB[0]
+    if is_step:
+        hub, own = followed(case.law)
+        case = case.under(own)
+    arm, chain = case.arm, case.chain
     poles = None if case.law.is_discrete else usual_poles(ContinuousLoop(arm, case.law))
     length = usual_duration(poles, chain) if duration is None else duration
     if is_step:

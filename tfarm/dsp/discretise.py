@@ -24,11 +24,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, AnyLaw, Arm, as_law, full_law, must_not_be_algebraic
+from tfarm.arm import MOMENT_GAIN, must_not_be_algebraic
 from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace
 from tfarm.arm.chain import MOST_DELAY, Chain
 from tfarm.arm.law import Law, Part, is_measured
 from tfarm.arrays import MACHINE_EPS, Complex, Real
+from tfarm.case import Case
 from tfarm.errors import ParameterError, require
 from tfarm.exact.rationals import block_factors
 from tfarm.records import frozen
@@ -121,35 +122,24 @@ def system_matrix(law: Law) -> Real:
     return np.block([[A, B], [C, D]])
 
 
-def with_all_gains(arm: Arm, law: AnyLaw) -> Law:
-    """Return the law; gains at the hub that follow all their references with a part for each gain, also for 0.
+def acting_law(case: Case) -> tuple[Law, Chain]:
+    """Return the feedback of a case in z in the numbers of its chain's arithmetic, and the chain with its delay.
 
-    Raises ParameterError for the algebraic loop, I_h = 0 and K2 != 0, and for a gain that is too large.
+    Raises ParameterError for a delay that is too long, for a gain that is too large, for a massless hub whose moment is
+    fed back (an algebraic loop), and as `discretised` and `in_single` do.
     """
-    law = as_law(law)
-    if (gains := law.gains) is None or not set(law.signals) <= set(law.references):
-        return law
-    if gains.K2:
-        must_not_be_algebraic(arm, MOMENT_GAIN, gains.K2)
-    check_gains(arm, gains)
-    return full_law(law)
-
-
-def acting_law(arm: Arm, law: Law, chain: Chain) -> tuple[Law, Chain]:
-    """Return the law in z in the numbers of the chain's arithmetic, and the chain with its delay.
-
-    Raises ParameterError for a delay that is too long, for a massless hub whose moment is fed back (an algebraic loop),
-    and as `discretised` and `in_single` do.
-    """
-    T = chain.sampling.period
-    samples = chain.sampling.delay_samples + law.delay / T
+    law, gains, sampling = case.feedback, case.gains, case.chain.sampling
+    if law.part_gains.get("root_moment", (0, 1.0))[1] and "root_moment" in law.signals:
+        key, value = ("signals", "root_moment") if gains is None else (MOMENT_GAIN, gains.K2)
+        must_not_be_algebraic(case.arm, key, value)
+    if gains is not None:
+        check_gains(case.arm, gains)
+    samples = sampling.delay_samples + law.delay / sampling.period
     remedy = f"with the delay of the chain it is {samples:.4g} samples; at most {MOST_DELAY:g}"
     require(samples <= MOST_DELAY, "delay", law.delay, remedy)
-    if "root_moment" in law.signals and law.part_gains.get("root_moment", (0, 1.0))[1]:
-        must_not_be_algebraic(arm, "signals", "root_moment")
-    late = replace(chain, sampling=replace(chain.sampling, delay_samples=samples))
-    acting = discretised(law, T)
-    return in_single(acting) if chain.converters.is_single else acting, late
+    acting = discretised(law, sampling.period)
+    late = replace(case.chain, sampling=replace(sampling, delay_samples=samples))
+    return in_single(acting) if late.converters.is_single else acting, late
 
 
 def in_single(law: Law) -> Law:

@@ -14,8 +14,8 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import AnyLaw, Arm, as_law
-from tfarm.arm.chain import Chain, Converters, chain_or_usual
+from tfarm.arm import AnyLaw, Arm
+from tfarm.arm.chain import Chain, Converters
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.case import Case
 from tfarm.dsp.discretise import RULE, rule_in_words
@@ -162,9 +162,8 @@ class Run:
         run = self.simulation
         if run.chain.is_linear or self.tuner is not None:
             return None
-        law = replace(self.case.feedback, delay=0.0)  # that is in the chain of the run
-        ideal = Simulator(self.arm, ideal_chain(run.chain), run.scenario, law, count=self.used.modes)
-        return limit_cycle(run, ideal.run())
+        ideal = self.case.through(ideal_chain(self.case.chain))
+        return limit_cycle(run, Simulator(ideal, run.scenario, count=self.used.modes).run())
 
     @property
     def torque_unit(self) -> Annotated[str, Quantity(help="unit of the input of the arm")]:
@@ -270,22 +269,16 @@ def simulate(
     `outputs` are recorded in addition, as "tip_rotation" or "strain@0.05".  Raises ParameterError for a locked hub, an
     algebraic loop, an unknown signal, a law in z whose period is not the chain's, and as `scenario` does.
     """
-    return simulated_run(
-        arm, law, chain, scenario_name, duration, count=count, between=between, outputs=outputs
-    ).simulation
+    case = Case(arm, law, chain)
+    return simulated_run(case, scenario_name, duration, count=count, between=between, outputs=outputs).simulation
 
 
-def drawn(arm: Arm, law: AnyLaw, chain: Chain, scenario_name: str, duration: float) -> Simulation:
+def drawn(case: Case, scenario_name: str, duration: float) -> Simulation:
     """Simulate the same for a picture: 20 records in each period of the fastest visible mode (`traces.resolved`)."""
-    case = Case(arm, as_law(law), chain)
-    task = scenario(scenario_name, case.arm, chain, duration)
-    used = enough_modes(lambda n: simulator(case.through(ideal_chain(chain)), task, count=n).run())
-    return resolved(simulator(case, task, count=used.modes), case.arm, Simulator.run)[0]
-
-
-def simulator(case: Case, task: Scenario, **how: Any) -> Simulator:
-    """The simulator of a case."""
-    return Simulator(case.arm, case.chain, task, case.law, **how)
+    task = scenario(scenario_name, case.arm, case.chain, duration)
+    ideal = case.through(ideal_chain(case.chain))
+    used = enough_modes(lambda n: Simulator(ideal, task, count=n).run())
+    return resolved(Simulator(case, task, count=used.modes), case.arm, Simulator.run)[0]
 
 
 def simulated(
@@ -301,14 +294,12 @@ def simulated(
     Gains at the hub follow the references of all their signals.
     """
     ideal = case.through(ideal_chain(case.chain))
-    used = enough_modes(lambda n: run(simulator(ideal, task, count=n, outputs=outputs)), count)
-    return run(simulator(case, task, count=used.modes, between=between, outputs=outputs)), used
+    used = enough_modes(lambda n: run(Simulator(ideal, task, count=n, outputs=outputs)), count)
+    return run(Simulator(case, task, count=used.modes, between=between, outputs=outputs)), used
 
 
 def simulated_run(
-    arm: Arm,
-    law: AnyLaw,
-    chain: Chain | None,
+    case: Case,
     name: str,
     duration: float,
     *,
@@ -320,6 +311,5 @@ def simulated_run(
 
     Raises ParameterError as `simulate` does.
     """
-    case = Case(arm, as_law(law), chain_or_usual(chain))
     task = scenario(name, case.arm, case.chain, duration)
     return Run(case, *simulated(case, task, count, between, outputs), described(task, case.arm, case.chain))

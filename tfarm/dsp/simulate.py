@@ -18,13 +18,14 @@ from typing import Annotated, NamedTuple, Self, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import ANGLE_GAIN, AT_HUB, RATE_GAIN, AnyLaw, Arm, HubFeedback
+from tfarm.arm import ANGLE_GAIN, AT_HUB, RATE_GAIN, HubFeedback
 from tfarm.arm.chain import TIME_ROUNDING, Chain
 from tfarm.arm.checks import whole
 from tfarm.arm.law import REFERENCE, Law
 from tfarm.arrays import LEAST_SIZE, Complex, Real
+from tfarm.case import Case
 from tfarm.dsp import kernel
-from tfarm.dsp.discretise import acting_law, system_matrix, with_all_gains
+from tfarm.dsp.discretise import acting_law, system_matrix
 from tfarm.dsp.plant import RECORDED, USUAL_MODES, Plant, sensed_plant, with_held_filter
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.stages import admit
@@ -38,7 +39,6 @@ MOST_BETWEEN = 1000  # records between two samples
 RESIDUAL = "residual root moment after the slew"
 SETTLING_BAND = 0.02  # of the travel, within which a signal has settled: as in python-control and MATLAB
 LEFT_OF_RECORD = 10  # a tenth of a record has to follow a settling time
-NO_GAINS = HubFeedback()
 
 
 def quantisers(chain: Chain) -> Real:
@@ -223,7 +223,7 @@ class Simulation:
 
 
 class Simulator:
-    """An arm with `count` modes, a chain, a scenario and a law, prepared once; each call simulates it from the start.
+    """A case with `count` modes over a scenario, prepared once; each call simulates it from the start.
 
     `between` is the number of records in each sample, `outputs` are signals beyond those of `RECORDED`, by name, those
     along the arm with their place [m]: "tip_rotation", "strain@0.05".  Raises ParameterError for a locked hub, for an
@@ -233,10 +233,8 @@ class Simulator:
 
     def __init__(
         self,
-        arm: Arm,
-        chain: Chain,
+        case: Case,
         scenario: Scenario,
-        law: AnyLaw = NO_GAINS,
         *,
         count: int = USUAL_MODES,
         between: int = 0,
@@ -244,10 +242,11 @@ class Simulator:
     ) -> None:
         remedy = f"a whole number of records between two samples, 0 to {MOST_BETWEEN}"
         between = whole("between", between, 0, MOST_BETWEEN, remedy)
+        arm, chain = case.arm, case.chain
         admit(kernel.CONSUMER, arm, chain)
-        given = with_all_gains(arm, law)
-        self.gains = given.gains if given.references == AT_HUB else None
-        self.law, self.chain = acting_law(arm, given, chain)
+        self.case = case
+        self.gains = case.gains if case.feedback.references == AT_HUB else None
+        self.law, self.chain = acting_law(case)
         references_of(self.law, scenario)  # raises for one that is missing
         self.scenario, self.between = scenario, between
         self.others = tuple(dict.fromkeys(name for name in outputs if name not in RECORDED))
@@ -281,7 +280,8 @@ class Simulator:
 
         Raises ParameterError for I_h = 0 with moment feedback.
         """
-        return self._driven(with_all_gains(self.plant.arm, gains), gains)
+        law, _ = acting_law(self.case.under(gains))
+        return self._driven(law, gains)
 
     def _driven(self, law: Law, gains: HubFeedback | None) -> Simulation:
         """A law in z over the scenario, and its gains at the hub, if it is of these."""

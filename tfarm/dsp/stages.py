@@ -7,6 +7,7 @@ from tfarm.arm import Arm, must_be_arm
 from tfarm.arm.chain import Chain, chain_or_usual, stated
 from tfarm.arm.stages import Consumer
 from tfarm.arm.writing import arm_table
+from tfarm.case import Case
 from tfarm.dsp.plant import driven
 
 
@@ -19,6 +20,12 @@ def admit(consumer: Consumer, arm: Arm, chain: Chain | None) -> tuple[Arm, Chain
     chain = chain_or_usual(chain)
     consumer.refuse_others(*_tables(arm, chain))
     return driven(arm, chain)
+
+
+def admit_case(consumer: Consumer, case: Case) -> Case:
+    """Return a case with the arm that its chain drives, as `admit`."""
+    arm, chain = admit(consumer, case.arm, case.chain)
+    return case if arm is case.arm else case.on(arm).through(chain)
 
 
 @lru_cache(maxsize=64)

@@ -16,9 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, HubFeedback
 from tfarm.arm.chain import TIME_ROUNDING
 from tfarm.arrays import Complex, Real
+from tfarm.case import Case
 from tfarm.dsp.plant import RECORDED
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator
@@ -177,7 +178,7 @@ def motion_of(arm: Arm, run: Simulation, until: float = math.inf, most: int = MO
     names = [f"deflection@{each!r}" for each in x.tolist()]
     torque = np.pad(run.torque, (0, run.scenario.t.size - run.torque.size))
     # records between two samples, between two of which is a frame
-    again = Simulator(arm, run.chain, run.scenario, between=4, outputs=names)
+    again = Simulator(Case(arm, HubFeedback(), run.chain), run.scenario, between=4, outputs=names)
     found = again.controller(lambda measured: float(torque[measured.k]))
     # eight frames to a period of the first mode, as far as the film may be that long
     wish = math.ceil(8 * float(modes(arm, 1).natural_frequency_hz[-1]) / RATE)

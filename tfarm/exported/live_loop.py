@@ -40,6 +40,7 @@ from tfarm.assessment.card import (
     reference_damping,
 )
 from tfarm.assessment.stability_map import BEYOND_PICTURE, sampled_region
+from tfarm.case import Case
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits
 from tfarm.dsp import Chain, PulseTransfer, Simulator, scenario, traces
@@ -149,7 +150,7 @@ def law_data(arm: Arm, chain: Chain, law: Law, reach: float = 10.0) -> LiveNumbe
         "start": gains,
         "reference": gains,
         **dict.fromkeys(("continuous", "sampled_map", "slew", "lyapunov", "default", "outputs")),
-        "sampled_loop": law_in_page(sampled_verdict(arm, law, chain).full, list(gains)),
+        "sampled_loop": law_in_page(sampled_verdict(Case(arm, law, chain)).full, list(gains)),
     }
 
 
@@ -209,7 +210,7 @@ def _graded(arm: Arm, corners: Sequence[Law], chain: Chain, law: AnyLaw, unit: L
     """Return the loop with whose damping an undamped arm is graded, and the words for that: `tfarm.assessment.card`."""
     C = reference_damping(arm)
     damped = arm.having(damping=C)
-    sampled = sampled_verdict(damped, law, chain).full
+    sampled = sampled_verdict(Case(damped, law, chain)).full
     samples, _ = _samples(damped, corners, unit)
     return samples | {
         "kind": "band",
@@ -345,8 +346,10 @@ def slew_numbers(arm: Arm, chain: Chain, law: HubFeedback, most: int = 5000) -> 
         task = scenario("slew", arm, chain, traces.RECORD_LENGTH * chain.slew.rise_time)
         if task.t.size > most:
             return None
-        count = enough_modes(lambda number: Simulator(arm, ideal_chain(chain), task, count=number).linear(law)).modes
-        plant = _upper(Simulator(arm, chain, task, count=count).plant)
+        case = Case(arm, law, chain)
+        ideal_case = case.through(ideal_chain(chain))
+        count = enough_modes(lambda number: Simulator(ideal_case, task, count=number).run()).modes
+        plant = _upper(Simulator(case, task, count=count).plant)
         ideal = np.c_[task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference, task.rigid_moment]
         return {
             **_sampling(chain),

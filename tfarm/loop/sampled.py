@@ -31,16 +31,16 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import FED_BACK, GAINS, AnyLaw, Arm, HubFeedback, Law, law_of
-from tfarm.arm.chain import Chain, Sampling, chain_or_usual
+from tfarm.arm import FED_BACK, GAINS, Arm, HubFeedback, Law, law_of
+from tfarm.arm.chain import Chain, Sampling
 from tfarm.arrays import LEAST_SIZE, MACHINE_EPS, Complex, Real, Whole
+from tfarm.case import Case
 from tfarm.dsp.discretise import (
     LawInZ,
     acting_law,
     law_in_z,
     root_product,
     root_product_error,
-    with_all_gains,
 )
 from tfarm.dsp.plant import (
     MODES_USED,
@@ -215,7 +215,7 @@ class Sampled(Loop):
         sampling = self.chain.sampling
         own = max(0.0, sampling.delay_samples - self.law.delay / sampling.period)
         chain = replace(self.chain, sampling=replace(sampling, delay_samples=own))
-        return sampled_loop(self.arm, law, chain, count=self.plant.count)
+        return sampled_loop(Case(self.arm, law, chain), count=self.plant.count)
 
     def on(self, arm: Arm, count: int) -> Sampled:
         """The loop of the same law on another arm, with `count` flexible modes."""
@@ -419,20 +419,19 @@ def _weierstrass(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tu
     return loop.row @ loop.rig.terms(1 + (one + o), b, o), slope, apart
 
 
-def sampled_loop(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int = USUAL_MODES) -> Sampled:
-    """Return the loop with `count` flexible modes.
+def sampled_loop(case: Case, *, count: int = USUAL_MODES) -> Sampled:
+    """Return the loop of a case with `count` flexible modes.
 
     Raises ParameterError for a locked hub, an unknown signal, a law in z of another period, a massless hub whose moment
     is fed back (an algebraic loop), and as `discretised` does.
     """
-    law = with_all_gains(arm, law)
-    acting, chain = acting_law(arm, law, chain_or_usual(chain))
+    law, (acting, chain) = case.feedback, acting_law(case)
     weights, units = [1.0] * len(law.parts), acting.part_gains
     for name, (place, value) in units.items():
         weights[place] = value
         law, acting = (each.having(name, 1.0) for each in (law, acting))
     in_z = law_in_z(law, acting, chain)
-    return Sampled(SampledRig(sensed_plant(arm, chain, in_z.signals, count), chain, in_z), law, tuple(weights))
+    return Sampled(SampledRig(sensed_plant(case.arm, chain, in_z.signals, count), chain, in_z), law, tuple(weights))
 
 
 def resized(loop: Sampled, count: int) -> Sampled:

@@ -22,12 +22,14 @@ import scipy  # whose statistics take half a second to load
 
 from tfarm.arm import PLANE
 from tfarm.arrays import Real
-from tfarm.assessment.card import LoopCard, admitted, analysis_of, loop_card, words_of
+from tfarm.assessment.card import LoopCard, analysis_of, loop_card, words_of
 from tfarm.assessment.step import LoopResponse, step
+from tfarm.dsp.stages import admit_case
 from tfarm.errors import ConvergenceError, TfarmError, must_be_known, require
 from tfarm.exact.system import system_of
 from tfarm.loop.curve import decibels
 from tfarm.loop.poles import closed_loop_poles
+from tfarm.loop.sampled_verdict import SAMPLED_LOOP
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Interval, windows_of
 from tfarm.response import transfer
@@ -126,7 +128,7 @@ def _card_of(loop: str) -> Asked:
         if loop == "continuous" and one.case.law.is_discrete:
             return {}
         if names <= {f"{loop}.stability", f"{loop}.certainty"}:
-            case = admitted(one.case)
+            case = admit_case(SAMPLED_LOOP, one.case)
             words = words_of(analysis_of(loop, case).verdict, case.chain)
             return {f"{loop}.{key}": text for key, text in words.items()}
         return {name: value for name, _, value in entries_of(LoopCard, loop_card(loop, one.case), loop)}
@@ -168,7 +170,7 @@ def intervals_of(one: Subject, names: Set[str]) -> dict[str, Any]:
     """Stability and intervals of gains at the hub; undecided, without intervals, where poles cannot be counted."""
     found: dict[str, Any] = {STABILITY: "undecided"}
     with suppress(ConvergenceError):
-        case = admitted(one.case)
+        case = admit_case(SAMPLED_LOOP, one.case)
         verdict = stability(case.arm, case.law)
         gains = [gain for gain in PLANE if gain in verdict.loop.numbers and any(f".{gain}." in name for name in names)]
         for gain, of in windows_of(verdict, gains).items():
@@ -184,7 +186,7 @@ def _damped_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
 
 
 def _poles_of(one: Subject, _: Set[str]) -> dict[str, float | None]:
-    case = admitted(one.case)
+    case = admit_case(SAMPLED_LOOP, one.case)
     found = closed_loop_poles(case.arm, case.law)
     s = found.values
     return {UNSTABLE: float(found.unstable), **_numbered(REAL, s.real), **_numbered(IMAGINARY, s.imag)}

@@ -13,6 +13,7 @@ import numpy as np
 from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm, as_law, must_turn
 from tfarm.arm.chain import chain_or_usual
 from tfarm.arm.stages import Consumer
+from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.dsp.stages import admit
 from tfarm.errors import ConvergenceError, must_be_known, require
@@ -291,7 +292,7 @@ class _Task:
         own = choice.search.form
         on_arms = tuple(
             OnArm(each.name, each.numbers, judge.value(law), stability(judge.arm, law),
-                  sampled_brief(judge.arm, law, judge.chain))
+                  sampled_brief(Case(judge.arm, law, judge.chain)))
             for each, judge in zip(named, choice.worst.judges, strict=True)
         )  # fmt: skip
         at_ends = own.at_ends(x)
@@ -317,7 +318,7 @@ def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Cha
     text = f"no law {form.name} with {within} was found that is stable"
     if chain is None:
         return f"{text}: widen the bounds"
-    verdict = max((sampled_verdict(each.arm, law, chain) for each in arms), key=lambda each: each.log_radius)
+    verdict = max((sampled_verdict(Case(each.arm, law, chain)) for each in arms), key=lambda each: each.log_radius)
     growth = np.expm1(verdict.log_radius)
     nearest = f"{verdict.slowest} grows by {growth:.2g} a sample" if growth > 0 else "there is no reserve"
     text = (

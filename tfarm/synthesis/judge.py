@@ -218,7 +218,7 @@ class Judge:
         shares = (1.0, 1 / RESERVE, RESERVE) if self.is_sampled else ()
         try:
             return stability(self.arm, law).is_stable and all(
-                sampled_verdict(self.arm, law.times(share), self.chain).is_stable for share in shares
+                sampled_verdict(Case(self.arm, law.times(share), self.chain)).is_stable for share in shares
             )
         except ConvergenceError:  # a pole on the axis or the circle
             return False
