@@ -124,10 +124,8 @@ def export(
     name: beginning of the identifiers in C
     anyway: also where the loop is not certified stable
     """
-    subject, controller, defaults = loop(arm)
-    found = tfarm.export(
-        subject,
-        controller,
+    case, defaults = loop(arm)
+    found = case.export(
         what=cast("Any", what),
         form=cast("Any", form),
         folder=out,
@@ -324,9 +322,9 @@ def study_arguments(
     if "arm" in file.tables:  # an arm's file names no arm
         refuse({f"--{key}": value for key, value in typed.items()}, f"the study is that of {file.name}; leave this out")
         return load_study(file), None
-    subject, controller, defaults = loop(file)
+    case, defaults = loop(file)
     known = {key: value for key, value in typed.items() if value is not None}
-    return {"arm": subject, "law": controller, "chain": chain(file), **known}, defaults
+    return {"arm": case.arm, "law": case.law, "chain": chain(file), **known}, defaults
 
 
 @command(epilog="study sasaki2012-lab --over payload.mass=uniform:0,0.2 --ask card --draws 100 --out study")
