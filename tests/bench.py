@@ -347,7 +347,7 @@ def loops():
 def loci(order=20):
     """The exact root locus and python-control's on a model of the same number of poles, against 50 digits."""
     exact, upper, n = along(BARE), along(BARE, order // 2 + 1), 20 * 500
-    gains, system = exact.gain, open_loop(BARE.arm, HubFeedback(), "K1", order // 2 - 1)
+    gains, system = exact.gain, open_loop(Case(BARE.arm, HubFeedback()), "K1", order // 2 - 1)
     ours, theirs = timed(
         [CALLS["root locus"][0], lambda subject: lambda: control.root_locus_map(system, gains)], 20, BARE
     )
@@ -355,7 +355,7 @@ def loci(order=20):
     def error(found, values):
         worst = 0.0
         for at in np.linspace(1, gains.size - 1, 6).round().astype(int):
-            loop = ContinuousLoop(BARE.arm, HubFeedback(K1=float(gains[at])))
+            loop = ContinuousLoop(Case(BARE.arm, HubFeedback(K1=float(gains[at]))))
             for near, value in zip(found.branches[:, at], values[:, at], strict=True):
                 if near:
                     disc = enclosed(loop.k, complex(near), 50, loop.exact)

@@ -21,7 +21,6 @@ from tfarm.dsp import Chain
 from tfarm.dsp.scenarios import slew
 from tfarm.dsp.simulate import Simulator
 from tfarm.loop.circle_crossings import sampled_map
-from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.locus import locus
 from tfarm.loop.plane import gain_map
 from tfarm.records import LONGEST_REPR, record
@@ -156,7 +155,7 @@ def test_a_law_is_shown_as_it_is_typed() -> None:
         ["deflection@0.3", "0.5"],
         ["delay", "0.002"],
     ]
-    assert "law=Law(hub_angle=([2, 1], [0.01, 1]), deflection@0.3=0.5, delay=0.002)" in repr(ContinuousLoop(LAB, LEAD))
+    assert "law=Law(hub_angle=([2, 1], [0.01, 1]), deflection@0.3=0.5, delay=0.002)" in repr(Case(LAB, LEAD))
 
 
 def test_every_record_with_arrays_is_one() -> None:

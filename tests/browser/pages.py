@@ -271,7 +271,7 @@ def test_loci_have_the_poles_of_their_gains(browser, folder, name):
             assert turns.size > 5
             assert turns.max() <= LARGEST_TURN
         for row in rows[:: len(rows) // 6]:
-            exact = stability(arm, law.having("K2", row["gain"]), band).poles.values
+            exact = stability(Case(arm, law.having("K2", row["gain"])), band).poles.values
             s = complex(row["re"], row["im"])
             assert abs(exact - s).min() < 5e-4 * abs(s), row
         loop = sampled_verdict(Case(arm, law, chain)).full
@@ -343,7 +343,7 @@ def test_a_chord_of_the_loop_function_is_within_a_pixel_of_it(browser, folder, n
         pixels = page.evaluate("live.room('nyquist')[0]") / 5.0  # of 1, where that is the shorter side
         graded = arm.having(damping=reference_damping(arm)) if arm.has_elastic_link else arm
         of = arm if sampled_verdict(Case(arm, law, chain)).word == "unstable" else graded
-        exact = (ContinuousLoop(graded, as_law(law)).parts, sampled_verdict(Case(of, law, chain)).full.parts)
+        exact = (ContinuousLoop(Case(graded, as_law(law))).parts, sampled_verdict(Case(of, law, chain)).full.parts)
         for key, parts in zip(("curve", "zcurve"), exact, strict=True):
             rows = page.evaluate(f"live.now.{key}(live.now.from).map(row => [row.w, row.x, row.y])")
             w, x, y = np.array(rows).T

@@ -123,5 +123,6 @@ def test_a_locus_under_any_law_keeps_its_poles():
     for n in more[::3]:
         branches = fine.branches[np.isfinite(fine.branches[:, n]), n]
         assert (
-            abs(1 + ContinuousLoop(LAB, LEAD.having("gain", float(fine.gain[n]))).loop_function(branches)).max() < 1e-6
+            abs(1 + ContinuousLoop(Case(LAB, LEAD.having("gain", float(fine.gain[n])))).loop_function(branches)).max()
+            < 1e-6
         )

@@ -87,7 +87,7 @@ def test_radii_on_the_page_are_those_of_the_command_at_each_delay(capsys, file, 
 def test_the_loop_function_of_an_unstable_loop_has_no_margins(given):
     law = Law({"hub_angle": -5.0, "hub_rate": ([1.0], [0.01, 1.0])}, name="backwards")
     section = margins_section(ArmReport(LAB, Chain(), (GivenLaw(law),)))
-    assert margins_of(LAB, law).stability.verdict == "unstable"
+    assert margins_of(LAB, law).stability.word == "unstable"
     assert set(blocks_of(section)) == {"law-bode", "margins", "law-spill", "law-windows"}
     assert "interval" not in table(section, "law-windows")
 

@@ -62,7 +62,7 @@ def test_samples_are_the_parts_of_the_loop_function(case):
     arm, data, page = case
     omega = np.random.default_rng(3).uniform(1e-3, 1.0, 200) * data["band"]
     for law in some_gains(data, 5, 3):
-        drive, fed_back = ContinuousLoop(arm, law).parts(1j * omega)
+        drive, fed_back = ContinuousLoop(Case(arm, law)).parts(1j * omega)
         D, N = page.parts(omega, law)
         size = (abs(drive) * abs(D) + abs(fed_back) * abs(N) + abs(drive) * abs(N) + abs(fed_back) * abs(D)) / 2
         assert np.max(abs(drive * N - fed_back * D) / size) < 1e-9

@@ -40,7 +40,7 @@ def section():
 
 
 def windows(arm, gains=GAINS):
-    return windows_of(stability(arm, gains), ["K2"])["K2"]
+    return windows_of(stability(Case(arm, gains)), ["K2"])["K2"]
 
 
 # ------------------------------------------------------------ the overlay
@@ -69,7 +69,7 @@ def test_the_map_of_both_regions_is_that_of_the_poles():
             inside = [any(a < K2 < b for a, b in each.stable_intervals[i]) for each in regions]
             law = tfarm.HubFeedback(K1=K1, K2=float(K2))
             assert inside == [
-                stability(LAB, law).is_stable,
+                stability(Case(LAB, law)).is_stable,
                 loop.having("K1", K1).having("K2", float(K2)).poles.is_stable,
             ]
 

@@ -97,7 +97,7 @@ def test_a_hub_without_inertia_has_no_moment_gain(capsys, tmp_path):
     file.write_text(tfarm.arm.to_toml(pin), encoding="utf-8")
     found = answer(capsys, "margins", str(file))
     assert (found["K1"], found["K2"]) == (default_gains(pin).K1, 0.0)
-    assert stability(pin, HubFeedback(K1=found["K1"])).verdict == found["verdict"]
+    assert stability(Case(pin, HubFeedback(K1=found["K1"]))).word == found["verdict"]
 
 
 VERBS = [

@@ -384,7 +384,7 @@ def test_pi_needs_friction(monkeypatch):
         rough = replace(LAB, hub=replace(LAB.hub, friction=share * LAB.total_inertia * Ki / Kp))
         assert np.roots([LAB.total_inertia, rough.hub.friction, Kp, Ki]).real.max() * (-1) ** is_stable > 0
         law = form.record_at(form.at([Ki]))
-        assert stability(rough, law).is_stable == is_stable
+        assert stability(Case(rough, law)).is_stable == is_stable
 
 
 def test_a_pinned_tip_has_laws_of_all_structures_and_a_locked_hub_none():

@@ -133,7 +133,7 @@ class ComparedSide:
             loop = cast("Analysis", self.loop).loop
             late = loop.chain.sampling.delay_samples + delay / loop.chain.sampling.period
             return [stable_windows(loop.with_delay(each), FACTOR) for each in late.tolist()]
-        in_s = ContinuousLoop(self.arm, self.case.law)
+        in_s = ContinuousLoop(self.case)
         factors = between(0.0, MOST_FACTOR, FACTORS)
         return [*plane(in_s, ("delay", "gain"), in_s.law.delay + delay, factors).stable_intervals]
 

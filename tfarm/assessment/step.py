@@ -165,7 +165,7 @@ class _Record:
             (error <= CONVERGED * abs(peak.value)).all() and peak.bound <= CONVERGED * abs(peak.value)
             for _, _, error, peak in curves.values()
         )
-        word, count = verdict_on(response.poles.loop).verdict, f"{response.poles.count} poles{omitted}"
+        word, count = verdict_on(response.poles.loop).word, f"{response.poles.count} poles{omitted}"
         return self._loop(word, is_converged, count, curves)
 
     def _of_sampled(self, case: Case, task: Scenario, names: Sequence[str]) -> LoopResponse:
@@ -366,7 +366,7 @@ def step(
         hub, own = followed(case.law)
         case = case.under(own)
     arm, chain = case.arm, case.chain
-    poles = None if case.law.is_discrete else usual_poles(ContinuousLoop(arm, case.law))
+    poles = None if case.law.is_discrete else usual_poles(ContinuousLoop(case))
     length = usual_duration(poles, chain) if duration is None else duration
     if is_step:
         task = resting("reference", arm, chain, length, hub)

@@ -176,7 +176,7 @@ def _of_any_law(arm: Arm, chain: Chain, corners: Sequence[Law], law: AnyLaw, uni
         "limits": {"gain": GAIN_LIMITS, "phase": PHASE_LIMITS, "periods": PERIOD_LIMITS, "peak": PEAK_LIMITS},
         **samples,
         **_known(arm, is_quiet, unit is None),
-        "reference_count": stability(arm, law, samples["band"]).unstable_roots,
+        "reference_count": stability(Case(arm, law), samples["band"]).unstable_roots,
         "graded": _graded(arm, corners, chain, law, unit) if arm.has_elastic_link else None,
         "margin_names": dict(zip(("up", "down", "phase", "delay", "peak"), GRADED.values(), strict=True)),
     }
@@ -190,8 +190,8 @@ def _samples(arm: Arm, corners: Sequence[Law], law: Law | None = None) -> tuple[
 
     They are those of hub angle and gauge, or of each part of `law`, whose poles and zeros are steep places too.
     """
-    band, is_quiet = band_of_family(ContinuousLoop(arm, each) for each in corners)
-    samples = loop_panels(arm, band, None if law is None else ContinuousLoop(arm, law))
+    band, is_quiet = band_of_family(ContinuousLoop(Case(arm, each)) for each in corners)
+    samples = loop_panels(arm, band, None if law is None else ContinuousLoop(Case(arm, law)))
     blocks = [] if law is None else _blocks(law)
     own = [abs(s) for block in blocks for s in (*block.poles, *block.zeros) if s]
     return {
@@ -214,7 +214,7 @@ def _graded(arm: Arm, corners: Sequence[Law], chain: Chain, law: AnyLaw, unit: L
     samples, _ = _samples(damped, corners, unit)
     return samples | {
         "kind": "band",
-        "reference_count": stability(damped, law, samples["band"]).unstable_roots,
+        "reference_count": stability(Case(damped, law), samples["band"]).unstable_roots,
         "sampled_loop": sampled_numbers(sampled) if unit is None else law_in_page(sampled, list(unit.part_gains)),
         "words": UNDAMPED.format(C),
     }
@@ -246,7 +246,7 @@ def _known(arm: Arm, is_quiet: bool, are_gains: bool) -> LiveNumbers:
 
 def _stable_moments(arm: Arm) -> list[float | None]:
     """Return between which K2 no mode is driven by K1 > 0 without damping; None where no limit was found."""
-    found = windows_of(stability(arm, default_gains(arm).having(MOMENT_GAIN, 0.0)), [MOMENT_GAIN])[MOMENT_GAIN]
+    found = windows_of(stability(Case(arm, default_gains(arm).having(MOMENT_GAIN, 0.0))), [MOMENT_GAIN])[MOMENT_GAIN]
     return [end if found.end(end) == "edge" else None for end in found.around or (-math.inf, math.inf)]
 
 

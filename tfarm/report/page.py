@@ -406,7 +406,7 @@ def check_laws(report: ArmReport) -> None:
         case = Case(each.arm, each.law, report.chain)
         Signals(case.arm, case.law.signals)
         if not case.law.is_discrete:
-            ContinuousLoop(case.arm, case.law)
+            ContinuousLoop(case)
         discretise.acting_law(case)
 
 

@@ -170,12 +170,11 @@ def intervals_of(one: Subject, names: Set[str]) -> dict[str, Any]:
     """Stability and intervals of gains at the hub; undecided, without intervals, where poles cannot be counted."""
     found: dict[str, Any] = {STABILITY: "undecided"}
     with suppress(ConvergenceError):
-        case = admit_case(SAMPLED_LOOP, one.case)
-        verdict = stability(case.arm, case.law)
+        verdict = stability(admit_case(SAMPLED_LOOP, one.case))
         gains = [gain for gain in PLANE if gain in verdict.loop.numbers and any(f".{gain}." in name for name in names)]
         for gain, of in windows_of(verdict, gains).items():
             found |= {f"{INTERVAL}.{gain}.{name}": getattr(of.interval, name, None) for name in Interval._fields}
-        found[STABILITY] = verdict.verdict
+        found[STABILITY] = verdict.word
     return found
 
 

@@ -57,7 +57,7 @@ class OnArm:
         self,
     ) -> Annotated[str, Quantity("continuous-time loop", key="verdict", help="stability without sampling")]:
         """The verdict on the continuous-time loop."""
-        return self.verdict.verdict
+        return self.verdict.word
 
     @property
     def known_beyond(self) -> Annotated[bool, Quantity(help="whether the verdict holds for all higher modes too")]:
@@ -225,7 +225,7 @@ def design(
     same_input(arms)
     form = structure_of(structure, arm, Kp=Kp, modes=modes, period=chain.sampling.period, bounds={"K1": K1, "K2": K2})
     for each in arms:
-        ContinuousLoop(each.arm, as_law(form.record_at(form.origin)))
+        ContinuousLoop(Case(each.arm, as_law(form.record_at(form.origin))))
         check_bounds(form, each.arm)
     tell = progress or (lambda text: None)
     task = _Task(arm, objective, form, modes, chain, continuous, tell)
@@ -291,7 +291,7 @@ class _Task:
         x = choice.x
         own = choice.search.form
         on_arms = tuple(
-            OnArm(each.name, each.numbers, judge.value(law), stability(judge.arm, law),
+            OnArm(each.name, each.numbers, judge.value(law), stability(Case(judge.arm, law)),
                   sampled_brief(Case(judge.arm, law, judge.chain)))
             for each, judge in zip(named, choice.worst.judges, strict=True)
         )  # fmt: skip
