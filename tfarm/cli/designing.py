@@ -10,7 +10,7 @@ from typing import Annotated, Any, cast
 import typer
 
 import tfarm
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, TWO_GAINS, as_law
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, TWO_GAINS
 from tfarm.arm.reading import ArmFile
 from tfarm.cli.app import (
     CONTROLLER,
@@ -78,8 +78,9 @@ def design(
     """
     from tfarm.arm.writing import save_law
 
+    subject = load_arm(arm, theory)
     found = tfarm.design(
-        load_arm(arm, theory),
+        subject,
         objective,
         structure=structure,
         modes=modes,
@@ -91,7 +92,7 @@ def design(
         **{RATE_GAIN: k1, MOMENT_GAIN: k2, ANGLE_GAIN: kp},
     )
     if save is not None:
-        save_law(as_law(found.law), save)
+        save_law(tfarm.Case(subject, found.law).law, save)
     show(found, also=(save,))
 
 

@@ -25,8 +25,8 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import scipy  # whose statistics take half a second to load
 
-from tfarm.arm import AnyLaw, Arm, as_law
-from tfarm.arm.chain import Chain, chain_or_usual, file_text, load_chain
+from tfarm.arm import AnyLaw, Arm
+from tfarm.arm.chain import Chain, file_text, load_chain
 from tfarm.arm.checks import whole
 from tfarm.arm.law_tables import load_law
 from tfarm.arm.reading import AnyFile, load, load_tables, presets
@@ -258,7 +258,7 @@ def study(
     ConvergenceError
         Where a worker process or the scheduler was killed; another run goes on.
     """
-    case = Case(arm, as_law(default_gains(arm) if law is None else law), chain_or_usual(chain))
+    case = Case(arm, default_gains(arm) if law is None else law, chain)
     workers = usual_workers(client) if workers is None else workers
     for key, value in {"draws": draws, "seed": seed, "workers": workers, "part": 1 if part is None else part}.items():
         whole(key, value, int(key != "seed"), MOST_SEED, f"a whole number from {int(key != 'seed')}")
