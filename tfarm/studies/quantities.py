@@ -202,7 +202,7 @@ def _columns(name: str, label: str, unit: str, meaning: str) -> dict[str, Quanti
 
 
 def _tuner_of(one: Subject, _: Set[str]) -> dict[str, Any]:
-    tuning = tuned(one.case.arm, one.case.chain, one.plan, **one.tuner)
+    tuning = tuned(one.case.arm, one.case.chain, None, **one.tuner)
     training = tuning.training
     return {
         **_numbered(TRIAL_COST, training.costs),
@@ -352,10 +352,10 @@ class Failure(NamedTuple):
     row: Annotated[int, Quantity("first row", help="number of the first of these rows")]
 
 
-def least_share(successes: int, count: int, confidence: float = CONFIDENCE) -> float:
-    """Return the share that is exceeded with that confidence, one-sided (Clopper and Pearson, 1934)."""
+def least_share(successes: int, count: int) -> float:
+    """Return the share that is exceeded with 95 % confidence, one-sided (Clopper and Pearson, 1934)."""
     test = scipy.stats.binomtest(successes, count, alternative="greater")
-    return float(test.proportion_ci(confidence, method="exact").low)
+    return float(test.proportion_ci(CONFIDENCE, method="exact").low)
 
 
 def shares_of(table: Mapping[str, Any], names: Sequence[str], is_independent: bool) -> tuple[StableShare, ...]:

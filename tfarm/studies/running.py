@@ -28,7 +28,6 @@ from tfarm.case import Case
 from tfarm.errors import ConvergenceError, ParameterError, TfarmError, one_line, require
 from tfarm.files import write_file
 from tfarm.records import frozen
-from tfarm.tuner import Plan as TunerPlan
 
 from .quantities import FAILED, Values, prepare, quantity_of, sources_of, values_of
 from .space import Space, Subject, Subjects, extra, parquet
@@ -64,7 +63,6 @@ class Plan:
     case: Case
     space: Space
     names: tuple[str, ...]
-    tuner: TunerPlan | None = None  # the usual one of each arm by default
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -85,7 +83,7 @@ class Plan:
     def subjects(self) -> Subjects:
         """The arms and loops of the rows."""
         fitted = self.space.posterior.keys if self.space.posterior else ()
-        return Subjects(self.case, self.space.keys, self.tuner, fitted)
+        return Subjects(self.case, self.space.keys, fitted)
 
 
 def chunk(plan: Plan, first: int, last: int, listed: Real | None = None) -> Chunk:
