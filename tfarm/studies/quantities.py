@@ -362,18 +362,21 @@ def shares_of(table: Mapping[str, Any], names: Sequence[str], is_independent: bo
     """Return the stable shares of the loops whose stability was computed."""
     found = []
     for loop in [each for each in LOOPS if f"{each}.stability" in names]:
-        words = table[f"{loop}.stability"]
-        stable = int((words == STABLE).sum())
-        open_ = int((words == "").sum())
-        count = len(words)
-        texts = table.get(f"{loop}.certainty", np.full(count, ""))[words == STABLE].tolist()
-        known = [text.partition(" ")[0].rstrip(",") for text in texts]
+        words = table[f"{loop}.stability"].tolist()
+        stable = words.count(STABLE)
+        undetermined = words.count("")
+        texts = table.get(f"{loop}.certainty", [""] * len(words))
+        known = [text.partition(" ")[0].rstrip(",") for text, word in zip(texts, words, strict=True) if word == STABLE]
         weakest = ["exact", "certified", "converged", "approximate", "not determined", ""]
-        found.append(StableShare(
-            loop=loop.replace("continuous", "continuous-time"), stable=stable, open=open_, other=count - stable - open_,
+        share = StableShare(
+            loop=loop.replace("continuous", "continuous-time"),
+            stable=stable,
+            other=len(words) - stable - undetermined,
+            open=undetermined,
             certainty=max(known, key=weakest.index, default=""),
-            at_least=Percent(least_share(stable, count)) if is_independent else None,
-        ))  # fmt: skip
+            at_least=Percent(least_share(stable, len(words))) if is_independent else None,
+        )
+        found.append(share)
     return tuple(found)
 
 

@@ -108,6 +108,11 @@ def table_of(plan: Plan, first: int, rows: Real) -> Chunk:
     return table
 
 
+def rows_of(table: Mapping[str, Sequence[Any]]) -> list[Row]:
+    """Return the rows of a table."""
+    return [dict(zip(table, values, strict=True)) for values in zip(*table.values(), strict=True)]
+
+
 def _attempt(function: Callable[..., Any], *arguments: Any) -> Any:
     """Return the result of a function, or the reason for none: one arm never ends a study."""
     try:
@@ -321,19 +326,17 @@ def searched(parts: Parts, search: Callable[[Callable[[Real], Row]], object], de
     Each is written as a part and computed once: an interrupted search goes on where it was.  None where it has no end
     before the deadline [s].
     """
-    columns = parts.column(*parts.plan.columns)
+    known = rows_of(parts.column(*parts.plan.columns))
     seen = list[Row]()
-    rows = zip(*columns.values(), strict=True)
-    known = {int(values[0]): dict(zip(columns, values, strict=True)) for values in rows}
 
     def result(values: Real) -> Row:
         n = len(seen)
-        if n not in known:
+        if n == len(known):
             if time.monotonic() >= deadline:
                 raise TimeoutError
             table = table_of(parts.plan, n, values)
             parts.write(n, table)
-            known[n] = {name: of[0] for name, of in table.items()}
+            known.extend(rows_of(table))
         seen.append(known[n])
         return known[n]
 
