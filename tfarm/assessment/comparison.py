@@ -58,9 +58,8 @@ class ComparedSide:
 
     `poles` are closed-loop poles with Im s >= 0, complete in their box; `open_loop` those of the arm with Im s > 0 by
     flexible mode; `sampled` is the verdict at the chain's period; `loop` has verdict and margins, `range_words` the
-    frequency range of a continuous-time verdict beyond which nothing is known.  Where one of the
-    laws compared is a law in z there is no continuous-time loop on either side: `loop` is the sampled one, with poles
-    s = ln(z)/T.
+    frequency range of a continuous-time verdict beyond which nothing is known.  Where one of the laws compared is a law
+    in z there is no continuous-time loop on either side: `loop` is the sampled one, with poles s = ln(z)/T.
     """
 
     name: str
