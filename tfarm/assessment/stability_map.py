@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import GAINS, PLANE, Arm, HubFeedback, shown_unit
+from tfarm.arm import GAINS, PLANE, Arm, shown_unit
 from tfarm.arrays import Complex, Real
 from tfarm.case import Case
 from tfarm.dsp import Chain
@@ -54,11 +54,14 @@ class StableRegions(NamedTuple):
         ]
 
 
-def stable_regions(arm: Arm, gains: HubFeedback, chain: Chain) -> StableRegions:
-    """Return the regions around these gains.  Raises ParameterError where the arm has no loop."""
+def stable_regions(case: Case) -> StableRegions:
+    """Return the regions around the gains of a case.  Raises ParameterError where it has no loop."""
+    gains = case.gains
+    assert gains is not None
+    arm = case.arm
     # at C = 0 with a little damping too
     dampings = (arm.damping,) if arm.damping else (1e-4, 1e-6, 0.0)
-    loops = [sampled_verdict(Case(arm.having(damping=C), gains, chain)).full for C in dampings]
+    loops = [sampled_verdict(case.on(arm.having(damping=C))).full for C in dampings]
     ends = np.unique(np.concatenate([ends_of_K1(loop) for loop in loops]))
     ends = ends[ends > 0]
     ends = ends[np.diff(ends, prepend=0.0) > 1e-3 * ends]
@@ -154,10 +157,6 @@ def least_damping(plane: Plane) -> Real:
     """
     signals = tuple(each.output for name in PLANE for each in GAINS if each.name == name)
     model = continuous_model(plane.arm, signals, DESIGNED_MODES, 8, first_frequency(plane.arm))
-    points = np.reshape(np.meshgrid(*plane.axes), (2, -1))
-    found = []
-    # five hundred points at a time for memory, whatever the grid
-    for part in np.array_split(points, math.ceil(points.shape[1] / 500), axis=1):
-        law = [Entry(name, row[None], ONE) for name, row in zip(signals, part, strict=True)]
-        found.append(damping_of(model, model.poles(law)))
-    return np.concatenate(found).reshape(plane.y.size, plane.x.size)
+    grids = np.meshgrid(*plane.axes)
+    laws = [Entry(name, grid.reshape(1, -1), ONE) for name, grid in zip(signals, grids, strict=True)]
+    return damping_of(model, model.poles(laws)).reshape(grids[0].shape)

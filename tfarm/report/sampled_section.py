@@ -57,7 +57,11 @@ def sampled_section(report: ArmReport) -> PageSection:
     if not report.laws:
         # the gains of the arm itself
         (_, own), *_ = found
-        blocks = [overlay_picture(stable_regions(report.arm, own.loop.gains, chain), own), *blocks, loci_picture(own)]
+        blocks = [
+            overlay_picture(stable_regions(Case(report.arm, own.loop.law, chain)), own),
+            *blocks,
+            loci_picture(own),
+        ]
         facts = [*interval_facts(own), *facts]
     of_whole_law = ("index", "natural_frequency", "band", "aliased", "first_order", "by_damping", "log_radius")
     for each, it in found:

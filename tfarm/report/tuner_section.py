@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm
 from tfarm.assessment.stability_map import stable_regions
+from tfarm.case import Case
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain, scenarios, traces
 from tfarm.errors import CertificationError
@@ -96,7 +97,7 @@ def blocks_of(data: TunerNumbers) -> Iterator[Picture | Table]:
     """
     tuning = data.tuning
     result = tuning.training.result
-    regions = stable_regions(data.arm, tuning.constant, tuning.trial.loop.chain)
+    regions = stable_regions(Case(data.arm, tuning.constant, tuning.trial.loop.chain))
     columns = Column("t_s", of=result.t), Column("K", of=result.K), Column("x_N_m", of=result.x)
     gain = tuning.constant.gain_text(RATE_GAIN, plain)
     yield picture("tune_gain", motion.draw_gain.figure(tuning, *regions), data=columns, tuning=tuning, gain=gain)

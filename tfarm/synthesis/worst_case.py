@@ -160,30 +160,27 @@ def for_the_worst(
     named = list(arms)
     if box is None:
         return find(named, None, "whole"), named, WorstCase({}, 0)
-    tried = added = 0
+    efforts: list[Effort] = ["sketch", "sketch", "whole", *("near",) * 4]
+    tried = 0
     found = None
-    effort: Effort = "sketch"
     while True:
+        effort = efforts.pop(0)
         found = find(named, found, effort)
         limit = max(score_on(found, each.arm) for each in named)
         worst, score, number = worst_inside(box, partial(score_on, found))
         tried += number
         is_worse = score > limit + MUCH_WORSE * abs(limit)
-        if effort != "sketch":
-            if not is_worse:
-                return found, named, WorstCase(box.ranges, tried)
-            if added == 4 and math.isinf(score):
-                raise ConvergenceError(f"no law found is stable on {worst.name}: narrow the ranges", None, None)
-            if added == 4:
-                return found, named, WorstCase(box.ranges, tried, worst.name)
-            effort = "near"
+        if effort != "sketch" and not is_worse:
+            return found, named, WorstCase(box.ranges, tried)
+        if not efforts and math.isinf(score):
+            raise ConvergenceError(f"no law found is stable on {worst.name}: narrow the ranges", None, None)
+        if not efforts:
+            return found, named, WorstCase(box.ranges, tried, worst.name)
         if is_worse:
             tell(f"{worst.name} is worse than the other {len(named)} arms, and added")
             named.append(worst)
-            added += 1
-        if effort == "sketch" and (not is_worse or added == 2):
-            effort = "whole"
-            added = 0
+        elif efforts[0] == "sketch":
+            efforts.pop(0)
 
 
 def same_input(arms: Sequence[NamedArm]) -> None:
