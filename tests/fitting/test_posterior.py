@@ -20,9 +20,8 @@ from tests.shared import refusal, sized, thinned
 from tests.shell import refused, run
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
-from tfarm.fitting.fit import arms_drawn, fit, repeats, save_fit
-from tfarm.fitting.possible import response_band, stable_share
-from tfarm.fitting.posterior import Posterior, PosteriorNumber, load_posterior
+from tfarm.fitting.fit import arms_drawn, fit, response_band, save_fit, stable_share
+from tfarm.fitting.posterior import Posterior, PosteriorNumber, load_posterior, repeats
 from tfarm.plots.frequency import draw_band, draw_share
 from tfarm.report.page import ArmReport
 from tfarm.report.response_sections import fit_section
@@ -304,7 +303,7 @@ def test_the_scatter_between_records(scatter):
     shares = np.array([-1.2, 0.7, 0.1, 1.4, -0.6, -1.1, 0.9, -0.2])
     moduli = LAB.link.youngs_modulus * (1 + scatter * shares)
     found = fit(LAB, records(moduli), free=["link.youngs_modulus"], profile=False)
-    several = repeats(found, draws=12)
+    several = repeats(found, found.parameters, draws=12)
     each = [row["link.youngs_modulus"] for row in several.each]
     assert each == pytest.approx(moduli, rel=5e-3 if scatter else 2e-3)
     times = several.times_wider["link.youngs_modulus"]
@@ -319,6 +318,5 @@ def test_the_scatter_between_records(scatter):
 
 
 def test_two_records_have_no_scatter():
-    assert (
-        repeats(fit(LAB, records([LAB.link.youngs_modulus] * 2), free=["link.youngs_modulus"], profile=False)) is None
-    )
+    found = fit(LAB, records([LAB.link.youngs_modulus] * 2), free=["link.youngs_modulus"], profile=False)
+    assert found.records is None

@@ -37,8 +37,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import AnyLaw, Arm, as_law
-from tfarm.arm.chain import TIME_ROUNDING, Chain
+from tfarm.arm.chain import TIME_ROUNDING
 from tfarm.arm.reading import AnyFile, load_tables
 from tfarm.arm.schema import StrictTable, validated
 from tfarm.arrays import Complex, Real
@@ -217,32 +216,28 @@ class RunComparison:
         return self.run.at_samples.hub_angle + self.measured.reference[0]
 
 
-def compare_run(arm: Arm, law: AnyLaw, chain: Chain, measured: MeasuredRun) -> RunComparison:
+def compare_run(case: Case, measured: MeasuredRun) -> RunComparison:
     """The sampled loop under the reference of a measured run, with as many modes as its signals take.
 
     Raises ParameterError as `simulate` does.
     """
-    case = Case(arm, as_law(law), chain)
-    run, _ = simulated(case, measured.scenario(chain.sampling.period))
+    run, _ = simulated(case, measured.scenario(case.chain.sampling.period))
     return RunComparison(measured, run)
 
 
-def departures(
-    arm: Arm, law: AnyLaw, chain: Chain, measured: MeasuredRun, count: int, longer: float, share: float = 0.05
-) -> list[float]:
+def departures(case: Case, measured: MeasuredRun, count: int, longer: float, share: float = 0.05) -> list[float]:
     """Return the times [s] after a measured run at which the computed hub angle is off its end, by a share of the step.
 
     The reference stays for that much `longer` [s], of 10,000 samples at most; `count` modes are in the loop.
     """
-    period = chain.sampling.period
+    period = case.chain.sampling.period
     end = float(measured.t[-1])
     t = np.append(measured.t, end + min(longer, 10_000 * period))
     held = replace(measured, t=t, reference=np.append(measured.reference, measured.reference[-1]))
-    case = Case(arm, as_law(law), chain)
-    run = Simulator(case.arm, chain, held.scenario(period), case.law, count=count).run().at_samples
+    run = Simulator(case.arm, case.chain, held.scenario(period), case.law, count=count).run().at_samples
     settled = run.hub_angle[run.t <= end][-1]
     away = abs(run.hub_angle - settled) > share * abs(measured.step)
-    return [float(t) for t in run.t[away & (run.t > end)]]
+    return run.t[away & (run.t > end)].tolist()
 
 
 def overshoot(angle: Real, step: float, end: float) -> float:

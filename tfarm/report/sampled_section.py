@@ -15,6 +15,7 @@ from tfarm.arm.chain import MOST_DELAY
 from tfarm.assessment.card import margins_of, sampled_of
 from tfarm.assessment.stability_map import StableRegions, stable_regions
 from tfarm.assessment.step import Step, step
+from tfarm.case import Case
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain, Simulation, results, traces
 from tfarm.dsp.traces import motion_of
@@ -298,7 +299,7 @@ def step_rows(name: str, found: RunComparison) -> Iterator[StepRow]:
 def measured_blocks(report: ArmReport) -> Iterator[Picture | Table]:
     """Each measured run with the exact loop over it, and both in numbers; nothing where none was measured."""
     runs = [(each, each.given.measured) for each in report.controllers if each.given.measured is not None]
-    found = {each.name: compare_run(each.arm, each.law, report.chain, run) for each, run in runs}
+    found = {each.name: compare_run(Case(each.arm, each.law, report.chain), run) for each, run in runs}
     if not found:
         return
     figure = motion.draw_measured_runs.figure(found)
@@ -315,7 +316,7 @@ def growth_words(each: Controller, found: verdict.Verdict, chain: Chain) -> str:
     shown: list[float] = []
     if measured is not None:
         # as much longer as an unstable loop may seem settled
-        shown = departures(each.arm, each.law, chain, measured, found.modes_used, 20 * growth)
+        shown = departures(Case(each.arm, each.law, chain), measured, found.modes_used, 20 * growth)
     return prose("growth", name=each.name, found=found, growth=growth, measured=measured, shown=shown)
 
 
