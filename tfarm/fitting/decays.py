@@ -127,23 +127,20 @@ def ring(
     Raises ParameterError for a signal or times that are not there and for too few samples, ConvergenceError where the
     oscillations are not found.
     """
-    y = recording.signal(name, "--signal")
+    whole = recording.signal(name, "--signal")
     times = recording.times
     low = times[0] if start is None else start
     high = times[-1] if stop is None else stop
     rounding = recording.period / 2 * 1e-6
     kept = (times >= low - rounding) & (times <= high + rounding)
-    most, least = 20, 4 * (EACH * modes + 1)
-    require(1 <= modes <= most, "--modes", modes, f"a whole number from 1 to {most}")
-    found = f"{kept.sum()} samples from {low:g} to {high:g} s; {modes} modes take {least}"
-    remedy = f"{found} (the record goes from {times[0]:g} to {times[-1]:g} s)"
+    require(1 <= modes <= 20, "--modes", modes, "a whole number from 1 to 20")
+    least = 4 * (EACH * modes + 1)
+    taken = f"{kept.sum()} samples from {low:g} to {high:g} s; {modes} modes take {least}"
+    remedy = f"{taken} (the record goes from {times[0]:g} to {times[-1]:g} s)"
     require(kept.sum() >= least, "--from", float(low), remedy, recording.source)
-    require(np.ptp(y[kept]) > 0, "--signal", name, "does not move there", recording.source)
-    return ring_of(recording, name, times[kept], y[kept], modes)
-
-
-def ring_of(recording: Recording, name: str, times: Real, y: Real, modes: int) -> Ring:
-    """The modes of a decay of samples y at some of the times of a record."""
+    times = times[kept]
+    y = whole[kept]
+    require(np.ptp(y) > 0, "--signal", name, "does not move there", recording.source)
     t = times - times[0]
     poles = starting_poles(t, y, modes)
     found = nearest_sum(t, y, poles) if poles.size == modes else None
@@ -155,8 +152,7 @@ def ring_of(recording: Recording, name: str, times: Real, y: Real, modes: int) -
     white = 1.0 if squares <= y.size * (rounding * abs(y).max()) ** 2 else whiteness(found.e)
     notes = [recording.note] if recording.note else []
     if white < NOT_WHITE:
-        rare = 1e-9
-        chance = f"{white:.1g}" if white > rare else f"below {rare:g}"
+        chance = f"{white:.1g}" if white > 1e-9 else "below 1e-09"
         notes.append(
             f"the residuals are correlated (probability {chance} if they were white noise): intervals are "
             "by their autocovariance, and may be too narrow, above all if the residuals are no noise"
@@ -228,8 +224,7 @@ class DampedSum:
         n = self.poles.size
         columns = basis(self.poles, self.t)
         by_time = self.t[:, None]
-        cosines = columns[:, :n]
-        sines = columns[:, n:-1]
+        cosines, sines = np.hsplit(columns[:, :-1], 2)
         a, b = self.linear[:-1].reshape(2, n)
         return np.c_[-by_time * (a * cosines + b * sines), by_time * (b * cosines - a * sines), columns]
 
@@ -241,9 +236,8 @@ class DampedSum:
     @property
     def energy(self) -> Real:
         """(n,): the sum of squares of each mode alone."""
-        n = self.poles.size
-        parts = (basis(self.poles, self.t) * self.linear)[:, :-1]
-        return ((parts[:, :n] + parts[:, n:]) ** 2).sum(axis=0)
+        cosines, sines = np.hsplit((basis(self.poles, self.t) * self.linear)[:, :-1], 2)
+        return ((cosines + sines) ** 2).sum(axis=0)
 
     @property
     def freedom(self) -> int:
@@ -279,11 +273,15 @@ class DampedSum:
 
 def nearest_sum(t: Real, y: Real, start: Complex) -> DampedSum | None:
     """The sum with the least squares next to the poles of a start; None where that is no oscillation in the record."""
-    n = start.size
     period = t[1] - t[0]
+
+    def poles_at(x: Real) -> Complex:
+        real, imaginary = x.reshape(2, -1)
+        return real + 1j * imaginary
+
     first = np.r_[start.real, start.imag]
-    found = least_projected(lambda x: basis(x[:n] + 1j * x[n:], t), y, first, xtol=1e-12)
-    poles = found.x[:n] + 1j * found.x[n:]
+    found = least_projected(lambda x: basis(poles_at(x), t), y, first, xtol=1e-12)
+    poles = poles_at(found.x)
     is_inside = (poles.imag > 0) & (poles.imag < np.pi / period) & (abs(poles.real) < 2 / period)
     if not (found.success and is_inside.all()):
         return None

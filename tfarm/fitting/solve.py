@@ -36,8 +36,6 @@ from tfarm.schema import Quantity
 from .data import CONFIDENCE, in_parts
 from .model import Problem, walled
 
-DRAWS = 300  # points about one that the equation errors lead to
-STARTS = ((0, (0.1,)), (DRAWS, (0.1,)), (DRAWS, (1.0, 0.3, 0.1)))  # draws, and shares of w one after another
 LINES = 400  # of a response, at most
 FIT_SEED = 852780  # of all that a fit draws: the number of the paper's article, any would do
 
@@ -94,11 +92,12 @@ def with_gains(problem: Problem, point: Real) -> tuple[Problem, Real]:
     parameters = list(problem.parameters)
     point = point.copy()
     for H, each in zip(problem.computed(point), problem.responses, strict=True):
+        omega = each.data.omega
         ratio = each.data.values / H
         if each.delay is not None:
-            delay = aligning_delay(each.data.omega, ratio)
+            delay = aligning_delay(omega, ratio)
             point[each.delay] += delay / parameters[each.delay].size
-            ratio = ratio * np.exp(1j * delay * each.data.omega)
+            ratio = ratio * np.exp(1j * delay * omega)
         if each.gain is not None:
             own = parameters[each.gain]
             if np.median(ratio.real / abs(ratio)) < 0:
@@ -115,8 +114,8 @@ def aligning_delay(omega: Real, ratio: Complex) -> float:
     period = 2 * math.pi / omega[0]
     count = math.ceil(16 * min(omega[-1] / omega[0], LINES))
     delays = np.linspace(-period, period, 2 * count + 1)
-    phases = ratio[ratio != 0] / abs(ratio[ratio != 0])
-    aligned = abs(np.exp(1j * np.outer(delays, omega[ratio != 0])) @ phases)
+    phases = np.sign(ratio)
+    aligned = abs(np.exp(1j * np.outer(delays, omega)) @ phases)
     return float(delays[aligned.argmax()]) if aligned.max() > 1.5 * aligned[count] else 0.0
 
 
@@ -124,12 +123,10 @@ def thinned(problem: Problem, most: int) -> Problem:
     """The problem at a number of each response's frequencies at most."""
     responses = []
     for each in problem.responses:
-        w = each.data.omega
-        values = each.data.values
-        sigma = each.noise.sigma
-        kept = np.unique(np.linspace(0, w.size - 1, min(w.size, most)).astype(int))
-        kept = kept[np.isfinite(sigma[kept]) & (values[kept] != 0)]
-        responses.append(each.at(w[kept], values[kept], sigma[kept]))
+        data = each.data
+        kept = np.unique(np.linspace(0, data.points - 1, min(data.points, most)).astype(int))
+        kept = kept[np.isfinite(each.noise.sigma[kept]) & (data.values[kept] != 0)]
+        responses.append(each.at(data.omega[kept], data.values[kept], each.noise.sigma[kept]))
     return replace(problem, responses=tuple(responses))
 
 
@@ -164,8 +161,8 @@ class Solution:
     @cached_property
     def parts(self) -> tuple[Real, ...]:
         """The residuals of each response, over their deviations."""
-        sizes = [each.size for each in self.problem.responses]
-        return tuple(np.split(self.residuals, np.cumsum(sizes))[: len(sizes)])
+        ends = np.cumsum([each.size for each in self.problem.responses], dtype=int)
+        return tuple(np.split(self.residuals, ends)[:-1])
 
     @property
     def freedom(
@@ -188,8 +185,8 @@ class Solution:
     @property
     def misfit(self) -> float:
         """Minus ln of the likelihood, but for a constant: with the noise, where that is from the residuals."""
-        sigmas = (each.noise.sigma for each in self.problem.responses)
-        return self.chi_squared / 2 + sum(2 * np.log(sigma[np.isfinite(sigma)]).sum() for sigma in sigmas)
+        sigma = np.concatenate([np.empty(0), *(each.noise.sigma for each in self.problem.responses)])
+        return self.chi_squared / 2 + 2 * float(np.log(sigma[np.isfinite(sigma)]).sum())
 
     @property
     def quantile(self) -> float:
@@ -205,7 +202,8 @@ def best_solution(problem: Problem, is_enough: Callable[[Solution], bool | None]
     is there only between two lines.  Then the fit's own start is tried too.
     """
     found: list[Solution] = []
-    for draws, shares in STARTS:
+    # draws about the point that the equation errors lead to, and their shares of w one after another
+    for draws, shares in ((0, [0.1]), (300, [0.1]), (300, [1.0, 0.3, 0.1])):
         found.append(_rescaled(nearest_minimum(*start_by(problem, draws, shares))))
         best = min(found, key=lambda each: each.misfit)
         if best.converged and (is_enough or is_explained)(best):
@@ -284,10 +282,16 @@ def nearest_minimum(problem: Problem, start: Real, held: dict[int, float] | None
     first = problem.inside(point)[free]
     low, high = problem.bounds
     found = least_squares(
-        walled(lambda x: problem.residuals(at(x)), first), first, jac=jacobian,
-        bounds=(low[free], high[free]), x_scale="jac", xtol=1e-7, ftol=1e-9,
-        gtol=None, max_nfev=MOST_EVALUATIONS,
-    )  # fmt: skip
+        walled(lambda x: problem.residuals(at(x)), first),
+        first,
+        jac=jacobian,
+        bounds=(low[free], high[free]),
+        x_scale="jac",
+        xtol=1e-7,
+        ftol=1e-9,
+        gtol=None,
+        max_nfev=MOST_EVALUATIONS,
+    )
     slopes = np.zeros((found.fun.size, start.size))
     slopes[:, free] = np.asarray(found.jac)
     return Solution(problem, at(found.x), found.fun, slopes, bool(found.status > 0), 1)
@@ -310,7 +314,6 @@ def _rescaled(found: Solution) -> Solution:
 Progress = Callable[[int, int, str], object]
 
 TAKES_PART = 0.1  # of a unit vector: a smaller component has no part in it
-REACHES = (0.5, 1.0, 2.0, 4.0, 6.0, 9.0)  # of ln p: where a number that does not matter is tried
 
 
 @frozen(kw_only=True)
@@ -368,20 +371,31 @@ def confidence_intervals(
             progress(n, len(parameters), f"interval of {each.key}")
         low = high = deviation = None
         point = float(found.point[n])
+        value = each.value(point)
         own = deviations[n]
         if not part[:, n].any():
-            ends = [_end(found, n, way, own, quantile, held) if profile else point + way * quantile * own
-                    for way in (-1, 1)]  # fmt: skip
+            ends = [point - quantile * own, point + quantile * own]
+            if profile:
+                ends = [_end(found, n, end, quantile, held) for end in ends]
             low, high = each.ends(ends)
-            deviation = own * each.per_coordinate(each.value(point))
+            deviation = own * each.per_coordinate(value)
         elif n in alone:
             low, high = _one_sided(found, n, quantile)
             words[alone[n]] = words[alone[n]] if low is None else ""
         of = file_key(each.key)
-        fitted.append(Fitted(
-            label=of.label, key=each.key, unit=of.unit or "1", value=each.value(point), low=low, high=high,
-            deviation=deviation, identified=low is not None and high is not None, start=each.start,
-        ))  # fmt: skip
+        fitted.append(
+            Fitted(
+                label=of.label,
+                key=each.key,
+                unit=of.unit or "1",
+                value=value,
+                low=low,
+                high=high,
+                deviation=deviation,
+                identified=None not in (low, high),
+                start=each.start,
+            )
+        )
         if (low is None) != (high is None):
             end = f"at most {high:.4g}" if low is None else f"at least {low:.4g}"
             words.append(f"{each.key} is {end}: one-sided bound")
@@ -398,35 +412,35 @@ def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float | None, 
     if each.size:
         return None, None
     low, high = (each[n] for each in found.problem.bounds)
+    own = found.point[n]
+    along = np.eye(found.point.size)[n]
 
     def excess(at: float) -> float:
-        point = found.point.copy()
-        point[n] = at
-        return sum_of_squares(found.problem, point) - found.chi_squared - quantile**2
+        return sum_of_squares(found.problem, found.point + (at - own) * along) - found.chi_squared - quantile**2
 
     def end(way: int) -> float | None:
-        steps = (found.point[n] + way * reach for reach in REACHES)
+        # of ln p: where a number that does not matter is tried
+        steps = (own + way * reach for reach in (0.5, 1.0, 2.0, 4.0, 6.0, 9.0))
         beyond = next((at for at in steps if low <= at <= high and excess(at) > 0), None)
-        return None if beyond is None else each.value(float(brentq(excess, found.point[n], beyond, xtol=1e-4)))
+        return None if beyond is None else each.value(float(brentq(excess, own, beyond, xtol=1e-4)))
 
     lower = end(-1)
     upper = end(1)
     return (None, None) if lower is None and upper is None else (lower or 0.0, upper)
 
 
-def _end(found: Solution, n: int, way: int, deviation: float, quantile: float, held: dict[int, float]) -> float:
-    """Where the least sum of squares with coordinate n held has grown by quantile^2, on one side of the best.
+def _end(found: Solution, n: int, at: float, quantile: float, held: dict[int, float]) -> float:
+    """Where the least sum of squares with coordinate n held has grown by quantile^2, on the side of the best of `at`.
 
     The root of that growth is nearly linear in the coordinate, so a secant finds it in two or three steps.
     """
     low, high = (each[n] for each in found.problem.bounds)
     rest = [m for m in range(found.point.size) if m != n and m not in held]
-    slope = np.zeros(found.point.size)  # of the others where n is held elsewhere
+    # of the others where n is held elsewhere
+    slope = np.eye(found.point.size)[n]
     slope[rest] = -np.linalg.lstsq(found.jacobian[:, rest], found.jacobian[:, n], rcond=None)[0]
-    slope[n] = 1.0
     near = found.point[n]
     root_near = 0.0
-    at = near + way * quantile * deviation
     # three steps do but in a crooked valley
     for _ in range(12):
         at = np.clip(at, low, high)
