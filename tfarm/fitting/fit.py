@@ -130,10 +130,9 @@ class Fit(Solution):
         rows = []
         for one, residuals in zip(self.problem.responses, self.parts, strict=True):
             of = one.data
+            names = (of.name, of.label, of.unit, of.source, of.digest)
             chi_squared = float(residuals @ residuals)
-            rows.append(FittedResponse(
-                of.name, of.label, of.unit, of.source, of.digest, of.points, *of.range_hz, one.noise.source, chi_squared
-            ))  # fmt: skip
+            rows.append(FittedResponse(*names, of.points, *of.range_hz, one.noise.source, chi_squared))
         return rows
 
     @cached_property
@@ -184,10 +183,8 @@ class Fit(Solution):
         """The root mean square of ln(computed/measured), complex, over all values; None where there are none."""
         if not self.responses:
             return None
-        computed = self.problem.computed(self.point)
-        pairs = zip(computed, self.responses, strict=True)
-        away = np.concatenate([np.log(H / each.values)[each.values != 0] for H, each in pairs])
-        return rms(away)
+        pairs = zip(self.problem.computed(self.point), self.responses, strict=True)
+        return rms(np.concatenate([np.log(H / each.values)[each.values != 0] for H, each in pairs]))
 
     @property
     def is_explained(
@@ -264,13 +261,10 @@ class Fit(Solution):
         """The remedy that helps most, or that none of those tried is enough; None where the curve does not miss."""
         if not self.misses:
             return None
-        best = next(iter(self.remedies), None)
-        if best is not None and best.is_enough:
-            return best.in_words
-        most = f"; most helps {best.change}" if best is not None else ""
-        return (
-            f"no gain, delay, sign or bound is enough: free other numbers of the arm, or add a part that it lacks{most}"
-        )
+        words = "no gain, delay, sign or bound is enough: free other numbers of the arm, or add a part that it lacks"
+        for best in self.remedies[:1]:
+            return best.in_words if best.is_enough else f"{words}; most helps {best.change}"
+        return words
 
 
 def fit(
@@ -323,9 +317,10 @@ def _assumptions(fit: Fit, before: Sequence[str]) -> tuple[str, ...]:
     for text in before:
         labels = [file_key(key).label for key in family.keys if is_named(key, family.value(key), text)]
         mark = f"Before the fit of {listed(labels)}: " if labels else ""
-        texts.append(text if text.startswith(mark) else mark + text)
-    numbers = [(each.label, each.value, file_key(each.key).unit) for each in fit.parameters if "." in each.key]
-    values = [f"{label} = {value:.6g} {unit}".rstrip() for label, value, unit in numbers] or ["sensors alone"]
+        texts.append(mark + text.removeprefix(mark))
+    numbers = [each for each in fit.parameters if "." in each.key]
+    values = [f"{each.label} = {each.value:.6g} {file_key(each.key).unit}".rstrip() for each in numbers]
+    values = values or ["sensors alone"]
     texts.append(f"Fitted: {listed(values)}, from the arm {fit.before.name}; {fit.in_words}.")
     for each in fit.responses:
         digest = each.digest or "none"
@@ -340,9 +335,9 @@ def is_named(key: str, value: float, text: str) -> bool:
     # a symbol ends a label: I_h, Kt
     symbol = last if len(last) <= 3 else ""
     label = " ".join(words) if symbol else of.label
-    patterns = [rf"(?i:\b{re.escape(label)}\b)", *([rf"(?<!\d )\b{symbol}(?=,| and | of | =)"] if symbol else [])]
+    pattern = rf"(?i:\b{re.escape(label)}\b)" + rf"|(?<!\d )\b{symbol}(?=,| and | of | =)" * bool(symbol)
     values = re.findall(rf"({NUMBER}) {re.escape(of.unit)}(?![\w^/]| m\^)", text) if of.unit else []
-    return any(re.search(each, text) for each in patterns) or any(float(each) == value for each in values)
+    return bool(re.search(pattern, text)) or value in map(float, values)
 
 
 def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: Any, rings: Any) -> Problem:
@@ -375,12 +370,12 @@ def arms_drawn(fit: Fit, count: int) -> tuple[Arm, ...]:
     data, or the sum of squares is so far from a parabola that draws of one are none of it.
     """
     own = fit.problem.of_the_arm
-    J = fit.jacobian
-    of_sensors = -np.linalg.pinv(J[:, len(own) :]) @ J[:, : len(own)]
     if fit.misses:
         raise ConvergenceError("the fitted curve misses the data", [], 0)
-    each_time = 10  # draws for each arm wanted, at most
-    normal = np.random.default_rng(FIT_SEED).standard_normal((each_time * count, len(own)))
+    J, of_the_sensors = np.split(fit.jacobian, [len(own)], axis=1)
+    of_sensors = -np.linalg.pinv(of_the_sensors) @ J
+    # ten draws for each arm wanted, at most
+    normal = np.random.default_rng(FIT_SEED).standard_normal((10 * count, len(own)))
     # of draws of a normal distribution: one whose sum of squares is larger is none of them
     most = fit.chi_squared + 2.0 * gammaincinv(len(own) / 2, 0.999)  # the quantile of chi squared
     kept: list[Arm] = []

@@ -167,21 +167,17 @@ def mode_of(text: str) -> RingMode:
     spread = rf"(?:~\s*{some})?"
     form = rf"\s*(\d{{1,3}})\s*=\s*{some}(?:hz|rad_s)\s*{spread}(?:,\s*{some}{spread})?"
     found = re.fullmatch(form, text, re.IGNORECASE | re.ASCII)
-    number, w, dw, ratio, spread_of_ratio = found.groups() if found else ("0",) * 5
-    unit = 2 * math.pi if "hz" in text.lower() else 1.0
-    frequency = float(w) * unit
-    mode = RingMode(
-        number=int(number),
-        frequency=frequency,
-        frequency_deviation=float(dw) * unit if dw else 2e-3 * frequency,
-        ratio=float(ratio) if ratio else None,
-        ratio_deviation=float(spread_of_ratio or 0.1 * float(ratio or math.inf)),
-    )
-    is_ratio = mode.ratio is None or (0 < mode.ratio < 1 and mode.ratio_deviation > 0)
-    is_frequency = mode.frequency_deviation > 0 and 0 < frequency * mode.frequency_deviation < math.inf
     remedy = "write N=FREQUENCY,RATIO such as 1=2.52hz,0.006 (hz or rad_s; a deviation after ~: 2.52hz~0.01)"
-    require(1 <= mode.number <= 100 and is_frequency and is_ratio, "--mode", text, remedy)
-    return mode
+    number, *given = found.groups() if found else ("0",) * 5
+    w, dw, ratio, of_ratio = (float(each) if each else None for each in given)
+    unit = 2 * math.pi if "hz" in text.lower() else 1.0
+    frequency = (w or 0.0) * unit
+    deviation = 2e-3 * frequency if dw is None else dw * unit
+    of_ratio = 0.1 * (math.inf if ratio is None else ratio) if of_ratio is None else of_ratio
+    is_ratio = ratio is None or 0 < ratio < 1
+    is_positive = min(frequency, deviation, of_ratio) > 0 and frequency * deviation < math.inf
+    require(1 <= int(number) <= 100 and is_positive and is_ratio, "--mode", text, remedy)
+    return RingMode(int(number), frequency, deviation, ratio, of_ratio)
 
 
 def eigenvalue(arm: Arm, number: int) -> complex:

@@ -93,15 +93,17 @@ class Posterior(StrictTable):
         """
         known = [n for n, key in enumerate(self.keys) if key in ranged]
         rest = [n for n, key in enumerate(self.keys) if key not in ranged]
-        value, size = (np.array([getattr(each, name) for each in self.numbers]) for name in ("value", "size"))
         P = self.information
         x_r = np.empty((len(known), len(normal)))
         for row, n in zip(x_r, known, strict=True):
-            p = np.asarray(ranged[self.keys[n]])
-            row[:] = (p - value[n]) / size[n] if size[n] else np.log(np.maximum(p / value[n], LEAST_SIZE))
-        L = np.linalg.cholesky(P[np.ix_(rest, rest)])  # unique: independent of the processor
+            of = self.numbers[n]
+            p = np.asarray(ranged[of.key])
+            row[:] = (p - of.value) / of.size if of.size else np.log(np.maximum(p / of.value, LEAST_SIZE))
+        # unique: independent of the processor
+        L = np.linalg.cholesky(P[np.ix_(rest, rest)])
         x_o = np.linalg.solve(L.T, normal.T - np.linalg.solve(L, P[np.ix_(rest, known)] @ x_r)).T
-        return np.where(size[rest] > 0, value[rest] + size[rest] * x_o, value[rest] * np.exp(x_o))
+        value, size = np.transpose([(self.numbers[n].value, self.numbers[n].size) for n in rest]).reshape(2, -1)
+        return np.where(size > 0, value + size * x_o, value * np.exp(x_o))
 
 
 def posterior_of(found: Solution, fitted: Sequence[Fitted], not_determined: Sequence[str], arm: str) -> Posterior:
@@ -186,33 +188,38 @@ def repeats(fit: Solution, fitted: Sequence[Fitted], draws: int = 40) -> Repeats
     own = fit.problem
     names = [each.data.label for each in own.responses]
     most = max(names, key=names.count, default="")
-    records = [n for n, name in enumerate(names) if name == most]
+    records = [each for each in own.responses if each.data.label == most]
     if len(records) < 3:
         return None
-    others = [n for n, name in enumerate(names) if name != most]
+    others = [each for each in own.responses if each.data.label != most]
     identified = {n: each for n, each in enumerate(fitted) if each.identified}
     # a key with a colon is of one record's sensor, which others do not know
     known = {n: each for n, each in identified.items() if each.deviation and ":" not in each.key}
 
     def numbers(chosen: Sequence[int]) -> Real:
-        some = replace(own, responses=tuple(own.responses[n] for n in (*chosen, *others)))
-        sensors = {place for each in some.responses for place in (each.gain, each.delay)}
-        used = identified.keys() & (sensors | set(range(len(own.of_the_arm))))
+        some = (*(records[n] for n in chosen), *others)
+        sensors = {place for each in some for place in (each.gain, each.delay)}
+        used = identified.keys() & {*sensors, *range(len(own.of_the_arm))}
         held = {n: float(x) for n, x in enumerate(fit.point) if n not in used}
-        point = nearest_minimum(some, fit.point, held).point
+        point = nearest_minimum(replace(own, responses=some), fit.point, held).point
         return np.array([own.value(point, n) for n in known])
 
     drawn = bootstrap(
-        (records,), numbers, n_resamples=draws, vectorized=False, method="percentile", confidence_level=CONFIDENCE,
+        (range(len(records)),),
+        numbers,
+        n_resamples=draws,
+        vectorized=False,
+        method="percentile",
+        confidence_level=CONFIDENCE,
         rng=FIT_SEED,
-    )  # fmt: skip
+    )
 
     def by_key(values: Real) -> dict[str, Any]:
         return dict(zip([each.key for each in known.values()], values.tolist(), strict=True))
 
     return Repeats(
         response=most,
-        each=[by_key(numbers([n])) for n in records],
+        each=[by_key(numbers([n])) for n in range(len(records))],
         intervals=by_key(np.array(drawn.confidence_interval).T),
         times_wider=by_key(drawn.standard_error / np.array([each.deviation for each in known.values()])),
     )

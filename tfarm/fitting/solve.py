@@ -224,20 +224,22 @@ def _nearest(found: Solution) -> Solution:
     A valley may be open where the search began and closed where it ended, where noise exceeds an effect too small to be
     measured (the rotary inertia of E I).  The point moves only where the sum of squares stays what it is.
     """
+    least = found.chi_squared
+    problem = found.problem
     for limit, most in ((OPEN_DEVIATION, SAME_SUM), (0.1, EXCLUDED)):
         some = open_axes(found.jacobian, limit)
         if not some.size:
             continue
         start = found.point - some.T @ (some @ found.point)
-        back = nearest_minimum(found.problem, start, {int(n): float(start[n]) for n in abs(some).argmax(axis=1)})
-        again = nearest_minimum(found.problem, back.point)  # a logarithm may have ended where it changes nothing
-        if again.converged and again.chi_squared < found.chi_squared - SAME_SUM:
+        back = nearest_minimum(problem, start, {int(n): float(start[n]) for n in abs(some).argmax(axis=1)})
+        # a logarithm may have ended where it changes nothing
+        again = nearest_minimum(problem, back.point)
+        if again.converged and again.chi_squared < least - SAME_SUM:
             return _nearest(again)
-        back = replace(back, jacobian=found.problem.jacobian(back.point), converged=found.converged)
+        back = replace(back, jacobian=problem.jacobian(back.point), converged=found.converged)
         fewest = max(1, len(open_axes(found.jacobian)))
-        if back.chi_squared < found.chi_squared + most and len(open_axes(back.jacobian)) >= fewest:
-            is_same = back.chi_squared < found.chi_squared + SAME_SUM
-            return back if is_same else replace(found, jacobian=back.jacobian)
+        if back.chi_squared < least + most and len(open_axes(back.jacobian)) >= fewest:
+            return back if back.chi_squared < least + SAME_SUM else replace(found, jacobian=back.jacobian)
     return found
 
 
@@ -358,12 +360,13 @@ def confidence_intervals(
     parameters = found.problem.parameters
     quantile = found.quantile
     sizes, axes = principal_axes(found.jacobian)
-    is_open = sizes < 1.0 / OPEN_DEVIATION
-    deviations = np.linalg.norm(axes[~is_open] / sizes[~is_open, None], axis=0).tolist()
-    part = abs(axes[is_open]) > TAKES_PART
-    largest = abs(axes[is_open]).argmax(axis=1).tolist()
+    is_known = sizes >= 1.0 / OPEN_DEVIATION
+    deviations = np.linalg.norm(axes[is_known] / sizes[is_known, None], axis=0).tolist()
+    unknown = axes[~is_known]
+    part = abs(unknown) > TAKES_PART
+    largest = abs(unknown).argmax(axis=1).tolist()
     held = {n: float(found.point[n]) for n in largest}
-    words = [_undetermined(axis, [each.key for each in parameters]) for axis in axes[is_open]]
+    words = [_undetermined(axis, [each.key for each in parameters]) for axis in unknown]
     alone = {n: k for k, n in enumerate(largest) if part[k].sum() == 1}
     fitted = []
     for n, each in enumerate(parameters):
@@ -439,12 +442,12 @@ def _end(found: Solution, n: int, at: float, quantile: float, held: dict[int, fl
     # of the others where n is held elsewhere
     slope = np.eye(found.point.size)[n]
     slope[rest] = -np.linalg.lstsq(found.jacobian[:, rest], found.jacobian[:, n], rcond=None)[0]
-    near = found.point[n]
+    own = near = found.point[n]
     root_near = 0.0
     # three steps do but in a crooked valley
     for _ in range(12):
         at = np.clip(at, low, high)
-        start = found.point + slope * (at - found.point[n])
+        start = found.point + slope * (at - own)
         there = nearest_minimum(found.problem, start, held | {n: at})
         growth = there.chi_squared - found.chi_squared
         # of a sum of squares: a profile that falls by more has left the valley of the best
@@ -454,8 +457,12 @@ def _end(found: Solution, n: int, at: float, quantile: float, held: dict[int, fl
         # of a deviation: there the profile has reached its level
         if abs(root - quantile) < 0.01 or (at in (low, high) and root < quantile):
             return float(at)
-        step = (quantile - root) * (at - near) / (root - root_near) if root != root_near else 2 * (at - near)
-        near, root_near, at = at, root, at + np.clip(step, -3 * abs(at - near), 3 * abs(at - near))
+        last = at - near
+        # of the last step: no farther than three of it
+        times = np.clip((quantile - root) / (root - root_near), -3, 3) if root != root_near else 2
+        near = at
+        root_near = root
+        at = at + times * last
     return float(at)
 
 
@@ -463,13 +470,15 @@ def _undetermined(axis: Real, keys: Sequence[str]) -> str:
     """A direction along which nothing changes, in words; of two numbers, the combination that is known instead."""
     part = [n for n in np.argsort(-abs(axis)) if abs(axis[n]) > TAKES_PART]
     names = [keys[n] for n in part]
+    shares = axis[part] / abs(axis[part[0]])
     if len(part) == 1:
         return f"{names[0]} is not determined by these data"
     if len(part) == 2:
-        power = -axis[part[0]] / axis[part[1]]  # first * second^power does not change along the axis
-        known = f"{names[0]} {'*' if power > 0 else '/'} {names[1]}"
-        # a power so near to 1 is written as 1
-        known += "" if abs(abs(power) - 1) < 0.02 else f"^{abs(power):.3g}"
-        return f"{names[0]} and {names[1]} are not determined by these data: only {known} is"
-    shares = ", ".join(f"{name} {axis[n] / abs(axis[part[0]]):+.3g} %" for name, n in zip(names, part, strict=True))
-    return f"not determined by these data: {shares} together change nothing"
+        # first * second^power does not change along the axis
+        power = -shares[0] / shares[1]
+        # one so near to 1 is written as 1
+        exponent = "" if abs(abs(power) - 1) < 0.02 else f"^{abs(power):.3g}"
+        known = f"{names[0]} {'*' if power > 0 else '/'} {names[1]}{exponent}"
+        return f"{' and '.join(names)} are not determined by these data: only {known} is"
+    words = ", ".join(f"{name} {share:+.3g} %" for name, share in zip(names, shares, strict=True))
+    return f"not determined by these data: {words} together change nothing"

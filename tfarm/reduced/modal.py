@@ -6,9 +6,8 @@ A truncated Mittag-Leffler series, exact at s -> 0.  At C = 0 the poles are exac
 At C > 0 the undamped modes do not diagonalise the damping, so the residues are those of the damped eigenvalues.
 
 An output is G = N/D with N and the drive D analytic, so its residue at a simple zero p of D is N(p)/D'(p).  Where hub
-angle or moment is a small difference there, it is computed from the balance of the hub.  At double frequencies the
-residue is c b of the mode shapes for C = 0 (Meirovitch, Fundamentals of Vibrations, 2001, ch. 7) and Cauchy's integral
-around p for C > 0.
+angle or moment is a small difference there, it is computed from the balance of the hub.  Where both are 0 it is
+Cauchy's integral around p.  Two frequencies of an undamped arm that are equal to eight digits have none.
 
 State spaces from the input to the signals of a controller, in series and in a loop with it.
 """
@@ -64,24 +63,6 @@ AT_HUB = (  # moment and shear force of the link at the hub, and the hub's angle
 )
 
 
-def undamped_residues(table: Modes, wanted: Sequence[Output], k: System, x: float) -> Real:
-    """Return residues in s^2 of each output over s^power at the flexible modes (C = 0): (outputs, modes).
-
-    c b, with c the output of the mode and b its hub participation (its root moment where the hub is locked).
-    `x` is a share of the length.
-    """
-    s = 1j * table.flexible
-    residues, doubtful = end_residues(k, wanted, s, x)
-    products: Real = (residues * 2 * s / s ** powers_of(wanted)).real
-    # 1e-6: relative gap under which only shapes separate two modes
-    close = np.r_[False, np.diff(table.flexible) < 1e-6 * table.flexible[1:], False]
-    by_shapes = close[:-1] | close[1:] | doubtful
-    of_shapes = {"theta", "W", "Y", "Phi", "M", "Q"}
-    if by_shapes.any() and all(each.quantity in of_shapes and each.side == "outer" for each in wanted):
-        products[:, by_shapes] = _from_shapes(table, wanted, k, x)[:, by_shapes]
-    return products
-
-
 def powers_of(wanted: Sequence[Output]) -> NDArray[np.int64]:
     """Return the powers of s of the outputs (outputs, 1)."""
     return np.array([[each.power] for each in wanted])
@@ -113,47 +94,25 @@ def end_residues(k: System, wanted: Sequence[Output], p: Complex, x: float = 0.0
     return residues, np.asarray(~np.isfinite(residues).all(axis=0))
 
 
-def contour_residues(k: System, wanted: Sequence[Output], p: Complex, x: float) -> Complex:
-    """Return residues (outputs, p) by the trapezoid rule on circles around p, which converges geometrically.
+def contour_residues(k: System, wanted: Sequence[Output], p: Complex, known: Complex, x: float) -> Complex:
+    """Return residues (outputs, p) by the trapezoid rule on a circle around p, which converges geometrically.
 
-    A circle shrinks until one of a third of its radius agrees with it.
-    Raises ConvergenceError where none does: two eigenvalues are one to the last digits.
+    Every other one of the `known` eigenvalues is at least 4 radii away.
+    Raises ConvergenceError where one is too close.
     """
-    apart = abs(p[:, None] - p) + np.where(np.eye(p.size, dtype=bool), np.inf, 0.0)
-    away = [apart.min(axis=1, initial=np.inf), abs(p), *(abs(p - point) for point in k.singular)]
-    # another pole is at least 4 radii away
-    radius = np.min(away, axis=0) / 4
-    # ten circles, each a third of the one before
-    falls = 3.0 ** -np.arange(10)
-    # of Cauchy's integral: a pole 4 radii away adds 4^-32 of its residue
-    circle = np.exp(2j * np.pi * np.arange(32) / 32)
-    arrow = falls[:, None, None] * radius[:, None] * circle
-    values = evaluate_outputs(k, wanted, (p[:, None] + arrow).ravel(), x).reshape(len(wanted), *arrow.shape) * arrow
-    # (outputs, radii, p)
-    residues = values.mean(axis=-1)
-    size = abs(values).max(axis=-1)
-    larger = np.maximum(size[:, 1:], size[:, :-1])
-    # 1e-11 of the largest value on the circle: the largest difference of two radii
-    agree = (abs(np.diff(residues, axis=1)) <= 1e-11 * larger).all(axis=0)
-    for worst in p[~agree.any(axis=0)].tolist():
+    away = abs(p[:, None] - np.r_[known, known.conj(), 0.0, k.singular])
+    radius = np.where(away > 0, away, np.inf).min(axis=1) / 4
+    _must_be_apart(p[radius < 1e-9 * abs(p)])
+    # a pole 4 radii away adds 4^-32 of its residue
+    arrow = np.outer(radius, np.exp(2j * np.pi * np.arange(32) / 32))
+    values = evaluate_outputs(k, wanted, (p[:, None] + arrow).ravel(), x).reshape(len(wanted), *arrow.shape)
+    return np.asarray((values * arrow).mean(axis=-1))
+
+
+def _must_be_apart(p: Complex) -> None:
+    """Raise ConvergenceError for the first of some eigenvalues."""
+    for worst in p.tolist():
         raise ConvergenceError(f"no residue at the eigenvalue {worst:.10g} 1/s: another one is too close", worst, 0.0)
-    return residues[:, agree.argmax(axis=0), np.arange(p.size)]
-
-
-def _from_shapes(table: Modes, wanted: Sequence[Output], k: System, x: float) -> Real:
-    """Return c b (outputs, modes) of the flexible modes by the mode shapes."""
-    length = float(k.length)
-    theta = table.hub_participation
-    drive = table.modal_moment if k.is_locked else theta
-    of: dict[str, Callable[[float], Real]] = {
-        "theta": lambda _: theta,
-        "W": table.shape,
-        "Y": lambda at: table.shape(at) - (at + float(k.radius) * length) * theta,
-        "Phi": lambda at: table.rotation(at) - theta,
-        "M": table.moment,
-        "Q": table.shear,
-    }
-    return np.array([of[each.quantity](each.share(x) * length) * drive for each in wanted])[:, table.index > 0]
 
 
 MOST_MODELLED = 1000  # of a model: its matrices of 2000 states take 32 MB
@@ -274,20 +233,24 @@ def _residues(
     table: Modes, k: System, wanted: list[Output], share: float, p: Complex, single: Real
 ) -> tuple[Complex, Real]:
     """Return residues (outputs, n, 2) at pairs of eigenvalues (n, 2), and at single real ones (outputs, m)."""
-    if table.arm.is_undamped and not single.size:
-        s = p[:, 0]
-        upper = undamped_residues(table, wanted, k, share) * s ** powers_of(wanted) / (2 * s)
-        return np.stack([upper, upper.conj()], axis=2), np.empty((len(wanted), 0))
-    s = np.r_[p.ravel(), single]
+    rings = p[:, 0].imag > 0
+    s = np.r_[p[:, 0], p[~rings, 1], single]
     found, doubtful = end_residues(k, wanted, s, share)
-    doubtful[p.size :] |= table.arm.is_undamped  # the pole of the circuit, where the current is 0 over 0
+    if table.arm.is_undamped:
+        close = np.diff(table.flexible) < 1e-8 * table.flexible[1:]
+        _must_be_apart(p[1:, 0][close])
+        # the pole of the circuit, where the current is 0 over 0
+        doubtful[len(p) :] = True
     if doubtful.any():
-        found[:, doubtful] = contour_residues(k, wanted, s[doubtful], share)
-    residues = found[:, : p.size].reshape(len(wanted), *p.shape)
-    pair = p[:, 0].imag > 0
-    residues[:, pair, 1] = residues[:, pair, 0].conj()
-    residues[:, ~pair] = residues[:, ~pair].real
-    return residues, found[:, p.size :].real.astype(float)
+        found[:, doubtful] = contour_residues(k, wanted, s[doubtful], s, share)
+    if table.arm.is_undamped and not single.size:
+        # exactly lossless: a power of s times a real function of s^2
+        power = s ** powers_of(wanted)
+        found = (found * 2 * s / power).real * power / (2 * s)
+    upper, others, alone = np.split(found, [len(p), s.size - single.size], axis=1)
+    residues = np.stack([upper, upper.conj()], axis=2)
+    residues[:, ~rings] = np.stack([upper[:, ~rings], others], axis=2).real
+    return residues, alone.real.astype(float)
 
 
 ALGEBRAIC = 1e-9  # distance from -1 of a feedthrough of the loop that leaves its input undetermined
