@@ -272,7 +272,7 @@ def sensed_model(arm: Arm, signals: Sequence[str], count: int) -> Matrices:
         x = share * arm.length if any(each.place == "x" for each in wanted) else None
         A, B, C, D = modal_model(arm, wanted, count, x).matrices()
         both |= zip(mine, np.c_[C, D][len(extra) :], strict=True)
-    C, D = np.split([both[n] for n in sorted(both)], [-1], axis=1)
+    C, D = np.split(np.array([both[n] for n in sorted(both)]), [-1], axis=1)
     return A, B, C, D
 
 
