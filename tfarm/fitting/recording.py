@@ -227,7 +227,7 @@ def departures(case: Case, measured: MeasuredRun, count: int, longer: float, sha
     end = float(measured.t[-1])
     t = np.append(measured.t, end + min(longer, 10_000 * period))
     held = replace(measured, t=t, reference=np.append(measured.reference, measured.reference[-1]))
-    run = Simulator(case.arm, case.chain, held.scenario(period), case.law, count=count).run().at_samples
+    run = Simulator(case, held.scenario(period), count=count).run().at_samples
     settled = run.hub_angle[run.t <= end][-1]
     away = abs(run.hub_angle - settled) > share * abs(measured.step)
     return run.t[away & (run.t > end)].tolist()

@@ -7,12 +7,16 @@ to a band are listed in addition, with the band.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Annotated
 
 from tfarm.arm import AnyLaw, Arm
-from tfarm.loop.curve import IN_RANGE, LoopCurve
+from tfarm.arrays import Real
+from tfarm.case import Case
+from tfarm.crossing import Window
+from tfarm.loop.curve import IN_RANGE, LoopAnalysis
 from tfarm.loop.loop_margins import (
     DELAY_MARGIN,
     DISK_MARGIN,
@@ -22,8 +26,9 @@ from tfarm.loop.loop_margins import (
     LoopMargins,
     PhaseCrossover,
 )
+from tfarm.loop.plane import between, plane
 from tfarm.loop.stability import Stability, is_quiet, stability
-from tfarm.loop.theorem import Lyapunov, Signs, lyapunov, signs_of_loop, theorem_of
+from tfarm.loop.theorem import Lyapunov, Signs, lyapunov, signs_of_loop
 from tfarm.loop.windows import Windows, reach_words, windows_of
 from tfarm.records import frozen
 from tfarm.schema import Quantity
@@ -33,7 +38,7 @@ GAIN_CROSSOVERS = Quantity("gain crossovers, abs(L) = 1", help="all in the frequ
 
 
 @frozen
-class Margins:
+class Margins(LoopAnalysis):
     """Verdict and margins of a loop; `windows` are the stability intervals of each number of the law, by its name.
 
     `in_band` are the margins up to the verdict's band; `exact_delay`, `exact_disk` and `exact_peak` those of the whole
@@ -46,14 +51,9 @@ class Margins:
     damping_limit = None  # is searched at the samples alone
 
     @property
-    def verdict(self) -> Stability:
+    def verdict(self) -> Stability:  # type: ignore[override]
         """The verdict."""
         return self.stability
-
-    @property
-    def curve(self) -> LoopCurve:
-        """The loop function on a grid that resolves it."""
-        return self.stability.curve
 
     @property
     def in_band(self) -> Annotated[LoopMargins | None, IN_RANGE]:
@@ -88,19 +88,26 @@ class Margins:
         arm, gains, of_disk = loop.arm, loop.gains, (found.disk, found.peak_sensitivity)
         if not arm.is_undamped and is_quiet(loop, self.stability.band):
             return found.delay, *of_disk
-        if gains is not None and arm.is_undamped and theorem_of(loop).energy is not None:
+        if gains is None:
+            return None, None, None
+        if arm.is_undamped and loop.theorem.energy is not None:
             if gains.K2:
                 return 0.0, 0.0, math.inf
             # 1 + L = 1 + (Kp + i K1 w) theta, theta real: no dip deepens with w
             return 0.0 if loop.feeds_back else found.delay, *of_disk
-        if gains is not None and not arm.is_undamped and gains.K2 == gains.Kp == 0 and not arm.input_lags:
-            return None, *of_disk  # L is in the right half-plane
-        return None, None, None
+        # with a rate gain alone L is in the right half-plane
+        is_passive = not arm.is_undamped and gains.K2 == gains.Kp == 0 and not arm.input_lags
+        return (None, *of_disk) if is_passive else (None, None, None)
 
     @property
     def delay_margin_seconds(self) -> float | None:
         """The delay margin [s], or that in the frequency range where the exact one is not determined."""
         return self.in_band.delay if self.in_band is not None and self.exact_delay is None else self.exact_delay
+
+    def factor_intervals(self, delays: Real) -> list[Sequence[Window]]:
+        """Return the intervals of a factor on the law, 0 to 4, at each further delay [s] (n,), from a map of both."""
+        loop = self.stability.loop
+        return [*plane(loop, ("delay", "gain"), loop.law.delay + delays, between(0.0, 4.0, 40)).stable_intervals]
 
     @cached_property
     def windows(self) -> dict[str, Windows]:
@@ -129,14 +136,14 @@ class Margins:
             help="energy argument for constant gains at the hub")]:  # fmt: skip
         """The proof by energy, for gains at the hub."""
         loop = self.stability.loop
-        return None if loop.gains is None else lyapunov(loop.arm, loop.gains)
+        return lyapunov(loop) if loop.is_of_gains else None
 
     @property
     def passivity(self) -> Annotated[Signs | None, Quantity("passivity of the controller",
             help="sign of the controller from hub angle or rate to torque")]:  # fmt: skip
         """The sign of a law that is more than gains at the hub."""
         loop = self.stability.loop
-        return signs_of_loop(loop) if loop.gains is None else None
+        return None if loop.is_of_gains else signs_of_loop(loop)
 
     @property
     def stability_intervals(self) -> Annotated[list[Windows], Quantity("stability intervals", first=True,
@@ -152,7 +159,7 @@ class Margins:
         A theorem on the sign of a law, and small gain, hold for that law, not for one with another number.
         """
         loop, words = self.stability.loop, reach_words(self.windows.values())
-        if loop.gains is not None:
+        if loop.is_of_gains:
             return None if self.stability.is_known_beyond else words or None
         if not self.windows and loop.arm.has_elastic_link:
             return "no stability intervals: with an undamped link all modes meet on the axis"
@@ -177,4 +184,4 @@ def margins(arm: Arm, law: AnyLaw, band: float | None = None) -> Margins:
     Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted, or where with damping
     one is on the axis to working precision.
     """
-    return Margins(stability(arm, law, band))
+    return Margins(stability(Case(arm, law), band))

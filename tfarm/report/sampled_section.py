@@ -106,7 +106,7 @@ def delays_table(found: Sequence[tuple[Controller, Analysis]], chain: Chain) -> 
             delay = sampling.delay_samples + more
             if delay + each.law.delay / sampling.period <= MOST_DELAY:
                 late = replace(chain, sampling=replace(sampling, delay_samples=delay))
-                rows.append((each.name, 1e3 * sampling.period * more, sampled_verdict(each.arm, each.law, late)))
+                rows.append((each.name, 1e3 * sampling.period * more, sampled_verdict(Case(each.arm, each.law, late))))
     names, delays, verdicts = zip(*rows, strict=True)
     columns = (
         Column("law", "controller", of=names),
@@ -181,7 +181,7 @@ def slews(report: ArmReport) -> tuple[list[Picture | Table], list[str], list[Fac
     for each in (*([] if report.laws else [bare]), *report.controllers):
         try:
             duration = traces.RECORD_LENGTH * chain.slew.rise_time
-            runs[each.name] = results.drawn(each.arm, each.law, chain, "slew", duration)
+            runs[each.name] = results.drawn(Case(each.arm, each.law, chain), "slew", duration)
             simulated.append(each)
         except ParameterError as error:
             words.append(f"No slew of {each.name} is simulated: {error}.")

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.dsp.law_orders import BITS, Case, law_in_balls, laws, truth
+from tests.loop.law_orders import BITS, law_in_balls, laws, truth
 from tests.shared import sized
 from tests.survey import each_of, tally
 from tfarm import Law
 from tfarm.arm.law_tables import load_law
+from tfarm.case import Case
 from tfarm.dsp import Chain, Converters, Sampling, load_chain
 from tfarm.dsp.discretise import acting_law, law_in_z, with_estimate
 from tfarm.loop.sampled import sampled_loop
@@ -31,13 +32,13 @@ def chain_of(period):
 
 
 def is_stable(law, chain):
-    return sampled_verdict(LAB, law, chain).is_stable
+    return sampled_verdict(Case(LAB, law, chain)).is_stable
 
 
 def test_five_poles_next_to_one_are_no_integrator():
     """At 0.5 ms the loop's poles are as good as those of continuous time, which the exact arm has."""
     chain = chain_of(0.0005)
-    analysis = Analysis(sampled_verdict(LAB, SLOW, chain))
+    analysis = Analysis(sampled_verdict(Case(LAB, SLOW, chain)))
     verdict, (low, high) = analysis.verdict, analysis.gain_factors
     slowest = tfarm.closed_loop_poles(LAB, SLOW, 4).values.real.max()
     assert (verdict.word, verdict.is_settled, verdict.loop.poles_at_one) == ("stable", True, 0)
@@ -52,7 +53,7 @@ def reproduced(name):
     """A case of the survey, or of another one: rig, chain and law, the verdict on its loop, and the truth."""
     file = str(FILES / f"{name}.toml")
     case = Case(tfarm.load(file), load_law(FILES / f"{name}_law.toml"), load_chain(file))
-    verdict = sampled_verdict(case.arm, case.law, case.chain)
+    verdict = sampled_verdict(case)
     return verdict, *truth(verdict.loop, case)
 
 
@@ -98,7 +99,7 @@ def on_moment(*den):
 )
 def test_an_integrator_of_what_is_0_at_rest_stays_at_one(entries, at_one):
     case = Case(LAB, Law(entries, period=T), chain_of(T))
-    loop = sampled_loop(LAB, case.law, case.chain, count=4)
+    loop = sampled_loop(case, count=4)
     there, logs = truth(loop, case)
     assert (loop.poles_at_one, there - loop.has_free_angle) == (at_one, at_one)
     largest = max(logs[0], 0.0) if at_one else logs[0]
@@ -132,7 +133,7 @@ LAWS = {
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_values_next_to_one_are_those_of_states_in_balls(law):
     """C (z - A)^-1 B + D, at points from 1e-6 to 2 away from z = 1."""
-    in_z = law_in_z(law, acting_law(LAB, law, Chain())[0], Chain())
+    in_z = law_in_z(law, acting_law(Case(LAB, law))[0], Chain())
     delta = np.r_[1e-6j, 1e-4 + 1e-4j, 0.03j, -0.3 + 0.7j, -1.999]
     values = values_of(in_z, delta)
     before, flint.ctx.prec = flint.ctx.prec, BITS
@@ -164,8 +165,9 @@ OTHERS = {
 @pytest.mark.parametrize("law", OTHERS.values(), ids=OTHERS)
 def test_factors_are_those_of_the_law_as_it_acts(law, hub_rate):
     chain = Chain(converters=Converters(hub_rate=hub_rate, rate_filter=80.0))
-    in_z = law_in_z(law, acting_law(LAB, law, chain)[0], chain)
-    acting = with_estimate(acting_law(LAB, law, chain)[0], chain)
+    in_computer, _ = acting_law(Case(LAB, law, chain))
+    in_z = law_in_z(law, in_computer, chain)
+    acting = with_estimate(in_computer, chain)
     z = np.array([1.3, 0.4 + 0.9j, -1.2 + 0.1j])
     assert in_z.signals == acting.signals
     np.testing.assert_allclose(values_of(in_z, z - 1).sum(axis=0), acting.values(z), rtol=1e-11, atol=1e-15)
