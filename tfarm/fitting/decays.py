@@ -127,20 +127,7 @@ def ring(
     Raises ParameterError for a signal or times that are not there and for too few samples, ConvergenceError where the
     oscillations are not found.
     """
-    whole = recording.signal(name, "--signal")
-    times = recording.times
-    low = float(times[0] if start is None else start)
-    high = times[-1] if stop is None else stop
-    # within half a millionth of a sample: rounding of times
-    kept = abs(2 * times - low - high) <= high - low + 1e-6 * recording.period
-    require(1 <= modes <= 20, "--modes", modes, "a whole number from 1 to 20")
-    least = 4 * (EACH * modes + 1)
-    taken = f"{kept.sum()} samples from {low:g} to {high:g} s; {modes} modes take {least}"
-    remedy = f"{taken} (the record goes from {times[0]:g} to {times[-1]:g} s)"
-    require(kept.sum() >= least, "--from", low, remedy, recording.source)
-    times = times[kept]
-    y = whole[kept]
-    require(np.ptp(y) > 0, "--signal", name, "does not move there", recording.source)
+    times, y = _samples(recording, name, start, stop, modes)
     t = times - times[0]
     poles = starting_poles(t, y, modes)
     found = nearest_sum(t, y, poles) if poles.size == modes else None
@@ -183,6 +170,23 @@ def ring(
         notes=tuple(notes),
         modes=tuple(rows),
     )
+
+
+def _samples(recording: Recording, name: str, start: float | None, stop: float | None, modes: int) -> tuple[Real, Real]:
+    """Return times [s] and samples of a signal between two times, enough for that many modes."""
+    y = recording.signal(name, "--signal")
+    times = recording.times
+    low = float(times[0] if start is None else start)
+    high = times[-1] if stop is None else stop
+    # within half a millionth of a sample: rounding of times
+    kept = abs(2 * times - low - high) <= high - low + 1e-6 * recording.period
+    require(1 <= modes <= 20, "--modes", modes, "a whole number from 1 to 20")
+    least = 4 * (EACH * modes + 1)
+    taken = f"{kept.sum()} samples from {low:g} to {high:g} s; {modes} modes take {least}"
+    remedy = f"{taken} (the record goes from {times[0]:g} to {times[-1]:g} s)"
+    require(kept.sum() >= least, "--from", low, remedy, recording.source)
+    require(np.ptp(y[kept]) > 0, "--signal", name, "does not move there", recording.source)
+    return times[kept], y[kept]
 
 
 def by_part(t: Real, y: Real, poles: Complex) -> tuple[Real, Real]:
