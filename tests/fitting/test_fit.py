@@ -12,11 +12,11 @@ import pytest
 import tfarm
 from tests import chain_elements
 from tests.fitting.planted import chi_squared_at, elements_response, judged, judged_pair, judged_rig
-from tests.shared import thinned
+from tests.shared import refusal, thinned
 from tests.shell import answer, refused, run
 from tfarm.fitting.data import noise_of
 from tfarm.fitting.fit import fit, is_named
-from tfarm.fitting.model import RingMode, mode_of
+from tfarm.fitting.model import RingMode, eigenvalue, mode_of
 
 LAB = tfarm.load("sasaki2012-lab")
 OMEGA = np.geomspace(8.0, 1200.0, 160)
@@ -127,6 +127,13 @@ def test_decays_alone():
     assert found.arm.link.youngs_modulus == pytest.approx(LAB.link.youngs_modulus, rel=1e-5)
     assert found.arm.link.damping == pytest.approx(LAB.link.damping, rel=1e-3)
     assert found.rms_log_error is None
+
+
+def test_a_decay_is_of_a_mode_that_rings():
+    """Its eigenvalue is that followed from the undamped mode; overdamped there is none."""
+    followed = tfarm.damped_modes(tfarm.modes(LAB, 2)).eigenvalues[-1, 0]
+    assert eigenvalue(LAB, 2) == pytest.approx(followed, rel=1e-12)
+    assert "does not ring" in str(refusal(eigenvalue, LAB.having(damping=1.0), 1, kind=tfarm.ConvergenceError))
 
 
 def test_noise_by_its_coherence_and_by_its_scatter():
