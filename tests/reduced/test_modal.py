@@ -15,7 +15,9 @@ from tests.strategies import BOUNDARY_CASES, some_arm
 from tfarm import ConvergenceError, Hub, ParameterError
 from tfarm.arm import Arm, Link, Section
 from tfarm.reduced import modal_model, reduce, relaxed_model, slow_model
+from tfarm.reduced.modal import sensed_model
 from tfarm.response import transfer
+from tfarm.response.signals import Signals
 
 pytestmark = pytest.mark.kernels
 
@@ -88,6 +90,13 @@ def test_state_space_and_partial_fractions_are_one_model(arm, lab):
         s = np.array([0.3 + 57.1j, -2.0 + 400j, 12.0])
         np.testing.assert_allclose(by_matrices(model, s), model(s), rtol=1e-10)
         np.testing.assert_allclose(model(np.array([[1j, 2j]]))[:, 0, 1], model(2j))
+
+
+def test_signals_at_several_places_are_one_model(lab):
+    names, s = ("moment@0.6", "hub_rate", "moment@0.3"), np.array([0.5 + 3j])
+    A, B, C, D = sensed_model(lab, names, 12)
+    values = C @ np.linalg.solve(s * np.eye(len(A)) - A, B) + D
+    np.testing.assert_allclose(values, Signals(lab, names).values(s), rtol=1e-5)
 
 
 def test_lossless_to_the_bit_at_no_damping(arm):
