@@ -22,6 +22,7 @@ from tfarm.arm.chain import load_chain
 from tfarm.arm.law_tables import load_law
 from tfarm.assessment.card import GAIN_LIMITS, PEAK_LIMITS, PERIOD_LIMITS, PHASE_LIMITS
 from tfarm.audit.published import Validation, validate
+from tfarm.case import Case
 from tfarm.digits import general
 from tfarm.fitting.decays import ring
 from tfarm.fitting.recording import compare_run, load_run, overshoot, read_recording
@@ -153,7 +154,7 @@ def rig_laws() -> list[str]:
     rows = []
     for name in ("lqg", "hinf"):
         law, run = load_law(RIG / f"{name}.toml"), load_run(RIG / f"{name}.toml")
-        found = compare_run(arm, law, chain, run)
+        found = compare_run(Case(arm, law, chain), run)
         step, end = run.step, run.reference[-1]
         shares = (overshoot(each, step, end) for each in (run.hub_angle, found.hub_angle))
         rows.append(

@@ -182,35 +182,6 @@ def appendix(points):
     return lambda subject: lambda: values(subject.arm)
 
 
-def four_by_four(points):
-    """The same by the paper's 4x4 system in float64, all points at once; a growing wave is measured from the tip."""
-    s = axis(points)
-    return lambda subject: lambda: solved(subject.arm, s)
-
-
-def solved(arm, s):
-    """The three outputs (3, points) by (A.1), (A.2) and one solution of each 4x4 system."""
-    link, payload, L = arm.link, arm.payload, arm.link.length
-    EI, kGA, s2 = link.EI * (1 + link.damping * s), link.kGA, s * s
-    stretch, shear = link.rhoI / EI, link.rhoA / kGA  # rho/(E(1 + C s)) and rho/(kappa G)
-    inner = np.sqrt((stretch - shear) ** 2 * s2 * s2 - 4 * link.rhoA * s2 / EI)
-    waves = [np.sqrt(((stretch + shear) * s2 + inner) / 2), np.sqrt(((stretch + shear) * s2 - inner) / 2)]
-    l = np.stack([waves[0], waves[1], -waves[0], -waves[1]], axis=-1)
-    EI, s2 = EI[:, None], s2[:, None]
-    gamma, over, grows = l - shear * s2 / l, np.exp(-abs(l.real) * L + 1j * l.imag * L), l.real > 0
-    turned = np.exp(-abs(l.real) * L - 1j * l.imag * L)
-    tip, root = np.where(grows, 1, over), np.where(grows, turned, 1)
-    rows = [
-        (payload.mass * s2 + link.rhoA * s2 / l) * tip,
-        gamma * (payload.inertia * s2 + EI * l) * tip,
-        root,
-        (arm.hub.inertia * s2 - EI * l) * gamma * root,
-    ]
-    k = np.linalg.solve(np.stack(rows, axis=1), np.array([0, 0, 0, 1.0])[:, None])[..., 0]
-    angle = (gamma * k * root).sum(axis=1)
-    return np.stack([angle, link.EI * (gamma * l * k * root).sum(axis=1), (k * tip).sum(axis=1)])
-
-
 def plane(law):
     """The gains of a map, about those of a law."""
     return abs(law.K1) * np.linspace(1 / 30, 50 / 3, 200), np.linspace(-0.5, 1.5, 200)
@@ -315,11 +286,6 @@ def responses():
                 f"response, prepared: {subject.arm.name}", response(n), exponentials(n), "two exponentials", n, rounds,
                 subject, error=error, **at_random,
             )  # fmt: skip
-    few = axis(100)
-    yield compared(
-        "response by NumPy, 4x4 systems", four_by_four(1000), response(1000), "tfarm, prepared", 1000, 20, LAB,
-        error=response_error(LAB.arm, few, solved(LAB.arm, few)),
-    )  # fmt: skip
     ours, (theirs,) = timed([response(100)], 50, LAB), timed([appendix(100)], 1, LAB)[0]
     yield Row("response by mpmath, 30 digits", 100, theirs / 100, theirs / np.median(ours), "tfarm")
 

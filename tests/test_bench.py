@@ -69,8 +69,3 @@ def test_only_bounded_caches_keep_anything_of_an_arm():
     assert caches.grown(before) == set()
     assert [each.cache_info().misses for each in known] == misses
     assert not hasattr(LOADED.arm, "__dict__")
-
-
-def test_the_peer_of_the_response_solves_the_same_equations():
-    arm, s = LOADED.arm, bench.axis(20)
-    assert np.allclose(bench.solved(arm, s), tfarm.transfer(arm, list(bench.OUTPUTS))(s), rtol=1e-9, atol=0)

@@ -1,3 +1,4 @@
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -5,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import tfarm
-from tests.shared import thinned
+from tests.shared import refusal, thinned
 
 HEAVY = ("control", "matplotlib", "matplotlib.pyplot", "sympy", "mpmath",
          "scipy.linalg", "scipy.signal", "scipy.stats", "scipy.optimize")  # fmt: skip
@@ -65,14 +66,8 @@ def test_an_unknown_name_is_an_attribute_error():
 @pytest.mark.parametrize("arm", ["sasaki2012", Path("arm.toml"), None])
 def test_a_name_in_the_place_of_an_arm_is_refused_with_what_to_write(arm):
     law = tfarm.HubFeedback(K1=0.3, K2=0.3)
-    calls = (
-        lambda: tfarm.modes(arm, count=3),
-        lambda: tfarm.transfer(arm, "root_moment"),
-        lambda: tfarm.closed_loop_poles(arm, law, 3),
-        lambda: tfarm.margins(arm, law),
-        lambda: tfarm.reduce(arm, ["root_moment"], order=4),
-        lambda: tfarm.fit(arm, [], free=["hub.inertia"]),
-    )
-    for call in calls:
-        with pytest.raises(tfarm.ParameterError, match=r"arm = .*: is no Arm; give tfarm.load\('[\w.]+'\)"):
-            call()
+    calls = {"modes": (), "transfer": ("root_moment",), "closed_loop_poles": (law, 3), "margins": (law,),
+             "reduce": (["root_moment"],), "fit": ([], ["hub.inertia"]), "step": (law,), "Case": (law,)}  # fmt: skip
+    for name, others in calls.items():
+        line = str(refusal(getattr(tfarm, name), arm, *others))
+        assert re.match(r"arm = .*: is no Arm; give tfarm.load\('[\w.]+'\)", line)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.shared import refusal
 from tfarm.errors import ParameterError
 from tfarm.files import locked_folder, place_in, read_file, temporary_folder, write_file
 
@@ -63,8 +64,7 @@ def test_a_pipe_is_written_to_and_stays_a_pipe(tmp_path):
 def test_a_pipe_without_a_reader_is_refused_and_not_waited_for(tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    with pytest.raises(ParameterError, match="--csv = "):
-        write(pipe)
+    assert refusal(write, pipe).key == "--csv"
     assert stat.S_ISFIFO(pipe.stat().st_mode)
 
 
@@ -134,17 +134,14 @@ def test_a_failed_write_leaves_the_old_file_alone(tmp_path, monkeypatch):
     file = tmp_path / "file"
     file.write_bytes(b"old")
     monkeypatch.setattr(os, "replace", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device")))
-    with pytest.raises(ParameterError, match="No space left"):
-        write(file)
+    assert "No space left" in str(refusal(write, file))
     assert [each.read_bytes() for each in tmp_path.iterdir()] == [b"old"]
 
 
 def test_a_name_that_is_too_long_for_the_system_is_one_line(tmp_path):
     for place in (tmp_path / "a" / ("x" * 300), tmp_path / "a" / ("x" * 300) / "b"):
-        with pytest.raises(
-            ParameterError, match=r"cannot be written to \(File name too long\); give a folder that can"
-        ):
-            place_in(place, "--out").__enter__()
+        refused = refusal(place_in(place, "--out").__enter__)
+        assert "cannot be written to (File name too long); give a folder that can" in str(refused)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -159,10 +156,7 @@ def test_a_folder_that_a_failed_run_made_is_removed_and_no_other_one(tmp_path):
     assert (tmp_path / "a" / "b" / "file").exists()
 
 
-def test_only_regular_files_are_read(tmp_path):
-    pipe = tmp_path / "pipe"
-    os.mkfifo(pipe)
-    with pytest.raises(ParameterError, match="no regular file; give a tuner"):
-        read_file(pipe, 10, key="controller", what="a tuner's file")
-    with pytest.raises(ParameterError, match="null"):
-        read_file("a\0b", 10, key="controller", what="a tuner's file")
+@pytest.mark.parametrize(("name", "words"), [("pipe", "no regular file; give a tuner"), ("a\0b", "null")])
+def test_only_regular_files_are_read(tmp_path, name, words):
+    os.mkfifo(tmp_path / "pipe")
+    assert words in str(refusal(read_file, f"{tmp_path}/{name}", 10, key="controller", what="a tuner's file"))

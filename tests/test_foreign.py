@@ -12,8 +12,8 @@ import pytest
 import scipy.io
 
 from tests.cli.stops import members
+from tests.shared import refusal
 from tests.shell import heard, refused
-from tfarm.errors import ParameterError
 from tfarm.fitting.data import read_measured
 from tfarm.fitting.recording import read_recording
 from tfarm.studies.space import listing_of
@@ -53,10 +53,9 @@ def reader(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("body", ENDS)
 def test_a_reader_that_ends_is_one_line(body, reader, capfd):
-    with pytest.raises(ParameterError, match=r"sweep\.uff': no UFF file that can be read: ") as caught:
-        read_measured(reader(body), "tip_acceleration", "hub_torque")
-    assert ENDS[body] in str(caught.value)
-    assert "\n" not in str(caught.value)
+    line = str(refusal(read_measured, reader(body), "tip_acceleration", "hub_torque"))
+    assert "sweep.uff': no UFF file that can be read: " in line
+    assert ENDS[body] in line
     assert capfd.readouterr() == ("", "")
 
 
@@ -85,23 +84,18 @@ def test_a_list_is_no_device_no_pipe_and_no_endless_line(tmp_path):
     os.mkfifo(tmp_path / "pipe.csv")
     (tmp_path / "pipe.parquet").symlink_to("/dev/zero")
     for name in ("pipe.csv", "pipe.parquet"):
-        with pytest.raises(ParameterError, match="is no regular file; give a CSV or Parquet file"):
-            listing_of(tmp_path / name)
+        assert "is no regular file; give a CSV or Parquet file" in str(refusal(listing_of, tmp_path / name))
     with (tmp_path / "zeros.csv").open("wb") as file:
         file.truncate(3 << 30)
-    with pytest.raises(ParameterError, match=r"cannot be read \(field larger than field limit"):
-        listing_of(tmp_path / "zeros.csv")
+    assert "cannot be read (field larger than field limit" in str(refusal(listing_of, tmp_path / "zeros.csv"))
     os.truncate(tmp_path / "zeros.csv", 5 << 30)
-    with pytest.raises(ParameterError, match="size in bytes = 5368709120"):
-        listing_of(tmp_path / "zeros.csv")
+    assert "size in bytes = 5368709120" in str(refusal(listing_of, tmp_path / "zeros.csv"))
 
 
 @pytest.mark.parametrize("number", ["9" * 5000, "0", "3"])
 def test_a_number_of_a_response_that_is_none_is_one_line(number, tmp_path):
     (tmp_path / "sweep.uff").write_text(f"    -1\n    58\n{number}\n    -1\n")
-    with pytest.raises(ParameterError) as caught:
-        read_measured(f"{tmp_path / 'sweep.uff'}#{number}", "tip_acceleration", "hub_torque")
-    assert "\n" not in str(caught.value)
+    assert refusal(read_measured, f"{tmp_path / 'sweep.uff'}#{number}", "tip_acceleration", "hub_torque")
 
 
 def test_a_stopped_command_ends_its_reader(reader):

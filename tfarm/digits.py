@@ -6,12 +6,9 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any
 
-POWER_OF_TEN = re.compile(r"(?<![\w.])(\d(?:\.\d+)?)e([-+]?\d{1,3})(?!\w|\.\d)")
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 DOUBLE_DIGITS = 15  # of a decimal number that a double preserves
 LEAST_PLAIN, MOST_PLAIN = 1e-3, 1e7  # outside, numbers have powers of ten
-SPARE_DIGITS = 2  # more digits of the largest number of a column, for those of the smallest
-MOST_DECIMALS = 7  # of a column; where more are needed each number has its own
 CellsOf = Callable[[Sequence[Any]], Sequence[str]]  # from the values of a column to its cells
 
 
@@ -58,9 +55,10 @@ def aligned(values: Iterable[float], digits: int, *, least: int = 6) -> tuple[st
     """
     column = list(values)
     sizes = [abs(x) for x in column if x and math.isfinite(x)] or [1.0]
-    top, bottom = _exponent(max(sizes), digits), _exponent(min(sizes), least)
-    decimals = max(0, digits - 1 - top, least - 1 - bottom)
-    if top + 1 + decimals > digits + SPARE_DIGITS or decimals > MOST_DECIMALS or top > 7:
+    top = _exponent(max(sizes), digits)
+    decimals = max(0, digits - 1 - top, least - 1 - _exponent(min(sizes), least))
+    # two more digits of the largest number than asked for, and seven decimals
+    if top + decimals > digits + 1 or decimals > 7 or top > 7:
         return tuple(significant(x, digits) for x in column)
     return tuple(_typeset(f"{x:.{decimals}f}") if x else "0" for x in column)
 
@@ -95,7 +93,8 @@ def listed(words: Sequence[str]) -> str:
 
 def powers(text: str) -> str:
     """Return a text with powers of ten: 1.8 × 10⁻⁹ for 1.8e-9."""
-    return POWER_OF_TEN.sub(lambda number: f"{number[1]} × 10{str(int(number[2])).translate(SUPERSCRIPT)}", text)
+    number = r"(?<![\w.])(\d(?:\.\d+)?)e([-+]?\d{1,3})(?!\w|\.\d)"
+    return re.sub(number, lambda found: f"{found[1]} × 10{str(int(found[2])).translate(SUPERSCRIPT)}", text)
 
 
 def unit(text: str) -> str:

@@ -19,7 +19,9 @@ class ParameterError(TfarmError, ValueError):
     """Bad input.  Its text is one line: the file (if any), the key, the value and the remedy."""
 
     def __init__(self, *, key: str, value: object, remedy: str, file: str | os.PathLike[str] | None = None) -> None:
-        self.key, self.value, self.remedy = key, value, remedy
+        self.key = key
+        self.value = value
+        self.remedy = remedy
         self.file = None if file is None else os.fspath(file)
         super().__init__(str(self))
 

@@ -82,7 +82,8 @@ def of_uff(path: str) -> Iterator[memoryview]:
     """Return frequencies and values of each frequency response function (data set 58, function 4) of a UFF file."""
     import pyuff
 
-    file, found = pyuff.UFF(path), dict[str, Any]()
+    file = pyuff.UFF(path)
+    found: dict[str, Any] = {}
     for n, kind in enumerate(file.get_set_types()):
         each = file.read_sets(n) if int(kind) == 58 else {}
         # 18: the kind of an abscissa that is a frequency

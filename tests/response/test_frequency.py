@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.shared import thinned
+from tests.shared import refusal, thinned
 from tfarm.arm import Motor
 from tfarm.response.frequency import EVEN_PER_DECADE, bode, refined_grid, resonant_band, without_cancelled
 from tfarm.schema import sections
@@ -92,8 +92,7 @@ def test_from_another_input_it_is_the_ratio_of_two_responses():
     ],
 )
 def test_what_is_no_bode_plot_is_refused(arguments, words):
-    with pytest.raises(tfarm.ParameterError, match=words):
-        bode(UNDAMPED, **arguments)
+    assert words in str(refusal(bode, UNDAMPED, **arguments))
 
 
 def test_a_pole_and_a_zero_that_coincide_cancel():
@@ -102,14 +101,11 @@ def test_a_pole_and_a_zero_that_coincide_cancel():
     assert zeros.tolist() == [3j]
 
 
-def test_with_a_free_pin_the_gauge_reads_the_torque():
-    data = response(replace(UNDAMPED, hub=tfarm.Hub(inertia=0.0)), "root_moment")
+def test_with_a_free_pin_the_gauge_reads_the_torque_and_a_pinned_tip_does_not_move():
+    data = response(UNDAMPED.having(hub_inertia=0.0), "root_moment")
     assert data.poles.size == data.zeros.size == 0
     assert abs(data.value + 1).max() < 1e-12
-
-
-def test_a_pinned_tip_does_not_move():
-    assert response(replace(UNDAMPED, payload=tfarm.Payload(mass=math.inf)), "tip_displacement").is_zero
+    assert response(UNDAMPED.having(payload_mass=math.inf), "tip_displacement").is_zero
 
 
 def test_behind_an_inductance_an_arm_without_losses_has_the_phase_of_its_values():

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.shared import thinned
-from tfarm import Hub, Output, ParameterError, Payload
+from tests.shared import refusal, thinned
+from tfarm import Hub, Output, Payload
 from tfarm.exact import appendix
 
 EPS = np.finfo(float).eps
@@ -86,8 +86,7 @@ def test_what_is_held_constant_has_its_value_at_a_resonance_too(name: str, wante
     arm = replace(ARMS[name], link=replace(ARMS[name].link, damping=0.0))
     G = tfarm.transfer(arm, wanted, x=None if share is None else share * arm.link.length)
     s = 1j * float(tfarm.modes(arm, 2).natural_frequency[-1])
-    with pytest.raises(ParameterError, match="a natural frequency"):
-        tfarm.transfer(arm, "tip_deflection")(s)
+    assert "a natural frequency" in str(refusal(tfarm.transfer(arm, "tip_deflection"), s))
     assert (G(s), G.derivative(s), G(0)) == (value, 0.0, value)
     assert [float(part) for part in G.digits(s, 30)] == [value, 0.0]
 
@@ -113,14 +112,10 @@ def test_what_is_held_constant_has_its_value_at_a_resonance_too(name: str, wante
 def test_what_is_no_output_is_refused(change, message: str) -> None:
     right = {"quantity": "W", "place": "tip", "unit": "m", "label": "where the tip is"}
     assert Output(**right).name == "where_the_tip_is"
-    with pytest.raises(ParameterError, match=message) as refused:
-        Output(**(right | change))
-    assert "\n" not in str(refused.value)
+    assert message in str(refusal(Output, **(right | change)))
 
 
 def test_two_outputs_of_one_name_are_not_confused() -> None:
     false = Output(quantity="Y", place="tip", unit="m", label="tip displacement")
-    with pytest.raises(ParameterError, match="the name of another output"):
-        tfarm.transfer(LAB, false)
-    with pytest.raises(ParameterError, match="the name of an output"):
-        tfarm.transfer(LAB, [3])  # type: ignore[list-item]
+    assert "the name of another output" in str(refusal(tfarm.transfer, LAB, false))
+    assert "the name of an output" in str(refusal(tfarm.transfer, LAB, [3]))

@@ -8,7 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 import tfarm
-from tfarm import Arm, Hub, ParameterError
+from tests.shared import refusal
+from tfarm import Arm, Hub
 
 EPS = np.finfo(float).eps
 
@@ -32,8 +33,7 @@ def test_next_to_zero_the_expansion_there_is_the_answer_or_one_line(arm, s) -> N
     assert G(s) == pytest.approx(G.static, rel=1e-14)
     angle = tfarm.transfer(arm, "hub_angle")
     if abs(s) < 1e-150:
-        with pytest.raises(ParameterError, match="hub_angle is larger than any float64 there"):
-            angle(s)
+        assert "hub_angle is larger than any float64 there" in str(refusal(angle, s))
     else:
         assert angle(s) == pytest.approx(1 / arm.total_inertia / abs(s) ** 2 * (1 if s.real else -1), rel=1e-14)
 
@@ -41,10 +41,9 @@ def test_next_to_zero_the_expansion_there_is_the_answer_or_one_line(arm, s) -> N
 def test_a_pole_is_named() -> None:
     arm = tfarm.load("sasaki2012")
     omega = tfarm.modes(arm, 1).natural_frequency[1]
-    with pytest.raises(ParameterError, match=r"a pole: a natural frequency, 71\.50568247 rad/s"):
-        tfarm.transfer(arm, "root_moment")([1j, 1j * omega])
-    with pytest.raises(ParameterError, match="rigid body"):
-        tfarm.transfer(arm, "hub_angle")(0)
+    refused = refusal(tfarm.transfer(arm, "root_moment"), [1j, 1j * omega])
+    assert "a pole: a natural frequency, 71.50568247 rad/s" in str(refused)
+    assert "rigid body" in str(refusal(tfarm.transfer(arm, "hub_angle"), 0))
 
 
 def test_poles_without_damping_are_the_natural_frequencies() -> None:
@@ -57,9 +56,9 @@ def test_poles_without_damping_are_the_natural_frequencies() -> None:
 
 
 def test_an_outermost_zero_on_the_edge_of_the_box_moves_the_box() -> None:
-    arm = tfarm.load("sasaki2012-lab")
-    pole = tfarm.transfer(arm, "hub_angle").poles(up_to=100.0).values[-1]
-    poles = tfarm.transfer(arm, "hub_angle").poles(up_to=float(abs(pole.imag)))
+    G = tfarm.transfer(tfarm.load("sasaki2012-lab"), "hub_angle")
+    pole = G.poles(up_to=100.0).values[-1]
+    poles = G.poles(up_to=float(abs(pole.imag)))
     assert poles.box[3] > abs(pole.imag)
     assert np.isclose(poles.values, pole).any()
 
@@ -88,14 +87,13 @@ def test_shapes() -> None:
     ],
 )
 def test_refusals(outputs: str, x: float | None, message: str) -> None:
-    with pytest.raises(ParameterError, match=message):
-        tfarm.transfer(tfarm.load("sasaki2012"), outputs, x=x)
+    assert message in str(refusal(tfarm.transfer, tfarm.load("sasaki2012"), outputs, x=x))
 
 
 @pytest.mark.parametrize("s", [math.nan, complex(3.0, math.nan), complex(0, math.inf), -2e20])
 def test_s_is_finite_and_in_the_range_of_powers(s: complex) -> None:
-    with pytest.raises(ParameterError, match="at most" if s == -2e20 else "finite"):
-        tfarm.transfer(tfarm.load("sasaki2012"), "hub_rate")([1.0, s])
+    refused = refusal(tfarm.transfer(tfarm.load("sasaki2012"), "hub_rate"), [1.0, s])
+    assert ("at most" if s == -2e20 else "finite") in str(refused)
 
 
 def test_many_points_have_the_values_of_few():
@@ -104,6 +102,4 @@ def test_many_points_have_the_values_of_few():
     s = 1j * np.geomspace(0.1, 1e3, 20_001)
     apart = np.concatenate([G(few) for few in np.array_split(s, 7)], axis=1)
     assert np.array_equal(G(s), apart)
-    for wrong in (np.nan, complex(0.0, -np.inf), complex(-1e21, 0.0)):
-        with pytest.raises(tfarm.ParameterError, match="s = "):
-            G(np.r_[s, wrong])
+    assert refusal(G, np.r_[s, np.nan]).key == "s"

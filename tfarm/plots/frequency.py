@@ -14,9 +14,8 @@ from tfarm.arm import PLANE, HubFeedback
 from tfarm.arrays import Complex, Real
 from tfarm.exact.outputs import signal_words, unit_over
 from tfarm.fitting.data import Measured
-from tfarm.fitting.fit import Fit
+from tfarm.fitting.fit import Fit, ResponseBand, ShareOfArms
 from tfarm.fitting.overlay import Overlay
-from tfarm.fitting.possible import ResponseBand, ShareOfArms, fitted_curves
 from tfarm.loop.curve import decibels
 from tfarm.response.frequency import Bode
 
@@ -222,7 +221,7 @@ def fitted(fit: Fit, *, ax: Sequence[Axes]) -> None:
     """
     count = len(fit.responses)
     looks = {"color": GREY, "lw": 1.0, "label": "start"}, {"color": BLUE, "lw": 1.4, "label": "fitted, exact"}
-    for one, (omega, *curves), upper, lower in zip(fit.responses, fitted_curves(fit), ax, ax[count:], strict=False):
+    for one, (omega, *curves), upper, lower in zip(fit.responses, fit.curves, ax, ax[count:], strict=False):
         _over_measured(one, [(omega, *each) for each in zip(curves, looks, strict=True)], upper, lower)
         upper.set(title=one.label, xlabel="", ylabel=f"magnitude [{one.unit}]")
 

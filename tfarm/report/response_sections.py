@@ -14,9 +14,8 @@ from tfarm.arm import Arm, Theory
 from tfarm.audit.arm_proofs import BRACKET_DIGITS, proven_damped_modes, proven_modes
 from tfarm.digits import fixed, kept_digits, lined, listed, plain
 from tfarm.errors import CertificationError, ConvergenceError
-from tfarm.fitting.fit import ARMS, arms_drawn
+from tfarm.fitting.fit import ARMS, arms_drawn, response_band, stable_share
 from tfarm.fitting.overlay import overlay
-from tfarm.fitting.possible import response_band, stable_share
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import ranges_of
 from tfarm.plots import frequency, motion

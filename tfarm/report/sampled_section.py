@@ -303,7 +303,7 @@ def step_rows(name: str, found: RunComparison) -> Iterator[StepRow]:
 def measured_blocks(report: ArmReport) -> Iterator[Picture | Table]:
     """Each measured run with the exact loop over it, and both in numbers; nothing where none was measured."""
     runs = [(each, each.given.measured) for each in report.controllers if each.given.measured is not None]
-    found = {each.name: compare_run(each.arm, each.law, report.chain, run) for each, run in runs}
+    found = {each.name: compare_run(Case(each.arm, each.law, report.chain), run) for each, run in runs}
     if not found:
         return
     figure = motion.draw_measured_runs.figure(found)
@@ -320,7 +320,7 @@ def growth_words(each: Controller, found: verdict.Verdict, chain: Chain) -> str:
     shown: list[float] = []
     if measured is not None:
         # as much longer as an unstable loop may seem settled
-        shown = departures(each.arm, each.law, chain, measured, found.modes_used, 20 * growth)
+        shown = departures(Case(each.arm, each.law, chain), measured, found.modes_used, 20 * growth)
     return prose("growth", name=each.name, found=found, growth=growth, measured=measured, shown=shown)
 
 
