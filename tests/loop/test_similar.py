@@ -17,7 +17,7 @@ from tfarm.loop.plane import gain_map
 from tfarm.loop.poles import Poles
 from tfarm.loop.stability import Stability
 from tfarm.spectrum.box import Box
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 LAB = tfarm.load("sasaki2012-lab")
 LEAD = {"hub_angle": ([3.0, 20.0], [0.002, 1.0]), "root_moment": ([0.2], [1e-4, 2e-2, 1.0])}  # num and den in s

@@ -22,7 +22,7 @@ from tfarm.loop.plane import Axis, moment_axis, rate_axis, stable_edge
 from tfarm.loop.poles import Poles, count_with_mirrors, first_poles, poles_below, starting_points
 from tfarm.loop.stability import stability
 from tfarm.spectrum.box import Box
-from tfarm.spectrum.table import rate_unit
+from tfarm.spectrum.gains import rate_unit
 
 LAB, STOCKY = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
 

@@ -17,7 +17,7 @@ from tfarm.loop.circle_crossings import stable_windows
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import stability
-from tfarm.spectrum.table import (
+from tfarm.spectrum.gains import (
     DEFAULT_DIGITS,
     PAPER_GAINS,
     RATE_SHARE,
