@@ -32,9 +32,9 @@ SURVEYS := \
 	synthesis.designs \
 	loop.nyquist_counts \
 	reduced.test_accuracy \
-	dsp.settled \
-	dsp.law_orders \
-	dsp.single_laws \
+	loop.settled \
+	loop.law_orders \
+	loop.single_laws \
 	fitting.planted \
 	studies.kills \
 	studies.planted \

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import field, replace
 from functools import cached_property
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 from tfarm.arm.chain import Chain, chain_or_usual
 from tfarm.arm.feedback import HubFeedback
@@ -36,6 +36,10 @@ class Case:
     law: Law
     chain: Chain = field(default=cast("Chain", None))
 
+    if TYPE_CHECKING:
+        # what may be given: gains become a law, no chain the usual one
+        def __init__(self, arm: Arm, law: AnyLaw, chain: Chain | None = None) -> None: ...
+
     def __post_init__(self) -> None:
         must_be_arm(self.arm)
         law = as_law(self.law)
@@ -46,7 +50,7 @@ class Case:
         object.__setattr__(self, "law", law if gains is None else Law.of_gains(gains))
         object.__setattr__(self, "chain", chain_or_usual(self.chain))
 
-    @property
+    @cached_property
     def gains(self) -> HubFeedback | None:
         """The controller as gains at the hub; None of any other."""
         return self.law.gains
@@ -77,7 +81,7 @@ class Case:
 
     def under(self, law: AnyLaw) -> Case:
         """Return the case with another controller."""
-        return Case(self.arm, as_law(law), self.chain)
+        return Case(self.arm, law, self.chain)
 
     def on(self, arm: Arm) -> Case:
         """Return the case with another arm."""

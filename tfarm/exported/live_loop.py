@@ -40,6 +40,7 @@ from tfarm.assessment.card import (
     reference_damping,
 )
 from tfarm.assessment.stability_map import BEYOND_PICTURE, sampled_region
+from tfarm.case import Case
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits
 from tfarm.dsp import Chain, PulseTransfer, Simulator, scenario, traces
@@ -149,7 +150,7 @@ def law_data(arm: Arm, chain: Chain, law: Law, reach: float = 10.0) -> LiveNumbe
         "start": gains,
         "reference": gains,
         **dict.fromkeys(("continuous", "sampled_map", "slew", "lyapunov", "default", "outputs")),
-        "sampled_loop": law_in_page(sampled_verdict(arm, law, chain).full, list(gains)),
+        "sampled_loop": law_in_page(sampled_verdict(Case(arm, law, chain)).full, list(gains)),
     }
 
 
@@ -175,7 +176,7 @@ def _of_any_law(arm: Arm, chain: Chain, corners: Sequence[Law], law: AnyLaw, uni
         "limits": {"gain": GAIN_LIMITS, "phase": PHASE_LIMITS, "periods": PERIOD_LIMITS, "peak": PEAK_LIMITS},
         **samples,
         **_known(arm, is_quiet, unit is None),
-        "reference_count": stability(arm, law, samples["band"]).unstable_roots,
+        "reference_count": stability(Case(arm, law), samples["band"]).unstable_roots,
         "graded": _graded(arm, corners, chain, law, unit) if arm.has_elastic_link else None,
         "margin_names": dict(zip(("up", "down", "phase", "delay", "peak"), GRADED.values(), strict=True)),
     }
@@ -189,8 +190,8 @@ def _samples(arm: Arm, corners: Sequence[Law], law: Law | None = None) -> tuple[
 
     They are those of hub angle and gauge, or of each part of `law`, whose poles and zeros are steep places too.
     """
-    band, is_quiet = band_of_family(ContinuousLoop(arm, each) for each in corners)
-    samples = loop_panels(arm, band, None if law is None else ContinuousLoop(arm, law))
+    band, is_quiet = band_of_family(ContinuousLoop(Case(arm, each)) for each in corners)
+    samples = loop_panels(arm, band, None if law is None else ContinuousLoop(Case(arm, law)))
     blocks = [] if law is None else _blocks(law)
     own = [abs(s) for block in blocks for s in (*block.poles, *block.zeros) if s]
     return {
@@ -209,11 +210,11 @@ def _graded(arm: Arm, corners: Sequence[Law], chain: Chain, law: AnyLaw, unit: L
     """Return the loop with whose damping an undamped arm is graded, and the words for that: `tfarm.assessment.card`."""
     C = reference_damping(arm)
     damped = arm.having(damping=C)
-    sampled = sampled_verdict(damped, law, chain).full
+    sampled = sampled_verdict(Case(damped, law, chain)).full
     samples, _ = _samples(damped, corners, unit)
     return samples | {
         "kind": "band",
-        "reference_count": stability(damped, law, samples["band"]).unstable_roots,
+        "reference_count": stability(Case(damped, law), samples["band"]).unstable_roots,
         "sampled_loop": sampled_numbers(sampled) if unit is None else law_in_page(sampled, list(unit.part_gains)),
         "words": UNDAMPED.format(C),
     }
@@ -245,7 +246,7 @@ def _known(arm: Arm, is_quiet: bool, are_gains: bool) -> LiveNumbers:
 
 def _stable_moments(arm: Arm) -> list[float | None]:
     """Return between which K2 no mode is driven by K1 > 0 without damping; None where no limit was found."""
-    found = windows_of(stability(arm, default_gains(arm).having(MOMENT_GAIN, 0.0)), [MOMENT_GAIN])[MOMENT_GAIN]
+    found = windows_of(stability(Case(arm, default_gains(arm).having(MOMENT_GAIN, 0.0))), [MOMENT_GAIN])[MOMENT_GAIN]
     return [end if found.end(end) == "edge" else None for end in found.around or (-math.inf, math.inf)]
 
 
@@ -345,8 +346,10 @@ def slew_numbers(arm: Arm, chain: Chain, law: HubFeedback, most: int = 5000) -> 
         task = scenario("slew", arm, chain, traces.RECORD_LENGTH * chain.slew.rise_time)
         if task.t.size > most:
             return None
-        count = enough_modes(lambda number: Simulator(arm, ideal_chain(chain), task, count=number).linear(law)).modes
-        plant = _upper(Simulator(arm, chain, task, count=count).plant)
+        case = Case(arm, law, chain)
+        ideal_case = case.through(ideal_chain(chain))
+        count = enough_modes(lambda number: Simulator(ideal_case, task, count=number).run()).modes
+        plant = _upper(Simulator(case, task, count=count).plant)
         ideal = np.c_[task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference, task.rigid_moment]
         return {
             **_sampling(chain),

@@ -28,8 +28,9 @@ from tfarm.arm.blocks import Matrices, StateSpace
 from tfarm.arm.law import REFERENCE, Part
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex
+from tfarm.case import Case
 from tfarm.dsp import Chain
-from tfarm.dsp.discretise import acting_law, with_all_gains, with_estimate
+from tfarm.dsp.discretise import acting_law, with_estimate
 from tfarm.dsp.plant import USUAL_MODES, PulseTransfer, driven, sensed_plant
 from tfarm.dsp.stages import not_covered
 from tfarm.errors import require
@@ -80,7 +81,7 @@ class NamedSystem:
 
 def controller_system(arm: Arm, law: Law, chain: Chain) -> NamedSystem:
     """Return the controller in z, from its signals and then their references to its share of the input."""
-    acting, _ = acting_law(arm, with_all_gains(arm, law), chain)
+    acting, _ = acting_law(Case(arm, law, chain))
     parts = tuple(_with_references(part, acting.references) for part in acting.parts)
     acting = with_estimate(replace(acting, parts=parts, references=()), chain)
     columns = (*acting.signals, *acting.wanted)
@@ -99,7 +100,7 @@ def _with_references(part: Part, references: tuple[str, ...]) -> Part:
 
 def plant_system(arm: Arm, law: Law, chain: Chain) -> NamedSystem:
     """Return the sampled plant from its input to the signals of the law and the tip, exact for its modal model."""
-    acting, late = acting_law(arm, with_all_gains(arm, law), chain)
+    acting, late = acting_law(Case(arm, law, chain))
     signals = with_estimate(acting, chain).signals
     sensed = sensed_plant(arm, late, list(dict.fromkeys((*signals, "tip_displacement"))), USUAL_MODES)
     A, B, C = PulseTransfer(sensed.together, late.sampling).folded().matrices()

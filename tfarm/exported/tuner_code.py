@@ -34,6 +34,7 @@ import numpy as np
 from tfarm.arm import HubFeedback
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import Real, Whole
+from tfarm.case import Case
 from tfarm.dsp import Measurement
 from tfarm.errors import MISSING, ParameterError, must_be_known, require
 from tfarm.exact.compiled import compiled, inlined
@@ -239,7 +240,8 @@ def c_tuner(task: ExportTask) -> Export:
     require(saved.period == period, "sampling.period", period, remedy)
     tuner = ExportedTuner(saved, task.precision)
     of = tuner.numbers
-    loop = sampled_loop(task.arm, HubFeedback(K1=float(of.K1), K2=1.0, Kp=float(of.Kp)), task.chain, count=TRIAL_MODES)
+    servo = HubFeedback(K1=float(of.K1), K2=1.0, Kp=float(of.Kp))
+    loop = sampled_loop(Case(task.arm, servo, task.chain), count=TRIAL_MODES)
     guard = sector_guard(loop, float(of.lo), float(of.hi))
     certainty = "not certified for a gain that varies" if guard is None else guard.sentence
     is_proven = guard is not None and guard.is_proven

@@ -45,6 +45,7 @@ from scipy.linalg import LinAlgError, solve_discrete_are, solve_triangular
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN
 from tfarm.arrays import Real
+from tfarm.case import Case
 from tfarm.dsp.plant import first_distinct, held_amplitude
 from tfarm.dsp.stages import not_covered
 from tfarm.errors import CertificationError, ConvergenceError, must_be_known
@@ -252,7 +253,7 @@ def find_guard(loop: Sampled, kind: GuardKind, best_constant: float) -> Guard:
     # the least damping with a guard, of a few [s]
     for C in filter(arm.damping.__lt__, np.geomspace(1e-12, 1e-2, 11).tolist()):
         with suppress(ConvergenceError):
-            damped = sampled_loop(arm.having(damping=C), loop.gains, loop.chain, count=loop.plant.count)
+            damped = sampled_loop(Case(arm.having(damping=C), loop.gains, loop.chain), count=loop.plant.count)
             if (other := find(_larger(damped), 0.0)) and other.is_settled:
                 raise CertificationError(f"{start}; with a damping of C = {C:.1e} s there is one")
     remedy = f"take another {RATE_GAIN}, or a shorter period or delay"

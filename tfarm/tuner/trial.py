@@ -34,6 +34,7 @@ from tfarm.arm.chain import Reading
 from tfarm.arm.checks import check_annotated, not_negative, number, positive
 from tfarm.arm.schema import StrictTable, validated_file
 from tfarm.arrays import Real
+from tfarm.case import Case
 from tfarm.dsp import Chain, Measurement, Scenario, Simulation, Simulator, scenario
 from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
 from tfarm.dsp.simulate import FOLDED_UP
@@ -137,11 +138,12 @@ class Trial:
 
     def on(self, arm: Arm, chain: Chain, servo: HubFeedback) -> Trial:
         """The same slew on another loop, with the references of this one's arm."""
-        return replace(self, loop=sampled_loop(arm, replace(servo, K2=1.0), chain, count=self.loop.plant.count))
+        return replace(self, loop=sampled_loop(Case(arm, replace(servo, K2=1.0), chain), count=self.loop.plant.count))
 
     def simulator(self, *, chain: Chain | None = None, task: Scenario | None = None) -> Simulator:
         """A simulator of the loop, with the converters of a chain, by default that of the trial."""
-        return Simulator(self.arm, chain or self.loop.chain, task or self.task, count=self.loop.plant.count)
+        case = Case(self.arm, HubFeedback(), chain or self.loop.chain)
+        return Simulator(case, task or self.task, count=self.loop.plant.count)
 
     def room(self, network: Network) -> tuple[kernel.Run, kernel.Work]:
         """Empty record and buffers of a trial with that network."""
@@ -192,7 +194,7 @@ def slew_trial(
     rise = chain.slew.rise_time
     require(length >= rise, "duration", length, f"a trial lasts at least as long as its slew, {rise:g} s")
     must_not_be_algebraic(arm, "hub.inertia", 0.0)
-    loop = sampled_loop(arm, HubFeedback(K1=rate_gain, K2=1.0, Kp=Kp), chain, count=count)
+    loop = sampled_loop(Case(arm, HubFeedback(K1=rate_gain, K2=1.0, Kp=Kp), chain), count=count)
     return Trial(loop, scenario("slew", arm, chain, length), Cost() if cost is None else cost, signals)
 
 
