@@ -20,7 +20,7 @@ from tfarm.arm.checks import on_the_arm
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
-from tfarm.exact.characteristic import loop_parts
+from tfarm.exact.characteristic import drive_of
 from tfarm.exact.system import System
 from tfarm.records import frozen
 from tfarm.schema import Quantity
@@ -318,7 +318,7 @@ def entered(damped: DampedModes) -> Real:
     at = -np.geomspace(min(SLOWEST * lowest, reach / 2), reach, REAL_POINTS)
 
     def signed(s: Real) -> Real:
-        drive, _, scale = loop_parts(k, s + 0j)
+        drive, scale = drive_of(k, s + 0j)
         return np.asarray((drive * np.exp(1j * scale.imag)).real)
 
     alone = damped.unassigned_pairs[:, 0]
