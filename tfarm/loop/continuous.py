@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from dataclasses import field, replace
 from functools import cached_property, lru_cache
 from typing import Annotated, Any, cast
@@ -32,7 +33,7 @@ from tfarm.arm import (
 from tfarm.arrays import Complex
 from tfarm.case import Case
 from tfarm.errors import require
-from tfarm.exact.characteristic import Analytic, Feedback, LoopParts, by_differences, feedback
+from tfarm.exact.characteristic import Analytic, Feedback, LoopParts, deflated, difference_steps, feedback
 from tfarm.exact.system import System
 from tfarm.loop.loop import Loop
 from tfarm.loop.theorem import Theorem, theorem_of
@@ -192,6 +193,17 @@ class ContinuousLoop(Loop):
         """D/s^n, n = `zeros_at_origin`, with slopes from differences."""
         s = np.where(s == 0, NEAREST_TO_ORIGIN * first_frequency(self.arm), np.asarray(s, dtype=complex))
         return by_differences(self.k, self.characteristic, s, self.zeros_at_origin)
+
+
+def by_differences(
+    k: System, characteristic: Callable[[Complex], tuple[Complex, Complex]], s: Complex, at_zero: int
+) -> Analytic:
+    """D/s^at_zero at s (n,), not 0, with slopes from differences; `characteristic` gives D e^{-scale} and scale."""
+    h = difference_steps(k, s)
+    with np.errstate(over="ignore", invalid="ignore"):  # far from where it is large: no number, and no start
+        D, scale = characteristic(np.array([s, s + h, s - h]))
+        up, down = D[1:] * np.exp(scale[1:] - scale[0])
+        return deflated(D[0], (up - down) / (2 * h), scale[0], s, at_zero)
 
 
 def _must_not_be_algebraic(loop: ContinuousLoop) -> None:

@@ -21,9 +21,9 @@ from tfarm.arrays import Complex, Real, Whole
 from tfarm.case import Case
 from tfarm.crossing import Line
 from tfarm.errors import ConvergenceError, require
-from tfarm.exact.characteristic import Analytic, by_differences
+from tfarm.exact.characteristic import Analytic
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.loop.continuous import NEAREST_TO_ORIGIN, ORDER_READ_AT, ContinuousLoop, band_of
+from tfarm.loop.continuous import NEAREST_TO_ORIGIN, ORDER_READ_AT, ContinuousLoop, band_of, by_differences
 from tfarm.loop.lines import LawTerms
 from tfarm.loop.poles import box_of, poles_below, slow_poles
 from tfarm.records import frozen

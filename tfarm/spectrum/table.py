@@ -17,7 +17,7 @@ from tfarm.arm import (
 from tfarm.arm.checks import on_the_arm, whole
 from tfarm.arrays import Real, Whole
 from tfarm.digits import DOUBLE_DIGITS, general, singly
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError, require
 from tfarm.exact.system import System, shear_flexibility, system_of
 from tfarm.exact.values import (
     APPENDIX_DIGITS,
@@ -258,18 +258,14 @@ def modes(arm: Arm, count: int | None = None, *, up_to: float | None = None, the
     theory = arm.theory if theory is None else theory
     k = system_of(arm, theory).undamped
     rigid = arm.has_rigid_mode
-    if (count is None) == (up_to is None):
-        raise ParameterError(key="count", value=count, remedy="give either a count of modes or a frequency up_to")
-    if up_to is not None:
-        if not 0 < up_to < math.inf:
-            raise ParameterError(key="up_to", value=up_to, remedy="a positive, finite frequency in rad/s")
-        count = modes_below(arm, up_to, theory=theory)
-    else:
+    require((count is None) != (up_to is None), "count", count, "give either a count of modes or a frequency up_to")
+    if up_to is None:
         count = whole("count", count, 1, math.inf, f"a whole number of modes from 1 to {MOST_TABLE_MODES}")
-    if count == 0:
-        raise ParameterError(key="up_to", value=up_to, remedy="no flexible mode lies below it; choose a higher one")
-    if count > MOST_TABLE_MODES:
-        raise ParameterError(key="count", value=count, remedy=f"at most {MOST_TABLE_MODES} modes")
+    else:
+        require(0 < up_to < math.inf, "up_to", up_to, "a positive, finite frequency in rad/s")
+        count = modes_below(arm, up_to, theory=theory)
+        require(count, "up_to", up_to, "no flexible mode lies below it; choose a higher one")
+    require(count <= MOST_TABLE_MODES, "count", count, f"at most {MOST_TABLE_MODES} modes")
     flexible = natural_frequencies(k, rigid + 1, rigid + count)
     index = np.arange(1 - rigid, count + 1)
     return Modes(arm, theory, index, np.concatenate([[0.0] * rigid, flexible]), k)
