@@ -95,7 +95,7 @@ def quick_characteristics(k: System, s: Complex, at_zero: int = 0) -> Analytic:
 
 def drive_of(k: System, s: Complex) -> tuple[Complex, Complex]:
     """Return D e^{-scale} of a system without a law, and scale, at s of any shape."""
-    free = free_of(readings(k, (), 0.0), s.ravel())
+    free = free_of(readings(k), s.ravel())
     return free.drive.reshape(s.shape), free.scale.reshape(s.shape)
 
 
@@ -230,7 +230,7 @@ def _by_waves(
 
 def _layout(k: System, law: Feedback | None) -> Layout:
     """Return the layout of a system with the signals of a law."""
-    return readings(k, (), 0.0) if law is None else law.read
+    return readings(k) if law is None else law.read
 
 
 def _fed_back(sweep: Sweep, law: Feedback | None) -> Any:

@@ -14,7 +14,7 @@ voltage and a prescribed hub angle see `Drive`.  One uniform link is a chain of 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
@@ -233,8 +233,17 @@ class System:
 
     @cached_property
     def kept(self) -> dict[Any, Any]:
-        """The cache of layouts and other results of the system (`layout.readings`)."""
+        """The cache of layouts and other results of the system."""
         return {}
+
+    def keep(self, key: Any, make: Callable[[], Any]) -> Any:
+        """Return the result that is cached under a key, made where there is none."""
+        if key not in self.kept:
+            # 256: more than the places of a page
+            if len(self.kept) >= 256:
+                self.kept.clear()
+            self.kept[key] = make()
+        return self.kept[key]
 
     @cached_property
     def segments(self) -> tuple[Segment, ...]:

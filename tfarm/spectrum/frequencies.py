@@ -25,7 +25,7 @@ from tfarm.arrays import Real, Whole
 from tfarm.errors import ConvergenceError
 from tfarm.exact.balls import Ball, Sweep, across_waves, first_success, in_chain, precision, rational
 from tfarm.exact.count import DOUBLINGS, chain_counts, list_steps, rows_to_count
-from tfarm.exact.layout import LAYOUTS_KEPT, Layout, readings
+from tfarm.exact.layout import Layout, readings
 from tfarm.exact.system import Segment, Spring, System
 from tfarm.exact.waves import Plane
 from tfarm.records import read_only
@@ -82,7 +82,7 @@ class AxisSweep(Sweep):
     def __init__(self, system: System, omega: Ball, counting: bool) -> None:
         self._counting, self.number = counting, 0
         self._free = sum(not isinstance(end, float) for end in (system.tip_mass, system.tip_inertia))
-        super().__init__(readings(system, (), 0.0), flint.arb(0), -omega * omega)
+        super().__init__(readings(system), flint.arb(0), -omega * omega)
 
     @property
     def drive(self) -> Ball:
@@ -231,10 +231,8 @@ def list_frequencies(systems: Sequence[System], first: int, last: int) -> None:
     for j, i in np.argwhere(near):
         found[j, i] = _separated(systems[j], float(found[j, i]), int(number[i]))
     for k, own in zip(systems, read_only(found[:, number.size - 2 - last + first : -1]), strict=True):
-        if len(k.kept) >= LAYOUTS_KEPT:
-            k.kept.clear()
         if not np.isnan(own).any():
-            k.kept[first, last] = own
+            k.keep((first, last), own.view)
 
 
 def _separated(k: System, omega: float, number: int) -> float:

@@ -95,7 +95,7 @@ class Damping:
 
     def __post_init__(self) -> None:
         """Lay the system out without its damping, and the difference that the whole of it makes."""
-        still, layout = (readings(k, (), 0.0) for k in (self.k.with_damping(0.0), self.k))
+        still, layout = (readings(k) for k in (self.k.with_damping(0.0), self.k))
         rows, whole = (each.rows.view((float, len(OF_ELEMENT.split()) + 4)) for each in (still, layout))
         self.rows = rows, whole - rows
         self.ends = still.ends, layout.ends - still.ends
