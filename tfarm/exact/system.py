@@ -251,6 +251,11 @@ class System:
         return tuple(each for each in self.elements if isinstance(each, Segment))
 
     @property
+    def free_motions_of_tip(self) -> int:
+        """The number of motions of the tip that no infinite inertia locks."""
+        return sum(isinstance(end, Fraction) for end in (self.tip_mass, self.tip_inertia))
+
+    @property
     def reads_hub_moment(self) -> bool:
         """Whether the root moment acts on the hub: a clamp on the axis, without a body there."""
         inside = takewhile(lambda each: not isinstance(each, Segment), reversed(self.elements))

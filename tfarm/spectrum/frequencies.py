@@ -81,7 +81,7 @@ class AxisSweep(Sweep):
 
     def __init__(self, system: System, omega: Ball, counting: bool) -> None:
         self._counting, self.number = counting, 0
-        self._free = sum(not isinstance(end, float) for end in (system.tip_mass, system.tip_inertia))
+        self._free = system.free_motions_of_tip
         super().__init__(readings(system), flint.arb(0), -omega * omega)
 
     @property
