@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 import tfarm
 from tests.shared import refusal, thinned
-from tests.spectrum.test_double import pinned_pinned, steel
+from tests.spectrum.test_frequencies import pinned_pinned, steel
 from tests.strategies import BOUNDARY_CASES, some_arm
 from tfarm import ConvergenceError, Hub, ParameterError
 from tfarm.arm import Arm, Link, Section

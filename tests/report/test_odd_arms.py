@@ -33,7 +33,7 @@ from tfarm.report.page import ArmReport, GivenLaw, has_loop, on_hub, prose, sign
 from tfarm.report.response_sections import bode_section, damped_tables, modal_table
 from tfarm.report.writing import pieces_of
 from tfarm.spectrum import DampedModes
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 ARMS = odd_arms()
 DAMPED = [name for name, arm in ARMS.items() if arm.link.damping]

@@ -26,7 +26,7 @@ from tfarm.report import sampled_section as page
 from tfarm.report.page import DRAWN_DIGITS, ArmReport, GivenLaw, prose, save_block
 from tfarm.report.sampled_section import FILM_FRAMES, sampled_section, slews
 from tfarm.schema import text
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 GAINS = HubFeedback(K1=0.3, K2=0.3)

@@ -40,7 +40,7 @@ from tfarm.report.page import TEMPLATES, ArmReport, GivenLaw, best, explained, p
 from tfarm.report.trust import write_trust, written_proofs
 from tfarm.report.writing import PIECES, QUESTIONS, index_page, kept, make_section, navigation, pieces_of
 from tfarm.schema import Column, quantities, to_dict
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 # ------------------------------------------------------------ the same bytes
 

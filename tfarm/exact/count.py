@@ -49,9 +49,7 @@ FREE_MOTIONS = 12  # in the vector of ends: the number of free motions of the ti
 
 def rows_to_count(layout: Layout) -> tuple[NDArray[np.void], Real]:
     """Return rows and ends of a layout without damping, for `chain_count`, both read-only as those of a layout."""
-    chain = layout.chain
-    free = sum(not isinstance(end, float) for end in (chain.tip_mass, chain.tip_inertia))
-    return layout.rows, np.asarray(read_only(np.append(layout.ends, free)))
+    return layout.rows, np.asarray(read_only(np.append(layout.ends, layout.chain.free_motions_of_tip)))
 
 
 @inlined

@@ -1,6 +1,6 @@
 """Layouts of a system: cut and marked at places, as rows of the kernel, with the weights of each output."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -39,7 +39,6 @@ OF_ELEMENT = "kind a b g a_low b_low g_low sigma damping length stiffness compli
 ROW = np.dtype([*((name, float) for name in OF_ELEMENT.split()), ("of_chain", float, 4)])
 AT_JOINT = 2.0**-50  # of the length: rounding of a place at a joint, a quotient of float64 numbers
 OF_ANGLE, OF_MOMENT = 6, 10  # in the vector of ends: after six numbers of the payload A_0..A_3, then B_0 and B_1
-LAYOUTS_KEPT = 256  # of one system: more places than those of a page
 
 W, PSI, M, Q = range(4)  # the fields of a state
 FIELDS = {"W": W, "Y": W, "centre": W, "Psi": PSI, "Phi": PSI, "M": M, "strain": M, "Q": Q}  # of each quantity
@@ -59,9 +58,6 @@ class Reading(NamedTuple):
     C: Fraction | float = 0.0
     rate: Fraction = ZERO
     input: int = 0
-
-
-UNIT = Reading._fields.index("unit")  # its column in a table
 
 
 class Layout:
@@ -178,14 +174,11 @@ def reading_of(chain: System, wanted: Output, x: float) -> Reading:
     return Reading(place, FIELDS[wanted.quantity], theta, wanted.power, unit, segment.damping if wanted.gauge else 0.0)
 
 
-def readings(chain: System, wanted: tuple[Output, ...], x: float) -> Layout:
+def readings(chain: System, wanted: Iterable[Output] = (), x: float = 0.0) -> Layout:
     """Return the outputs of a chain, laid out and cached with it."""
-    key = wanted, x
-    if key not in chain.kept:
-        if len(chain.kept) >= LAYOUTS_KEPT:
-            chain.kept.clear()
-        chain.kept[key] = laid_out(chain, wanted, [x] * len(wanted))
-    return chain.kept[key]
+    outputs = tuple(wanted)
+    layout: Layout = chain.keep((outputs, x), lambda: laid_out(chain, outputs, [x] * len(outputs)))
+    return layout
 
 
 def laid_out(chain: System, wanted: Sequence[Output], shares: Sequence[float]) -> Layout:

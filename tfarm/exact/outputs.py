@@ -24,15 +24,19 @@ Place = Literal["root", "tip", "x"]
 Side = Literal["outer", "inner"]  # of a joint of two segments, or of an attachment
 
 MOST_POWER = 4  # of s: rate, acceleration, jerk and its rate
-PLACES_OF: Mapping[str, tuple[Place, ...]] = MappingProxyType({
-    **dict.fromkeys(("theta", "current"), ("root",)),
-    **dict.fromkeys(("M", "Q"), ("root", "tip", "x")),
-    **dict.fromkeys(("W", "Y", "Phi", "Psi"), ("tip", "x")),
-    "strain": ("x",),
-    "centre": ("tip",),
+# SI unit of each quantity, and the places where it is known
+QUANTITIES: Mapping[str, tuple[str, ...]] = MappingProxyType({
+    "theta": ("rad", "root"),
+    "M": ("N m", "root", "tip", "x"),
+    "Q": ("N", "root", "tip", "x"),
+    "W": ("m", "tip", "x"),
+    "Y": ("m", "tip", "x"),
+    "Phi": ("rad", "tip", "x"),
+    "Psi": ("rad", "tip", "x"),
+    "strain": ("1", "x"),
+    "centre": ("m", "tip"),
+    "current": ("A", "root"),
 })  # fmt: skip
-_METRES, _RADIANS = dict.fromkeys(("W", "Y", "centre"), "m"), dict.fromkeys(("theta", "Phi", "Psi"), "rad")
-QUANTITY_UNITS = MappingProxyType({**_METRES, **_RADIANS, "M": "N m", "Q": "N", "strain": "1", "current": "A"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,15 +64,14 @@ class Output:
             object.__setattr__(self, "name", "_".join(re.findall(r"\w+", self.label)))
         is_name = isinstance(self.name, str) and re.fullmatch(r"\w+", self.name)
         require(is_name, "output.name", self.name, "letters, digits and underscores")
-        must_be_known("output.quantity", self.quantity, get_args(Quantity))
-        places = PLACES_OF[self.quantity]
+        must_be_known("output.quantity", self.quantity, QUANTITIES)
+        unit, *places = QUANTITIES[self.quantity]
         require(self.place in places, "output.place", self.place, f"{self.quantity} is known at: {', '.join(places)}")
         whole("output.power", self.power, 0, MOST_POWER, f"a power of s: a whole number from 0 to {MOST_POWER}")
         is_gauge = isinstance(self.gauge, bool) and (not self.gauge or self.quantity in ("M", "strain"))
         remedy = "true or false, true for a moment only: a strain gauge measures E I phi' without its damping"
         require(is_gauge, "output.gauge", self.gauge, remedy)
-        per_time = "" if self.power == 0 else "/s" if self.power == 1 else f"/s^{self.power}"
-        unit = QUANTITY_UNITS[self.quantity] + per_time
+        unit += "" if self.power == 0 else "/s" if self.power == 1 else f"/s^{self.power}"
         require(self.unit in ("", unit), "output.unit", self.unit, f'values are in SI units, here "{unit}"')
         object.__setattr__(self, "unit", unit)
 

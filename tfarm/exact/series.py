@@ -92,7 +92,7 @@ def order_at_zero(chain: System, wanted: Output, x: float = 0.0) -> int:
 @lru_cache(SERIES_KEPT)
 def _at_zero(chain: System, wanted: Output | None = None, x: float = 0.0) -> list[Ball]:
     """Return the power series at s = 0 of an output of the free response, else of the drive, with exact zeros."""
-    layout = readings(chain, () if wanted is None else (wanted,), x)
+    layout = readings(chain, [wanted] if wanted else (), x)
     with precision(SERIES_BITS):
         sweep = _swept(chain, layout.places)
         series = sweep.input if wanted is None else sweep.output(layout.each[0])

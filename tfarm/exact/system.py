@@ -14,7 +14,7 @@ voltage and a prescribed hub angle see `Drive`.  One uniform link is a chain of 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
@@ -216,8 +216,8 @@ SYSTEMS_KEPT = 64  # arms whose exact numbers are cached: one page needs those o
 class System:
     """An arm or rig: its elements from the payload inwards, the conditions of both ends, and the units.
 
-    `gauge` is the place of the moment that a law feeds back; `radius` and `offset` of hub and payload are shares of the
-    link's `length` [m]; `EI` [N m^2] is that at the hub.
+    `gauge` is the place of the moment that a law feeds back; with `has_rigid_mode` it can turn freely; `radius` and
+    `offset` of hub and payload are shares of the link's `length` [m]; `EI` [N m^2] is that at the hub.
     """
 
     elements: tuple[Element, ...]
@@ -227,18 +227,33 @@ class System:
     radius: Fraction
     offset: Fraction
     gauge: Place
+    has_rigid_mode: bool
     length: Fraction
     EI: Fraction
 
     @cached_property
     def kept(self) -> dict[Any, Any]:
-        """The cache of layouts and other results of the system (`layout.readings`)."""
+        """The cache of layouts and other results of the system."""
         return {}
+
+    def keep(self, key: Any, make: Callable[[], Any]) -> Any:
+        """Return the result that is cached under a key, made where there is none."""
+        if key not in self.kept:
+            # 256: more than the places of a page
+            if len(self.kept) >= 256:
+                self.kept.clear()
+            self.kept[key] = make()
+        return self.kept[key]
 
     @cached_property
     def segments(self) -> tuple[Segment, ...]:
         """The uniform pieces, from the outermost inwards."""
         return tuple(each for each in self.elements if isinstance(each, Segment))
+
+    @property
+    def free_motions_of_tip(self) -> int:
+        """The number of motions of the tip that no infinite inertia locks."""
+        return sum(isinstance(end, Fraction) for end in (self.tip_mass, self.tip_inertia))
 
     @property
     def reads_hub_moment(self) -> bool:
@@ -255,13 +270,6 @@ class System:
     def is_locked(self) -> bool:
         """Whether the hub angle is the input."""
         return not self.drive.turns
-
-    @property
-    def has_rigid_mode(self) -> bool:
-        """Whether it can turn as a rigid body: without infinite inertias and springs to ground."""
-        ends, bodies = (self.tip_mass, self.tip_inertia), (each for each in self.elements if isinstance(each, Body))
-        springs = any(each.stiffness or each.rotational_stiffness for each in bodies) or self.drive.stiffness
-        return not (springs or self.is_locked) and all(isinstance(end, Fraction) for end in ends)
 
     @property
     def at_rest(self) -> int:
@@ -356,6 +364,7 @@ def system_of(arm: Arm, theory: Theory | None = None) -> System:
         radius=Fraction(arm.hub.radius) / unit_length,
         offset=Fraction(arm.payload.offset) / unit_length,
         gauge=Place(min(Fraction(arm.gauge.x) / unit_length, ONE), arm.gauge.side),
+        has_rigid_mode=arm.has_rigid_mode,
         length=unit_length,
         EI=EI,
     )

@@ -56,7 +56,7 @@ class Free(NamedTuple):
 
 def free_outputs(chain: System, wanted: Sequence[Output], s: Complex, x: float) -> Free:
     """Return the free response at s (1-D), with outputs in SI for one unit of the drive."""
-    return free_of(readings(chain, tuple(wanted), x), s)
+    return free_of(readings(chain, wanted, x), s)
 
 
 def free_of(layout: Layout, s: Complex) -> Free:
@@ -77,7 +77,7 @@ def _filled(
 
 def free_slopes(chain: System, wanted: Sequence[Output], s: Complex, x: float) -> tuple[Free, Free]:
     """Return the free response and its derivative at s (1-D), by Cauchy's integral on a circle, to rounding."""
-    layout = readings(chain, tuple(wanted), x)
+    layout = readings(chain, wanted, x)
     here = free_of(layout, s)
     radius = SLOPE_RADIUS * np.maximum(abs(s), 1e-150) / np.maximum(1.0, abs(here.scale))
     for each in chain.singular:
@@ -109,11 +109,13 @@ def free_fields(
 
     The states satisfy axis . (W, Psi, M, Q) = 0 on the hub's axis, by default W = 0.
     """
-    places = tuple(places)
-    if places not in chain.kept:
+
+    def with_states() -> Layout:
         each = [Reading(place, field, ZERO, 0, ONE) for place in places for field in range(4)]
-        chain.kept[places] = Layout(chain, tuple(dict.fromkeys(places)), (*each, Reading(None, -1, ONE, 0, ONE)))
-    found, _ = _filled(chain.kept[places], s, np.asarray(read_only(np.ascontiguousarray(axis))))
+        return Layout(chain, tuple(dict.fromkeys(places)), (*each, Reading(None, -1, ONE, 0, ONE)))
+
+    layout = chain.keep(tuple(places), with_states)
+    found, _ = _filled(layout, s, np.asarray(read_only(np.ascontiguousarray(axis))))
     return found[2:-1].reshape(len(places), 4, s.size).transpose(1, 2, 0), found[-1], found[1]
 
 
@@ -128,7 +130,7 @@ def evaluate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float =
     with np.errstate(all="ignore"):
         # of a chain by NumPy's division, which leaves no imaginary part where there is none but for rounding
         is_link = len(k.elements) == 1
-        found, lost = _filled(readings(k, tuple(wanted), x), s, per_input=is_link)
+        found, lost = _filled(readings(k, wanted, x), s, per_input=is_link)
         values: Complex = found[2:] if is_link else found[2:] / found[0]
     return _with_care(k, wanted, s, x, values, lost)
 

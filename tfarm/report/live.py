@@ -29,7 +29,7 @@ from tfarm.report.page import (
     sign_words,
     write_text,
 )
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 LIVE_PAGE = "live.html"
 ASSETS = "assets"

@@ -37,7 +37,7 @@ from tfarm.report.page import (
 )
 from tfarm.response.signals import Signals, sign_convention
 from tfarm.schema import Column, Quantity, Table, across, curve_table, quantities, roots_table, table, text
-from tfarm.spectrum.table import default_gains, rate_unit
+from tfarm.spectrum.gains import default_gains, rate_unit
 
 RECOMMENDED = "Recommended gains (best damping)"
 

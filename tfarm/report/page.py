@@ -52,7 +52,7 @@ from tfarm.records import frozen
 from tfarm.response.signals import Signals, sign_of
 from tfarm.schema import Column, Table, quantities, save_table, text, to_json
 from tfarm.schema.html import as_html, with_symbols
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 from tfarm.synthesis.design import Design, design
 
 TEMPLATES = Path(__file__).parent / "templates"

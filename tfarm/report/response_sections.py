@@ -24,8 +24,8 @@ from tfarm.report.page import ArmReport, PageSection, Picture, has_loop, picture
 from tfarm.response.frequency import AXIS_SHARE, Bode, bode
 from tfarm.schema import Column, Table, curve_table, table
 from tfarm.spectrum import Modes
+from tfarm.spectrum.gains import default_gains
 from tfarm.spectrum.listing import SHAPE_DIGITS, beyond_the_box, listed_modes
-from tfarm.spectrum.table import default_gains
 
 # as `tfarm modes` lists them; shapes in three rows of two
 TABLED_MODES = 10

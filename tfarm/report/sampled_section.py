@@ -38,7 +38,7 @@ from tfarm.report.page import (
     sheet,
 )
 from tfarm.schema import Column, Quantity, Table, across, table, text
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 FILM_FRAMES = 80  # at most: a second of computing
 

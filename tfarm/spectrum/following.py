@@ -272,25 +272,20 @@ def which_plain(guess: Any, found: Any, base: Any, singular: Any, blur: float) -
 
     Others include `singular` points (m, p) and the mirror image of a root without one in the base (b,).
     """
-    is_plain, alone = np.isnan(guess), np.empty(base.size, np.bool_)
-    for i in range(base.size):
-        alone[i] = base[i].imag != 0.0
-        for j in range(base.size):
-            alone[i] &= base[j] != base[i].conjugate()
+    is_plain = np.isnan(guess)
     for m in range(len(found)):
         index, away = nearest(found[m])
         for i in range(base.size):
             here, is_couple = found[m, i], index[index[i]] == i
-            room, moved = np.inf, abs(here - guess[m, i])
-            for j in range(base.size):
-                if j != i and not (is_couple and j == index[i]) and abs(here - found[m, j]) < room:
-                    room = abs(here - found[m, j])
-            for point in singular[m]:
-                room = min(room, abs(here - point))
-            if alone[i]:
+            others = np.append(np.abs(np.append(found[m], singular[m]) - here), np.inf)
+            others[i] = np.inf
+            # of a couple the roots meet or separate
+            if is_couple:
+                others[index[i]] = np.inf
+            room, moved = np.nanmin(others), abs(here - guess[m, i])
+            if base[i].imag != 0.0 and np.all(base != base[i].conjugate()):
                 room = min(room, 2.0 * min(abs(here.imag), abs(base[i].imag)))
             same_side = np.sign(here.imag) == np.sign(guess[m, i].imag)
-            # of a couple the roots meet or separate
             near = same_side and moved <= (2.0 * PLAIN_MOVE if is_couple else PLAIN_MOVE) * away[i]
             is_plain[m, i] |= moved <= blur or (
                 (near or guess[m, i] == 0.0 or here == 0.0) and moved <= PLAIN_MOVE * room

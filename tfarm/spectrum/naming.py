@@ -38,43 +38,32 @@ def function_of(k: System) -> Function:
 @compiled
 def _newton(s: Any, rows: Any, ends: Any, at_rest: int, singular: Any) -> None:
     """Replace guesses s (n,) by the zeros of D/s^at_rest next to them, or NaN, as `following.settled` does."""
-    moving, count = np.empty(s.size, np.int64), 0
-    for i in range(s.size):
-        if not np.isnan(s[i]):
-            moving[count] = i
-            count += 1
-    at, h = np.empty(3 * s.size, np.complex128), np.empty(s.size)
-    found, lost = np.empty((2, 3 * s.size), np.complex128), np.empty(3 * s.size, np.bool_)
+    moving = np.flatnonzero(~np.isnan(s))
     for _ in range(NEWTON_STEPS):
-        for i in range(count):
-            here, near = s[moving[i]], 1.0
-            for each in singular:
-                near = min(near, abs(1.0 - here / each))
-            h[i] = DIFFERENCE_STEP * max(abs(here) * near, 1e-300)
-            at[3 * i], at[3 * i + 1], at[3 * i + 2] = here, here + h[i], here - h[i]
-        fill_free(at[: 3 * count], rows, ends, AXIS, NO_OUTPUT, found, lost, False)
-        kept = 0
-        for i in range(count):
-            n, j = moving[i], 3 * i
-            if at[j] == 0.0:
-                s[n] = LOST
-                continue
-            value = found[0, j] / at[j] ** at_rest
-            up = found[0, j + 1] * np.exp(found[1, j + 1] - found[1, j]) / at[j + 1] ** at_rest
-            down = found[0, j + 2] * np.exp(found[1, j + 2] - found[1, j]) / at[j + 2] ** at_rest
-            if up == down:  # complex division by zero is an error in compiled code
-                s[n] = LOST
-                continue
-            move = 2.0 * h[i] * value / (up - down)
-            s[n] -= move.real if s[n].imag == 0.0 else move
-            if not abs(move) <= SETTLED * abs(s[n]):
-                moving[kept] = n
-                kept += 1
-        count = kept
-        if count == 0:
+        here, many = s[moving], moving.size
+        if many == 0:
             break
-    for i in range(count):
-        s[moving[i]] = LOST
+        near, left = np.ones(many), np.empty(many)
+        for each in singular:
+            near = np.minimum(near, np.abs(1.0 - here / each))
+        h = DIFFERENCE_STEP * np.maximum(np.abs(here) * near, 1e-300)
+        at = np.concatenate((here, here + h, here - h))
+        found, lost = np.empty((2, at.size), np.complex128), np.empty(at.size, np.bool_)
+        fill_free(at, rows, ends, AXIS, NO_OUTPUT, found, lost, False)
+        for i in range(many):
+            up, down = i + many, i + 2 * many
+            move = LOST
+            # complex division by zero is an error in compiled code
+            if here[i] != 0.0:
+                value = found[0, i] / at[i] ** at_rest
+                above = found[0, up] * np.exp(found[1, up] - found[1, i]) / at[up] ** at_rest
+                below = found[0, down] * np.exp(found[1, down] - found[1, i]) / at[down] ** at_rest
+                if above != below:
+                    move = 2.0 * h[i] * value / (above - below)
+            s[moving[i]] -= move.real if here[i].imag == 0.0 else move
+            left[i] = abs(move) - SETTLED * abs(s[moving[i]])
+        moving = moving[left > 0.0]
+    s[moving] = LOST
 
 
 @dataclass
@@ -95,7 +84,7 @@ class Damping:
 
     def __post_init__(self) -> None:
         """Lay the system out without its damping, and the difference that the whole of it makes."""
-        still, layout = (readings(k, (), 0.0) for k in (self.k.with_damping(0.0), self.k))
+        still, layout = (readings(k) for k in (self.k.with_damping(0.0), self.k))
         rows, whole = (each.rows.view((float, len(OF_ELEMENT.split()) + 4)) for each in (still, layout))
         self.rows = rows, whole - rows
         self.ends = still.ends, layout.ends - still.ends
