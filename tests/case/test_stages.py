@@ -19,6 +19,7 @@ from tests.exported.units import Unit, driven, inputs_of, modes_of_units
 from tests.shared import thinned
 from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import STAGES
+from tfarm.case import Case
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, Simulator, Slew, kernel, scenario
 from tfarm.dsp.kernel import AMPLIFIER, DAC, ENCODER
 from tfarm.dsp.simulate import quantisers
@@ -194,7 +195,7 @@ console.log(JSON.stringify({ torque: [...torque], moment, angle, tip }));
 @vectors(live_loop.CONSUMER)
 def test_the_page_in_javascript(stages):
     chain = chain_of(stages)
-    data = live_loop.slew_numbers(ARM, chain, LAW)
+    data = live_loop.slew_numbers(Case(ARM, LAW, chain))
     truth = vector(chain, data["modes"])
     task = truth.scenario
     ideal = [task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference, task.rigid_moment]

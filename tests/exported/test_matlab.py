@@ -16,6 +16,7 @@ from tests.octave import left_by_octave
 from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.arm.law_tables import law_of_table
+from tfarm.case import Case
 from tfarm.dsp import Actuator, Chain
 from tfarm.exported.result import ExportTask
 from tfarm.exported.systems import linear, save_mat
@@ -115,7 +116,7 @@ def test_octave_builds_each_system_with_its_names(folder, tmp_path):
     inputs, outputs, states, name = left["plant"]["names"].item()
     assert (inputs, outputs[0], states[0], name) == ("hub_torque", "hub_angle", "plant1", "sasaki2012-lab, sampled")
     assert float(left["plant"]["T"]) == 0.01
-    own = linear(ExportTask(arm=LAB, given=LAW, chain=Chain(), what="loop", form="mat")).systems
+    own = linear(ExportTask(case=Case(LAB, LAW), what="loop", form="mat")).systems
     for name, of in own.items():
         for letter, matrix in zip("ABCD", of.matrices, strict=True):
             np.testing.assert_array_equal(np.reshape(left[name][letter].item(), matrix.shape), matrix)

@@ -12,7 +12,7 @@ import pytest
 import tfarm
 from tests import hostile
 from tfarm import HubFeedback, Law
-from tfarm.dsp import Chain
+from tfarm.case import Case
 from tfarm.exported.result import ExportTask
 from tfarm.exported.systems import linear, plain
 
@@ -51,7 +51,7 @@ def folder(tmp_path_factory):
 def test_a_script_builds_the_systems_of_its_task(folder):
     """With every digit; the first lines have the error of the reduced model."""
     for what, found in zip(WHAT, systems(folder, *WHAT), strict=True):
-        own = linear(ExportTask(arm=LAB, given=LAW, chain=Chain(), what=what, form="py")).systems
+        own = linear(ExportTask(case=Case(LAB, LAW), what=what, form="py")).systems
         assert found.keys() == own.keys()
         for name, (inputs, outputs, period, *matrices) in found.items():
             assert (inputs, outputs, period) == (plain(own[name].inputs), plain(own[name].outputs), own[name].period)

@@ -11,6 +11,7 @@ import tfarm
 from tests.exported import worst
 from tests.exported.cases import GAINS, IDEAL, LAB, NOTCH, PI, REAL, realised, task_of
 from tests.survey import tally
+from tfarm.case import Case
 from tfarm.dsp import Converters
 from tfarm.errors import ParameterError
 from tfarm.exported.controller import c_controller, in_z
@@ -37,7 +38,7 @@ UNSTABLE = tfarm.HubFeedback(K1=0.3, K2=30.0)
 
 
 def exact_loop(law, chain=IDEAL, arm=LAB):
-    return in_z(tfarm.arm.as_law(law), chain), tfarm.sampled(arm, law, chain).verdict.loop
+    return in_z(Case(arm, law, chain)), tfarm.sampled(arm, law, chain).verdict.loop
 
 
 @pytest.mark.parametrize("law", [SERVO, PI, NOTCH])

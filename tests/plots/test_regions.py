@@ -8,6 +8,7 @@ import pytest
 import tfarm
 from tfarm.arm import HubFeedback
 from tfarm.assessment.stability_map import sampled_region
+from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.exported.live_loop import live_data
 from tfarm.loop.plane import moment_axis, rate_axis, rate_columns
@@ -44,7 +45,7 @@ def test_its_least_rate_gain_is_an_upright_edge_of_the_picture():
     stable = np.array([bool(each) for each in plane.stable_intervals])
     assert plane.K1[stable].min() == pytest.approx(-FRICTION, rel=1e-8)
     assert not stable[plane.K1 < -FRICTION].any()
-    areas = live_data(LOSSY, Chain())["continuous"]
+    areas = live_data(Case(LOSSY, tfarm.default_gains(LOSSY)))["continuous"]
     assert min(row["K1"] for row in areas) >= -FRICTION
 
 

@@ -13,6 +13,7 @@ import pytest
 
 import tfarm
 from tests.odd_arms import odd_arms
+from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling
 from tfarm.loop.sampled import sampled_loop
 from tfarm.spectrum.table import default_gains
@@ -27,6 +28,8 @@ from tfarm.tuner import (
 )
 from tfarm.tuner.baselines import quantised_chain, shaped, shaper, tried_loops
 from tfarm.tuner.tuning import usual_plan
+
+GAINS = tfarm.HubFeedback(K1=0.3, K2=1.0)
 
 
 def best_of(monkeypatch, cost, windows):
@@ -144,7 +147,7 @@ def test_the_scales_of_the_tuner_are_the_arms_own(name):
     assert 2 < torque / plan.scale < 4.5  # one digit of a third: the paper's 3 N m over its 1 N m
     cost = plan.trial(arm, chain).cost
     assert (cost.a * plan.scale**2, cost.b * plan.scale**2) == pytest.approx((1.0, 2.6))
-    conditioned = {each.name: each.arm for each in tried_loops(arm, chain)}
+    conditioned = {each.name: each.case.arm for each in tried_loops(Case(arm, GAINS, chain))}
     loads = [each.payload.mass for key, each in conditioned.items() if key.startswith("payload")]
     of_mass, wanted = (arm.payload.mass, [0.5, 1.5, 2.0]) if arm.payload.mass else (arm.own_mass, [0.06, 0.15, 0.3])
     assert loads == pytest.approx([share * of_mass for share in wanted], rel=0.05)  # two digits
@@ -156,14 +159,14 @@ def test_the_scales_of_the_tuner_are_the_arms_own(name):
 
 def test_the_papers_arm_keeps_the_papers():
     lab = tfarm.load("sasaki2012-lab")
-    names = [each.name for each in tried_loops(lab, Chain())]
+    names = [each.name for each in tried_loops(Case(lab, GAINS))]
     assert names[4:] == [
         "payload 0.1 kg", "payload 0.25 kg", "payload 0.5 kg", "hub -20%", "hub +20%", "C = 0 s", "C = 1e-05 s",
         "C = 0.001 s",
     ]  # fmt: skip
     assert names[2:4] == ["one sample of delay", "quantised, one sample of delay"]
     late = Chain(sampling=Sampling(delay_samples=0.5))
-    assert [each.name for each in tried_loops(lab, late)][2:4] == [
+    assert [each.name for each in tried_loops(Case(lab, GAINS, late))][2:4] == [
         each.replace("one", "one more") for each in names[2:4]
     ]
     converters = quantised_chain(lab, Chain()).converters
@@ -174,7 +177,7 @@ def test_the_papers_arm_keeps_the_papers():
 def test_an_arm_without_damping_is_tried_with_two_dampings_of_its_first_mode(hub, wanted):
     """0.0358 and 3.58 per cent of critical, but that C is rounded to one digit."""
     arm = tfarm.load("sasaki2012").having(hub_inertia=hub)
-    given = [each.arm for each in tried_loops(arm, Chain()) if each.name.startswith("C =")]
+    given = [each.case.arm for each in tried_loops(Case(arm, GAINS)) if each.name.startswith("C =")]
     assert [each.damping for each in given] == wanted
     ratios = [tfarm.damped_modes(tfarm.modes(each, 1)).damping_ratio[-1] for each in given]
     assert ratios == pytest.approx([3.575e-4, 3.575e-2], rel=0.1)
