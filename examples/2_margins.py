@@ -9,7 +9,7 @@ arm = tfarm.load("sasaki2012-lab")
 law = tfarm.HubFeedback(K1=0.3, K2=0.3)  # u = -K1 theta_t - K2 E I phi'(0)
 
 found = tfarm.margins(arm, law)  # the verdict comes first; margins of an unstable loop there are none
-print(found.stability.verdict)
+print(found.stability.word)
 print("K2 alone may go from and to", found.windows["K2"].around)
 assert found.in_band is not None  # the loop is stable
 print("phase lag", found.in_band.phase_lag, "deg; delay margin", found.exact_delay, "s")

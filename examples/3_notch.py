@@ -14,4 +14,4 @@ found = tfarm.spill(arm, law)  # the exact loop compared with models of 1, 2, 3 
 print(found.in_words)
 
 lab = tfarm.load("sasaki2012-lab")  # the same with 0.36 % of critical damping in its first mode
-print("with damping:", tfarm.margins(lab, law).stability.verdict)
+print("with damping:", tfarm.margins(lab, law).stability.word)

@@ -1,6 +1,7 @@
 """The same gains from a digital controller: does the loop hold at 10 ms, and how does the arm come to rest?"""
 
 import tfarm
+from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling
 from tfarm.loop.sampled_verdict import sampled_verdict
 
@@ -8,7 +9,8 @@ arm = tfarm.load("sasaki2012-lab")
 law = tfarm.HubFeedback(K1=0.3, K2=0.3)
 
 for period in (0.01, 0.02):  # s
-    verdict = sampled_verdict(arm, law, Chain(sampling=Sampling(period=period)))  # tfarm.sampled has the margins too
+    chain = Chain(sampling=Sampling(period=period))
+    verdict = sampled_verdict(Case(arm, law, chain))  # tfarm.sampled has the margins too
     print(f"{1e3 * period:g} ms: {verdict.sentence}")
 
 runs = {f"K2 = {K2:g}": tfarm.simulate(arm, law.having("K2", K2), duration=3.0) for K2 in (0.0, 0.3)}

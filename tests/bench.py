@@ -219,7 +219,11 @@ def plane(law):
 def simulator(subject):
     """A slew of 300 samples on a model of 20 modes."""
     _, chain = subject.arm, subject.chain
-    return Simulator(subject.arm, chain, scenario("slew", subject.arm, chain, 300 * chain.sampling.period), count=20)
+    return Simulator(
+        Case(subject.arm, HubFeedback(), chain),
+        scenario("slew", subject.arm, chain, 300 * chain.sampling.period),
+        count=20,
+    )
 
 
 def another_law(subject):
@@ -278,7 +282,7 @@ CALLS = {  # what a call is, what it prepares for a subject, and how many points
     "result card": (lambda subject: lambda: to_dict(tfarm.result_card(*subject)), 1),
     "map of gains": (lambda subject: lambda: gain_map(subject.arm, *plane(subject.law)), 40_000),
     "sampled map of gains": (
-        lambda subject: lambda: sampled_map(sampled_verdict(*subject).loop, *plane(subject.law)),
+        lambda subject: lambda: sampled_map(sampled_verdict(Case(*subject)).loop, *plane(subject.law)),
         40_000,
     ),
     "slew of 300 samples, 20 modes": (lambda subject: lambda: simulator(subject).linear(subject.law), 1),
@@ -343,7 +347,7 @@ def loops():
 def loci(order=20):
     """The exact root locus and python-control's on a model of the same number of poles, against 50 digits."""
     exact, upper, n = along(BARE), along(BARE, order // 2 + 1), 20 * 500
-    gains, system = exact.gain, open_loop(BARE.arm, HubFeedback(), "K1", order // 2 - 1)
+    gains, system = exact.gain, open_loop(Case(BARE.arm, HubFeedback()), "K1", order // 2 - 1)
     ours, theirs = timed(
         [CALLS["root locus"][0], lambda subject: lambda: control.root_locus_map(system, gains)], 20, BARE
     )
@@ -351,7 +355,7 @@ def loci(order=20):
     def error(found, values):
         worst = 0.0
         for at in np.linspace(1, gains.size - 1, 6).round().astype(int):
-            loop = ContinuousLoop(BARE.arm, HubFeedback(K1=float(gains[at])))
+            loop = ContinuousLoop(Case(BARE.arm, HubFeedback(K1=float(gains[at]))))
             for near, value in zip(found.branches[:, at], values[:, at], strict=True):
                 if near:
                     disc = enclosed(loop.k, complex(near), 50, loop.exact)

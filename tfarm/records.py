@@ -161,7 +161,9 @@ def _is_default(self: Any, entry: Field[Any]) -> bool:
 def _found(self: Any) -> list[str]:
     """Return the names in `SHOWN_FIRST` of a record's fields, and of its properties that are no records themselves."""
     own = self.__dataclass_fields__
-    return [name for name in SHOWN_FIRST if name in own or not is_dataclass(getattr(self, name, self))]
+    # a record with a word has no other verdict
+    names = SHOWN_FIRST[1:] if "word" in own else SHOWN_FIRST
+    return [name for name in names if name in own or not is_dataclass(getattr(self, name, self))]
 
 
 def _shown(value: Any, longest: int = 60) -> str:

@@ -26,6 +26,7 @@ import tfarm
 from tfarm.arm import Arm, HubFeedback, Law, as_law
 from tfarm.arm.law_tables import load_law
 from tfarm.assessment.card import LoopCard, reference_damping
+from tfarm.case import Case
 from tfarm.dsp import Chain, load_chain
 from tfarm.dsp.results import simulated_run
 from tfarm.loop.continuous import ContinuousLoop
@@ -132,13 +133,13 @@ def set_gains(page: Page, law: HubFeedback) -> None:
 
 def slew_words(arm: Arm, law: HubFeedback, chain: Chain, modes: int) -> dict[str, str]:
     """What the page shows of a slew, from the answer of `tfarm simulate`."""
-    answer = to_dict(simulated_run(arm, law, chain, "slew", 3 * chain.slew.rise_time, count=modes))
+    answer = to_dict(simulated_run(Case(arm, law, chain), "slew", 3 * chain.slew.rise_time, count=modes))
     settled = answer["settling_time_s"]
     largest = {name: max(map(abs, answer[key])) for name, key in (("torque", "torque"), ("moment", "root_moment"))}
     figures = largest | {"residual": answer["residual_moment_rms"]}  # none of a run that stopped
     shown = {name: "not computed" if value is None else f"{value:.5g}" for name, value in figures.items()}
     words = f"not settled within {answer['t'][-1]:.5g} s" if settled is None else f"{settled:.5g}"
-    is_unstable = sampled_verdict(arm, law, chain).word == "unstable"
+    is_unstable = sampled_verdict(Case(arm, law, chain)).word == "unstable"
     return {f"slew-{name}": value for name, value in shown.items()} | {
         "slew-settled": "unstable" if is_unstable else words
     }
@@ -201,7 +202,7 @@ def test_what_is_shown_at_random_gains_is_what_tfarm_prints(browser, folder, nam
         slow = start.having("K1", 0.1 * data["axes"]["K1"]["linear"])  # rounding in its margins
         for law in (slow, start, *random_gains(data, GAINS)):
             set_gains(page, law)
-            found, verdict = margins(arm, law, data["band"]), sampled_verdict(arm, law, chain)
+            found, verdict = margins(arm, law, data["band"]), sampled_verdict(Case(arm, law, chain))
             wanted = {"sampled": verdict.word} | slew_words(arm, law, chain, data["slew"]["modes"])
             if found.in_band is not None and law is not slow:
                 low, high = found.in_band.gain
@@ -270,10 +271,10 @@ def test_loci_have_the_poles_of_their_gains(browser, folder, name):
             assert turns.size > 5
             assert turns.max() <= LARGEST_TURN
         for row in rows[:: len(rows) // 6]:
-            exact = stability(arm, law.having("K2", row["gain"]), band).poles.values
+            exact = stability(Case(arm, law.having("K2", row["gain"])), band).poles.values
             s = complex(row["re"], row["im"])
             assert abs(exact - s).min() < 5e-4 * abs(s), row
-        loop = sampled_verdict(arm, law, chain).full
+        loop = sampled_verdict(Case(arm, law, chain)).full
         for row in discs[:: len(discs) // 12]:
             z = complex(row["re"], row["im"])
             assert abs(loop.having("K2", row["gain"]).poles.z - z).min() < 1e-6, row
@@ -341,8 +342,8 @@ def test_a_chord_of_the_loop_function_is_within_a_pixel_of_it(browser, folder, n
         set_gains(page, law)
         pixels = page.evaluate("live.room('nyquist')[0]") / 5.0  # of 1, where that is the shorter side
         graded = arm.having(damping=reference_damping(arm)) if arm.has_elastic_link else arm
-        of = arm if sampled_verdict(arm, law, chain).word == "unstable" else graded
-        exact = (ContinuousLoop(graded, as_law(law)).parts, sampled_verdict(of, law, chain).full.parts)
+        of = arm if sampled_verdict(Case(arm, law, chain)).word == "unstable" else graded
+        exact = (ContinuousLoop(Case(graded, as_law(law))).parts, sampled_verdict(Case(of, law, chain)).full.parts)
         for key, parts in zip(("curve", "zcurve"), exact, strict=True):
             rows = page.evaluate(f"live.now.{key}(live.now.from).map(row => [row.w, row.x, row.y])")
             w, x, y = np.array(rows).T

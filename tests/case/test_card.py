@@ -12,6 +12,7 @@ import tfarm
 from tests.shared import sized
 from tests.shell import answer, run
 from tfarm.assessment import card
+from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling, load_chain
 from tfarm.loop.sampled_verdict import sampled_verdict, unaliased_poles
 from tfarm.schema.terminal import table_lines
@@ -28,7 +29,7 @@ def some_loops(count):
         arm = LAB.having(damping=10 ** rng.uniform(-4, -3), payload_mass=LAB.payload.mass * rng.uniform(0.2, 3))
         law = tfarm.HubFeedback(K1=10 ** rng.uniform(-1, 0), K2=rng.uniform(-0.1, 0.5), Kp=10 ** rng.uniform(-1, 0.5))
         chain = Chain(sampling=Sampling(period=10 ** rng.uniform(-3, -2)))
-        both = tfarm.margins(arm, law).stability.is_stable, sampled_verdict(arm, law, chain).is_stable
+        both = tfarm.margins(arm, law).stability.is_stable, sampled_verdict(Case(arm, law, chain)).is_stable
         found += [(arm, law, chain, tfarm.result_card(arm, law, chain))] if all(both) else []
     return found
 
@@ -41,7 +42,7 @@ def continuous_model(arm, law, _):
 
 def sampled_model(arm, law, chain):
     """L(z) by python-control: states of arm and law without feedback, and the row that closes the loop."""
-    loop = sampled_verdict(arm, law, chain).full
+    loop = sampled_verdict(Case(arm, law, chain)).full
     (A, b), closed = loop.rig.frame, loop.matrix()
     row = np.linalg.lstsq(b[:, None], A - closed, rcond=None)[0]
     return control.StateSpace(A, b[:, None], row, [[0.0]], chain.sampling.period)

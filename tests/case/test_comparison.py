@@ -9,6 +9,7 @@ from matplotlib import image
 import tfarm
 from tests.shell import answer, run
 from tfarm.assessment import comparison
+from tfarm.case import Case
 from tfarm.loop.sampled_verdict import Analysis, sampled_verdict
 from tfarm.schema import Difference, Percent, table, to_dict
 
@@ -64,7 +65,7 @@ def test_each_side_is_what_it_is_alone():
     for side, law, loop in zip(found.sides, (LAW, other), to_dict(found)["loops"], strict=True):
         assert side.loop == tfarm.margins(LAB, law)
         assert loop == to_dict(side.loop)
-        assert side.sampled.is_stable == sampled_verdict(LAB, law).is_stable
+        assert side.sampled.is_stable == sampled_verdict(Case(LAB, law)).is_stable
         alone = tfarm.closed_loop_poles(LAB, law, 6).values
         assert side.oscillating[:3] == pytest.approx(alone[alone.imag > 0][:3], rel=1e-12)
     delays = [tfarm.margins(LAB, law).exact_delay for law in (LAW, other)]
@@ -188,7 +189,7 @@ def test_a_law_in_z_and_gains_are_compared_at_the_samples_of_both():
     found = tfarm.compare(LAB, [LAW, late], modes=1)
     delays, reaches = found.reaches
     for side, law, reach in zip(found.sides, (LAW, late), reaches, strict=True):
-        alone = Analysis(sampled_verdict(LAB, tfarm.Law.of_gains(law) if law is LAW else law))
+        alone = Analysis(sampled_verdict(Case(LAB, tfarm.Law.of_gains(law) if law is LAW else law)))
         assert side.loop.gain_factors == alone.gain_factors
         assert side.sampled.is_stable == alone.verdict.is_stable
         _, L = side.loop_function

@@ -79,7 +79,7 @@ def designed(arm, chain):
         judge_of(arm, arm, chain, objective, ("hub_rate", "root_moment"), 2, 8).value(GAINS)
         for objective in ("damping", "residual")
     ]
-    return values, sampled_brief(arm, GAINS, chain).words
+    return values, sampled_brief(Case(arm, GAINS, chain)).words
 
 
 def tuned(arm, chain):
@@ -113,13 +113,13 @@ def tuner_in_c(arm, chain):
 
 
 def run_of(arm, chain):
-    return simulated_run(arm, GAINS, chain, "slew", 1.5, count=3).signals
+    return simulated_run(Case(arm, GAINS, chain), "slew", 1.5, count=3).signals
 
 
 def answers_of_samples(arm, chain):
     """Verdict, margins, and the column of the card."""
     found = sampled(arm, GAINS, chain, count=3)
-    brief = sampled_brief(arm, GAINS, chain)
+    brief = sampled_brief(Case(arm, GAINS, chain))
     return to_dict(found.verdict), found.gain_factors, brief, to_dict(card_of(arm, chain).sampled)
 
 
@@ -138,7 +138,7 @@ ANSWERS = {
     fmu.CONSUMER: exported("fmu", "loop"),
     systems.CONSUMER: exported("py", "loop"),
     live_loop.CONSUMER: lambda arm, chain: (
-        live_loop.sampled_numbers(sampled_verdict(arm, GAINS, chain, count=3).loop),
+        live_loop.sampled_numbers(sampled_verdict(Case(arm, GAINS, chain), count=3).loop),
         live_loop.slew_numbers(Case(arm, GAINS, chain)),
     ),
 }  # fmt: skip
@@ -146,7 +146,7 @@ PUBLIC = {  # the functions that users call, which refuse before any work
     "transfer": lambda arm, _: tfarm.transfer(arm, "hub_angle"),
     "modes": lambda arm, _: tfarm.modes(arm, 3),
     "margins": lambda arm, _: tfarm.margins(arm, GAINS),
-    "verdict": lambda arm, chain: sampled_verdict(arm, GAINS, chain),
+    "verdict": lambda arm, chain: sampled_verdict(Case(arm, GAINS, chain)),
     "sampled": lambda arm, chain: tfarm.sampled(arm, GAINS, chain),
     "card": lambda arm, chain: tfarm.result_card(arm, GAINS, chain),
     "step": lambda arm, chain: tfarm.step(arm, GAINS, chain),

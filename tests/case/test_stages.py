@@ -17,6 +17,7 @@ from tests.exported.compilers import needed, pumped, run, stepped
 from tests.exported.tuners import exported, some_tuner
 from tests.exported.units import Unit, driven, inputs_of, modes_of_units
 from tests.shared import thinned
+from tfarm.arm import HubFeedback
 from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import STAGES
 from tfarm.case import Case
@@ -76,7 +77,7 @@ def vector(chain, count=MODES):
     task = scenario("slew", ARM, chain, RECORD_LENGTH * chain.slew.rise_time)
     sizes = {"feedforward": 3.0, "hub_angle": 0.1, "hub_rate": 1.0, "rigid_moment": 1.0}
     noise = {name: getattr(task, name) + size * rng.normal(size=task.t.size) for name, size in sizes.items()}
-    truth = Simulator(ARM, chain, replace(task, **noise), LAW, count=count).run()
+    truth = Simulator(Case(ARM, LAW, chain), replace(task, **noise), count=count).run()
     assert truth.stopped is None
     for value, row in ((truth.measured[:, 0], ENCODER), (truth.measured[:, 2], AMPLIFIER)):
         if (step := quantisers(chain)[row, 0]) > 0:
@@ -115,7 +116,7 @@ def test_a_controller_in_python(stages):
         asked.append(float(servo - f(LAW.K2) * (f(m.root_moment) - wanted)))
         return asked[-1]
 
-    found = Simulator(ARM, chain, truth.scenario, count=MODES).controller(torque)
+    found = Simulator(Case(ARM, HubFeedback(), chain), truth.scenario, count=MODES).controller(torque)
     step = quantisers(chain)[DAC, 0]
     assert not step or abs(np.array(asked) / step % 1 - 0.5).min() > TIE
     assert_equal(found.torque, on_steps(np.array(asked), chain, DAC), step)
@@ -162,7 +163,7 @@ def test_the_controller_in_c(stages, tmp_path):
 def test_the_matrices_of_the_tuner(stages):
     chain = chain_of(stages)
     truth = vector(chain)
-    loop = sampled_loop(ARM, LAW, chain, count=MODES)
+    loop = sampled_loop(Case(ARM, LAW, chain), count=MODES)
     found = Trial(loop, truth.scenario, Cost(), "vibration").with_constant(LAW.K2)
     assert_equal(found.e + truth.scenario.feedforward, truth.torque)
     assert_equal(found.x + truth.scenario.moment_reference, truth.measured[:, 2])

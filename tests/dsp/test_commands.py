@@ -15,6 +15,7 @@ from tests.shared import remember, thinned
 from tests.shell import answer, run
 from tfarm import HubFeedback, Law
 from tfarm.arm.chain import Sampling, chain_of_tables
+from tfarm.case import Case
 from tfarm.cli.app import load_chain
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
@@ -99,7 +100,7 @@ def test_gains_that_fail_when_sampled_are_not_recommended_without_a_word(capsys,
     ],
 )
 def test_the_origin_of_the_period(chain, law, origin):
-    brief = brief_of(ConvergenceError("not tried", None, None), law, chain)
+    brief = brief_of(ConvergenceError("not tried", None, None), Case(tfarm.load("sasaki2012-lab"), law, chain))
     assert (brief.period_from, brief.period_is_default) == (origin, origin == "tfarm's default period")
     assert brief.words.endswith(f"({origin})" if origin else "ms")
 

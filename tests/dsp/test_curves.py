@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 import tfarm
 from tests.odd_arms import odd_arms
 from tfarm.arm import HubFeedback
+from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling, Simulator, Slew, scenario
 from tfarm.dsp.results import drawn
 from tfarm.dsp.traces import (
@@ -44,7 +45,7 @@ def test_a_fast_ringing_is_drawn_as_a_band_that_holds_the_curve():
 
 
 def test_the_slew_of_a_stiff_arm_is_not_aliased_and_its_file_has_the_curve():
-    run = drawn(STEEL, default_gains(STEEL).having("K2", 0.0), Chain(), "slew", 3.0)
+    run = drawn(Case(STEEL, default_gains(STEEL).having("K2", 0.0), Chain()), "slew", 3.0)
     records = run.between.t.size / run.t.size
     first = tfarm.modes(STEEL, 1).natural_frequency[-1] / (2 * np.pi)
     assert (records + 1) * 100 >= POINTS_A_PERIOD * first > 400  # 400 a second is what three records gave
@@ -60,7 +61,7 @@ def test_the_slew_of_a_stiff_arm_is_not_aliased_and_its_file_has_the_curve():
 def test_a_slew_under_any_law_is_resolved_too():
     """On the page of a law: 20 records in each period of the first mode, which rings at 368 Hz, or a band around it."""
     law = tfarm.Law({"hub_rate": ([40.0, 0.0], [1.0, 300.0]), "hub_angle": 100.0})
-    run = drawn(STEEL, law, Chain(), "impulse", 0.1)
+    run = drawn(Case(STEEL, law, Chain()), "impulse", 0.1)
     first = tfarm.modes(STEEL, 1).natural_frequency[-1] / (2 * np.pi)
     assert (run.between.t.size / run.t.size + 1) * 100 >= POINTS_A_PERIOD * first
     found, needed = points_a_period(STEEL, run)
@@ -73,7 +74,7 @@ def test_a_slew_under_any_law_is_resolved_too():
 
 def test_a_slow_arm_is_a_line_of_the_simulators_own_records():
     lab = tfarm.load("sasaki2012-lab")
-    run = drawn(lab, default_gains(lab), Chain(), "slew", 3.0)
+    run = drawn(Case(lab, default_gains(lab), Chain()), "slew", 3.0)
     curve = curve_of(run, "root_moment")
     assert not curve.is_band
     assert curve.t.size == run.t.size + run.between.t.size >= (LEAST_BETWEEN + 1) * 301
@@ -103,7 +104,12 @@ def test_torques_applied_again_let_a_mode_ring_as_far_as_in_the_simulation(name,
     """Without feedback or damping, by the range of the moment within the sample where it is largest."""
     arm = replace(STEEL, link=replace(STEEL.link, damping=0.0))
     chain = Chain(sampling=Sampling(delay_samples=delay))
-    simulator = Simulator(arm, chain, scenario(name, arm, chain, 0.3 if name == "step" else 1.5), count=1, between=400)
+    simulator = Simulator(
+        Case(arm, HubFeedback(), chain),
+        scenario(name, arm, chain, 0.3 if name == "step" else 1.5),
+        count=1,
+        between=400,
+    )
     run = simulator.linear(HubFeedback(K1=0.0, K2=0.0))
     moment = run.between.root_moment.reshape(-1, 400)[math.ceil(delay) :]  # 96 records a period, four periods a sample
     frequency, size = run.rings

@@ -10,7 +10,9 @@ import tfarm
 from tests.dsp.independent import radius_of, stepped
 from tests.shared import thinned
 from tfarm import Law, ParameterError
+from tfarm.arm import HubFeedback
 from tfarm.arm.law_tables import load_law
+from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling, Simulator, load_chain, scenario
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_verdict import sampled_verdict
@@ -40,9 +42,12 @@ def test_a_law_with_states_is_a_controller_that_remembers():
         memory[:] = out, m.hub_angle
         return m.feedforward - out - 0.1 * m.root_moment
 
-    mine = Simulator(LAB, Chain(), task, law, count=8).run()
+    mine = Simulator(Case(LAB, law, Chain()), task, count=8).run()
     assert_close(
-        mine, Simulator(LAB, Chain(sampling=Sampling(delay_samples=0.4)), task, count=8).controller(controller)
+        mine,
+        Simulator(Case(LAB, HubFeedback(), Chain(sampling=Sampling(delay_samples=0.4))), task, count=8).controller(
+            controller
+        ),
     )
 
 
@@ -53,9 +58,9 @@ def test_a_servo_follows_as_in_python_control():
         period=T, references=("hub_angle",),
     )  # fmt: skip
     task = scenario("slew", LAB, Chain(), 2.0)
-    mine = Simulator(LAB, Chain(), task, law, count=6).run()
+    mine = Simulator(Case(LAB, law, Chain()), task, count=6).run()
     A, B, C, D = law.matrices()
-    plant = sampled_loop(LAB, law, Chain(), count=6).pulse.state_space()
+    plant = sampled_loop(Case(LAB, law, Chain()), count=6).pulse.state_space()
     loop, by_angle = control.feedback(plant, control.ss(A, B, C, D, T)), control.ss(A, B[:, [0]], C, D[:, [0]], T)
     t = np.arange(task.feedforward.size) * T
     led = task.feedforward + control.forced_response(by_angle, t, task.hub_angle).outputs
@@ -78,7 +83,7 @@ def real(name):
 def test_the_exact_rig_under_the_real_controllers_is_that_of_a_model_of_order_80(name, late):
     law = real(name)
     chain = Chain(sampling=Sampling(delay_samples=late / T))
-    loop = sampled_verdict(RIG, law, chain, count=40).loop
+    loop = sampled_verdict(Case(RIG, law, chain), count=40).loop
     other = radius_of(stepped(RIG, loop.law, loop.chain), loop.has_free_angle)
     assert loop.poles.log_spectral_radius == pytest.approx(other, abs=1e-10)
     assert loop.poles.is_stable == (name == "hinf")

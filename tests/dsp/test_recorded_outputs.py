@@ -14,6 +14,7 @@ from tests.rigs import some_rig
 from tests.shared import thinned
 from tfarm.arm import HubFeedback, Law, RotarySpring
 from tfarm.arm.chain import Slew
+from tfarm.case import Case
 from tfarm.dsp import Actuator, Chain, Sampling, Simulator, scenario
 from tfarm.dsp.plant import RECORDED
 from tfarm.dsp.scenarios import slew
@@ -39,7 +40,7 @@ def test_signals_are_those_of_the_modal_state_space(arm, delay):
     chain = Chain(sampling=Sampling(delay_samples=delay))
     task = scenario("slew", arm, chain, 0.3)
     task = replace(task, disturbance=np.random.default_rng(4).normal(size=task.t.size))
-    run = Simulator(arm, chain, task, count=4, between=4, outputs=OTHERS).linear(GAINS)
+    run = Simulator(Case(arm, HubFeedback(), chain), task, count=4, between=4, outputs=OTHERS).linear(GAINS)
     names = (*RECORDED, *OTHERS)
     A, B, C, D = modal_model(arm, names, 4).matrices()
     n = len(A)
@@ -93,7 +94,9 @@ def test_every_output_there_is_can_be_recorded_or_is_refused_in_a_line():
     for name, each in OUTPUTS.items():
         requested = f"{name}@{0.4 * rig.length!r}" if each.place == "x" else name
         try:
-            found = Simulator(rig, chain, task, count=3, outputs=[requested]).linear(HubFeedback(K1=0.1, K2=0.0))
+            found = Simulator(Case(rig, HubFeedback(), chain), task, count=3, outputs=[requested]).linear(
+                HubFeedback(K1=0.1, K2=0.0)
+            )
         except ParameterError as error:
             refused.append((name, str(error)))
             continue
@@ -108,7 +111,7 @@ def test_every_output_there_is_can_be_recorded_or_is_refused_in_a_line():
 )
 def test_what_cannot_be_read_is_refused(name, why):
     with pytest.raises(ParameterError, match=why):
-        Simulator(LAB, Chain(), scenario("step", LAB, Chain(), 0.1), outputs=[name])
+        Simulator(Case(LAB, HubFeedback(), Chain()), scenario("step", LAB, Chain(), 0.1), outputs=[name])
 
 
 def test_an_output_that_was_not_requested_is_refused_with_the_known_ones():
@@ -126,7 +129,7 @@ def test_a_hub_that_its_actuator_damps_is_a_hub_with_that_friction(law, friction
     names = ("tip_rotation", "moment@0.3")
     by_actuator = Chain(actuator=Actuator(hub_damping=0.05))
     rig, rubbed = (replace(LAB, hub=replace(LAB.hub, friction=each)) for each in (friction, friction + 0.05))
-    one, other = sampled_loop(rig, law, by_actuator, count=20), sampled_loop(rubbed, law, Chain(), count=20)
+    one, other = sampled_loop(Case(rig, law, by_actuator), count=20), sampled_loop(Case(rubbed, law, Chain()), count=20)
     assert one.poles.log_spectral_radius == pytest.approx(other.poles.log_spectral_radius, rel=1e-9)
     one = tfarm.simulate(rig, law, by_actuator, "impulse", 0.3, count=20, outputs=names).at_samples
     other = tfarm.simulate(rubbed, law, Chain(), "impulse", 0.3, count=20, outputs=names).at_samples
@@ -159,7 +162,7 @@ def test_the_verdict_on_a_damped_rig_is_proven(name, factor):
     """Poles of friction and of the circuit are among those that are counted; as many grow as in a stepped model."""
     arm = tfarm.load(name).having(damping=2e-5)
     gains = tfarm.default_gains(arm).times(factor)
-    verdict = sampled_verdict(arm, gains)
+    verdict = sampled_verdict(Case(arm, gains))
     assert verdict.is_settled
     z = np.linalg.eigvals(stepped(arm, Law.of_gains(gains), Chain(), verdict.modes_used))
     grow = int((np.log(abs(z)) > 1e-9).sum())

@@ -11,6 +11,7 @@ from tests.dsp.independent import aliased, aliased_loop
 from tests.odd_arms import odd_arms
 from tests.strategies import arm_of
 from tfarm.arm import FED_BACK, HubFeedback
+from tfarm.case import Case
 from tfarm.dsp import Actuator, Chain, Sampling, pulse_transfer
 from tfarm.dsp.plant import PulseTransfer, sensed_plant
 from tfarm.loop.sampled import sampled_loop
@@ -97,7 +98,7 @@ def test_a_rigid_inertia_is_stable_up_to_its_known_gain(delay):
     edge = 2 * np.sin(np.pi / (2 * (2 * delay + 1))) * arm.total_inertia / T
     chain = Chain(sampling=Sampling(delay_samples=delay))
     for factor, stable in ((0.999, True), (1.001, False)):
-        loop = sampled_loop(arm, HubFeedback(K1=factor * edge, K2=0.0), chain, count=2)
+        loop = sampled_loop(Case(arm, HubFeedback(K1=factor * edge, K2=0.0), chain), count=2)
         assert loop.poles.is_stable is stable
 
 

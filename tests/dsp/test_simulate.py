@@ -10,6 +10,7 @@ from scipy.signal import lfilter, lsim
 
 import tfarm
 from tfarm.arm import HubFeedback
+from tfarm.case import Case
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, Simulator, scenario
 from tfarm.dsp.kernel import estimate
 from tfarm.dsp.results import (
@@ -33,7 +34,9 @@ ROUNDED = 16 * np.finfo(float).eps  # of the largest moment: 20 modes and 40 are
 
 def simulator(arm, name="slew", duration=3.0, chain=None, count=8, between=0):
     chain = Chain() if chain is None else chain
-    return Simulator(arm, chain, scenario(name, arm, chain, duration), count=count, between=between)
+    return Simulator(
+        Case(arm, HubFeedback(), chain), scenario(name, arm, chain, duration), count=count, between=between
+    )
 
 
 @pytest.mark.parametrize("name", list(SCENARIOS))
@@ -63,7 +66,7 @@ def test_free_decay_is_the_damping_of_the_first_mode(lab):
 def test_a_decay_begins_with_filters_at_the_value_that_they_were_held_at(lab, gains):
     """The measured signals are the solution of y_f' = w (y - y_f), y_f(0) = y(0), of the recorded ones."""
     chain, between = Chain(sampling=Sampling(antialias_corner=60.0)), 50
-    run = Simulator(lab, chain, scenario("decay", lab, chain, 0.5), gains, count=2, between=between).run()
+    run = Simulator(Case(lab, gains, chain), scenario("decay", lab, chain, 0.5), count=2, between=between).run()
     t = np.r_[run.at_samples.t, run.between.t]
     order = np.argsort(t, kind="stable")
     for column, name in ((1, "hub_rate"), (2, "root_moment")):
@@ -77,7 +80,7 @@ def test_a_decay_begins_with_filters_at_the_value_that_they_were_held_at(lab, ga
 @pytest.mark.parametrize("K2", [0.1, 0.9])
 def test_the_decay_in_time_is_the_spectral_radius(lab, K2):
     gains = HubFeedback(K1=0.05, K2=K2)
-    loop = sampled_loop(lab, gains, count=8)
+    loop = sampled_loop(Case(lab, gains), count=8)
     run = simulator(lab, "impulse", 60.0).linear(gains)
     rate = run.at_samples.hub_rate[-200:]
     slope = np.polyfit(np.arange(200), np.log(abs(rate)), 1)[0]
@@ -92,7 +95,7 @@ def test_quantisation_keeps_a_limit_cycle_up(lab):
     )
     run = simulator(lab, "impulse", 20.0, chain).linear(gains)
     ideal = simulator(lab, "impulse", 20.0, ideal_chain(chain)).linear(gains)
-    assert sampled_loop(lab, gains, chain, count=8).poles.is_stable
+    assert sampled_loop(Case(lab, gains, chain), count=8).poles.is_stable
     cycle = limit_cycle(run, ideal)
     assert cycle is not None
     assert cycle.torque == pytest.approx(np.ptp(run.torque[-500:]) / 2)
@@ -107,12 +110,15 @@ def test_quantisation_keeps_a_limit_cycle_up(lab):
 def test_an_unstable_loop_that_its_motor_limits_rings_for_ever(lab):
     """Everything is linear but the limit: twice the limit and twice the impulse make a cycle twice as large."""
     gains = HubFeedback(K1=0.3, K2=1.18)
-    assert not sampled_loop(lab, gains, count=8).poles.is_stable
+    assert not sampled_loop(Case(lab, gains), count=8).poles.is_stable
     cycles = []
     for size in (1.0, 2.0):
         chain = Chain(actuator=Actuator(torque_limit=3.0 * size))
         task = replace(scenario("impulse", lab, chain, 20.0), impulse=0.01 * size)
-        run, ideal = (Simulator(lab, each, task, count=8).linear(gains) for each in (chain, ideal_chain(chain)))
+        run, ideal = (
+            Simulator(Case(lab, HubFeedback(), each), task, count=8).linear(gains)
+            for each in (chain, ideal_chain(chain))
+        )
         cycles.append(limit_cycle(run, ideal))
         assert run.saturated["torque"] > 100
         assert limit_cycle(ideal, ideal) is None
@@ -123,24 +129,24 @@ def test_an_unstable_loop_that_its_motor_limits_rings_for_ever(lab):
     assert (one.kept_up_by, one.torque) == ("saturation", 3.0)
     assert two.root_moment == pytest.approx(2 * one.root_moment, rel=1e-6)  # what rounding makes of 20 s of ringing
     assert two.frequency == one.frequency
-    answer = to_dict(simulated_run(lab, gains, chain, "impulse", 20.0, count=8))
+    answer = to_dict(simulated_run(Case(lab, gains, chain), "impulse", 20.0, count=8))
     assert answer["limit_cycle"]["kept_up_by"] == "saturation"
 
 
 def test_a_simulation_uses_enough_modes_or_reports_its_error(lab, lossless):
     """20 modes do after a slew, and with damping after an impulse; without it 40 do not, and the error is right."""
     for task, duration in (("slew", 1.5), ("impulse", 0.5)):
-        enough = to_dict(simulated_run(lab, GAINS, Chain(), task, duration))
+        enough = to_dict(simulated_run(Case(lab, GAINS, Chain()), task, duration))
         assert (enough["modes_used"], enough["modes_change"] < 1e-4) == (20, True)
         fine = simulator(lab, task, duration, count=30).linear(GAINS).at_samples
         off = abs(enough["root_moment"] - fine.root_moment).max() / abs(fine.root_moment).max()
         assert 0 < off < max(enough["modes_change"], ROUNDED)
-    sudden = to_dict(simulated_run(lossless, GAINS, Chain(), "impulse", 0.5))
+    sudden = to_dict(simulated_run(Case(lossless, GAINS, Chain()), "impulse", 0.5))
     assert (sudden["modes_used"], sudden["modes_change"] > 1e-4) == (40, True)
     more = simulator(lossless, "impulse", 0.5, count=160).linear(GAINS).at_samples
     off = abs(sudden["root_moment"] - more.root_moment).max() / abs(more.root_moment).max()
     assert 1e-4 < off < 2 * sudden["modes_change"]
-    limited = to_dict(simulated_run(lab, GAINS, Chain(), "slew", 0.1, count=3))
+    limited = to_dict(simulated_run(Case(lab, GAINS, Chain()), "slew", 0.1, count=3))
     assert (limited["modes_used"], limited["modes_change"]) == (3, None)
 
 
@@ -168,10 +174,10 @@ def test_divergence_is_reported_with_its_time_and_mode(lab):
     run = simulator(lab, duration=5.0).linear(HubFeedback(K1=0.3, K2=1.5))
     assert run.stopped is not None
     assert run.stopped.time == pytest.approx(run.t.size * T)
-    assert f"mode {run.stopped.mode}" == dominant(sampled_loop(lab, HubFeedback(K1=0.3, K2=1.5), count=8))
+    assert f"mode {run.stopped.mode}" == dominant(sampled_loop(Case(lab, HubFeedback(K1=0.3, K2=1.5)), count=8))
     for signal in (run.torque, run.at_samples.root_moment, run.at_samples.tip_displacement):
         assert np.isfinite(signal).all()
-    answer = to_dict(simulated_run(lab, HubFeedback(K1=0.3, K2=1.5), Chain(), "slew", 5.0, count=8))
+    answer = to_dict(simulated_run(Case(lab, HubFeedback(K1=0.3, K2=1.5), Chain()), "slew", 5.0, count=8))
     assert answer["settling_time_s"] is None
     assert answer["stopped_at_s"] == run.stopped.time
 

@@ -14,6 +14,7 @@ from tests.spectrum.independent import delta
 from tests.strategies import ENDS, some_arm
 from tests.transition import determinant
 from tfarm import HubFeedback
+from tfarm.case import Case
 from tfarm.exact.balls import point, precision
 from tfarm.exact.characteristic import (
     Analytic,
@@ -61,14 +62,14 @@ def laws(case):
 
 
 def exact(arm, law):
-    return ContinuousLoop(arm, HubFeedback(**law)).exact if law else None
+    return ContinuousLoop(Case(arm, HubFeedback(**law))).exact if law else None
 
 
 def in_doubles(arm, law, s):
     """D of a loop, its zeros at the origin multiplied in again; both kinds without a law."""
     if not law:
         return characteristic(system_of(arm), s), quick_characteristics(system_of(arm), s)
-    loop = ContinuousLoop(arm, HubFeedback(**law))
+    loop = ContinuousLoop(Case(arm, HubFeedback(**law)))
     at, n = loop.function(s), loop.zeros_at_origin
     return (Analytic(at.value * s**n, (at.slope + n / s * at.value) * s**n, at.scale),)
 
@@ -130,7 +131,7 @@ def test_the_quick_function_is_the_other_without_its_zeros_at_rest(name, at_zero
 @pytest.mark.parametrize("name", ["sasaki2012-lab", "tests/rigs/bench-rig.toml"])
 def test_with_its_zero_at_rest_divided_out_the_function_is_its_limit_there(name) -> None:
     """(K1 + what the hub loses) theta, not 0: else a box would hold a pole at rest twice."""
-    loop = ContinuousLoop(tfarm.load(name), HubFeedback(K1=0.3, K2=0.4))
+    loop = ContinuousLoop(Case(tfarm.load(name), HubFeedback(K1=0.3, K2=0.4)))
     assert loop.zeros_at_origin == 1
     at = loop.function(np.array([0j, 1e-9]))
     assert at.value[0] == pytest.approx(at.value[1], rel=1e-8)
@@ -167,7 +168,7 @@ def test_zeros_at_the_origin_are_as_many_as_the_order_of_D_there(case) -> None:
         law = allowed({"K1": K1, "K2": K2, "Kp": Kp} if any((K1, K2, Kp)) else {}, case[0])
         at = small * (1e-9 if K1 else 1.0)  # where K1 s outweighs the inertia
         far, near = (abs(each) for each in balls(k, at.astype(complex), exact(arm, law)))
-        order = ContinuousLoop(arm, HubFeedback(**law)).zeros_at_origin if law else k.at_rest
+        order = ContinuousLoop(Case(arm, HubFeedback(**law))).zeros_at_origin if law else k.at_rest
         assert float(mpmath.log10(far / near)) == pytest.approx(order, abs=1e-2)
 
 

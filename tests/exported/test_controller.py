@@ -12,6 +12,7 @@ import tfarm
 from tests.exported.cases import CASES, GAINS, IDEAL, LAB, readings, realised, task_of
 from tests.exported.compilers import build, needed, random_inputs, run, stepped
 from tests.shared import thinned
+from tfarm.case import Case
 from tfarm.dsp.scenarios import scenario
 from tfarm.dsp.simulate import Simulator
 from tfarm.exported.controller import c_controller
@@ -77,7 +78,7 @@ def test_the_code_is_the_simulation(case, precision):
     chain = replace(chain, converters=replace(chain.converters, arithmetic=arithmetic))
     controller, _ = realised(task_of((arm, law, chain), precision))
     slew = scenario("slew", arm, chain, 1.5)
-    own = Simulator(arm, chain, slew, controller.word.rounded, count=6)
+    own = Simulator(Case(arm, controller.word.rounded, chain), slew, count=6)
     done = own.run()
     signals = readings(done)
     columns = [signals[name] for name in controller.signals]

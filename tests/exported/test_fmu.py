@@ -29,6 +29,8 @@ from tests.hostile import C_TEXTS, NAME
 from tests.odd_arms import odd_arms
 from tests.shared import thinned
 from tfarm import Law, ParameterError
+from tfarm.arm import HubFeedback
+from tfarm.case import Case
 from tfarm.dsp import Simulator, scenario
 from tfarm.dsp.results import simulated_run
 from tfarm.exported import fmu as module
@@ -86,7 +88,7 @@ def test_a_loop_is_that_of_the_simulation(case):
     gains under every stage of a chain."""
     arm, law, chain, name = LOOPS[case]
     unit, exported = made("loop", case)
-    truth = simulated_run(arm, law, chain, name, 1.5, count=MODES).simulation
+    truth = simulated_run(Case(arm, law, chain), name, 1.5, count=MODES).simulation
     task, n = truth.scenario, truth.t.size
     assert truth.stopped is None
     unit.start(impulse=task.impulse)
@@ -108,7 +110,7 @@ def test_a_plant_is_that_of_the_simulation_under_any_torque(case):
         seen.append((m.hub_angle, m.hub_rate, m.root_moment))
         return torque[m.k]
 
-    truth, n = Simulator(LAB, chain, task, count=MODES).controller(controller), task.t.size
+    truth, n = Simulator(Case(LAB, HubFeedback(), chain), task, count=MODES).controller(controller), task.t.size
     assert case == "gains" or min(truth.saturated["moment"], truth.saturated["torque"]) > 9
     unit.start()
     found = driven(unit, {"hub_torque": torque, "disturbance": task.disturbance}, n)
@@ -207,7 +209,7 @@ def test_an_unstable_loop_stops_where_the_simulation_does():
     unit, exported = made("loop", "unstable")
     assert exported.verdict.startswith("NOT CERTIFIED STABLE")
     assert "NOT CERTIFIED STABLE" in unit.xml.get("description")
-    truth = simulated_run(LAB, law, IDEAL, "slew", 30.0, count=MODES).simulation
+    truth = simulated_run(Case(LAB, law, IDEAL), "slew", 30.0, count=MODES).simulation
     unit.start()
     inputs, last = inputs_of(truth.scenario), truth.t.size - 1
     for k in range(last):
@@ -420,7 +422,7 @@ def test_an_arm_without_a_slew_has_the_modes_of_a_step(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "COMPILERS", ())
     held = replace(LAB, hub=replace(LAB.hub, stiffness=20.0))
     found = tfarm.export(held, GAINS, what="plant", form="fmu", folder=tmp_path)
-    assert found.details.modes == simulated_run(held, GAINS, IDEAL, "step", 3.0).used.modes
+    assert found.details.modes == simulated_run(Case(held, GAINS, IDEAL), "step", 3.0).used.modes
 
 
 @pytest.mark.parametrize("what", ["plant", "controller", "loop"])
@@ -438,7 +440,7 @@ def test_fmpy_simulates_the_slew(tmp_path, case):
     fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: extra fmu")
     arm, law, chain, _ = LOOPS[case]
     tfarm.export(arm, law, what="loop", form="fmu", folder=tmp_path, chain=chain, anyway=True)
-    truth = simulated_run(arm, law, chain, "slew", 3.0).simulation
+    truth = simulated_run(Case(arm, law, chain), "slew", 3.0).simulation
     inputs = {"time": truth.t} | inputs_of(truth.scenario)
     table = np.array(list(zip(*inputs.values(), strict=True)), dtype=[(name, float) for name in inputs])
     found = fmpy.simulate_fmu(str(tmp_path / "loop.fmu"), stop_time=3.0, input=table)

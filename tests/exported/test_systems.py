@@ -59,7 +59,7 @@ def value(system, z):
 
 @EVERY
 def test_the_loop_has_the_matrix_of_the_analysis(law, chain):
-    loop, mine = sampled_loop(LAB, law, chain), systems(law, chain)[2].matrices[0]
+    loop, mine = sampled_loop(Case(LAB, law, chain)), systems(law, chain)[2].matrices[0]
     assert mine == pytest.approx(loop.matrix(), rel=0, abs=1e-14 * abs(mine).max())  # one rounding a product
 
 
@@ -83,7 +83,7 @@ def test_the_loop_is_the_interconnection_of_plant_and_controller(law, chain):
 def test_the_loop_steps_as_the_simulation_does(law, chain, name):
     """Sample by sample, by the recursion of its matrices; recorded signals of the simulation are not filtered."""
     task = scenario(name, LAB, chain, 0.8)
-    found, loop = Simulator(LAB, chain, task, law).run(), systems(law, chain)[2]
+    found, loop = Simulator(Case(LAB, law, chain), task).run(), systems(law, chain)[2]
     (A, B, C, D), x, y = loop.matrices, np.zeros(len(loop.states)), []
     known = {"feedforward": task.feedforward} | {f"reference:{key}": value for key, value in task.references.items()}
     for u in np.array([known[each] for each in loop.inputs]).T:

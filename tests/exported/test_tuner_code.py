@@ -18,6 +18,7 @@ from tests.shared import sized, thinned
 from tests.shell import answer, refused
 from tests.survey import tally
 from tfarm.arm import HubFeedback
+from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling
 from tfarm.errors import ParameterError
 from tfarm.exported import tuner_code as functions
@@ -298,12 +299,14 @@ def test_cppcheck_finds_nothing(tmp_path):
 
 def test_the_guard_is_certified_anew(lab, tmp_path):
     """A sector of the default rule again; beyond its radius there is none; at C = 0 it is not settled."""
-    loop = sampled_loop(lab, HubFeedback(K1=0.3, K2=1.0), count=6)
+    loop = sampled_loop(Case(lab, HubFeedback(K1=0.3, K2=1.0)), count=6)
     guard = find_guard(loop, "time-varying", 0.336)
     again = sector_guard(loop, guard.lo, guard.hi)
     assert (again.is_proven, again.sentence) == (guard.is_proven, guard.sentence) == (True, again.sentence)
     assert sector_guard(loop, guard.lo, 1.2 * guard.hi) is None
-    assert sector_guard(sampled_loop(lab.having(damping=0.0), HubFeedback(K1=0.3, K2=1.0), count=6), *SECTOR) is None
+    assert (
+        sector_guard(sampled_loop(Case(lab.having(damping=0.0), HubFeedback(K1=0.3, K2=1.0)), count=6), *SECTOR) is None
+    )
 
 
 @pytest.mark.parametrize(("changed", "arm"), [({"guard": (0.0, 1.1)}, LAB), ({}, "sasaki2012")])

@@ -20,8 +20,7 @@ from tests.exported.units import Unit, driven, inputs_of, modes_of_units
 from tests.strategies import some_arm
 from tests.survey import Finding, each_of
 from tfarm.case import Case
-from tfarm.dsp import Actuator, Chain, Converters, Sampling, scenario
-from tfarm.dsp.results import simulator
+from tfarm.dsp import Actuator, Chain, Converters, Sampling, Simulator, scenario
 from tfarm.errors import ConvergenceError, ParameterError
 
 SAMPLES, EQUAL = 200, 1e-12
@@ -59,7 +58,7 @@ def loops(rng):
             unit = Unit(Path(place) / "loop.fmu", Path(place) / "unpacked")
         task = scenario("slew", arm, chain, SAMPLES * chain.sampling.period)
         task = replace(task, disturbance=0.1 * abs(task.feedforward).max() * rng.normal(size=task.t.size))
-        truth = simulator(Case(arm, law, chain), task, count=3).run()
+        truth = Simulator(Case(arm, law, chain), task, count=3).run()
     except (ParameterError, ConvergenceError):
         return None
     unit.start()

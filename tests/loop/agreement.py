@@ -18,6 +18,7 @@ from tests.loop.ritz_loop import RitzLoop
 from tests.strategies import some_arm
 from tests.survey import Finding
 from tfarm import Hub, HubFeedback
+from tfarm.case import Case
 from tfarm.loop.plane import INFINITE, gain_map
 from tfarm.loop.stability import stability
 
@@ -74,14 +75,14 @@ def judge(model, law, of_map):
     rightmost = model.rightmost(law)
     if abs(rightmost) < SLOW:
         return None
-    verdict = stability(model.arm, law)
+    verdict = stability(Case(model.arm, law))
     if of_map != (INFINITE if verdict.unstable_roots_infinite else verdict.unstable_roots):
         outcome = "map and count differ"
-    elif verdict.verdict != ("stable" if of_map == 0 else "unstable"):
+    elif verdict.word != ("stable" if of_map == 0 else "unstable"):
         outcome = "verdict and count differ"
     else:
         outcome = "agree" if (rightmost > 0) == (of_map != 0) else "model differs"
-    words = "" if outcome == "agree" else f"{model.arm} {law} {of_map} {verdict.verdict} {rightmost}"
+    words = "" if outcome == "agree" else f"{model.arm} {law} {of_map} {verdict.word} {rightmost}"
     return Finding(outcome, words, bool(words), {"unstable": of_map})
 
 

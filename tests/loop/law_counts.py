@@ -13,6 +13,7 @@ from tests import survey
 from tests.loop.arms import some_loop
 from tests.survey import Finding, each_of
 from tfarm.arm import Law
+from tfarm.case import Case
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.stability import stability
 from tfarm.reduced.modal import sensed_model
@@ -128,7 +129,7 @@ def exact(arm, law):
 def judge(arm, law):
     """ "right", "refused: ...", "wrong: ..." or "no second count"."""
     try:
-        found = stability(arm, law)
+        found = stability(Case(arm, law))
     except (ConvergenceError, ParameterError) as error:
         return f"refused: {str(error).splitlines()[0]}"
     if found.unstable_roots_infinite:

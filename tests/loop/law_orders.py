@@ -9,7 +9,7 @@ and its eigenvalues: their verdict, the poles at z = 1, and the spectral radius.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import flint
 import numpy as np
@@ -19,7 +19,8 @@ from tests.loop.arms import some_loop
 from tests.loop.law_counts import SIGNALS
 from tests.rigs import some_rig
 from tests.survey import Finding, each_of
-from tfarm.arm import Arm, Law
+from tfarm.arm import Law
+from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling, pulse_transfer
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.sampled_verdict import sampled_verdict
@@ -31,13 +32,6 @@ AT_ONE = 1e-40  # an eigenvalue as near is z = 1: a quadruple one is right to 1e
 RADIUS_AGREES, RADIUS_NOISE = 1e-6, 1e-12  # of ln of the spectral radius, and of the model's matrices in doubles
 SLOW = 1e-9  # of ln|z|: of a pole next to one at z = 1 rounding leaves no more, 9e-11 was the most of 1,000 laws
 MOST_ORDER = 12
-
-
-@dataclass(frozen=True)
-class Case:
-    arm: Arm
-    law: Law
-    chain: Chain
 
 
 def some_case(rng):
@@ -261,7 +255,7 @@ def integrals_apart(loop):
 def judge(case):
     """ "right", "refused: ...", "wrong: ..." , whether it is proven, or that it need not be."""
     try:
-        verdict = sampled_verdict(case.arm, case.law, case.chain)
+        verdict = sampled_verdict(case)
         mine, word = verdict.log_radius, verdict.word
         loop = verdict.loop
     except (ConvergenceError, ParameterError) as error:

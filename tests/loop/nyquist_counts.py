@@ -7,6 +7,7 @@ they differ, so what is counted here are refusals, by reason.  A small negative 
 from tests import survey
 from tests.loop.arms import some_loop
 from tests.survey import Finding, each_of
+from tfarm.case import Case
 from tfarm.errors import ConvergenceError
 from tfarm.loop.nyquist import nyquist_of
 from tfarm.loop.stability import stability
@@ -16,13 +17,13 @@ def plots(rng):
     """ "agree", "no verdict" or "refused", with the reason; a plot whose counts are by finding poles is wrong."""
     arm, law = some_loop(rng, slenderness=(5, 60))
     try:
-        verdict = stability(arm, law)
+        verdict = stability(Case(arm, law))
     except ConvergenceError:
         return Finding("no verdict")
     try:
         nyquist_of(verdict)
     except ConvergenceError as error:
-        return Finding("refused", f"{verdict.verdict} loop: {error}", "by finding" in str(error))
+        return Finding("refused", f"{verdict.word} loop: {error}", "by finding" in str(error))
     return Finding("agree")
 
 

@@ -7,7 +7,7 @@ that put one of the modes 10 to 60 where sampled rate feedback destabilises it, 
 must agree, or one of 240 polynomials decides; a growth below 1e-7 a sample is not decided.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import block_diag, expm
@@ -18,6 +18,7 @@ from tests.plausible.arms import log
 from tests.strategies import arm_of
 from tests.survey import Finding, each_of
 from tfarm.arm import HubFeedback
+from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling
 from tfarm.errors import ConvergenceError
 from tfarm.loop.sampled_verdict import sampled_verdict
@@ -25,13 +26,6 @@ from tfarm.spectrum import modes
 
 FAINT = 1e-7
 PERIOD = 0.01  # s, of the ordinary ones
-
-
-@dataclass(frozen=True)
-class Case:
-    arm: object
-    gains: HubFeedback
-    chain: Chain
 
 
 def beam_of(rng, longest, stockiest):
@@ -83,7 +77,7 @@ def oracle(case):
 def settled(case):
     """The finding on one loop; what the oracle does not decide is "unclear"."""
     try:
-        verdict = sampled_verdict(case.arm, case.gains, case.chain)
+        verdict = sampled_verdict(case)
     except ConvergenceError as error:
         return Finding("refused", f"{error} {case}")
     stable = oracle(case)

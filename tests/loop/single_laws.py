@@ -21,6 +21,7 @@ from tests.survey import Finding, each_of
 from tfarm import Law
 from tfarm.arm.blocks import Rational, StateSpace
 from tfarm.arm.law import Part
+from tfarm.case import Case
 from tfarm.dsp import Chain, Converters, Sampling, Simulator, pulse_transfer, scenario
 from tfarm.loop.sampled import sampled_loop
 
@@ -90,7 +91,7 @@ def balls(values):
 def growth(law, chain, impulse):
     """ln of the growth a sample of the root moment between two quarters of a simulation; and the samples of it."""
     task = replace(scenario("impulse", ARM, chain, DURATION), impulse=impulse)
-    moment = abs(Simulator(ARM, chain, task, law, count=MODES).run().at_samples.root_moment)
+    moment = abs(Simulator(Case(ARM, law, chain), task, count=MODES).run().at_samples.root_moment)
     n = moment.size // 8
     first, last = moment[4 * n : 6 * n].max(), moment[6 * n : 8 * n].max()
     return np.log(last / first) / (2 * n), moment.size
@@ -102,8 +103,8 @@ def judge(rng):
     K1, law = float(np.float32(0.3)), Law({**entries, "hub_rate": 0.3}, period=period)
     blocks = [each.astype(np.float32).astype(float) for each in by_hand(*entries["hub_angle"], period)]
     truth, is_free = true_log_radius(blocks, K1)
-    found = sampled_loop(ARM, law, SINGLE, count=MODES).poles.log_spectral_radius
-    exact = sampled_loop(ARM, law, DOUBLE, count=MODES).poles.log_spectral_radius
+    found = sampled_loop(Case(ARM, law, SINGLE), count=MODES).poles.log_spectral_radius
+    exact = sampled_loop(Case(ARM, law, DOUBLE), count=MODES).poles.log_spectral_radius
     hand = Law({}, parts=(Part(("hub_angle",), StateSpace(*blocks)), Part(("hub_rate",), Rational((K1,)))), period=T)
     (slope, samples), (single, _) = growth(hand, DOUBLE, FAINTEST), growth(law, SINGLE, FAINT)
     words = f"{law.order}, {'z' if period else 's'}: {found:.6e}, true {truth:.6e}, simulated {slope:.6e}, {single:.6e}"

@@ -16,6 +16,7 @@ from tests.loop.law_counts import some_delay, some_law
 from tests.plausible.arms import draw
 from tests.rigs import some_rig
 from tests.survey import Finding
+from tfarm.case import Case
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.continuous import ContinuousLoop
 
@@ -32,7 +33,7 @@ def some_case(number, seed):
         arm = some_loop(rng)[0] if number % 3 == 1 else some_rig(rng)
         try:
             law = some_law(rng, arm, delay=0.0 if arm.is_undamped else some_delay(rng, arm))
-            ContinuousLoop(arm, law)
+            ContinuousLoop(Case(arm, law))
         except (ParameterError, ConvergenceError):  # a locked hub, or no loop
             continue
         return arm, law
@@ -57,9 +58,7 @@ def spread(size, seed):
     for number in range(size):
         spent, found = seconds(*some_case(number, seed))
         times.append(spent)
-        yield Finding(
-            "refused" if isinstance(found, Exception) else found.stability.verdict, figures={"CPU [s]": spent}
-        )
+        yield Finding("refused" if isinstance(found, Exception) else found.stability.word, figures={"CPU [s]": spent})
     median = np.median(times)
     print(f"  99th percentile {np.percentile(times, 99) / median:.3g} medians, worst {max(times) / median:.3g}")
 

@@ -18,6 +18,7 @@ from tests.spectrum.independent import delta
 from tfarm import Hub, HubFeedback, Law, Payload
 from tfarm.arm import as_law
 from tfarm.arm.blocks import Rational
+from tfarm.case import Case
 from tfarm.errors import CertificationError
 from tfarm.loop.poles import Poles
 from tfarm.loop.stability import stability
@@ -124,8 +125,8 @@ def test_friction_at_the_hub_alone_damps_every_mode_that_the_hub_takes_part_in(f
     The free hub's pole at 0 is apart; no gain is needed, and no theorem on the link's damping.
     """
     arm = replace(BARE, hub=Hub(inertia=BARE.hub.inertia, friction=friction, stiffness=stiffness))
-    found = stability(arm, HubFeedback())
-    assert (found.verdict, found.unstable_roots, found.is_known_beyond) == ("stable", 0, True)
+    found = stability(Case(arm, HubFeedback()))
+    assert (found.word, found.unstable_roots, found.is_known_beyond) == ("stable", 0, True)
     assert (found.poles.values == 0).sum() == (stiffness == 0)
     law = as_law(HubFeedback(K1=friction, Kp=stiffness))
     for pole in found.poles.moving[:: max(1, found.poles.moving.size // 6)]:
@@ -134,7 +135,7 @@ def test_friction_at_the_hub_alone_damps_every_mode_that_the_hub_takes_part_in(f
 
 
 def test_without_losses_the_verdict_is_marginal_and_friction_at_a_held_tip_is_stable():
-    assert stability(BARE, HubFeedback()).verdict == "marginal"
+    assert stability(Case(BARE, HubFeedback())).word == "marginal"
     held = replace(BARE, hub=Hub(inertia=0.1, friction=0.5), payload=Payload(mass=math.inf))
-    found = stability(held, HubFeedback())
-    assert (found.verdict, (found.poles.values == 0).any()) == ("stable", False)
+    found = stability(Case(held, HubFeedback()))
+    assert (found.word, (found.poles.values == 0).any()) == ("stable", False)

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.loop.law_orders import BITS, Case, law_in_balls, laws, truth
+from tests.loop.law_orders import BITS, law_in_balls, laws, truth
 from tests.shared import sized
 from tests.survey import each_of, tally
 from tfarm import Law
 from tfarm.arm.law_tables import load_law
+from tfarm.case import Case
 from tfarm.dsp import Chain, Converters, Sampling, load_chain
 from tfarm.dsp.discretise import acting_law, law_in_z, with_estimate
 from tfarm.loop.sampled import sampled_loop
@@ -31,13 +32,13 @@ def chain_of(period):
 
 
 def is_stable(law, chain):
-    return sampled_verdict(LAB, law, chain).is_stable
+    return sampled_verdict(Case(LAB, law, chain)).is_stable
 
 
 def test_five_poles_next_to_one_are_no_integrator():
     """At 0.5 ms the loop's poles are as good as those of continuous time, which the exact arm has."""
     chain = chain_of(0.0005)
-    analysis = Analysis(sampled_verdict(LAB, SLOW, chain))
+    analysis = Analysis(sampled_verdict(Case(LAB, SLOW, chain)))
     verdict, (low, high) = analysis.verdict, analysis.gain_factors
     slowest = tfarm.closed_loop_poles(LAB, SLOW, 4).values.real.max()
     assert (verdict.word, verdict.is_settled, verdict.loop.poles_at_one) == ("stable", True, 0)
@@ -52,7 +53,7 @@ def reproduced(name):
     """A case of the survey, or of another one: rig, chain and law, the verdict on its loop, and the truth."""
     file = str(FILES / f"{name}.toml")
     case = Case(tfarm.load(file), load_law(FILES / f"{name}_law.toml"), load_chain(file))
-    verdict = sampled_verdict(case.arm, case.law, case.chain)
+    verdict = sampled_verdict(case)
     return verdict, *truth(verdict.loop, case)
 
 
@@ -98,7 +99,7 @@ def on_moment(*den):
 )
 def test_an_integrator_of_what_is_0_at_rest_stays_at_one(entries, at_one):
     case = Case(LAB, Law(entries, period=T), chain_of(T))
-    loop = sampled_loop(LAB, case.law, case.chain, count=4)
+    loop = sampled_loop(case, count=4)
     there, logs = truth(loop, case)
     assert (loop.poles_at_one, there - loop.has_free_angle) == (at_one, at_one)
     largest = max(logs[0], 0.0) if at_one else logs[0]

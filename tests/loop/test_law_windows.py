@@ -12,6 +12,7 @@ from tfarm import ConvergenceError, Law, RotarySpring
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Part
 from tfarm.arm.law_tables import load_law
+from tfarm.case import Case
 from tfarm.loop import lines as lines_module
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.lines import unstable_below
@@ -33,17 +34,17 @@ def holds(windows, value):
 @pytest.mark.parametrize(("law", "every"), thinned([(LAW, 3), (LAW, 1), (LAW.having("gain", 7.0), 1)], 3))
 def test_verdicts_turn_at_each_end(law, every):
     """Of each number of the law, or of every third one."""
-    found = windows_of(stability(LAB, law))
+    found = windows_of(stability(Case(LAB, law)))
     assert found.keys() == law.numbers.keys()
     edges = 0
     for name, each in list(found.items())[::every]:
         for low, high in each.all:
             for end, side in ((low, 1), (high, -1)):
                 inward = side * (OFF_END if end else OFF_ZERO) * (high - low)
-                assert stability(LAB, law.having(name, end + inward)).is_stable
+                assert stability(Case(LAB, law.having(name, end + inward))).is_stable
                 if each.end(end) == "edge":
                     edges += 1
-                    assert not stability(LAB, law.having(name, end - inward)).is_stable
+                    assert not stability(Case(LAB, law.having(name, end - inward))).is_stable
         assert holds(each, law.numbers[name]) == (each.around is not None) == (law is LAW)
     assert edges >= 8 // every
 
@@ -51,7 +52,7 @@ def test_verdicts_turn_at_each_end(law, every):
 def test_a_spring_is_outweighed_by_a_law_as_stiff():
     """2 N m/rad hold the hub: k + C(0) = 0, whatever else there is; and a filter turns over at T = 0."""
     held = replace(LAB, hub=replace(LAB.hub, stiffness=2.0, friction=0.5))
-    found = windows_of(stability(held, Law({"hub_angle": ([0.5], [0.01, 0.25])})))
+    found = windows_of(stability(Case(held, Law({"hub_angle": ([0.5], [0.01, 0.25])}))))
     assert found["hub_angle.num.0"].around[0] == pytest.approx(-2.0 * 0.25, rel=1e-9)
     assert found["gain"].around[0] == pytest.approx(-1.0, rel=1e-9)
     assert found["hub_angle.den.0"].around[0] == 0.0
@@ -64,8 +65,8 @@ def test_the_factor_on_the_law_is_its_gain_margin():
 
 def test_where_poles_stay_on_the_axis_there_are_none():
     assert tfarm.margins(BARE, LAW.having("delay", 0.0)).windows == {}
-    marginal = stability(LAB, Law({"tip_acceleration": 0.01, "root_moment": 0.1}))  # nothing holds angle or rate
-    assert marginal.verdict == "marginal"
+    marginal = stability(Case(LAB, Law({"tip_acceleration": 0.01, "root_moment": 0.1})))  # nothing holds angle or rate
+    assert marginal.word == "marginal"
     assert windows_of(marginal) == {}
 
 
@@ -93,18 +94,18 @@ NARROW = {  # two crossings 0.15 rad/s apart, near 72 and 93, lie between neighb
 
 @pytest.mark.parametrize(("law", "name", "values"), thinned(NARROW.values(), 2), ids=NARROW)
 def test_a_window_has_no_unstable_stretch_inside(law, name, values):
-    window = windows_of(stability(LAB, law))[name]
+    window = windows_of(stability(Case(LAB, law)))[name]
     for value in values:
-        assert holds(window, value) == stability(LAB, law.having(name, value)).is_stable
+        assert holds(window, value) == stability(Case(LAB, law.having(name, value))).is_stable
 
 
 @pytest.mark.parametrize(("name", "band"), [("hub_angle.gain", 90.0), ("tip_acceleration.den.0", 150.0)])
 def test_below_a_band_through_whose_top_poles_pass_each_interval_is_counted(name, band):
     """Crossings below it do not carry the count from one end of the range to the other."""
     law = LAW.having("gain", 7.0)
-    found = windows_of(stability(LAB, law, band), [name])[name]
+    found = windows_of(stability(Case(LAB, law), band), [name])[name]
     for value in np.linspace(*found.looked_at, 8)[1:-1].tolist():
-        count = unstable_below(ContinuousLoop(LAB, law.having(name, value)), found.band)
+        count = unstable_below(ContinuousLoop(Case(LAB, law.having(name, value))), found.band)
         assert holds(found, value) == (count == 0)
 
 
@@ -129,10 +130,10 @@ def test_next_to_zero_windows_are_not_cut_by_rounding(damping) -> None:
     hub = replace(stocky.hub, friction=0.3)
     arm = replace(stocky.having(damping=damping), hub=hub, joint=RotarySpring(stiffness=1.0))
     law = Law({"hub_angle": ([0.03, 0.07], [1.0, 0.0])})
-    found = windows_of(stability(arm, law))["hub_angle.den.0"]
+    found = windows_of(stability(Case(arm, law)))["hub_angle.den.0"]
     probes = [*np.geomspace(1e-8, 5.0, 8), *((low + high) / 2 for low, high in found.all)]
     for value in probes:
-        count = stability(arm, law.having("hub_angle.den.0", float(value)), band=found.band).unstable_roots
+        count = stability(Case(arm, law.having("hub_angle.den.0", float(value))), band=found.band).unstable_roots
         assert holds(found, value) == (count == 0)
 
 
@@ -145,9 +146,9 @@ def reproduced(name):
 def test_counts_are_not_carried_through_a_zero_leading_coefficient() -> None:
     """Next to 0 high modes are driven, and poles come to a lower band from above: the window was wrong."""
     arm, law = reproduced("lifted")
-    found = windows_of(stability(arm, law))["tip_acceleration.den.0"]
+    found = windows_of(stability(Case(arm, law)))["tip_acceleration.den.0"]
     for value in (-7.7, -7.4, -6.4):
-        count = stability(arm, law.having("tip_acceleration.den.0", value)).unstable_roots
+        count = stability(Case(arm, law.having("tip_acceleration.den.0", value))).unstable_roots
         assert holds(found, value) == (count == 0)
     assert [pair[0] for pair in found.all] == [-10.0]
 
@@ -155,7 +156,7 @@ def test_counts_are_not_carried_through_a_zero_leading_coefficient() -> None:
 def test_a_leading_coefficient_without_which_there_is_no_loop_keeps_its_sign() -> None:
     """A lead on the hub's rate: without its lag it would answer the torque at once."""
     law = Law({"hub_rate": ([0.02, 0.3], [0.01, 1.0]), "hub_angle": 1.0})
-    found = windows_of(stability(LAB, law))["hub_rate.den.0"]
+    found = windows_of(stability(Case(LAB, law)))["hub_rate.den.0"]
     assert found.looked_at == (0.001, 0.1)
     assert all(0.001 <= low < high <= 0.1 for low, high in found.all)
 
@@ -184,7 +185,7 @@ def test_a_count_next_to_a_law_s_slow_poles_is_right():
     """Three within a millionth of the lowest frequency, and a hub that turns freely: all in one step of a grid."""
     slow = 1e-6 * tfarm.modes(LAB, 1).natural_frequency[-1]
     law = Law({"hub_rate": {"zeros": [0.0] * 3, "poles": [slow, slow * (1 + 1j), slow * (1 - 1j)], "gain": 0.3}})
-    loop = ContinuousLoop(LAB, law)
+    loop = ContinuousLoop(Case(LAB, law))
     near = loop.law.times(1e-9)  # as good as no feedback: its own poles, three of them right of the axis
     assert unstable_below(loop.under(near), 300.0) == 3
 
@@ -206,7 +207,7 @@ def test_integrators_of_two_signals_leave_the_third_its_zeros_at_rest():
         "root_moment": ([0.3, 5.0], [1.0, 0.0]),
         "tip_acceleration": ([0.3, 5.0], [1.0, 7.0, 0.0]),
     })  # fmt: skip
-    loop = ContinuousLoop(LAB, law)
+    loop = ContinuousLoop(Case(LAB, law))
     assert loop.zeros_at_origin == 2
     at = loop.function(1e-5 * np.array([1j, 0.5j]))
     farther, nearer = at.value * np.exp(at.scale)

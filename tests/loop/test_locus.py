@@ -18,6 +18,7 @@ from tests.shared import thinned
 from tests.shell import run
 from tfarm import Arm, Hub, HubFeedback, Law, Link, ParameterError, Payload, Section
 from tfarm.arm import Attachment, Motor
+from tfarm.case import Case
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.lines import line_crossings
 from tfarm.loop.loci import damping_ratios, held_branches, loci, most_damped, reduced_locus
@@ -199,7 +200,7 @@ def test_a_branch_that_comes_to_the_accumulation_point_ends_there_and_the_others
     assert (ended.imag, -1 / C < ended.real < -0.95 / C) == (0.0, True)
     assert np.isnan(found.branches).sum() == np.isnan(found.branches[branch]).sum() == (found.gain > last).sum()
     others = np.delete(found.branches, branch, axis=0)[:, -1]
-    poles = poles_below(ContinuousLoop(LAB, HubFeedback(K1=2000.0)), 0.9 * others.imag.max()).values
+    poles = poles_below(ContinuousLoop(Case(LAB, HubFeedback(K1=2000.0))), 0.9 * others.imag.max()).values
     low = 0.8 * others.imag.max()
     assert upper(others[others.imag < low]) == pytest.approx(upper(poles[poles.imag < low]), rel=1e-9)
     assert found.spectral_abscissa[-1] == others[others != 0].real.max()
@@ -304,7 +305,8 @@ def test_a_real_pole_passes_through_0_at_its_closed_form(name):
     if here.size and arm is MASSED:  # a pole at 0 has no digits to be followed by; the others are there
         row = found.branches[:, here[0]]
         sides = [
-            poles_below(ContinuousLoop(arm, law.having(vary, 1.0 + side * 1e-7)), 200.0).values for side in (-1, 1)
+            poles_below(ContinuousLoop(Case(arm, law.having(vary, 1.0 + side * 1e-7))), 200.0).values
+            for side in (-1, 1)
         ]
         assert (row == 0).sum() == 1
         for pole in row[row != 0]:
@@ -388,7 +390,7 @@ def test_ten_digits_of_its_size_are_shown_and_a_gain_has_its_unit():
     assert held_branches(pole) == pytest.approx([-0.12345679 + 98.76543211j, 0.0], rel=1e-15)
     assert abs(held_branches(1e5 * pole) - 1e5 * held_branches(pole)).max() <= 1e-15 * 1e7
     held = replace(LAB, hub=replace(LAB.hub, stiffness=2.0))
-    assert [loci(arm, HUB, vary, 0.0, 0.5).unit for arm, vary in ((LAB, "K1"), (held, "K2"))] == ["N m s/rad", ""]
+    assert [loci(Case(arm, HUB), vary, 0.0, 0.5).unit for arm, vary in ((LAB, "K1"), (held, "K2"))] == ["N m s/rad", ""]
 
 
 REFUSED = [

@@ -17,6 +17,7 @@ from tests.shared import thinned
 from tests.transition import response as transition
 from tfarm import Hub, HubFeedback
 from tfarm.arm import as_law
+from tfarm.case import Case
 from tfarm.loop.continuous import ContinuousLoop, grid
 from tfarm.loop.loop_margins import lowest
 from tfarm.loop.stability import stability
@@ -100,7 +101,7 @@ def test_the_loop_bears_just_less_than_the_delay_margin(arm, law) -> None:
     """By the poles of the delayed loop, complete in their box by the winding number."""
     found = margins(arm, law)
     late = [replace(as_law(law), delay=found.exact_delay * share) for share in (1 - 1e-5, 1 + 1e-5)]
-    assert [stability(arm, each).unstable_roots for each in late] == [0, 2]
+    assert [stability(Case(arm, each)).unstable_roots for each in late] == [0, 2]
 
 
 def test_what_nothing_bounds_beyond_the_band_is_not_called_exact() -> None:
@@ -114,7 +115,7 @@ def test_what_nothing_bounds_beyond_the_band_is_not_called_exact() -> None:
     link = arm.link
     omega = (law.K1 / link.section.second_moment) ** 2 / (link.density * link.youngs_modulus * link.damping)
     assert omega > found.in_band.band
-    L = ContinuousLoop(arm, law).loop_function(1j * omega * np.array([0.5, 2.0]))
+    L = ContinuousLoop(Case(arm, law)).loop_function(1j * omega * np.array([0.5, 2.0]))
     assert abs(L[0]) > 1 > abs(L[1])
     assert np.mod(np.angle(-L), 2 * np.pi) == pytest.approx([0.75 * np.pi] * 2, abs=0.2)
     assert 0.75 * np.pi / (0.5 * omega) < 0.5 * found.in_band.delay
@@ -144,10 +145,10 @@ def test_the_loop_bears_just_less_than_the_gain_margin(arm, law) -> None:
     low, high = margins(arm, law).in_band.gain
     assert 0 <= low < 1 < high
     if high < math.inf:
-        assert stability(arm, law.times(high * (1 - 1e-6))).verdict == "stable"
-        assert stability(arm, law.times(high * (1 + 1e-6))).verdict == "unstable"
+        assert stability(Case(arm, law.times(high * (1 - 1e-6)))).word == "stable"
+        assert stability(Case(arm, law.times(high * (1 + 1e-6)))).word == "unstable"
     if low > 0:
-        assert stability(arm, law.times(low * (1 - 1e-6))).verdict == "unstable"
+        assert stability(Case(arm, law.times(low * (1 - 1e-6)))).word == "unstable"
 
 
 def test_without_damping_the_exact_margins_are_zero_and_those_in_range_positive() -> None:
@@ -185,7 +186,7 @@ def test_no_margin_without_stability(arm, law) -> None:
 def test_the_loop_function_of_no_gains_limits_nothing() -> None:
     pin = replace(LAB, hub=Hub(inertia=0.0), payload=held().payload)
     found = margins(pin, HubFeedback())
-    assert found.stability.verdict == "stable"
+    assert found.stability.word == "stable"
     assert (found.in_band.phase, found.in_band.delay) == (math.inf, math.inf)
     assert found.in_band.peak_sensitivity == 1.0
 
@@ -213,7 +214,7 @@ def test_where_an_angle_is_held_alone_L_settles_nowhere_at_rest(Kp) -> None:
     law = HubFeedback(K1=0.3, K2=0.3, Kp=Kp)
     for w, factor in margins(LAB, law).in_band.phase_crossovers:
         assert w > 0
-        assert abs(1 + factor * ContinuousLoop(LAB, law).loop_function(np.array([1j * w]))[0]) < 1e-6
+        assert abs(1 + factor * ContinuousLoop(Case(LAB, law)).loop_function(np.array([1j * w]))[0]) < 1e-6
 
 
 @pytest.mark.parametrize("share", [1e-3, 1e-5])

@@ -11,6 +11,7 @@ from tests.loop.arms import window_arm
 from tests.shared import thinned
 from tests.spectrum.independent import newton_step
 from tfarm import Hub, HubFeedback, Law, ParameterError
+from tfarm.case import Case
 from tfarm.errors import ConvergenceError
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
@@ -123,8 +124,8 @@ def far_poles(found):
 def test_acceleration_fed_forward_beyond_the_hubs_inertia_is_unstable_far_beyond_the_modes():
     """-2 J s^2 up to a corner takes more than all of the hub's inertia, which counts above the link's own impedance."""
     arm = LAB.having(hub_inertia=J)
-    found = stability(arm, PUSHED)
-    assert (found.verdict, found.unstable_roots) == ("unstable", 2)
+    found = stability(Case(arm, PUSHED))
+    assert (found.word, found.unstable_roots) == ("unstable", 2)
     rate = tfarm.transfer(arm, "hub_rate", method="appendix")
     for s in far_poles(found):
         law = ((0.05 - 2 * J * CORNER) * s + 0.05 * CORNER) / (s + CORNER) + 0.2 / s
@@ -139,7 +140,7 @@ def test_a_rate_gain_beyond_the_links_impedance_drives_a_pin_without_inertia(sha
     rate = tfarm.transfer(arm, "hub_rate", method="appendix")
     impedance = 1 / complex(rate(1e12 + 0j)).real
     K1 = -share * impedance
-    far = far_poles(stability(arm, HubFeedback(K1=K1, Kp=1e-3)))
+    far = far_poles(stability(Case(arm, HubFeedback(K1=K1, Kp=1e-3))))
     assert far.size == number
     for s in far:
         assert (K1 + 1e-3 / s) * complex(rate(complex(s))).real == pytest.approx(-1, rel=1e-9)
@@ -149,9 +150,9 @@ def test_a_rate_gain_beyond_the_links_impedance_drives_a_pin_without_inertia(sha
 def test_a_corner_beyond_double_range_leaves_the_gain_alone(corner):
     """A gain on the rate through a corner so fast is that gain alone."""
     law = Law({"hub_rate": ((0.1 * corner,), (1.0, corner)), "hub_angle": 0.1})
-    found, alone = stability(LAB, law), stability(LAB, Law({"hub_rate": 0.1, "hub_angle": 0.1}))
+    found, alone = stability(Case(LAB, law)), stability(Case(LAB, Law({"hub_rate": 0.1, "hub_angle": 0.1})))
     assert far_poles(found).size == 0
-    assert found.verdict == alone.verdict == "stable"
+    assert found.word == alone.word == "stable"
     np.testing.assert_allclose(found.poles.values[:4], alone.poles.values[:4], rtol=1e-6)
 
 
@@ -161,6 +162,6 @@ def test_a_pole_of_the_law_beyond_all_boxes_is_named(lead, verdict):
     law = Law({"hub_rate": ((0.5,), (lead, 1.0, 1e3) if lead else (1.0, 1e3))})
     if verdict is None:
         with pytest.raises(ConvergenceError, match=r"pole at 2\.5e\+10"):
-            stability(LAB, law)
+            stability(Case(LAB, law))
     else:
-        assert stability(LAB, law).verdict == verdict
+        assert stability(Case(LAB, law)).word == verdict

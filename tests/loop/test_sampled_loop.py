@@ -8,6 +8,7 @@ import pytest
 
 import tfarm
 from tfarm.arm import Hub, HubFeedback
+from tfarm.case import Case
 from tfarm.dsp import Actuator, Chain, Converters, Sampling
 from tfarm.errors import ParameterError
 from tfarm.loop.sampled import sampled_loop
@@ -25,7 +26,7 @@ def test_small_gains_follow_the_law(lossless, delay):
     modes = tfarm.modes(lossless, 10)
     w, b = modes.natural_frequency[1:], modes.hub_participation[1:]
     for K1, K2, Kp in ((1e-5, 0.0, 0.0), (0.0, 1e-5, 0.0), (1e-6, 2e-5, 0.0), (0.0, 1e-6, 1e-4)):
-        table = mode_table(sampled_loop(lossless, HubFeedback(K1=K1, K2=K2, Kp=Kp), chain, count=14))
+        table = mode_table(sampled_loop(Case(lossless, HubFeedback(K1=K1, K2=K2, Kp=Kp), chain), count=14))
         law = table.first_order[:10]
         second = 1e-4 * b**2 * (K1 / w + K2 * 0.1 + Kp / w**2)  # where the law is zero, the second order is not
         assert np.all(abs(table.log_radius[:10] - law) <= 0.01 * abs(law) + second)
@@ -37,7 +38,9 @@ def test_small_gains_follow_the_law(lossless, delay):
 @pytest.mark.parametrize("Kp", [0.0, 0.7])
 def test_the_polished_poles_are_the_eigenvalues_of_the_matrix(lab, Kp):
     """All of them, apart from the z = 1 of a free hub angle, which the whole matrix has."""
-    loop = sampled_loop(lab, HubFeedback(K1=0.3, K2=0.3, Kp=Kp), Chain(sampling=Sampling(delay_samples=1.5)), count=10)
+    loop = sampled_loop(
+        Case(lab, HubFeedback(K1=0.3, K2=0.3, Kp=Kp), Chain(sampling=Sampling(delay_samples=1.5))), count=10
+    )
     whole = np.linalg.eigvals(loop.matrix())
     ours = loop.poles.z[abs(loop.poles.z) > 0.2]
     assert (min(abs(whole - 1)) < 1e-12) == loop.has_free_angle == (Kp == 0)
@@ -57,7 +60,7 @@ def test_a_rate_by_difference_is_in_the_matrix_as_in_F(lab, delay, Kp, hub_dampi
         converters=Converters(hub_rate="difference", rate_filter=200.0),
         actuator=Actuator(hub_damping=hub_damping),
     )
-    loop = sampled_loop(lab, HubFeedback(K1=0.3, K2=0.25, Kp=Kp), chain, count=8)
+    loop = sampled_loop(Case(lab, HubFeedback(K1=0.3, K2=0.25, Kp=Kp), chain), count=8)
     z = loop.poles.z[abs(loop.poles.z) > 0.2]
     assert z.size >= 8
     np.testing.assert_allclose(abs(loop(z)), 0, atol=1e-8)
@@ -94,7 +97,7 @@ CHAINS = {
 def test_the_first_order_effect_of_a_gain_is_that_of_a_tiny_gain(arm, name):
     """Through delay, filter, difference and a lag of the motor; an arm's own damping is taken for what it is."""
     arm, chain = tfarm.load(arm), CHAINS[name]
-    loop = sampled_loop(arm, HubFeedback(K1=0.02, K2=0.3), chain, count=5)
+    loop = sampled_loop(Case(arm, HubFeedback(K1=0.02, K2=0.3), chain), count=5)
     table = mode_table(loop)
     assert table.index.size >= 4
     for by, found in (("K1", table.by_rate), ("K2", table.by_moment)):
@@ -104,7 +107,7 @@ def test_the_first_order_effect_of_a_gain_is_that_of_a_tiny_gain(arm, name):
 def test_on_a_spring_moment_feedback_drives_the_mode_that_the_spring_makes(lab):
     """I_h theta'' = u + M - k theta: below sqrt(k/I_h) the moment is with the angle, and late it drives."""
     arm = replace(lab, hub=replace(lab.hub, stiffness=3.0), link=replace(lab.link, damping=0.0))
-    table = mode_table(sampled_loop(arm, HubFeedback(K1=0.001, K2=0.3), count=6))
+    table = mode_table(sampled_loop(Case(arm, HubFeedback(K1=0.001, K2=0.3)), count=6))
     assert table.natural_frequency[0] < np.sqrt(3.0 / lab.hub.inertia) < table.natural_frequency[1]
     assert table.index[table.by_moment > 0].tolist() == [1]
 
@@ -112,17 +115,19 @@ def test_on_a_spring_moment_feedback_drives_the_mode_that_the_spring_makes(lab):
 def test_a_locked_hub_has_no_loop_and_a_free_pin_none_by_moment(lab):
     locked = replace(lab, hub=Hub(inertia=np.inf))
     with pytest.raises(ParameterError, match="no loop"):
-        sampled_loop(locked, HubFeedback(K1=0.3, K2=0.3))
+        sampled_loop(Case(locked, HubFeedback(K1=0.3, K2=0.3)))
     pin = replace(lab, hub=Hub(inertia=0.0))
     with pytest.raises(ParameterError, match="algebraic loop"):
-        sampled_loop(pin, HubFeedback(K1=0.3, K2=0.3))
-    assert sampled_loop(pin, HubFeedback(K1=0.1, K2=0.0), count=6).poles.z.size > 10
+        sampled_loop(Case(pin, HubFeedback(K1=0.3, K2=0.3)))
+    assert sampled_loop(Case(pin, HubFeedback(K1=0.1, K2=0.0)), count=6).poles.z.size > 10
 
 
 @pytest.mark.parametrize("period", [0.003, 0.01, 0.04])
 def test_each_mode_is_seen_where_its_samples_turn(lossless, period):
     """Samples have cos(w T) of a mode alone: it appears at arccos(cos(w T))/T, the aliased frequency."""
-    table = mode_table(sampled_loop(lossless, HubFeedback(K1=0.1), Chain(sampling=Sampling(period=period)), count=8))
+    table = mode_table(
+        sampled_loop(Case(lossless, HubFeedback(K1=0.1), Chain(sampling=Sampling(period=period))), count=8)
+    )
     turned = table.natural_frequency * period
     np.testing.assert_allclose(table.aliased, np.arccos(np.cos(turned)) / period, rtol=1e-6)
     folded = np.where(table.band % 2 == 0, table.aliased * period, np.pi - table.aliased * period)
@@ -136,7 +141,9 @@ GAINS = HubFeedback(K1=0.3, K2=0.3)
 
 @pytest.fixture(scope="module")
 def found():
-    return sampled_loci(sampled_loop(LAB, GAINS, Chain(sampling=Sampling(period=0.01)), count=6), 25.0, (-0.5, 1.5))
+    return sampled_loci(
+        sampled_loop(Case(LAB, GAINS, Chain(sampling=Sampling(period=0.01))), count=6), 25.0, (-0.5, 1.5)
+    )
 
 
 def test_each_point_of_a_locus_is_a_pole_of_its_loop(found):
@@ -165,7 +172,7 @@ def test_a_branch_is_named_after_the_mode_whose_pole_it_leaves(found):
 )
 def test_the_dominant_pole_has_the_name_of_its_mode_or_none(K2, named, nameless):
     """A pole that rings is none of the hub's, whether its mode is known or not."""
-    loop = sampled_loop(tfarm.load("sasaki2012-lab"), HubFeedback(K1=0.3, K2=K2))
+    loop = sampled_loop(Case(tfarm.load("sasaki2012-lab"), HubFeedback(K1=0.3, K2=K2)))
     assert dominant(loop) == named
     sensed = loop.rig.sensed
     without = replace(sensed, plants=tuple(replace(each, mode=0 * each.mode) for each in sensed.plants))

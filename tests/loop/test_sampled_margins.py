@@ -17,6 +17,7 @@ from tests.shared import circle_crossings, thinned
 from tests.similar import EITHER
 from tfarm import HubFeedback, Law, modes
 from tfarm.arm import as_law
+from tfarm.case import Case
 from tfarm.dsp import Chain, Converters, Sampling
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.circle_crossings import ENDS_AT, around, ends_of_K1, sampled_map, stable_windows
@@ -39,7 +40,7 @@ def stable_at(loop, name, values):
 def test_a_static_crossing_torn_by_rounding_hides_no_window(period):
     """A pinned tip, where a pole meets z = 1 at K2 = 1: the window below it is there, by the poles on its two sides."""
     arm = odd_arms()["pinned"]
-    loop = sampled_loop(arm, HubFeedback(K1=0.0374, K2=0.3), Chain(sampling=Sampling(period=period)), count=8)
+    loop = sampled_loop(Case(arm, HubFeedback(K1=0.0374, K2=0.3), Chain(sampling=Sampling(period=period))), count=8)
     low, high = around(stable_windows(loop, "K2"), 0.3)
     assert high == pytest.approx(1.0, rel=1e-9)
     assert stable_at(loop, "K2", (low - 1e-6, low + 1e-6, 0.999, 1.001)) == [False, True, True, False]
@@ -48,7 +49,7 @@ def test_a_static_crossing_torn_by_rounding_hides_no_window(period):
 def test_where_the_feedback_outweighs_no_fast_modes_damping_all_delays_are_looked_through(lab):
     """A weak rate gain on a little damped arm, whose fastest mode turns more than 20 times in a sample."""
     arm = replace(lab, link=replace(lab.link, damping=1e-4))
-    loop = sampled_loop(arm, HubFeedback(K1=0.02), Chain(sampling=Sampling(period=0.02)), count=12)
+    loop = sampled_loop(Case(arm, HubFeedback(K1=0.02), Chain(sampling=Sampling(period=0.02))), count=12)
     assert loop.plant.poles.imag.max() * 0.02 > 2 * np.pi * 20
     assert delay_margin(loop) == DelayMargin(20.0, True)
     assert all(loop.with_delay(delay).poles.is_stable for delay in np.linspace(0.0, 20.0, 9))
@@ -60,7 +61,7 @@ def test_where_the_feedback_outweighs_no_fast_modes_damping_all_delays_are_looke
 
 def test_a_long_delay_hides_no_crossing_between_two_points_of_the_grid(lab):
     """Sixty samples turn the loop's phase sixty times round the circle; a grid ten times coarser loses a pair."""
-    loop = sampled_loop(lab, GAINS, Chain(sampling=Sampling(delay_samples=60.0)), count=6)
+    loop = sampled_loop(Case(lab, GAINS, Chain(sampling=Sampling(delay_samples=60.0))), count=6)
     found = circle_crossings(loop.having("K1", 0.0).having("K2", 0.3), "K1")
     edges = found.gain[np.diff(found.gain, append=np.inf) > 1e-6]
     middles = np.r_[edges[0] - 1, (edges[1:] + edges[:-1]) / 2, edges[-1] + 1]
@@ -69,14 +70,14 @@ def test_a_long_delay_hides_no_crossing_between_two_points_of_the_grid(lab):
 
 
 def test_the_map_has_exact_edges(lab):
-    loop = sampled_loop(lab, GAINS, count=11)
+    loop = sampled_loop(Case(lab, GAINS), count=11)
     plane = sampled_map(loop, [0.1, 0.3, 30.0], np.linspace(-0.5, 1.5, 5))
     assert plane.stable_intervals[1:] == [[pytest.approx(stable_windows(loop, "K2")[0], rel=1e-12)], []]
 
 
 @pytest.mark.parametrize("K2", [0.1, 0.3, 0.9])
 def test_the_delay_margin_is_where_the_verdict_turns(lab, K2):
-    loop = sampled_loop(lab, HubFeedback(K1=0.3, K2=K2), count=12)
+    loop = sampled_loop(Case(lab, HubFeedback(K1=0.3, K2=K2)), count=12)
     margin = delay_margin(loop)
     assert not margin.is_bound
     delays = *np.linspace(0, margin.samples, 41)[:-1], margin.samples - 1e-6, margin.samples + 1e-6
@@ -85,27 +86,29 @@ def test_the_delay_margin_is_where_the_verdict_turns(lab, K2):
 
 def test_the_required_damping_is_where_the_verdict_turns(lossless):
     """At C = 0 modes grow by 1e-9 a sample; very little damping stabilises that, and a formula gives it."""
-    C = required_damping(lossless, GAINS, Chain(), count=20)
-    growth, w = sampled_verdict(lossless, GAINS).log_radius, tfarm.modes(lossless, 13).natural_frequency[13]
+    C = required_damping(Case(lossless, GAINS, Chain()), count=20)
+    growth, w = sampled_verdict(Case(lossless, GAINS)).log_radius, tfarm.modes(lossless, 13).natural_frequency[13]
     assert pytest.approx(2 * growth / (0.01 * w**2), rel=0.02) == C
     arms = [lossless.having(damping=each * C) for each in (1, 1 - 4e-6)]
-    assert [sampled_loop(arm, GAINS, Chain()).poles.is_stable for arm in arms] == [True, False]
+    assert [sampled_loop(Case(arm, GAINS, Chain())).poles.is_stable for arm in arms] == [True, False]
 
 
 @pytest.mark.parametrize(("K1", "K2", "ratio"), [(0.3, -0.2, 0.02), (20.0, 0.3, 0.15)])
 def test_a_required_damping_next_to_overdamped_modes_is_that_of_a_loop_with_all_of_them(lossless, K1, K2, ratio):
     """The search has few modes that outlive a sample: eigenvalues of 20 turn there."""
     law, chain = HubFeedback(K1=K1, K2=K2), Chain()
-    C = required_damping(lossless, law, chain)
+    C = required_damping(Case(lossless, law, chain))
     assert ratio / 10 < C * tfarm.modes(lossless, 1).natural_frequency[1] / 2 < ratio
-    sides = [sampled_loop(lossless.having(damping=C * side), law, chain, count=20) for side in (1 - 1e-4, 1 + 1e-4)]
+    sides = [
+        sampled_loop(Case(lossless.having(damping=C * side), law, chain), count=20) for side in (1 - 1e-4, 1 + 1e-4)
+    ]
     radii = [abs(loop.eigenvalues).max() for loop in sides]
     assert radii[0] > 1 > radii[1]
 
 
 def test_the_region_is_upright_where_intervals_of_the_rate_gain_end(lab):
     """Stable on one side of each end, not on the other, by the eigenvalues at one of the gains that were looked at."""
-    loop = sampled_loop(lab, GAINS, count=14)
+    loop = sampled_loop(Case(lab, GAINS), count=14)
     ends = ends_of_K1(loop)
     assert ends.size
     assert (ends > 0).all()
@@ -116,33 +119,35 @@ def test_the_region_is_upright_where_intervals_of_the_rate_gain_end(lab):
 
 def test_no_damping_cures_some_loops_and_none_is_needed_for_few_modes(lossless):
     """At the strongest damping the loop of ringing modes alone is stable, and that of 20 modes is not."""
-    assert required_damping(lossless, HubFeedback(K1=0.3, K2=3.0), Chain(), count=6) == np.inf
-    assert required_damping(lossless, GAINS, Chain(), count=6) == 0.0
+    assert required_damping(Case(lossless, HubFeedback(K1=0.3, K2=3.0), Chain()), count=6) == np.inf
+    assert required_damping(Case(lossless, GAINS, Chain()), count=6) == 0.0
     case = draw(63, 531)
     chain = Chain(sampling=Sampling(period=2 * math.pi / case.first / 9))
     strongest = case.arm.elastic.having(damping=0.3 / case.first)
-    radii = [abs(sampled_loop(strongest, case.law, chain, count=n).eigenvalues).max() for n in (1, 20)]
+    radii = [abs(sampled_loop(Case(strongest, case.law, chain), count=n).eigenvalues).max() for n in (1, 20)]
     assert radii[0] < 1 < radii[1]
-    assert required_damping(case.arm.elastic, case.law, chain) == np.inf
+    assert required_damping(Case(case.arm.elastic, case.law, chain)) == np.inf
 
 
 def test_the_verdict_settles_with_damping_and_names_its_modes_without(lab, lossless):
-    verdict, undamped = sampled_verdict(lab, GAINS), sampled_verdict(lossless, GAINS)
+    verdict, undamped = sampled_verdict(Case(lab, GAINS)), sampled_verdict(Case(lossless, GAINS))
     assert (verdict.is_settled, undamped.is_settled, undamped.band_rad_s) == (True, False, None)
     assert (undamped.slowest, undamped.modes_used) == ("mode 13", 20)
     assert undamped.holds_for == "model of the first 20 modes, not determined beyond"
-    still = sampled_verdict(lossless, HubFeedback(K1=0, K2=0))
-    words = [each.sentence.split()[0] for each in (verdict, sampled_verdict(lossless, GAINS, count=12), still)]
+    still = sampled_verdict(Case(lossless, HubFeedback(K1=0, K2=0)))
+    words = [each.sentence.split()[0] for each in (verdict, sampled_verdict(Case(lossless, GAINS), count=12), still)]
     assert words == ["stable", "stable", "marginal"]
 
 
 def test_the_verdict_is_converged_where_only_fewer_modes_agree(lab, monkeypatch):
     monkeypatch.setattr(room, "complete_band", lambda loop: None)
     assert re.fullmatch(
-        r"converged for the first \d+ modes, not determined beyond", sampled_verdict(lab, GAINS).holds_for
+        r"converged for the first \d+ modes, not determined beyond", sampled_verdict(Case(lab, GAINS)).holds_for
     )
     monkeypatch.setattr(room, "RADIUS_AGREES", -1.0)
-    assert re.fullmatch(r"model of the first \d+ modes, not determined beyond", sampled_verdict(lab, GAINS).holds_for)
+    assert re.fullmatch(
+        r"model of the first \d+ modes, not determined beyond", sampled_verdict(Case(lab, GAINS)).holds_for
+    )
 
 
 def test_margins_of_a_certified_loop_have_the_digits_that_are_shown(lab):
@@ -156,14 +161,14 @@ def test_margins_of_a_certified_loop_have_the_digits_that_are_shown(lab):
 
 def test_a_count_of_modes_is_checked(lab):
     with pytest.raises(ParameterError, match="1 to 400"):
-        sampled_verdict(lab, GAINS, count=0)
+        sampled_verdict(Case(lab, GAINS), count=0)
 
 
 @pytest.mark.parametrize("friction", [0.02, 1e-5])
 def test_windows_of_the_rate_gain_of_a_damped_hub_begin_where_its_losses_are_taken(lab, friction):
     """There the hub drifts, a pole at z = 1; below it the loop is unstable, however small the friction."""
     arm = replace(lab, hub=replace(lab.hub, friction=friction))
-    loop = sampled_loop(arm, GAINS, count=8)
+    loop = sampled_loop(Case(arm, GAINS), count=8)
     ((low, high),) = stable_windows(loop, "K1")
     assert low == pytest.approx(-friction, rel=1e-13)
     sides = -1.005 * friction, -0.995 * friction, 0.99 * high, 1.01 * high
@@ -188,7 +193,7 @@ def some_sampled(seed):
 def answers(arm, law, chain, units):
     """Intervals of K1 and K2 in units of the law's, delay margin, poles in z; None where modes are not determined."""
     try:
-        loop = sampled_loop(arm, law, chain, count=6)
+        loop = sampled_loop(Case(arm, law, chain), count=6)
     except ConvergenceError:
         return None
     windows = [np.array(stable_windows(loop, name)) / units[name] for name in ("K1", "K2")]
@@ -220,7 +225,7 @@ def test_a_sampled_loop_has_the_same_windows_delay_and_poles(seed, units):
 
 def test_an_arm_that_something_holds_has_its_whole_window():
     """By the poles on either side of both ends, and at gains in between."""
-    loop = sampled_loop(*some_sampled(STILL_RIG), count=6)
+    loop = sampled_loop(Case(*some_sampled(STILL_RIG)), count=6)
     ((low, high),) = stable_windows(loop, "K1")
     shares = np.array([-1e-6, 1e-6, 0.1, 0.35, 0.6, 0.9, 1 - 1e-6, 1 + 1e-6])
     assert stable_at(loop, "K1", low + (high - low) * shares) == [False, *[True] * 6, False]
@@ -248,12 +253,12 @@ def test_the_count_at_a_point_is_that_of_the_poles_of_its_own_loop(law, chain, v
     """Of a loop made anew for the law at that point; some are unstable."""
     rng = np.random.default_rng(3)
     x, y = (np.sort(rng.uniform(*ends, 4)) for ends in (across, up))
-    plane = sampled_map(sampled_loop(LAB, law, chain, count=6), x, y, vary)
+    plane = sampled_map(sampled_loop(Case(LAB, law, chain), count=6), x, y, vary)
     assert plane.vary == vary
     counts = []
     for i, j in [(i, j) for i in range(4) for j in range(4) if (i + j) % 2]:
         there = as_law(law).having(vary[0], x[i]).having(vary[1], y[j])
-        poles = sampled_loop(LAB, there, chain, count=6).poles
+        poles = sampled_loop(Case(LAB, there, chain), count=6).poles
         counts.append(int((abs(poles.z) > 1).sum()))
         assert (plane.unstable[i, j], plane.counts[j, i]) == (counts[-1], counts[-1])
     assert min(counts) < max(counts)
@@ -262,4 +267,4 @@ def test_the_count_at_a_point_is_that_of_the_poles_of_its_own_loop(law, chain, v
 @pytest.mark.parametrize("name", ["hub_angel", "hub_angle.num.7"])
 def test_what_is_no_number_of_the_law_is_refused(name):
     with pytest.raises(tfarm.ParameterError, match="law"):
-        sampled_map(sampled_loop(LAB, FOUR, count=4), [0.0, 1.0], [0.0, 1.0], (name, "hub_rate"))
+        sampled_map(sampled_loop(Case(LAB, FOUR), count=4), [0.0, 1.0], [0.0, 1.0], (name, "hub_rate"))

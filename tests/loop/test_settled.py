@@ -12,6 +12,7 @@ from tests.loop.settled import HoldModel, hurting, ordinary
 from tests.shared import thinned
 from tests.survey import each_of, tally
 from tfarm.arm import FED_BACK, Arm, Hub, HubFeedback, Link, Section
+from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling
 from tfarm.loop import circle as circle_module
 from tfarm.loop.circle import Circle, complete_band
@@ -47,8 +48,8 @@ CASES = {
 def test_modes_beyond_the_sixteenth_can_be_the_unstable_ones(name):
     """Sixteen modes are stable, forty are not; verdict and an independent hold model agree."""
     arm, gains, chain = CASES[name]
-    assert sampled_loop(arm, gains, chain, count=16).poles.is_stable
-    verdict = sampled_verdict(arm, gains, chain)
+    assert sampled_loop(Case(arm, gains, chain), count=16).poles.is_stable
+    verdict = sampled_verdict(Case(arm, gains, chain))
     assert verdict.is_settled
     assert not verdict.is_stable
     assert verdict.sentence.startswith("unstable (certified ")
@@ -61,7 +62,7 @@ def test_modes_beyond_the_sixteenth_can_be_the_unstable_ones(name):
 def test_an_edge_has_the_digits_that_more_modes_leave():
     """Sixteen modes put the edge of K1 at 0.62; it is near 0.50.  Unproven it has no digit."""
     gains, chain = HubFeedback(K1=0.1, K2=0.3), Chain(sampling=Sampling(period=9e-5))
-    loop, band = sampled_loop(LIGHT, gains, chain, count=16), complete_band(whole_loop(LIGHT, gains, chain))
+    loop, band = sampled_loop(Case(LIGHT, gains, chain), count=16), complete_band(whole_loop(Case(LIGHT, gains, chain)))
     assert stable_windows(loop, "K1")[0][1] > 0.6
     ((low, high),) = shown_windows(loop, band, "K1")
     assert (low.text, low.is_settled, high.band) == ("0", True, band.top)
@@ -74,7 +75,7 @@ def test_an_edge_has_the_digits_that_more_modes_leave():
 
 def test_the_band_holds_every_pole_of_twice_as_many_modes_there():
     """Below its top and right of its line no other of twice as many modes."""
-    loop = whole_loop(RINGING, HubFeedback(K1=0.3, K2=0.3), Chain())
+    loop = whole_loop(Case(RINGING, HubFeedback(K1=0.3, K2=0.3), Chain()))
     band, found = complete_band(loop), loop.plant.poles
     line, zeros = -found.real[complete_band(loop).kept].min(), damped_modes(modes(RINGING, 60)).eigenvalues.ravel()
     inside = zeros[(abs(zeros.imag) < band.top) & (zeros.real >= -line) & (zeros != 0)]
@@ -86,7 +87,10 @@ def test_the_band_holds_every_pole_of_twice_as_many_modes_there():
 def test_poles_left_of_the_line_weigh_no_more_than_the_bound(delay):
     """Pulse transfer functions of the band's poles, and those of sixty modes, on the circle."""
     gains, chain = HubFeedback(K1=0.3, K2=0.3), Chain(sampling=Sampling(delay_samples=delay))
-    band, many = complete_band(whole_loop(RINGING, gains, chain)), sampled_loop(RINGING, gains, chain, count=60)
+    band, many = (
+        complete_band(whole_loop(Case(RINGING, gains, chain))),
+        sampled_loop(Case(RINGING, gains, chain), count=60),
+    )
     circle = band.circle
     z = np.exp(0.5j * (circle.low + circle.high))
     F = circle.characteristic(band.loop.weights).middle / (1 - 1 / z)  # of K1, whose plant has a simple pole at z = 1
@@ -99,7 +103,7 @@ def test_the_count_does_not_depend_on_the_arcs_to_begin_with(lab, coarser, monke
     """Resonances narrower than 1e-6 rad between the ends of arcs: these are halved until they are seen."""
     monkeypatch.setattr("tfarm.loop.circle.ARCS", 64 // coarser)
     slightly = replace(lab, link=replace(lab.link, damping=1e-12))
-    loop = sampled_loop(slightly, HubFeedback(K1=0.3, K2=0.3), count=14)
+    loop = sampled_loop(Case(slightly, HubFeedback(K1=0.3, K2=0.3)), count=14)
     circle = complete_band(loop).circle
     for K2 in (0.3, -0.05, 1.3):
         other = loop.having("K1", 0.3).having("K2", K2)
@@ -112,7 +116,7 @@ def test_the_count_does_not_depend_on_the_arcs_to_begin_with(lab, coarser, monke
 )
 def test_the_count_is_that_of_the_eigenvalues_outside_odd_ones_too(lab, K1, K2, Kp):
     """An odd number of them: F begins or ends on the negative real axis, and its turn is none of whole turns."""
-    loop = sampled_loop(lab, HubFeedback(K1=K1, K2=K2, Kp=Kp), Chain())
+    loop = sampled_loop(Case(lab, HubFeedback(K1=K1, K2=K2, Kp=Kp), Chain()))
     outside = abs(np.linalg.eigvals(loop.reduced_matrix())) > 1 + 1e-9
     assert complete_band(loop).circle.count(loop.weights) == outside.sum()
 
@@ -121,7 +125,7 @@ def test_the_count_is_that_of_the_eigenvalues_outside_odd_ones_too(lab, K1, K2, 
 def test_far_beyond_critical_one_mode_shows_what_a_hold_model_does(lab, damping, K2, off):
     """Eleven and 429 times critical in the first mode: its slow pole, and the remainder near -1/C."""
     arm, gains = lab.having(damping=damping), HubFeedback(K1=0.3, K2=K2)
-    verdict = sampled_verdict(arm, gains)
+    verdict = sampled_verdict(Case(arm, gains))
     assert (verdict.modes_used, verdict.is_stable) == (1, K2 < 1)
     assert verdict.loop.poles.log_spectral_radius == pytest.approx(HoldModel(arm, 30).log_radius(gains, Chain()), off)
 
@@ -131,10 +135,10 @@ def test_far_beyond_critical_one_mode_shows_what_a_hold_model_does(lab, damping,
 def test_only_a_count_on_the_circle_that_the_poles_agree_with_settles(lab, K2, counted, monkeypatch):
     """Stable and unstable: none to be had, or one of the other kind, settles nothing, and the poles speak."""
     gains = HubFeedback(K1=0.3, K2=K2)
-    there = int((abs(sampled_loop(lab, gains).eigenvalues) > 1).sum())
+    there = int((abs(sampled_loop(Case(lab, gains)).eigenvalues) > 1).sum())
     count = {"as they are": there, "not": None, "otherwise": 0 if there else 1}[counted]
     monkeypatch.setattr(Circle, "count", lambda circle, weights: count)
-    verdict = sampled_verdict(lab, gains)
+    verdict = sampled_verdict(Case(lab, gains))
     assert verdict.is_settled is (counted == "as they are")
     assert verdict.is_stable is (there == 0)
 
@@ -151,7 +155,7 @@ def test_what_is_left_of_the_line_is_bounded_by_the_integrals_of_both_edges():
     """Up the line and along the level one to where nothing outlives a sample, by SciPy's quadrature."""
     lab = tfarm.load("sasaki2012-lab")
     chain = Chain(sampling=Sampling(period=0.01, delay_samples=0.4, antialias_corner=200.0))
-    loop, line, top = sampled_loop(lab, HubFeedback(K1=0.3, K2=0.3), chain, count=8), 100.0, 120.0
+    loop, line, top = sampled_loop(Case(lab, HubFeedback(K1=0.3, K2=0.3), chain), count=8), 100.0, 120.0
     T, remaining = 0.01, 0.01 * (1 - loop.chain.sampling.fraction)
     G = tfarm.transfer(lab, "root_moment")
     row = FED_BACK.index("root_moment")
@@ -169,12 +173,12 @@ def test_what_is_left_of_the_line_is_bounded_by_the_integrals_of_both_edges():
 def test_with_much_damping_the_band_extends_to_the_shear_waves():
     """Much damping leaves four modes of bending; what oscillates above them dies within a sample."""
     arm = tfarm.load("sasaki2012-lab").having(damping=1e-3)
-    loop = sampled_loop(arm, HubFeedback(K1=0.3, K2=0.3), count=4)
+    loop = sampled_loop(Case(arm, HubFeedback(K1=0.3, K2=0.3)), count=4)
     found, highest = complete_band(loop), loop.plant.poles.imag.max()
     assert found.top > 100 * highest
-    others = sampled_loop(arm, HubFeedback(K1=0.3, K2=0.3), count=12).plant.poles
+    others = sampled_loop(Case(arm, HubFeedback(K1=0.3, K2=0.3)), count=12).plant.poles
     others = others[(others.imag > 1.01 * highest) & (others.imag < found.top)]
     assert others.size
     assert others.real.max() < -TOWARD_SINGULAR / arm.damping  # left of the line: they are gone within a sample
-    few = complete_band(sampled_loop(tfarm.load("sasaki2012-lab"), HubFeedback(K1=0.3, K2=0.3), count=8))
+    few = complete_band(sampled_loop(Case(tfarm.load("sasaki2012-lab"), HubFeedback(K1=0.3, K2=0.3)), count=8))
     assert few.top == pytest.approx(1.02 * few.loop.plant.poles.imag.max(), rel=1e-12)  # the ninth is not far

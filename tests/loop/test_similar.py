@@ -11,6 +11,7 @@ from tests.rigs import some_rig
 from tests.shared import thinned
 from tests.similar import EITHER
 from tfarm import HubFeedback, Law
+from tfarm.case import Case
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import gain_map
@@ -23,7 +24,7 @@ LAB = tfarm.load("sasaki2012-lab")
 LEAD = {"hub_angle": ([3.0, 20.0], [0.002, 1.0]), "root_moment": ([0.2], [1e-4, 2e-2, 1.0])}  # num and den in s
 POWERS = {"phase": 0, "phase_lag": 0, "phase_lead": 0, "delay": 1, "disk": 0, "peak_sensitivity": 0}
 POWERS |= {"peak_complementary": 0}
-TOLD = ("verdict", "unstable_roots")
+TOLD = ("word", "unstable_roots")
 
 
 def digits(*numbers):
@@ -95,7 +96,7 @@ def test_a_law_with_dynamics_has_the_same_margins(name):
     units = EITHER[name]
     other, law = units.arm(LAB), units.law(LAB, LEAD)
     here, there = tfarm.margins(LAB, tfarm.Law(LEAD)), tfarm.margins(other, law)
-    assert there.stability.verdict == here.stability.verdict == "stable"
+    assert there.stability.word == here.stability.word == "stable"
     assert apart(here.in_band, there.in_band, units) == []
     here, there = tfarm.closed_loop_poles(LAB, tfarm.Law(LEAD), 9), tfarm.closed_loop_poles(other, law, 9)
     np.testing.assert_allclose(there.values * units.time, here.values, rtol=1e-9)
@@ -135,7 +136,7 @@ def test_margins_look_at_what_is_narrow_in_the_law_itself():
     """A notch a ten-millionth wide."""
     w, ratio = 40.0, 1e-7
     law = Law({"hub_rate": ([0.3, 0.0, 0.3 * w * w], [1.0, 2 * ratio * w, w * w])})
-    loop = ContinuousLoop(LAB, law)
+    loop = ContinuousLoop(Case(LAB, law))
     poles = Poles(loop, np.empty(0, complex), Box(-100.0, 10.0, -100.0, 100.0))
     omega = Stability(loop, "stable", 0, False, 100.0, "", poles).frequencies
     assert (abs(omega - w) <= 2 * ratio * w).sum() > 5

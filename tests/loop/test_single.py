@@ -9,6 +9,7 @@ from tests.survey import each_of, tally
 from tfarm import Law, ParameterError
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Part
+from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling
 from tfarm.loop.sampled_verdict import sampled_verdict
 
@@ -20,8 +21,8 @@ FIVE = Law({"hub_angle": (NUM, DEN)}, period=T, references=("hub_angle",))  # fi
 
 def test_the_certified_loop_is_the_one_that_runs_in_float32():
     """In float64 it is stable, in float32 it is neither in the verdict, nor on the card, nor in a simulation."""
-    assert sampled_verdict(ARM, FIVE, Chain(sampling=Sampling(period=T))).word == "stable"
-    found, card = sampled_verdict(ARM, FIVE, SINGLE), tfarm.result_card(ARM, FIVE, SINGLE).sampled
+    assert sampled_verdict(Case(ARM, FIVE, Chain(sampling=Sampling(period=T)))).word == "stable"
+    found, card = sampled_verdict(Case(ARM, FIVE, SINGLE)), tfarm.result_card(ARM, FIVE, SINGLE).sampled
     assert (found.word, found.is_settled, card.stability, card.grade) == ("unstable", True, "unstable", "-")
     A = np.eye(5, k=-1)
     A[0] = -np.float32(DEN[1:])
@@ -37,7 +38,11 @@ def test_rounded_laws_have_their_own_poles_and_growth():
 
 def test_gains_at_the_hub_are_rounded_too():
     gains = tfarm.HubFeedback(K1=0.3, K2=0.7)
-    assert sampled_verdict(ARM, gains, SINGLE).loop.weights == (0.0, float(np.float32(0.3)), float(np.float32(0.7)))
+    assert sampled_verdict(Case(ARM, gains, SINGLE)).loop.weights == (
+        0.0,
+        float(np.float32(0.3)),
+        float(np.float32(0.7)),
+    )
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from tests.loop.arms import held, held_stiffness, hub_units, some_loop, window_a
 from tests.loop.ritz_loop import RitzLoop
 from tests.shared import thinned
 from tfarm import Arm, Hub, HubFeedback, Law, Link, Payload, Section
+from tfarm.case import Case
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.loop.continuous import ContinuousLoop
@@ -42,8 +43,8 @@ THEORY = {
 @pytest.mark.parametrize(("verdict", "gains"), [(word, each) for word in THEORY for each in THEORY[word]])
 def test_verdicts_at_no_damping_are_those_of_theory(verdict, gains) -> None:
     K1, K2, _ = gains
-    found = stability(BARE, HubFeedback(**dict(zip(("K1", "K2", "Kp"), gains, strict=True))))
-    assert found.verdict == verdict
+    found = stability(Case(BARE, HubFeedback(**dict(zip(("K1", "K2", "Kp"), gains, strict=True)))))
+    assert found.word == verdict
     assert found.unstable_roots_infinite == ((K1 > 0 and K2 > 1) or (K1 < 0 and K2 < 1))
     assert (found.unstable_roots > 0, found.is_stable) == (verdict == "unstable", verdict == "stable")
 
@@ -51,8 +52,8 @@ def test_verdicts_at_no_damping_are_those_of_theory(verdict, gains) -> None:
 @pytest.mark.parametrize("K1", [1e-7, 0.3, 1e4])
 def test_what_lyapunov_proves_is_stable_however_slowly_it_decays(K1) -> None:
     """Of a stocky arm some modes decay by less than 1e-11 of their frequency, too little for double precision."""
-    found = stability(STOCKY, HubFeedback(K1=K1, K2=0.3))
-    assert found.verdict == "stable"
+    found = stability(Case(STOCKY, HubFeedback(K1=K1, K2=0.3)))
+    assert found.word == "stable"
 
 
 HELD_TIPS = (Payload(mass=math.inf), Payload(inertia=math.inf), Payload(mass=math.inf, inertia=math.inf))
@@ -64,8 +65,8 @@ def test_held_tips_have_verdicts_too(payload) -> None:
     model = RitzLoop(arm, 12)
     for law in (HubFeedback(K1=0.3, K2=0.3), HubFeedback(K1=-0.3, K2=0.3), HubFeedback(K1=0.3, K2=1.3)):
         rightmost = model.rightmost(law)
-        found = stability(arm, law)
-        assert found.verdict == ("stable" if rightmost < 0 else "unstable")
+        found = stability(Case(arm, law))
+        assert found.word == ("stable" if rightmost < 0 else "unstable")
         assert found.poles.spectral_abscissa == pytest.approx(rightmost, rel=1e-6)
         assert found.unstable_roots == int((model.eigenvalues(law).real > 0).sum())
 
@@ -87,8 +88,8 @@ def test_a_mode_without_hub_participation_stays_undamped_under_any_law() -> None
     arm = exceptional()
     assert not is_controllable(arm, 3e4)
     assert is_controllable(arm, 2e4)
-    found = stability(arm, HubFeedback(K1=20.0, K2=0.3))
-    assert found.verdict == "marginal"
+    found = stability(Case(arm, HubFeedback(K1=20.0, K2=0.3)))
+    assert found.word == "marginal"
     assert found.poles.spectral_abscissa > -1e-6
     heavy, light = (replace(BARE, hub=Hub(inertia=inertia)) for inertia in (1e6, 1e-6))
     assert is_controllable(heavy, 1e4)
@@ -108,10 +109,10 @@ def test_hub_shares_of_a_slender_beam_are_those_of_euler_bernoulli_modes() -> No
 def test_a_pole_on_the_axis_to_working_precision_is_refused_with_its_reason() -> None:
     edge = 1.0305375542174282
     with pytest.raises(ConvergenceError, match="on the imaginary axis to working precision"):
-        stability(LAB, HubFeedback(K1=0.3, K2=edge))
-    assert stability(LAB, HubFeedback(K1=0.3, K2=edge * (1 - 1e-9))).verdict == "stable"
-    assert stability(LAB, HubFeedback(K1=0.3, K2=edge * (1 + 1e-9))).verdict == "unstable"
-    assert stability(LAB, HubFeedback(K2=0.3)).verdict == "marginal"
+        stability(Case(LAB, HubFeedback(K1=0.3, K2=edge)))
+    assert stability(Case(LAB, HubFeedback(K1=0.3, K2=edge * (1 - 1e-9)))).word == "stable"
+    assert stability(Case(LAB, HubFeedback(K1=0.3, K2=edge * (1 + 1e-9)))).word == "unstable"
+    assert stability(Case(LAB, HubFeedback(K2=0.3))).word == "marginal"
 
 
 def test_beyond_the_band_the_loop_is_quiet_far_up_between_shear_resonances_too() -> None:
@@ -119,7 +120,7 @@ def test_beyond_the_band_the_loop_is_quiet_far_up_between_shear_resonances_too()
     rng = np.random.default_rng(8)
     for arm in (LAB, window_arm(), some_free_arm(rng, True), some_free_arm(rng, True)):
         inertia, omega = hub_units(arm)
-        loop = ContinuousLoop(arm, HubFeedback(K1=inertia * omega, K2=-7.0))
+        loop = ContinuousLoop(Case(arm, HubFeedback(K1=inertia * omega, K2=-7.0)))
         band, quiet = band_of_loop(loop)
         assert quiet
         shear = math.pi / arm.link.length * math.sqrt(arm.link.kGA / arm.link.rhoA)
@@ -133,7 +134,7 @@ def test_a_tail_that_needs_too_many_modes_is_reported() -> None:
         length=1.0, density=2700.0, youngs_modulus=7e10, poissons_ratio=0.3,
         section=Section.rectangle(width=0.1, depth=0.002), damping=1e-12,
     )  # fmt: skip
-    found = stability(Arm(link=thin, hub=Hub(inertia=1e-4)), HubFeedback(K1=0.001, K2=0.3), band=200.0)
+    found = stability(Case(Arm(link=thin, hub=Hub(inertia=1e-4)), HubFeedback(K1=0.001, K2=0.3)), band=200.0)
     assert "not determined beyond" in found.tail
     assert not is_quiet(found.loop, 200.0)
 
@@ -158,7 +159,7 @@ PUSHES = Law({"hub_angle": ([-SPRING], [1e-2, 1.0])})
 @pytest.mark.parametrize(("more", "verdict"), [(0.0, "marginal"), (1e-6, "unstable"), (-1e-6, "stable")])
 def test_a_law_as_stiff_as_the_spring_has_its_pole_at_0_and_none_next_to_it(more, verdict):
     for law in (HubFeedback(Kp=-SPRING * (1 + more)), PUSHES.having("gain", 1 + more)):
-        assert tfarm.margins(HELD, law).stability.verdict == verdict
+        assert tfarm.margins(HELD, law).stability.word == verdict
         poles = tfarm.closed_loop_poles(HELD, law, 3)
         assert ((poles.values == 0).sum(), poles.unstable) == (more == 0, more > 0)
 
@@ -167,7 +168,7 @@ def test_without_losses_two_poles_meet_there():
     arm = replace(LAB.elastic, hub=Hub(inertia=0.1, stiffness=SPRING))
     poles = tfarm.closed_loop_poles(arm, HubFeedback(Kp=-SPRING), 4)
     assert (poles.values == 0).sum() == 2
-    assert tfarm.margins(arm, HubFeedback(Kp=-SPRING)).stability.verdict == "marginal"
+    assert tfarm.margins(arm, HubFeedback(Kp=-SPRING)).stability.word == "marginal"
 
 
 def test_a_map_may_have_it_among_its_points():
@@ -193,7 +194,7 @@ def unstable(arm, feedback, count=8):
 
 
 def test_without_K1_V_is_constant() -> None:
-    found = lyapunov(BARE, law(K1=0.0))
+    found = lyapunov(ContinuousLoop(Case(BARE, law(K1=0.0))))
     assert (found.proven, found.kind, found.a1_over_a2) == (True, "conserved", 0.7)
     poles = closed_loop_poles(BARE, law(K1=0.0), 8)
     assert abs(poles.values.real).max() < 1e-12 * abs(poles.values).max()
@@ -211,7 +212,7 @@ def test_without_K1_V_is_constant() -> None:
     ],
 )
 def test_where_no_weights_exist(arm, feedback, words: str) -> None:
-    found = lyapunov(arm, feedback)
+    found = lyapunov(ContinuousLoop(Case(arm, feedback)))
     assert (found.proven, found.a1_over_a2, found.kind) == (False, None, "unproven")
     assert words in found.reason
     assert "\n" not in found.reason
@@ -224,7 +225,7 @@ def test_at_zero_damping_proven_is_stable_and_unproven_unstable(seed: int) -> No
     while len(seen) < 12:
         arm, feedback = some_loop(rng, damping=0.0)
         if feedback.K1:
-            proven = lyapunov(arm, feedback).proven
+            proven = lyapunov(ContinuousLoop(Case(arm, feedback))).proven
             seen.append(proven)
             assert proven == (unstable(arm, feedback, 6) == 0), (arm, feedback)
     assert 0 < sum(seen) < len(seen)
@@ -234,7 +235,7 @@ def test_a_negative_spring_is_proven_up_to_the_stiffness_of_a_held_tip() -> None
     arm, K2 = held(0.0), 0.4
     edge = -(1 - K2) * held_stiffness(arm)
     for Kp, proven in ((edge * (1 - 1e-9), True), (edge * (1 + 1e-9), False)):
-        assert lyapunov(arm, law(K2=K2, Kp=Kp)).proven is proven
+        assert lyapunov(ContinuousLoop(Case(arm, law(K2=K2, Kp=Kp)))).proven is proven
     assert unstable(arm, law(K2=K2, Kp=0.999 * edge)) == 0
     assert unstable(arm, law(K2=K2, Kp=1.001 * edge)) == 1
 
@@ -245,5 +246,5 @@ def test_without_K2_damping_does_no_harm(seed: int) -> None:
     for _ in range(6):
         arm, drawn = some_loop(rng)
         feedback = HubFeedback(K1=abs(drawn.K1), Kp=abs(drawn.Kp))
-        assert lyapunov(arm, feedback).proven
+        assert lyapunov(ContinuousLoop(Case(arm, feedback))).proven
         assert unstable(arm, feedback, 6) == 0

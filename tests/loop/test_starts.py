@@ -13,6 +13,7 @@ import tfarm
 from tests.loop.arms import window_arm
 from tests.rigs import some_rig
 from tfarm import HubFeedback, Law
+from tfarm.case import Case
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.continuous import ContinuousLoop, band_of
 from tfarm.loop.locus import BranchCrossing, Locus
@@ -29,7 +30,7 @@ LAB, STOCKY = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
 
 def listed(*values):
     box = Box(-50.0, 10.0, -60.0, 60.0)
-    return Poles(ContinuousLoop(LAB, HubFeedback(K1=0.3)), np.array(values, complex), box)
+    return Poles(ContinuousLoop(Case(LAB, HubFeedback(K1=0.3))), np.array(values, complex), box)
 
 
 def test_a_shorter_list_has_a_lower_box_between_its_last_pole_and_the_next():
@@ -70,7 +71,7 @@ LAWS = {
 @pytest.mark.parametrize("name", LAWS)
 def test_the_slope_of_the_function_is_its_difference_quotient(name):
     """Of higher order and wider: by the values of the function alone, its zeros at 0 divided out."""
-    loop = ContinuousLoop(LAB, LAWS[name])
+    loop = ContinuousLoop(Case(LAB, LAWS[name]))
     for s in (0.3 + 2j, -5 + 40j, 2.0 + 0j, 1e-3 + 1e-2j):
         h = 1e-3 * abs(s)
         at = loop.function(s + h * np.array([0, -2, -1, 1, 2]))
@@ -122,9 +123,9 @@ def test_the_stable_edge_has_stable_points_on_one_side():
     assert len(points) > 20
     assert ((points[:, 0] > 0) & (points[:, 0] <= 3.0) & (points[:, 1] >= -4.0) & (points[:, 1] <= 2.0)).all()
     for K1, K2, omega in points[:: len(points) // 6]:
-        sides = [stability(LAB, HubFeedback(K1=K1, K2=K2 + way)).is_stable for way in (-1e-6, 1e-6)]
+        sides = [stability(Case(LAB, HubFeedback(K1=K1, K2=K2 + way))).is_stable for way in (-1e-6, 1e-6)]
         assert sides[0] != sides[1]
-        poles = poles_below(ContinuousLoop(LAB, HubFeedback(K1=K1, K2=K2)), 1.1 * omega).values
+        poles = poles_below(ContinuousLoop(Case(LAB, HubFeedback(K1=K1, K2=K2))), 1.1 * omega).values
         assert abs(poles - 1j * omega).min() < 1e-9 * omega
 
 
@@ -146,7 +147,7 @@ def test_between_its_samples_a_panel_is_the_loop_function_too(arm, modes, monkey
         d, theta, m = (BarycentricInterpolator(CHEBYSHEV[order], part[order])(inside) for part in values)
         s = 1j * ((low + high) / 2 + (high - low) / 2 * inside)
         fed_back = (law.Kp + law.K1 * s) * theta + law.K2 * m * s**2
-        whole = ContinuousLoop(arm, law).loop_function(s)
+        whole = ContinuousLoop(Case(arm, law)).loop_function(s)
         np.testing.assert_allclose(fed_back / (d * s**found.order), whole, rtol=1e-6 * (1 + abs(whole).max()))
     if arm is WIDE:
         width = np.diff(found.high)[1:4]  # of the panel that was halved, and its first half again
@@ -159,11 +160,11 @@ def test_between_its_samples_a_panel_is_the_loop_function_too(arm, modes, monkey
 def test_a_contour_passes_the_poles_of_a_law_on_the_axis_below_its_band():
     """Where it rings without damping, and its integrator if the rig has no zero there."""
     slow, fast = ([1.0, 0.0, w**2] for w in (30.0, 900.0))
-    loop = ContinuousLoop(LAB, Law({"hub_rate": ([1.0], slow), "root_moment": ([1.0], fast)}))
+    loop = ContinuousLoop(Case(LAB, Law({"hub_rate": ([1.0], slow), "root_moment": ([1.0], fast)})))
     np.testing.assert_allclose(poles_on_axis(loop, 400.0), [0.0, 30.0], rtol=1e-9)
     np.testing.assert_allclose(poles_on_axis(loop, 1000.0), [0.0, 30.0, 900.0], rtol=1e-9)
     np.testing.assert_allclose(poles_on_axis(loop, 10.0), [0.0])
-    bare = ContinuousLoop(BARE, Law({"root_moment": ([1.0], slow)}))  # finite at rest, where the arm turns
+    bare = ContinuousLoop(Case(BARE, Law({"root_moment": ([1.0], slow)})))  # finite at rest, where the arm turns
     omega = tfarm.modes(BARE, 3).natural_frequency[1:]
     expected = np.sort([30.0, *omega[omega < 400.0]])
     np.testing.assert_allclose(poles_on_axis(bare, 400.0), expected, rtol=1e-9)
@@ -244,7 +245,7 @@ def test_an_arm_that_cannot_turn_has_no_such_zeros():
 
 def test_poles_of_a_long_delay_have_starts_next_to_them():
     """A delay of half a second has a pole every 2 pi/delay; three of four starts are within a hundredth of that."""
-    loop = ContinuousLoop(LAB, Law({"hub_rate": 30.0}, delay=0.5))
+    loop = ContinuousLoop(Case(LAB, Law({"hub_rate": 30.0}, delay=0.5)))
     poles, starts = poles_below(loop, 300.0).values, starting_points(loop, 300.0)
     upper = poles[poles.imag > 0]
     away = np.abs(upper[:, None] - starts).min(axis=1)

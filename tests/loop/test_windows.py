@@ -12,6 +12,7 @@ from tests.loop.agreement import some_free_arm, some_gains
 from tests.loop.arms import window_arm
 from tests.loop.ritz_loop import RitzLoop
 from tfarm import Hub, HubFeedback, ParameterError, Payload
+from tfarm.case import Case
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.lines import line_crossings
 from tfarm.loop.margins import margins
@@ -24,7 +25,7 @@ LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012
 
 
 def windows(arm, law, name):
-    return windows_of(stability(arm, law), [name])[name]
+    return windows_of(stability(Case(arm, law)), [name])[name]
 
 
 def edge_by_bisection(model, law, name, inside, outside):
@@ -77,7 +78,7 @@ def test_random_stability_intervals_agree_with_the_model(seed) -> None:
     arm = some_free_arm(rng, damped=True)
     K1, K2, Kp = some_gains(rng, arm, 3)
     law, model = HubFeedback(K1=float(K1[1]), K2=float(K2[1]), Kp=Kp), RitzLoop(arm, 18)
-    verdict = stability(arm, law)
+    verdict = stability(Case(arm, law))
     for name in ("K1", "K2", "Kp"):
         found = windows_of(verdict, [name])[name]
         edges = sorted({*found.looked_at, *(each.t for each in found.crossings)})
@@ -102,7 +103,7 @@ def test_an_end_of_the_search_is_no_edge() -> None:
     found = windows(LAB, HubFeedback(K1=0.3, K2=0.3), "K2")
     assert [found.end(value) for value in found.around] == ["search bound", "edge"]
     for value in found.around:
-        poles = poles_below(ContinuousLoop(LAB, HubFeedback(K1=0.3, K2=value)), 2e3).moving
+        poles = poles_below(ContinuousLoop(Case(LAB, HubFeedback(K1=0.3, K2=value))), 2e3).moving
         assert (abs(poles.real / abs(poles)).min() < 1e-12) == (found.end(value) == "edge")
     assert [windows(BARE, HubFeedback(K1=0.3), "K1").end(value) for value in (0.0, math.inf)] == ["edge", "no limit"]
 
@@ -114,7 +115,7 @@ def test_of_a_heavy_hub_k2_is_looked_at_beyond_where_it_cancels_the_inertia(C) -
     arm = replace(LAB, hub=Hub(inertia=100 * carried), link=replace(LAB.link, damping=C))
     found = windows(arm, HubFeedback(K1=1e-3, K2=0.3), "K2")
     assert (found.looked_at[1] > 101 >= found.around[1], found.end(found.around[1])) == (True, "edge")
-    assert stability(arm, HubFeedback(K1=1e-3, K2=101.5)).unstable_roots > 0
+    assert stability(Case(arm, HubFeedback(K1=1e-3, K2=101.5))).unstable_roots > 0
 
 
 def test_behind_an_inductance_the_lowest_K2_is_that_of_its_band():
@@ -126,7 +127,7 @@ def test_behind_an_inductance_the_lowest_K2_is_that_of_its_band():
     band = found.windows["K2"].band
     assert math.isfinite(band)
     low = found.windows["K2"].around[0]
-    higher = line_crossings(ContinuousLoop(arm, law), "K2", 2 * low, 0.0, 4 * band).gain
+    higher = line_crossings(ContinuousLoop(Case(arm, law)), "K2", 2 * low, 0.0, 4 * band).gain
     assert 0.5 * low < higher[higher < 0].max() < 0
 
 
@@ -144,5 +145,5 @@ def test_exact_intervals_have_no_note(name, reach):
 )
 def test_where_there_is_no_loop(inertia: float, law, words: str) -> None:
     with pytest.raises(ParameterError, match=words) as refused:
-        ContinuousLoop(replace(BARE, hub=Hub(inertia=inertia)), law)
+        ContinuousLoop(Case(replace(BARE, hub=Hub(inertia=inertia)), law))
     assert "\n" not in str(refused.value)

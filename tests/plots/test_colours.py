@@ -13,6 +13,7 @@ from matplotlib.colors import to_hex, to_rgb
 
 import tfarm
 from tests.plots.labels import linear_rgb
+from tfarm.case import Case
 from tfarm.loop.circle_crossings import sampled_map
 from tfarm.loop.locus import locus
 from tfarm.loop.stability import stability
@@ -99,7 +100,7 @@ def test_unstable_regions_are_red_and_none_is_the_stable_one_for_the_colour_blin
 def test_a_map_has_the_colour_of_the_number_of_unstable_poles_of_the_loop():
     figure = gain_map.figure(tfarm.map(LAB, K1, K2))
     places = [(0.5, 0.5), (-0.05, 0.5), (1.5, 1.35), (-0.3, 0.55)]
-    counts = [stability(LAB, tfarm.HubFeedback(K1=x, K2=y)).unstable_roots for x, y in places]
+    counts = [stability(Case(LAB, tfarm.HubFeedback(K1=x, K2=y))).unstable_roots for x, y in places]
     assert counts == [0, 1, 2, 3]
     assert colour_at(figure, places) == [style.REGIONS[count] for count in counts]
 

@@ -64,5 +64,5 @@ def test_nothing_is_stable_below_the_rate_gain_that_the_words_name(friction):
     loop = region_of(arm).loop
     for K1 in (-friction - 1e-5, -friction - 0.3, -friction - 20.0):
         for K2 in K2S:
-            assert not stability(arm, HubFeedback(K1=K1, K2=K2)).is_stable
+            assert not stability(Case(arm, HubFeedback(K1=K1, K2=K2))).is_stable
             assert abs(loop.having("K1", K1).having("K2", K2).eigenvalues).max() > 1

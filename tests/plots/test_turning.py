@@ -5,6 +5,7 @@ import pytest
 
 import tfarm
 from tfarm.assessment.stability_map import sampled_region
+from tfarm.case import Case
 from tfarm.crossing import pieces
 from tfarm.dsp import load_chain
 from tfarm.loop.continuous import ContinuousLoop
@@ -45,7 +46,9 @@ def of_gains(arm, vary, start, stop):
 
 
 def sampled():
-    return draw_sampled_loci.figure(sampled_loci(sampled_loop(LAB, default_gains(LAB), count=3), 25.0, (-0.5, 1.5)))
+    return draw_sampled_loci.figure(
+        sampled_loci(sampled_loop(Case(LAB, default_gains(LAB)), count=3), 25.0, (-0.5, 1.5))
+    )
 
 
 @pytest.mark.parametrize(
@@ -120,5 +123,6 @@ def test_a_locus_under_any_law_keeps_its_poles():
     for n in more[::3]:
         branches = fine.branches[np.isfinite(fine.branches[:, n]), n]
         assert (
-            abs(1 + ContinuousLoop(LAB, LEAD.having("gain", float(fine.gain[n]))).loop_function(branches)).max() < 1e-6
+            abs(1 + ContinuousLoop(Case(LAB, LEAD.having("gain", float(fine.gain[n])))).loop_function(branches)).max()
+            < 1e-6
         )

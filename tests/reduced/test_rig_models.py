@@ -11,6 +11,7 @@ from tests.reduced.test_modal import by_matrices
 from tests.transition import determinant
 from tfarm import Hub, damped_modes, load, modes, transfer
 from tfarm.arm import FED_BACK, Motor
+from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling, pulse_transfer
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.reduced.modal import modal_model
@@ -111,7 +112,7 @@ def test_the_sampled_loop_of_few_modes_is_that_of_many():
     """Both with a pole at -135 1/s that was in neither: a fit of slow poles had stood in for it."""
     arm, chain = rubbing(0.0, 5.0), Chain(sampling=Sampling(period=2e-3))
     law = default_gains(arm)
-    few, many = (sampled_verdict(arm, law, chain, count=count) for count in (8, 24))
+    few, many = (sampled_verdict(Case(arm, law, chain), count=count) for count in (8, 24))
     assert few.log_radius == pytest.approx(many.log_radius, rel=1e-6)
 
 

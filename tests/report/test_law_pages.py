@@ -16,9 +16,9 @@ from tests.report.written import blocks_of, values_of
 from tests.shared import sized
 from tests.shell import answer, run
 from tfarm import HubFeedback, Law, ParameterError
-from tfarm.arm import tracked
 from tfarm.arm.law_tables import load_law
 from tfarm.assessment.card import margins_of
+from tfarm.case import Case
 from tfarm.dsp import Chain, Simulator, load_chain
 from tfarm.errors import one_line
 from tfarm.fitting.recording import compare_run, load_run, overshoot
@@ -87,7 +87,7 @@ def test_radii_on_the_page_are_those_of_the_command_at_each_delay(capsys, file, 
 def test_the_loop_function_of_an_unstable_loop_has_no_margins(given):
     law = Law({"hub_angle": -5.0, "hub_rate": ([1.0], [0.01, 1.0])}, name="backwards")
     section = margins_section(ArmReport(LAB, Chain(), (GivenLaw(law),)))
-    assert margins_of(LAB, law).stability.verdict == "unstable"
+    assert margins_of(LAB, law).stability.word == "unstable"
     assert set(blocks_of(section)) == {"law-bode", "margins", "law-spill", "law-windows"}
     assert "interval" not in table(section, "law-windows")
 
@@ -175,7 +175,7 @@ def test_a_step_over_the_measured_one_is_that_of_python_control(name):
     led = measured.scenario(0.01).hub_angle
     np.testing.assert_allclose(led, measured.reference - measured.reference[0], atol=1e-15)  # every row is a sample
     A, B, C, D = law.matrices((*law.signals, *law.wanted))
-    plant = sampled_loop(PRESET, law, Chain(), count=count).pulse.state_space()
+    plant = sampled_loop(Case(PRESET, law, Chain()), count=count).pulse.state_space()
     closed = control.feedback(plant, control.ss(A, B[:, :2], C, D[:, :2], 0.01))
     given = control.forced_response(control.ss(A, -B[:, 2:], C, -D[:, 2:], 0.01), np.arange(led.size) * 0.01, led)
     found = control.forced_response(closed, np.arange(led.size) * 0.01, given.outputs).outputs[0]
@@ -222,10 +222,10 @@ def _growth(law, measured, ends):
     """Growth [s] by the eigenvalues, and the time [s] at which the hub angle leaves its end, of 24 modes."""
     arm, chain = tfarm.load(DATA / "rig.toml"), load_chain(DATA / "rig.toml")
     t, reference = np.append(measured.t, 32.0), np.append(measured.reference, measured.reference[-1])
-    arm, law = tracked(arm, law)
     task = replace(measured, t=t, reference=reference).scenario(0.01)
-    run = Simulator(arm, chain, task, law, count=24).run().at_samples
-    radius = abs(sampled_loop(arm, law, chain, count=24).eigenvalues).max()
+    case = Case(arm, law, chain)
+    run = Simulator(case, task, count=24).run().at_samples
+    radius = abs(sampled_loop(case, count=24).eigenvalues).max()
     away = abs(run.hub_angle - run.hub_angle[run.t < ends][-1]) > 0.05 * abs(measured.step)
     return 0.01 / np.log(radius), run.t[away & (run.t > ends)][0]
 

@@ -64,7 +64,7 @@ def test_samples_are_the_parts_of_the_loop_function(case):
     arm, data, page = case
     omega = np.random.default_rng(3).uniform(1e-3, 1.0, 200) * data["band"]
     for law in some_gains(data, 5, 3):
-        drive, fed_back = ContinuousLoop(arm, law).parts(1j * omega)
+        drive, fed_back = ContinuousLoop(Case(arm, law)).parts(1j * omega)
         D, N = page.parts(omega, law)
         size = (abs(drive) * abs(D) + abs(fed_back) * abs(N) + abs(drive) * abs(N) + abs(fed_back) * abs(D)) / 2
         assert np.max(abs(drive * N - fed_back * D) / size) < 1e-9
@@ -98,7 +98,7 @@ def test_sampled_poles_of_the_plant_in_the_page_are_the_librarys(case):
             z = np.delete(z, abs(z - 1).argmin())  # the angle that nothing regulates, or an integral that none feels
         if law.Kp == 0 and held["states"] < 2:
             z = np.delete(z, abs(z - 1).argmin())
-        known = sampled_verdict(arm, law, chain)
+        known = sampled_verdict(Case(arm, law, chain))
         assert math.log(abs(z).max()) == pytest.approx(known.log_radius, rel=1e-6, abs=error), law
         assert (abs(z).max() < 1) == known.is_stable or abs(known.log_radius) < error, law
 
@@ -271,7 +271,7 @@ def test_sampled_loop_of_a_law_has_the_poles_of_its_state_space(law_page):
             blocks.append(control.ss(control.zpk(zeros, poles, gain, dt=T)))
         outputs = control.ss(plant.A, plant.B[:, None], plant.C[:3], 0, T)
         L = control.ss([], [], [], np.ones((1, 3)), T) * control.append(*blocks) * outputs
-        known = sampled_verdict(arm, LAW.times(factor), chain)
+        known = sampled_verdict(Case(arm, LAW.times(factor), chain))
         assert held["delay"] == held["fraction"] == 0
         z = control.feedback(L, 1).poles()
         if not any(twice for twice, _ in held["rigid"]):

@@ -14,6 +14,7 @@ from tfarm.arm import Hub, HubFeedback
 from tfarm.arm.chain import Sampling
 from tfarm.assessment import stability_map
 from tfarm.assessment.card import margins_of
+from tfarm.case import Case
 from tfarm.dsp import Chain, load_chain
 from tfarm.loop import plane as edges
 from tfarm.loop.continuous import band_of
@@ -126,7 +127,7 @@ def test_the_verdict_comes_before_any_margin():
 
 
 def test_the_answer_of_the_loci_names_the_crossing():
-    data = loci(LAB, PAPER_GAINS, "K2", -1.0, 1.6)
+    data = loci(Case(LAB, PAPER_GAINS), "K2", -1.0, 1.6)
     assert "unstable from K2 = 1.0305; mode 1" in prose("locus_lead", found={"K2": data}, gains={"K2": "K1 = 0.3"})
 
 

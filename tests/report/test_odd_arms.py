@@ -16,6 +16,7 @@ from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.arm import implausible
 from tfarm.assessment.card import margins_of
+from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.loop import loci as loci_room
 from tfarm.loop.continuous import ContinuousLoop
@@ -135,7 +136,7 @@ LOOPS = [name for name, arm in ARMS.items() if has_loop(arm)]
 
 def is_stable(arm, law, up_to):
     """By finding every pole below a frequency: a method without stability intervals."""
-    return poles_below(ContinuousLoop(arm, law), up_to).unstable == 0
+    return poles_below(ContinuousLoop(Case(arm, law)), up_to).unstable == 0
 
 
 @pytest.mark.parametrize("name", thinned(LOOPS, 2))

@@ -15,6 +15,7 @@ from tests.report.written import blocks_of, values_of
 from tfarm.arm import HubFeedback
 from tfarm.arm.chain import Converters, Sampling
 from tfarm.assessment.stability_map import CUT_RANGE, K2_RANGE, stable_regions
+from tfarm.case import Case
 from tfarm.digits import kept_digits
 from tfarm.dsp import Chain, Simulator, scenario
 from tfarm.loop.sampled import sampled_loop
@@ -39,7 +40,7 @@ def section():
 
 
 def windows(arm, gains=GAINS):
-    return windows_of(stability(arm, gains), ["K2"])["K2"]
+    return windows_of(stability(Case(arm, gains)), ["K2"])["K2"]
 
 
 # ------------------------------------------------------------ the overlay
@@ -60,7 +61,7 @@ def test_the_picture_of_a_rig_is_as_high_as_its_own_gains():
 def test_the_map_of_both_regions_is_that_of_the_poles():
     data = PLANE()
     random = np.random.default_rng(5)
-    loop = sampled_loop(LAB, GAINS, Chain(), count=16)
+    loop = sampled_loop(Case(LAB, GAINS, Chain()), count=16)
     for i in random.integers(0, data.continuous.K1.size, 6):
         K1 = float(data.continuous.K1[i])
         for K2 in random.uniform(*K2_RANGE, 2):
@@ -68,7 +69,7 @@ def test_the_map_of_both_regions_is_that_of_the_poles():
             inside = [any(a < K2 < b for a, b in each.stable_intervals[i]) for each in regions]
             law = tfarm.HubFeedback(K1=K1, K2=float(K2))
             assert inside == [
-                stability(LAB, law).is_stable,
+                stability(Case(LAB, law)).is_stable,
                 loop.having("K1", K1).having("K2", float(K2)).poles.is_stable,
             ]
 
@@ -120,7 +121,7 @@ def test_at_zero_damping_a_little_more_than_the_least_that_is_needed_is_stable()
     assert found.verdict.slowest == "mode 13"
     assert f"{found.minimum_damping.value:.4g}" == "1.004e-14"
     healed = replace(PAPER, link=replace(PAPER.link, damping=1.01e-14))
-    assert sampled_loop(healed, GAINS, Chain(), count=20).poles.is_stable
+    assert sampled_loop(Case(healed, GAINS, Chain()), count=20).poles.is_stable
 
 
 def test_every_part_of_a_chain_is_named():
@@ -137,7 +138,7 @@ def test_every_part_of_a_chain_is_named():
 def test_the_slew_is_the_simulators_own(section):
     """Without the feedback of the root moment, and with it."""
     drawn = values_of(blocks_of(section)["sampled-slew"].data)
-    simulator = Simulator(LAB, Chain(), scenario("slew", LAB, Chain(), 3.0), count=20)
+    simulator = Simulator(Case(LAB, HubFeedback(), Chain()), scenario("slew", LAB, Chain(), 3.0), count=20)
     for key, K2 in (("without", 0.0), ("default", 0.3)):
         expected = simulator.linear(HubFeedback(K1=0.3, K2=K2))
         for name, signal in (("torque", expected.torque), ("root_moment", expected.at_samples.root_moment)):

@@ -11,6 +11,7 @@ from tests.shell import answer, run
 from tests.similar import INERTIA, Units
 from tfarm import Hub, HubFeedback, Payload
 from tfarm.arm.chain import Sampling
+from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
 from tfarm.loop.circle_crossings import stable_windows
@@ -62,7 +63,7 @@ def test_a_gain_is_too_large_for_an_arm_and_not_by_itself():
         with pytest.raises(ParameterError, match=rf"{name} = .*for this arm at most 1e\+09 times J w1"):
             tfarm.margins(LAB, HubFeedback(**{name: 2e9 * unit}))
         with pytest.raises(ParameterError, match="for this arm"):
-            sampled_verdict(LAB, HubFeedback(**{name: 2e9 * unit}))
+            sampled_verdict(Case(LAB, HubFeedback(**{name: 2e9 * unit})))
 
 
 def test_windows_and_designs_of_a_large_arm_are_those_of_a_similar_small_one():
@@ -71,7 +72,7 @@ def test_windows_and_designs_of_a_large_arm_are_those_of_a_similar_small_one():
     slow = Chain(sampling=Sampling(period=0.01 * time))
     chains, arms = (Chain(), slow), (LAB, large)
     laws = [HubFeedback(K1=2 * rate_unit(arm), K2=0.3) for arm in arms]
-    ends = [stable_windows(sampled_loop(*each, count=4), "K1") for each in zip(arms, laws, chains, strict=True)]
+    ends = [stable_windows(sampled_loop(Case(*each), count=4), "K1") for each in zip(arms, laws, chains, strict=True)]
     assert np.ravel(ends[1]) * time / inertia == pytest.approx(np.ravel(ends[0]), rel=1e-6)
     found = [design(arm, "damping", chain=chain) for arm, chain in zip(arms, chains, strict=True)]
     assert found[1].law.K1 * time / inertia == pytest.approx(found[0].law.K1, rel=1e-3)
@@ -96,7 +97,7 @@ def test_a_hub_without_inertia_has_no_moment_gain(capsys, tmp_path):
     file.write_text(tfarm.arm.to_toml(pin), encoding="utf-8")
     found = answer(capsys, "margins", str(file))
     assert (found["K1"], found["K2"]) == (default_gains(pin).K1, 0.0)
-    assert stability(pin, HubFeedback(K1=found["K1"])).verdict == found["verdict"]
+    assert stability(Case(pin, HubFeedback(K1=found["K1"]))).word == found["verdict"]
 
 
 VERBS = [

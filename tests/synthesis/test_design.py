@@ -12,6 +12,7 @@ from tests.loop.ritz_loop import RitzLoop
 from tests.shared import refusal, sized
 from tests.synthesis.judged import judge_of
 from tfarm import HubFeedback
+from tfarm.case import Case
 from tfarm.errors import ConvergenceError
 from tfarm.loop.continuous import band_of
 from tfarm.loop.stability import stability
@@ -150,9 +151,9 @@ def test_random_gains_have_no_better_disk_margin(number) -> None:
     rng = np.random.default_rng(6)
     values = []
     for K1, K2 in zip(rng.uniform(0.1, 20.0, number), rng.uniform(0.3, 1.0, number), strict=True):
-        values.append(stability(LAB, HubFeedback(K1=K1, K2=K2), TOP).in_band.disk)
+        values.append(stability(Case(LAB, HubFeedback(K1=K1, K2=K2)), TOP).in_band.disk)
     assert max(values) <= found.value * (1 + 1e-6)
-    assert found.value == pytest.approx(stability(LAB, found.law, TOP).in_band.disk, rel=1e-3)
+    assert found.value == pytest.approx(stability(Case(LAB, found.law), TOP).in_band.disk, rel=1e-3)
 
 
 def test_a_continuous_time_design_of_another_structure_has_the_damping_of_its_poles() -> None:

@@ -18,6 +18,7 @@ from tfarm import ConvergenceError, HubFeedback, Law, ParameterError
 from tfarm.arm import TWO_GAINS, as_law
 from tfarm.arm.chain import Converters
 from tfarm.arm.law_tables import load_law
+from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import stability
@@ -341,7 +342,7 @@ def test_the_law_is_that_of_the_textbook_and_stable_in_exact_loops(pid, continuo
 
 def test_the_sampled_loop_is_stable_with_a_reserve_by_another_model(pid):
     law = pid[False].law
-    assert all(sampled_verdict(LAB, law.times(share), pid[False].chain).is_stable for share in (0.8, 1.0, 1.25))
+    assert all(sampled_verdict(Case(LAB, law.times(share), pid[False].chain)).is_stable for share in (0.8, 1.0, 1.25))
     assert tfarm.sampled(LAB, law).verdict.is_stable
     assert np.log(HELD.radius(law)) == pytest.approx(np.log(pid[False].sampled.spectral_radius), rel=1e-4)
 
@@ -383,7 +384,7 @@ def test_pi_needs_friction(monkeypatch):
         rough = replace(LAB, hub=replace(LAB.hub, friction=share * LAB.total_inertia * Ki / Kp))
         assert np.roots([LAB.total_inertia, rough.hub.friction, Kp, Ki]).real.max() * (-1) ** is_stable > 0
         law = form.record_at(form.at([Ki]))
-        assert stability(rough, law).is_stable == is_stable
+        assert stability(Case(rough, law)).is_stable == is_stable
 
 
 def test_a_pinned_tip_has_laws_of_all_structures_and_a_locked_hub_none():

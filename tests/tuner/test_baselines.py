@@ -131,7 +131,7 @@ TURNING = [name for name, arm in ARMS.items() if arm.has_rigid_mode and arm.hub.
 def test_a_shaper_has_one_impulse_where_no_mode_lies_below_nyquist_frequency(name):
     """What the sentence about shaping rests on, by the poles of the loop itself."""
     arm, chain = ARMS[name], Chain()
-    loop = sampled_loop(arm, default_gains(arm), chain, count=3)
+    loop = sampled_loop(Case(arm, default_gains(arm), chain), count=3)
     seen = ((loop.plant.poles.imag > 0) & (loop.plant.poles.imag < math.pi / chain.sampling.period)).any()
     assert (shaper(loop, "ZV").size == 1) == (not seen)
 

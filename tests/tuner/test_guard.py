@@ -19,6 +19,7 @@ from tests.survey import tally
 from tests.tuner import bounded
 from tests.tuner.bounded import adversary
 from tfarm.arm import HubFeedback
+from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling
 from tfarm.errors import CertificationError
 from tfarm.exact.rationals import is_positive_definite
@@ -31,7 +32,7 @@ FINE = np.r_[np.geomspace(1e-6, 1e-2, 500), np.linspace(1e-2, np.pi, 100_001)]
 
 def moving(arm, count=6, delay=0.0, **servo):
     chain = Chain(sampling=Sampling(delay_samples=delay))
-    return MovingGain(sampled_loop(arm, HubFeedback(**{"K1": 0.3, "K2": 1.0} | servo), chain, count=count))
+    return MovingGain(sampled_loop(Case(arm, HubFeedback(**{"K1": 0.3, "K2": 1.0} | servo), chain), count=count))
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +42,7 @@ def loop(lab):
 
 def test_gains_of_a_tuner_are_those_that_hold_from_0_to_10(monkeypatch, lab):
     monkeypatch.setattr(guard, "stable_windows", lambda loop, vary: [(-3.0, -1.0), (-0.5, 0.4), (0.6, 12.0)])
-    assert guard.constant_windows(sampled_loop(lab, HubFeedback(K1=0.3), count=2)) == [(0.0, 0.4), (0.6, 10.0)]
+    assert guard.constant_windows(sampled_loop(Case(lab, HubFeedback(K1=0.3)), count=2)) == [(0.0, 0.4), (0.6, 10.0)]
 
 
 def criterion(loop, lo, hi):
@@ -161,7 +162,7 @@ def test_modes_are_quiet_where_they_lose_more_than_the_feedback_could_give(lab):
         residues=np.array([[0.0, 0.0], [9.0, 0.01], [9.0, 0.02]], complex),
         poles=np.array([-1e-3 + 1e-6j, -0.05 + 1e-6j]), mode=np.array([1, 2]), count=2,
     )  # fmt: skip
-    loop = sampled_loop(lab, HubFeedback(K1=-0.5), Chain(sampling=Sampling(period=1.0)), count=1)
+    loop = sampled_loop(Case(lab, HubFeedback(K1=-0.5), Chain(sampling=Sampling(period=1.0))), count=1)
     loop = replace(loop, rig=replace(loop.rig, sensed=SimpleNamespace(together=plant)))
     hold = (1 - np.exp(-0.05)) / 0.05
     edge = (0.05 / hold / 2 - 0.5 * 0.01) / 0.02
@@ -171,7 +172,7 @@ def test_modes_are_quiet_where_they_lose_more_than_the_feedback_could_give(lab):
 
 @pytest.mark.parametrize("before", [(0.1, 0.6 - 6e-4), (0.1, 0.6 + 6e-4), (0.1 - 6e-4, 0.6), (0.1 + 6e-4, 0.6)])
 def test_a_guard_that_more_modes_change_by_a_thousandth_of_its_width_is_not_settled(lab, before):
-    loops = [sampled_loop(lab, HubFeedback(K1=0.3, K2=1.0), count=count) for count in (2, 24)]
+    loops = [sampled_loop(Case(lab, HubFeedback(K1=0.3, K2=1.0)), count=count) for count in (2, 24)]
     assert not guard._settled(loops, [before, (0.1, 0.6)])
     nearer = tuple(end + 0.5 * (was - end) for was, end in zip(before, (0.1, 0.6), strict=True))
     assert guard._settled(loops, [nearer, (0.1, 0.6)])
@@ -205,7 +206,7 @@ def test_a_loop_that_no_damping_saves(lab):
 def test_a_frozen_guard_is_the_window_nearest_to_a_best_gain_that_lies_in_none(lab, monkeypatch):
     """By their middles: 0.5 is nearer to 2 than 5 is, and farther from 3.5."""
     monkeypatch.setattr(guard, "constant_windows", lambda loop: [(0.0, 1.0), (4.0, 6.0)])
-    loops = [sampled_loop(lab, HubFeedback(K1=0.3, K2=1.0), count=2)]
+    loops = [sampled_loop(Case(lab, HubFeedback(K1=0.3, K2=1.0)), count=2)]
     assert guard._frozen(loops, 2.0).hi == pytest.approx(RADIUS_SHARE)
     assert guard._frozen(loops, 3.5).lo == pytest.approx(4.0 + 2 * (1 - RADIUS_SHARE))
 
@@ -234,7 +235,7 @@ def test_guarded_runs_stay_bounded_and_in_the_guard():
 
 def test_the_adversary_has_teeth():
     """HubFeedback that are stable one by one: beyond a sector it drives the loop unstable, inside one it cannot."""
-    loop = MovingGain(sampled_loop(tfarm.load("sasaki2012-lab"), HubFeedback(K1=0.3, K2=1.0), count=6))
+    loop = MovingGain(sampled_loop(Case(tfarm.load("sasaki2012-lab"), HubFeedback(K1=0.3, K2=1.0)), count=6))
     grown = {ends: adversary(loop, *ends, np.random.default_rng(0), 1) for ends in ((0, 1.1), (0.1, 0.6), (0.31, 0.63))}
     assert grown[0, 1.1] > 50
     assert grown[0.1, 0.6] > 5

@@ -54,7 +54,9 @@ def test_a_trial_is_that_of_the_simulator(lab, inputs, signals, chain, K1, Kp):
     network = initial_network(3, scales=np.full(inputs, 1.3))
     record = trial.with_network(network, SECTOR)
     gain = TunedGain(network, SECTOR, HubFeedback(K1=K1, Kp=Kp), signals)
-    other = judged(gain.run(Simulator(lab, trial.loop.chain, trial.task, count=6)), trial.cost, signals)
+    other = judged(
+        gain.run(Simulator(Case(lab, HubFeedback(), trial.loop.chain), trial.task, count=6)), trial.cost, signals
+    )
     np.testing.assert_allclose(other.K, record.K, atol=1e-11)
     np.testing.assert_allclose(other.e, record.e, atol=1e-10)
     np.testing.assert_allclose(other.x, record.x, atol=1e-10)  # behind the filter, where there is one
@@ -66,7 +68,7 @@ def test_the_best_constant_gain_is_global(lab):
     assert best_constant(slew_trial(lab, signals="total")).gain < 1e-4
     trial = slew_trial(lab, signals="vibration", cost=Cost(a=3.0, b=0.4))
     best = best_constant(trial)
-    loop = Simulator(lab, trial.loop.chain, trial.task, count=6)
+    loop = Simulator(Case(lab, HubFeedback(), trial.loop.chain), trial.task, count=6)
 
     def cost(K):
         run = loop.linear(HubFeedback(K1=0.3, K2=K))
@@ -130,7 +132,7 @@ KP, K1 = 10.0, 3.6
 
 
 def moving(count=6):
-    return MovingGain(sampled_loop(LAB, HubFeedback(K1=K1, K2=1.0, Kp=KP), Chain(), count=count))
+    return MovingGain(sampled_loop(Case(LAB, HubFeedback(K1=K1, K2=1.0, Kp=KP), Chain()), count=count))
 
 
 def test_the_exact_arm_obeys_the_criterion_with_its_angle_held():

@@ -22,6 +22,7 @@ from functools import lru_cache
 from typing import Annotated, Any, NamedTuple
 
 from tfarm.arm import AnyLaw, Arm, as_law
+from tfarm.case import Case
 from tfarm.digits import general
 from tfarm.dsp import Chain
 from tfarm.dsp.stages import admit, not_covered
@@ -265,7 +266,7 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
     found = None
     if not law.is_discrete:
         own = margins_of(damped, law)
-        found = as_card(own.curve, (own.stability if damped is arm else stability(arm, law)).verdict)
+        found = as_card(own.curve, (own.stability if damped is arm else stability(Case(arm, law))).word)
     if found is not None and chain is None:
         return found
     at_samples = sampled_of(damped, law, usual)

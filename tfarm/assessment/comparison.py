@@ -117,7 +117,7 @@ class ComparedSide:
         if isinstance(self.loop, Analysis):
             return ""
         verdict = self.loop.stability
-        is_open = verdict.verdict != "unstable" and not verdict.is_known_beyond
+        is_open = verdict.word != "unstable" and not verdict.is_known_beyond
         return f"up to {verdict.band:.4g} rad/s, not determined beyond" if is_open else ""
 
     def reach(self, delay: Real) -> list[Sequence[Window]]:
@@ -126,7 +126,7 @@ class ComparedSide:
             sampling, late = self.loop.loop.chain.sampling, self.loop.loop.with_delay
             now = [late(sampling.delay_samples + more) for more in (delay / sampling.period).tolist()]
             return [stable_windows(each, FACTOR) for each in now]
-        loop, factors = ContinuousLoop(self.arm, as_law(self.law)), between(0.0, MOST_FACTOR, FACTORS)
+        loop, factors = ContinuousLoop(Case(self.arm, as_law(self.law))), between(0.0, MOST_FACTOR, FACTORS)
         return [*plane(loop, ("delay", "gain"), loop.law.delay + delay, factors).stable_intervals]
 
 
@@ -350,14 +350,15 @@ def _side(name: str, case: Case, count: int, is_sampled: bool) -> ComparedSide:
     most = count + 6  # poles with Im s >= 0: also real ones, those of the hub, the motor and a controller
     arm, chain = driven(case.arm, case.chain)
     rows, open_loop = _modes_of_arm(arm, count, most)
+    case = Case(arm, law, chain)
     loop: Margins | Analysis
     verdict: Verdict | ConvergenceError
     if is_sampled:
-        loop = Analysis(verdict := sampled_verdict(arm, law, chain))
+        loop = Analysis(verdict := sampled_verdict(case))
         poles, open_loop = _sampled_poles(loop, most)
     else:
         try:
-            verdict = sampled_verdict(arm, law, chain)
+            verdict = sampled_verdict(case)
         except ConvergenceError as error:
             verdict = error
         loop = margins_of(arm, law)
@@ -370,7 +371,7 @@ def _side(name: str, case: Case, count: int, is_sampled: bool) -> ComparedSide:
         poles=poles,
         open_loop={n: s for n, s in open_loop.items() if n and s.imag > 0},
         loop=loop,
-        sampled=brief_of(verdict, law, chain),
+        sampled=brief_of(verdict, case),
     )
 
 

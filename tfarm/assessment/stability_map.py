@@ -13,6 +13,7 @@ import numpy as np
 
 from tfarm.arm import GAINS, PLANE, Arm, HubFeedback, shown_unit
 from tfarm.arrays import Complex, Real
+from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
 from tfarm.loop.circle_crossings import GainMap, ends_of_K1, rounded_map, sampled_map, with_both_sides, with_more
@@ -57,7 +58,7 @@ def stable_regions(arm: Arm, gains: HubFeedback, chain: Chain) -> StableRegions:
     """Return the regions around these gains.  Raises ParameterError where the arm has no loop."""
     # at C = 0 with a little damping too
     dampings = (arm.damping,) if arm.damping else (1e-4, 1e-6, 0.0)
-    loops = [sampled_verdict(arm.having(damping=C), gains, chain).full for C in dampings]
+    loops = [sampled_verdict(Case(arm.having(damping=C), gains, chain)).full for C in dampings]
     ends = np.unique(np.concatenate([ends_of_K1(loop) for loop in loops]))
     ends = ends[ends > 0]
     ends = ends[np.diff(ends, prepend=0.0) > 1e-3 * ends]
@@ -80,7 +81,7 @@ def stable_regions(arm: Arm, gains: HubFeedback, chain: Chain) -> StableRegions:
 def sampled_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> GainMap | None:
     """Return where in the picture the sampled loop is stable, with the modes of the verdict on the default gains."""
     try:
-        loop = sampled_verdict(arm, default_gains(arm), chain).full
+        loop = sampled_verdict(Case(arm, default_gains(arm), chain)).full
         across = with_both_sides(rate_columns(arm, x, SAMPLED_COLUMNS), ends_of_K1(loop))
         across = across[(x.low <= across) & (x.high > across)]
         up = np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])

@@ -165,7 +165,7 @@ class _Record:
             (error <= CONVERGED * abs(peak.value)).all() and peak.bound <= CONVERGED * abs(peak.value)
             for _, _, error, peak in curves.values()
         )
-        word, count = verdict_on(response.poles.loop).verdict, f"{response.poles.count} poles{omitted}"
+        word, count = verdict_on(response.poles.loop).word, f"{response.poles.count} poles{omitted}"
         return self._loop(word, is_converged, count, curves)
 
     def _of_sampled(self, law: AnyLaw, chain: Chain, task: Scenario, names: Sequence[str]) -> LoopResponse:
@@ -175,7 +175,7 @@ class _Record:
         signals = {name: traces.continuous(run, name)[1][: self.t.size] for name in names}
         signals[TORQUE] = traces.held_at(run, run.torque, self.t[: signals[MOMENT].size])
         is_converged = used.change is not None and used.change <= ENOUGH_CHANGE
-        word = UNSTABLE if run.stopped else sampled_verdict(self.arm, law, chain).word
+        word = UNSTABLE if run.stopped else sampled_verdict(Case(self.arm, law, chain)).word
         curves = {name: (self.t[: y.size], y, 0 * y, None) for name, y in signals.items()}
         return self._loop(word, is_converged, f"{used.modes} modes", curves)
 
@@ -364,7 +364,7 @@ def step(
     case = Case(arm, as_law(law), chain)
     arm, law = case.arm, case.law
     full, of_angle, response = as_law(law), hub == AT_HUB[0], None
-    poles = None if full.is_discrete else usual_poles(ContinuousLoop(arm, full))
+    poles = None if full.is_discrete else usual_poles(ContinuousLoop(Case(arm, full)))
     length = usual_duration(poles, chain) if duration is None else duration
     task = (
         resting("reference", arm, chain, length, hub)

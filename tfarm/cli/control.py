@@ -9,6 +9,7 @@ import typer
 
 import tfarm
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN
+from tfarm.case import Case
 from tfarm.cli.app import (
     AngleGain,
     ArmName,
@@ -197,7 +198,7 @@ def gain_map(
     x, y = (between(low, high, number) for low, high in axes.values())
     if given(chain):
         found: Any = crossings.sampled_map(
-            verdict.sampled_verdict(subject, controller, chain(arm)).full, x, y, tuple(axes)
+            verdict.sampled_verdict(Case(subject, controller, chain(arm))).full, x, y, tuple(axes)
         )
     else:
         subject, _ = driven(subject, chain(arm))
@@ -284,7 +285,7 @@ def simulate(
     defaults = None
     if controller is None:
         subject, control, defaults = loop(arm)
-        found = simulated_run(subject, control, chain(arm), scenario, duration, **how)
+        found = simulated_run(Case(subject, control, chain(arm)), scenario, duration, **how)
     else:
         from tfarm.tuner import load_tuner, tuning
 

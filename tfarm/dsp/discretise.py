@@ -24,11 +24,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, AnyLaw, Arm, as_law, full_law, must_not_be_algebraic
+from tfarm.arm import MOMENT_GAIN, must_not_be_algebraic
 from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace
 from tfarm.arm.chain import MOST_DELAY, Chain
 from tfarm.arm.law import Law, Part, is_measured
 from tfarm.arrays import MACHINE_EPS, Complex, Real
+from tfarm.case import Case
 from tfarm.errors import ParameterError, require
 from tfarm.exact.rationals import block_factors
 from tfarm.records import frozen
@@ -66,7 +67,8 @@ def rule_in_words(law: Law) -> str:
 
 def _in_z(part: Part, law: Law, period: float) -> LawBlock:
     """A block of the law in z."""
-    block, rule = part.block, law.rule
+    block = part.block
+    rule = law.rule
     remedy = f"the rule {rule} is not for a law that differentiates: add a pole to den, or take tustin"
     require(block.excess <= 0 or rule == "tustin", f"law.{part.signals[0]}.num", law.name, remedy)
     if not block.order and block.excess <= 0:
@@ -121,35 +123,26 @@ def system_matrix(law: Law) -> Real:
     return np.block([[A, B], [C, D]])
 
 
-def with_all_gains(arm: Arm, law: AnyLaw) -> Law:
-    """Return the law; gains at the hub that follow all their references with a part for each gain, also for 0.
+def acting_law(case: Case) -> tuple[Law, Chain]:
+    """Return the feedback of a case in z in the numbers of its chain's arithmetic, and the chain with its delay.
 
-    Raises ParameterError for the algebraic loop, I_h = 0 and K2 != 0, and for a gain that is too large.
+    Raises ParameterError for a delay that is too long, for a gain that is too large, for a massless hub whose moment is
+    fed back (an algebraic loop), and as `discretised` and `in_single` do.
     """
-    law = as_law(law)
-    if (gains := law.gains) is None or not set(law.signals) <= set(law.references):
-        return law
-    if gains.K2:
-        must_not_be_algebraic(arm, MOMENT_GAIN, gains.K2)
-    check_gains(arm, gains)
-    return full_law(law)
-
-
-def acting_law(arm: Arm, law: Law, chain: Chain) -> tuple[Law, Chain]:
-    """Return the law in z in the numbers of the chain's arithmetic, and the chain with its delay.
-
-    Raises ParameterError for a delay that is too long, for a massless hub whose moment is fed back (an algebraic loop),
-    and as `discretised` and `in_single` do.
-    """
-    T = chain.sampling.period
-    samples = chain.sampling.delay_samples + law.delay / T
+    law = case.feedback
+    gains = case.gains
+    sampling = case.chain.sampling
+    if law.part_gains.get("root_moment", (0, 1.0))[1] and "root_moment" in law.signals:
+        key, value = ("signals", "root_moment") if gains is None else (MOMENT_GAIN, gains.K2)
+        must_not_be_algebraic(case.arm, key, value)
+    if gains is not None:
+        check_gains(case.arm, gains)
+    samples = sampling.delay_samples + law.delay / sampling.period
     remedy = f"with the delay of the chain it is {samples:.4g} samples; at most {MOST_DELAY:g}"
     require(samples <= MOST_DELAY, "delay", law.delay, remedy)
-    if "root_moment" in law.signals and law.part_gains.get("root_moment", (0, 1.0))[1]:
-        must_not_be_algebraic(arm, "signals", "root_moment")
-    late = replace(chain, sampling=replace(chain.sampling, delay_samples=samples))
-    acting = discretised(law, T)
-    return in_single(acting) if chain.converters.is_single else acting, late
+    acting = discretised(law, sampling.period)
+    late = replace(case.chain, sampling=replace(sampling, delay_samples=samples))
+    return in_single(acting) if late.converters.is_single else acting, late
 
 
 def in_single(law: Law) -> Law:
@@ -183,22 +176,24 @@ def with_estimate(law: Law, chain: Chain) -> Law:
 
 
 def _differenced(part: Part, a: float, T: float) -> Part:
-    """A part of a law with its columns of the hub rate replaced by columns of the hub angle."""
+    """A part of a law with its columns of the hub rate replaced by columns of the hub angle.
+
+    x_{k+1} = a x_k + angle,  rate = (1 - a)/T (angle + (a - 1) x_k)
+    """
     if "hub_rate" not in part.signals:
         return part
-    signals = tuple("hub_angle" if name == "hub_rate" else name for name in part.signals)
+    is_rate = np.array([name == "hub_rate" for name in part.signals], dtype=float)
+    through = (1 - a) / T
+    by_state = through * (a - 1) * is_rate[:, None]
+    by_angle = np.diag(1 + (through - 1) * is_rate)
     A, B, C, D = part.block.matrices()
-    rate = np.array([name == "hub_rate" for name in part.signals], dtype=float)
-    through, kept = (1 - a) / T, 1.0 - rate
-    Br, Dr = (B @ rate)[:, None], (D @ rate)[:, None]
-    slope = through * (a - 1)
     block = StateSpace(
-        np.block([[A, slope * Br], [np.zeros((1, len(A))), np.array([[a]])]]),
-        np.vstack([B * kept + through * Br * rate, rate[None]]),
-        np.hstack([C, slope * Dr]),
-        D * kept + through * Dr * rate,
+        np.block([[A, B @ by_state], [np.zeros((1, len(A))), np.array([[a]])]]),
+        np.vstack([B @ by_angle, is_rate]),
+        np.hstack([C, D @ by_state]),
+        D @ by_angle,
     )
-    return Part(signals, block)
+    return Part(tuple("hub_angle" if name == "hub_rate" else name for name in part.signals), block)
 
 
 # ------------------------------------------------------------ factors
@@ -263,7 +258,8 @@ def law_in_z(law: Law, acting: Law, chain: Chain) -> LawInZ:
 
     The factors are those of the law itself; in float32 those of `acting`, whose numbers are rounded.
     """
-    law, acting = acting if chain.converters.is_single else law, with_estimate(acting, chain)
+    law = acting if chain.converters.is_single else law
+    acting = with_estimate(acting, chain)
     alone = [acting.weighted(row).matrices() for row in np.eye(len(acting.parts)).tolist()]
     (A, B, _, _), C, D = alone[0], *(np.vstack([each[n] for each in alone]) for n in (2, 3))
     found = [_factors(part, law, chain) for part in law.parts]

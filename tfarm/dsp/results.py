@@ -14,8 +14,8 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import AnyLaw, Arm, as_law
-from tfarm.arm.chain import Chain, Converters, chain_or_usual
+from tfarm.arm import AnyLaw, Arm
+from tfarm.arm.chain import Chain, Converters
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.case import Case
 from tfarm.dsp.discretise import RULE, rule_in_words
@@ -52,14 +52,16 @@ def enough_modes(simulate: Callable[[int], Simulation], count: int | None = None
     """
     if count is not None:
         return Enough(count, None)
-    before, found = simulate(MODE_COUNTS[0]), Enough(MODE_COUNTS[0], np.inf)
+    before = simulate(MODE_COUNTS[0])
+    found = Enough(MODE_COUNTS[0], np.inf)
     for count in MODE_COUNTS[1:]:
         try:
             now = simulate(count)
         except ConvergenceError:  # two damped modes are not distinguished: the number before is used
             break
         off = change(before.at_samples, now.at_samples)
-        before, found = now, Enough(count, off)
+        before = now
+        found = Enough(count, off)
         if off <= ENOUGH_CHANGE:
             break
     return found
@@ -134,7 +136,8 @@ class Run:
     def note(self) -> Annotated[str | None, Quantity("not determined", key="note",
             help="reason for a residual or a settling time without a value")]:  # fmt: skip
         """The reason why there is no residual or no settling time."""
-        run, ends = self.simulation, "the record ends before the slew"
+        run = self.simulation
+        ends = "the record ends before the slew"
         if run.stopped is not None:
             ends = f"the run stops at {self.stopped_at:.6g} s"
         reasons = {
@@ -162,9 +165,8 @@ class Run:
         run = self.simulation
         if run.chain.is_linear or self.tuner is not None:
             return None
-        law = replace(self.case.feedback, delay=0.0)  # that is in the chain of the run
-        ideal = Simulator(self.arm, ideal_chain(run.chain), run.scenario, law, count=self.used.modes)
-        return limit_cycle(run, ideal.run())
+        ideal = self.case.through(ideal_chain(self.case.chain))
+        return limit_cycle(run, Simulator(ideal, run.scenario, count=self.used.modes).run())
 
     @property
     def torque_unit(self) -> Annotated[str, Quantity(help="unit of the input of the arm")]:
@@ -187,7 +189,8 @@ class Run:
     @property
     def csv_table(self) -> Table:
         """The signals in the order of time; those that change at samples only are empty between them."""
-        finer, coarse = self.between or {"t": np.empty(0)}, self.signals
+        finer = self.between or {"t": np.empty(0)}
+        coarse = self.signals
         order = np.argsort(np.r_[coarse["t"], finer["t"]], kind="stable").tolist()
         known = {
             "t": ("time", "s"),
@@ -195,7 +198,8 @@ class Run:
             "gain": ("gain", "-"),
             "volts": ("volts", "V"),
         }
-        empty, columns = [""] * len(finer["t"]), []
+        empty = [""] * len(finer["t"])
+        columns = []
         for name, values in coarse.items():
             if len(values):
                 of, _, at = name.partition("@")
@@ -215,9 +219,11 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
     # a shorter record shows no limit cycle
     if simulation.stopped or simulation.chain.is_linear or n < 40:
         return None
-    last, before = slice(n - n // 4, n), slice(n - n // 2, n - n // 4)
+    last = slice(n - n // 4, n)
+    before = slice(n - n // 2, n - n // 4)
     moment = simulation.at_samples.root_moment
-    size, earlier = _half_range(moment[last]), _half_range(moment[before])
+    size = _half_range(moment[last])
+    earlier = _half_range(moment[before])
     about = moment[last] - moment[last].mean()
     turns = np.count_nonzero(np.diff(np.signbit(about))) / 2
     is_clipped = bool(simulation.saturated_at[last].any())
@@ -270,22 +276,16 @@ def simulate(
     `outputs` are recorded in addition, as "tip_rotation" or "strain@0.05".  Raises ParameterError for a locked hub, an
     algebraic loop, an unknown signal, a law in z whose period is not the chain's, and as `scenario` does.
     """
-    return simulated_run(
-        arm, law, chain, scenario_name, duration, count=count, between=between, outputs=outputs
-    ).simulation
+    case = Case(arm, law, chain)
+    return simulated_run(case, scenario_name, duration, count=count, between=between, outputs=outputs).simulation
 
 
-def drawn(arm: Arm, law: AnyLaw, chain: Chain, scenario_name: str, duration: float) -> Simulation:
+def drawn(case: Case, scenario_name: str, duration: float) -> Simulation:
     """Simulate the same for a picture: 20 records in each period of the fastest visible mode (`traces.resolved`)."""
-    case = Case(arm, as_law(law), chain)
-    task = scenario(scenario_name, case.arm, chain, duration)
-    used = enough_modes(lambda n: simulator(case.through(ideal_chain(chain)), task, count=n).run())
-    return resolved(simulator(case, task, count=used.modes), case.arm, Simulator.run)[0]
-
-
-def simulator(case: Case, task: Scenario, **how: Any) -> Simulator:
-    """The simulator of a case."""
-    return Simulator(case.arm, case.chain, task, case.law, **how)
+    task = scenario(scenario_name, case.arm, case.chain, duration)
+    ideal = case.through(ideal_chain(case.chain))
+    used = enough_modes(lambda n: Simulator(ideal, task, count=n).run())
+    return resolved(Simulator(case, task, count=used.modes), case.arm, Simulator.run)[0]
 
 
 def simulated(
@@ -301,14 +301,12 @@ def simulated(
     Gains at the hub follow the references of all their signals.
     """
     ideal = case.through(ideal_chain(case.chain))
-    used = enough_modes(lambda n: run(simulator(ideal, task, count=n, outputs=outputs)), count)
-    return run(simulator(case, task, count=used.modes, between=between, outputs=outputs)), used
+    used = enough_modes(lambda n: run(Simulator(ideal, task, count=n, outputs=outputs)), count)
+    return run(Simulator(case, task, count=used.modes, between=between, outputs=outputs)), used
 
 
 def simulated_run(
-    arm: Arm,
-    law: AnyLaw,
-    chain: Chain | None,
+    case: Case,
     name: str,
     duration: float,
     *,
@@ -320,6 +318,5 @@ def simulated_run(
 
     Raises ParameterError as `simulate` does.
     """
-    case = Case(arm, as_law(law), chain_or_usual(chain))
     task = scenario(name, case.arm, case.chain, duration)
     return Run(case, *simulated(case, task, count, between, outputs), described(task, case.arm, case.chain))

@@ -16,9 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, HubFeedback
 from tfarm.arm.chain import TIME_ROUNDING
 from tfarm.arrays import Complex, Real
+from tfarm.case import Case
 from tfarm.dsp.plant import RECORDED
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator
@@ -110,7 +111,8 @@ def tip_deviation(arm: Arm, simulation: Simulation) -> TimeCurve:
 
 def reference_angle(task: Scenario, t: Real) -> Real:
     """The reference angle [rad] between its samples, where its rate is linear in time."""
-    T, n = task.period, task.hub_angle.size
+    T = task.period
+    n = task.hub_angle.size
     k = np.minimum(np.floor(t / T * (1 + TIME_ROUNDING)).astype(np.int64), n - 1)
     slope = np.diff(np.r_[task.hub_rate, task.hub_rate[-1:]]) / T
     tau = t - k * T
@@ -129,10 +131,12 @@ def curve(t: Real, y: Real) -> TimeCurve:
 
 def continuous(simulation: Simulation, signal: str) -> tuple[Real, Real]:
     """A signal at the samples and between them, in order of time."""
-    at, between = simulation.at_samples, simulation.between
+    at = simulation.at_samples
+    between = simulation.between
     if between is None:
         return at.t, at.signal(signal)
-    t, y = np.r_[at.t, between.t], np.r_[at.signal(signal), between.signal(signal)]
+    t = np.r_[at.t, between.t]
+    y = np.r_[at.signal(signal), between.signal(signal)]
     order = np.argsort(t, kind="stable")
     return t[order], y[order]
 
@@ -177,7 +181,7 @@ def motion_of(arm: Arm, run: Simulation, until: float = math.inf, most: int = MO
     names = [f"deflection@{each!r}" for each in x.tolist()]
     torque = np.pad(run.torque, (0, run.scenario.t.size - run.torque.size))
     # records between two samples, between two of which is a frame
-    again = Simulator(arm, run.chain, run.scenario, between=4, outputs=names)
+    again = Simulator(Case(arm, HubFeedback(), run.chain), run.scenario, between=4, outputs=names)
     found = again.controller(lambda measured: float(torque[measured.k]))
     # eight frames to a period of the first mode, as far as the film may be that long
     wish = math.ceil(8 * float(modes(arm, 1).natural_frequency_hz[-1]) / RATE)

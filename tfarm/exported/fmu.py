@@ -27,7 +27,7 @@ from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex, Real
 from tfarm.dsp import Simulator, scenario
 from tfarm.dsp.plant import MODES_USED, RECORDED
-from tfarm.dsp.results import simulated, simulator
+from tfarm.dsp.results import simulated
 from tfarm.dsp.scenarios import TRIAL_DURATION
 from tfarm.errors import ParameterError, one_line, require
 from tfarm.exact.outputs import signal_words
@@ -170,7 +170,7 @@ def prepared_simulator(task: ExportTask) -> Simulator:
     except ParameterError:  # an arm that cannot turn
         run = scenario("step", case.arm, case.chain, TRIAL_DURATION)
     modes = 1 if task.what == "controller" else simulated(case, run)[1].modes
-    return simulator(case, run, count=modes)
+    return Simulator(case, run, count=modes)
 
 
 def variables_of(what: What, of: Simulator) -> list[Variable]:

@@ -32,9 +32,9 @@ from tfarm.assessment.stability_map import BEYOND_PICTURE, sampled_region
 from tfarm.case import Case
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits
-from tfarm.dsp import Chain, PulseTransfer, scenario, traces
+from tfarm.dsp import Chain, PulseTransfer, Simulator, scenario, traces
 from tfarm.dsp.plant import Plant, sensed_plant
-from tfarm.dsp.results import enough_modes, ideal_chain, simulator
+from tfarm.dsp.results import enough_modes, ideal_chain
 from tfarm.dsp.simulate import FOLDED_UP, quantisers
 from tfarm.errors import TfarmError
 from tfarm.loop.circle_crossings import GainMap
@@ -185,8 +185,8 @@ def _samples(case: Case, corners: Sequence[Case], unit: Law | None) -> tuple[Liv
     They are those of hub angle and gauge, or of each part of `unit`, whose poles and zeros are steep places too.
     """
     arm = case.arm
-    band, is_quiet = band_of_family(ContinuousLoop(each.arm, each.law) for each in corners)
-    samples = loop_panels(arm, band, None if unit is None else ContinuousLoop(arm, unit))
+    band, is_quiet = band_of_family(map(ContinuousLoop, corners))
+    samples = loop_panels(arm, band, None if unit is None else ContinuousLoop(case.under(unit)))
     own = [abs(s) for block in _blocks(unit) for s in (*block.poles, *block.zeros) if s] if unit else []
     return {
         # by panel, part and point
@@ -197,7 +197,7 @@ def _samples(case: Case, corners: Sequence[Case], unit: Law | None) -> tuple[Liv
         "error": float(f"{samples.error:.0e}"),
         "places": np.unique(np.r_[steep_places(arm, 1.05 * samples.band), own]).tolist(),
         "band": samples.band,
-        "reference_count": stability(arm, case.law, samples.band).unstable_roots,
+        "reference_count": stability(case, samples.band).unstable_roots,
     }, is_quiet
 
 
@@ -235,7 +235,7 @@ def _known(arm: Arm, is_quiet: bool, are_gains: bool) -> LiveNumbers:
 
 def _stable_moments(arm: Arm) -> list[float | None]:
     """Return between which K2 no mode is driven by K1 > 0 without damping; None where no limit was found."""
-    found = windows_of(stability(arm, default_gains(arm).having(MOMENT_GAIN, 0.0)), [MOMENT_GAIN])[MOMENT_GAIN]
+    found = windows_of(stability(Case(arm, default_gains(arm).having(MOMENT_GAIN, 0.0))), [MOMENT_GAIN])[MOMENT_GAIN]
     return [end if found.end(end) == "edge" else None for end in found.around or (-math.inf, math.inf)]
 
 
@@ -275,7 +275,7 @@ def sampled_numbers(loop: Sampled) -> LiveNumbers:
 
 def _in_page(case: Case, unit: Law | None) -> LiveNumbers:
     """Return the sampled loop of a case, of gains at the hub or of the parts of `unit`."""
-    loop = sampled_verdict(case.arm, case.law, case.chain).full
+    loop = sampled_verdict(case).full
     return sampled_numbers(loop) if unit is None else law_in_page(loop, list(unit.part_gains))
 
 
@@ -343,8 +343,8 @@ def slew_numbers(case: Case) -> LiveNumbers | None:
         if task.t.size > 5000:
             return None
         ideal = case.through(ideal_chain(chain))
-        count = enough_modes(lambda number: simulator(ideal, task, count=number).run()).modes
-        plant = _upper(simulator(case, task, count=count).plant)
+        count = enough_modes(lambda number: Simulator(ideal, task, count=number).run()).modes
+        plant = _upper(Simulator(case, task, count=count).plant)
         signals = task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference, task.rigid_moment
         return {
             **_sampling(chain),

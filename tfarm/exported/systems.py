@@ -80,7 +80,7 @@ class NamedSystem:
 
 def controller_system(case: Case) -> NamedSystem:
     """Return the controller in z, from its signals and then their references to its share of the input."""
-    acting, _ = acting_law(case.arm, case.feedback, case.chain)
+    acting, _ = acting_law(case)
     parts = tuple(_with_references(part, acting.references) for part in acting.parts)
     acting = with_estimate(replace(acting, parts=parts, references=()), case.chain)
     columns = (*acting.signals, *acting.wanted)
@@ -100,7 +100,7 @@ def _with_references(part: Part, references: tuple[str, ...]) -> Part:
 
 def plant_system(case: Case) -> NamedSystem:
     """Return the sampled plant from its input to the signals of the law and the tip, exact for its modal model."""
-    acting, late = acting_law(case.arm, case.feedback, case.chain)
+    acting, late = acting_law(case)
     signals = with_estimate(acting, late).signals
     sensed = sensed_plant(case.arm, late, list(dict.fromkeys((*signals, "tip_displacement"))), USUAL_MODES)
     A, B, C = PulseTransfer(sensed.together, late.sampling).folded().matrices()

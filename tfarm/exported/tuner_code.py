@@ -241,7 +241,7 @@ def c_tuner(task: ExportTask) -> Export:
     tuner = ExportedTuner(saved, task.precision)
     of = tuner.numbers
     gains = HubFeedback(K1=float(of.K1), K2=1.0, Kp=float(of.Kp))
-    loop = sampled_loop(case.arm, gains, case.chain, count=TRIAL_MODES)
+    loop = sampled_loop(case.under(gains), count=TRIAL_MODES)
     guard = sector_guard(loop, float(of.lo), float(of.hi))
     certainty = "not certified for a gain that varies" if guard is None else guard.sentence
     is_proven = guard is not None and guard.is_proven

@@ -239,7 +239,7 @@ def departures(
     t = np.append(measured.t, end + min(longer, 10_000 * period))
     held = replace(measured, t=t, reference=np.append(measured.reference, measured.reference[-1]))
     case = Case(arm, as_law(law), chain)
-    run = Simulator(case.arm, chain, held.scenario(period), case.law, count=count).run().at_samples
+    run = Simulator(case, held.scenario(period), count=count).run().at_samples
     settled = run.hub_angle[run.t <= end][-1]
     away = abs(run.hub_angle - settled) > share * abs(measured.step)
     return [float(t) for t in run.t[away & (run.t > end)]]

@@ -27,17 +27,16 @@ from tfarm.arm import (
     Arm,
     HubFeedback,
     Law,
-    as_law,
-    full_law,
-    must_be_arm,
     must_have_free_hub,
     must_not_be_algebraic,
 )
 from tfarm.arrays import Complex
+from tfarm.case import Case
 from tfarm.errors import require
 from tfarm.exact.characteristic import Analytic, Feedback, LoopParts, deflated, difference_steps, feedback
 from tfarm.exact.system import System
 from tfarm.loop.loop import Loop
+from tfarm.loop.theorem import Theorem, theorem_of
 from tfarm.records import frozen
 from tfarm.response.signals import Controller, Signals, controller
 from tfarm.schema import Quantity
@@ -65,46 +64,55 @@ MOST_BAND_MODES = 150  # flexible: in a band; beyond, poles are not determined w
 
 @frozen
 class ContinuousLoop(Loop):
-    """A rig under a law in s, gains at the hub among them; `signals` are those fed back, made unless given.
+    """The loop of a case with a law in s, gains at the hub among them; `signals` are those fed back.
 
     Raises ParameterError for a locked hub, a law in z, an algebraic loop, and gains that are far too small or
     too large for the arm.
     """
 
-    arm: Arm
-    law: Law
+    case: Case
     signals: Signals = field(default=cast("Signals", None), repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        must_be_arm(self.arm)
-        law = as_law(self.law)
-        if law.input is not None and law.input != self.arm.input:
-            object.__setattr__(self, "arm", replace(self.arm, input=law.input))  # type: ignore[arg-type]
         must_have_free_hub(self.arm)
         remedy = "a law in z has a sampled loop: ask for that, or leave the period out of a law in s"
-        require(not law.is_discrete, "period", law.period, remedy)
-        object.__setattr__(self, "law", full_law(law))
+        require(not self.law.is_discrete, "period", self.law.period, remedy)
         given: Signals | None = self.signals
         if given is None or given.names != self.law.signals or given.arm != self.arm:
-            object.__setattr__(self, "signals", Signals(self.arm, self.law.signals))
+            object.__setattr__(self, "signals", self.case.signals)
         if self.gains is not None:
             # searches under other laws may come to values next to 0
             _must_be_possible(self.arm, self.gains, LEAST_UNITS if given is None else 0.0)
         _must_not_be_algebraic(self)
 
     @property
+    def arm(self) -> Arm:
+        """The arm, with the input of the law."""
+        return self.case.arm
+
+    @property
+    def law(self) -> Law:
+        """The law; of gains at the hub a part for each, also for 0."""
+        return self.case.feedback
+
+    @property
     def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
-        """Names of the arm and the controller."""
-        return controller(self.law if self.gains is None else as_law(self.gains), self.arm)
+        """Names of the arm and the controller, without gains of 0."""
+        return controller(self.case.law, self.arm)
 
     def under(self, law: Law) -> ContinuousLoop:
         """Return the same rig under another law; its signals at rest are kept."""
-        return ContinuousLoop(self.arm, law, self.signals)
+        return ContinuousLoop(self.case.under(law), self.signals)
 
     @cached_property
     def gains(self) -> HubFeedback | None:
         """The law as gains at the hub; None of any other law."""
-        return self.law.gains
+        return self.case.gains
+
+    @cached_property
+    def theorem(self) -> Theorem:
+        """The theorem that decides the stability of every mode."""
+        return theorem_of(self)
 
     @property
     def numbers(self) -> dict[str, float]:

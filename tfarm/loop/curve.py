@@ -90,20 +90,17 @@ class LoopCurve:
 class LoopVerdict(ABC):
     """The verdict on a loop over either curve, with margins of a stable loop, and the curve of its loop function.
 
-    `full` is the loop with every mode of the verdict's range, `consumer` states the stages of a sample in the verdict.
+    `full` is the loop with every mode of the verdict's range, `consumer` states the stages of a sample in the verdict,
+    `word` is stable, marginal or unstable.
     """
 
     consumer: ClassVar[Consumer]
+    word: str
 
     @property
     @abstractmethod
     def full(self) -> Loop:
         """The loop with every mode of the range."""
-
-    @property
-    @abstractmethod
-    def word(self) -> str:
-        """The verdict: stable, marginal or unstable."""
 
     @property
     @abstractmethod

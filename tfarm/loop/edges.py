@@ -18,10 +18,11 @@ from typing import Annotated, TypeVar
 import numpy as np
 from scipy.optimize import brentq
 
-from tfarm.arm import AnyLaw, Arm
+from tfarm.arm import Arm
 from tfarm.arm.chain import Chain
+from tfarm.case import Case
 from tfarm.digits import general
-from tfarm.dsp.discretise import acting_law, with_all_gains
+from tfarm.dsp.discretise import acting_law
 from tfarm.dsp.plant import FORGOTTEN, OVERDAMPED, first_distinct, held_amplitude
 from tfarm.loop.circle import Band, complete_band
 from tfarm.loop.circle_crossings import stable_windows
@@ -81,12 +82,12 @@ def delay_margin(loop: Sampled) -> DelayMargin:
     return DelayMargin(min(MOST_STEPS * step, LONGEST_DELAY_SAMPLES), True)
 
 
-def required_damping(arm: Arm, law: AnyLaw, chain: Chain, *, count: int = 40) -> float:
-    """Return the smallest C [s] from which on the loop of this law is stable on this arm (without its own C).
+def required_damping(case: Case, *, count: int = 40) -> float:
+    """Return the smallest C [s] from which on the loop of a case is stable (without the arm's own C).
 
     0 where it is stable without damping, inf where it is unstable up to 15 % of critical in the first mode.
     """
-    return damping_edge(sampled_loop(arm.elastic, law, chain, count=count))
+    return damping_edge(sampled_loop(case.on(case.arm.elastic), count=count))
 
 
 def damping_edge(loop: Sampled) -> float:
@@ -141,12 +142,12 @@ def most_modes(arm: Arm, chain: Chain) -> int:
     return min(MOST_LOOP_MODES, 4 + outliving(arm, chain)) if arm.least_damping else MOST_LOOP_MODES
 
 
-def whole_loop(arm: Arm, law: AnyLaw, chain: Chain) -> Sampled:
-    """Return the loop of a damped arm with `most_modes`, or with one mode where that is far overdamped."""
-    criticals = arm.damping * first_frequency(arm) / 2
-    most = most_modes(arm, acting_law(arm, with_all_gains(arm, law), chain)[1])
+def whole_loop(case: Case) -> Sampled:
+    """Return the loop of a case of a damped arm with `most_modes`, or with one mode where that is far overdamped."""
+    criticals = case.arm.damping * first_frequency(case.arm) / 2
+    most = most_modes(case.arm, acting_law(case)[1])
     # beyond 5 times critical in the first mode: all poles of bending lie left of any line, one mode is enough
-    return sampled_loop(arm, law, chain, count=1 if criticals > 5.0 else max(1, most))
+    return sampled_loop(case, count=1 if criticals > 5.0 else max(1, most))
 
 
 @frozen
@@ -347,13 +348,15 @@ def delay_limit(loop: Sampled, band: Band | None) -> Figure | Limit:
 def damping_limit(loop: Sampled, count: int) -> Figure | Limit:
     """Return the damping [s] from which on a loop is stable, by a search with `count` modes."""
     count = min(count, MOST_EDGE_MODES)
-    bare, law = loop.on(loop.plant.arm.elastic, count), replace(loop.law, delay=0.0)  # that is in the chain
+    bare = loop.on(loop.plant.arm.elastic, count)
+    # its delay is in the chain
+    case = Case(bare.plant.arm, replace(loop.law, delay=0.0), loop.chain)
     C = damping_edge(bare)
     if C == 0.0:
         return Figure(C, OTHER_DIGITS, None, count)
 
     def proof(value: float) -> Proof:
-        whole = whole_loop(bare.plant.arm.having(damping=value), law, loop.chain)
+        whole = whole_loop(case.on(case.arm.having(damping=value)))
         return _proof(complete_band(whole), whole)
 
     def holds(value: float) -> Proof:

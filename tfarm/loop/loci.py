@@ -15,6 +15,7 @@ from scipy.optimize import linear_sum_assignment, minimize_scalar
 from tfarm.arm import FED_BACK, NAMES, Arm, HubFeedback
 from tfarm.arm.blocks import Matrices
 from tfarm.arrays import LEAST_SIZE, Complex, Real
+from tfarm.case import Case
 from tfarm.errors import ConvergenceError
 from tfarm.loop.locus import ORIGIN, Locus, locus, origin_name
 from tfarm.loop.varied import OF_THE_LAW, Title
@@ -76,7 +77,7 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
         import control
 
         which = np.arange(exact.gain.size)
-        system = open_loop(arm, exact.gains, exact.vary, count)
+        system = open_loop(exact.case, exact.vary, count)
         try:
             poles = np.asarray(control.root_locus_map(system, exact.gain).loci)
         except np.linalg.LinAlgError as error:  # it works with coefficients of s^n, which overflow at high frequencies
@@ -103,13 +104,15 @@ def reduced_of(exact: Locus) -> ReducedLocus | None:
     return None if exact.in_box else reduced_locus(exact)
 
 
-def open_loop(arm: Arm, law: HubFeedback, vary: str, count: int) -> control.StateSpace:
+def open_loop(case: Case, vary: str, count: int) -> control.StateSpace:
     """The loop function that the varied gain multiplies, all other gains closed: state space of a modal model."""
     import control
 
+    law = case.gains
+    assert law is not None
     moving = np.array(law.row) if vary == "all" else np.array(HubFeedback().having(vary, 1.0).row)
     fixed = np.zeros(moving.size) if vary == "all" else np.array(law.having(vary, 0.0).row)
-    (A, B, C, D), row = _closed(arm, fixed, count, moving)
+    (A, B, C, D), row = _closed(case.arm, fixed, count, moving)
     return control.StateSpace(A, B, row @ C, row @ D)
 
 
@@ -225,7 +228,7 @@ def held_branches(branches: Complex) -> Complex:
     return np.round(branches.real / unit) * unit + 1j * (np.round(branches.imag / unit) * unit)
 
 
-def loci(arm: Arm, law: HubFeedback, vary: str, start: float, stop: float) -> Loci:
+def loci(case: Case, vary: str, start: float, stop: float) -> Loci:
     """Return both loci of one gain.  Raises what `locus` and `reduced_locus` raise."""
-    exact = locus(arm, law, vary, start, stop, LOCUS_POINTS, LOCUS_BRANCHES)
+    exact = locus(case.arm, case.law, vary, start, stop, LOCUS_POINTS, LOCUS_BRANCHES)
     return Loci(exact, reduced_locus(exact))

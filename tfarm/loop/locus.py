@@ -21,9 +21,10 @@ from typing import Annotated, cast
 import numpy as np
 from scipy.optimize import brentq
 
-from tfarm.arm import FED_BACK, NAMES, PLANE, AnyLaw, Arm, HubFeedback, arm_and_law, as_law
+from tfarm.arm import FED_BACK, NAMES, PLANE, AnyLaw, Arm, HubFeedback, Law
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real, Whole
+from tfarm.case import Case
 from tfarm.crossing import Crossing
 from tfarm.crossing.turning import loose
 from tfarm.errors import ConvergenceError, must_be_known, require
@@ -71,8 +72,7 @@ class Locus:
     `crossings` are those of the imaginary axis, ascending along the way.
     """
 
-    arm: Arm
-    law: AnyLaw
+    case: Case
     vary: Annotated[str, Quantity("varied", help="number of the controller or the arm along which poles are followed")]
     gain: Annotated[Real, Quantity("value", curve=True, help="values of the number that varies")]
     branches: Annotated[Complex, Quantity("branch", "1/s", curve=True, help="closed-loop poles, a branch each")]
@@ -100,7 +100,17 @@ class Locus:
     @property
     def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
         """Names of the arm and the controller."""
-        return controller(as_law(self.law), self.arm)
+        return controller(self.law, self.arm)
+
+    @property
+    def arm(self) -> Arm:
+        """The arm, at the first value where a number of it varies."""
+        return self.case.arm
+
+    @property
+    def law(self) -> Law:
+        """The law of the case."""
+        return self.case.law
 
     @property
     def mode(self) -> Whole:
@@ -117,15 +127,15 @@ class Locus:
         """The title of the curve of its values."""
         return {"gain": self.varied.title}
 
-    @property
+    @cached_property
     def varied(self) -> Varied:
         """The family of loops."""
-        return Varied(self.arm, self.law, self.vary, float(self.gain[0]), float(self.gain[-1]), self.box)
+        return Varied(self.case, self.vary, float(self.gain[0]), float(self.gain[-1]), self.box)
 
     @property
     def gains(self) -> HubFeedback:
         """The gains at the hub, of a locus of these."""
-        return cast("HubFeedback", self.law)
+        return cast("HubFeedback", self.case.gains)
 
     @property
     def spectral_abscissa(self) -> Real:
@@ -152,7 +162,8 @@ def locus(
     modes, by default at 100 values.  Else it has that many branches, by default at 500 values.
     Raises ParameterError for an invalid law, loop or range, ConvergenceError where branches cannot be distinguished.
     """
-    (arm, plain), gains = arm_and_law(arm, law), as_law(law).gains
+    case = Case(arm, law)
+    gains = case.gains
     require(isinstance(vary, str), "vary", vary, f"the name of what varies, such as {PLANE[1]} or length")
     known = (*OF_THE_LAW, *ARM_PARAMETERS)
     in_box = gains is None or vary not in known
@@ -160,13 +171,12 @@ def locus(
         must_be_known("vary", vary.partition(".")[0], (*known, "gain", "delay", *FED_BACK))
         remedy = f"every gain is 0: give {' or '.join(NAMES)} to be scaled"
         require(vary != "all" or gains != HubFeedback(), "vary", "all", remedy)
-    law = as_law(law) if in_box else plain
     # by default 500 values of gains, 100 of any other law
     points = (100 if in_box else 500) if points is None else points
     points = whole("points", points, 2, MOST_LOCUS_POINTS, f"a whole number from 2 to {MOST_LOCUS_POINTS}")
     branches = whole("branches", branches, 1, MOST_BRANCHES, f"a whole number from 1 to {MOST_BRANCHES}")
-    number = branches if in_box else max(1, branches - 2 * arm.has_rigid_mode)
-    family = Varied(arm, law, vary, start, stop).boxed(number)
+    number = branches if in_box else max(1, branches - 2 * case.arm.has_rigid_mode)
+    family = Varied(case, vary, start, stop).boxed(number)
     gain = np.linspace(start, stop, points)
     rows, origin = followed(family, gain, number)
     is_shown = family.box.holds(rows) if in_box else ~np.isnan(rows)
@@ -179,7 +189,7 @@ def locus(
     origin = np.r_[at_origin(family.first)[:pinned], origin[listed]]
     top = family.box.im_max if in_box else float(np.fmax.reduce(found.imag).min()) or family.frequency
     crossings = branch_crossings(family, gain, found, origin, top)
-    return Locus(family.first.arm, law, vary, gain, found, origin, family.box, crossings, rows, listed, in_box)
+    return Locus(case.on(family.first.arm), vary, gain, found, origin, family.box, crossings, rows, listed, in_box)
 
 
 def shown(rows: Complex, listed: Whole, pinned: int, box: Box | None) -> Complex:
@@ -239,10 +249,9 @@ def named(family: Varied, number: int) -> tuple[Complex, Whole]:
     In the order of the modes, `number` flexible ones; poles of a law come last.
     """
     loop = family.first
-    law = family.law_at(family.start)
-    grown = Varied(loop.arm, law, "gain", 0.0, 1.0, family.box)
+    grown = Varied(loop.case, "gain", 0.0, 1.0, family.box)
     row, origin = open_poles(loop.arm, number)
-    own, resting = law.poles[law.poles != 0], at_origin(grown.at(0.0))
+    own, resting = loop.law.poles[loop.law.poles != 0], at_origin(grown.at(0.0))
     row = np.r_[np.zeros(resting.size - grown.pinned, complex), row, own]
     origin = np.r_[resting[grown.pinned :], origin, np.full(own.size, CONTROLLER)]
     if loop.feeds_back:

@@ -23,10 +23,17 @@ from tfarm.schema import Quantity
 
 
 class Loop(ABC):
-    """A rig under a law; `law` has its present numbers."""
+    """A rig under a law."""
 
-    arm: Arm
-    law: Law
+    @property
+    @abstractmethod
+    def arm(self) -> Arm:
+        """The arm, with the input of the law."""
+
+    @property
+    @abstractmethod
+    def law(self) -> Law:
+        """The law with its present numbers."""
 
     @property
     def period(self) -> float | None:

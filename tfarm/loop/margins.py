@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Annotated
 
 from tfarm.arm import AnyLaw, Arm
+from tfarm.case import Case
 from tfarm.loop.curve import IN_RANGE, LoopCurve
 from tfarm.loop.loop_margins import (
     DELAY_MARGIN,
@@ -23,7 +24,7 @@ from tfarm.loop.loop_margins import (
     PhaseCrossover,
 )
 from tfarm.loop.stability import Stability, is_quiet, stability
-from tfarm.loop.theorem import Lyapunov, Signs, lyapunov, signs_of_loop, theorem_of
+from tfarm.loop.theorem import Lyapunov, Signs, lyapunov, signs_of_loop
 from tfarm.loop.windows import Windows, reach_words, windows_of
 from tfarm.records import frozen
 from tfarm.schema import Quantity
@@ -88,14 +89,16 @@ class Margins:
         arm, gains, of_disk = loop.arm, loop.gains, (found.disk, found.peak_sensitivity)
         if not arm.is_undamped and is_quiet(loop, self.stability.band):
             return found.delay, *of_disk
-        if gains is not None and arm.is_undamped and theorem_of(loop).energy is not None:
+        if gains is None:
+            return None, None, None
+        if arm.is_undamped and loop.theorem.energy is not None:
             if gains.K2:
                 return 0.0, 0.0, math.inf
             # 1 + L = 1 + (Kp + i K1 w) theta, theta real: no dip deepens with w
             return 0.0 if loop.feeds_back else found.delay, *of_disk
-        if gains is not None and not arm.is_undamped and gains.K2 == gains.Kp == 0 and not arm.input_lags:
-            return None, *of_disk  # L is in the right half-plane
-        return None, None, None
+        # with a rate gain alone L is in the right half-plane
+        is_passive = not arm.is_undamped and gains.K2 == gains.Kp == 0 and not arm.input_lags
+        return (None, *of_disk) if is_passive else (None, None, None)
 
     @property
     def delay_margin_seconds(self) -> float | None:
@@ -129,14 +132,14 @@ class Margins:
             help="energy argument for constant gains at the hub")]:  # fmt: skip
         """The proof by energy, for gains at the hub."""
         loop = self.stability.loop
-        return None if loop.gains is None else lyapunov(loop.arm, loop.gains)
+        return lyapunov(loop) if loop.is_of_gains else None
 
     @property
     def passivity(self) -> Annotated[Signs | None, Quantity("passivity of the controller",
             help="sign of the controller from hub angle or rate to torque")]:  # fmt: skip
         """The sign of a law that is more than gains at the hub."""
         loop = self.stability.loop
-        return signs_of_loop(loop) if loop.gains is None else None
+        return None if loop.is_of_gains else signs_of_loop(loop)
 
     @property
     def stability_intervals(self) -> Annotated[list[Windows], Quantity("stability intervals", first=True,
@@ -152,7 +155,7 @@ class Margins:
         A theorem on the sign of a law, and small gain, hold for that law, not for one with another number.
         """
         loop, words = self.stability.loop, reach_words(self.windows.values())
-        if loop.gains is not None:
+        if loop.is_of_gains:
             return None if self.stability.is_known_beyond else words or None
         if not self.windows and loop.arm.has_elastic_link:
             return "no stability intervals: with an undamped link all modes meet on the axis"
@@ -177,4 +180,4 @@ def margins(arm: Arm, law: AnyLaw, band: float | None = None) -> Margins:
     Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted, or where with damping
     one is on the axis to working precision.
     """
-    return Margins(stability(arm, law, band))
+    return Margins(stability(Case(arm, law), band))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import AnyLaw, Arm
 from tfarm.arrays import Complex, Real
+from tfarm.case import Case
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.records import frozen
@@ -87,7 +88,7 @@ def nyquist(arm: Arm, law: AnyLaw) -> Nyquist:
     Raises as `stability` does, and ConvergenceError where the curve passes too near to -1 for them to be counted, or
     where the two counts differ.
     """
-    return nyquist_of(stability(arm, law))
+    return nyquist_of(stability(Case(arm, law)))
 
 
 def nyquist_of(verdict: Stability) -> Nyquist:

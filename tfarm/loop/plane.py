@@ -24,9 +24,10 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, AnyLaw, Arm, HubFeedback, Law, as_law
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, AnyLaw, Arm, HubFeedback, Law
 from tfarm.arm.feedback import ON
 from tfarm.arrays import Real
+from tfarm.case import Case
 from tfarm.crossing import Crossings, Window, ascending, counts_over
 from tfarm.crossing.shown import PlaneOfCounts
 from tfarm.errors import ConvergenceError, ParameterError, require
@@ -70,8 +71,7 @@ class Plane(PlaneOfCounts):
     the frequency range of the crossings, 0 where every mode is known; `crossings` those along y for each x, or none.
     """
 
-    arm: Arm
-    law: Law
+    loop: ContinuousLoop
     vary: Annotated[tuple[str, str], Quantity("plane of", help="the two numbers that vary, across and up")]
     x: Annotated[Real, Quantity(curve=True, help="values of the first number")]
     y: Annotated[Real, Quantity(curve=True, help="values of the second number")]
@@ -84,6 +84,16 @@ class Plane(PlaneOfCounts):
     def reach(self) -> Annotated[str, Quantity("frequency range", help="poles in it are counted completely")]:
         """The frequency range in words."""
         return f"up to {self.band:.6g} rad/s" if self.band else "every mode, by a theorem"
+
+    @property
+    def arm(self) -> Arm:
+        """The arm of the loop."""
+        return self.loop.arm
+
+    @property
+    def law(self) -> Law:
+        """The law of the loop, both numbers as they were given."""
+        return self.loop.law
 
     @property
     def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
@@ -131,7 +141,7 @@ class Plane(PlaneOfCounts):
         if not self.is_known:
             return super().stable_intervals
         limits = float(self.y[0]), float(self.y[-1])
-        loop = ContinuousLoop(self.arm, self.law.having(RATE_GAIN, self.upright + default_gains(self.arm).K1))
+        loop = self.loop.having(RATE_GAIN, self.upright + default_gains(self.arm).K1)
         stable = theorem_windows(loop, MOMENT_GAIN, limits, theorem_edges(loop, MOMENT_GAIN, limits))
         return [stable if self.upright < K1 else [] for K1 in self.x]
 
@@ -160,8 +170,8 @@ def gain_map(
     """
     if law is None:
         require(vary is None, "law", None, "give the HubFeedback or Law whose numbers vary names")
-        return plane(ContinuousLoop(arm, as_law(HubFeedback(Kp=Kp))), PLANE, K1, K2)
-    loop = ContinuousLoop(arm, as_law(law))
+        return plane(ContinuousLoop(Case(arm, HubFeedback(Kp=Kp))), PLANE, K1, K2)
+    loop = ContinuousLoop(Case(arm, law))
     require(not Kp, ANGLE_GAIN, Kp, "give Kp in the law, or no law")
     vary = PLANE if vary is None and loop.gains is not None else vary
     match vary:
@@ -189,7 +199,7 @@ def plane(loop: ContinuousLoop, vary: tuple[str, str], x: Real, y: Real) -> Plan
     corners = [_at(loop, vary, each) for each in itertools.product(across, up)]
     if loop.gains is not None and _is_known_everywhere(loop.arm) and tuple(ON.get(n, n) for n in vary) == PLANE:
         counts = _known_counts(loop, x, y)
-        return Plane(loop.arm, loop.law, vary, x, y, counts, np.empty((0, 3)), 0.0, [])
+        return Plane(loop, vary, x, y, counts, np.empty((0, 3)), 0.0, [])
     if vary[1] == "delay":
         turned = plane(loop, (vary[1], vary[0]), y, x)
         return replace(turned, vary=vary, x=x, y=y, unstable=turned.unstable.T.copy(), crossings=[])
@@ -202,7 +212,7 @@ def plane(loop: ContinuousLoop, vary: tuple[str, str], x: Real, y: Real) -> Plan
     edge = np.empty((0, 3))
     if vary == PLANE and loop.gains is not None:
         edge = boundary(loop, np.asarray(grid(loop.arm, band)))
-    done = Plane(loop.arm, loop.law, vary, x, y, unstable, edge, band, found)
+    done = Plane(loop, vary, x, y, unstable, edge, band, found)
 
     def counted(*point: float) -> int | None:
         try:
@@ -378,7 +388,7 @@ def moment_axis(arm: Arm, x: Axis) -> Axis:
 
 def edge(found: Plane, x: Axis, y: Axis) -> Real:
     """The boundary in the picture, refined where it is coarse, with a row of nan after each of its parts."""
-    points, loop = found.boundary, ContinuousLoop(found.arm, found.law)
+    points, loop = found.boundary, found.loop
     # rounds of cutting at most: 2^-30 of a step between frequencies is less than a pixel
     for _ in range(30):
         length, is_seen = _segments(points, x, y)
@@ -418,6 +428,6 @@ def resting_frequencies(found: Plane, count: int) -> Real:
 def static_edges(found: Plane) -> tuple[float | None, float | None]:
     """The gains at which a real pole passes through 0: an upright line of the boundary, and a level one."""
     upright = found.upright if found.arm.has_rigid_mode and found.Kp == 0 else None
-    loop, up = ContinuousLoop(found.arm, found.law), float(abs(found.y).max())
+    loop, up = found.loop, float(abs(found.y).max())
     level = static_edge(loop.having(RATE_GAIN, 1.0), MOMENT_GAIN, (-up, up))
     return upright, None if level is None else level.t

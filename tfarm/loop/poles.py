@@ -14,10 +14,11 @@ from typing import Annotated
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from tfarm.arm import AnyLaw, Arm, as_law
+from tfarm.arm import AnyLaw, Arm
 from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex
+from tfarm.case import Case
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, require
 from tfarm.records import frozen
@@ -30,7 +31,7 @@ from tfarm.spectrum.starts import damped_starts
 from tfarm.spectrum.table import first_frequency
 
 from .continuous import ContinuousLoop, band_of, steep_places
-from .theorem import CONSERVES, GIVES, theorem_of
+from .theorem import CONSERVES, GIVES
 
 MOST_POLES = 1000  # that may be asked for
 USUAL_POLES = 10  # poles listed where no count is asked for
@@ -90,11 +91,11 @@ class Poles:
     def unstable(self) -> Annotated[int, Quantity("unstable poles", help="of the box, conjugates counted")]:
         """Number of poles of the box, conjugates counted, right of the axis.
 
-        A real part below working precision decides nothing; without damping a theorem decides (`theorem_of`).
+        A real part below working precision decides nothing; without damping a theorem decides.
         """
         size = abs(self.values)
         right = self.values.real > AXIS_SHARE * size
-        if theorem_of(self.loop).energy == GIVES:
+        if self.loop.theorem.energy == GIVES:
             right |= (self.values.imag > 0) & (abs(self.values.real) <= AXIS_SHARE * size)
         return count_with_mirrors(self.values[right])
 
@@ -141,7 +142,7 @@ def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles:
     """
     if count is not None:
         count = whole("count", count, 1, MOST_POLES, f"a whole number from 1 to {MOST_POLES}")
-    loop = ContinuousLoop(arm, as_law(law))
+    loop = ContinuousLoop(Case(arm, law))
     wanted, limit = (USUAL_POLES, loop.arm.shear_cutoff) if count is None else (count, math.inf)
     number = wanted + 2
     while True:
@@ -172,7 +173,7 @@ def poles_below(
     starts, known = starting_points(loop, STARTS_REACH * height), slow_poles(loop, SLOW_SHARE * height)
     found, box = complete(loop.function, lambda top: box_of(loop, top, late), height, starts, known, factors)
     # without losses a simple zero is its own mirror image, and its real part is rounding
-    is_even = loop.is_lossless or (loop.arm.is_undamped and theorem_of(loop).energy == CONSERVES)
+    is_even = loop.is_lossless or (loop.arm.is_undamped and loop.theorem.energy == CONSERVES)
     on_axis = is_even & (abs(found.real) <= AXIS_SHARE * abs(found))
     found = np.where(on_axis, 1j * found.imag, found)
     upper = found[found.imag >= 0]

@@ -8,14 +8,15 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, AnyLaw, Arm, arm_and_law, as_law
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, AnyLaw, Arm
 from tfarm.arm.chain import Chain, Sampling
 from tfarm.arm.checks import whole
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import Real
+from tfarm.case import Case
 from tfarm.crossing import Window
 from tfarm.dsp.discretise import RULE, rule_in_words
-from tfarm.dsp.stages import admit, not_covered
+from tfarm.dsp.stages import admit_case, not_covered
 from tfarm.errors import ConvergenceError
 from tfarm.loop.circle import Band, complete_band
 from tfarm.loop.circle_crossings import FACTOR, around, stable_windows, windows_of
@@ -121,7 +122,7 @@ class Verdict(OfLoop, LoopVerdict):
         return self.loop if self.band is None else self.band.full
 
     @property
-    def word(self) -> Annotated[str, Quantity("stability", key="verdict",
+    def word(self) -> Annotated[str, Quantity("stability", key="verdict",  # type: ignore[override]
             help="stable, marginal (largest |z| = 1 within its rounding error) or unstable")]:  # fmt: skip
         """stable, marginal or unstable."""
         growth = self.log_radius
@@ -190,11 +191,13 @@ def unaliased_poles(loop: Sampled) -> dict[int, complex]:
 
     Of several poles of a mode it is the least damped one.
     """
-    poles, table = loop.poles, modes(loop.arm, max(1, int(loop.poles.mode.max(initial=1))))
+    poles = loop.poles
+    table = modes(loop.arm, max(1, int(loop.poles.mode.max(initial=1))))
     rounding = 1e-9 * abs(poles.z)
     # a real z < 0 oscillates at half the sampling rate, one > 0 never does, whatever rounding leaves of Im z
     upper = (poles.z.imag > rounding) | ((poles.z.real < 0) & (abs(poles.z.imag) <= rounding))
-    mode, q = poles.mode[upper], abs(np.angle(poles.z[upper]))
+    mode = poles.mode[upper]
+    q = abs(np.angle(poles.z[upper]))
     own = np.where(mode > 0, np.interp(mode, table.index, table.natural_frequency) * loop.period, q)
     turns = 2 * math.pi * np.round((own + [[-1], [1]] * q) / (2 * math.pi))
     aliases = abs([[1], [-1]] * q + turns)
@@ -204,29 +207,31 @@ def unaliased_poles(loop: Sampled) -> dict[int, complex]:
     return dict(zip(mode[order].tolist(), s[order].tolist(), strict=True))
 
 
-def sampled_verdict(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | None = None) -> Verdict:
-    """Return the verdict, with `count` modes, or enough of them (C > 0), or the first 20 (C = 0).
+def sampled_verdict(case: Case, *, count: int | None = None) -> Verdict:
+    """Return the verdict on a case, with `count` modes, or enough of them (C > 0), or the first 20 (C = 0).
 
     They are enough when the number of poles outside the circle is that certified for the whole band, and the largest
     radius that of the loop with every mode of the band.  Raises ParameterError as `sampled_loop` does, and for a count
     outside 1..400.
     """
-    arm, chain = admit(SAMPLED_LOOP, arm, chain)
+    case = admit_case(SAMPLED_LOOP, case)
     if count is not None:
         count = whole("modes", count, 1, MOST_COUNT, f"a whole number of flexible modes from 1 to {MOST_COUNT}")
-        return Verdict(sampled_loop(arm, law, chain, count=count))
-    if arm.has_elastic_link:
-        return Verdict(sampled_loop(arm, law, chain, count=UNDAMPED_MODES))
-    largest = whole_loop(arm, law, chain)
+        return Verdict(sampled_loop(case, count=count))
+    if case.arm.has_elastic_link:
+        return Verdict(sampled_loop(case, count=UNDAMPED_MODES))
+    largest = whole_loop(case)
     band = complete_band(largest)
     full = largest if band is None else band.full
-    proven, radius = None if band is None else band.circle.count(full.weights), full.poles.log_spectral_radius
+    proven = None if band is None else band.circle.count(full.weights)
+    radius = full.poles.log_spectral_radius
 
     def agrees(fewer: Sampled) -> bool:
         is_near = abs(fewer.poles.log_spectral_radius - radius) <= RADIUS_AGREES * abs(radius) + RADIUS_NOISE
         return is_near and fewer.poles.unstable == full.poles.unstable and proven in (None, fewer.poles.unstable)
 
-    few, most = min(FEWEST_COMPARED, full.plant.count // 2), full.plant.count
+    few = min(FEWEST_COMPARED, full.plant.count // 2)
+    most = full.plant.count
     loops = (resized(full, few << n) for n in range(most.bit_length()) if 0 < few << n < most)
     loop = next(filter(agrees, loops), full)
     is_proven = proven is not None and loop.poles.is_determined and (proven == 0) == (loop.poles.unstable == 0)
@@ -320,7 +325,8 @@ class Analysis:
 
     def interval(self, name: str) -> Window | None:
         """The stability interval around a gain; a gain of 0 on a free angle is the end of its own interval."""
-        value, windows = self.loop.number(name), self.windows[name]
+        value = self.loop.number(name)
+        windows = self.windows[name]
         if name == ANGLE_GAIN and value == 0.0 and self.verdict.is_stable:
             return next((window for window in windows if window[0] <= 0.0 < window[1]), None)
         return around(windows, value)
@@ -397,9 +403,7 @@ def sampled(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | N
     `count` is the number of flexible modes, by default enough for the verdict.  Raises ParameterError for a locked hub,
     an algebraic loop, an unknown signal, and a law in z whose period is not the chain's.
     """
-    arm, chain = admit(SAMPLED_LOOP, arm, chain)
-    arm, law = arm_and_law(arm, law)
-    return Analysis(sampled_verdict(arm, law, chain, count=count), count or UNDAMPED_MODES)
+    return Analysis(sampled_verdict(Case(arm, law, chain), count=count), count or UNDAMPED_MODES)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -430,19 +434,20 @@ class SampledBrief:
         return f"{verdict} when sampled every {1e3 * self.period:g} ms"
 
 
-def sampled_brief(arm: Arm, law: AnyLaw, chain: Chain) -> SampledBrief:
-    """Return the verdict on a law at the sampling of a chain.  Raises ParameterError where the arm has no such loop."""
+def sampled_brief(case: Case) -> SampledBrief:
+    """Return the verdict on a case in short.  Raises ParameterError where the arm has no such loop."""
     try:
-        return brief_of(sampled_verdict(arm, law, chain), law, chain)
+        return brief_of(sampled_verdict(case), case)
     except ConvergenceError as error:
-        return brief_of(error, law, chain)
+        return brief_of(error, case)
 
 
-def brief_of(found: Verdict | ConvergenceError, law: AnyLaw, chain: Chain) -> SampledBrief:
-    """A verdict on a law in short, or the reason that there is none; in capitals where the loop is not stable."""
-    T, delay = chain.sampling.period, chain.sampling.delay_samples
-    origin = chain.period_from or (DEFAULT_PERIOD if Sampling().period == T else "")
-    origin = LAWS_PERIOD if as_law(law).is_discrete else origin
+def brief_of(found: Verdict | ConvergenceError, case: Case) -> SampledBrief:
+    """A verdict on a case in short, or the reason that there is none; in capitals where the loop is not stable."""
+    T = case.chain.sampling.period
+    delay = case.chain.sampling.delay_samples
+    origin = case.chain.period_from or (DEFAULT_PERIOD if Sampling().period == T else "")
+    origin = LAWS_PERIOD if case.law.is_discrete else origin
     verdict = None if isinstance(found, ConvergenceError) else found
     word, _, rest = (f"undecided: {found}" if verdict is None else verdict.sentence).partition(" ")
     is_stable = None if verdict is None else verdict.is_stable

@@ -18,6 +18,7 @@ Spillover: a law is designed on a model of a few modes, and may destabilise a mo
 """
 
 import math
+import warnings
 from collections.abc import Iterable
 from functools import cached_property
 from typing import Annotated, NamedTuple
@@ -25,11 +26,12 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import AnyLaw, Arm, arm_and_law, as_law
+from tfarm.arm import AnyLaw, Arm
 from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex, Real
+from tfarm.case import Case
 from tfarm.errors import ConvergenceError, ParameterError, require
 from tfarm.records import frozen
 from tfarm.reduced.modal import modal_model, sensed_model
@@ -40,7 +42,7 @@ from .continuous import MOST_BAND_MODES, QUIET_REACH, ContinuousLoop, band_of, g
 from .curve import LoopVerdict, next_limits
 from .loop_margins import PhaseCrossover
 from .poles import HUB, Poles, box_of, poles_below, poles_by_mode, poles_of_model
-from .theorem import GIVES, TAKES, Theorem, theorem_of
+from .theorem import GIVES, TAKES, Theorem
 
 LEAST_BAND_MODES = 12  # flexible modes in the band at C = 0, and at least
 QUIET = 0.5  # |L| beyond the band, with damping
@@ -86,7 +88,9 @@ class Stability(LoopVerdict):
     """
 
     loop: Annotated[ContinuousLoop, Quantity(flat=True)]
-    verdict: Annotated[str, Quantity("stability", help="stable, marginal or unstable; the pole of a free hub left out")]
+    word: Annotated[
+        str, Quantity("stability", key="verdict", help="stable, marginal or unstable; the pole of a free hub left out")
+    ]
     unstable_roots: Annotated[int, Quantity("unstable poles", help="in the frequency range")]
     unstable_roots_infinite: Annotated[bool, Quantity(help="infinitely many poles beyond the range are unstable")]
     band: Annotated[float, BAND]
@@ -109,7 +113,7 @@ class Stability(LoopVerdict):
     @property
     def is_stable(self) -> Annotated[bool, Quantity(key="stable", help="whether the verdict is stable")]:
         """Whether every pole but that of the free hub angle lies left of the axis."""
-        return self.verdict == "stable"
+        return self.word == "stable"
 
     @property
     def full(self) -> ContinuousLoop:
@@ -117,9 +121,10 @@ class Stability(LoopVerdict):
         return self.loop
 
     @property
-    def word(self) -> str:
-        """The verdict."""
-        return self.verdict
+    def verdict(self) -> str:
+        """The word, by its name of version 1.0."""
+        warnings.warn("Stability.verdict has moved: it is Stability.word", DeprecationWarning, stacklevel=2)
+        return self.word
 
     @property
     def range_words(self) -> str:
@@ -168,26 +173,26 @@ class Stability(LoopVerdict):
         factor follows from a theorem.
         """
         gains, arm = self.loop.gains, self.loop.arm
-        if gains is None or not arm.loses_at_hub_alone or theorem_of(self.loop).energy is None:
+        if gains is None or not arm.loses_at_hub_alone or self.loop.theorem.energy is None:
             return next_limits(t for _, t in by_phase)
         found = [t for w, t in by_phase if w == 0]
         found += [arm.input_per_torque / gains.K2] if gains.K2 else []
         return next_limits(found + ([-arm.rate_loss / gains.K1] if gains.K1 and arm.rate_loss else []))
 
 
-def stability(arm: Arm, law: AnyLaw, band: float | None = None) -> Stability:
-    """Return the verdict on the loop of an arm and a law.  `band` [rad/s] is chosen if it is not given.
+def stability(case: Case, band: float | None = None) -> Stability:
+    """Return the verdict on the loop of a case.  `band` [rad/s] is chosen if it is not given.
 
     Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted, and where with damping
     one is on the axis to working precision.
     """
-    return verdict_on(ContinuousLoop(arm, as_law(law)), band)
+    return verdict_on(ContinuousLoop(case), band)
 
 
 def verdict_on(loop: ContinuousLoop, band: float | None = None) -> Stability:
     """Return the verdict on a loop, as `stability`."""
-    theorem = theorem_of(loop)
-    height, quiet = (band, False) if band is not None else band_of_loop(loop, theorem)
+    theorem = loop.theorem
+    height, quiet = (band, False) if band is not None else band_of_loop(loop)
     poles = poles_below(loop, height, LISTED_LEFT)
     delayed = DELAYED if loop.arm.is_undamped and loop.law.delay and loop.feeds_back else ""
     tail = theorem.reason if theorem.energy is not None else SMALL_GAIN if quiet else delayed
@@ -238,9 +243,9 @@ def hub_shares(arm: Arm, up_to: float) -> Real:
     return np.array([b * scale / k, b * arm.hub_side_inertia * omega**2 * scale / (EI * k**2)])
 
 
-def band_of_loop(loop: ContinuousLoop, theorem: Theorem | None = None) -> tuple[float, bool]:
+def band_of_loop(loop: ContinuousLoop) -> tuple[float, bool]:
     """The band [rad/s] in which poles are computed, and whether small gain holds beyond it (never without damping)."""
-    theorem, arm, own = theorem or theorem_of(loop), loop.arm, loop.law.poles
+    theorem, arm, own = loop.theorem, loop.arm, loop.law.poles
     ringing = own[own.real > -DULL * abs(own)]
     fastest, highest = BEYOND_LAW_POLES * float(abs(ringing).max(initial=0.0)), band_of(arm, MOST_BAND_MODES)
     least = max(band_of(arm, LEAST_BAND_MODES), min(fastest, highest))
@@ -293,7 +298,7 @@ def is_known_without(loop: ContinuousLoop, name: str) -> bool:
     """
     try:
         without = loop.having(name, 0.0)
-        return theorem_of(without).energy in (TAKES, 0) or band_of_loop(without)[1]
+        return without.theorem.energy in (TAKES, 0) or band_of_loop(without)[1]
     except (ParameterError, ConvergenceError):
         return False
 
@@ -362,7 +367,7 @@ class Spill:
         """The exact loop, and the models that are stable where it is not."""
         if not self.driven.size:
             where = "" if self.verdict.is_known_beyond else " in the frequency range"
-            return f"none: the exact loop is {self.verdict.verdict}{where}"
+            return f"none: the exact loop is {self.verdict.word}{where}"
         which = f"mode {self.first_mode}" if self.first_mode else "a pole below the first mode"
         words = f"{which} is unstable in the exact loop, at {abs(self.driven[0]):.6g} rad/s"
         if not self.content.size:
@@ -385,10 +390,10 @@ def spill(arm: Arm, law: AnyLaw, most: int = USUAL_SPILL_MODES) -> Spill:
     Raises ParameterError for an invalid law, where there is no loop, or none of finite order; ConvergenceError as
     `stability` does.
     """
-    (arm, _), law = arm_and_law(arm, law), as_law(law)
+    case = Case(arm, law)
     most = whole("modes", most, 1, MOST_SPILL_MODES, f"a whole number of modes, 1 to {MOST_SPILL_MODES}")
-    require(not law.is_improper, "law", law.name, "differentiates, and has no states; add a fast pole to den")
-    verdict = stability(arm, law)
+    require(not case.law.is_improper, "law", case.law.name, "differentiates, and has no states; add a fast pole to den")
+    verdict = stability(case)
     loop, numbers, unstable, rightmost = verdict.loop, np.arange(1, most + 1), [], []
     slowest = REST_SHARE * float(modes(loop.arm, 1).natural_frequency[-1])
     for model in _bare_models(loop, most):

@@ -43,13 +43,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import Arm, HubFeedback, Law, as_law
+from tfarm.arm import Law
 from tfarm.arm.blocks import Rational
+from tfarm.loop.loop import Loop
 from tfarm.records import frozen
 from tfarm.response import transfer
 from tfarm.schema import Quantity
-
-from .continuous import ContinuousLoop
 
 if TYPE_CHECKING:
     Poly = Any  # of sympy, over the rationals: it comes without types, and is imported where it is used
@@ -87,12 +86,13 @@ DAMPED = "C = 0: every mode beyond is damped (Lyapunov), with a decay rate that 
 DRIVEN = "C = 0: every flexible mode beyond is unstable too, with a growth rate that tends to 0"
 
 
-def absorbed(arm: Arm, law: Law) -> tuple[float, Law] | None:
+def absorbed(loop: Loop) -> tuple[float, Law] | None:
     """The share k of the moment on the hub that a law cancels, and the rest of the law.
 
     None for laws on other signals than the hub's angle and rate and, statically, the moment that acts on the hub.  With
     damping in the links that moment is not the gauge's.
     """
+    arm, law = loop.arm, loop.law
     share, rest = 0.0, []
     for part in law.parts:
         if part.signals != ("root_moment",):
@@ -108,9 +108,9 @@ def absorbed(arm: Arm, law: Law) -> tuple[float, Law] | None:
     return share, replace(law, parts=tuple(rest), references=())
 
 
-def theorem_of(loop: ContinuousLoop) -> Theorem:
+def theorem_of(loop: Loop) -> Theorem:
     """Return the theorem that decides the stability of every mode of a loop."""
-    arm, parts = loop.arm, absorbed(loop.arm, loop.law)
+    arm, parts = loop.arm, absorbed(loop)
     if parts is None or (arm.input_lags and loop.feeds_back):
         return NO_THEOREM
     share, rest = parts
@@ -129,7 +129,7 @@ def theorem_of(loop: ContinuousLoop) -> Theorem:
     return NO_THEOREM
 
 
-def signs_of_loop(loop: ContinuousLoop) -> Signs:
+def signs_of_loop(loop: Loop) -> Signs:
     """The sign of the law of a loop, the hub's friction included; none behind an inductance."""
     if loop.arm.input_lags:
         return Signs("", "the torque lags behind the input, through an inductance")
@@ -211,20 +211,20 @@ class Lyapunov:
     the law is "unproven", which alone does not make it unstable.  `reason` is one sentence.
     """
 
-    loop: ContinuousLoop
     proven: Annotated[bool, Quantity("stability proven", help="no pole in the right half-plane, as V never grows")]
     a1_over_a2: Annotated[float | None, Quantity("weights a1/a2", help="1 - K2, of the energies in V")]
     kind: Literal["dissipated", "conserved", "unproven"]
     reason: Annotated[str, Quantity("reason", help="sign of V_t, or the term of V or V_t that has no sign")]
 
 
-def lyapunov(arm: Arm, law: HubFeedback) -> Lyapunov:
-    """Return Lyapunov's proof for gains at the hub with a strain gauge.  Raises ParameterError where there is no loop.
+def lyapunov(loop: Loop) -> Lyapunov:
+    """Return Lyapunov's proof for a loop of gains at the hub, with a strain gauge.
 
     V_t = -a2 K1 theta_t^2 - a1 C integral(E I phi_xt^2) with a1/a2 = 1 - K2, where that has a sign.
     """
-    loop, C = ContinuousLoop(arm, as_law(law)), arm.damping
-    weight, K1 = 1.0 - law.K2 / arm.input_per_torque, law.K1 + arm.rate_loss
+    arm, law = loop.arm, loop.law.gains
+    assert law is not None
+    C, weight, K1 = arm.damping, 1.0 - law.K2 / arm.input_per_torque, law.K1 + arm.rate_loss
     least = 0.0  # of Kp: below 0 where the tip is held, and gives the hub a static stiffness
     if law.Kp < 0 and not arm.has_rigid_mode:
         least = -weight / float(transfer(arm, "hub_angle").static)
@@ -243,12 +243,12 @@ def lyapunov(arm: Arm, law: HubFeedback) -> Lyapunov:
         ),
     }
     if reason := next((text for text, holds in obstacles.items() if holds), ""):
-        return Lyapunov(loop, False, None, "unproven", reason)
+        return Lyapunov(False, None, "unproven", reason)
     loss = "V_t = -a2 K1 theta_t^2" + ("" if arm.is_undamped else " less the dissipation of the material")
     is_dissipated = bool(K1) or not arm.is_undamped
     change = f"never grows ({loss})" if is_dissipated else "is constant (K1 = 0), and no motion decays"
     reason = f"V with a1/a2 = {weight:g} {change}: no pole lies in the right half-plane"
-    return Lyapunov(loop, True, weight, "dissipated" if is_dissipated else "conserved", reason)
+    return Lyapunov(True, weight, "dissipated" if is_dissipated else "conserved", reason)
 
 
 # ------------------------------------------------------------ polynomials, exactly

@@ -16,8 +16,9 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from tfarm.arm import LISTED, NAMES, RATE_GAIN, AnyLaw, Arm, Law, arm_and_law, full_law, unit_of
+from tfarm.arm import LISTED, NAMES, RATE_GAIN, Law, unit_of
 from tfarm.arrays import Complex, Real, Whole
+from tfarm.case import Case
 from tfarm.crossing import Line
 from tfarm.errors import ConvergenceError, require
 from tfarm.exact.characteristic import Analytic
@@ -42,14 +43,13 @@ Title = tuple[str, str]  # label and unit
 
 @frozen
 class Varied:
-    """The loops of an arm and a law, with the number `vary` from `start` to `stop`.
+    """The loops of a case, with the number `vary` from `start` to `stop`.
 
     `vary` is a number of the law as `Law.having` names it, "all" (a factor on it), or of the arm.  Raises
     ParameterError for another name, and where there is no loop.
     """
 
-    arm: Arm
-    law: AnyLaw
+    case: Case
     vary: str
     start: float
     stop: float
@@ -81,7 +81,7 @@ class Varied:
     def unit(self) -> str:
         """The SI unit of the number, "1" of a pure one."""
         of_other = ARM_PARAMETERS | {"delay": "s"}
-        return unit_of(self.vary, self.arm) if self.vary in NAMES else of_other.get(self.vary, "1")
+        return unit_of(self.vary, self.case.arm) if self.vary in NAMES else of_other.get(self.vary, "1")
 
     @property
     def title(self) -> Title:
@@ -96,10 +96,10 @@ class Varied:
         """Whether the law alone dissipates, and is static: then modes may stay on the axis at all values."""
         return self.first.k.is_real_on_axis and self.full.is_static and not self.full.delay
 
-    @cached_property
+    @property
     def full(self) -> Law:
-        """The law; gains at the hub as a law of all of these."""
-        return full_law(self.law)
+        """The law; of gains at the hub a part for each."""
+        return self.case.feedback
 
     def law_at(self, value: float) -> Law:
         """The law where the number has that value."""
@@ -116,14 +116,14 @@ class Varied:
 
         @lru_cache(200)
         def of_arm(value: float) -> ContinuousLoop:
-            return ContinuousLoop(arm_and_law(self.arm.having(**{self.vary: value}), self.law)[0], self.full)
+            return ContinuousLoop(self.case.on(self.case.arm.having(**{self.vary: value})))
 
         return of_arm
 
     @cached_property
     def first(self) -> ContinuousLoop:
         """The loop at the first value."""
-        return self.at(self.start) if self.is_of_arm else ContinuousLoop(self.arm, self.law_at(self.start))
+        return self.at(self.start) if self.is_of_arm else ContinuousLoop(self.case.under(self.law_at(self.start)))
 
     @cached_property
     def pinned(self) -> int:

@@ -17,7 +17,7 @@ from tfarm.errors import ConvergenceError
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.lines import LEADING, Along, LawTerms, critical, crossed, static_edge, unstable_below
 from tfarm.loop.stability import Stability, band_of_family, is_known_without, verdict_on
-from tfarm.loop.theorem import TAKES, absorbed, theorem_of
+from tfarm.loop.theorem import TAKES, absorbed
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import first_frequency, gain_unit, most_gain
@@ -96,7 +96,7 @@ def windows_of(verdict: Stability, names: Iterable[str] | None = None) -> dict[s
     one band: high enough for both ends of each range, or that of a verdict beyond which nothing is known.
     """
     loop, numbers = verdict.loop, verdict.loop.numbers
-    if loop.gains is None and (verdict.verdict == "marginal" or loop.arm.has_elastic_link):
+    if loop.gains is None and (verdict.word == "marginal" or loop.arm.has_elastic_link):
         return {}
     ranges = {name: looked_at(loop, name) for name in names or numbers}
     solved = {name: pair for name, pair in ranges.items() if pair[0] < pair[1] and not is_decided_along(loop, name)}
@@ -166,7 +166,7 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
     found = without_losses(loop, name, found)
     pairs, count, at = found.spans(*limits), verdict.unstable_roots, value
     resting = [each.change for each in found if each.t == value and each.at == 0]
-    is_known = verdict.verdict != "marginal"
+    is_known = verdict.word != "marginal"
     if is_known and resting in ([1], [-1]):  # the verdict leaves that pole out
         count += resting[0] > 0
     elif not (is_known and any(low < value < high for low, high in pairs)):
@@ -234,8 +234,8 @@ def theorem_windows(loop: ContinuousLoop, name: str, limits: Window, edges: Cros
 
 def is_held(loop: ContinuousLoop) -> bool:
     """Whether a theorem excludes unstable poles: every mode is damped, and the static stiffness is positive."""
-    parts = absorbed(loop.arm, loop.law)
-    if parts is None or not parts[0] < 1 or theorem_of(loop).energy != TAKES:
+    parts = absorbed(loop)
+    if parts is None or not parts[0] < 1 or loop.theorem.energy != TAKES:
         return False
     # 1e-9 of the lowest frequency: L there is that of an arm at rest
     small = np.array([1e-9 * first_frequency(loop.arm)], dtype=complex)

@@ -196,7 +196,7 @@ def _words(data: Nyquist, name: str) -> str:
     verdict = data.verdict
     gains = gains_words(verdict.loop.law).removeprefix(f"{name}, ")
     counts = f"encirclements of −1: {data.encirclements:d};  unstable poles: {verdict.unstable_roots}"
-    return f"{safe(name)}{': ' * bool(name)}{verdict.verdict.upper()}\n{safe(gains)}\n{counts}"
+    return f"{safe(name)}{': ' * bool(name)}{verdict.word.upper()}\n{safe(gains)}\n{counts}"
 
 
 @picture(

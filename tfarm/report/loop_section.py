@@ -11,6 +11,7 @@ from tfarm.arm.law import REFERENCE, is_measured
 from tfarm.assessment.card import POOR, margins_of, result_card
 from tfarm.assessment.card import loop_function as loop_curves
 from tfarm.assessment.stability_map import DESIGNED_MODES, stability_map
+from tfarm.case import Case
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain
 from tfarm.dsp.discretise import rule_in_words
@@ -239,7 +240,7 @@ def locus_section(report: ArmReport) -> PageSection:
     found: dict[str, loci.Loci] = {}
     for name, (start, stop) in ranges.items():
         try:
-            found[name] = own = loci.loci(arm, gains, name, start, stop)
+            found[name] = own = loci.loci(Case(arm, gains), name, start, stop)
             stem = f"locus-{name}"
             blocks += [
                 picture("locus", roots.draw_loci.figure(own), stem=stem, data=locus_data(own), found=own),

@@ -38,6 +38,7 @@ from tfarm.arm.chain import file_text
 from tfarm.arm.writing import law_toml
 from tfarm.assessment.card import LoopCard
 from tfarm.assessment.stability_map import DESIGNED_MODES
+from tfarm.case import Case
 from tfarm.digits import how_many, kept_digits, listed, plain, scientific, significant
 from tfarm.dsp import Chain, discretise, load_chain
 from tfarm.errors import ConvergenceError, ParameterError, one_line
@@ -402,11 +403,11 @@ def on_hub(arm: Arm, gains: HubFeedback, name: str, key: str) -> Controller:
 def check_laws(report: ArmReport) -> None:
     """Raise ParameterError for a law that does not suit this arm or the sampling period of its chain."""
     for each in report.controllers if report.laws and not report.arm.is_locked else ():
-        law = discretise.with_all_gains(*arm_and_law(each.arm, each.law))
-        Signals(each.arm, law.signals)
-        if not law.is_discrete:
-            ContinuousLoop(each.arm, law)
-        discretise.discretised(law, report.chain.sampling.period)
+        case = Case(each.arm, each.law, report.chain)
+        Signals(case.arm, case.law.signals)
+        if not case.law.is_discrete:
+            ContinuousLoop(case)
+        discretise.acting_law(case)
 
 
 def has_loop(arm: Arm) -> bool:

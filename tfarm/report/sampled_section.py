@@ -15,6 +15,7 @@ from tfarm.arm.chain import MOST_DELAY
 from tfarm.assessment.card import margins_of, sampled_of
 from tfarm.assessment.stability_map import StableRegions, stable_regions
 from tfarm.assessment.step import Step, step
+from tfarm.case import Case
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain, Simulation, results, traces
 from tfarm.dsp.traces import motion_of
@@ -105,7 +106,7 @@ def delays_table(found: Sequence[tuple[Controller, Analysis]], chain: Chain) -> 
             delay = sampling.delay_samples + more
             if delay + each.law.delay / sampling.period <= MOST_DELAY:
                 late = replace(chain, sampling=replace(sampling, delay_samples=delay))
-                rows.append((each.name, 1e3 * sampling.period * more, sampled_verdict(each.arm, each.law, late)))
+                rows.append((each.name, 1e3 * sampling.period * more, sampled_verdict(Case(each.arm, each.law, late))))
     names, delays, verdicts = zip(*rows, strict=True)
     columns = (
         Column("law", "controller", of=names),
@@ -180,7 +181,7 @@ def slews(report: ArmReport) -> tuple[list[Picture | Table], list[str], list[Fac
     for each in (*([] if report.laws else [bare]), *report.controllers):
         try:
             duration = traces.RECORD_LENGTH * chain.slew.rise_time
-            runs[each.name] = results.drawn(each.arm, each.law, chain, "slew", duration)
+            runs[each.name] = results.drawn(Case(each.arm, each.law, chain), "slew", duration)
             simulated.append(each)
         except ParameterError as error:
             words.append(f"No slew of {each.name} is simulated: {error}.")

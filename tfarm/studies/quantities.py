@@ -24,6 +24,7 @@ from tfarm.arm import PLANE
 from tfarm.arrays import Real
 from tfarm.assessment.card import LoopCard, loop_card, words_of
 from tfarm.assessment.step import LoopResponse, step
+from tfarm.case import Case
 from tfarm.errors import ConvergenceError, TfarmError, must_be_known, require
 from tfarm.exact.system import system_of
 from tfarm.loop.poles import closed_loop_poles
@@ -128,7 +129,7 @@ def _card_of(loop: str) -> Asked:
             card = loop_card(loop, case.arm, case.law, case.chain)
             return {name: value for name, _, value in entries_of(LoopCard, card, loop)}
         arm, law, chain = case.arm, case.law, case.chain
-        verdict = stability(one.driven_arm, law) if loop == "continuous" else sampled(arm, law, chain).verdict
+        verdict = stability(Case(one.driven_arm, law)) if loop == "continuous" else sampled(arm, law, chain).verdict
         return {f"{loop}.{key}": text for key, text in words_of(verdict, chain).items()}
 
     return {name: column for name, column, _ in entries_of(LoopCard, None, loop)}, values
@@ -168,11 +169,11 @@ def intervals_of(one: Subject, names: Set[str]) -> dict[str, Any]:
     """Stability and intervals of gains at the hub; undecided, without intervals, where poles cannot be counted."""
     found: dict[str, Any] = {STABILITY: "undecided"}
     with suppress(ConvergenceError):
-        verdict = stability(one.driven_arm, one.case.law)
+        verdict = stability(Case(one.driven_arm, one.case.law))
         gains = [gain for gain in PLANE if gain in verdict.loop.numbers and any(f".{gain}." in name for name in names)]
         for gain, of in windows_of(verdict, gains).items():
             found |= {f"{INTERVAL}.{gain}.{name}": getattr(of.interval, name, None) for name in Interval._fields}
-        found[STABILITY] = verdict.verdict
+        found[STABILITY] = verdict.word
     return found
 
 

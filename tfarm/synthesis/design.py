@@ -13,6 +13,7 @@ import numpy as np
 from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm, as_law, must_turn
 from tfarm.arm.chain import chain_or_usual
 from tfarm.arm.stages import Consumer
+from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.dsp.stages import admit
 from tfarm.errors import ConvergenceError, must_be_known, require
@@ -56,7 +57,7 @@ class OnArm:
         self,
     ) -> Annotated[str, Quantity("continuous-time loop", key="verdict", help="stability without sampling")]:
         """The verdict on the continuous-time loop."""
-        return self.verdict.verdict
+        return self.verdict.word
 
     @property
     def known_beyond(self) -> Annotated[bool, Quantity(help="whether the verdict holds for all higher modes too")]:
@@ -224,7 +225,7 @@ def design(
     same_input(arms)
     form = structure_of(structure, arm, Kp=Kp, modes=modes, period=chain.sampling.period, bounds={"K1": K1, "K2": K2})
     for each in arms:
-        ContinuousLoop(each.arm, as_law(form.record_at(form.origin)))
+        ContinuousLoop(Case(each.arm, as_law(form.record_at(form.origin))))
         check_bounds(form, each.arm)
     tell = progress or (lambda text: None)
     task = _Task(arm, objective, form, modes, chain, continuous, tell)
@@ -290,8 +291,8 @@ class _Task:
         x = choice.x
         own = choice.search.form
         on_arms = tuple(
-            OnArm(each.name, each.numbers, judge.value(law), stability(judge.arm, law),
-                  sampled_brief(judge.arm, law, judge.chain))
+            OnArm(each.name, each.numbers, judge.value(law), stability(Case(judge.arm, law)),
+                  sampled_brief(Case(judge.arm, law, judge.chain)))
             for each, judge in zip(named, choice.worst.judges, strict=True)
         )  # fmt: skip
         at_ends = own.at_ends(x)
@@ -317,7 +318,7 @@ def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Cha
     text = f"no law {form.name} with {within} was found that is stable"
     if chain is None:
         return f"{text}: widen the bounds"
-    verdict = max((sampled_verdict(each.arm, law, chain) for each in arms), key=lambda each: each.log_radius)
+    verdict = max((sampled_verdict(Case(each.arm, law, chain)) for each in arms), key=lambda each: each.log_radius)
     growth = np.expm1(verdict.log_radius)
     nearest = f"{verdict.slowest} grows by {growth:.2g} a sample" if growth > 0 else "there is no reserve"
     text = (

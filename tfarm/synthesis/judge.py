@@ -196,7 +196,7 @@ class Judge:
         """The least damping ratio; of the continuous-time loop that of its exact poles."""
         if self.is_sampled:
             return -self.score(law)
-        s = stability(self.arm, law, self.model.band).poles.values
+        s = stability(Case(self.arm, law), self.model.band).poles.values
         s = s[(s.imag > 0) & (s.imag < self.model.band)]
         return float((-s.real / abs(s)).min(initial=1.0))
 
@@ -217,8 +217,8 @@ class Judge:
         """Whether the loop is stable by the exact verdicts, when sampled also with a reserve."""
         shares = (1.0, 1 / RESERVE, RESERVE) if self.is_sampled else ()
         try:
-            return stability(self.arm, law).is_stable and all(
-                sampled_verdict(self.arm, law.times(share), self.chain).is_stable for share in shares
+            return stability(Case(self.arm, law)).is_stable and all(
+                sampled_verdict(Case(self.arm, law.times(share), self.chain)).is_stable for share in shares
             )
         except ConvergenceError:  # a pole on the axis or the circle
             return False

@@ -146,11 +146,12 @@ class Trial:
 
     def on(self, case: Case) -> Trial:
         """The same slew in another case, with the references of this one's arm."""
-        return replace(self, loop=sampled_loop(case.arm, case.law, case.chain, count=self.loop.plant.count))
+        return replace(self, loop=sampled_loop(case, count=self.loop.plant.count))
 
     def simulator(self, chain: Chain | None = None) -> Simulator:
         """A simulator of the loop, with the converters of a chain, by default that of the trial."""
-        return Simulator(self.arm, chain or self.loop.chain, self.task, count=self.loop.plant.count)
+        case = self.case if chain is None else self.case.through(chain)
+        return Simulator(case, self.task, count=self.loop.plant.count)
 
     def room(self, network: Network) -> tuple[kernel.Run, kernel.Work]:
         """Empty record and buffers of a trial with that network."""
@@ -200,7 +201,7 @@ def slew_trial(
     rise = chain.slew.rise_time
     require(length >= rise, "duration", length, f"a trial lasts at least as long as its slew, {rise:g} s")
     must_not_be_algebraic(arm, "hub.inertia", 0.0)
-    loop = sampled_loop(arm, gains, chain, count=count)
+    loop = sampled_loop(Case(arm, gains, chain), count=count)
     return Trial(loop, scenario("slew", arm, chain, length), cost, signals)
 
 
