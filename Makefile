@@ -42,7 +42,6 @@ SURVEYS := \
 	exported.laws \
 	exported.worst \
 	exported.tuners \
-	exported.unit_loops \
 	cli.fuzz \
 	cli.stops \
 	case.steps \

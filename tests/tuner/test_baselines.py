@@ -32,8 +32,20 @@ from tfarm.tuner.tuning import usual_plan
 GAINS = tfarm.HubFeedback(K1=0.3, K2=1.0)
 
 
-def best_of(monkeypatch, cost, windows):
-    """The best constant gain of a trial with that cost, and every gain that was tried."""
+@pytest.mark.parametrize(
+    ("cost", "windows", "best", "off"),
+    [
+        # the lowest of two valleys is the narrower one
+        (lambda K: min((K - 0.3) ** 2, 50 * (K - 0.8) ** 2 - 0.1), [(0.0, 1.0)], 0.8, 1e-7),
+        (lambda K: (K - 1.2) ** 2, [(0.0, 0.5), (1.0, 1.5)], 1.2, 1e-7),
+        # no moment feedback is not stable
+        (lambda K: K, [(0.2, 1.0)], 0.2, 1e-5),
+        (lambda K: 2.0 + K, [(0.0, 1.0)], 0.0, 0.0),
+        (lambda K: 2.0 + K, [], 0.0, 0.0),
+    ],
+)
+def test_the_best_constant_gain_has_the_lowest_cost_of_the_stability_intervals(monkeypatch, cost, windows, best, off):
+    """Costs with a minimum in closed form; no other gain is tried, but 0 where no gain is stable."""
     tried = []
 
     def with_constant(K):
@@ -41,27 +53,11 @@ def best_of(monkeypatch, cost, windows):
         return SimpleNamespace(cost=cost(K))
 
     monkeypatch.setattr(baselines, "constant_windows", lambda loop: windows)
-    return best_constant(SimpleNamespace(loop=None, n=300, with_constant=with_constant)), tried
-
-
-def test_the_lowest_of_two_valleys_is_found_though_it_is_the_narrower(monkeypatch):
-    found, _ = best_of(monkeypatch, lambda K: min((K - 0.3) ** 2, 50 * (K - 0.8) ** 2 - 0.1), [(0.0, 1.0)])
-    assert found == (pytest.approx(0.8, abs=1e-7), pytest.approx(-0.1, rel=1e-12))
-
-
-def test_only_gains_inside_the_stability_intervals_are_tried(monkeypatch):
-    found, tried = best_of(monkeypatch, lambda K: (K - 1.2) ** 2, [(0.0, 0.5), (1.0, 1.5)])
-    assert found.gain == pytest.approx(1.2, abs=1e-7)
-    assert all(0 <= K < 0.5 or 1.0 < K < 1.5 for K in tried)
-    found, tried = best_of(monkeypatch, lambda K: K, [(0.2, 1.0)])  # no moment feedback is not stable
-    assert 0.2 < min(tried) <= found.gain == pytest.approx(0.2, abs=1e-5)
-
-
-@pytest.mark.parametrize("windows", [[(0.0, 1.0)], []])
-def test_zero_gain_is_tried_too_and_alone_where_none_is_stable(monkeypatch, windows):
-    found, tried = best_of(monkeypatch, lambda K: 2.0 + K, windows)
-    assert found == (0.0, 2.0)
+    found = best_constant(SimpleNamespace(loop=None, n=300, with_constant=with_constant))
+    assert found.gain == pytest.approx(best, abs=off)
+    assert found.cost == cost(found.gain)
     assert len(tried) > 1 or not windows
+    assert all(any(low <= K < high for low, high in windows) or not (windows or K) for K in tried)
 
 
 POLES = [0.999 * np.exp(0.3j), 0.97 * np.exp(0.71j), np.exp(1j * math.pi / 4), 0.9 * np.exp(2.04j)]
