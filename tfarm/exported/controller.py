@@ -62,8 +62,8 @@ CONSUMER = Consumer(
 
 FILES = ("controller.h", "controller.c", "self_test.c", "example.c")
 REAL = {"double": ("double", "", "DBL_MAX"), "float": ("float", "f", "FLT_MAX"), FIXED: ("int32_t", "", "")}  # in C
-INPUT_ERROR, OVERFLOW, SATURATED, STATE_SATURATED = 1, 2, 3, 4  # status of a step, 0 of one without an event
-MINUEND, SUBTRAHEND = 0, 1  # columns of a plan
+INPUT_ERROR, OVERFLOW, SATURATED, STATE_SATURATED = range(1, 5)  # status of a step, 0 of one without an event
+MINUEND, SUBTRAHEND = range(2)  # columns of a plan
 LARGEST = 2147483647  # of 32 bits
 
 
@@ -115,7 +115,9 @@ class Controller:
     @cached_property
     def plan(self) -> Whole:
         """The two inputs whose difference is e of each column, as `run_real` has them: references less signals."""
-        law, rate, zero = self.word.law, self.inputs, self.inputs + 1
+        law = self.word.law
+        rate = self.inputs
+        zero = rate + 1
         signals = {name: n for n, name in enumerate(self.signals)} | ({RATE: rate} if self.hub else {})
         wanted = {name: len(self.signals) + n for n, name in enumerate(self.references)}
         rows = [(wanted[name] if name in law.references else zero, signals[name]) for name in law.signals]
@@ -142,8 +144,10 @@ class Controller:
 
     def run(self, inputs: NDArray[Any]) -> tuple[NDArray[Any], Whole]:
         """Outputs and status (n,) of inputs (n, k), those of the C code bit for bit; whole numbers in fixed point."""
-        word, kind = self.word, np.int64 if self.word.precision == FIXED else np.float64
-        outputs, status = np.zeros(len(inputs), kind), np.zeros(len(inputs), int)
+        word = self.word
+        kind = np.int64 if word.precision == FIXED else np.float64
+        outputs = np.zeros(len(inputs), kind)
+        status = np.zeros(len(inputs), int)
         table, inputs = (np.ascontiguousarray(each, dtype=kind) for each in (word.table, inputs))
         if word.precision == FIXED:
             run_fixed(table, word.shifts, self.plan, inputs, self.whole_dac, outputs, status)
@@ -174,7 +178,9 @@ def c_controller(task: ExportTask) -> Export:
 
 def word_length(controller: Controller, name: str, gains: list[NoiseGain], limit_cycle: float | None) -> WordLength:
     """The record of a controller's arithmetic, in the realisation of this name."""
-    word, (low, high), bounds = controller.word, controller.limits, controller.word.bounds
+    word = controller.word
+    low, high = controller.limits
+    bounds = word.bounds
     samples = None if bounds.is_whole else MOST_SUMMED
     excluded = f"excluded for inputs within their ranges{f', for {samples} samples' if samples else ''}"
     # in fixed point the scale of a state
@@ -209,7 +215,8 @@ def source_files(
 
     `bounds` are stated with the ranges of the inputs.
     """
-    name, signals = name_in_c(task.name or "controller"), identifiers(controller.signals, "y_")
+    name = name_in_c(task.name or "controller")
+    signals = identifiers(controller.signals, "y_")
     references = identifiers(controller.references, "r_")
     values = values_of(task, controller, ports_of(task, controller, signals, references))
     values |= {"name": next(iter(name.values())), "facts": facts, "bounds": bounds}
@@ -221,7 +228,8 @@ def in_z(case: Case) -> Law:
 
     Raises ParameterError for a delay of its own that is no whole number of samples.
     """
-    law, period = case.law, case.chain.sampling.period
+    law = case.law
+    period = case.chain.sampling.period
     samples = law.delay / period
     remedy = f"is {samples:.6g} samples: C code has a delay of whole samples; write another one into the law's states"
     # but for the rounding of a delay
@@ -233,7 +241,9 @@ def in_z(case: Case) -> Law:
 def controller_of(law: Law, task: ExportTask) -> Controller:
     """A realised law in the numbers of a task.  Raises ParameterError as `word_of` does."""
     chain = task.case.chain
-    of, T, dac = chain.converters, chain.sampling.period, quantisers(chain)[DAC]
+    of = chain.converters
+    T = chain.sampling.period
+    dac = quantisers(chain)[DAC]
     is_estimated = of.hub_rate == "difference" and RATE in law.signals
     remedy = 'with q31 the hub rate is an input, or the law reads hub_angle: set converters.hub_rate = "ideal"'
     require(not (is_estimated and task.precision == FIXED), "converters.hub_rate", of.hub_rate, remedy)
@@ -266,11 +276,16 @@ def run_real(table: Any, plan: Any, inputs: Any, dac: Any, hub: Any, single: boo
     among the inputs, an estimated hub rate and 0; `dac` is a row of the quantisers; `hub` index of the hub angle (-1:
     no estimate), pole and period of the estimated rate.
     """
-    n, forward = table.shape[0] - 1, inputs.shape[1] - 1
-    known, z, following = np.zeros(forward + 3), np.zeros(table.shape[1]), np.zeros(n + 1)
-    memory, clipped = np.zeros(3), np.zeros(3, np.bool_)
+    n = table.shape[0] - 1
+    forward = inputs.shape[1] - 1
+    known = np.zeros(forward + 3)
+    z = np.zeros(table.shape[1])
+    following = np.zeros(n + 1)
+    memory = np.zeros(3)
+    clipped = np.zeros(3, np.bool_)
     for k in range(inputs.shape[0]):
-        known[: forward + 1], before = inputs[k], memory.copy()
+        known[: forward + 1] = inputs[k]
+        before = memory.copy()
         status[k] = INPUT_ERROR
         if np.isfinite(inputs[k]).all():
             if hub[0] >= 0.0:
@@ -296,8 +311,10 @@ def shifted(value: int, shift: int) -> int:
 @compiled
 def run_fixed(table: Any, shifts: Any, plan: Any, inputs: Any, dac: Any, outputs: Any, status: Any) -> None:
     """The same in fixed point; `dac` is the shift of the step of the DAC, 0 for none, lowest and highest output."""
-    n, forward = table.shape[0] - 1, inputs.shape[1] - 1
-    known, z = np.zeros(forward + 3, np.int64), np.zeros(table.shape[1], np.int64)
+    n = table.shape[0] - 1
+    forward = inputs.shape[1] - 1
+    known = np.zeros(forward + 3, np.int64)
+    z = np.zeros(table.shape[1], np.int64)
     following = np.zeros(n + 1, np.int64)
     for k in range(inputs.shape[0]):
         known[: forward + 1] = inputs[k]
@@ -322,9 +339,12 @@ def run_fixed(table: Any, shifts: Any, plan: Any, inputs: Any, dac: Any, outputs
 
 def values_of(task: ExportTask, controller: Controller, ports: Sequence[Port]) -> dict[str, Any]:
     """The values of the templates, but for name and facts."""
-    word, is_fixed, (real, suffix, largest) = controller.word, task.precision == FIXED, REAL[task.precision]
+    word = controller.word
+    is_fixed = task.precision == FIXED
+    real, suffix, largest = REAL[task.precision]
     arm = task.case.arm
-    dac, unit = controller.whole_dac if is_fixed else controller.dac, arm.input_unit
+    dac = controller.whole_dac if is_fixed else controller.dac
+    unit = arm.input_unit
     cast, zero = ("(int64_t)", "") if is_fixed else ("", f"0.0{suffix}")
     known = [*(f"{cast}input->{each.identifier}" for each in ports), f"({real})rate", zero]
     return {
@@ -352,7 +372,8 @@ def statuses(controller: Controller) -> dict[str, int]:
 
 def ports_of(task: ExportTask, controller: Controller, *known: dict[str, str]) -> list[Port]:
     """The inputs of the C function: signals, references, and the feedforward."""
-    word, ranges = controller.word, controller.ranges
+    word = controller.word
+    ranges = controller.ranges
     steps = f", at most {ranges[RATE] * controller.hub[1]!r} a sample" if controller.hub and RATE in ranges else ""
     over = ", over {!r}".format if word.precision == FIXED else lambda size: ""
     found = []
@@ -370,7 +391,9 @@ def recorded(
 ) -> dict[str, Any]:
     """Values of the template of a self-test, whose inputs are those of a linear congruential generator."""
     # a thousand samples, one of them refused for a NaN
-    samples, refused, seed = 1000, 500, 1
+    samples = 1000
+    refused = 500
+    seed = 1
     places = range(samples * len(ports))
     _, *numbers = accumulate(places, lambda last, _: (1664525 * last + 1013904223) % 2**32, initial=seed)
     inputs: NDArray[Any] = np.array(numbers, dtype=np.int64).reshape(samples, -1)

@@ -116,16 +116,21 @@ def fmu(task: ExportTask) -> Export:
 
     Raises ParameterError for a loop that is not certified stable, a controller in fixed point, and as `Simulator` does.
     """
-    prepared, has_plant, name = prepared_simulator(task), task.what != "controller", task.name or task.what
-    variables, own = variables_of(task.what, prepared), identifiers([name], "fmu_")
+    prepared = prepared_simulator(task)
+    has_plant = task.what != "controller"
+    name = task.name or task.what
+    variables = variables_of(task.what, prepared)
+    own = identifiers([name], "fmu_")
     law = None if task.what == "plant" else law_code(task, prepared.law, variables)
-    verdict, period = law.verdict if law else "", repr(float(task.case.chain.sampling.period))
+    verdict = law.verdict if law else ""
+    period = repr(float(task.case.chain.sampling.period))
     about = f"{task.what} of {task.case.arm.name}, sampled every {period} s{verdict and f': {verdict}'}"
     modes = prepared.plant.count if has_plant else None
     guid = hashlib.sha256(repr((task.sha256, name, about, modes, variables, version("tfarm"))).encode()).hexdigest()
     head: dict[str, Any] = {"variables": variables, "has_plant": has_plant, "period": period, "about": about}
-    head["guid"], numbers = guid[:32], plant_code(prepared)
-    source = render("fmu.c", law=law, functions=FUNCTIONS, errors=ERRORS, sha256=task.sha256, **head, **numbers)
+    head["guid"] = guid[:32]
+    plant = plant_code(prepared)
+    source = render("fmu.c", law=law, functions=FUNCTIONS, errors=ERRORS, sha256=task.sha256, **head, **plant)
     sources = {"fmi2.h": render("fmi2.h"), "fmu.c": source, **(law.files if law else {})}
     binary, compiler = binary_of(sources, own[name])
     files = {f"sources/{name}": content for name, content in sources.items()} | binary
@@ -142,8 +147,8 @@ def law_code(task: ExportTask, law: Law, variables: Sequence[Variable]) -> LawCo
     remedy = "a functional mock-up unit has a controller in double or float; take c for fixed point"
     require(task.precision != FIXED, "precision", task.precision, remedy)
     task = replace(task, precision="float" if task.case.chain.converters.is_single else task.precision)
-    acting = replace(law, delay=0.0) if task.what == "loop" else law
-    controller = controller_of(in_z(task.case.under(acting)), task)
+    own = task.case.under(replace(law, delay=0.0) if task.what == "loop" else law)
+    controller = controller_of(in_z(own), task)
     controller = replace(controller, hub=None, signals=law.signals, dac=np.array([0.0, -np.inf, np.inf]))
     case = task.case.under(replace(controller.word.rounded, delay=task.case.law.delay))
     found = task.analysis(case)
@@ -175,13 +180,15 @@ def prepared_simulator(task: ExportTask) -> Simulator:
 
 def variables_of(what: What, of: Simulator) -> list[Variable]:
     """The variables of a unit: inputs, parameters, outputs."""
-    drive, law = of.plant.arm.input, of.law
+    drive = of.plant.arm.input
+    law = of.law
 
     def variable(name: str, causality: str, prefix: str = "", words: str = "") -> Variable:
         label, unit = signal_words(name)
         return Variable(f"{prefix}{name}", causality, unit, f"{words}{label}")
 
-    unit, side = signal_words(drive)[1], "input" if what == "controller" else "output"
+    unit = signal_words(drive)[1]
+    side = "input" if what == "controller" else "output"
     names = law.signals if what == "controller" else of.measured
     sensors = [variable(name, side, MEASURED, "reading of the ") for name in names]
     wanted = dict.fromkeys((*law.references, *(name.removeprefix(REFERENCE) for name in law.wanted)))
@@ -201,7 +208,8 @@ def variables_of(what: What, of: Simulator) -> list[Variable]:
 
 def plant_code(of: Simulator) -> dict[str, Any]:
     """The numbers of the plant in its template."""
-    chain, model = of.electronics, of.model
+    chain = of.electronics
+    model = of.model
     tables = {
         "turn[PIECES][POLES][2]": parts(model.turn),
         "push[PIECES][POLES][2]": parts(model.push),

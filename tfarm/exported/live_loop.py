@@ -87,8 +87,8 @@ def _of_gains(case: Case, start: HubFeedback) -> LiveNumbers:
     y = moment_axis(arm, x)
     stiffest = 0.1 * angle_unit(arm)
     axes = dict(zip(NAMES, (*map(_range, (x, y)), _range(Axis(0.0, stiffest, 1e-4 * stiffest))), strict=True))
-    ends = product(*((of["low"], of["high"]) for of in axes.values()))
-    corners = [case.under(HubFeedback(**dict(zip(NAMES, each, strict=True)))) for each in ends]
+    ends = [(of["low"], of["high"]) for of in axes.values()]
+    corners = [case.under(HubFeedback(K1=K1, K2=K2, Kp=Kp)) for K1, K2, Kp in product(*ends)]
     reference = default_gains(arm)
     across = np.unique(np.r_[rate_columns(arm, x, LIVE_COLUMNS), x.high])
     continuous = gain_map(arm, across, np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE]))
@@ -162,7 +162,8 @@ def _of_any_law(case: Case, corners: Sequence[Case], unit: Law | None = None) ->
 
     Gains at the hub have no `unit`.
     """
-    arm, period = case.arm, case.chain.sampling.period
+    arm = case.arm
+    period = case.chain.sampling.period
     samples, is_quiet = _samples(case, corners, unit)
     return {
         **sensor_numbers(arm),
@@ -337,7 +338,8 @@ def slew_numbers(case: Case) -> LiveNumbers | None:
     None where there is no such slew, and of one of more than 5000 samples, 160 kB of references: it is left to
     `tfarm simulate`.
     """
-    arm, chain = case.arm, case.chain
+    arm = case.arm
+    chain = case.chain
     try:
         task = scenario("slew", arm, chain, traces.RECORD_LENGTH * chain.slew.rise_time)
         if task.t.size > 5000:

@@ -115,7 +115,8 @@ def loop_system(plant: NamedSystem, controller: NamedSystem) -> NamedSystem:
 
     The first outputs of the plant are the first inputs of the controller.
     """
-    (A, B, C, _), (a, b, c, d) = plant.matrices, controller.matrices
+    A, B, C, _ = plant.matrices
+    a, b, c, d = controller.matrices
     n = sum(not name.startswith(REFERENCE) for name in controller.inputs)
     matrix, _, u = closed(A, B, C[:n], a, b[:, :n], c, d[:, :n])
     # the input by feedforward and references
@@ -147,13 +148,15 @@ def reduced_system(reduced: ReducedModel, outputs: tuple[str, ...]) -> NamedSyst
 
 def reduced_systems(arm: Arm, names: tuple[str, ...]) -> dict[str, NamedSystem]:
     """Return modal models with the modes of the sampled plant, one for each place along the arm."""
-    read, found = Signals(arm, names), {}
+    read = Signals(arm, names)
+    found = {}
     own = list(zip(names, read.outputs, read.places, strict=True))
     along = [place for _, output, place in own if output.place == "x"]
     for n, share in enumerate(dict.fromkeys(along or [0.0])):
         # outputs at an end are with those of the first place
         here = [each for each in own if (each[2] == share if each[1].place == "x" else n == 0)]
-        outputs, x = [output for _, output, _ in here], share * arm.length if along else None
+        outputs = [output for _, output, _ in here]
+        x = share * arm.length if along else None
         order = modal_model(arm, outputs, USUAL_MODES, x).order
         reduced = reduce(arm, outputs, order=order, method="modal", x=x)
         found[f"reduced_{n + 1}" if n else "reduced"] = reduced_system(reduced, tuple(name for name, _, _ in here))
@@ -191,7 +194,8 @@ class Linear(NamedTuple):
 
 def linear(task: ExportTask) -> Linear:
     """Return the systems of a task.  Raises ParameterError for a loop that is not certified stable."""
-    case, what = task.case, task.what
+    case = task.case
+    what = task.what
     facts = {
         "arm": case.arm.name,
         "sampled plant": f"linear{not_covered(CONSUMER, case.chain)}",
@@ -249,7 +253,8 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
     output it is written alone.  Raises ParameterError, naming `key`, where they cannot be written, or a script of that
     name is another file's.
     """
-    path, model = Path(path), reduced.model
+    path = Path(path)
+    model = reduced.model
     G = transfer(model.arm, model.rows, x=model.x)
     exact = response_data(model.arm, reduced.input, reduced.outputs, reduced.band, G)
     of = Linear({"sys": reduced_system(reduced, reduced.outputs)}, [], exact)

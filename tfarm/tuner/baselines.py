@@ -79,20 +79,29 @@ def best_constant(trial: Trial) -> BestConstant:
 
 def lq_bound(trial: Trial) -> Record:
     """Return the optimal trial; its K is zero, as it has no moment feedback, and its u is e."""
-    model, m = trial.model, trial.reference.rigid
-    a, b = trial.numbers.T * trial.cost.a, trial.numbers.T * trial.cost.b
+    model = trial.model
+    m = trial.reference.rigid
+    a = trial.numbers.T * trial.cost.a
+    b = trial.numbers.T * trial.cost.b
     # of the states and 1: the last column of A is B r, the last entry of c is -m
-    A, B, c = np.pad(model.A, (0, 1)), np.r_[model.B, 0.0], np.r_[model.moment, 0.0]
-    A[-1, -1], P, gains = 1.0, np.zeros_like(A), np.zeros((trial.n, B.size))
+    A = np.pad(model.A, (0, 1))
+    B = np.r_[model.B, 0.0]
+    c = np.r_[model.moment, 0.0]
+    A[-1, -1] = 1.0
+    P = np.zeros_like(A)
+    gains = np.zeros((trial.n, B.size))
     # e_k = -gains_k s, the last sample first
     for k in reversed(range(trial.n)):
-        A[:-1, -1], c[-1], PB = model.B * trial.reference.rest[k], -m[k], P @ B
+        A[:-1, -1] = model.B * trial.reference.rest[k]
+        c[-1] = -m[k]
+        PB = P @ B
         if (weight := b + B @ PB) > 0:
             gains[k] = A.T @ PB / weight
         closed = A - np.outer(B, gains[k])
         P = closed.T @ P @ closed + b * np.outer(gains[k], gains[k]) + a * np.outer(c, c)
         P = (P + P.T) / 2
-    states, e = np.zeros((trial.n + 1, B.size - 1)), np.zeros(trial.n)
+    states = np.zeros((trial.n + 1, B.size - 1))
+    e = np.zeros(trial.n)
     for k, gain in enumerate(gains):
         e[k] = -gain[:-1] @ states[k] - gain[-1]
         states[k + 1] = model.A @ states[k] + model.B * (e[k] + trial.reference.rest[k])
@@ -128,7 +137,8 @@ def shaper(loop: Sampled, kind: Shaper, modes: int = 2) -> Real:
 
     By default for those two that a slew excites most.
     """
-    impulses, build = np.ones(1), zero_vibration if kind == "ZV" else extra_insensitive
+    impulses = np.ones(1)
+    build = zero_vibration if kind == "ZV" else extra_insensitive
     poles: Any = loop.having(MOMENT_GAIN, 0.0).poles
     for mode in range(1, modes + 1):
         own = loop.plant.poles[(loop.plant.mode == mode) & (loop.plant.poles.imag > 0)]
@@ -267,7 +277,8 @@ def compare_controllers(
     found = []
     for condition in tried_loops(trial.case) if listed is None else listed:
         here = trial.on(condition.case)
-        own, bound = best_constant(here), lq_bound(here)
+        own = best_constant(here)
+        bound = lq_bound(here)
         found.append(
             Outcomes(
                 condition=condition.name,

@@ -94,12 +94,16 @@ def learn_by_trials(
     last accepted one is taken back, its step halved and the momentum set to zero; after an accepted one the step grows
     again, up to its full size.
     """
-    n, size = run.x.size, weights.size
-    gradient, change, kept, slope = np.zeros(size), np.zeros(size), weights.copy(), np.zeros(size)
-    best, share = np.inf, 1.0
+    size = weights.size
+    gradient = np.zeros(size)
+    change = np.zeros(size)
+    kept = weights.copy()
+    slope = np.zeros(size)
+    best = np.inf
+    share = 1.0
     for trial in range(costs.size):
         done = forward(setting, weights, run, work)
-        cost = trial_cost(done, setting.numbers, run) if done == n else np.inf
+        cost = trial_cost(done, setting.numbers, run) if done == run.x.size else np.inf
         costs[trial] = cost
         if takes_back and not cost <= best and best < np.inf:
             share *= 0.5
@@ -131,30 +135,32 @@ def derive(k: int, setting: Setting, weights: Real, run: Run, work: Work, S: Rea
 
     S (n, weights) is that of the state, and advances by one sample.
     """
-    model, by_input = setting.model, work.by_input
+    states, size = S.shape
+    model = setting.model
+    by_input = work.by_input
     for row in range(D.shape[0] - 1, BEFORE - 1, -1):
         copied(D[row - BEFORE], D[row])
     for row in range(BEFORE):
         D[row].fill(0.0)
-    for i in range(S.shape[0]):
-        for p in range(S.shape[1]):
+    for i in range(states):
+        for p in range(size):
             D[X, p] += model.moment[i] * S[i, p]
             D[U, p] -= model.servo[i] * S[i, p]
     gain_gradient(weights, run.inputs[k], run.hidden[k], run.slope[k], D[K], by_input)
     for i in range(by_input.size):
-        for p in range(S.shape[1]):
+        for p in range(size):
             D[K, p] += by_input[i] / setting.scales[i] * D[INPUT_ROWS[i], p]
-    for p in range(S.shape[1]):
+    for p in range(size):
         D[E, p] = D[U, p] - run.K[k] * D[X, p] - run.x[k] * D[K, p]
     spare.fill(0.0)
-    for i in range(S.shape[0]):
-        for j in range(S.shape[0]):
+    for i in range(states):
+        for j in range(states):
             if model.A[i, j] != 0.0:
-                for p in range(S.shape[1]):
+                for p in range(size):
                     spare[i, p] += model.A[i, j] * S[j, p]
-        for p in range(S.shape[1]):
+        for p in range(size):
             spare[i, p] += model.B[i] * D[E, p]
-    for i in range(S.shape[0]):
+    for i in range(states):
         copied(spare[i], S[i])
 
 
@@ -168,9 +174,17 @@ def learn_by_samples(
     forward since the trial began: the gradient of a x^2/2 + b e^2/2 now, by weights that are taken for constant
     (Williams and Zipser, 1989).
     """
-    n, size, states, numbers = run.x.size, weights.size, work.state.size, setting.numbers
-    gradient, change, past, kept = np.zeros(size), np.zeros(size), np.zeros((numbers.lag, size)), weights.copy()
-    S, room, D = np.zeros((states, size)), np.zeros((states, size)), np.zeros((3 * BEFORE, size))
+    n = run.x.size
+    size = weights.size
+    states = work.state.size
+    numbers = setting.numbers
+    gradient = np.zeros(size)
+    change = np.zeros(size)
+    past = np.zeros((numbers.lag, size))
+    kept = weights.copy()
+    S = np.zeros((states, size))
+    room = np.zeros((states, size))
+    D = np.zeros((3 * BEFORE, size))
     for trial in range(costs.size):
         copied(weights, kept)
         work.state.fill(0.0)
@@ -309,7 +323,8 @@ def train(trial: Trial, network: Network, guard: Guard, learning: Learning, tria
     The same inputs give the same bits.  Raises ParameterError for an invalid number of trials or rates.
     """
     trials = whole("trials", trials, 1, 1_000_000, "a whole number of trials from 1 to 1000000")
-    weights, costs = network.weights, np.zeros(trials)
+    weights = network.weights
+    costs = np.zeros(trials)
     longest = math.inf if learning.rule == "plain" else learning.clip
     steps = Steps(learning.eta, learning.alpha, longest, learning.enough)
     common = (trial.setting(network, guard.limits), steps, weights, costs, *trial.room(network))
@@ -318,6 +333,5 @@ def train(trial: Trial, network: Network, guard: Guard, learning: Learning, tria
     else:
         made, sample = learn_by_samples(*common, learning.sensitivity == "whole")
     learnt = network.with_weights(weights)
-    result = trial.with_network(learnt, guard.limits)
     stopped = Stopped(made - 1, int(sample), trial.numbers.bound) if sample >= 0 else None
-    return Training(learnt, guard, costs[:made], result, stopped, sample == ENOUGH)
+    return Training(learnt, guard, costs[:made], trial.with_network(learnt, guard.limits), stopped, sample == ENOUGH)

@@ -110,19 +110,22 @@ class Trial:
     @cached_property
     def model(self) -> kernel.Model:
         """The loop from sample to sample, open at the torque, and the rows of the servo and the moment."""
-        loop, last = self.loop, self.loop.pulse.integrals_at + 2
-        A = loop.times(0.0).matrix()
+        loop = self.loop
+        last = loop.pulse.integrals_at + 2
+        A, drive = loop.rig.frame
         # the last state is the torque of the last sample: B is 1 there
         servo = -loop.having("K2", 0.0).matrix()[last]
         moment = -loop.times(0.0).having("K2", 1.0).matrix()[last]
-        of_plant = loop.pulse.matrices()[1], loop.rig.sensed.own_moment(loop.chain.sampling)
-        drive, own = (np.pad(of, (0, len(A) - of.size)) for of in of_plant)
+        own = loop.rig.sensed.own_moment(loop.chain.sampling)
+        own = np.pad(own, (0, drive.size - own.size))
         return kernel.Model(*(np.ascontiguousarray(each) for each in (A.T, A, drive, servo, moment, own)))
 
     @cached_property
     def reference(self) -> kernel.Reference:
         """The references at each sample."""
-        task, gains, none = self.task, self.loop.gains, np.zeros(self.n)
+        task = self.task
+        gains = self.loop.gains
+        none = np.zeros(self.n)
         counted, rest = (task.feedforward, none) if self.signals == "total" else (none, task.feedforward)
         wanted = gains.Kp * task.hub_angle + gains.K1 * task.hub_rate
         return kernel.Reference(wanted, counted, rest, task.moment_reference)
@@ -130,8 +133,10 @@ class Trial:
     @cached_property
     def numbers(self) -> kernel.Numbers:
         """The cost's weights, the period, the largest moment, and when and how x follows a torque."""
-        model, sampling = self.model, self.loop.chain.sampling
-        bound, delay = float(FOLDED_UP * self.arm.bending_scale), sampling.whole_delay
+        model = self.model
+        sampling = self.loop.chain.sampling
+        bound = float(FOLDED_UP * self.arm.bending_scale)
+        delay = sampling.whole_delay
         reply = float(model.moment @ np.linalg.matrix_power(model.A, delay) @ model.B)
         return kernel.Numbers(self.cost.a, self.cost.b, sampling.period, bound, 1 + delay, reply)
 
@@ -155,7 +160,9 @@ class Trial:
 
     def room(self, network: Network) -> tuple[kernel.Run, kernel.Work]:
         """Empty record and buffers of a trial with that network."""
-        (hidden, inputs), n, states = network.W1.shape, self.n, self.model.B.size
+        hidden, inputs = network.W1.shape
+        n = self.n
+        states = self.model.B.size
         run = kernel.Run(np.zeros((n, inputs)), np.zeros((n, hidden)), *np.zeros((6, n)))
         return run, kernel.Work(np.zeros(states), np.zeros(states), np.zeros(inputs))
 
@@ -255,7 +262,8 @@ class TunedGain:
         """The gain at this sample."""
         if m.k == 0:
             self._past = (0.0,) * 5
-        (u1, e1, x1, K1, e2), x = self._past, m.vibration
+        u1, e1, x1, K1, e2 = self._past
+        x = m.vibration
         u = m.servo(self.servo) + (m.feedforward if self.signals == "total" else 0.0)
         row = np.array([u, u1, e1, e2, x, x1, K1][: self.network.scales.size])
         K = self.network.gain(row, self.guard)
@@ -283,8 +291,8 @@ def tip_off(simulation: Simulation, trial: Trial) -> float | None:
     """Distance of the tip from its target [m] at the end of a simulated slew; None of an unstable loop."""
     if simulation.stopped is not None:
         return None
-    chain, arm = trial.loop.chain, trial.arm
-    return float(simulation.at_samples.tip_displacement[-1] - chain.slew.travel_of(arm.reach))
+    travel = trial.loop.chain.slew.travel_of(trial.arm.reach)
+    return float(simulation.at_samples.tip_displacement[-1] - travel)
 
 
 class SavedTuner(StrictTable):
@@ -311,7 +319,8 @@ class SavedTuner(StrictTable):
     @property
     def network(self) -> Network:
         """The network.  Raises ParameterError where its parts do not match."""
-        widths, inputs = {len(row) for row in self.W1}, len(self.scales)
+        widths = {len(row) for row in self.W1}
+        inputs = len(self.scales)
         require(widths == {inputs}, "W1", sorted(widths), f"rows of {inputs}, one weight an input")
         return Network(np.array(self.W1), np.array(self.w2), np.array(self.scales))
 

@@ -104,12 +104,14 @@ class Tuning:
     @property
     def finding(self) -> str:
         """Costs of the tuned slew, of the best constant gain, and without moment feedback."""
-        tuned, constant, without = self.training.result.cost, self.best_constant.cost, self.without.cost
-        return f"cost {tuned:.6g}; {constant:.6g} with the best constant gain, {without:.6g} without"
+        costs = self.training.result.cost, self.best_constant.cost, self.without.cost
+        return "cost {:.6g}; {:.6g} with the best constant gain, {:.6g} without".format(*costs)
 
     def saved(self) -> SavedTuner:
         """The record that `save_tuner` writes."""
-        guard, plan, network = self.training.guard, self.plan, self.training.network
+        guard = self.training.guard
+        plan = self.plan
+        network = self.training.network
         return SavedTuner(
             format=FORMAT, arm=self.trial.arm.name, period=self.trial.task.period, K1=plan.K1, Kp=plan.Kp,
             signals=plan.signals, a=plan.cost.a, b=plan.cost.b, guard_kind=guard.kind,
@@ -147,7 +149,8 @@ def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuni
     require(isinstance(plan, Plan | None), "plan", plan, "give a tfarm.tuner.Plan, such as Plan(trials=50, K1=0.3)")
     must_be_arm(arm)
     plan = usual_plan(arm, chain) if plan is None else plan
-    network, own = plan.network(plan.seed), replace(plan, learning=Learning(), trials=1, seed=0)
+    network = plan.network(plan.seed)
+    own = replace(plan, learning=Learning(), trials=1, seed=0)
     trial, guard, baselines = _baselines(arm, chain, own)
     return Tuning(
         trial=trial, plan=plan, training=train(trial, network, guard, plan.learning, plan.trials), **baselines
@@ -159,7 +162,8 @@ def _baselines(arm: Arm, chain: Chain | None, plan: Plan) -> tuple[Trial, Guard,
     """Return trial, guard and baselines of a plan: the same for each learning, seed and number of trials."""
     trial = plan.trial(arm, chain)
     best = best_constant(trial)
-    guard, shaped = find_guard(trial.loop, plan.guard, best.gain), dict[str, Baseline]()
+    guard = find_guard(trial.loop, plan.guard, best.gain)
+    shaped = dict[str, Baseline]()
     for kind in SHAPERS:
         late = shaped_trial(trial, kind)
         delay = late.task.busy_until - trial.task.busy_until
@@ -205,7 +209,8 @@ class SlewEnd(NamedTuple):
     @classmethod
     def of(cls, tuning: Tuning) -> SlewEnd:
         """The end of the trial of a tuning."""
-        simulator, gain = tuning.trial.simulator(), tuning.gain()
+        simulator = tuning.trial.simulator()
+        gain = tuning.gain()
         runs = gain.run(simulator), simulator.linear(tuning.constant), simulator.linear(gain.servo)
         residuals = runs[0].residual_moment, runs[0].residual_raw, runs[-1].residual_moment
         return cls(*residuals, *(tip_off(run, tuning.trial) for run in runs))
@@ -256,7 +261,8 @@ class TuningResult:
         self,
     ) -> Annotated[list[Baseline], Quantity("compared with baselines", help="costs of the same slew")]:
         """The costs with the tuner and with the baselines."""
-        tuning, best = self.tuning, self.tuning.best_constant
+        tuning = self.tuning
+        best = tuning.best_constant
         return [
             Baseline("no moment feedback", tuning.without.cost),
             Baseline(f"best constant gain, K = {best.gain:.4g}", best.cost),
@@ -268,7 +274,8 @@ class TuningResult:
     @property
     def numbers(self) -> Annotated[dict[str, Any], Quantity(flat=True, help="costs of tuner and baselines")]:
         """The same numbers by name."""
-        tuning, shaped = self.tuning, self.tuning.shaped
+        tuning = self.tuning
+        shaped = tuning.shaped
         bound = "the least cost of any control signal e on this slew, with full state and preview"
         if tuning.plan.signals == "total":
             bound = "the least cost of any torque: under this reading it is that of an arm at rest"
@@ -346,7 +353,8 @@ def controlled_run(
 
     Its guard is certified for the loop of its training, not for another arm or chain.
     """
-    chain, gain = with_signals(chain, saved.signals), saved.gain()
+    chain = with_signals(chain, saved.signals)
+    gain = saved.gain()
     case = Case(arm, gain.servo, chain)
     task = scenario(name, arm, chain, duration)
     run, used = simulated(case, task, count, between, outputs, gain.run)
