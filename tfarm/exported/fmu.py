@@ -56,31 +56,43 @@ LARGEST = sys.float_info.max  # of a range without limit
 LONGEST_TEXT = 400  # characters
 ERRORS = "logStatusError"  # category of messages
 MEASURED = "measured:"
-AT, STATE, KIND, SELF = ("const fmi2ValueReference *", "size_t"), "fmi2FMUstate", "fmi2StatusKind", "((model *)c)"
-ABSENT, ELSE_DISCARD = "report(c, fmi2Error, __func__)", "? fmi2OK : fmi2Discard"
+AT = ("const fmi2ValueReference *", "size_t")
+ABSENT = "report(c, fmi2Error, __func__)"
 FUNCTIONS: tuple[tuple[str, tuple[str, ...], str], ...] = (  # of FMI in one statement: name, types of arguments, status
     ("SetDebugLogging", ("fmi2Boolean", "size_t", "const fmi2String *"), "fmi2OK"),
     ("SetupExperiment", ("fmi2Boolean", "fmi2Real", "fmi2Real", "fmi2Boolean", "fmi2Real"), "begin(c, a3)"),
     ("EnterInitializationMode", (), "fmi2OK"),
-    ("ExitInitializationMode", (), f"{SELF}->at.is_running = 1, fmi2OK"),
+    ("ExitInitializationMode", (), "((model *)c)->at.is_running = 1, fmi2OK"),
     ("Terminate", (), "fmi2OK"),
-    ("Reset", (), f"memset({SELF}->given, 0, sizeof {SELF}->given), begin(c, 0.0)"),
+    ("Reset", (), "memset(((model *)c)->given, 0, sizeof ((model *)c)->given), begin(c, 0.0)"),
     *(
         (f"{act}{kind}", (*AT, f"{const}fmi2{kind} *"), f"a2 ? {ABSENT} : fmi2OK")
         for kind in ("Integer", "Boolean", "String")
         for act, const in (("Get", ""), ("Set", "const "))
     ),
-    *((f"{act}FMUstate", (f"{STATE}{star}",), ABSENT) for act, star in (("Get", " *"), ("Set", ""), ("Free", " *"))),
-    ("SerializedFMUstateSize", (STATE, "size_t *"), ABSENT),
-    ("SerializeFMUstate", (STATE, "fmi2Byte *", "size_t"), ABSENT),
-    ("DeSerializeFMUstate", ("const fmi2Byte *", "size_t", f"{STATE} *"), ABSENT),
+    ("GetFMUstate", ("fmi2FMUstate *",), ABSENT),
+    ("SetFMUstate", ("fmi2FMUstate",), ABSENT),
+    ("FreeFMUstate", ("fmi2FMUstate *",), ABSENT),
+    ("SerializedFMUstateSize", ("fmi2FMUstate", "size_t *"), ABSENT),
+    ("SerializeFMUstate", ("fmi2FMUstate", "fmi2Byte *", "size_t"), ABSENT),
+    ("DeSerializeFMUstate", ("const fmi2Byte *", "size_t", "fmi2FMUstate *"), ABSENT),
     ("GetDirectionalDerivative", (*AT, *AT, "const fmi2Real *", "fmi2Real *"), ABSENT),
     ("SetRealInputDerivatives", (*AT, "const fmi2Integer *", "const fmi2Real *"), ABSENT),
     ("GetRealOutputDerivatives", (*AT, "const fmi2Integer *", "fmi2Real *"), ABSENT),
     ("CancelStep", (), ABSENT),
-    *((f"Get{of}Status", (KIND, f"fmi2{of or 'Status'} *"), "fmi2Discard") for of in ("", "Integer", "String")),
-    ("GetRealStatus", (KIND, "fmi2Real *"), f"*a2 = {SELF}->at.time, a1 == fmi2LastSuccessfulTime {ELSE_DISCARD}"),
-    ("GetBooleanStatus", (KIND, "fmi2Boolean *"), f"*a2 = {SELF}->at.is_stopped, a1 == fmi2Terminated {ELSE_DISCARD}"),
+    ("GetStatus", ("fmi2StatusKind", "fmi2Status *"), "fmi2Discard"),
+    ("GetIntegerStatus", ("fmi2StatusKind", "fmi2Integer *"), "fmi2Discard"),
+    ("GetStringStatus", ("fmi2StatusKind", "fmi2String *"), "fmi2Discard"),
+    (
+        "GetRealStatus",
+        ("fmi2StatusKind", "fmi2Real *"),
+        "*a2 = ((model *)c)->at.time, a1 == fmi2LastSuccessfulTime ? fmi2OK : fmi2Discard",
+    ),
+    (
+        "GetBooleanStatus",
+        ("fmi2StatusKind", "fmi2Boolean *"),
+        "*a2 = ((model *)c)->at.is_stopped, a1 == fmi2Terminated ? fmi2OK : fmi2Discard",
+    ),
 )
 
 
@@ -157,8 +169,8 @@ def law_code(task: ExportTask, law: Law, variables: Sequence[Variable]) -> LawCo
     for of, array in (("output", "out"), ("input", "in")):
         names = [each.name for each in variables if each.causality == of]
         place |= {name: f"{array}[{n}]" for n, name in enumerate(names)}
-    fields = [f"{MEASURED}{each}" for each in controller.signals]
-    fields += [*(f"{REFERENCE}{each}" for each in controller.references), FEEDFORWARD]
+    fields = [MEASURED + each for each in controller.signals]
+    fields += [*(REFERENCE + each for each in controller.references), FEEDFORWARD]
     verdict = found.verdict.sentence if is_certified(found) else f"{ANYWAY}: {found.verdict.sentence}"
     code = {each: files[each] for each in ("controller.h", "controller.c")}
     return LawCode(first.identifier, [place[each] for each in fields], code, verdict)

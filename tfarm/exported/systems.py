@@ -253,7 +253,6 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
     output it is written alone.  Raises ParameterError, naming `key`, where they cannot be written, or a script of that
     name is another file's.
     """
-    path = Path(path)
     model = reduced.model
     G = transfer(model.arm, model.rows, x=model.x)
     exact = response_data(model.arm, reduced.input, reduced.outputs, reduced.band, G)
