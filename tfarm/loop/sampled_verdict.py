@@ -20,7 +20,7 @@ from tfarm.dsp.stages import admit_case, not_covered
 from tfarm.errors import ConvergenceError
 from tfarm.loop.circle import Band, complete_band
 from tfarm.loop.circle_crossings import FACTOR, around, stable_windows, windows_of
-from tfarm.loop.curve import LoopCurve, LoopVerdict, next_limits
+from tfarm.loop.curve import LoopAnalysis, LoopContour, LoopVerdict, next_limits
 from tfarm.loop.edges import (
     DelayMargin,
     Figure,
@@ -47,12 +47,10 @@ SAMPLED_LOOP = Consumer(
     partly=("arithmetic",),
     none=("reference", "volts"),
 )
-LAW_DELAY_DIGITS = 4  # of the delay margin of a law that is more than gains at the hub
 UNDAMPED_MODES = 20  # of an undamped arm, whose verdict is of the first modes alone
-FEWEST_COMPARED = 8  # modes of the smallest loop, twice as many in each next
-LARGEST_LOG = 700.0  # whose exponential is a double
 RADIUS_AGREES = 1e-4  # of ln of the spectral radius: its largest error with fewer modes
 RADIUS_NOISE = 1e-12  # and its rounding error
+ON_CIRCLE = 1e-12  # of ln|z|: an open-loop pole so near to the circle is on it
 MOST_COUNT = 400  # modes that may be asked for
 DEFAULT_PERIOD, LAWS_PERIOD = "tfarm's default period", "the controller's period"  # origins of a sampling period
 
@@ -108,7 +106,8 @@ class Verdict(OfLoop, LoopVerdict):
     def spectral_radius(self) -> Annotated[float, Quantity("spectral radius", digits=12,
             help="largest |z| of the closed-loop poles but z = 1 of a free hub angle; below 1 if stable")]:  # fmt: skip
         """Largest |z|; infinity where it overflows."""
-        return math.exp(self.log_radius) if self.log_radius < LARGEST_LOG else math.inf
+        # of 700 the exponential is a double
+        return math.exp(self.log_radius) if self.log_radius < 700.0 else math.inf
 
     @property
     def unstable_poles(self) -> Annotated[int, Quantity("unstable poles",
@@ -177,6 +176,24 @@ class Verdict(OfLoop, LoopVerdict):
         return math.pi / self.full.period
 
     @cached_property
+    def contour(self) -> LoopContour:
+        """Around the upper half of the circle, as s = ln(z)/T, and outside the poles on it."""
+        loop, poles = self.full, self.full.poles
+        s = np.log(1 + loop.rig.open_loop[loop.rig.open_loop != -1])
+        is_near = abs(s.real) <= ON_CIRCLE
+        closed = np.asarray(poles.log_radius + 1j * abs(np.angle(poles.z)), dtype=np.complex128)
+        return LoopContour(
+            grid=self.frequencies,
+            on_curve=np.unique(s.imag[is_near & (s.imag >= 0) & (s.imag < math.pi)]) / loop.period,
+            closed=closed / loop.period,
+            closing=np.empty(0, complex),
+            unstable_open=int((s.real > ON_CIRCLE).sum()),
+            unstable=poles.unstable,
+            clear=poles.unstable,
+            near_axis=int((poles.log_radius == 0).sum()),
+        )
+
+    @cached_property
     def factors(self) -> list[Window]:
         """Every stability interval of a factor on the whole law, with the modes of the verdict."""
         return stable_windows(self.loop, FACTOR)
@@ -230,7 +247,8 @@ def sampled_verdict(case: Case, *, count: int | None = None) -> Verdict:
         is_near = abs(fewer.poles.log_spectral_radius - radius) <= RADIUS_AGREES * abs(radius) + RADIUS_NOISE
         return is_near and fewer.poles.unstable == full.poles.unstable and proven in (None, fewer.poles.unstable)
 
-    few = min(FEWEST_COMPARED, full.plant.count // 2)
+    # 8 modes of the smallest loop, twice as many in each next
+    few = min(8, full.plant.count // 2)
     most = full.plant.count
     loops = (resized(full, few << n) for n in range(most.bit_length()) if 0 < few << n < most)
     loop = next(filter(agrees, loops), full)
@@ -249,7 +267,7 @@ class SampledNumber(NamedTuple):
 
 
 @frozen
-class Analysis:
+class Analysis(LoopAnalysis):
     """A sampled loop: its verdict, and, computed when first read, its limits of stability and its modes.
 
     `shown`, `delay` and `damping` are limits with their certified digits, or those that other modes confirm; the
@@ -258,11 +276,6 @@ class Analysis:
 
     verdict: Annotated[Verdict, Quantity(flat=True, help="stability of the loop")]
     damping_modes: int = UNDAMPED_MODES
-
-    @property
-    def curve(self) -> LoopCurve:
-        """The loop function on a grid that resolves it."""
-        return self.verdict.curve
 
     @property
     def in_band(self) -> LoopMargins | None:
@@ -360,7 +373,8 @@ class Analysis:
         if self.loop.is_of_gains:
             return delay_limit(self.loop, self.verdict.band)
         found = delay_margin(self.loop)
-        return Figure(found.samples, LAW_DELAY_DIGITS, None, self.verdict.modes_used, found.is_bound)
+        # four digits of the delay margin of a law that is more than gains at the hub
+        return Figure(found.samples, 4, None, self.verdict.modes_used, found.is_bound)
 
     @property
     def delay_margin(self) -> DelayMargin:
@@ -377,6 +391,12 @@ class Analysis:
     def damping_limit(self) -> Figure | Limit | None:
         """The same with a test of its digits, which takes as long as the search."""
         return damping_limit(self.loop, self.damping_modes) if self.loop.is_of_gains else None
+
+    def factor_intervals(self, delays: Real) -> list[Sequence[Window]]:
+        """Return the intervals of a positive factor on the law at each further delay [s] (n,)."""
+        sampling = self.loop.chain.sampling
+        late = sampling.delay_samples + delays / sampling.period
+        return [stable_windows(self.loop.with_delay(each), FACTOR) for each in late.tolist()]
 
     @property
     def stable_gain_factors(self) -> Annotated[list[Window] | None, Quantity("stable factors on the controller",
