@@ -153,8 +153,7 @@ class Controller:
             run_fixed(table, word.shifts, self.plan, inputs, self.whole_dac, outputs, status)
         else:
             hub = np.array([self.signals.index(ANGLE), *self.hub] if self.hub else [-1.0, 0.0, 1.0])
-            is_single = word.precision == "float"
-            run_real(table, self.plan, inputs, self.dac, hub, is_single, outputs, status)
+            run_real(table, self.plan, inputs, self.dac, hub, word.precision == "float", outputs, status)
         is_good = ~np.isin(status, (INPUT_ERROR, OVERFLOW))  # a refused sample moves no delay line: the output is held
         return np.r_[np.zeros(1 + self.delay, kind), outputs[is_good]][np.cumsum(is_good)], status
 
@@ -219,7 +218,8 @@ def source_files(
     signals = identifiers(controller.signals, "y_")
     references = identifiers(controller.references, "r_")
     values = values_of(task, controller, ports_of(task, controller, signals, references))
-    values |= {"name": next(iter(name.values())), "facts": facts, "bounds": bounds}
+    (own,) = name.values()
+    values |= {"name": own, "facts": facts, "bounds": bounds}
     return {file: render(file, **values) for file in FILES}, names_of(name, signals, references)
 
 

@@ -197,7 +197,7 @@ def variables_of(what: What, of: Simulator) -> list[Variable]:
 
     def variable(name: str, causality: str, prefix: str = "", words: str = "") -> Variable:
         label, unit = signal_words(name)
-        return Variable(f"{prefix}{name}", causality, unit, f"{words}{label}")
+        return Variable(prefix + name, causality, unit, words + label)
 
     unit = signal_words(drive)[1]
     side = "input" if what == "controller" else "output"

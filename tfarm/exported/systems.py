@@ -281,10 +281,10 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
 def py(task: ExportTask) -> Export:
     """Return the script of a task."""
     found = linear(task)
-    content = render("systems.txt", of=found, listed=listed)
     every = [name for each in found.systems.values() for name in (*each.inputs, *each.outputs)]
     changed = {name: new for name, new in zip(every, plain(every), strict=True) if new != name}
-    return task.exported({f"{task.what}.py": content}, names_of(changed), found.verdict)
+    contents = {f"{task.what}.py": render("systems.txt", of=found, listed=listed)}
+    return task.exported(contents, names_of(changed), found.verdict)
 
 
 def plain(names: Iterable[str]) -> list[str]:

@@ -252,8 +252,7 @@ def c_tuner(task: ExportTask) -> Export:
     require(saved.period == period, "sampling.period", period, remedy)
     tuner = ExportedTuner(saved, task.precision)
     of = tuner.numbers
-    gains = HubFeedback(K1=float(of.K1), K2=1.0, Kp=float(of.Kp))
-    loop = sampled_loop(case.under(gains), count=TRIAL_MODES)
+    loop = sampled_loop(case.under(HubFeedback(K1=float(of.K1), K2=1.0, Kp=float(of.Kp))), count=TRIAL_MODES)
     guard = sector_guard(loop, float(of.lo), float(of.hi))
     certainty = "not certified for a gain that varies" if guard is None else guard.sentence
     is_proven = guard is not None and guard.is_proven
@@ -267,8 +266,8 @@ def c_tuner(task: ExportTask) -> Export:
         "SHA-256 of the inputs": task.sha256, "tfarm": version("tfarm"),
     }  # fmt: skip
     name = name_in_c(task.name or "tuner")
-    contents = written(task, tuner, next(iter(name.values())), facts)
-    return task.exported(contents, names_of(name), certainty)
+    (own,) = name.values()
+    return task.exported(written(task, tuner, own, facts), names_of(name), certainty)
 
 
 def written(task: ExportTask, tuner: ExportedTuner, name: str, facts: dict[str, str]) -> dict[str, bytes]:

@@ -93,8 +93,8 @@ def with_system_matrix(law: Law, S: Real) -> Law:
     """The law with another state space of all its columns, and the sign of v = -sum."""
     columns = (*law.signals, *law.wanted)
     n = S.shape[1] - len(columns)
-    block = StateSpace(S[:n, :n], S[:n, n:], S[n:, :n], S[n:, n:])
-    return replace(law, parts=(Part(columns, block),), sign=-1)
+    part = Part(columns, StateSpace(S[:n, :n], S[:n, n:], S[n:, :n], S[n:, n:]))
+    return replace(law, parts=(part,), sign=-1)
 
 
 def closed(A: Real, B: Real, C: Real, a: Real, b: Real, c: Real, d: Real) -> tuple[Real, Real, Real]:

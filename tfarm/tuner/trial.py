@@ -335,8 +335,7 @@ class SavedTuner(StrictTable):
 
 def to_text(tuner: SavedTuner) -> str:
     """Text of a tuner's file; equal tuners give equal text, and it loads to the same bits."""
-    content = tuner.model_dump(exclude_defaults=True)
-    return json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+    return json.dumps(tuner.model_dump(exclude_defaults=True), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def save_tuner(tuner: SavedTuner, path: Path) -> None:

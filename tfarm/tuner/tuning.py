@@ -150,8 +150,7 @@ def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuni
     must_be_arm(arm)
     plan = usual_plan(arm, chain) if plan is None else plan
     network = plan.network(plan.seed)
-    own = replace(plan, learning=Learning(), trials=1, seed=0)
-    trial, guard, baselines = _baselines(arm, chain, own)
+    trial, guard, baselines = _baselines(arm, chain, replace(plan, learning=Learning(), trials=1, seed=0))
     return Tuning(
         trial=trial, plan=plan, training=train(trial, network, guard, plan.learning, plan.trials), **baselines
     )
@@ -162,14 +161,16 @@ def _baselines(arm: Arm, chain: Chain | None, plan: Plan) -> tuple[Trial, Guard,
     """Return trial, guard and baselines of a plan: the same for each learning, seed and number of trials."""
     trial = plan.trial(arm, chain)
     best = best_constant(trial)
-    guard = find_guard(trial.loop, plan.guard, best.gain)
     shaped = dict[str, Baseline]()
     for kind in SHAPERS:
         late = shaped_trial(trial, kind)
         delay = late.task.busy_until - trial.task.busy_until
         shaped[kind] = Baseline(f"input shaping, {kind}", late.with_constant(0.0).cost, delay)
-    without = trial.with_constant(0.0)
-    return trial, guard, {"without": without, "best_constant": best, "bound": lq_bound(trial), "shaped": shaped}
+    return (
+        trial,
+        find_guard(trial.loop, plan.guard, best.gain),
+        {"without": trial.with_constant(0.0), "best_constant": best, "bound": lq_bound(trial), "shaped": shaped},
+    )
 
 
 def tuned(arm: Arm, chain: Chain, plan: Plan | None = None, **numbers: float) -> Tuning:
