@@ -73,14 +73,8 @@ def test_names_are_listed_with_their_identifiers():
 
 def test_all_files_are_written_or_none(tmp_path):
     folder = tmp_path / "new" / "folder"
-    with pytest.raises(KeyError):
-        write_into(folder, _Broken({"a.c": b"a", "b.c": b"b"}))
+    with pytest.raises(TypeError):
+        write_into(folder, {"a.c": b"a", "b.c": None})
     assert not (tmp_path / "new").exists()
     write_into(folder, {"a.c": b"a", "resources/b.c": b"b"})
     assert (folder / "resources" / "b.c").read_bytes() == b"b"
-
-
-class _Broken(dict):
-    def items(self):
-        yield "a.c", self["a.c"]
-        yield "b.c", self["c.c"]

@@ -130,34 +130,25 @@ def test_no_kept_state_refuses_a_later_sample(precision):
 
 
 @pytest.mark.parametrize("precision", PRECISIONS)
-def test_no_sum_of_the_network_overflows(precision):
-    """u(t) and u(t-1) of the size of the largest number and with opposite weights: their sum is 0, not inf - inf."""
-    saved = tuner_of(0, W1=[[1e6, -1e6, 0.0, 0.0, 0.0, 0.0]], w2=[1.0], scales=[1.0] * 6)
-    tuner = ExportedTuner(saved, precision)
+def test_ends_of_the_network_and_of_the_guard(precision):
+    """u(t) and u(t-1) of the largest size with opposite weights: their sum is 0, not inf - inf.
+
+    No gain is above the guard where the sum of its lower end and its width is, by rounding.  A finite input times a
+    gain of ten is refused.
+    """
+    opposite = {"W1": [[1e6, -1e6, 0.0, 0.0, 0.0, 0.0]], "w2": [1.0], "scales": [1.0] * 6}
+    tuner, exceeded, large = (
+        ExportedTuner(tuner_of(0, **each), precision) for each in (opposite, EXCEEDED, {"guard": (5.0, 10.0)})
+    )
     row = np.zeros(7)
     row[[1, 4]] = np.array([-1.0, 1.0]) * float(tuner.numbers.largest)
-    _, status = tuner.run(np.array([row, row]))
-    assert not status.any()
+    assert not tuner.run(np.array([row, row]))[1].any()
     assert tuner.state[3] == pytest.approx(SECTOR[0] + (SECTOR[1] - SECTOR[0]) / (1 + math.exp(-0.5)), rel=1e-6)
-
-
-@pytest.mark.parametrize("precision", PRECISIONS)
-def test_no_gain_is_above_the_guard(precision):
-    """Where the sum of its lower end and its width is, by rounding."""
-    tuner = ExportedTuner(tuner_of(0, **EXCEEDED), precision)
-    tuner.run(np.zeros((1, 7)))
-    assert tuner.numbers.lo + (tuner.numbers.hi - tuner.numbers.lo) > tuner.numbers.hi
-    assert tuner.state[3] == tuner.numbers.hi
-
-
-def test_a_result_beyond_the_largest_number_is_refused():
-    """A finite input times a gain of ten."""
-    saved = tuner_of(0, guard=(5.0, 10.0))
-    tuner = ExportedTuner(saved)
-    row = np.zeros((1, 7))
-    row[0, 2] = 0.9 * float(tuner.numbers.largest)
-    torque, status = tuner.run(row)
-    assert (status[0], torque[0], tuner.state.tolist()) == (2, 0.0, [0.0] * 6)
+    of = exceeded.numbers
+    exceeded.run(np.zeros((1, 7)))
+    assert of.lo + (of.hi - of.lo) > of.hi == exceeded.state[3]
+    torque, status = large.run(0.9 * float(large.numbers.largest) * np.eye(7)[2:3])
+    assert (status[0], torque[0], large.state.tolist()) == (2, 0.0, [0.0] * 6)
 
 
 @pytest.mark.parametrize(("changed", "key"), [({"K1": 1e39}, "K1"), ({"scales": [1e-50] * 6}, "scales")])
