@@ -19,7 +19,6 @@ from tests.shared import thinned
 from tests.similar import EITHER
 from tests.transition import response as transition
 from tfarm import Hub, HubFeedback, Law
-from tfarm.arm import as_law
 from tfarm.loop.continuous import grid
 from tfarm.loop.loop_margins import lowest
 from tfarm.loop.plane import gain_map
@@ -106,8 +105,17 @@ def test_the_disk_margin_is_that_of_python_control_for_a_modal_model(arm, law) -
 def test_the_loop_bears_just_less_than_the_delay_margin(arm, law) -> None:
     """By the poles of the delayed loop, complete in their box by the winding number."""
     found = margins(arm, law)
-    late = [replace(as_law(law), delay=found.exact_delay * share) for share in (1 - 1e-5, 1 + 1e-5)]
+    late = [replace(loop_of(arm, law).law, delay=found.exact_delay * share) for share in (1 - 1e-5, 1 + 1e-5)]
     assert [verdict_of(arm, each).unstable_roots for each in late] == [0, 2]
+
+
+@pytest.mark.parametrize("ask", [tfarm.margins, tfarm.sampled])
+def test_up_to_the_delay_margin_the_law_itself_is_among_the_stable_factors(ask) -> None:
+    """Of both loops: crossovers and a map on one side, a scan and intervals of the circle on the other."""
+    found = ask(LAB, LAW)
+    delays = found.delay_margin_seconds * np.array([0.0, 0.99, 1.01])
+    inside = [any(low < 1 < high for low, high in each) for each in found.factor_intervals(delays)]
+    assert inside == [True, True, False]
 
 
 def test_what_nothing_bounds_beyond_the_band_is_not_called_exact() -> None:

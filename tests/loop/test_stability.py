@@ -17,7 +17,6 @@ from tests.shared import thinned
 from tests.shell import run
 from tests.spectrum.independent import delta
 from tfarm import Arm, Hub, HubFeedback, Law, Link, Payload, Section
-from tfarm.arm import as_law
 from tfarm.arm.blocks import Rational
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.exact.characteristic import Analytic
@@ -58,6 +57,13 @@ def test_what_lyapunov_proves_is_stable_however_slowly_it_decays(K1) -> None:
     """Of a stocky arm some modes decay by less than 1e-11 of their frequency, too little for double precision."""
     found = verdict_of(STOCKY, HubFeedback(K1=K1, K2=0.3))
     assert found.word == "stable"
+
+
+def test_the_word_of_a_verdict_has_its_former_name_too() -> None:
+    found = verdict_of(BARE, HubFeedback(K1=0.3))
+    with pytest.warns(DeprecationWarning, match=r"it is Stability\.word"):
+        assert found.verdict == found.word == "stable"
+    assert repr(found).startswith("Stability(word='stable'")
 
 
 HELD_TIPS = (Payload(mass=math.inf), Payload(inertia=math.inf), Payload(mass=math.inf, inertia=math.inf))
@@ -298,16 +304,15 @@ def zeros_in(arm, law, middle, radius, away=0, points=16):
 
 @pytest.mark.parametrize("name", thinned(LAWS, 5))
 def test_each_disc_holds_one_zero_of_the_papers_determinant_and_its_neighbour_none(name):
-    law = LAWS[name]
-    poles = tfarm.closed_loop_poles(LAB, law, 5)
-    discs = poles.certify(18)
+    poles = tfarm.closed_loop_poles(LAB, LAWS[name], 5)
+    law, discs = poles.loop.law, poles.certify(18)
     assert len(discs) == poles.moving.size > 3
     for disc, pole in zip(discs, poles.moving, strict=True):
         with mpmath.workdps(40):
             middle, radius = mpmath.mpc(disc.re, disc.im), mpmath.mpf(disc.radius)
         assert abs(complex(middle) - pole) < 1e-11 * abs(pole)
-        assert zeros_in(LAB, as_law(law), middle, radius) == 1
-        assert zeros_in(LAB, as_law(law), middle, radius, away=5) == 0
+        assert zeros_in(LAB, law, middle, radius) == 1
+        assert zeros_in(LAB, law, middle, radius, away=5) == 0
 
 
 TIP = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], [0.02, 1.0])}, delay=0.002)
@@ -356,7 +361,7 @@ def test_friction_at_the_hub_alone_damps_every_mode_that_the_hub_takes_part_in(f
     found = verdict_of(arm, HubFeedback())
     assert (found.word, found.unstable_roots, found.is_known_beyond) == ("stable", 0, True)
     assert (found.poles.values == 0).sum() == (stiffness == 0)
-    law = as_law(HubFeedback(K1=friction, Kp=stiffness))
+    law = loop_of(BARE, HubFeedback(K1=friction, Kp=stiffness)).law
     for pole in found.poles.moving[:: max(1, found.poles.moving.size // 6)]:
         assert pole.real < 0
         assert zeros_in(BARE, law, mpmath.mpc(pole), -pole.real / 9) == 1  # left of the axis, on which roots are cut

@@ -10,7 +10,6 @@ import pytest
 import tfarm
 from tests.loop.arms import loop_of
 from tests.shared import thinned
-from tfarm.arm import as_law
 from tfarm.exact.appendix import response as appendix_response
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.loop.time_response import ACTUATOR, Excitation, time_response, usual_poles
@@ -45,7 +44,7 @@ def durbin(values, duration, points=2**15):
 
 def exact_signals(arm, law, excitation, s):
     """The signals of a closed loop from the arm's transfer functions and the law's: G W/(1 + L)."""
-    law = as_law(law)
+    law = loop_of(arm, law).law
     L = sum(
         C * np.exp(-s * law.delay) * tfarm.transfer(arm, name)(s)
         for name, C in zip(law.signals, law.values(s), strict=True)
@@ -131,7 +130,7 @@ def test_the_rest_of_four_times_as_many_modes_is_within_the_bound(arm):
 def test_without_feedback_it_is_the_modal_sum(arm, name):
     """The rigid body and the residues of the modal model under a step of the torque, its remainder left out."""
     step = Excitation({ACTUATOR: lambda s: 1 / s})
-    found = time_response(usual_poles(loop_of(arm, as_law(tfarm.HubFeedback()))), (name,), step, 0.5)
+    found = time_response(usual_poles(loop_of(arm, tfarm.HubFeedback())), (name,), step, 0.5)
     model, t = modal_model(arm, name, 60), np.linspace(0.0, 0.5, 101)[1:]
     p, r = model.eigenvalues.ravel(), model.residues[0].ravel()
     p, r = np.r_[p, model.single], np.r_[r, model.single_residues[0]]
@@ -171,7 +170,7 @@ def test_the_final_value_is_that_of_the_theorem(stiffness):
 
 
 def test_a_growing_response_beyond_doubles_is_refused_with_a_duration():
-    poles = usual_poles(loop_of(LAB, as_law(tfarm.HubFeedback(K1=-30.0))))
+    poles = usual_poles(loop_of(LAB, tfarm.HubFeedback(K1=-30.0)))
     with pytest.raises(tfarm.ParameterError, match=r"duration = 1000.0: the loop is unstable .* at most [\d.]+ s"):
         time_response(poles, NAMES, versine(), 1000.0)
 
@@ -210,7 +209,7 @@ def test_the_largest_torque_is_found_on_both_sides_of_a_jump():
     assert peak.value <= peak.most <= 1000.0 + 1e-6
     ramp = Excitation({ACTUATOR: lambda s: 1 / s**2}, (0.0, 0.3), (1.0, -1.0))
     stopped = Excitation({ACTUATOR: lambda s: 1 / s**2 - 0.3 / s * np.exp(0 * s)}, (0.0,), (1.0,))
-    free = usual_poles(loop_of(LAB, as_law(tfarm.HubFeedback())))
+    free = usual_poles(loop_of(LAB, tfarm.HubFeedback()))
     t = np.linspace(0.0, 0.5, 101)
     np.testing.assert_allclose(time_response(free, NAMES, ramp, 0.5).at(t)[-1], np.minimum(t, 0.3), atol=1e-9)
     start = time_response(free, NAMES, stopped, 0.5).peaks(np.linspace(0.1, 0.5, 30))["torque"]
@@ -250,7 +249,7 @@ def test_the_largest_of_many_maxima_is_found_whatever_the_record():
     """That of a torque of two frequencies over forty periods, as on a grid of two million times."""
     w = np.array([50.0, 50.0 * 2**0.5])
     two = Excitation({ACTUATOR: lambda s: sum(0.5 * each / (s * s + each**2) for each in w)}, poles=tuple(1j * w))
-    found = time_response(usual_poles(loop_of(LAB, as_law(tfarm.HubFeedback()))), NAMES, two, 5.0)
+    found = time_response(usual_poles(loop_of(LAB, tfarm.HubFeedback())), NAMES, two, 5.0)
     t = np.linspace(0.0, 5.0, 2_000_001)
     expected = abs(0.5 * np.sin(np.outer(w, t)).sum(axis=0)).max()
     for points in (400, 701, 1000):
