@@ -198,9 +198,10 @@ def test_without_damping_a_proof_is_of_the_first_modes_and_no_proof_of_the_loop(
     assert "certified for the first 20 modes" in guard.sentence
 
 
-def test_a_loop_that_no_damping_saves(lab):
+@pytest.mark.parametrize("kind", ["frozen", "time-varying"])
+def test_a_loop_that_no_damping_saves(lab, kind):
     with pytest.raises(CertificationError, match="nor with any damping"):
-        find_guard(slew_trial(lab, K1=500.0).loop, "frozen", 0.3)
+        find_guard(slew_trial(lab, K1=500.0).loop, kind, 0.3)
 
 
 def test_a_frozen_guard_is_the_window_nearest_to_a_best_gain_that_lies_in_none(lab, monkeypatch):
@@ -211,21 +212,17 @@ def test_a_frozen_guard_is_the_window_nearest_to_a_best_gain_that_lies_in_none(l
     assert guard._frozen(loops, 3.5).lo == pytest.approx(4.0 + 2 * (1 - RADIUS_SHARE))
 
 
-@pytest.mark.parametrize(
-    ("best", "radius", "middle"),
-    [
-        (0.2, lambda m: m, 1.0),  # 0.2 is 0.8 of the radius off the middle of 0.2 ... 1.8
-        (0.9, lambda m: m, 2.0 * 60 / 61),  # the last one that is tried
-        (0.6, lambda m: min(m, 1.6 - m), 1.6 - 48 / 61),  # as wide as the widest that is tried, at 48/61
-        (0.0, lambda m: 0.01, 2.0 / 61),  # near enough nowhere: as near as can be
-        (0.5, lambda m: 0.0, None),
-    ],
-)
-def test_the_middle_of_the_default_sector_by_closed_forms(monkeypatch, best, radius, middle):
-    """Of sixty that are tried in 0 ... 2 the widest that holds the best gain, shifted as far as it goes on widening."""
-    monkeypatch.setattr(guard, "constant_windows", lambda loop: [(0.0, 2.0)])
-    found = guard._middle(SimpleNamespace(loop=None, radius=radius), best)
-    assert found == (None if middle is None else pytest.approx(middle, abs=2.0 / 61 / 2**11))
+@pytest.mark.parametrize("best", [0.1, 0.336, 1.1])
+def test_the_default_sector_is_the_widest_with_the_best_gain_a_tenth_inside(loop, best):
+    """Of all middles in the stability interval; beyond it the sector is the last one."""
+    found = find_guard(loop.loop, "time-varying", best)
+    ((low, high),) = guard.constant_windows(loop.loop)
+    radii = {m: loop.radius(m) for m in np.linspace(low, high, 302)[1:-1].tolist()}
+    widest = max(radius for m, radius in radii.items() if abs(best - m) <= 0.8 * radius)
+    half = (found.hi - found.lo) / 2 / RADIUS_SHARE
+    assert half == pytest.approx(widest, rel=0.04)
+    assert abs(best - (found.hi + found.lo) / 2) <= 0.8 * half * (1 + 1e-3)
+    assert find_guard(loop.loop, "time-varying", 3 * high).lo > 0.95 * high
 
 
 def test_guarded_runs_stay_bounded_and_in_the_guard():

@@ -19,18 +19,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Law
-from tfarm.arm.chain import Chain
 from tfarm.arm.checks import positive
 from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import Real, Whole
+from tfarm.case import Case
 from tfarm.dsp.discretise import discretised, system_matrix
 from tfarm.dsp.kernel import DAC, estimate, law_step, quantise, rounded
 from tfarm.dsp.simulate import quantisers
 from tfarm.errors import must_be_known, require
 from tfarm.exact.compiled import compiled, inlined
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.exported.result import Export, ExportTask, Name, is_certified, names_of
+from tfarm.exported.result import Export, ExportTask, Name, names_of
 from tfarm.exported.texts import facts_of, identifiers, literal, name_in_c, render
 from tfarm.exported.word_length import (
     ANGLE,
@@ -46,7 +46,6 @@ from tfarm.exported.word_length import (
     with_system_matrix,
     word_of,
 )
-from tfarm.loop.sampled_verdict import Analysis, sampled
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 
@@ -63,8 +62,8 @@ CONSUMER = Consumer(
 
 FILES = ("controller.h", "controller.c", "self_test.c", "example.c")
 REAL = {"double": ("double", "", "DBL_MAX"), "float": ("float", "f", "FLT_MAX"), FIXED: ("int32_t", "", "")}  # in C
-INPUT_ERROR, OVERFLOW, SATURATED, STATE_SATURATED = 1, 2, 3, 4  # status of a step, 0 of one without an event
-MINUEND, SUBTRAHEND = 0, 1  # columns of a plan
+INPUT_ERROR, OVERFLOW, SATURATED, STATE_SATURATED = range(1, 5)  # status of a step, 0 of one without an event
+MINUEND, SUBTRAHEND = range(2)  # columns of a plan
 LARGEST = 2147483647  # of 32 bits
 
 
@@ -116,7 +115,9 @@ class Controller:
     @cached_property
     def plan(self) -> Whole:
         """The two inputs whose difference is e of each column, as `run_real` has them: references less signals."""
-        law, rate, zero = self.word.law, self.inputs, self.inputs + 1
+        law = self.word.law
+        rate = self.inputs
+        zero = rate + 1
         signals = {name: n for n, name in enumerate(self.signals)} | ({RATE: rate} if self.hub else {})
         wanted = {name: len(self.signals) + n for n, name in enumerate(self.references)}
         rows = [(wanted[name] if name in law.references else zero, signals[name]) for name in law.signals]
@@ -143,35 +144,42 @@ class Controller:
 
     def run(self, inputs: NDArray[Any]) -> tuple[NDArray[Any], Whole]:
         """Outputs and status (n,) of inputs (n, k), those of the C code bit for bit; whole numbers in fixed point."""
-        word, kind = self.word, np.int64 if self.word.precision == FIXED else np.float64
-        outputs, status = np.zeros(len(inputs), kind), np.zeros(len(inputs), int)
+        word = self.word
+        kind = np.int64 if word.precision == FIXED else np.float64
+        outputs = np.zeros(len(inputs), kind)
+        status = np.zeros(len(inputs), int)
         table, inputs = (np.ascontiguousarray(each, dtype=kind) for each in (word.table, inputs))
         if word.precision == FIXED:
             run_fixed(table, word.shifts, self.plan, inputs, self.whole_dac, outputs, status)
         else:
             hub = np.array([self.signals.index(ANGLE), *self.hub] if self.hub else [-1.0, 0.0, 1.0])
-            is_single = word.precision == "float"
-            run_real(table, self.plan, inputs, self.dac, hub, is_single, outputs, status)
+            run_real(table, self.plan, inputs, self.dac, hub, word.precision == "float", outputs, status)
         is_good = ~np.isin(status, (INPUT_ERROR, OVERFLOW))  # a refused sample moves no delay line: the output is held
         return np.r_[np.zeros(1 + self.delay, kind), outputs[is_good]][np.cumsum(is_good)], status
 
 
 def c_controller(task: ExportTask) -> Export:
-    """The files of a controller in C99, and its finite word length."""
-    exact = task.analysis(task.law)
-    law, name, gains = least_noise(in_z(task.law, task.chain), exact.verdict.loop)
+    """The files of a controller in C99, and its finite word length.
+
+    Raises ParameterError where the loop with the coefficients as exported is not certified stable, unless `anyway`.
+    """
+    law = in_z(task.case)
+    law, name, gains = least_noise(law, task.analysis(task.case).verdict.loop)
     controller = controller_of(law, task)
     word = controller.word
-    found = judged(task, word)
+    case = task.case.under(word.rounded)
+    found = task.judged(case, "precision", task.precision, f"rounded to {task.precision} the loop", "take more digits")
     details = word_length(controller, name, gains, word.limit_cycle(found.verdict.loop))
     bounds = dict(facts_of(details)) | ({} if details.samples else {"samples of these bounds": "all"})
-    contents, names = source_files(task, controller, [*task.facts(word.rounded, found).items()], [*bounds.items()])
+    contents, names = source_files(task, controller, [*task.facts(case, found).items()], [*bounds.items()])
     return task.exported(contents, names, found.verdict.sentence, details)
 
 
 def word_length(controller: Controller, name: str, gains: list[NoiseGain], limit_cycle: float | None) -> WordLength:
     """The record of a controller's arithmetic, in the realisation of this name."""
-    word, (low, high), bounds = controller.word, controller.limits, controller.word.bounds
+    word = controller.word
+    low, high = controller.limits
+    bounds = word.bounds
     samples = None if bounds.is_whole else MOST_SUMMED
     excluded = f"excluded for inputs within their ranges{f', for {samples} samples' if samples else ''}"
     # in fixed point the scale of a state
@@ -206,29 +214,36 @@ def source_files(
 
     `bounds` are stated with the ranges of the inputs.
     """
-    name, signals = name_in_c(task.name or "controller"), identifiers(controller.signals, "y_")
+    name = name_in_c(task.name or "controller")
+    signals = identifiers(controller.signals, "y_")
     references = identifiers(controller.references, "r_")
     values = values_of(task, controller, ports_of(task, controller, signals, references))
-    values |= {"name": next(iter(name.values())), "facts": facts, "bounds": bounds}
+    (own,) = name.values()
+    values |= {"name": own, "facts": facts, "bounds": bounds}
     return {file: render(file, **values) for file in FILES}, names_of(name, signals, references)
 
 
-def in_z(law: Law, chain: Chain) -> Law:
-    """The law in z of one state space.
+def in_z(case: Case) -> Law:
+    """The law of a case in z, of one state space.
 
     Raises ParameterError for a delay of its own that is no whole number of samples.
     """
-    samples = law.delay / chain.sampling.period
+    law = case.law
+    period = case.chain.sampling.period
+    samples = law.delay / period
     remedy = f"is {samples:.6g} samples: C code has a delay of whole samples; write another one into the law's states"
     # but for the rounding of a delay
     require(abs(samples - round(samples)) <= 1e-9, "law.delay", law.delay, remedy)
-    law = discretised(law, chain.sampling.period)
+    law = discretised(law, period)
     return with_system_matrix(law, system_matrix(law))
 
 
 def controller_of(law: Law, task: ExportTask) -> Controller:
     """A realised law in the numbers of a task.  Raises ParameterError as `word_of` does."""
-    of, T, dac = task.chain.converters, task.chain.sampling.period, quantisers(task.chain)[DAC]
+    chain = task.case.chain
+    of = chain.converters
+    T = chain.sampling.period
+    dac = quantisers(chain)[DAC]
     is_estimated = of.hub_rate == "difference" and RATE in law.signals
     remedy = 'with q31 the hub rate is an input, or the law reads hub_angle: set converters.hub_rate = "ideal"'
     require(not (is_estimated and task.precision == FIXED), "converters.hub_rate", of.hub_rate, remedy)
@@ -250,17 +265,6 @@ def controller_of(law: Law, task: ExportTask) -> Controller:
     return Controller(word, signals, references, ranges, dac, round(law.delay / T), hub)
 
 
-def judged(task: ExportTask, word: Word) -> Analysis:
-    """The sampled loop with the coefficients as exported.
-
-    Raises ParameterError where it is not certified stable, unless it is exported anyway.
-    """
-    found = sampled(task.arm, word.rounded, task.chain)
-    remedy = f"rounded to {task.precision} the loop is not certified stable: {found.verdict.sentence}; take more digits"
-    require(task.anyway or is_certified(found), "precision", task.precision, remedy)
-    return found
-
-
 # ------------------------------------------------------------ its arithmetic, that of C and of a simulation
 
 
@@ -272,11 +276,16 @@ def run_real(table: Any, plan: Any, inputs: Any, dac: Any, hub: Any, single: boo
     among the inputs, an estimated hub rate and 0; `dac` is a row of the quantisers; `hub` index of the hub angle (-1:
     no estimate), pole and period of the estimated rate.
     """
-    n, forward = table.shape[0] - 1, inputs.shape[1] - 1
-    known, z, following = np.zeros(forward + 3), np.zeros(table.shape[1]), np.zeros(n + 1)
-    memory, clipped = np.zeros(3), np.zeros(3, np.bool_)
+    n = table.shape[0] - 1
+    forward = inputs.shape[1] - 1
+    known = np.zeros(forward + 3)
+    z = np.zeros(table.shape[1])
+    following = np.zeros(n + 1)
+    memory = np.zeros(3)
+    clipped = np.zeros(3, np.bool_)
     for k in range(inputs.shape[0]):
-        known[: forward + 1], before = inputs[k], memory.copy()
+        known[: forward + 1] = inputs[k]
+        before = memory.copy()
         status[k] = INPUT_ERROR
         if np.isfinite(inputs[k]).all():
             if hub[0] >= 0.0:
@@ -302,8 +311,10 @@ def shifted(value: int, shift: int) -> int:
 @compiled
 def run_fixed(table: Any, shifts: Any, plan: Any, inputs: Any, dac: Any, outputs: Any, status: Any) -> None:
     """The same in fixed point; `dac` is the shift of the step of the DAC, 0 for none, lowest and highest output."""
-    n, forward = table.shape[0] - 1, inputs.shape[1] - 1
-    known, z = np.zeros(forward + 3, np.int64), np.zeros(table.shape[1], np.int64)
+    n = table.shape[0] - 1
+    forward = inputs.shape[1] - 1
+    known = np.zeros(forward + 3, np.int64)
+    z = np.zeros(table.shape[1], np.int64)
     following = np.zeros(n + 1, np.int64)
     for k in range(inputs.shape[0]):
         known[: forward + 1] = inputs[k]
@@ -328,8 +339,12 @@ def run_fixed(table: Any, shifts: Any, plan: Any, inputs: Any, dac: Any, outputs
 
 def values_of(task: ExportTask, controller: Controller, ports: Sequence[Port]) -> dict[str, Any]:
     """The values of the templates, but for name and facts."""
-    word, is_fixed, (real, suffix, largest) = controller.word, task.precision == FIXED, REAL[task.precision]
-    dac, unit = controller.whole_dac if is_fixed else controller.dac, task.arm.input_unit
+    word = controller.word
+    is_fixed = task.precision == FIXED
+    real, suffix, largest = REAL[task.precision]
+    arm = task.case.arm
+    dac = controller.whole_dac if is_fixed else controller.dac
+    unit = arm.input_unit
     cast, zero = ("(int64_t)", "") if is_fixed else ("", f"0.0{suffix}")
     known = [*(f"{cast}input->{each.identifier}" for each in ports), f"({real})rate", zero]
     return {
@@ -342,8 +357,8 @@ def values_of(task: ExportTask, controller: Controller, ports: Sequence[Port]) -
         "converter": bool(np.isfinite(dac).all()), "delay": controller.delay, "step": dac.tolist()[0],
         "dac": [literal(each, "") for each in dac.tolist()], "statuses": statuses(controller),
         "hub": controller.hub and (ports[controller.signals.index(ANGLE)].identifier, *map(float.hex, controller.hub)),
-        "output": f"{task.arm.input} over {word.output!r} {unit}" if is_fixed else f"{task.arm.input} [{unit}]",
-        "period": repr(task.chain.sampling.period),
+        "output": f"{arm.input} over {word.output!r} {unit}" if is_fixed else f"{arm.input} [{unit}]",
+        "period": repr(task.case.chain.sampling.period),
     }  # fmt: skip
 
 
@@ -357,7 +372,8 @@ def statuses(controller: Controller) -> dict[str, int]:
 
 def ports_of(task: ExportTask, controller: Controller, *known: dict[str, str]) -> list[Port]:
     """The inputs of the C function: signals, references, and the feedforward."""
-    word, ranges = controller.word, controller.ranges
+    word = controller.word
+    ranges = controller.ranges
     steps = f", at most {ranges[RATE] * controller.hub[1]!r} a sample" if controller.hub and RATE in ranges else ""
     over = ", over {!r}".format if word.precision == FIXED else lambda size: ""
     found = []
@@ -366,7 +382,7 @@ def ports_of(task: ExportTask, controller: Controller, *known: dict[str, str]) -
             size = ranges.get(name, 1.0)
             text = f"{title}{name} [{OUTPUTS[name.partition('@')[0]].unit}]{steps * (name == ANGLE)}{over(size)}"
             found.append(Port(own, text, size))
-    text = f"{FEEDFORWARD} [{task.arm.input_unit}]{over(word.output)}"
+    text = f"{FEEDFORWARD} [{task.case.arm.input_unit}]{over(word.output)}"
     return [*found, Port(FEEDFORWARD, text, word.feedforward)]
 
 
@@ -375,7 +391,9 @@ def recorded(
 ) -> dict[str, Any]:
     """Values of the template of a self-test, whose inputs are those of a linear congruential generator."""
     # a thousand samples, one of them refused for a NaN
-    samples, refused, seed = 1000, 500, 1
+    samples = 1000
+    refused = 500
+    seed = 1
     places = range(samples * len(ports))
     _, *numbers = accumulate(places, lambda last, _: (1664525 * last + 1013904223) % 2**32, initial=seed)
     inputs: NDArray[Any] = np.array(numbers, dtype=np.int64).reshape(samples, -1)

@@ -25,7 +25,6 @@ from tfarm.arm import Law
 from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex, Real
-from tfarm.case import Case
 from tfarm.dsp import Simulator, scenario
 from tfarm.dsp.plant import MODES_USED, RECORDED
 from tfarm.dsp.results import simulated
@@ -57,31 +56,43 @@ LARGEST = sys.float_info.max  # of a range without limit
 LONGEST_TEXT = 400  # characters
 ERRORS = "logStatusError"  # category of messages
 MEASURED = "measured:"
-AT, STATE, KIND, SELF = ("const fmi2ValueReference *", "size_t"), "fmi2FMUstate", "fmi2StatusKind", "((model *)c)"
-ABSENT, ELSE_DISCARD = "report(c, fmi2Error, __func__)", "? fmi2OK : fmi2Discard"
+AT = ("const fmi2ValueReference *", "size_t")
+ABSENT = "report(c, fmi2Error, __func__)"
 FUNCTIONS: tuple[tuple[str, tuple[str, ...], str], ...] = (  # of FMI in one statement: name, types of arguments, status
     ("SetDebugLogging", ("fmi2Boolean", "size_t", "const fmi2String *"), "fmi2OK"),
     ("SetupExperiment", ("fmi2Boolean", "fmi2Real", "fmi2Real", "fmi2Boolean", "fmi2Real"), "begin(c, a3)"),
     ("EnterInitializationMode", (), "fmi2OK"),
-    ("ExitInitializationMode", (), f"{SELF}->at.is_running = 1, fmi2OK"),
+    ("ExitInitializationMode", (), "((model *)c)->at.is_running = 1, fmi2OK"),
     ("Terminate", (), "fmi2OK"),
-    ("Reset", (), f"memset({SELF}->given, 0, sizeof {SELF}->given), begin(c, 0.0)"),
+    ("Reset", (), "memset(((model *)c)->given, 0, sizeof ((model *)c)->given), begin(c, 0.0)"),
     *(
         (f"{act}{kind}", (*AT, f"{const}fmi2{kind} *"), f"a2 ? {ABSENT} : fmi2OK")
         for kind in ("Integer", "Boolean", "String")
         for act, const in (("Get", ""), ("Set", "const "))
     ),
-    *((f"{act}FMUstate", (f"{STATE}{star}",), ABSENT) for act, star in (("Get", " *"), ("Set", ""), ("Free", " *"))),
-    ("SerializedFMUstateSize", (STATE, "size_t *"), ABSENT),
-    ("SerializeFMUstate", (STATE, "fmi2Byte *", "size_t"), ABSENT),
-    ("DeSerializeFMUstate", ("const fmi2Byte *", "size_t", f"{STATE} *"), ABSENT),
+    ("GetFMUstate", ("fmi2FMUstate *",), ABSENT),
+    ("SetFMUstate", ("fmi2FMUstate",), ABSENT),
+    ("FreeFMUstate", ("fmi2FMUstate *",), ABSENT),
+    ("SerializedFMUstateSize", ("fmi2FMUstate", "size_t *"), ABSENT),
+    ("SerializeFMUstate", ("fmi2FMUstate", "fmi2Byte *", "size_t"), ABSENT),
+    ("DeSerializeFMUstate", ("const fmi2Byte *", "size_t", "fmi2FMUstate *"), ABSENT),
     ("GetDirectionalDerivative", (*AT, *AT, "const fmi2Real *", "fmi2Real *"), ABSENT),
     ("SetRealInputDerivatives", (*AT, "const fmi2Integer *", "const fmi2Real *"), ABSENT),
     ("GetRealOutputDerivatives", (*AT, "const fmi2Integer *", "fmi2Real *"), ABSENT),
     ("CancelStep", (), ABSENT),
-    *((f"Get{of}Status", (KIND, f"fmi2{of or 'Status'} *"), "fmi2Discard") for of in ("", "Integer", "String")),
-    ("GetRealStatus", (KIND, "fmi2Real *"), f"*a2 = {SELF}->at.time, a1 == fmi2LastSuccessfulTime {ELSE_DISCARD}"),
-    ("GetBooleanStatus", (KIND, "fmi2Boolean *"), f"*a2 = {SELF}->at.is_stopped, a1 == fmi2Terminated {ELSE_DISCARD}"),
+    ("GetStatus", ("fmi2StatusKind", "fmi2Status *"), "fmi2Discard"),
+    ("GetIntegerStatus", ("fmi2StatusKind", "fmi2Integer *"), "fmi2Discard"),
+    ("GetStringStatus", ("fmi2StatusKind", "fmi2String *"), "fmi2Discard"),
+    (
+        "GetRealStatus",
+        ("fmi2StatusKind", "fmi2Real *"),
+        "*a2 = ((model *)c)->at.time, a1 == fmi2LastSuccessfulTime ? fmi2OK : fmi2Discard",
+    ),
+    (
+        "GetBooleanStatus",
+        ("fmi2StatusKind", "fmi2Boolean *"),
+        "*a2 = ((model *)c)->at.is_stopped, a1 == fmi2Terminated ? fmi2OK : fmi2Discard",
+    ),
 )
 
 
@@ -117,16 +128,21 @@ def fmu(task: ExportTask) -> Export:
 
     Raises ParameterError for a loop that is not certified stable, a controller in fixed point, and as `Simulator` does.
     """
-    prepared, has_plant, name = prepared_simulator(task), task.what != "controller", task.name or task.what
-    variables, own = variables_of(task.what, prepared), identifiers([name], "fmu_")
+    prepared = prepared_simulator(task)
+    has_plant = task.what != "controller"
+    name = task.name or task.what
+    variables = variables_of(task.what, prepared)
+    own = identifiers([name], "fmu_")
     law = None if task.what == "plant" else law_code(task, prepared.law, variables)
-    verdict, period = law.verdict if law else "", repr(float(task.chain.sampling.period))
-    about = f"{task.what} of {task.arm.name}, sampled every {period} s{verdict and f': {verdict}'}"
+    verdict = law.verdict if law else ""
+    period = repr(float(task.case.chain.sampling.period))
+    about = f"{task.what} of {task.case.arm.name}, sampled every {period} s{verdict and f': {verdict}'}"
     modes = prepared.plant.count if has_plant else None
     guid = hashlib.sha256(repr((task.sha256, name, about, modes, variables, version("tfarm"))).encode()).hexdigest()
     head: dict[str, Any] = {"variables": variables, "has_plant": has_plant, "period": period, "about": about}
-    head["guid"], numbers = guid[:32], plant_code(prepared)
-    source = render("fmu.c", law=law, functions=FUNCTIONS, errors=ERRORS, sha256=task.sha256, **head, **numbers)
+    head["guid"] = guid[:32]
+    plant = plant_code(prepared)
+    source = render("fmu.c", law=law, functions=FUNCTIONS, errors=ERRORS, sha256=task.sha256, **head, **plant)
     sources = {"fmi2.h": render("fmi2.h"), "fmu.c": source, **(law.files if law else {})}
     binary, compiler = binary_of(sources, own[name])
     files = {f"sources/{name}": content for name, content in sources.items()} | binary
@@ -142,19 +158,19 @@ def law_code(task: ExportTask, law: Law, variables: Sequence[Variable]) -> LawCo
     """
     remedy = "a functional mock-up unit has a controller in double or float; take c for fixed point"
     require(task.precision != FIXED, "precision", task.precision, remedy)
-    is_loop, is_single = task.what == "loop", task.chain.converters.is_single
-    task = replace(task, precision="float" if is_single else task.precision)
-    controller = controller_of(in_z(replace(law, delay=0.0) if is_loop else law, task.chain), task)
+    task = replace(task, precision="float" if task.case.chain.converters.is_single else task.precision)
+    own = task.case.under(replace(law, delay=0.0) if task.what == "loop" else law)
+    controller = controller_of(in_z(own), task)
     controller = replace(controller, hub=None, signals=law.signals, dac=np.array([0.0, -np.inf, np.inf]))
-    rounded = replace(controller.word.rounded, delay=task.law.delay)
-    found = task.analysis(rounded)
-    files, (first, *_) = source_files(task, controller, [*task.facts(rounded, found).items()])
+    case = task.case.under(replace(controller.word.rounded, delay=task.case.law.delay))
+    found = task.analysis(case)
+    files, (first, *_) = source_files(task, controller, [*task.facts(case, found).items()])
     place: dict[str, str] = {}
     for of, array in (("output", "out"), ("input", "in")):
         names = [each.name for each in variables if each.causality == of]
         place |= {name: f"{array}[{n}]" for n, name in enumerate(names)}
-    fields = [f"{MEASURED}{each}" for each in controller.signals]
-    fields += [*(f"{REFERENCE}{each}" for each in controller.references), FEEDFORWARD]
+    fields = [MEASURED + each for each in controller.signals]
+    fields += [*(REFERENCE + each for each in controller.references), FEEDFORWARD]
     verdict = found.verdict.sentence if is_certified(found) else f"{ANYWAY}: {found.verdict.sentence}"
     code = {each: files[each] for each in ("controller.h", "controller.c")}
     return LawCode(first.identifier, [place[each] for each in fields], code, verdict)
@@ -165,7 +181,7 @@ def prepared_simulator(task: ExportTask) -> Simulator:
 
     A plant alone has no delay of the law.
     """
-    case = Case(task.arm, replace(task.law, delay=0.0) if task.what == "plant" else task.law, task.chain)
+    case = task.case.under(replace(task.case.law, delay=0.0)) if task.what == "plant" else task.case
     try:
         run = scenario("slew", case.arm, case.chain, TRIAL_DURATION)
     except ParameterError:  # an arm that cannot turn
@@ -176,13 +192,15 @@ def prepared_simulator(task: ExportTask) -> Simulator:
 
 def variables_of(what: What, of: Simulator) -> list[Variable]:
     """The variables of a unit: inputs, parameters, outputs."""
-    drive, law = of.plant.arm.input, of.law
+    drive = of.plant.arm.input
+    law = of.law
 
     def variable(name: str, causality: str, prefix: str = "", words: str = "") -> Variable:
         label, unit = signal_words(name)
-        return Variable(f"{prefix}{name}", causality, unit, f"{words}{label}")
+        return Variable(prefix + name, causality, unit, words + label)
 
-    unit, side = signal_words(drive)[1], "input" if what == "controller" else "output"
+    unit = signal_words(drive)[1]
+    side = "input" if what == "controller" else "output"
     names = law.signals if what == "controller" else of.measured
     sensors = [variable(name, side, MEASURED, "reading of the ") for name in names]
     wanted = dict.fromkeys((*law.references, *(name.removeprefix(REFERENCE) for name in law.wanted)))
@@ -202,7 +220,8 @@ def variables_of(what: What, of: Simulator) -> list[Variable]:
 
 def plant_code(of: Simulator) -> dict[str, Any]:
     """The numbers of the plant in its template."""
-    chain, model = of.electronics, of.model
+    chain = of.electronics
+    model = of.model
     tables = {
         "turn[PIECES][POLES][2]": parts(model.turn),
         "push[PIECES][POLES][2]": parts(model.push),

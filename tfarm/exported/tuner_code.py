@@ -34,7 +34,6 @@ import numpy as np
 from tfarm.arm import HubFeedback
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import Real, Whole
-from tfarm.case import Case
 from tfarm.dsp import Measurement
 from tfarm.errors import MISSING, ParameterError, must_be_known, require
 from tfarm.exact.compiled import compiled, inlined
@@ -56,7 +55,8 @@ CONSUMER = Consumer(
 ULPS = 1.5  # bound of the error of e^x, x from `lowest` to 0
 LN_2 = Fraction(math.log(2.0)) + Fraction(2319046813846299558, 10**35)  # 35 digits: math.log(2) and its remainder
 
-ANGLE, RATE, MOMENT, WANTED_ANGLE, WANTED_RATE, WANTED_MOMENT, FORWARD = 0, 1, 2, 3, 4, 5, -1
+ANGLE, RATE, MOMENT, WANTED_ANGLE, WANTED_RATE, WANTED_MOMENT = range(6)
+FORWARD = -1
 U, E, X, K, E_BEFORE, TORQUE = range(6)  # places of the state: the last sample, and e of the one before
 ZERO, ONE = np.array([0.0, 1.0], np.float32)  # exact, and of either precision with another number
 
@@ -97,7 +97,8 @@ def numbers_of(saved: SavedTuner, real: Any) -> Numbers:
     high = Fraction(round(LN_2 * 2**bits), 2**bits)
     scalars = 0.5, lowest, 1.5 * 2 ** np.finfo(real).nmant, 1 / math.log(2.0), high, LN_2 - high
     taylor = np.array([1 / math.factorial(n) for n in range(terms)], dtype=real)
-    limits, names = saved.gain().guard, ("W1", "w2", "scales", "K1", "Kp")
+    limits = saved.gain().guard
+    names = ("W1", "w2", "scales", "K1", "Kp")
     with np.errstate(over="ignore", under="ignore"):
         W1, w2, scales, K1, Kp = rounded = [np.array(getattr(saved, name), dtype=real) for name in names]
         lo, hi = map(real, limits)
@@ -128,7 +129,8 @@ def exponential(x: float, of: Numbers) -> float:
         return ZERO
     k = (x * of.inverse + of.shift) - of.shift
     result = polynomial((x - k * of.high) - k * of.low, of.taylor)
-    power, n = of.half, int(-k)
+    power = of.half
+    n = int(-k)
     while n > 0:  # at most ten times
         if n % 2 == 1:
             result *= power
@@ -168,11 +170,17 @@ def step(of: Numbers, state: Real, inputs: Real) -> int:
     u = servo + inputs[FORWARD] if of.is_total else servo
     row = np.array([u, state[U], state[E], state[E_BEFORE], x, state[X], state[K]])
     gain = network_gain(of, row)
-    e, torque = u - gain * x, (inputs[FORWARD] + servo) - gain * x
+    e = u - gain * x
+    torque = (inputs[FORWARD] + servo) - gain * x
     for value in (u, e, x, gain, torque):
         if not -of.largest <= value <= of.largest:
             return OVERFLOW
-    state[U], state[E], state[X], state[K], state[E_BEFORE], state[TORQUE] = u, e, x, gain, state[E], torque
+    state[E_BEFORE] = state[E]
+    state[U] = u
+    state[E] = e
+    state[X] = x
+    state[K] = gain
+    state[TORQUE] = torque
     return 0
 
 
@@ -203,7 +211,8 @@ class ExportedTuner:
 
     def __init__(self, saved: SavedTuner, precision: str = "double") -> None:
         must_be_known("precision", precision, FLOATS)
-        self.real, self.scale = FLOATS[precision][0], saved.scales[0]
+        self.real, _ = FLOATS[precision]
+        self.scale = saved.scales[0]
         self.numbers = numbers_of(saved, self.real)
         self.inputs = {key: of for key, of in INPUTS.items() if not (self.numbers.is_total and key == "r_root_moment")}
         self.reset()
@@ -214,7 +223,8 @@ class ExportedTuner:
 
     def run(self, inputs: Real) -> tuple[Real, Whole]:
         """Advance over rows of `inputs` (n, inputs); return torques and status (n,), as the C code has them."""
-        torque, status = np.zeros(len(inputs), self.real), np.zeros(len(inputs), np.int64)
+        torque = np.zeros(len(inputs), self.real)
+        status = np.zeros(len(inputs), np.int64)
         with np.errstate(over="ignore"):
             rows = np.ascontiguousarray(inputs, dtype=self.real)
         run(self.numbers, self.state, rows, torque, status)
@@ -235,42 +245,44 @@ def c_tuner(task: ExportTask) -> Export:
     """
     if task.tuned is None:
         raise ParameterError(key="tuned", value=MISSING, remedy="give the file of tfarm tune ARM --save FILE.json")
-    saved, period = load_tuner(task.tuned, "tuned"), task.chain.sampling.period
+    case = task.case
+    saved = load_tuner(task.tuned, "tuned")
+    period = case.chain.sampling.period
     remedy = f"the tuner was trained every {saved.period!r} s: sample so, or train one at this period"
     require(saved.period == period, "sampling.period", period, remedy)
     tuner = ExportedTuner(saved, task.precision)
     of = tuner.numbers
-    servo = HubFeedback(K1=float(of.K1), K2=1.0, Kp=float(of.Kp))
-    loop = sampled_loop(Case(task.arm, servo, task.chain), count=TRIAL_MODES)
+    loop = sampled_loop(case.under(HubFeedback(K1=float(of.K1), K2=1.0, Kp=float(of.Kp))), count=TRIAL_MODES)
     guard = sector_guard(loop, float(of.lo), float(of.hi))
     certainty = "not certified for a gain that varies" if guard is None else guard.sentence
     is_proven = guard is not None and guard.is_proven
     remedy = f"on this arm the gain is {certainty}; --anyway exports it"
     require(is_proven or task.anyway, "tuned", str(task.tuned), remedy)
     facts = {
-        "arm": task.arm.name, "tuner": f"trained on {saved.arm}", **({} if is_proven else {"warning": ANYWAY}),
+        "arm": case.arm.name, "tuner": f"trained on {saved.arm}", **({} if is_proven else {"warning": ANYWAY}),
         "sampling period": f"{period!r} s", "moment gain": certainty,
         "network": f"{of.scales.size}-{of.w2.size}-1, {task.precision}",
         "SHA-256 of the tuner": hashlib.sha256(task.tuned.read_bytes()).hexdigest(),
         "SHA-256 of the inputs": task.sha256, "tfarm": version("tfarm"),
     }  # fmt: skip
     name = name_in_c(task.name or "tuner")
-    contents = written(task, tuner, next(iter(name.values())), facts)
-    return task.exported(contents, names_of(name), certainty)
+    (own,) = name.values()
+    return task.exported(written(task, tuner, own, facts), names_of(name), certainty)
 
 
 def written(task: ExportTask, tuner: ExportedTuner, name: str, facts: dict[str, str]) -> dict[str, bytes]:
     """The files by name; constants have the names of `Numbers`."""
-    of, (real, suffix, _) = tuner.numbers, REAL[task.precision]
+    of = tuner.numbers
+    real, suffix, _ = REAL[task.precision]
     kept: dict[str, Any] = of._asdict()
     ports = [
-        Port(key, f"{meaning} [{unit or task.arm.input_unit}]", 1.0 if "rad" in unit else tuner.scale)
+        Port(key, f"{meaning} [{unit or task.case.arm.input_unit}]", 1.0 if "rad" in unit else tuner.scale)
         for key, (_, meaning, unit) in tuner.inputs.items()
     ]
     values = {
         "name": name, "facts": list(facts.items()), "fixed": False, "real": real, "suffix": suffix, "header": "tuner.h",
         "bounds": (), "statuses": {"INPUT_ERROR": INPUT_ERROR, "OVERFLOW": OVERFLOW},
-        "fields": ports, "output": f"{task.arm.input} [{task.arm.input_unit}]", "of": of, "ulps": ULPS,
+        "fields": ports, "output": f"{task.case.arm.input} [{task.case.arm.input_unit}]", "of": of, "ulps": ULPS,
         "scalars": {key: literal(float(x), suffix) for key, x in kept.items() if isinstance(x, np.floating)},
         "tables": {
             key: [literal(x, suffix) for x in each.ravel().tolist()]

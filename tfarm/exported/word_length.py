@@ -93,38 +93,52 @@ def with_system_matrix(law: Law, S: Real) -> Law:
     """The law with another state space of all its columns, and the sign of v = -sum."""
     columns = (*law.signals, *law.wanted)
     n = S.shape[1] - len(columns)
-    block = StateSpace(S[:n, :n], S[:n, n:], S[n:, :n], S[n:, n:])
-    return replace(law, parts=(Part(columns, block),), sign=-1)
+    part = Part(columns, StateSpace(S[:n, :n], S[:n, n:], S[n:, :n], S[n:, n:]))
+    return replace(law, parts=(part,), sign=-1)
+
+
+def closed(A: Real, B: Real, C: Real, a: Real, b: Real, c: Real, d: Real) -> tuple[Real, Real, Real]:
+    """Matrix, rows of y and row of u of the loop of x' = A x + B u, y = C x and k' = a k + b y, u = c k + d y."""
+    y = np.pad(C, ((0, 0), (0, len(a))))
+    u = np.c_[d @ C, c]
+    return block_diag(A, a) + np.r_[B @ u, b @ y], y, u
 
 
 def around(law: Law, loop: Sampled) -> Around:
     """The closed loop of `Sampled.matrix`, around a law of one state space."""
     A, B, C = loop.pulse.matrices()
     own, Bk, Ck, Dk = with_estimate(law, loop.chain).matrices(loop.in_z.signals)
-    n, m, order = len(A), len(own), law.order
-    output, push = -np.hstack([Dk @ C, Ck])[0], np.r_[B, np.zeros(m)]
+    matrix, reads, output = closed(A, B[:, None], C, own, Bk, -Ck, -Dk)
+    states = slice(len(A), len(A) + law.order)
+    push = np.r_[B, np.zeros(len(own))]
     return Around(
-        matrix=np.block([[A, np.zeros((n, m))], [Bk @ C, own]]) + np.outer(push, output),
-        of_signals=np.vstack([np.outer(B, -Dk[0]), Bk]),
-        of_rounding=np.c_[np.eye(n + m)[:, n : n + order], push],
-        output=output,
-        reads=np.hstack([C, np.zeros((len(C), m))]),
-        states=slice(n, n + order),
+        matrix=matrix,
+        of_signals=np.r_[np.outer(B, -Dk[0]), Bk],
+        of_rounding=np.c_[np.eye(len(matrix))[:, states], push],
+        output=output[0],
+        reads=reads,
+        states=states,
     )
+
+
+def sum_of_squares(M: Real, Q: Real, rows: slice) -> Real | None:
+    """Q + M Q M^T + M^2 Q M^2^T + ...; None where the sum of these rows does not converge."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(MOST_DOUBLINGS):
+            more = M @ Q @ M.T
+            Q = Q + more
+            M = M @ M
+            if abs(more[rows, rows]).max() <= SUMMED * abs(Q[rows, rows]).max() < np.inf:
+                return Q
+    return None
 
 
 def gramians(of: Around) -> tuple[Real, Real] | None:
     """K over the variance of u, and W, of the states of the law; None where their sums do not converge."""
-    M, K, W = of.matrix, of.of_signals @ of.of_signals.T, np.outer(of.output, of.output)
     rows = of.states
-    with np.errstate(over="ignore", invalid="ignore"):
-        for _ in range(MOST_DOUBLINGS):
-            more, seen = M @ K @ M.T, M.T @ W @ M
-            K, W, M = K + more, W + seen, M @ M
-            left = [(abs(a[rows, rows]).max(), abs(b[rows, rows]).max()) for a, b in ((more, K), (seen, W))]
-            if all(last <= SUMMED * whole < np.inf for last, whole in left):
-                return K[rows, rows] / (of.output @ K @ of.output), W[rows, rows]
-    return None
+    K = sum_of_squares(of.matrix, of.of_signals @ of.of_signals.T, rows)
+    W = sum_of_squares(of.matrix.T, np.outer(of.output, of.output), rows)
+    return None if K is None or W is None else (K[rows, rows] / (of.output @ K @ of.output), W[rows, rows])
 
 
 def balancing(K: Real, W: Real) -> Real | None:
@@ -144,7 +158,8 @@ def sections(A: Real, K: Real, W: Real) -> Real | None:
     if np.linalg.cond(modal / np.linalg.norm(modal, axis=0)) > 1e8:
         return None
     begins = np.flatnonzero(poles.imag >= 0)[1:]  # of a section, after the first
-    blocks, duals = np.split(modal, begins, axis=1), np.split(np.linalg.inv(modal), begins)
+    blocks = np.split(modal, begins, axis=1)
+    duals = np.split(np.linalg.inv(modal), begins)
     own = [balancing(dual @ K @ dual.T, block.T @ W @ block) for block, dual in zip(blocks, duals, strict=True)]
     known = [each for each in own if each is not None]
     return modal @ block_diag(*known) if len(known) == len(own) else None
@@ -152,7 +167,8 @@ def sections(A: Real, K: Real, W: Real) -> Real | None:
 
 def candidates(law: Law, loop: Sampled) -> list[tuple[NoiseGain, Real]]:
     """The realisations [A B; C D] of a law in z of one state space, that of the law as given first."""
-    S, n = system_matrix(law), law.order
+    S = system_matrix(law)
+    n = law.order
     found = gramians(around(law, loop)) if n else None
     if found is None:
         return [(NoiseGain(GIVEN, None if n else 0.0), S)]
@@ -184,16 +200,19 @@ def absolute_sum(M: Real, left: Real, right: Real, most: int = MOST_SUMMED) -> t
 
     With G = sum_{k<n} |left M^k|, sum_k |left M^k| <= G (I - |M^n|)^-1 once the row sums of |M^n| are below 1.
     """
-    G, S = np.zeros(left.shape), np.zeros((len(left), right.shape[1]))
+    G = np.zeros(left.shape)
+    S = np.zeros((len(left), right.shape[1]))
     with np.errstate(over="ignore", invalid="ignore"):  # of a matrix that grows
         block = np.array([left @ np.linalg.matrix_power(M, k) for k in range(BLOCK)])
         step = last = np.linalg.matrix_power(M, BLOCK)
         for _ in range(most // BLOCK):
-            G, S = G + abs(block).sum(axis=0), S + abs(block @ right).sum(axis=0)
+            G = G + abs(block).sum(axis=0)
+            S = S + abs(block @ right).sum(axis=0)
             # all later samples are bounded from here
             if abs(last).sum(axis=1).max(initial=0.0) <= 1e-3:
                 return S + np.linalg.solve(np.eye(len(M)) - abs(last).T, G.T).T @ abs(last @ right), True
-            block, last = block @ step, last @ step
+            block = block @ step
+            last = last @ step
     return np.nan_to_num(S, nan=np.inf), False
 
 
@@ -220,7 +239,8 @@ class Word:
     @cached_property
     def rounded(self) -> Law:
         """The law with the coefficients as exported, in SI units."""
-        S, one = np.asarray(self.table, dtype=float), np.ones(self.law.order)
+        S = np.asarray(self.table, dtype=float)
+        one = np.ones(self.law.order)
         if self.precision == FIXED:
             S = np.ldexp(S, -self.shifts[:, None]) * np.r_[one, self.output][:, None] / np.r_[one, self.ranges]
         return with_system_matrix(self.law, S)
@@ -228,7 +248,8 @@ class Word:
     @cached_property
     def errors(self) -> tuple[float, Real]:
         """Relative and absolute rounding error of a sum: of each state, and of u last."""
-        n, terms = self.law.order, self.law.order + self.sizes.size + (6 if self.step else 3)
+        n = self.law.order
+        terms = n + self.sizes.size + (6 if self.step else 3)
         of_dac = np.r_[np.zeros(n), self.step / 2]
         if self.precision == FIXED:
             return 0.0, HALF_STEP * np.r_[np.ones(n), self.output] + of_dac
@@ -244,21 +265,25 @@ class Word:
         is at most 1, and the bounds hold until one saturates.  Where the sums have no digits or X has no solution there
         are none.
         """
-        exact, rounded, n = system_matrix(self.law), system_matrix(self.rounded), self.law.order
+        exact = system_matrix(self.law)
+        rounded = system_matrix(self.rounded)
+        n = self.law.order
         relative, absolute = self.errors
+        unit = FLOATS["double"][1]
         # the coefficients of both are rounded in double, those of fixed point by their units
-        relative += (3 if self.precision == FIXED else 1) * FLOATS["double"][1]
-        V, A = abs(rounded - exact) + relative * abs(rounded), exact[:n, :n]
+        relative += (3 if self.precision == FIXED else 1) * unit
+        V = abs(rounded - exact) + relative * abs(rounded)
+        A = exact[:n, :n]
         sums, is_whole = absolute_sum(A, np.vstack([np.eye(n), exact[n, :n]]), np.hstack([np.eye(n), exact[:n, n:]]))
         lost = math.inf  # share of a sum that the roundings of its powers in double can change
         if np.isfinite(sums[:n, :n]).all():
-            lost = n * FLOATS["double"][1] * max(abs(np.linalg.eigvals(abs(A) @ sums[:n, :n])), default=0.0)
+            lost = n * unit * max(abs(np.linalg.eigvals(abs(A) @ sums[:n, :n])), default=0.0)
         if lost > 1e-3:
             return Bounds(np.full(n, np.inf), False, math.inf, math.inf)
         S, X = np.hsplit(sums * (1 + lost), [n])
         largest = X @ self.sizes
         output = float(largest[n] + abs(exact[n, n:]) @ self.sizes + self.feedforward)
-        output *= 1 + (n + self.sizes.size + 3) * FLOATS["double"][1]  # the sum itself is rounded
+        output *= 1 + (n + self.sizes.size + 3) * unit  # the sum itself is rounded
         rest = V[:, n:] @ self.sizes + abs(rounded[:, n:]) @ self.slips + absolute
         states = least_solution(S[:n] @ V[:n, :n], largest[:n] + S[:n] @ rest[:n])
         states = np.minimum(states, 1.0 if self.precision == FIXED else np.inf)
@@ -274,10 +299,13 @@ class Word:
         error of a signal, the relative and absolute errors g and a of a sum, b of a signal in fixed point, and
         Q = |A B; C D|.  Where all eigenvalues of g S Q are below 1 that bounds z.
         """
-        n, signals, read = self.law.order, self.law.signals, loop.in_z.signals
+        n = self.law.order
+        signals = self.law.signals
+        read = loop.in_z.signals
         if not set(signals) <= set(read):  # an estimated rate
             return None
-        of, at = around(self.rounded, loop), [read.index(name) for name in signals]
+        of = around(self.rounded, loop)
+        at = [read.index(name) for name in signals]
         left = np.vstack([np.eye(len(of.matrix))[of.states], of.reads[at], of.output])
         S, is_whole = absolute_sum(observed(of.matrix, left), left, np.c_[of.of_rounding, of.of_signals[:, at]])
         if not is_whole:
@@ -320,9 +348,12 @@ def word_of(
         remedy = f"q31 needs the largest absolute value: --range {name}=VALUE, in SI units"
         require(name in ranges or precision != FIXED, "range", name, remedy)
     R = np.array([ranges.get(name, 1.0) for name in names])
-    E, slips, U = R.copy(), np.zeros(R.size), ranges.get(OUTPUT, 1.0)
+    E = R.copy()
+    slips = np.zeros(R.size)
+    U = ranges.get(OUTPUT, 1.0)
     if hub:
-        at, (pole, period) = names.index(RATE), hub
+        at = names.index(RATE)
+        pole, period = hub
         # the l1 norm of (1 - p)/T (z - 1)/(z - p); of differences within RATE T the estimate is within RATE
         E[at] = min(2 * (1 - pole) / period * ranges.get(ANGLE, 1.0), ranges.get(RATE, math.inf))
         of_double = (6 + 2 / (1 - pole)) * FLOATS["double"][1] / (1 - pole)  # of its operations, and of the pole
@@ -331,7 +362,8 @@ def word_of(
     word = Word(law, precision, E, R, U, ranges.get(FEEDFORWARD, U), step, slips, system_matrix(law))
     if precision == FIXED:
         return _fixed(word)
-    kind, S = FLOATS[precision][0], word.table
+    kind = FLOATS[precision][0]
+    S = word.table
     with np.errstate(over="ignore"):
         own = S.astype(kind)
     _check(S, ~np.isfinite(own) | ((own == 0) & (S != 0)), np.dtype(kind).name)
@@ -355,20 +387,28 @@ def _fixed(word: Word) -> Word:
 
     Raises ParameterError for a feedforward beyond the output, a state without a scale, and coefficients without digits.
     """
-    E, R, U, law = word.sizes, word.ranges, word.output, word.law
+    E = word.sizes
+    R = word.ranges
+    U = word.output
+    law = word.law
     remedy = f"in fixed point feedforward is a fraction of the range of the output: at most {U!r}"
     require(word.feedforward <= U, "range.feedforward", word.feedforward, remedy)
-    S, n, one = system_matrix(law), law.order, np.ones(law.order)
-    X, is_whole = absolute_sum(S[:n, :n], np.eye(n), S[:n, n:])
+    S = system_matrix(law)
+    n = law.order
+    A = S[:n, :n]
+    B = S[:n, n:]
+    one = np.ones(n)
+    X, is_whole = absolute_sum(A, np.eye(n), B)
     reach = X @ E
     # a state without a bound saturates beyond four ranges of u
-    of_output = np.divide(4 * U, abs(S[n, :n]), out=np.full(n, np.inf), where=S[n, :n] != 0)
+    with np.errstate(divide="ignore"):
+        of_output = 4 * U / abs(S[n, :n])
     if not is_whole:  # a state whose sum still grows has the scale of u
-        earlier, _ = absolute_sum(S[:n, :n], np.eye(n), S[:n, n:], MOST_SUMMED // 2)
+        earlier, _ = absolute_sum(A, np.eye(n), B, MOST_SUMMED // 2)
         of_output[np.isfinite(reach) & (reach <= (1 + SUMMED) * (earlier @ E))] = np.inf
     size = np.maximum(reach if is_whole else np.minimum(reach, of_output), LEAST_SCALE)
     if not np.isfinite(size).all():
-        poles, vectors = np.linalg.eig(S[:n, :n])
+        poles, vectors = np.linalg.eig(A)
         remedy = (
             f"ill-conditioned or unstable in z: modulus of its poles up to {max(abs(poles)):.4g} in double, condition "
             f"number of their eigenvectors {np.linalg.cond(vectors):.2g}; q31 needs states with a bound: give the law "
@@ -377,8 +417,8 @@ def _fixed(word: Word) -> Word:
         raise ParameterError(key="law", value=law.name, remedy=remedy)
     # with room for roundings
     scale = np.exp2(np.ceil(np.log2((1 + 2.0**-10) * size)))
-    scaled = with_system_matrix(law, S * np.r_[scale, np.ones(R.size)] / np.r_[scale, 1.0][:, None])
-    table = system_matrix(scaled) * np.r_[one, R] / np.r_[one, U][:, None]
+    scaled = S * np.r_[scale, np.ones(R.size)] / np.r_[scale, 1.0][:, None]
+    table = scaled * np.r_[one, R] / np.r_[one, U][:, None]
     sums = abs(table) @ np.r_[one, E / R] + np.r_[np.zeros(n), 1.0]  # of u with the feedforward
     most = 2.0**FRACTION_BITS - len(table) - R.size
     # at most those of a sum of products
@@ -386,4 +426,4 @@ def _fixed(word: Word) -> Word:
     is_largest = abs(table) == abs(table).max(axis=1)[:, None]
     _check(table, is_largest & (shifts < 1)[:, None], "q31 at these ranges")
     whole = np.rint(np.ldexp(table, shifts[:, None])).astype(np.int64)
-    return replace(word, law=scaled, table=whole, shifts=shifts)
+    return replace(word, law=with_system_matrix(law, scaled), table=whole, shifts=shifts)

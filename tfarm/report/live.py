@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import mkdtemp
 
-from tfarm.arm import AnyLaw, Arm, Law, arm_and_law, as_law
+from tfarm.arm import AnyLaw, Arm, Law, as_law
+from tfarm.case import Case
 from tfarm.digits import scientific
 from tfarm.dsp import Chain
 from tfarm.dsp.stages import admit
 from tfarm.errors import TfarmError, require
-from tfarm.exported.live_loop import CONSUMER, LIVE_COLUMNS, law_data, live_data
+from tfarm.exported.live_loop import CONSUMER, LIVE_COLUMNS, live_data
 from tfarm.loop.panels import PANEL_SAMPLES
 from tfarm.plots.style import GOOD, LOW, MARGINAL, POOR, STABLE, UNSTABLE
 from tfarm.report.page import (
@@ -63,10 +64,11 @@ def save_live(report: ArmReport, folder: Path) -> None:
     title = f"{arm.name}: live loop"
     out = folder / LIVE_PAGE
     law = next((law for each in laws if has_sliders(law := as_law(each.law))), as_law(default_gains(arm)))
-    arm, _ = arm_and_law(arm, law)
+    case = Case(arm, law, chain)
+    arm = case.arm
     try:
         admit(CONSUMER, arm, chain)
-        numbers = law_data(arm, chain, law) if law.gains is None else live_data(arm, chain, law.gains)
+        numbers = live_data(case)
     except TfarmError as error:
         write_text(out, render("live_failed.html", title=title, why=str(error)))
         return

@@ -45,14 +45,13 @@ from scipy.linalg import LinAlgError, solve_discrete_are, solve_triangular
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN
 from tfarm.arrays import Real
-from tfarm.case import Case
 from tfarm.dsp.plant import first_distinct, held_amplitude
 from tfarm.dsp.stages import not_covered
 from tfarm.errors import CertificationError, ConvergenceError, must_be_known
 from tfarm.exact.rationals import exact_matrix, falls, is_positive_definite
 from tfarm.loop.circle_crossings import around, stable_windows
 from tfarm.loop.loop_margins import lowest
-from tfarm.loop.sampled import Sampled, sampled_loop
+from tfarm.loop.sampled import Sampled
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.tuner.kernel import CONSUMER, Limits
@@ -98,12 +97,16 @@ def common_lyapunov(middle: Real, drive: Real, sense: Real, low: Real, high: Rea
     if not abs(np.linalg.eigvals(middle)).max() < 1.0:
         return None
     # the size of each state after one push: a sum of squares over 2^40 samples, after which any mode has decayed
-    total, power = np.outer(drive, drive), middle
+    total = np.outer(drive, drive)
+    power = middle
     for _ in range(40):
-        total, power = total + power @ total @ power.T, power @ power
+        total = total + power @ total @ power.T
+        power = power @ power
     size = np.sqrt(np.diag(total))
     scale = np.where(size > 0, size, 1.0)
-    A, b, c = middle * scale / scale[:, None], (drive / scale)[:, None], (sense * scale)[None]
+    A = middle * scale / scale[:, None]
+    b = (drive / scale)[:, None]
+    c = (sense * scale)[None]
     found: list[CommonLyapunov] = []
     # slacks of the inequality, in states of size 1
     for slack in (1e-3, 1e-5, 1e-7, 1e-9):
@@ -136,8 +139,8 @@ class MovingGain:
     @cached_property
     def sense(self) -> Real:
         """(n,): the row of the moment."""
-        dropped = len(self.loop.matrix()) - len(self.open)
-        return np.asarray(self._fed_back[self.loop.pulse.integrals_at + 2 - dropped])  # of the torque: its drive is 1
+        # of the torque: its drive is 1
+        return np.asarray(self._fed_back[self.loop.pulse.integrals_at + 2 - len(self.loop.matrix()) + len(self.open)])
 
     @cached_property
     def drive(self) -> Real:
@@ -247,14 +250,15 @@ def find_guard(loop: Sampled, kind: GuardKind, best_constant: float) -> Guard:
     find, sector = (_frozen, "constant gain") if kind == "frozen" else (_moving, "sector of time-varying gains")
     if guard := find(_larger(loop), best_constant):
         return guard
-    arm, angle_gain = loop.plant.arm, loop.number(ANGLE_GAIN)
-    at = f"{RATE_GAIN} = {loop.number(RATE_GAIN):g}{f', {ANGLE_GAIN} = {angle_gain:g}' if angle_gain else ''}"
+    arm = loop.plant.arm
+    gains = loop.gains
+    at = ", ".join(f"{name} = {gains[name]:g}" for name in (RATE_GAIN, ANGLE_GAIN) if name == RATE_GAIN or gains[name])
     start = f"{arm.name}: no {sector} is certified stable at {at}, C = {arm.damping:g} s"
     # the least damping with a guard, of a few [s]
     for C in filter(arm.damping.__lt__, np.geomspace(1e-12, 1e-2, 11).tolist()):
         with suppress(ConvergenceError):
-            damped = sampled_loop(Case(arm.having(damping=C), loop.gains, loop.chain), count=loop.plant.count)
-            if (other := find(_larger(damped), 0.0)) and other.is_settled:
+            other = find(_larger(loop.on(arm.having(damping=C), loop.plant.count)), 0.0)
+            if other and other.is_settled:
                 raise CertificationError(f"{start}; with a damping of C = {C:.1e} s there is one")
     remedy = f"take another {RATE_GAIN}, or a shorter period or delay"
     raise CertificationError(f"{start}, nor with any damping up to 0.01 s; {remedy}")
@@ -268,16 +272,15 @@ def constant_windows(loop: Sampled) -> list[tuple[float, float]]:
 def _frozen(loops: list[Sampled], best_constant: float) -> Guard | None:
     """The stability interval common to all models, without its outermost hundredth."""
     found = []
-    for loop in loops:
-        windows = constant_windows(loop)
+    for windows in map(constant_windows, loops):
         if not windows:
             return None
         found.append(around(windows, best_constant) or min(windows, key=lambda w: abs(sum(w) / 2 - best_constant)))
-    low, high = max(low for low, _ in found), min(high for _, high in found)
+    low = max(low for low, _ in found)
+    high = min(high for _, high in found)
     edge = (1 - RADIUS_SHARE) * (high - low)
-    if high - low < NARROWEST_SECTOR:
-        return None
-    return _guard("frozen", loops, found, low + edge * (low > 0), high - edge)
+    is_wide = high - low >= NARROWEST_SECTOR
+    return _guard("frozen", loops, found, low + edge * (low > 0), high - edge) if is_wide else None
 
 
 def _moving(loops: list[Sampled], best_constant: float) -> Guard | None:
@@ -304,8 +307,7 @@ def _certified(models: list[MovingGain], lo: float, hi: float, middle: float) ->
     if len(proven) < len(models):
         return None
     widest = [(middle - radius, middle + radius) for radius in (model.radius(middle) for model in models)]
-    loops = [model.loop for model in models]
-    return _guard("time-varying", loops, widest, lo, hi, proven)
+    return _guard("time-varying", [model.loop for model in models], widest, lo, hi, proven)
 
 
 def _guard(
@@ -325,8 +327,7 @@ def _middle(model: MovingGain, best_constant: float) -> float | None:
     """The middle gain of the default rule; None where no gain is stable."""
     # the best constant gain is within this share of half the width of the sector
     inside = 0.8
-    windows = constant_windows(model.loop)
-    middles = [float(m) for low, high in windows for m in np.linspace(low, high, 62)[1:-1]]
+    middles = [float(m) for low, high in constant_windows(model.loop) for m in np.linspace(low, high, 62)[1:-1]]
     radii = np.array([model.radius(m) for m in middles])
     if not (radii > NARROWEST_SECTOR).any():
         return None
@@ -334,7 +335,8 @@ def _middle(model: MovingGain, best_constant: float) -> float | None:
     if (beyond > 0).all():
         return middles[int(np.argmin(beyond))]
     best = int(np.argmax(np.where(beyond <= 0, radii, -1.0)))
-    inner, outer = middles[best], middles[min(best + 1, len(middles) - 1)]
+    inner = middles[best]
+    outer = middles[min(best + 1, len(middles) - 1)]
     # up to where the best constant gain just is inside
     for _ in range(12):
         m = (inner + outer) / 2
@@ -359,7 +361,8 @@ def _settled(loops: list[Sampled], found: list[tuple[float, float]]) -> bool:
 
 def upper_modes_are_quiet(loop: Sampled, highest: float) -> bool:
     """Whether the own decay of the upper half of the modes exceeds the bound on the push of the feedback."""
-    plant, T = loop.plant, loop.chain.sampling.period
+    plant = loop.plant
+    T = loop.chain.sampling.period
     fed_back = loop.having(MOMENT_GAIN, highest).push
     push = 2 * fed_back * abs(held_amplitude(plant.poles, T))
     upper = (plant.mode > plant.count // 2) & (plant.poles.imag > 0)

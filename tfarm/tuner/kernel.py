@@ -138,7 +138,8 @@ def guarded(z: float, limits: Limits) -> tuple[float, float]:
 @compiled
 def network_gain(weights: Real, inputs: Real, hidden: Real, limits: Limits) -> tuple[float, float]:
     """Return the network's gain and its derivative by the output neuron's sum; fill `hidden`."""
-    m, h = inputs.size, hidden.size
+    m = inputs.size
+    h = hidden.size
     z = 0.0
     for j in range(h):
         net = 0.0
@@ -152,7 +153,8 @@ def network_gain(weights: Real, inputs: Real, hidden: Real, limits: Limits) -> t
 @compiled
 def gain_gradient(weights: Real, inputs: Real, hidden: Real, by_sum: float, out: Real, by_input: Real) -> None:
     """Add by_sum times the derivative of the output neuron's sum by every weight to `out`; set that by each input."""
-    m, h = inputs.size, hidden.size
+    m = inputs.size
+    h = hidden.size
     by_input.fill(0.0)
     for j in range(h):
         out[h * m + j] += by_sum * hidden[j]
@@ -191,29 +193,37 @@ def dot(a: Real, b: Real) -> float:
 @inlined
 def sense(k: int, setting: Setting, run: Run, work: Work) -> bool:
     """Read x and u at sample k and fill the network's inputs there; False where the moment passes the bound."""
-    model, reference, scales, inputs = setting.model, setting.reference, setting.scales, run.inputs[k]
+    model = setting.model
+    reference = setting.reference
+    inputs = run.inputs[k]
     moment = dot(model.moment, work.state)
     if not abs(moment) <= setting.numbers.bound:
         return False
-    run.x[k], run.moment[k] = moment - reference.rigid[k], dot(model.own, work.state)
+    run.x[k] = moment - reference.rigid[k]
+    run.moment[k] = dot(model.own, work.state)
     run.u[k] = reference.counted[k] + reference.servo[k] - dot(model.servo, work.state)
     inputs.fill(0.0)
-    inputs[U_NOW], inputs[X_NOW] = run.u[k], run.x[k]
+    inputs[U_NOW] = run.u[k]
+    inputs[X_NOW] = run.x[k]
     if k >= 1:
-        inputs[U_BEFORE], inputs[E_BEFORE], inputs[X_BEFORE] = run.u[k - 1], run.e[k - 1], run.x[k - 1]
+        inputs[U_BEFORE] = run.u[k - 1]
+        inputs[E_BEFORE] = run.e[k - 1]
+        inputs[X_BEFORE] = run.x[k - 1]
         if inputs.size > K_BEFORE:
             inputs[K_BEFORE] = run.K[k - 1]
     if k >= 2:
         inputs[E_TWO_BEFORE] = run.e[k - 2]
     for i in range(inputs.size):
-        inputs[i] /= scales[i]
+        inputs[i] /= setting.scales[i]
     return True
 
 
 @inlined
 def act(k: int, setting: Setting, weights: Real, run: Run, work: Work) -> None:
     """Set the gain, e and the torque at sample k; advance by one sample."""
-    model, state, spare = setting.model, work.state, work.spare
+    model = setting.model
+    state = work.state
+    spare = work.spare
     run.K[k], run.slope[k] = network_gain(weights, run.inputs[k], run.hidden[k], setting.limits)
     run.e[k] = run.u[k] - run.K[k] * run.x[k]
     torque = run.e[k] + setting.reference.rest[k]
@@ -250,7 +260,8 @@ def backward(setting: Setting, weights: Real, run: Run, work: Work, gradient: Re
     `back` is the derivative by the state of the next sample.  `late_e`, `late_u`, `late_x`, `late_K` are derivatives
     by e, u, x and K of this sample through the inputs of later ones, `later_e` by e of the sample before.
     """
-    model, (a, b, T, _, _, _) = setting.model, setting.numbers
+    model = setting.model
+    a, b, T, _, _, _ = setting.numbers
     n, m = run.inputs.shape
     back, spare, by_input = work
     late_e = later_e = late_u = late_x = late_K = 0.0
@@ -267,8 +278,10 @@ def backward(setting: Setting, weights: Real, run: Run, work: Work, gradient: Re
         turn(model.A, back, spare)
         for i in range(back.size):
             back[i] = spare[i] + model.moment[i] * by_x - model.servo[i] * by_u
-        late_e, later_e = later_e + by_input[E_BEFORE], by_input[E_TWO_BEFORE]
-        late_u, late_x = by_input[U_BEFORE], by_input[X_BEFORE]
+        late_e = later_e + by_input[E_BEFORE]
+        later_e = by_input[E_TWO_BEFORE]
+        late_u = by_input[U_BEFORE]
+        late_x = by_input[X_BEFORE]
         late_K = by_input[K_BEFORE] if m > K_BEFORE else 0.0
 
 

@@ -20,7 +20,7 @@ from typing import Annotated, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from tfarm.arm.checks import not_negative, positive, whole
+from tfarm.arm.checks import check_annotated, not_negative, positive, whole
 from tfarm.arrays import Real
 from tfarm.errors import must_be_known, require
 from tfarm.exact.compiled import compiled, inlined
@@ -94,12 +94,16 @@ def learn_by_trials(
     last accepted one is taken back, its step halved and the momentum set to zero; after an accepted one the step grows
     again, up to its full size.
     """
-    n, size = run.x.size, weights.size
-    gradient, change, kept, slope = np.zeros(size), np.zeros(size), weights.copy(), np.zeros(size)
-    best, share = np.inf, 1.0
+    size = weights.size
+    gradient = np.zeros(size)
+    change = np.zeros(size)
+    kept = weights.copy()
+    slope = np.zeros(size)
+    best = np.inf
+    share = 1.0
     for trial in range(costs.size):
         done = forward(setting, weights, run, work)
-        cost = trial_cost(done, setting.numbers, run) if done == n else np.inf
+        cost = trial_cost(done, setting.numbers, run) if done == run.x.size else np.inf
         costs[trial] = cost
         if takes_back and not cost <= best and best < np.inf:
             share *= 0.5
@@ -131,30 +135,32 @@ def derive(k: int, setting: Setting, weights: Real, run: Run, work: Work, S: Rea
 
     S (n, weights) is that of the state, and advances by one sample.
     """
-    model, by_input = setting.model, work.by_input
+    states, size = S.shape
+    model = setting.model
+    by_input = work.by_input
     for row in range(D.shape[0] - 1, BEFORE - 1, -1):
         copied(D[row - BEFORE], D[row])
     for row in range(BEFORE):
         D[row].fill(0.0)
-    for i in range(S.shape[0]):
-        for p in range(S.shape[1]):
+    for i in range(states):
+        for p in range(size):
             D[X, p] += model.moment[i] * S[i, p]
             D[U, p] -= model.servo[i] * S[i, p]
     gain_gradient(weights, run.inputs[k], run.hidden[k], run.slope[k], D[K], by_input)
     for i in range(by_input.size):
-        for p in range(S.shape[1]):
+        for p in range(size):
             D[K, p] += by_input[i] / setting.scales[i] * D[INPUT_ROWS[i], p]
-    for p in range(S.shape[1]):
+    for p in range(size):
         D[E, p] = D[U, p] - run.K[k] * D[X, p] - run.x[k] * D[K, p]
     spare.fill(0.0)
-    for i in range(S.shape[0]):
-        for j in range(S.shape[0]):
+    for i in range(states):
+        for j in range(states):
             if model.A[i, j] != 0.0:
-                for p in range(S.shape[1]):
+                for p in range(size):
                     spare[i, p] += model.A[i, j] * S[j, p]
-        for p in range(S.shape[1]):
+        for p in range(size):
             spare[i, p] += model.B[i] * D[E, p]
-    for i in range(S.shape[0]):
+    for i in range(states):
         copied(spare[i], S[i])
 
 
@@ -168,9 +174,17 @@ def learn_by_samples(
     forward since the trial began: the gradient of a x^2/2 + b e^2/2 now, by weights that are taken for constant
     (Williams and Zipser, 1989).
     """
-    n, size, states, numbers = run.x.size, weights.size, work.state.size, setting.numbers
-    gradient, change, past, kept = np.zeros(size), np.zeros(size), np.zeros((numbers.lag, size)), weights.copy()
-    S, room, D = np.zeros((states, size)), np.zeros((states, size)), np.zeros((3 * BEFORE, size))
+    n = run.x.size
+    size = weights.size
+    states = work.state.size
+    numbers = setting.numbers
+    gradient = np.zeros(size)
+    change = np.zeros(size)
+    past = np.zeros((numbers.lag, size))
+    kept = weights.copy()
+    S = np.zeros((states, size))
+    room = np.zeros((states, size))
+    D = np.zeros((3 * BEFORE, size))
     for trial in range(costs.size):
         copied(weights, kept)
         work.state.fill(0.0)
@@ -205,6 +219,7 @@ Rule = Literal["dynamic", "clipped", "plain"]
 Sensitivity = Literal["one-step", "whole"]
 
 QUARTILES = (0.25, 0.5, 0.75)  # of learning curves over the seeds
+MOMENTUM = "the momentum factor lies in [0, 1)"
 
 
 @frozen(kw_only=True)
@@ -218,19 +233,16 @@ class Learning:
     mode: Mode = "trial"
     rule: Rule = "dynamic"
     sensitivity: Sensitivity = "one-step"
-    eta: float = 0.8
-    alpha: float = 0.6
-    clip: float = 0.5
-    enough: float = 0.0
+    eta: Annotated[float, positive, "a learning rate is positive and finite, 0.8 in the paper"] = 0.8
+    alpha: Annotated[float, not_negative, MOMENTUM] = 0.6
+    clip: Annotated[float, positive, "the largest norm of a gradient is positive and finite"] = 0.5
+    enough: Annotated[float, not_negative, "the error to stop at is zero or positive, in N m"] = 0.0
 
     def __post_init__(self) -> None:
         for key, kind in {"mode": Mode, "rule": Rule, "sensitivity": Sensitivity}.items():
             must_be_known(key, getattr(self, key), get_args(kind))
-        positive("eta", self.eta, "a learning rate is positive and finite, 0.8 in the paper")
-        momentum = not_negative("alpha", self.alpha, "the momentum factor lies in [0, 1)")
-        require(momentum < 1.0, "alpha", momentum, "the momentum factor lies in [0, 1), below 1")
-        positive("clip", self.clip, "the largest norm of a gradient is positive and finite")
-        not_negative("enough", self.enough, "the error to stop at is zero or positive, in N m")
+        check_annotated(self, "")
+        require(self.alpha < 1.0, "alpha", self.alpha, MOMENTUM)
 
 
 @dataclass(frozen=True)
@@ -311,15 +323,15 @@ def train(trial: Trial, network: Network, guard: Guard, learning: Learning, tria
     The same inputs give the same bits.  Raises ParameterError for an invalid number of trials or rates.
     """
     trials = whole("trials", trials, 1, 1_000_000, "a whole number of trials from 1 to 1000000")
-    weights, costs = network.weights, np.zeros(trials)
-    longest = math.inf if learning.rule == "plain" else float(learning.clip)
-    steps = Steps(float(learning.eta), float(learning.alpha), longest, float(learning.enough))
+    weights = network.weights
+    costs = np.zeros(trials)
+    longest = math.inf if learning.rule == "plain" else learning.clip
+    steps = Steps(learning.eta, learning.alpha, longest, learning.enough)
     common = (trial.setting(network, guard.limits), steps, weights, costs, *trial.room(network))
     if learning.mode == "trial":
         made, sample = learn_by_trials(*common, learning.rule == "dynamic")
     else:
         made, sample = learn_by_samples(*common, learning.sensitivity == "whole")
     learnt = network.with_weights(weights)
-    result = trial.with_network(learnt, guard.limits)
     stopped = Stopped(made - 1, int(sample), trial.numbers.bound) if sample >= 0 else None
-    return Training(learnt, guard, costs[:made], result, stopped, sample == ENOUGH)
+    return Training(learnt, guard, costs[:made], trial.with_network(learnt, guard.limits), stopped, sample == ENOUGH)

@@ -31,7 +31,7 @@ from pydantic import Field
 
 from tfarm.arm import FED_BACK, Arm, HubFeedback, must_not_be_algebraic
 from tfarm.arm.chain import Reading
-from tfarm.arm.checks import check_annotated, not_negative, number, positive
+from tfarm.arm.checks import check_annotated, not_negative, positive
 from tfarm.arm.schema import StrictTable, validated_file
 from tfarm.arrays import Real
 from tfarm.case import Case
@@ -62,6 +62,9 @@ class Cost:
     def __post_init__(self) -> None:
         check_annotated(self, "")
         require(self.a or self.b, "a", self.a, "a and b are both zero: one of them has to be positive")
+
+
+DEFAULT_COST = Cost()
 
 
 @frozen
@@ -107,19 +110,22 @@ class Trial:
     @cached_property
     def model(self) -> kernel.Model:
         """The loop from sample to sample, open at the torque, and the rows of the servo and the moment."""
-        loop, last = self.loop, self.loop.pulse.integrals_at + 2
-        A = loop.times(0.0).matrix()
+        loop = self.loop
+        last = loop.pulse.integrals_at + 2
+        A, drive = loop.rig.frame
         # the last state is the torque of the last sample: B is 1 there
         servo = -loop.having("K2", 0.0).matrix()[last]
         moment = -loop.times(0.0).having("K2", 1.0).matrix()[last]
-        of_plant = loop.pulse.matrices()[1], loop.rig.sensed.own_moment(loop.chain.sampling)
-        drive, own = (np.pad(of, (0, len(A) - of.size)) for of in of_plant)
+        own = loop.rig.sensed.own_moment(loop.chain.sampling)
+        own = np.pad(own, (0, drive.size - own.size))
         return kernel.Model(*(np.ascontiguousarray(each) for each in (A.T, A, drive, servo, moment, own)))
 
     @cached_property
     def reference(self) -> kernel.Reference:
         """The references at each sample."""
-        task, gains, none = self.task, self.loop.gains, np.zeros(self.n)
+        task = self.task
+        gains = self.loop.gains
+        none = np.zeros(self.n)
         counted, rest = (task.feedforward, none) if self.signals == "total" else (none, task.feedforward)
         wanted = gains.Kp * task.hub_angle + gains.K1 * task.hub_rate
         return kernel.Reference(wanted, counted, rest, task.moment_reference)
@@ -127,8 +133,10 @@ class Trial:
     @cached_property
     def numbers(self) -> kernel.Numbers:
         """The cost's weights, the period, the largest moment, and when and how x follows a torque."""
-        model, sampling = self.model, self.loop.chain.sampling
-        bound, delay = float(FOLDED_UP * self.arm.bending_scale), sampling.whole_delay
+        model = self.model
+        sampling = self.loop.chain.sampling
+        bound = float(FOLDED_UP * self.arm.bending_scale)
+        delay = sampling.whole_delay
         reply = float(model.moment @ np.linalg.matrix_power(model.A, delay) @ model.B)
         return kernel.Numbers(self.cost.a, self.cost.b, sampling.period, bound, 1 + delay, reply)
 
@@ -136,18 +144,25 @@ class Trial:
         """Arguments of the compiled loops, without weights."""
         return kernel.Setting(self.model, self.reference, self.numbers, network.scales, guard)
 
-    def on(self, arm: Arm, chain: Chain, servo: HubFeedback) -> Trial:
-        """The same slew on another loop, with the references of this one's arm."""
-        return replace(self, loop=sampled_loop(Case(arm, replace(servo, K2=1.0), chain), count=self.loop.plant.count))
+    @property
+    def case(self) -> Case:
+        """The arm under its servo with a moment gain of 1, and the chain."""
+        return Case(self.arm, self.loop.gains, self.loop.chain)
 
-    def simulator(self, *, chain: Chain | None = None, task: Scenario | None = None) -> Simulator:
+    def on(self, case: Case) -> Trial:
+        """The same slew in another case, with the references of this one's arm."""
+        return replace(self, loop=sampled_loop(case, count=self.loop.plant.count))
+
+    def simulator(self, chain: Chain | None = None) -> Simulator:
         """A simulator of the loop, with the converters of a chain, by default that of the trial."""
-        case = Case(self.arm, HubFeedback(), chain or self.loop.chain)
-        return Simulator(case, task or self.task, count=self.loop.plant.count)
+        case = self.case if chain is None else self.case.through(chain)
+        return Simulator(case, self.task, count=self.loop.plant.count)
 
     def room(self, network: Network) -> tuple[kernel.Run, kernel.Work]:
         """Empty record and buffers of a trial with that network."""
-        (hidden, inputs), n, states = network.W1.shape, self.n, self.model.B.size
+        hidden, inputs = network.W1.shape
+        n = self.n
+        states = self.model.B.size
         run = kernel.Run(np.zeros((n, inputs)), np.zeros((n, hidden)), *np.zeros((6, n)))
         return run, kernel.Work(np.zeros(states), np.zeros(states), np.zeros(inputs))
 
@@ -157,10 +172,10 @@ class Trial:
         """The trial with a fixed network; the cost is inf where it was stopped."""
         run, work = self.room(network)
         done = int(kernel.forward(self.setting(network, guard), network.weights, run, work))
+        is_whole = done == self.n
+        cost = float(kernel.trial_cost(done, self.numbers, run)) if is_whole else math.inf
         t, x, u, e, K, moment = (each[:done] for each in (self.task.t, run.x, run.u, run.e, run.K, run.moment))
-        if done < self.n:
-            return Record(t, x, u, e, K, moment, math.inf, done)
-        return Record(t, x, u, e, K, moment, float(kernel.trial_cost(done, self.numbers, run)), None)
+        return Record(t, x, u, e, K, moment, cost, None if is_whole else done)
 
     def with_constant(self, K: float) -> Record:
         """The trial with a constant gain: a guard of one gain, for any network."""
@@ -174,7 +189,7 @@ def slew_trial(
     *,
     K1: float | None = None,
     Kp: float = 0.0,
-    cost: Cost | None = None,
+    cost: Cost = DEFAULT_COST,
     signals: Reading = "vibration",
     duration: float = TRIAL_DURATION,
     count: int = TRIAL_MODES,
@@ -187,15 +202,14 @@ def slew_trial(
     must_be_known("signals", signals, get_args(Reading))
     Kp = not_negative("Kp", Kp, ANGLE_REMEDY)
     arm, chain = admit(CONSUMER, arm, chain)
-    K1 = usual_rate_gain(arm, Kp) if K1 is None else K1
-    rate_gain = number("K1", K1, "the hub rate gain is a finite number of N m s/rad")
+    gains = HubFeedback(K1=usual_rate_gain(arm, Kp) if K1 is None else K1, K2=1.0, Kp=Kp)
     length = positive("duration", duration, "a trial lasts a positive number of seconds")
     chain = with_signals(chain, signals)
     rise = chain.slew.rise_time
     require(length >= rise, "duration", length, f"a trial lasts at least as long as its slew, {rise:g} s")
     must_not_be_algebraic(arm, "hub.inertia", 0.0)
-    loop = sampled_loop(Case(arm, HubFeedback(K1=rate_gain, K2=1.0, Kp=Kp), chain), count=count)
-    return Trial(loop, scenario("slew", arm, chain, length), Cost() if cost is None else cost, signals)
+    loop = sampled_loop(Case(arm, gains, chain), count=count)
+    return Trial(loop, scenario("slew", arm, chain, length), cost, signals)
 
 
 def usual_rate_gain(arm: Arm, Kp: float) -> float:
@@ -248,7 +262,8 @@ class TunedGain:
         """The gain at this sample."""
         if m.k == 0:
             self._past = (0.0,) * 5
-        (u1, e1, x1, K1, e2), x = self._past, m.vibration
+        u1, e1, x1, K1, e2 = self._past
+        x = m.vibration
         u = m.servo(self.servo) + (m.feedforward if self.signals == "total" else 0.0)
         row = np.array([u, u1, e1, e2, x, x1, K1][: self.network.scales.size])
         K = self.network.gain(row, self.guard)
@@ -261,22 +276,23 @@ def judged(simulation: Simulation, cost: Cost, signals: Reading) -> Record:
 
     So x has passed the anti-alias filter where there is one, but no quantisation.
     """
-    task, done = simulation.scenario, simulation.torque.size
-    rest = 0.0 if signals == "total" else task.feedforward[:done]
+    task = simulation.scenario
+    done = simulation.torque.size
+    is_whole = simulation.stopped is None
     x = simulation.measured[:, FED_BACK.index("root_moment")] - task.moment_reference[:done]
-    e = simulation.torque - rest
+    e = simulation.torque - (signals != "total") * task.feedforward[:done]
     K = np.zeros(done) if simulation.gain is None else simulation.gain
-    stopped = done if simulation.stopped is not None else None
-    total = np.inf if stopped is not None else float(task.period * np.sum(cost.a * x**2 + cost.b * e**2) / 2)
-    return Record(simulation.t, x, e + K * x, e, K, simulation.at_samples.root_moment, total, stopped)
+    total = float(task.period * np.sum(cost.a * x**2 + cost.b * e**2) / 2) if is_whole else math.inf
+    moment = simulation.at_samples.root_moment
+    return Record(simulation.t, x, e + K * x, e, K, moment, total, None if is_whole else done)
 
 
 def tip_off(simulation: Simulation, trial: Trial) -> float | None:
     """Distance of the tip from its target [m] at the end of a simulated slew; None of an unstable loop."""
     if simulation.stopped is not None:
         return None
-    chain, arm = trial.loop.chain, trial.arm
-    return float(simulation.at_samples.tip_displacement[-1] - chain.slew.travel_of(arm.reach))
+    travel = trial.loop.chain.slew.travel_of(trial.arm.reach)
+    return float(simulation.at_samples.tip_displacement[-1] - travel)
 
 
 class SavedTuner(StrictTable):
@@ -303,7 +319,8 @@ class SavedTuner(StrictTable):
     @property
     def network(self) -> Network:
         """The network.  Raises ParameterError where its parts do not match."""
-        widths, inputs = {len(row) for row in self.W1}, len(self.scales)
+        widths = {len(row) for row in self.W1}
+        inputs = len(self.scales)
         require(widths == {inputs}, "W1", sorted(widths), f"rows of {inputs}, one weight an input")
         return Network(np.array(self.W1), np.array(self.w2), np.array(self.scales))
 
@@ -318,8 +335,7 @@ class SavedTuner(StrictTable):
 
 def to_text(tuner: SavedTuner) -> str:
     """Text of a tuner's file; equal tuners give equal text, and it loads to the same bits."""
-    content = tuner.model_dump(exclude_defaults=True)
-    return json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+    return json.dumps(tuner.model_dump(exclude_defaults=True), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def save_tuner(tuner: SavedTuner, path: Path) -> None:

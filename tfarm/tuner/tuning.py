@@ -9,8 +9,9 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, as_law, must_be_arm
-from tfarm.arm.chain import Reading, chain_or_usual
+from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, must_be_arm
+from tfarm.arm.chain import Reading
+from tfarm.arm.checks import check_annotated, positive
 from tfarm.arrays import Real
 from tfarm.case import Case
 from tfarm.dsp import Chain, scenario
@@ -65,10 +66,10 @@ class Plan:
     count: int = TRIAL_MODES
     hidden: int = PAPER_HIDDEN
     seventh_input: bool = False
-    scale: float = 1.0
+    scale: Annotated[float, positive, "a scale is a positive, finite number of N m"] = 1.0
 
     def __post_init__(self) -> None:
-        require(0.0 < self.scale < np.inf, "scale", self.scale, "a scale is a positive, finite number of N m")
+        check_annotated(self, "")
 
     def trial(self, arm: Arm, chain: Chain | None) -> Trial:
         """The trial on an arm, with the weights of the cost on moments and torques in units of the scale."""
@@ -103,12 +104,14 @@ class Tuning:
     @property
     def finding(self) -> str:
         """Costs of the tuned slew, of the best constant gain, and without moment feedback."""
-        tuned, constant, without = self.training.result.cost, self.best_constant.cost, self.without.cost
-        return f"cost {tuned:.6g}; {constant:.6g} with the best constant gain, {without:.6g} without"
+        costs = self.training.result.cost, self.best_constant.cost, self.without.cost
+        return "cost {:.6g}; {:.6g} with the best constant gain, {:.6g} without".format(*costs)
 
     def saved(self) -> SavedTuner:
         """The record that `save_tuner` writes."""
-        guard, plan, network = self.training.guard, self.plan, self.training.network
+        guard = self.training.guard
+        plan = self.plan
+        network = self.training.network
         return SavedTuner(
             format=FORMAT, arm=self.trial.arm.name, period=self.trial.task.period, K1=plan.K1, Kp=plan.Kp,
             signals=plan.signals, a=plan.cost.a, b=plan.cost.b, guard_kind=guard.kind,
@@ -128,9 +131,10 @@ class Tuning:
 
 def usual_plan(arm: Arm, chain: Chain | None = None) -> Plan:
     """Return the paper's figures at the arm's default rate gain, in its unit of torque, for three times its slew."""
-    chain = chain_or_usual(chain)
+    gains = default_gains(arm)
+    chain = Case(arm, gains, chain).chain
     return Plan(
-        K1=default_gains(arm).K1,
+        K1=gains.K1,
         signals=chain.slew.reading,
         duration=TRIAL_SLEWS * chain.slew.rise_time,
         scale=torque_unit(arm, chain),
@@ -145,8 +149,8 @@ def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuni
     require(isinstance(plan, Plan | None), "plan", plan, "give a tfarm.tuner.Plan, such as Plan(trials=50, K1=0.3)")
     must_be_arm(arm)
     plan = usual_plan(arm, chain) if plan is None else plan
-    network, own = plan.network(plan.seed), replace(plan, learning=Learning(), trials=1, seed=0)
-    trial, guard, baselines = _baselines(arm, chain, own)
+    network = plan.network(plan.seed)
+    trial, guard, baselines = _baselines(arm, chain, replace(plan, learning=Learning(), trials=1, seed=0))
     return Tuning(
         trial=trial, plan=plan, training=train(trial, network, guard, plan.learning, plan.trials), **baselines
     )
@@ -157,13 +161,16 @@ def _baselines(arm: Arm, chain: Chain | None, plan: Plan) -> tuple[Trial, Guard,
     """Return trial, guard and baselines of a plan: the same for each learning, seed and number of trials."""
     trial = plan.trial(arm, chain)
     best = best_constant(trial)
-    guard, shaped = find_guard(trial.loop, plan.guard, best.gain), dict[str, Baseline]()
+    shaped = dict[str, Baseline]()
     for kind in SHAPERS:
         late = shaped_trial(trial, kind)
         delay = late.task.busy_until - trial.task.busy_until
         shaped[kind] = Baseline(f"input shaping, {kind}", late.with_constant(0.0).cost, delay)
-    without = trial.with_constant(0.0)
-    return trial, guard, {"without": without, "best_constant": best, "bound": lq_bound(trial), "shaped": shaped}
+    return (
+        trial,
+        find_guard(trial.loop, plan.guard, best.gain),
+        {"without": trial.with_constant(0.0), "best_constant": best, "bound": lq_bound(trial), "shaped": shaped},
+    )
 
 
 def tuned(arm: Arm, chain: Chain, plan: Plan | None = None, **numbers: float) -> Tuning:
@@ -203,7 +210,8 @@ class SlewEnd(NamedTuple):
     @classmethod
     def of(cls, tuning: Tuning) -> SlewEnd:
         """The end of the trial of a tuning."""
-        simulator, gain = tuning.trial.simulator(), tuning.gain()
+        simulator = tuning.trial.simulator()
+        gain = tuning.gain()
         runs = gain.run(simulator), simulator.linear(tuning.constant), simulator.linear(gain.servo)
         residuals = runs[0].residual_moment, runs[0].residual_raw, runs[-1].residual_moment
         return cls(*residuals, *(tip_off(run, tuning.trial) for run in runs))
@@ -254,7 +262,8 @@ class TuningResult:
         self,
     ) -> Annotated[list[Baseline], Quantity("compared with baselines", help="costs of the same slew")]:
         """The costs with the tuner and with the baselines."""
-        tuning, best = self.tuning, self.tuning.best_constant
+        tuning = self.tuning
+        best = tuning.best_constant
         return [
             Baseline("no moment feedback", tuning.without.cost),
             Baseline(f"best constant gain, K = {best.gain:.4g}", best.cost),
@@ -266,7 +275,8 @@ class TuningResult:
     @property
     def numbers(self) -> Annotated[dict[str, Any], Quantity(flat=True, help="costs of tuner and baselines")]:
         """The same numbers by name."""
-        tuning, shaped = self.tuning, self.tuning.shaped
+        tuning = self.tuning
+        shaped = tuning.shaped
         bound = "the least cost of any control signal e on this slew, with full state and preview"
         if tuning.plan.signals == "total":
             bound = "the least cost of any torque: under this reading it is that of an arm at rest"
@@ -344,9 +354,10 @@ def controlled_run(
 
     Its guard is certified for the loop of its training, not for another arm or chain.
     """
-    chain, gain = with_signals(chain, saved.signals), saved.gain()
+    chain = with_signals(chain, saved.signals)
+    gain = saved.gain()
+    case = Case(arm, gain.servo, chain)
     task = scenario(name, arm, chain, duration)
-    case = Case(arm, as_law(gain.servo), chain)
     run, used = simulated(case, task, count, between, outputs, gain.run)
     trained = {
         "trained_on": saved.arm, "guard_kind": saved.guard_kind, "guard": list(gain.guard), "K1": saved.K1,
