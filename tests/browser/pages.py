@@ -576,7 +576,7 @@ def test_a_page_without_sampled_loop_slew_and_sensor_has_the_rest(browser, folde
     (text,) = re.findall(r'id="live-data">(.*?)</script>', (folder / ARMS[0] / "live.html").read_text("utf-8"), re.S)
     missing = dict.fromkeys(("sampled_map", "sampled_loop", "slew", "sensor"))
     data = json.loads(text) | missing | {"no_sensor": "no polynomial follows"}
-    monkeypatch.setattr("tfarm.report.live.live_data", lambda *_: data)
+    monkeypatch.setattr("tfarm.report.page.live_data", lambda *_: data)
     (tmp_path / "arm").mkdir()
     save_live(ArmReport(tfarm.load(ARMS[0]), load_chain(ARMS[0])), tmp_path / "arm")
     write_assets(tmp_path / ASSETS)

@@ -82,7 +82,7 @@ def test_the_same_comparison_is_the_same_bytes(compared, folder, tmp_path):
 
 def test_an_index_leads_to_the_comparison_and_back(compared, tmp_path, monkeypatch):
     """One that is there; an arm's page that is made later leads to it too."""
-    monkeypatch.setattr("tfarm.report.page.save_figure", lambda *_, **__: None)
+    monkeypatch.setattr("tfarm.report.blocks.save_figure", lambda *_, **__: None)
     index, arm = tmp_path / "index.html", tmp_path / LAB.name
     index.write_text("an old index", encoding="utf-8")
     shown = write_comparison(compared, tmp_path)

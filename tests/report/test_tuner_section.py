@@ -16,8 +16,9 @@ from tests.shell import answer
 from tfarm.dsp import Chain, Sampling
 from tfarm.dsp.traces import away
 from tfarm.errors import CertificationError
-from tfarm.report.page import ArmReport, prose
-from tfarm.report.tuner_section import section_of, tuner_in_short, tuner_section
+from tfarm.report.blocks import prose
+from tfarm.report.page import ArmReport
+from tfarm.report.sampled_section import tuner_in_short, tuner_section
 from tfarm.schema.html import with_symbols
 from tfarm.studies import candidates as tuned
 from tfarm.tuner import Learning, LearningCurves, Plan, initial_network, train
@@ -33,7 +34,8 @@ def small(tmp_path_factory):
         patch.setattr(tuned, "LONG_TRIAL", 300)
         patch.setattr(tuned, "CURVE_SAMPLES", SEEDS * Plan().trials * 301)
         data = pickle.loads(once(tmp_path_factory, "tuner", save_study).read_bytes())
-    return data, section_of(data)
+        patch.setattr("tfarm.report.page.tuner_numbers", lambda *_: data)
+        return data, tuner_section(ArmReport(LAB, Chain()))
 
 
 def save_study(file):
@@ -118,7 +120,7 @@ def test_a_slew_that_runs_away_and_a_guard_that_fails_are_a_sentence(monkeypatch
     words = prose("tuner_unproven", error=CertificationError("no sector at K1 = 3.21e+06, C = 6.94e-05 s"))
     assert "K1 = 3.21 × 10⁶, C = 6.94 × 10⁻⁵ s" in with_symbols(words)
     runs_away = SimpleNamespace(tuning=SimpleNamespace(without=SimpleNamespace(cost=math.inf)))
-    monkeypatch.setattr("tfarm.report.tuner_section.tuner_numbers", lambda *_: runs_away)
+    monkeypatch.setattr("tfarm.report.page.tuner_numbers", lambda *_: runs_away)
     assert "is unstable" in tuner_section(ArmReport(LAB, Chain())).answer
 
 

@@ -4,6 +4,7 @@ import hashlib
 import json
 import math
 import re
+import shutil
 import subprocess
 import sys
 import time
@@ -33,12 +34,14 @@ from tfarm.assessment.card import Graded, LoopCard
 from tfarm.dsp import Chain, load_chain
 from tfarm.loop.edges import LowerBound
 from tfarm.plots.style import GOOD, LOW, MARGINAL, POOR, UNSTABLE
-from tfarm.report import overview, write, writing
-from tfarm.report.arm_section import arm_section
+from tfarm.report import page as report_page
+from tfarm.report import write, writing
+from tfarm.report.blocks import TEMPLATES, explained, prose, sheet, templates
 from tfarm.report.overview import Card, results, save_card
-from tfarm.report.page import TEMPLATES, ArmReport, GivenLaw, best, explained, prose, sheet, templates
+from tfarm.report.page import ArmReport, GivenLaw, best
+from tfarm.report.response_sections import arm_section
 from tfarm.report.trust import write_trust, written_proofs
-from tfarm.report.writing import PIECES, QUESTIONS, index_page, kept, make_section, navigation, pieces_of
+from tfarm.report.writing import PIECES, QUESTIONS, kept, make_section, navigation, pieces_of, write_index
 from tfarm.schema import Column, quantities, to_dict
 from tfarm.spectrum.table import default_gains
 
@@ -63,8 +66,17 @@ def test_another_process_with_other_hashes_writes_the_same_bytes(pages, audit_ro
     assert {name: there[name] == content for name, content in files_of(made).items() if there[name] != content} == {}
     write_trust(audit_rows, validated(), written_proofs(pages), tmp_path / "trust")
     assert files_of(tmp_path / "trust") == files_of(pages / "trust")
-    index = index_page(pages)
-    assert (pages / "index.html").read_text(encoding="utf-8") == index
+    again = tmp_path / "again"
+    shutil.copytree(pages, again)
+    assert index_of(again) == (pages / "index.html").read_text(encoding="utf-8")
+
+
+def index_of(out):
+    """The index of a folder of reports, written anew."""
+    (out / "index.html").unlink(missing_ok=True)
+    (out.parent / f"{out.name}-stage").mkdir()
+    write_index(out, out.parent / f"{out.name}-stage")
+    return (out / "index.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.survey
@@ -423,7 +435,7 @@ def rows_of(tmp_path, laws, chain):
     save_card(ArmReport(LAB, chain, tuple(laws)), folder)
     (folder / "index.html").write_text("a page")
     (card,) = kept(tmp_path, "card", Card).values()
-    return card.loops, index_page(tmp_path)
+    return card.loops, index_of(tmp_path)
 
 
 @pytest.mark.parametrize("law", [FAST, SLOW])
@@ -468,7 +480,7 @@ def test_a_lower_bound_is_one_on_a_card():
 
 
 def test_a_card_that_is_not_determined_has_its_reason(tmp_path, monkeypatch):
-    monkeypatch.setattr(overview, "result_card", Unmakeable(tfarm.ConvergenceError("stopped short", None, None)))
+    monkeypatch.setattr(report_page, "result_card", Unmakeable(tfarm.ConvergenceError("stopped short", None, None)))
     loops, page = rows_of(tmp_path, [], Chain())
     assert (loops, "no loop" in page) == ((), True)
     (card,) = kept(tmp_path, "card", Card).values()

@@ -24,7 +24,7 @@ from scipy.special import gammaincinv
 from tfarm.arm import Arm, must_be_arm
 from tfarm.arm.schema import file_key
 from tfarm.arm.writing import to_toml
-from tfarm.arrays import Real
+from tfarm.arrays import Complex, Real
 from tfarm.digits import listed
 from tfarm.errors import ConvergenceError, one_line, require
 from tfarm.files import is_standard_output, write_file
@@ -127,6 +127,16 @@ class Fit(Solution):
                 of.name, of.label, of.unit, of.source, of.digest, of.points, *of.range_hz, one.noise.source, chi_squared
             ))  # fmt: skip
         return rows
+
+    @cached_property
+    def curves(self) -> tuple[tuple[Real, Complex, Complex], ...]:
+        """Frequencies [rad/s] of each measured response, with its values at the start and at the fitted numbers."""
+        found = []
+        for number, one in enumerate(self.responses):
+            omega = np.unique(np.r_[np.geomspace(one.omega[0], one.omega[-1], 1200), one.omega])
+            problem = self.problem.at(number, omega)
+            found.append((omega, problem.computed(0 * self.point)[0], problem.computed(self.point)[0]))
+        return tuple(found)
 
     @cached_property
     def resonances(

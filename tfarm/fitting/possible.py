@@ -1,23 +1,15 @@
-"""Curves of a fit as pictures have them: before and after, and over the arms that the data leave possible."""
+"""Responses and stability over the arms that the data of a fit leave possible."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from tfarm.arm import Arm
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import Real
 from tfarm.fitting.fit import Fit
 from tfarm.loop.plane import gain_map
 from tfarm.response import transfer
-
-
-def fitted_curves(fit: Fit) -> Iterator[tuple[Real, Complex, Complex]]:
-    """Yield frequencies [rad/s] of each measured response, with its values at the start and at the fitted numbers."""
-    for number, one in enumerate(fit.responses):
-        omega = np.unique(np.r_[np.geomspace(one.omega[0], one.omega[-1], 1200), one.omega])
-        problem = fit.problem.at(number, omega)
-        yield omega, problem.computed(0 * fit.point)[0], problem.computed(fit.point)[0]
 
 
 class ResponseBand(NamedTuple):

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import MaxNLocator, NullFormatter
 
-from tfarm.arm import PLANE, HubFeedback
+from tfarm.arm import PLANE, HubFeedback, Law
 from tfarm.arrays import Complex, Real
 from tfarm.exact.outputs import signal_words, unit_over
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.fitting.overlay import Overlay
-from tfarm.fitting.possible import ResponseBand, ShareOfArms, fitted_curves
+from tfarm.fitting.possible import ResponseBand, ShareOfArms
 from tfarm.loop.curve import decibels
 from tfarm.response.frequency import Bode
 
@@ -222,7 +222,7 @@ def fitted(fit: Fit, *, ax: Sequence[Axes]) -> None:
     """
     count = len(fit.responses)
     looks = {"color": GREY, "lw": 1.0, "label": "start"}, {"color": BLUE, "lw": 1.4, "label": "fitted, exact"}
-    for one, (omega, *curves), upper, lower in zip(fit.responses, fitted_curves(fit), ax, ax[count:], strict=False):
+    for one, (omega, *curves), upper, lower in zip(fit.responses, fit.curves, ax, ax[count:], strict=False):
         _over_measured(one, [(omega, *each) for each in zip(curves, looks, strict=True)], upper, lower)
         upper.set(title=one.label, xlabel="", ylabel=f"magnitude [{one.unit}]")
 
@@ -253,7 +253,7 @@ def draw_share(fit: Fit, found: ShareOfArms, *, ax: Axes) -> None:
     """Draw the share of the possible arms that each pair of gains stabilises in continuous time."""
     mesh = ax.pcolormesh(*found, cmap="Blues", vmin=0.0, vmax=1.0, shading="nearest", rasterized=True)
     ax.figure.colorbar(mesh, ax=ax).set_label("share of the arms with a stable loop [−]")
-    name_axes(PLANE, fit.arm, HubFeedback(), ax)
+    name_axes(PLANE, fit.arm, Law.of_gains(HubFeedback()), ax)
     ax.grid(False)
 
 
