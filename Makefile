@@ -45,7 +45,7 @@ SURVEYS := \
 	exported.unit_loops \
 	cli.fuzz \
 	cli.stops \
-	case.steps \
+	assessment.steps \
 	report.plausible \
 	report.twice
 

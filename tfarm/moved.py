@@ -1,8 +1,10 @@
 """Names of former versions: a module that has them no more finds each where it is now, with a DeprecationWarning."""
 
+import sys
 import warnings
 from collections.abc import Callable, Mapping
 from importlib import import_module
+from types import ModuleType
 
 
 def moved(module: str, places: Mapping[str, str]) -> Callable[[str], object]:
@@ -15,3 +17,10 @@ def moved(module: str, places: Mapping[str, str]) -> Callable[[str], object]:
         return getattr(import_module(places[name]), name)
 
     return find
+
+
+def moved_module(name: str, places: Mapping[str, str]) -> ModuleType:
+    """Return a former module, which `import` finds too, by the modules that its names are in."""
+    module = sys.modules[name] = ModuleType(name, "A module of version 1.0, whose names are elsewhere.")
+    vars(module)["__getattr__"] = moved(name, places)
+    return module

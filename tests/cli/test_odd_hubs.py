@@ -6,37 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.shortest import OF_AN_ARM
 from tests.shell import run
 from tfarm.cli.running import whole_command
 
 PIN = Path("tests/golden/files/pin.toml").read_text(encoding="utf-8")
 HUBS = {"pinned": "inertia = 0.0", "locked": "inertia = inf", "spring": "inertia = 0.05\nstiffness = 20.0"}
-OF_AN_ARM = {
-    "check": "",
-    "modes": "--count 3",
-    "response": "--output root_moment --omega 1,30",
-    "bode": "",
-    "reduce": "--outputs root_moment --order 6",
-    "poles": "--count 3",
-    "margins": "",
-    "nyquist": "",
-    "nichols": "",
-    "sensitivity": "",
-    "spill": "",
-    "locus": "--vary K1 --from 0 --to 1 --points 3 --branches 2",
-    "map": "--K1 -1,3 --K2 -2,2 --points 5",
-    "step": "--duration 1",
-    "sampled": "--modes 3",
-    "simulate": "--scenario decay --duration 0.2 --modes 3",
-    "design": "--structure PD",
-    "export": "--what plant --as py --out OUT",
-    "tune": "--trials 1",
-    "compare": "sasaki2012-lab --modes 2",
-    "study": "--over payload.mass=uniform:0,0.1 --ask modes --draws 2 --workers 1 --out OUT",
-    "fit": "--mode 1=11hz --free link.youngs_modulus --covariance",
-    "report": "--only modes --out OUT",
-    "assumptions": "",
-}
 OF_NO_ARM = {"new", "presets", "frf", "ring", "audit", "validate", "glossary", "completion"}
 REASONS = {
     "locked": r"hub\.inertia = inf|locked hub",

@@ -7,17 +7,14 @@ import pytest
 
 import tfarm
 from tests import chain_elements
+from tests.cli.shortest import OF_AN_ARM
 from tests.shared import thinned
 from tests.shell import answer, refused, run
 
 RIGS = {"bench-rig": "tests/rigs/bench-rig.toml"} | {name: name for name in ("quanser-2dsfl", "quanser-flexlink")}
 
 
-@pytest.fixture(params=RIGS)
-def rig(request):
-    return RIGS[request.param]
-
-
+@pytest.mark.parametrize("rig", RIGS.values(), ids=RIGS)
 def test_hub_locked_frequencies_are_listed_with_the_free_ones_and_interlace_them(rig, capsys):
     """Elements of another kind have the same locked hub, and one constraint parts the frequencies (Rayleigh)."""
     found = answer(capsys, "modes", rig, "--count", "4")
@@ -46,20 +43,9 @@ def test_what_friction_makes_of_a_rigid_body_is_its_second_eigenvalue(capsys):
     assert "-1/C" not in out
 
 
-QUICK = {  # each verb, as short as it goes
-    "poles": ["--count", "2"],
-    "margins": [],
-    "map": ["--points", "5"],
-    "locus": ["--vary", "K2", "--from", "0", "--to", "0.001", "--points", "3", "--branches", "2"],
-    "simulate": ["--duration", "0.05", "--modes", "2", "--scenario", "step"],
-    "sampled": ["--modes", "4"],
-    "reduce": ["--outputs", "hub_rate", "--order", "8"],
-}
-
-
-@pytest.mark.parametrize("verb", thinned(QUICK, 2))
+@pytest.mark.parametrize("verb", thinned(["poles", "margins", "map", "locus", "simulate", "sampled", "reduce"], 2))
 def test_every_command_names_the_input_and_each_gains_unit(capsys, verb):
-    found = answer(capsys, verb, RIGS["quanser-2dsfl"], *QUICK[verb])
+    found = answer(capsys, verb, RIGS["quanser-2dsfl"], *OF_AN_ARM[verb].split())
     assert found["input"] == "motor_current"
     if verb != "reduce":
         assert found["gain_units"] == {"K1": "A s/rad", "K2": "A/(N m)", "Kp": "A/rad"}

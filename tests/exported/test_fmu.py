@@ -84,7 +84,7 @@ def assert_equal(found, truth, name=""):
 
 @pytest.mark.parametrize("case", ["single", "impulse", "pulse", *thinned(["reference", "rig"], 2)])
 def test_a_loop_is_that_of_the_simulation(case):
-    """Laws with states and of another input, references, an impulse and a disturbance; `tests.case.test_stages` has
+    """Laws with states and of another input, references, an impulse and a disturbance; `tests.dsp.test_stages` has
     gains under every stage of a chain."""
     arm, law, chain, name = LOOPS[case]
     unit, exported = made("loop", case)

@@ -43,7 +43,7 @@ def line(ax, label):
 
 
 def test_labels_are_the_numbers_of_the_card_of_both_loops(both):
-    """Which are those of python-control on a reduced model (tests/case/test_card.py)."""
+    """Which are those of python-control on a reduced model (tests/assessment/test_card.py)."""
     card = tfarm.result_card(LAB, LAW, CHAIN)
     found = labels(*tfarm.plots.loop(both, ax=Figure().subplots(2)))
     found |= labels(tfarm.plots.sensitivity(both, ax=Figure().subplots()))

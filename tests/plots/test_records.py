@@ -34,12 +34,7 @@ READERS = {
     *(f"tfarm.studies.quantities.{name}" for name in ("column_names", "loop_of", "quantity_of", "stability_of")),
 }
 # at the door: what is asked of an arm and a chain together, and the film of a run that a person has
-DOORS = {
-    "tfarm.dsp.plant.driven",
-    "tfarm.dsp.stages.admit",
-    "tfarm.dsp.traces.motion_of",
-    "tfarm.studies.bands.study_band",
-}
+DOORS = {"tfarm.dsp.plant.driven", "tfarm.dsp.stages.admit", "tfarm.dsp.traces.motion_of"}
 FILES = sorted({*ROOT.glob("plots/*.py"), *ROOT.glob("report/*.py")} - {ROOT / "report" / "page.py"})
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import tfarm
 from tfarm.assessment.stability_map import stable_regions
+from tfarm.case import Case
 from tfarm.digits import plain
 from tfarm.dsp import load_chain
 from tfarm.plots.frequency import bode as bode_plot
@@ -25,7 +26,7 @@ def write_pictures(out: Path) -> None:
     both = {label: bode(arm, "root_moment", band) for label, arm in zip(labels, (undamped, lab), strict=True)}
     figures = {
         "bode-root-moment": bode_plot.figure(both),
-        "gains": overlay.figure(*stable_regions(lab, default_gains(lab), load_chain(lab.name))),
+        "gains": overlay.figure(*stable_regions(Case(lab, default_gains(lab), load_chain(lab.name)))),
         "mode-shapes": modes.figure(tfarm.modes(lab, count=4)),  # two rows
     }
     for stem, figure in figures.items():

@@ -31,7 +31,7 @@ from tfarm.spectrum.table import default_gains
 
 LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 GAINS = HubFeedback(K1=0.3, K2=0.3)
-PLANE = cache(lambda: stable_regions(LAB, GAINS, Chain()))
+PLANE = cache(lambda: stable_regions(Case(LAB, GAINS)))
 analysed = cache(tfarm.sampled)
 
 
@@ -50,7 +50,7 @@ def windows(arm, gains=GAINS):
 def test_the_picture_of_a_rig_is_as_high_as_its_own_gains():
     """Driven by its motor's current, K2 balances a torque at 0.112 A/(N m), and not at 1."""
     rig = tfarm.load("quanser-2dsfl")
-    data = stable_regions(rig, default_gains(rig), Chain())
+    data = stable_regions(Case(rig, default_gains(rig)))
     low, high = overlay.figure(*data).axes[0].get_ylim()
     assert 0.112 < high < 0.2
     *_, sampled = data.sampled
@@ -76,7 +76,7 @@ def test_the_map_of_both_regions_is_that_of_the_poles():
 
 
 def test_without_damping_the_layers_are_nested_and_name_their_number_of_modes():
-    data = stable_regions(PAPER, GAINS, Chain())
+    data = stable_regions(Case(PAPER, GAINS))
     assert [layer.loop.plant.arm.damping for layer in data.sampled] == [1e-4, 1e-6, 0.0]
     assert data.sampled[-1].modes_used == 20
     assert all(column == [(CUT_RANGE[0], 1.0)] for column in data.continuous.stable_intervals)

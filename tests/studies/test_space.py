@@ -4,6 +4,7 @@ import csv
 import dataclasses
 import math
 import tomllib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,7 +19,6 @@ from tfarm.arm.writing import numbers_of
 from tfarm.case import Case
 from tfarm.errors import ParameterError
 from tfarm.fitting.posterior import Posterior, PosteriorNumber
-from tfarm.studies import space
 from tfarm.studies.space import ENDS, Listing, Subjects, lines_of, listing_of, space_of
 from tfarm.studies.study import files_of
 
@@ -76,12 +76,7 @@ def test_inverses_are_finite_at_both_ends_of_the_uniform_numbers(monkeypatch):
         values = made({"a": {kind: numbers}}).values(np.array([ENDS]).T)
         assert np.isfinite(values).all()
         assert values[0] < values[1]
-
-    class Zero:
-        def __init__(self, _):
-            self.random = np.zeros
-
-    monkeypatch.setattr(space.np.random, "Generator", Zero)
+    monkeypatch.setattr(np.random, "Generator", lambda _: SimpleNamespace(random=np.zeros))
     assert made({"a": {"normal": [0, 1]}}).uniform(3).tolist() == [ENDS[0]]
 
 
@@ -94,6 +89,7 @@ POSTERIOR = Posterior(
 
 
 def test_draws_of_a_posterior_have_its_covariance():
+    """A number with a range of its own is not drawn again; how it conditions is in `tests.fitting.test_posterior`."""
     found = made(posterior=POSTERIOR, draws=4000)
     a, b, c = found.rows(0, 4000, None).T
     coordinates = np.array([np.log(a / 2), (b - 5) / 2, c - 7])
@@ -104,13 +100,9 @@ def test_draws_of_a_posterior_have_its_covariance():
     assert abs(gap).max() < 4 * math.sqrt(2 / 4000)  # four deviations of a sample variance
     assert found.is_independent
     assert np.array_equal(found.rows(17, 19, None), found.rows(0, 4000, None)[17:19])
-
-
-def test_a_number_with_a_range_of_its_own_is_not_drawn_again():
-    """How it conditions the others is in `tests.fitting.test_posterior`."""
-    found = made({"a": {"loguniform": [1.0, 4.0]}}, posterior=POSTERIOR, draws=4000)
-    assert found.keys == ("a", "b", "c")
-    a, b, _ = found.rows(0, 4000, None).T
+    ranged = made({"a": {"loguniform": [1.0, 4.0]}}, posterior=POSTERIOR, draws=4000)
+    assert ranged.keys == ("a", "b", "c")
+    a, b, _ = ranged.rows(0, 4000, None).T
     assert stats.kstest(np.log2(a) / 2, "uniform").pvalue > CHANCE
     slope = COVARIANCE[1, 0] / COVARIANCE[0, 0]
     assert np.polyfit(np.log(a / 2), (b - 5) / 2, 1)[0] == pytest.approx(slope, abs=0.1)
@@ -140,11 +132,8 @@ def test_a_space_of_nothing_or_of_too_much_is_refused():
     assert "nothing is varied" in str(refusal(made, {}))
     many = refusal(made, {"a": {"grid": [0, 1, 5000]}, "b": {"grid": [0, 1, 5000]}})
     assert (many.key, "10,000,000" in many.remedy) == ("rows", True)
-
-
-def test_numbers_of_numpy_are_numbers():
-    found = made({"a": {"uniform": np.array([0.0, 1.0])}, "b": {"values": (np.float64(1), np.int64(2))}})
-    assert found.grids == {"b": (1.0, 2.0)}
+    numbers = made({"a": {"uniform": np.array([0.0, 1.0])}, "b": {"values": (np.float64(1), np.int64(2))}})
+    assert numbers.grids == {"b": (1.0, 2.0)}  # those of NumPy are numbers
 
 
 def test_a_key_has_one_place(lab):
@@ -281,9 +270,6 @@ BAD_LISTS = {  # by what is named
 def test_a_bad_list_is_refused_with_row_and_column(tmp_path, key, text):
     error = refusal(listing_of, listed(tmp_path, text))
     assert (error.key, "list.csv" in str(error)) == (key, True)
-
-
-def test_a_list_that_is_not_there_is_refused(tmp_path):
     for path in (tmp_path / "none.csv", tmp_path):
         with pytest.raises(ParameterError, match=r"cannot be read|is a folder"):
             listing_of(path)
@@ -295,31 +281,19 @@ PARQUET_CELLS = [
 ]  # fmt: skip
 
 
-@pytest.fixture
-def written(tmp_path):
-    """Write the columns of a table in Parquet."""
+@pytest.mark.parametrize(("cells", "values"), PARQUET_CELLS)
+def test_a_list_in_parquet_has_the_same_rules(tmp_path, cells, values):
     arrow = pytest.importorskip("pyarrow")
     parquet = pytest.importorskip("pyarrow.parquet")
-
-    def write(names, *columns):
-        parquet.write_table(arrow.table([arrow.array(each) for each in columns], names), tmp_path / "list.parquet")
-        return tmp_path / "list.parquet"
-
-    return write
-
-
-@pytest.mark.parametrize(("cells", "values"), PARQUET_CELLS)
-def test_a_list_in_parquet_has_the_same_rules(written, cells, values):
-    path = written(["a", "b"], [0.5, 1.5], cells)
+    path = tmp_path / "list.parquet"
+    parquet.write_table(arrow.table([arrow.array([0.5, 1.5]), arrow.array(cells)], ["a", "b"]), path)
     if values is None:
         with pytest.raises(ParameterError, match=r"list\.parquet: row [01], column b"):
             listing_of(path)
     else:
         assert list(lines_of(path)) == [("a", "b"), [0.5, values[0]], [1.5, values[1]]]
-
-
-def test_a_list_in_parquet_with_doubled_columns_or_of_other_bytes_is_refused(written, tmp_path):
-    assert "each column has a key of its own" in str(refusal(listing_of, written(["a", "a"], [1.0], [2.0])))
+    parquet.write_table(arrow.table([arrow.array([1.0])] * 2, ["a", "a"]), path)
+    assert "each column has a key of its own" in str(refusal(listing_of, path))
     assert "cannot be read" in str(refusal(listing_of, listed(tmp_path, b"PAR1 no table PAR1", "other.parquet")))
 
 

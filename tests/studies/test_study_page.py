@@ -19,11 +19,12 @@ from tests.shell import run
 from tests.studies.pictured import DRAWS, LAB, planted_study
 from tfarm.plots.motion import OF_STABILITY
 from tfarm.plots.studies import distributions, study, study_band, study_scatter
-from tfarm.plots.style import GREY, column, save_figure
+from tfarm.plots.style import GREY, column
 from tfarm.report import writing
 from tfarm.report.writing import write_study
 from tfarm.response.transfer import transfer
 from tfarm.schema import json_value, text, to_dict
+from tfarm.schema.terminal import show
 from tfarm.studies.study import SobolIndex, WorstArm
 
 COMMAND = ("study", "sasaki2012-lab", "--over", "payload.mass=uniform:0,0.2", "--over", "hub.inertia=uniform:0.05,0.2")
@@ -53,12 +54,17 @@ def page(found):
 
 
 def test_the_facts_and_the_ranges_are_those_of_the_command(found, page):
+    """Confidence is named for independent draws."""
     read, answer = Read(page), json_value(to_dict(found))
     shown = " ".join(read.texts)
     for share in answer["shares"]:
         assert share["finding"] in shown
         assert f"{share['stable']}" in read.texts
         assert f"of {found.done} arms stable" in read.texts
+    assert "one-sided, by Clopper and Pearson" in page
+    confident = r"converged stable on \d+ of 40 arms \(\d+ not stable, \d+ not determined\): at least [\d.]+ %"
+    assert re.search(confident, page)
+    assert all("at least" not in each._replace(at_least=None).finding for each in found.shares)
     cells = {tuple(row) for row in read.rows}
     for each in found.spreads:
         numbers = [text(x, 4).replace("-", "−") for x in (each.least, each.low, each.median, each.high, each.largest)]
@@ -66,15 +72,6 @@ def test_the_facts_and_the_ranges_are_those_of_the_command(found, page):
     with (found.parts.folder / "data" / "study-ranges.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [float(row["quantile_05"]) for row in rows] == [each["quantile_05"] for each in answer["spreads"]]
-
-
-def test_the_confidence_is_named_for_draws_alone(found, page):
-    assert "one-sided, by Clopper and Pearson" in page
-    assert re.search(
-        r"converged stable on \d+ of 40 arms \(\d+ not stable, \d+ not determined\): at least [\d.]+ %", page
-    )
-    counted = [each._replace(at_least=None).finding for each in found.shares]
-    assert all("at least" not in each for each in counted)
 
 
 def test_worst_arm_indices_and_failures(found, page):
@@ -147,22 +144,12 @@ def test_the_command_writes_page_and_figure_and_prints_the_findings(capsys, tmp_
 
 
 def test_the_findings_come_first_a_line_a_loop(found, capsys):
-    from tfarm.schema.terminal import show
-
     show(found)
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "stable arms (confidence one-sided, Clopper-Pearson)"
     loops = [line.split()[0] for line in lines[2:6] if not line.startswith(" ")]
     assert loops[:2] == ["continuous-time", "sampled"]
     assert max(map(len, lines[:4])) <= 130
-
-
-def test_the_study_has_every_kind_of_value(found):
-    """Otherwise the tests below are of less than they say."""
-    table = found.table()
-    assert {*table["sampled.stability"]} == {"stable", "unstable", ""}
-    assert all(check(table["sampled.gain_margin_db"]).any() for check in (np.isinf, np.isnan, np.isfinite))
-    assert len(found.failures) == 1
 
 
 def test_each_histogram_counts_the_arms(found):
@@ -184,7 +171,7 @@ def test_each_histogram_counts_the_arms(found):
     assert all(f"of {DRAWS} arms" in each for each in titles)  # some failed in each
 
 
-def test_a_quantity_has_one_name(found):
+def test_a_quantity_has_one_name_and_another_is_refused(found):
     by_place, by_name = study.figure(found, "phase_margin_deg"), study.figure(found, quantity="phase_margin_deg")
     assert [ax.get_xlabel() for ax in by_place.axes] == [ax.get_xlabel() for ax in by_name.axes]
     assert len(by_name.axes) == 1
@@ -192,19 +179,21 @@ def test_a_quantity_has_one_name(found):
     ax = Figure().subplots()
     assert tfarm.plots.study(found, quantity="phase_margin_deg", ax=ax) == (ax,)
     assert ax.get_xlabel() == by_name.axes[0].get_xlabel()
-
-
-@pytest.mark.parametrize("draw", [study, study_scatter])
-def test_a_quantity_that_is_not_there_is_refused(draw, found):
-    with pytest.raises(tfarm.ParameterError, match=r"quantity = 'natural_frequency_rad_s': .*name it in `ask`"):
-        draw.figure(found, "natural_frequency_rad_s")
-    with pytest.raises(tfarm.ParameterError, match="phase_margin"):
-        draw.figure(found, "phase_margine")
+    for draw in (study, study_scatter):
+        with pytest.raises(tfarm.ParameterError, match=r"quantity = 'natural_frequency_rad_s': .*name it in `ask`"):
+            draw.figure(found, "natural_frequency_rad_s")
+        with pytest.raises(tfarm.ParameterError, match="phase_margin"):
+            draw.figure(found, "phase_margine")
 
 
 def test_each_arm_is_one_mark_in_the_colour_of_its_loop(found):
-    """With a value at its height; without a limit at the upper edge, without a value at the lower one."""
+    """With a value at its height; without a limit at the upper edge, without a value at the lower one.
+
+    The study has every kind of them.
+    """
     table, figure = found.table(), study_scatter.figure(found)
+    assert {*table["sampled.stability"]} == {"stable", "unstable", ""}
+    assert all(check(table["sampled.gain_margin_db"]).any() for check in (np.isinf, np.isnan, np.isfinite))
     shown = [both[-1].name for both in distributions(found)][:3]
     keys = [re.match(r"[\w.]+", ax.get_xlabel())[0] for ax in figure.axes[-2:]]
     assert len(figure.axes) == 6
@@ -251,7 +240,7 @@ def test_a_band_has_the_curves_of_the_arms(found):
 
 
 def test_an_arm_without_a_response_is_left_out_and_none_at_all_is_an_error(found):
-    refused, place = tfarm.ConvergenceError("no", None, None), "tfarm.studies.bands.transfer"
+    refused, place = tfarm.ConvergenceError("no", None, None), "tfarm.studies.quantities.transfer"
     ready = transfer(found.parts.plan.case.arm, "root_moment")
     with mock.patch(place, side_effect=[ready, *[refused] * (DRAWS - 1), lambda s: 0 * s + 10]):
         (line, *_) = study_band.figure(found).axes[0].lines
@@ -271,11 +260,3 @@ def test_no_words_of_a_picture_overlap_in_any_size(found):
     with column():
         figures += [picture.figure(record) for picture, record in drawn]
     assert [line for figure in figures for line in complaints(figure)] == []
-
-
-def test_the_same_study_is_the_same_drawing_and_names_are_text(found, tmp_path):
-    for place in ("one", "other"):
-        save_figure(study_scatter.figure(found), tmp_path / f"{place}.svg")
-    one, other = ((tmp_path / f"{place}.svg").read_bytes() for place in ("one", "other"))
-    assert one == other
-    check_drawing(one.decode())

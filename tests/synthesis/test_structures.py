@@ -25,7 +25,7 @@ from tfarm.loop.stability import stability
 from tfarm.schema import text
 from tfarm.synthesis import judge, search
 from tfarm.synthesis.design import design
-from tfarm.synthesis.judge import LOST, RESERVE, entries_of
+from tfarm.synthesis.judge import LOST, RESERVE
 from tfarm.synthesis.models import in_blocks, squares
 from tfarm.synthesis.structures import INTEGRAL_SPEED, STRUCTURES, structure_of
 from tfarm.tuner.trial import Cost, slew_trial
@@ -272,7 +272,7 @@ def test_poles_of_a_rate_that_is_a_difference_are_those_of_the_sampled_loop():
     chain = Chain(converters=Converters(hub_rate="difference", rate_filter=80.0))
     for law in (tfarm.HubFeedback(K1=2.0, K2=0.2), tfarm.HubFeedback(K1=2.0, K2=0.2, Kp=4.0)):
         own = judge_of(LAB, law, "damping", chain)
-        z = abs(own.model.poles(entries_of(law))).max()
+        z = abs(own.model.poles(own.entries(law))).max()
         assert np.log(z) == pytest.approx(tfarm.sampled(LAB, law, chain).verdict.log_radius, rel=1e-6)
 
 

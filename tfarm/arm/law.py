@@ -187,7 +187,8 @@ class Law:
         found = {}
         every = [name for part in self.parts for name in part.signals]
         for place, part in enumerate(self.parts):
-            name, block = part.signals[0], part.block
+            name = part.signals[0]
+            block = part.block
             if len(part.signals) > 1 or not is_measured(name) or every.count(name) > 1:
                 continue
             if isinstance(block, Rational) and block.is_constant:
@@ -388,7 +389,8 @@ def tracked(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
 
     So a law of gains alone is returned as gains only where each of its signals is among its references.
     """
-    (driven, gains), full = arm_and_law(arm, law), as_law(law)
+    driven, gains = arm_and_law(arm, law)
+    full = as_law(law)
     return driven, gains if set(full.signals) <= set(full.references) else law
 
 

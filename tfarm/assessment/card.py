@@ -21,18 +21,17 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Annotated, Any, NamedTuple
 
-from tfarm.arm import AnyLaw, Arm, as_law
+from tfarm.arm import AnyLaw, Arm
 from tfarm.case import Case
 from tfarm.digits import general
 from tfarm.dsp import Chain
-from tfarm.dsp.stages import admit, not_covered
+from tfarm.dsp.stages import admit_case, not_covered
 from tfarm.errors import ConvergenceError
 from tfarm.loop.curve import LoopCurve, LoopVerdict, gain_margin
 from tfarm.loop.loop_margins import LoopMargins
 from tfarm.loop.margins import Margins, margins
 from tfarm.loop.poles import HUB
 from tfarm.loop.sampled_verdict import SAMPLED_LOOP, Analysis, sampled
-from tfarm.loop.stability import stability
 from tfarm.records import frozen
 from tfarm.schema import Percent, Quantity, Table, Tabled, across, text
 from tfarm.schema.html import as_html, with_symbols
@@ -171,34 +170,36 @@ def result_card(
     `continuous` (of `margins`) and `at_samples` (of `sampled`) are what is known of these loops already.  Raises
     ParameterError where there is no loop.
     """
-    law, (arm, chain) = as_law(law), admit(SAMPLED_LOOP, arm, chain)
-    _, undamped = graded_arm(arm)
-    notes = [SCALED + RECOMMENDED[arm.has_elastic_link]] if law.gains == default_gains(arm) else []
+    case = admit_case(SAMPLED_LOOP, Case(arm, law, chain))
+    _, undamped = graded_arm(case.arm)
+    notes = [SCALED + RECOMMENDED[case.arm.has_elastic_link]] if case.gains == default_gains(case.arm) else []
     notes += [undamped] if undamped else []
-    cards: dict[str, LoopCard | None] = {"continuous": None, "sampled": None}
-    for name in cards if not law.is_discrete else ("sampled",):
+    known = {"continuous": continuous, "sampled": at_samples}
+    cards: dict[str, LoopCard | None] = dict.fromkeys(known)
+    for name in known if not case.law.is_discrete else ("sampled",):
         try:
-            cards[name] = loop_card(name, arm, law, chain, continuous if name == "continuous" else at_samples)
+            cards[name] = loop_card(name, case, known[name])
         except ConvergenceError as error:
             notes.append(f"{name} loop not determined: {error}")
-    return ResultCard(**cards, period=chain.sampling.period, notes=tuple(notes))
+    return ResultCard(**cards, period=case.chain.sampling.period, notes=tuple(notes))
 
 
-def loop_card(loop: str, arm: Arm, law: AnyLaw, chain: Chain, known: Margins | Analysis | None = None) -> LoopCard:
-    """Return the card of the continuous or the sampled loop, of `known` margins or analysis where there are.
+def analysis_of(name: str, case: Case) -> Margins | Analysis:
+    """Return the margins of the continuous loop of a case, or the analysis of its sampled one."""
+    return sampled_of(case.arm, case.law, case.chain) if name == "sampled" else margins_of(case.arm, case.law)
+
+
+def loop_card(name: str, case: Case, known: Margins | Analysis | None = None) -> LoopCard:
+    """Return the card of the continuous or the sampled loop, of `known` margins or analysis where these are its own.
 
     Raises ConvergenceError where the loop is not determined.
     """
-    arm, chain = admit(SAMPLED_LOOP, arm, chain)
-    found: Margins | Analysis
-    if loop == "sampled":
-        found = known or sampled_of(arm, law, chain)
-    else:
-        is_own = known is not None and known.verdict.full.arm.hub == arm.hub
-        found = known if known is not None and is_own else margins_of(arm, law)
-    own, (damped, _) = card_of(found, chain), graded_arm(arm)
-    is_own = damped is arm or own.stability == "unstable"
-    return own if is_own else _with_margins(own, loop_card(loop, damped, law, chain))
+    case = admit_case(SAMPLED_LOOP, case)
+    is_own = known is not None and known.verdict.full.arm.hub == case.arm.hub
+    found = known if known is not None and is_own else analysis_of(name, case)
+    damped, _ = graded_arm(case.arm)
+    is_graded = damped is case.arm or found.verdict.word == "unstable"
+    return card_of(found, case.chain, found if is_graded else analysis_of(name, case.on(damped)))
 
 
 def reference_damping(arm: Arm) -> float:
@@ -214,15 +215,19 @@ def graded_arm(arm: Arm) -> tuple[Arm, str]:
     return arm.having(damping=reference), UNDAMPED.format(reference)
 
 
-def card_of(found: Margins | Analysis, chain: Chain) -> LoopCard:
-    """Return the card of a loop; its delay margin is graded by the sampling period of a chain."""
-    verdict = found.verdict
-    slowest, arm = verdict.time_constant, verdict.full.arm
+def card_of(found: Margins | Analysis, chain: Chain, graded: Margins | Analysis | None = None) -> LoopCard:
+    """Return the card of a loop; its delay margin is graded by the sampling period of a chain.
+
+    Margins and poles are those of a loop with more damping, where that is `graded` in its place.
+    """
+    graded = graded or found
+    arm = found.verdict.full.arm
+    slowest = graded.verdict.time_constant
     limit = found.damping_limit if arm.least_damping < reference_damping(arm) else None
     return LoopCard(
-        **words_of(verdict, chain),
-        **_margins(found.in_band, found.delay_margin_seconds, chain.sampling.period),
-        least_damping=_least_damped(verdict.ringing),
+        **words_of(found.verdict, chain),
+        **_margins(graded.in_band, graded.delay_margin_seconds, chain.sampling.period),
+        least_damping=_least_damped(graded.verdict.ringing),
         time_constant=slowest if slowest is not None and slowest > 0 else None,
         minimum_damping=None if limit is None else limit.value,
     )
@@ -257,21 +262,16 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
     ConvergenceError
         Where its stability is not determined.
     """
-    law, (arm, usual) = as_law(law), admit(SAMPLED_LOOP, arm, chain)
-    damped, note = graded_arm(arm)
+    case = admit_case(SAMPLED_LOOP, Case(arm, law, chain))
+    damped, note = graded_arm(case.arm)
 
-    def as_card(curve: LoopCurve, own: str) -> LoopCurve:
-        return replace(curve, stability=own, note=note, margins=None if own == "unstable" else curve.margins)
+    def as_card(name: str) -> LoopCurve:
+        word = analysis_of(name, case).verdict.word
+        curve = analysis_of(name, case.on(damped)).curve
+        return replace(curve, stability=word, note=note, margins=None if word == "unstable" else curve.margins)
 
-    found = None
-    if not law.is_discrete:
-        own = margins_of(damped, law)
-        found = as_card(own.curve, (own.stability if damped is arm else stability(Case(arm, law))).word)
-    if found is not None and chain is None:
-        return found
-    at_samples = sampled_of(damped, law, usual)
-    word = sampled_of(arm, law, usual).verdict.word
-    return replace(as_card(at_samples.curve, word), continuous=found)
+    found = None if case.law.is_discrete else as_card("continuous")
+    return found if found is not None and chain is None else replace(as_card("sampled"), continuous=found)
 
 
 def _least_damped(poles: Iterable[tuple[int, complex]]) -> LeastDamped | None:
@@ -315,9 +315,3 @@ def grade_of(size: float | None, limits: tuple[float, float]) -> str:
     sign = 1.0 if limits[0] > limits[1] else -1.0
     good, low = (sign * size >= sign * limit for limit in limits)
     return GOOD if good else LOW if low else POOR
-
-
-def _with_margins(own: LoopCard, graded: LoopCard) -> LoopCard:
-    """A card with the margins and the damping ratio of another one."""
-    names = (*GRADED, "grade", "limited_by", "delay_margin_periods", "disk_margin", "least_damping", "time_constant")
-    return replace(own, **{name: getattr(graded, name) for name in names})

@@ -7,13 +7,13 @@ from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
 
-from tfarm.arm import PLANE, AnyLaw, Arm, HubFeedback, as_law, must_have_free_hub
+from tfarm.arm import PLANE, AnyLaw, Arm, HubFeedback, must_have_free_hub
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
 from tfarm.case import Case
 from tfarm.crossing import Window
 from tfarm.dsp import Chain
-from tfarm.dsp.plant import driven
+from tfarm.dsp.stages import admit_case
 from tfarm.errors import ConvergenceError, one_line, require
 from tfarm.loop.circle_crossings import FACTOR, stable_windows
 from tfarm.loop.continuous import ContinuousLoop
@@ -21,7 +21,7 @@ from tfarm.loop.margins import Margins
 from tfarm.loop.margins import margins as margins_of
 from tfarm.loop.plane import Plane, between, gain_map, plane, ranges_of
 from tfarm.loop.poles import HUB, closed_loop_poles, poles_by_mode
-from tfarm.loop.sampled_verdict import Analysis, SampledBrief, Verdict, brief_of, sampled_verdict
+from tfarm.loop.sampled_verdict import SAMPLED_LOOP, Analysis, SampledBrief, brief_of, sampled_brief, sampled_verdict
 from tfarm.records import frozen
 from tfarm.response.frequency import Bode, bode, resonant_band
 from tfarm.schema import Difference, Percent, Quantity
@@ -54,27 +54,43 @@ class PoleOfMode(NamedTuple):
 
 @frozen(kw_only=True)
 class ComparedSide:
-    """One of the two: its name, arm and law, the modes of the arm, and poles, verdicts and margins of the loop.
+    """One of the two: its name and case, the modes of the arm, and poles, verdicts and margins of the loop.
 
     `poles` are closed-loop poles with Im s >= 0, complete in their box; `open_loop` those of the arm with Im s > 0 by
-    flexible mode; `sampled` is the verdict at the chain's period; `loop` has verdict and margins.  Where one of the
+    flexible mode; `sampled` is the verdict at the chain's period; `loop` has verdict and margins, `range_words` the
+    frequency range of a continuous-time verdict beyond which nothing is known.  Where one of the
     laws compared is a law in z there is no continuous-time loop on either side: `loop` is the sampled one, with poles
     s = ln(z)/T.
     """
 
     name: str
-    arm: Arm
-    law: AnyLaw
+    case: Case
     arm_modes: list[ArmMode]
     poles: Complex
     open_loop: dict[int, complex]
     loop: Margins | Analysis
     sampled: SampledBrief
+    range_words: str = ""
+
+    @property
+    def arm(self) -> Arm:
+        """The arm."""
+        return self.case.arm
+
+    @property
+    def law(self) -> AnyLaw:
+        """The law, as gains at the hub where it is no more than these."""
+        return self.case.gains or self.case.law
 
     @property
     def gains(self) -> HubFeedback | None:
         """The law as gains at the hub; None where it is more than these."""
-        return as_law(self.law).gains
+        return self.case.gains
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether the loop is that of the samples."""
+        return self.loop.verdict.full.period is not None
 
     @property
     def verdict(self) -> str:
@@ -111,23 +127,15 @@ class ComparedSide:
         in_band = self.loop.in_band
         return None if in_band is None else self.loop.delay_margin_seconds or in_band.delay
 
-    @property
-    def range_words(self) -> str:
-        """The frequency range of the continuous-time verdict where nothing is known beyond it."""
-        if isinstance(self.loop, Analysis):
-            return ""
-        verdict = self.loop.stability
-        is_open = verdict.word != "unstable" and not verdict.is_known_beyond
-        return f"up to {verdict.band:.4g} rad/s, not determined beyond" if is_open else ""
-
     def reach(self, delay: Real) -> list[Sequence[Window]]:
         """The intervals of a factor on the law in which its loop is stable, at each further delay [s]."""
-        if isinstance(self.loop, Analysis):
-            sampling, late = self.loop.loop.chain.sampling, self.loop.loop.with_delay
-            now = [late(sampling.delay_samples + more) for more in (delay / sampling.period).tolist()]
-            return [stable_windows(each, FACTOR) for each in now]
-        loop, factors = ContinuousLoop(Case(self.arm, as_law(self.law))), between(0.0, MOST_FACTOR, FACTORS)
-        return [*plane(loop, ("delay", "gain"), loop.law.delay + delay, factors).stable_intervals]
+        if self.is_sampled:
+            loop = cast("Analysis", self.loop).loop
+            late = loop.chain.sampling.delay_samples + delay / loop.chain.sampling.period
+            return [stable_windows(loop.with_delay(each), FACTOR) for each in late.tolist()]
+        in_s = ContinuousLoop(self.case)
+        factors = between(0.0, MOST_FACTOR, FACTORS)
+        return [*plane(in_s, ("delay", "gain"), in_s.law.delay + delay, factors).stable_intervals]
 
 
 class SideRow(NamedTuple):
@@ -168,7 +176,7 @@ class Comparison:
     ) -> Annotated[bool, Quantity("discrete-time comparison", key="at_samples",
                                   help="where a law is in z: both loops at their samples, s = ln(z)/T")]:  # fmt: skip
         """Whether the loops are compared at their samples, one of the laws being a law in z."""
-        return isinstance(self.one.loop, Analysis)
+        return self.one.is_sampled
 
     @property
     def rows(
@@ -325,53 +333,57 @@ def compare(
 
 def _cases(arms: Arm | Sequence[Arm], laws: AnyLaw | Sequence[AnyLaw] | None, chain: Chain | None) -> list[Case]:
     """Return both arms with their laws."""
-    given: list[Any] = list(arms) if isinstance(arms, list | tuple) else [arms]
-    some: list[Any] = [] if laws is None else list(laws) if isinstance(laws, list | tuple) else [laws]
+    given = _listed(arms)
+    some = [] if laws is None else _listed(laws)
     is_two = 1 <= len(given) <= 2 and len(some) <= 2 and max(len(given), len(some)) == 2
     require(is_two, "compare", f"{len(given)} arms, {len(some)} laws", "give two arms, or one arm and two laws")
     pair = given * (2 // len(given))
     each = some * (2 // len(some)) if some else map(default_gains, pair)
-    return [Case(arm, law, cast("Any", chain)) for arm, law in zip(pair, each, strict=True)]
+    return [Case(arm, law, chain) for arm, law in zip(pair, each, strict=True)]
+
+
+def _listed(given: Any) -> list[Any]:
+    """Return one or several as a list."""
+    return list(given) if isinstance(given, list | tuple) else [given]
 
 
 def _names(cases: list[Case]) -> Sequence[str]:
     """Return the arms' names where they differ, else the laws', else their numbers."""
-    arms = [case.arm.name for case in cases]
     laws = []
     for case in cases:
         gains = case.gains
         laws.append(", ".join(gains.gain_text(n, "{:.4g}".format) for n in PLANE) if gains else case.law.name)
+    arms = [case.arm.name for case in cases]
     return next((names for names in (arms, laws) if names[0] != names[1]), ("first", "second"))
 
 
 def _side(name: str, case: Case, count: int, is_sampled: bool) -> ComparedSide:
-    """Return all that is compared of one case; a sampled verdict that cannot be settled is left open."""
-    law = case.gains or case.law
+    """Return all that is compared of one case; a sampled verdict that is not determined is left open."""
     most = count + 6  # poles with Im s >= 0: also real ones, those of the hub, the motor and a controller
-    arm, chain = driven(case.arm, case.chain)
-    rows, open_loop = _modes_of_arm(arm, count, most)
-    case = Case(arm, law, chain)
+    case = admit_case(SAMPLED_LOOP, case)
+    rows, open_loop = _modes_of_arm(case.arm, count, most)
+    range_words = ""
     loop: Margins | Analysis
-    verdict: Verdict | ConvergenceError
     if is_sampled:
-        loop = Analysis(verdict := sampled_verdict(case))
+        loop = Analysis(sampled_verdict(case))
+        sampled = brief_of(loop.verdict, case)
         poles, open_loop = _sampled_poles(loop, most)
     else:
-        try:
-            verdict = sampled_verdict(case)
-        except ConvergenceError as error:
-            verdict = error
-        loop = margins_of(arm, law)
-        poles = closed_loop_poles(arm, law, most).values
+        sampled = sampled_brief(case)
+        loop = margins_of(case.arm, case.law)
+        verdict = loop.stability
+        if verdict.word != "unstable" and not verdict.is_known_beyond:
+            range_words = f"up to {verdict.band:.4g} rad/s, not determined beyond"
+        poles = closed_loop_poles(case.arm, case.law, most).values
     return ComparedSide(
         name=name,
-        arm=arm,
-        law=law,
+        case=case,
         arm_modes=rows,
         poles=poles,
         open_loop={n: s for n, s in open_loop.items() if n and s.imag > 0},
         loop=loop,
-        sampled=brief_of(verdict, case),
+        sampled=sampled,
+        range_words=range_words,
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import GAINS, PLANE, Arm, HubFeedback, shown_unit
+from tfarm.arm import GAINS, PLANE, Arm, shown_unit
 from tfarm.arrays import Complex, Real
 from tfarm.case import Case
 from tfarm.dsp import Chain
@@ -63,11 +63,14 @@ class StableRegions(NamedTuple):
         ]
 
 
-def stable_regions(arm: Arm, gains: HubFeedback, chain: Chain) -> StableRegions:
-    """Return the regions around these gains.  Raises ParameterError where the arm has no loop."""
+def stable_regions(case: Case) -> StableRegions:
+    """Return the regions around the gains of a case.  Raises ParameterError where it has no loop."""
+    gains = case.gains
+    assert gains is not None
+    arm = case.arm
     # at C = 0 with a little damping too
     dampings = (arm.damping,) if arm.damping else (1e-4, 1e-6, 0.0)
-    loops = [sampled_verdict(Case(arm.having(damping=C), gains, chain)).full for C in dampings]
+    loops = [sampled_verdict(case.on(arm.having(damping=C))).full for C in dampings]
     ends = np.unique(np.concatenate([ends_of_K1(loop) for loop in loops]))
     ends = ends[ends > 0]
     ends = ends[np.diff(ends, prepend=0.0) > 1e-3 * ends]

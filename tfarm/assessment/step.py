@@ -24,7 +24,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from tfarm.arm import AT_HUB, AnyLaw, Arm, Law, as_law
+from tfarm.arm import AT_HUB, AnyLaw, Arm, Law
 from tfarm.arm.chain import PERIOD, TIME_ROUNDING
 from tfarm.arm.checks import number
 from tfarm.arm.law import REFERENCE
@@ -37,7 +37,7 @@ from tfarm.dsp.plant import sensed_plant
 from tfarm.dsp.results import ENOUGH_CHANGE, simulated
 from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, described, resting, scenario
 from tfarm.dsp.simulate import MOST_BETWEEN, SETTLING_BAND, final_value, first_mode, settling_time
-from tfarm.dsp.stages import admit, not_covered
+from tfarm.dsp.stages import admit_case, not_covered
 from tfarm.errors import must_be_known, require
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.poles import Poles
@@ -168,14 +168,14 @@ class _Record:
         word, count = verdict_on(response.poles.loop).word, f"{response.poles.count} poles{omitted}"
         return self._loop(word, is_converged, count, curves)
 
-    def _of_sampled(self, law: AnyLaw, chain: Chain, task: Scenario, names: Sequence[str]) -> LoopResponse:
+    def _of_sampled(self, case: Case, task: Scenario, names: Sequence[str]) -> LoopResponse:
         """The sampled loop, with the signals of these names."""
         between = round(task.period / self.t[1]) - 1
-        run, used = simulated(Case(self.arm, as_law(law), chain), task, between=between, outputs=names)
+        run, used = simulated(case, task, between=between, outputs=names)
         signals = {name: traces.continuous(run, name)[1][: self.t.size] for name in names}
         signals[TORQUE] = traces.held_at(run, run.torque, self.t[: signals[MOMENT].size])
         is_converged = used.change is not None and used.change <= ENOUGH_CHANGE
-        word = UNSTABLE if run.stopped else sampled_verdict(Case(self.arm, law, chain)).word
+        word = UNSTABLE if run.stopped else sampled_verdict(case).word
         curves = {name: (self.t[: y.size], y, 0 * y, None) for name, y in signals.items()}
         return self._loop(word, is_converged, f"{used.modes} modes", curves)
 
@@ -359,49 +359,50 @@ def step(
     must_be_known("scenario", scenario_name, SAMPLED_NAMES)
     band = number("settling_band", settling_band, "a share of the travel, such as 0.02")
     require(0 < band < 1, "settling_band", settling_band, "a share of the travel between 0 and 1, such as 0.02")
-    (arm, chain), is_step = admit(CONSUMER, arm, chain), scenario_name == "reference"
-    hub, law = followed(law) if is_step else (AT_HUB[0], law)
-    case = Case(arm, as_law(law), chain)
-    arm, law = case.arm, case.law
-    full, of_angle, response = as_law(law), hub == AT_HUB[0], None
-    poles = None if full.is_discrete else usual_poles(ContinuousLoop(Case(arm, full)))
+    case = admit_case(CONSUMER, Case(arm, law, chain))
+    is_step = scenario_name == "reference"
+    hub = AT_HUB[0]
+    if is_step:
+        hub, own = followed(case.law)
+        case = case.under(own)
+    arm, chain = case.arm, case.chain
+    poles = None if case.law.is_discrete else usual_poles(ContinuousLoop(case))
     length = usual_duration(poles, chain) if duration is None else duration
-    task = (
-        resting("reference", arm, chain, length, hub)
-        if is_step
-        else scenario(SAMPLED_NAMES[scenario_name], arm, chain, length)
-    )
+    if is_step:
+        task = resting("reference", arm, chain, length, hub)
+    else:
+        task = scenario(SAMPLED_NAMES[scenario_name], arm, chain, length)
     require(task.t.size > 1, "duration", length, f"at least one sampling period, {task.period:g} s")
+    of_angle = hub == AT_HUB[0]
     tip = "tip_displacement" if of_angle else f"velocity@{arm.length!r}"
     names = tuple(dict.fromkeys((hub, tip, MOMENT, *outputs)))
     if task.tip_offset:
         first_mode(sensed_plant(arm, Chain(), ("tip_displacement",), 1).unfiltered, task.tip_offset, scenario_name)
+    response = None
     if poles is not None:
-        response = time_response(poles, names, excitation(poles.loop, full, chain, task, names), length)
+        response = time_response(poles, names, excitation(poles.loop, case, task, names), length)
     t = _times(response, task)
     angle = traces.reference_angle(task, t) if of_angle else np.ones(t.size)
     reference = {hub: angle, tip: arm.reach * angle} if is_step or scenario_name == "slew" else {}
-    omitted = not_covered(CONTINUOUS, chain)
     found = _Record(arm, (*names[:3], TORQUE), task.busy_until, t, reference, band)
     return Step(
-        **vars(found), controller=controller(full, arm), scenario=scenario_name, period=task.period,
+        **vars(found), controller=controller(case.law, arm), scenario=scenario_name, period=task.period,
         duration=min(length, float(t[-1])), scenario_in_words=described(task, arm, chain), response=response,
-        sampled=found._of_sampled(law, chain, task, names),
-        continuous=None if response is None else found._of_continuous(response, omitted),
+        sampled=found._of_sampled(case, task, names),
+        continuous=None if response is None else found._of_continuous(response, not_covered(CONTINUOUS, chain)),
     )  # fmt: skip
 
 
-def followed(law: AnyLaw) -> tuple[str, AnyLaw]:
+def followed(law: Law) -> tuple[str, Law]:
     """Return the signal of the hub whose reference steps, and the law with that reference.
 
     Raises ParameterError for a law that feeds back neither hub angle nor hub rate.
     """
-    full = as_law(law)
-    known = {*full.references, *(name.removeprefix(REFERENCE) for name in full.wanted)}
-    hub = next((name for name in AT_HUB[:2] if name in known.union(full.signals)), "")
-    require(hub, "scenario", "reference",
-            "the controller feeds back neither hub angle nor hub rate; choose slew, pulse or deflection")  # fmt: skip
-    return hub, law if hub in known else replace(full, references=(*full.references, hub))
+    known = {*law.references, *(name.removeprefix(REFERENCE) for name in law.wanted)}
+    hub = next((name for name in AT_HUB[:2] if name in known.union(law.signals)), "")
+    remedy = "the controller feeds back neither hub angle nor hub rate; choose slew, pulse or deflection"
+    require(hub, "scenario", "reference", remedy)
+    return hub, law if hub in known else replace(law, references=(*law.references, hub))
 
 
 def usual_duration(poles: Poles | None, chain: Chain) -> float:
@@ -416,22 +417,28 @@ def usual_duration(poles: Poles | None, chain: Chain) -> float:
     return float(f"{rise + TIME_CONSTANTS / decay:.2g}")
 
 
-def excitation(loop: ContinuousLoop, law: Law, chain: Chain, task: Scenario, names: Sequence[str]) -> Excitation:
-    """Return the input of a scenario of the sampled loop in continuous time; `law` names its own references.
+def excitation(loop: ContinuousLoop, case: Case, task: Scenario, names: Sequence[str]) -> Excitation:
+    """Return the input of a scenario of the sampled loop in continuous time; the case's law names its own references.
 
     Raises ParameterError for a reference that no scenario has.
     """
+    law = case.law
     for name in (*law.references, *law.wanted):
         must_be_known("references", name.removeprefix(REFERENCE), AT_HUB)
     if task.tip_offset:
         return _released(loop, task.tip_offset, names)
-    arm, rise, (angle, rate, moment) = loop.arm, chain.slew.rise_time, AT_HUB
+    arm = loop.arm
+    rise = case.chain.slew.rise_time
+    angle, rate, moment = AT_HUB
     if task.name == "pulse":
-        size, ends = task.disturbance[0], ((0.0, task.busy_until), (1.0, -1.0))  # which is no torque of the motor
-        return Excitation({ACTUATOR: lambda s: size / s}, *ends, free={TORQUE: lambda s: -size / s})
+        size = task.disturbance[0]
+        # which is no torque of the motor
+        free: dict[str, Transform] = {TORQUE: lambda s: -size / s}
+        return Excitation({ACTUATOR: lambda s: size / s}, (0.0, task.busy_until), (1.0, -1.0), free=free)
     if task.name == "reference":
         return Excitation(_through(law, {angle if task.hub_angle[0] else rate: lambda s: 1 / s}))
-    a, read = chain.slew.acceleration(arm.reach), arm.gauged_inertia * float(task.reading == "vibration")
+    a = case.chain.slew.acceleration(arm.reach)
+    read = arm.gauged_inertia * float(task.reading == "vibration")
     references: dict[str, Transform] = {
         angle: lambda s: 1 / s**3, rate: lambda s: 1 / s**2, moment: lambda s: -read / s
     }  # fmt: skip

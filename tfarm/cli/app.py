@@ -180,7 +180,12 @@ def given_gains(
     ] = None,
 ) -> dict[str, float]:
     """Return the gains that are given, by name."""
-    return {name: value for name, value in {"K1": K1, "K2": K2, "Kp": Kp}.items() if value is not None}
+    return without_none({"K1": K1, "K2": K2, "Kp": Kp})
+
+
+def without_none(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values that are not None, by name."""
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def add_command(group: str, **how: Any) -> Callable[[Callable[..., None]], Callable[..., None]]:
@@ -292,18 +297,20 @@ def load_law(
 
 def load_loop(
     file: ArmFile, *, law: LawFile = None, theory: TheoryName = None, gains: Any = given_gains
-) -> tuple[Arm, AnyLaw, dict[str, Any]]:
-    """Return arm and law of a command, and JSON's part of default gains."""
+) -> tuple[Any, dict[str, Any]]:
+    """Return the `tfarm.Case` of a command, through the usual chain, and JSON's part of default gains."""
     arm = load_arm(file, theory)
-    return arm, *load_law(file, arm, gains(), law)
+    controller, defaults = load_law(file, arm, gains(), law)
+    return tfarm.Case(arm, controller), defaults
 
 
-def load_driven_loop(file: ArmFile, *, loop: Any = load_loop) -> tuple[Arm, AnyLaw, dict[str, Any]]:
-    """Return the same of a command without sampling, the arm with the analog damping that its file states."""
+def load_driven_loop(file: ArmFile, *, loop: Any = load_loop) -> tuple[Any, dict[str, Any]]:
+    """Return the same of a command without sampling, through the chain of the file and with its analog damping."""
     from tfarm.dsp.plant import driven
 
-    arm, controller, defaults = loop(file)
-    return driven(arm, load_chain(file))[0], controller, defaults
+    case, defaults = loop(file)
+    arm, chain = driven(case.arm, load_chain(file))
+    return case.on(arm).through(chain), defaults
 
 
 def load_chain(
@@ -331,8 +338,7 @@ def load_chain(
     from tfarm.arm.chain import load_chain as read
 
     chain = read(dsp or file)
-    typed = {"period": period, "delay_samples": delay_samples}
-    sampling = replace(chain.sampling, **{key: value for key, value in typed.items() if value is not None})
+    sampling = replace(chain.sampling, **without_none({"period": period, "delay_samples": delay_samples}))
     return replace(chain, sampling=sampling, period_from=chain.period_from if period is None else "--period")
 
 
@@ -420,13 +426,12 @@ def emit(
 
 def emit_loop(picture: str, file: ArmFile, loop: Any, chain: Any, show: Any) -> None:
     """Emit the loop function of a command with that picture of it; of the sampled loop where sampling is given."""
-    from tfarm.dsp.plant import driven
-
-    arm, controller, defaults = loop(file)
     if given(chain):
-        found = tfarm.loop_function(arm, controller, chain(file))
+        case, defaults = loop(file)
+        found = case.through(chain(file)).loop_function()
     else:
-        found = tfarm.loop_function(driven(arm, chain(file))[0], controller)
+        case, defaults = load_driven_loop(file, loop=loop)
+        found = tfarm.loop_function(case.arm, case.law)
     show(found, defaults, picture=picture)
 
 

@@ -177,8 +177,8 @@ def response(
         from tfarm.fitting.data import data_of
 
         own = {"s": s, "omega": omega, "output": output, **along.keywords, "digits": how.keywords["digits"]}
-        for name, value in own.items():
-            refuse({f"--{name}": value}, "a measured response has its own outputs and frequencies; leave this out")
+        remedy = "a measured response has its own outputs and frequencies; leave this out"
+        refuse({f"--{name}": value for name, value in own.items()}, remedy)
         show(tfarm.overlay(load_arm(arm, theory), data_of(measured, "--measured")))
         return
     refuse({"--png": show.keywords["png"]}, "a picture needs --measured; tfarm bode draws the exact response")
@@ -240,15 +240,16 @@ def bode(
     """
     if loop:
         own = {"output": output, "from": start, "to": stop, **along.keywords, "input": driven}
-        for name, value in own.items():
-            refuse({f"--{name}": value}, "the loop function has no output and its own frequencies; leave this out")
+        remedy = "the loop function has no output and its own frequencies; leave this out"
+        refuse({f"--{name}": value for name, value in own.items()}, remedy)
         emit_loop("loop", arm, under, chain, show)
         return
     from tfarm.response.frequency import resonant_band
 
     of_loop = {**under.keywords["gains"].keywords, "law": under.keywords["law"], **chain.keywords}
-    for name, value in of_loop.items():
-        refuse({f"--{name.replace('_', '-')}": value}, "the loop function: give --loop too")
+    refuse(
+        {f"--{name.replace('_', '-')}": value for name, value in of_loop.items()}, "the loop function: give --loop too"
+    )
     subject = load_arm(arm, under.keywords["theory"], driven)
     (wanted,), x = along(["root_moment" if output is None else output])
     low, high = resonant_band(tfarm.transfer(subject, wanted, x=x, input=driven).arm)

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import typer
 
 import tfarm
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN
-from tfarm.case import Case
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, AnyLaw, Arm
+from tfarm.arm.reading import ArmFile
 from tfarm.cli.app import (
     AngleGain,
     ArmName,
@@ -56,20 +56,17 @@ def poles(
     count: poles with Im s >= 0; by default ten, or those below the shear cut-off
     certify: prove each, and that none is missing
     """
-    subject, controller, defaults = loop(arm)
-    found = tfarm.closed_loop_poles(subject, controller, count)
+    case, defaults = loop(arm)
+    found = case.poles(count)
     show(found.certified() if certify else found, defaults)
 
 
 @command(epilog="margins sasaki2012-lab --K1 0.3 --K2 0.3")
-def margins(*, arm: ArmName, loop: Any = load_loop, show: Any = emit_record) -> None:
+def margins(*, arm: ArmName, loop: Any = load_driven_loop, show: Any = emit_record) -> None:
     """Result card, stability, the stability interval of each gain, and the margins of the exact loop function."""
-    from tfarm.dsp.plant import driven
-
-    subject, controller, defaults = loop(arm)
-    subject, chain = driven(subject, load_chain(arm))
-    found = tfarm.margins(subject, controller)
-    show(found, defaults, summary=tfarm.result_card(subject, controller, chain, continuous=found))
+    case, defaults = loop(arm)
+    found = case.margins()
+    show(found, defaults, summary=case.card(continuous=found))
 
 
 @command(epilog="nyquist sasaki2012-lab --K1 0.3 --K2 0.3 --png nyquist.png")
@@ -79,8 +76,8 @@ def nyquist(*, arm: ArmName, disc: bool = False, loop: Any = load_driven_loop, s
     Options:
     disc: picture of the whole contour in a disc whose rim is infinity, in place of the linear plot with a zoom at -1
     """
-    subject, controller, defaults = loop(arm)
-    show(tfarm.nyquist(subject, controller), defaults, picture="disc" if disc else "nyquist")
+    case, defaults = loop(arm)
+    show(case.nyquist(), defaults, picture="disc" if disc else "nyquist")
 
 
 @command(epilog="nichols sasaki2012-lab --K1 0.3 --K2 0.3 --png nichols.png")
@@ -114,8 +111,8 @@ def spill(
     Options:
     modes: modes of the largest model
     """
-    subject, controller, defaults = loop(arm)
-    show(tfarm.spill(subject, controller, modes), defaults)
+    case, defaults = loop(arm)
+    show(case.spill(modes), defaults)
 
 
 @command(epilog="locus sasaki2012-lab --vary K2 --from 0 --to 2 --png locus.png")
@@ -142,28 +139,23 @@ def locus(
     """
     from tfarm.loop.loci import Loci, reduced_of
 
-    subject, controller, defaults = loop(arm)
-    found = tfarm.locus(subject, controller, vary, start, stop, points, branches)
+    case, defaults = loop(arm)
+    found = case.locus(vary, start, stop, points, branches)
     show(Loci(found, reduced_of(found)), defaults)
 
 
-@command(epilog="map sasaki2012-lab --K1 -1,3 --K2 -2,2 --png map.png", name="map")
-def gain_map(
+def map_plane(
+    file: ArmFile,
+    arm: Arm,
     *,
-    arm: ArmName,
     k1: Annotated[Any, typer.Option(f"--{RATE_GAIN}", parser=interval, metavar="LO,HI")] = None,
     k2: Annotated[Any, typer.Option(f"--{MOMENT_GAIN}", parser=interval, metavar="LO,HI")] = None,
     kp: AngleGain = 0.0,
     points: Annotated[int | None, typer.Option(min=2, max=2000)] = None,
     law: LawFile = None,
     vary: Annotated[list[Any] | None, typer.Option(parser=named(interval), metavar="NAME=LO,HI")] = None,
-    theory: TheoryName = None,
-    chain: Any = load_chain,
-    show: Any = emit,
-) -> None:
-    """Number of unstable poles over the plane of two gains, or of two numbers of a law, with the exact boundary.
-
-    With --period, --delay-samples or --dsp of the sampled loop.
+) -> tuple[AnyLaw, dict[str, Any]]:
+    """Return the law of a map, and the values of two of its numbers, by name.
 
     Options:
     k1: range of K1; by default -1,3 on the paper's arm, -3.33 to 10 times the default on a rig
@@ -172,37 +164,45 @@ def gain_map(
     vary: twice: two numbers of a law and their ranges; gain (a factor on the law), delay, SIGNAL, SIGNAL.num.N or
         SIGNAL.den.N
     """
-    from tfarm.dsp.plant import driven
-    from tfarm.loop import circle_crossings as crossings
-    from tfarm.loop import sampled_verdict as verdict
     from tfarm.loop.plane import between, ranges_of
 
-    subject = load_arm(arm, theory)
+    controller: AnyLaw
     typed = {RATE_GAIN: k1, MOMENT_GAIN: k2}
     if vary or law:
-        refuse(
-            {f"--{name}": value for name, value in (typed | {ANGLE_GAIN: kp or None}).items()},
-            "leave it out: of a law the map is over two of its own numbers, --vary NAME=LO,HI twice",
-        )
-        ranges, number = vary or [], points or 60
-        refuse(
-            {"--vary": [name for name, _ in ranges] if len(dict(ranges)) != 2 else None},
-            "give two numbers of the law, such as --vary hub_angle=0,10 --vary delay=0,0.02",
-        )
-        controller, _ = load_law(arm, subject, {}, law)
+        remedy = "leave it out: of a law the map is over two of its own numbers, --vary NAME=LO,HI twice"
+        refuse({f"--{name}": value for name, value in {**typed, ANGLE_GAIN: kp or None}.items()}, remedy)
+        ranges = dict(vary or [])
+        remedy = "give two numbers of the law, such as --vary hub_angle=0,10 --vary delay=0,0.02"
+        require(len(ranges) == 2, "--vary", [name for name, _ in vary or []], remedy)
+        controller, _ = load_law(file, arm, {}, law)
     else:
-        ranges = [(name, typed[name] or usual) for name, usual in zip(PLANE, ranges_of(subject), strict=True)]
-        number = points or 101
-        controller = tfarm.default_gains(subject).having(ANGLE_GAIN, kp)
-    axes = dict(ranges)
-    x, y = (between(low, high, number) for low, high in axes.values())
+        ranges = {name: typed[name] or usual for name, usual in zip(PLANE, ranges_of(arm), strict=True)}
+        controller = tfarm.default_gains(arm).having(ANGLE_GAIN, kp)
+    number = points or (60 if vary or law else 101)
+    return controller, {name: between(low, high, number) for name, (low, high) in ranges.items()}
+
+
+@command(epilog="map sasaki2012-lab --K1 -1,3 --K2 -2,2 --png map.png", name="map")
+def gain_map(
+    *, arm: ArmName, plane: Any = map_plane, theory: TheoryName = None, chain: Any = load_chain, show: Any = emit
+) -> None:
+    """Number of unstable poles over the plane of two gains, or of two numbers of a law, with the exact boundary.
+
+    With --period, --delay-samples or --dsp of the sampled loop.
+    """
+    from tfarm.dsp.plant import driven
+    from tfarm.loop.circle_crossings import sampled_map
+    from tfarm.loop.sampled_verdict import sampled_verdict
+
+    subject = load_arm(arm, theory)
+    controller, axes = plane(arm, subject)
+    names: Any = tuple(axes)
+    x, y = axes.values()
     if given(chain):
-        found: Any = crossings.sampled_map(
-            verdict.sampled_verdict(Case(subject, controller, chain(arm))).full, x, y, tuple(axes)
-        )
+        loop = sampled_verdict(tfarm.Case(subject, controller, chain(arm))).full
+        found: Any = sampled_map(loop, x, y, vary=names)
     else:
-        subject, _ = driven(subject, chain(arm))
-        found = tfarm.map(subject, x, y, law=controller, vary=tuple(axes))
+        found = tfarm.map(driven(subject, chain(arm))[0], x, y, law=controller, vary=names)
     show(found)
 
 
@@ -214,10 +214,10 @@ def sampled(
 
     A law of a file acts with its own period, which has to be that of the chain; one in s is made discrete by its rule.
     """
-    subject, controller, defaults = loop(arm)
-    sampling = chain(arm)
-    found = tfarm.sampled(subject, controller, sampling, count=modes)
-    show(found, defaults, summary=tfarm.result_card(subject, controller, sampling, at_samples=found))
+    case, defaults = loop(arm)
+    case = case.through(chain(arm))
+    found = case.sampled(count=modes)
+    show(found, defaults, summary=case.card(at_samples=found))
 
 
 @command(epilog="step sasaki2012-lab --scenario slew --png slew.png")
@@ -241,12 +241,9 @@ def step(
     output: further signal of the CSV file, as strain@0.05; may be repeated
     settling_band: share of the travel within which a signal has settled
     """
-    subject, controller, defaults = loop(arm)
-    sampling = chain(arm)
-    found = tfarm.step(
-        subject, controller, sampling, scenario, duration, outputs=output or (), settling_band=settling_band
-    )
-    show(found, defaults)
+    case, defaults = loop(arm)
+    case = case.through(chain(arm))
+    show(case.step(scenario, duration, outputs=output or (), settling_band=settling_band), defaults)
 
 
 @sampled_command(epilog="simulate sasaki2012-lab --scenario slew --output tip_rotation --csv slew.csv")
@@ -284,8 +281,8 @@ def simulate(
     how: Any = {"count": modes, "between": between or 15 * is_drawn, "outputs": output or ()}
     defaults = None
     if controller is None:
-        subject, control, defaults = loop(arm)
-        found = simulated_run(Case(subject, control, chain(arm)), scenario, duration, **how)
+        case, defaults = loop(arm)
+        found = simulated_run(case.through(chain(arm)), scenario, duration, **how)
     else:
         from tfarm.tuner import load_tuner, tuning
 

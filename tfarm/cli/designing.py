@@ -10,7 +10,7 @@ from typing import Annotated, Any, cast
 import typer
 
 import tfarm
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, TWO_GAINS, as_law
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, TWO_GAINS
 from tfarm.arm.reading import ArmFile
 from tfarm.cli.app import (
     CONTROLLER,
@@ -78,8 +78,9 @@ def design(
     """
     from tfarm.arm.writing import save_law
 
+    subject = load_arm(arm, theory)
     found = tfarm.design(
-        load_arm(arm, theory),
+        subject,
         objective,
         structure=structure,
         modes=modes,
@@ -91,7 +92,7 @@ def design(
         **{RATE_GAIN: k1, MOMENT_GAIN: k2, ANGLE_GAIN: kp},
     )
     if save is not None:
-        save_law(as_law(found.law), save)
+        save_law(tfarm.Case(subject, found.law).law, save)
     show(found, also=(save,))
 
 
@@ -124,10 +125,8 @@ def export(
     name: beginning of the identifiers in C
     anyway: also where the loop is not certified stable
     """
-    subject, controller, defaults = loop(arm)
-    found = tfarm.export(
-        subject,
-        controller,
+    case, defaults = loop(arm)
+    found = case.export(
         what=cast("Any", what),
         form=cast("Any", form),
         folder=out,
@@ -324,9 +323,9 @@ def study_arguments(
     if "arm" in file.tables:  # an arm's file names no arm
         refuse({f"--{key}": value for key, value in typed.items()}, f"the study is that of {file.name}; leave this out")
         return load_study(file), None
-    subject, controller, defaults = loop(file)
+    case, defaults = loop(file)
     known = {key: value for key, value in typed.items() if value is not None}
-    return {"arm": subject, "law": controller, "chain": chain(file), **known}, defaults
+    return {"arm": case.arm, "law": case.law, "chain": chain(file), **known}, defaults
 
 
 @command(epilog="study sasaki2012-lab --over payload.mass=uniform:0,0.2 --ask card --draws 100 --out study")

@@ -4,7 +4,7 @@ from tfarm.arm.chain import Actuator, Chain, Converters, Sampling, Slew, load_ch
 from tfarm.dsp.plant import PulseTransfer, pulse_transfer
 from tfarm.dsp.scenarios import Scenario, scenario
 from tfarm.dsp.simulate import Measurement, Simulation, Simulator
-from tfarm.moved import moved
+from tfarm.moved import moved, moved_module
 
 __all__ = [
     "Actuator",
@@ -22,7 +22,11 @@ __all__ = [
     "scenario",
 ]
 
-_MOVED = {  # names that this room had up to version 1.0, and their modules
+# modules and names that this room had up to version 1.0, and where their names are
+_OF_CHAIN = ("Actuator", "Chain", "Converters", "Sampling", "Slew", "chain_of_tables", "file_text", "load_chain")
+chain = moved_module(f"{__name__}.chain", dict.fromkeys(_OF_CHAIN, "tfarm.arm.chain"))
+sampled = moved_module(f"{__name__}.sampled", dict.fromkeys(("Sampled", "sampled_loop"), "tfarm.loop.sampled"))
+_MOVED = {
     "Analysis": "tfarm.loop.sampled_verdict",
     "GainMap": "tfarm.loop.circle_crossings",
     "Sampled": "tfarm.loop.sampled",

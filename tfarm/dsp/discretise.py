@@ -67,7 +67,8 @@ def rule_in_words(law: Law) -> str:
 
 def _in_z(part: Part, law: Law, period: float) -> LawBlock:
     """A block of the law in z."""
-    block, rule = part.block, law.rule
+    block = part.block
+    rule = law.rule
     remedy = f"the rule {rule} is not for a law that differentiates: add a pole to den, or take tustin"
     require(block.excess <= 0 or rule == "tustin", f"law.{part.signals[0]}.num", law.name, remedy)
     if not block.order and block.excess <= 0:
@@ -128,7 +129,9 @@ def acting_law(case: Case) -> tuple[Law, Chain]:
     Raises ParameterError for a delay that is too long, for a gain that is too large, for a massless hub whose moment is
     fed back (an algebraic loop), and as `discretised` and `in_single` do.
     """
-    law, gains, sampling = case.feedback, case.gains, case.chain.sampling
+    law = case.feedback
+    gains = case.gains
+    sampling = case.chain.sampling
     if law.part_gains.get("root_moment", (0, 1.0))[1] and "root_moment" in law.signals:
         key, value = ("signals", "root_moment") if gains is None else (MOMENT_GAIN, gains.K2)
         must_not_be_algebraic(case.arm, key, value)
@@ -173,22 +176,24 @@ def with_estimate(law: Law, chain: Chain) -> Law:
 
 
 def _differenced(part: Part, a: float, T: float) -> Part:
-    """A part of a law with its columns of the hub rate replaced by columns of the hub angle."""
+    """A part of a law with its columns of the hub rate replaced by columns of the hub angle.
+
+    x_{k+1} = a x_k + angle,  rate = (1 - a)/T (angle + (a - 1) x_k)
+    """
     if "hub_rate" not in part.signals:
         return part
-    signals = tuple("hub_angle" if name == "hub_rate" else name for name in part.signals)
+    is_rate = np.array([name == "hub_rate" for name in part.signals], dtype=float)
+    through = (1 - a) / T
+    by_state = through * (a - 1) * is_rate[:, None]
+    by_angle = np.diag(1 + (through - 1) * is_rate)
     A, B, C, D = part.block.matrices()
-    rate = np.array([name == "hub_rate" for name in part.signals], dtype=float)
-    through, kept = (1 - a) / T, 1.0 - rate
-    Br, Dr = (B @ rate)[:, None], (D @ rate)[:, None]
-    slope = through * (a - 1)
     block = StateSpace(
-        np.block([[A, slope * Br], [np.zeros((1, len(A))), np.array([[a]])]]),
-        np.vstack([B * kept + through * Br * rate, rate[None]]),
-        np.hstack([C, slope * Dr]),
-        D * kept + through * Dr * rate,
+        np.block([[A, B @ by_state], [np.zeros((1, len(A))), np.array([[a]])]]),
+        np.vstack([B @ by_angle, is_rate]),
+        np.hstack([C, D @ by_state]),
+        D @ by_angle,
     )
-    return Part(signals, block)
+    return Part(tuple("hub_angle" if name == "hub_rate" else name for name in part.signals), block)
 
 
 # ------------------------------------------------------------ factors
@@ -253,7 +258,8 @@ def law_in_z(law: Law, acting: Law, chain: Chain) -> LawInZ:
 
     The factors are those of the law itself; in float32 those of `acting`, whose numbers are rounded.
     """
-    law, acting = acting if chain.converters.is_single else law, with_estimate(acting, chain)
+    law = acting if chain.converters.is_single else law
+    acting = with_estimate(acting, chain)
     alone = [acting.weighted(row).matrices() for row in np.eye(len(acting.parts)).tolist()]
     (A, B, _, _), C, D = alone[0], *(np.vstack([each[n] for each in alone]) for n in (2, 3))
     found = [_factors(part, law, chain) for part in law.parts]

@@ -55,7 +55,9 @@ class Model(NamedTuple):
 
 def model_of(plant: Plant, kept: Whole, sampling: Sampling, between: int, hub: int) -> Model:
     """The model of a plant's poles `kept`, with `between` records in each sample; `hub` is the row of the hub angle."""
-    p, T, f = plant.poles[kept], sampling.period, sampling.fraction
+    p = plant.poles[kept]
+    T = sampling.period
+    f = sampling.fraction
     records = T * (np.arange(between) + 1) / (between + 1)
     ends = np.unique(np.r_[records, [f * T] if f else [], T])
     starts = np.r_[0.0, ends[:-1]]
@@ -121,7 +123,8 @@ def reading(o: int, model: Any, state: Any) -> float:
     """Output o without its static remainder."""
     value = model.rates[o, DOUBLY] * state.rigid[DOUBLY] + model.rates[o, ONCE] * state.rigid[ONCE]
     for i in range(state.amplitude.size):
-        weight, amplitude = model.weights[o, i], state.amplitude[i]
+        weight = model.weights[o, i]
+        amplitude = state.amplitude[i]
         value += weight.real * amplitude.real - weight.imag * amplitude.imag
     return value
 
@@ -175,7 +178,8 @@ def estimate(angle: float, rate: float, memory: Any, is_differenced: bool, pole:
     if not is_differenced:
         return rate
     if memory[BEGUN] < YES:
-        memory[ANGLE_BEFORE], memory[BEGUN] = angle, 1.0
+        memory[ANGLE_BEFORE] = angle
+        memory[BEGUN] = 1.0
     step = angle - memory[ANGLE_BEFORE]
     memory[RATE_BEFORE] = pole * memory[RATE_BEFORE] + (1.0 - pole) * step / period
     memory[ANGLE_BEFORE] = angle
@@ -241,8 +245,12 @@ def run(model: Any, state: Any, forcing: Any, electronics: Any, table: Any, sour
     (columns,) are the outputs of the columns, hub angle, hub rate and root moment through their converters, or -1 for a
     reference alone.
     """
-    single, order, memory, known = electronics.is_single, table.shape[0] - 1, np.zeros(3), np.zeros(3)
-    z, following = np.zeros(table.shape[1]), np.zeros(order + 1)
+    single = electronics.is_single
+    order = table.shape[0] - 1
+    memory = np.zeros(3)
+    known = np.zeros(3)
+    z = np.zeros(table.shape[1])
+    following = np.zeros(order + 1)
     for k in range(state.torque.size):
         if not _before(k, model, state, forcing, electronics):
             return k

@@ -147,9 +147,11 @@ def undelayed_plant(arm: Arm, outputs: Sequence[str], count: int, x: float | Non
 
 def with_modes(model: ModalModel, count: int) -> Plant:
     """The plant with the first `count` modes of a model, and slow real poles for all others where C is large."""
-    some, C = model.first(count), model.arm.damping
+    some = model.first(count)
+    C = model.arm.damping
     poles = some.eigenvalues.ravel()
-    residues, mode = some.residues.reshape(len(some.outputs), poles.size), np.repeat(some.index, 2)
+    residues = some.residues.reshape(len(some.outputs), poles.size)
+    mode = np.repeat(some.index, 2)
     plant = Plant(some.arm, some.outputs, poles, residues, some.rigid, some.static, mode, model)
     plant = plant.with_poles(some.single, some.single_residues)
     if C * some.natural_frequency.max(initial=0.0) < SLOW_POLES_FROM:
@@ -210,14 +212,16 @@ class SensedPlant:
     @cached_property
     def together(self) -> Plant:
         """All signals in the order of their names, through their analog filters."""
-        whole, corner = self.unfiltered, self.chain.sampling.antialias_corner
+        whole = self.unfiltered
+        corner = self.chain.sampling.antialias_corner
         analog = [n for n, each in enumerate(self.read.outputs) if is_analog(each, self.chain)]
         return whole if math.isinf(corner) or not analog else with_filter(whole, analog, corner)
 
     @property
     def unfiltered(self) -> Plant:
         """All signals in the order of their names, without filters."""
-        places, whole = dict.fromkeys(self.read.places), reduce(Plant.joined, self.plants)
+        places = dict.fromkeys(self.read.places)
+        whole = reduce(Plant.joined, self.plants)
         keys = [(place, name) for place, plant in zip(places, self.plants, strict=True) for name in plant.outputs]
         at = [keys.index((place, each.name)) for each, place in zip(self.read.outputs, self.read.places, strict=True)]
         return replace(whole.rows(at, self.read.names), arm=self.arm)
@@ -237,7 +241,8 @@ class SensedPlant:
 
 def sensed_plant(arm: Arm, chain: Chain, names: Sequence[str], count: int) -> SensedPlant:
     """Return the signals of these names with `count` flexible modes, of an arm whose hub a chain may damp."""
-    read, plants = Signals(driven(arm, chain)[0], tuple(names)), []
+    read = Signals(driven(arm, chain)[0], tuple(names))
+    plants = []
     for share in dict.fromkeys(read.places):
         here = zip(read.outputs, read.places, strict=True)
         wanted = list(dict.fromkeys(each.name for each, place in here if place == share))
@@ -293,20 +298,23 @@ class PulseTransfer:
     @cached_property
     def late(self) -> Complex:
         """Share of u_{k-d-1}, from before the switch."""
-        T, f = self.sampling.period, self.sampling.fraction
+        T = self.sampling.period
+        f = self.sampling.fraction
         return np.exp(self.poles * ((1 - f) * T)) * held_amplitude(self.poles, f * T)
 
     @property
     def slopes_at_one(self) -> Real:
         """dH/dz (outputs,) at z = 1, of the poles other than s = 0 and without the delay."""
-        gap, late = 1 - self.multipliers[:-1], self.late[:-1]
+        gap = 1 - self.multipliers[:-1]
+        late = self.late[:-1]
         terms = late / gap + (self.early[:-1] + late) / gap**2
         return -(self.plant.residues @ terms).real - self.plant.static
 
     @property
     def ramps(self) -> tuple[float, float]:
         """Shares of u_{k-d} and u_{k-d-1} in the double integral of the torque within a sample."""
-        T, f = self.sampling.period, self.sampling.fraction
+        T = self.sampling.period
+        f = self.sampling.fraction
         return (1 - f) ** 2 * T * T / 2, f * (1 - f / 2) * T * T
 
     def __call__(self, z: ArrayLike) -> Complex:
@@ -326,7 +334,8 @@ class PulseTransfer:
         rows = np.empty(0, np.int64) if base is None else np.flatnonzero(base >= 0)
         near = (rows, rows if base is None else base[rows])
         gap[near] = 1.0
-        share, distance = offset[:, None] / gap, z - 1.0 if delta is None else delta
+        share = offset[:, None] / gap
+        distance = z - 1.0 if delta is None else delta
         share[near] = 1.0
         distance = distance if base is None else np.where(base == self.poles.size - 1, offset, distance)
         return self._summed(np.positive, share, z, offset, distance)
@@ -337,7 +346,8 @@ class PulseTransfer:
         The rounding of z itself is in them: it is |z - 1|/|z - pole| in the term of a pole.
         """
         z = abs(1 + delta)
-        gap, own = abs(delta[:, None] - self.shifts), base[:, None] == np.arange(self.poles.size)
+        gap = abs(delta[:, None] - self.shifts)
+        own = base[:, None] == np.arange(self.poles.size)
         with np.errstate(divide="ignore", invalid="ignore"):
             share = np.where(own, 1.0, abs(offset)[:, None] / gap * (1 + abs(delta)[:, None] / gap))
         distance = abs(np.where(base == self.poles.size - 1, offset, delta))
@@ -350,7 +360,8 @@ class PulseTransfer:
         if self.sampling.fraction:
             value = value + (residues * late) @ share.T / z
         if self.plant.rigid[:, 0].any():
-            push, ramp = early[-1] + late[-1] / z, self.ramps[0] + self.ramps[1] / z
+            push = early[-1] + late[-1] / z
+            ramp = self.ramps[0] + self.ramps[1] / z
             twice = (self.sampling.period * push / distance + ramp) / distance
             value = value + np.outer(size(self.plant.rigid[:, 0]), twice * offset)
         return value * z ** (-self.sampling.whole_delay)
@@ -390,11 +401,16 @@ class PulseTransfer:
     @cached_property
     def _matrices(self) -> tuple[Real, Real, Real]:
         upper, real = self.kept()
-        T, d, z = self.sampling.period, self.sampling.whole_delay, self.multipliers
-        first, n = 2 * np.arange(upper.size), self.integrals_at + 2
+        T = self.sampling.period
+        d = self.sampling.whole_delay
+        z = self.multipliers
+        first = 2 * np.arange(upper.size)
+        n = self.integrals_at + 2
         A = np.diag(np.r_[np.repeat(z[upper].real, 2), z[real].real, 1.0, 1.0, np.zeros(d + 1)])
-        A[first, first + 1], A[first + 1, first] = -z[upper].imag, z[upper].imag
-        A[n - 2, n - 1], A[n:, n:] = T, np.eye(d + 1, k=-1)
+        A[first, first + 1] = -z[upper].imag
+        A[first + 1, first] = z[upper].imag
+        A[n - 2, n - 1] = T
+        A[n:, n:] = np.eye(d + 1, k=-1)
         pairs = np.ascontiguousarray(2 * self.residues[:, upper].conj()).view(float)
         C = np.c_[pairs, self.residues[:, real].real, self.plant.rigid, np.zeros((len(pairs), d)), self.plant.static]
         now, before = (
@@ -406,7 +422,8 @@ class PulseTransfer:
         newest = A[:, -2] if d else B
         newest[:n] = now
         if (braked := self.plant.braked(SLOW / self.sampling.period)) is not None:
-            place, p = 2 * upper.size + int(np.flatnonzero(real == braked)[0]), float(self.plant.poles[braked].real)
+            place = 2 * upper.size + int(np.flatnonzero(real == braked)[0])
+            p = float(self.plant.poles[braked].real)
             self._integrate(A, newest, p, (place, n - 1))
             C[:, place] += self.plant.rigid[:, 1]  # R/s + r/(s - p) = -R p/(s (s - p)) + (r + R)/(s - p)
             C[:, n - 1] = -p * self.plant.rigid[:, 1]
@@ -414,10 +431,13 @@ class PulseTransfer:
 
     def _integrate(self, A: Real, newest: Real, p: float, at: tuple[int, int]) -> None:
         """Put the integral of the amplitude of a slow real pole p into a row; `at`: that pole, and the row."""
-        T, late = self.sampling.period, self.sampling.fraction * self.sampling.period
-        (place, row), now = at, T - late
+        T = self.sampling.period
+        late = self.sampling.fraction * self.sampling.period
+        place, row = at
+        now = T - late
         A[row, :-1] = 0.0
-        A[row, row], A[row, place] = 1.0, T * np.expm1(p * T) / (p * T)
+        A[row, row] = 1.0
+        A[row, place] = T * np.expm1(p * T) / (p * T)
         A[row, -1] = late**2 * phi(p * late) + np.expm1(p * late) / p * np.expm1(p * now) / p
         newest[row] = now**2 * phi(p * now)
 

@@ -52,14 +52,16 @@ def enough_modes(simulate: Callable[[int], Simulation], count: int | None = None
     """
     if count is not None:
         return Enough(count, None)
-    before, found = simulate(MODE_COUNTS[0]), Enough(MODE_COUNTS[0], np.inf)
+    before = simulate(MODE_COUNTS[0])
+    found = Enough(MODE_COUNTS[0], np.inf)
     for count in MODE_COUNTS[1:]:
         try:
             now = simulate(count)
         except ConvergenceError:  # two damped modes are not distinguished: the number before is used
             break
         off = change(before.at_samples, now.at_samples)
-        before, found = now, Enough(count, off)
+        before = now
+        found = Enough(count, off)
         if off <= ENOUGH_CHANGE:
             break
     return found
@@ -134,7 +136,8 @@ class Run:
     def note(self) -> Annotated[str | None, Quantity("not determined", key="note",
             help="reason for a residual or a settling time without a value")]:  # fmt: skip
         """The reason why there is no residual or no settling time."""
-        run, ends = self.simulation, "the record ends before the slew"
+        run = self.simulation
+        ends = "the record ends before the slew"
         if run.stopped is not None:
             ends = f"the run stops at {self.stopped_at:.6g} s"
         reasons = {
@@ -186,7 +189,8 @@ class Run:
     @property
     def csv_table(self) -> Table:
         """The signals in the order of time; those that change at samples only are empty between them."""
-        finer, coarse = self.between or {"t": np.empty(0)}, self.signals
+        finer = self.between or {"t": np.empty(0)}
+        coarse = self.signals
         order = np.argsort(np.r_[coarse["t"], finer["t"]], kind="stable").tolist()
         known = {
             "t": ("time", "s"),
@@ -194,7 +198,8 @@ class Run:
             "gain": ("gain", "-"),
             "volts": ("volts", "V"),
         }
-        empty, columns = [""] * len(finer["t"]), []
+        empty = [""] * len(finer["t"])
+        columns = []
         for name, values in coarse.items():
             if len(values):
                 of, _, at = name.partition("@")
@@ -214,9 +219,11 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
     # a shorter record shows no limit cycle
     if simulation.stopped or simulation.chain.is_linear or n < 40:
         return None
-    last, before = slice(n - n // 4, n), slice(n - n // 2, n - n // 4)
+    last = slice(n - n // 4, n)
+    before = slice(n - n // 2, n - n // 4)
     moment = simulation.at_samples.root_moment
-    size, earlier = _half_range(moment[last]), _half_range(moment[before])
+    size = _half_range(moment[last])
+    earlier = _half_range(moment[before])
     about = moment[last] - moment[last].mean()
     turns = np.count_nonzero(np.diff(np.signbit(about))) / 2
     is_clipped = bool(simulation.saturated_at[last].any())

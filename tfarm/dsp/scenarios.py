@@ -85,10 +85,12 @@ def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
     """
     must_turn(arm)
     arm, chain = driven(arm, chain)
-    T, manoeuvre = chain.sampling.period, chain.slew
+    T = chain.sampling.period
+    manoeuvre = chain.slew
     t = T * np.arange(_samples(duration, T) + 1)
     rate = manoeuvre.acceleration(arm.reach) * np.clip(np.minimum(t, manoeuvre.rise_time - t), 0.0, None)
-    acceleration, mean = np.diff(rate) / T, (rate[1:] + rate[:-1]) / 2
+    acceleration = np.diff(rate) / T
+    mean = (rate[1:] + rate[:-1]) / 2
     return Scenario(
         name="slew",
         period=T,
@@ -125,8 +127,10 @@ def resting(name: str, arm: Arm, chain: Chain, duration: float, signal: str = "h
     after the sample at t = 0, 0.01 s of that unit.  So it is first measured a sample later.  (Just before a sample the
     moment of a damped arm would be measured where it grows as t^-1/2, without bound, and no number of modes converges.)
     """
-    T, unit = chain.sampling.period, torque_unit(arm, chain)
-    torque, zero = 0.1 * unit, np.zeros(_samples(duration, T))
+    T = chain.sampling.period
+    unit = torque_unit(arm, chain)
+    torque = 0.1 * unit
+    zero = np.zeros(_samples(duration, T))
     # of the pulse, in whole samples
     width = max(1, round(0.1 * chain.slew.rise_time / T))
     sizes: dict[str, dict[str, Any]] = {

@@ -46,7 +46,8 @@ def quantisers(chain: Chain) -> Real:
 
     A step of 0 is ideal; the torque's range also respects the motor's limit.
     """
-    of, limit = chain.converters, chain.actuator.torque_limit
+    of = chain.converters
+    limit = chain.actuator.torque_limit
     encoder = [2 * math.pi / of.encoder_counts if of.encoder_counts else 0.0, -math.inf, math.inf]
     step, low, high = _converter(of.torque_bits, of.torque_range)
     return np.array([encoder, _converter(of.moment_bits, of.moment_range), [step, max(low, -limit), min(high, limit)]])
@@ -97,7 +98,8 @@ class Measurement(NamedTuple):
 
     def servo(self, law: HubFeedback) -> float:
         """Input [N m] of a law by the errors of the hub's angle and rate."""
-        angle_off, rate_off = self.angle_reference - self.hub_angle, self.rate_reference - self.hub_rate
+        angle_off = self.angle_reference - self.hub_angle
+        rate_off = self.rate_reference - self.hub_rate
         return law[ANGLE_GAIN] * angle_off + law[RATE_GAIN] * rate_off
 
 
@@ -205,7 +207,8 @@ class Simulation:
     @property
     def finding(self) -> str:
         """End of the run, largest root moment, and clipped signals."""
-        end, moment = float(self.t.max(initial=0.0)), float(abs(self.at_samples.root_moment).max(initial=0.0))
+        end = float(self.t.max(initial=0.0))
+        moment = float(abs(self.at_samples.root_moment).max(initial=0.0))
         clipped = [f"{name} clipped at {n} samples" for name, n in self.saturated.items() if n]
         ran = f"ran to {end:.6g} s" if self.stopped is None else f"unstable, stopped at {self.stopped.time:.6g} s"
         return ", ".join([ran, f"root moment up to {moment:.4g} N m", *clipped])
@@ -242,13 +245,15 @@ class Simulator:
     ) -> None:
         remedy = f"a whole number of records between two samples, 0 to {MOST_BETWEEN}"
         between = whole("between", between, 0, MOST_BETWEEN, remedy)
-        arm, chain = case.arm, case.chain
+        arm = case.arm
+        chain = case.chain
         admit(kernel.CONSUMER, arm, chain)
         self.case = case
         self.gains = case.gains if case.feedback.references == AT_HUB else None
         self.law, self.chain = acting_law(case)
         references_of(self.law, scenario)  # raises for one that is missing
-        self.scenario, self.between = scenario, between
+        self.scenario = scenario
+        self.between = between
         self.others = tuple(dict.fromkeys(name for name in outputs if name not in RECORDED))
         self.measured = tuple(dict.fromkeys((*AT_HUB, *self.law.signals)))
         sensed = sensed_plant(arm, chain, self.measured, count)
@@ -260,7 +265,8 @@ class Simulator:
             self._release(sensed.unfiltered, scenario.tip_offset)
         self.kept = np.nonzero(self.plant.poles.imag >= 0)[0]
         self._forcing = kernel.Forcing(scenario.feedforward, scenario.disturbance, float(scenario.impulse))
-        c, sampling = self.chain.converters, self.chain.sampling
+        c = self.chain.converters
+        sampling = self.chain.sampling
         self.electronics = kernel.Electronics(
             quantisers=quantisers(self.chain),
             is_differenced=c.hub_rate == "difference",
@@ -289,7 +295,8 @@ class Simulator:
         kind = np.float32 if self.electronics.is_single else float
         table = system_matrix(law).astype(kind).astype(float)
         sources = np.array([self.measured.index(name) if name in self.measured else -1 for name in columns])
-        references, state = references_of(law, self.scenario), self._start()
+        references = references_of(law, self.scenario)
+        state = self._start()
         done = kernel.run(self.model, state, self._forcing, self.electronics, table, sources, references)
         return self._result(state, int(done), None if gains is None else np.full(state.torque.size, gains.K2))
 
@@ -324,7 +331,11 @@ class Simulator:
 
     def _stepped(self, rule: Callable[[Measurement], tuple[float, float]], gain: Real | None) -> Simulation:
         """The loop of `kernel.run` in Python."""
-        model, state, memory, of, forcing = self.model, self._start(), np.zeros(3), self.electronics, self._forcing
+        model = self.model
+        state = self._start()
+        memory = np.zeros(3)
+        of = self.electronics
+        forcing = self._forcing
         task = self.scenario
         references = np.c_[task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference].tolist()
 
@@ -344,7 +355,8 @@ class Simulator:
         return self._result(state, state.torque.size, gain)
 
     def _start(self) -> kernel.State:
-        n, outputs = self.scenario.feedforward.size, len(self.plant.outputs)
+        n = self.scenario.feedforward.size
+        outputs = len(self.plant.outputs)
         return kernel.State(
             amplitude=self._first[self.kept],
             rigid=np.zeros(2),
@@ -363,7 +375,9 @@ class Simulator:
         `unfiltered` are the measured signals ahead of the filters.
         """
         first, amplitude = first_mode(self.plant, offset)
-        self._first[first], held, n = amplitude, np.zeros(len(self.plant.outputs)), len(self.measured)
+        n = len(self.measured)
+        held = np.zeros(len(self.plant.outputs))
+        self._first[first] = amplitude
         held[:n] = 2 * ((unfiltered.residues[:, first] - self.plant.residues[:n, first]) * amplitude).real
         if held.any():
             self.plant, self._first = with_held_filter(self.plant, held), np.r_[self._first, 1.0]
@@ -376,18 +390,23 @@ class Simulator:
 
     def _result(self, state: kernel.State, done: int, gain: Real | None) -> Simulation:
         """The record of `done` samples."""
-        stopped, error = None, None
+        stopped = None
+        error = None
         if done < state.torque.size:
             of_root = np.nan_to_num(abs(self.plant.residues[kernel.MOMENT, self.kept] * state.amplitude), nan=np.inf)
             stopped = Stop(done * self.scenario.period, int(self.plant.mode[self.kept][int(np.argmax(of_root))]))
         elif self.plant.arm.is_undamped and not self.chain.actuator.hub_damping > 0:
             before = self._energy(self._first[self.kept] + self.scenario.impulse, self.scenario.impulse)
-            after, (work, moved) = self._energy(state.amplitude, state.rigid[kernel.ONCE]), state.work
+            after = self._energy(state.amplitude, state.rigid[kernel.ONCE])
+            work, moved = state.work
             error = float(abs(after - before - work) / max(before + moved, LEAST_SIZE))
-        p, weights = self.plant.poles[self.kept], self.model.weights[len(self.measured) :][: len(RECORDED)]
+        p = self.plant.poles[self.kept]
+        weights = self.model.weights[len(self.measured) :][: len(RECORDED)]
         is_ringing = p.imag > -p.real
         size = abs(weights[:, is_ringing]) * np.sqrt(state.circle[is_ringing])
-        T, m, between = self.scenario.period, self.between, None
+        T = self.scenario.period
+        m = self.between
+        between = None
         if m:
             at = T * (np.arange(done)[:, None] + (np.arange(m) + 1) / (m + 1))
             between = self._trace(at.ravel(), state.fine[:done].reshape(done * m, -1))
@@ -422,7 +441,8 @@ def first_mode(plant: Plant, offset: float, scenario: str = "decay") -> tuple[in
     remedy = "no free decay: the tip is pinned, or the first mode is overdamped; take another scenario"
     require(found.size, "scenario", scenario, remedy)
     first = int(found[0])
-    p, r = complex(plant.poles[first]), complex(tip[first])
+    p = complex(plant.poles[first])
+    r = complex(tip[first])
     return first, 1j * offset * abs(p) ** 2 / (2 * p.imag) / (p * r)
 
 

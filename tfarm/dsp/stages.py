@@ -1,8 +1,5 @@
 """The door of every answer on a sampled loop: an arm and its chain, where it has all of their stages (`arm.stages`)."""
 
-from functools import lru_cache
-from typing import Any
-
 from tfarm.arm import Arm, must_be_arm
 from tfarm.arm.chain import Chain, chain_or_usual, stated
 from tfarm.arm.stages import Consumer
@@ -18,7 +15,7 @@ def admit(consumer: Consumer, arm: Arm, chain: Chain | None) -> tuple[Arm, Chain
     """
     must_be_arm(arm)
     chain = chain_or_usual(chain)
-    consumer.refuse_others(*_tables(arm, chain))
+    consumer.refuse_others(arm_table(arm), stated(chain))
     return driven(arm, chain)
 
 
@@ -26,12 +23,6 @@ def admit_case(consumer: Consumer, case: Case) -> Case:
     """Return a case with the arm that its chain drives, as `admit`."""
     arm, chain = admit(consumer, case.arm, case.chain)
     return case if arm is case.arm else case.on(arm).through(chain)
-
-
-@lru_cache(maxsize=64)
-def _tables(arm: Arm, chain: Chain) -> tuple[dict[str, Any], ...]:
-    """The tables of the file of an arm and its chain, without defaults."""
-    return arm_table(arm), stated(chain)
 
 
 def not_covered(consumer: Consumer, chain: Chain) -> str:

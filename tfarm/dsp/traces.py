@@ -111,7 +111,8 @@ def tip_deviation(arm: Arm, simulation: Simulation) -> TimeCurve:
 
 def reference_angle(task: Scenario, t: Real) -> Real:
     """The reference angle [rad] between its samples, where its rate is linear in time."""
-    T, n = task.period, task.hub_angle.size
+    T = task.period
+    n = task.hub_angle.size
     k = np.minimum(np.floor(t / T * (1 + TIME_ROUNDING)).astype(np.int64), n - 1)
     slope = np.diff(np.r_[task.hub_rate, task.hub_rate[-1:]]) / T
     tau = t - k * T
@@ -130,10 +131,12 @@ def curve(t: Real, y: Real) -> TimeCurve:
 
 def continuous(simulation: Simulation, signal: str) -> tuple[Real, Real]:
     """A signal at the samples and between them, in order of time."""
-    at, between = simulation.at_samples, simulation.between
+    at = simulation.at_samples
+    between = simulation.between
     if between is None:
         return at.t, at.signal(signal)
-    t, y = np.r_[at.t, between.t], np.r_[at.signal(signal), between.signal(signal)]
+    t = np.r_[at.t, between.t]
+    y = np.r_[at.signal(signal), between.signal(signal)]
     order = np.argsort(t, kind="stable")
     return t[order], y[order]
 

@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal, NamedTuple, get_args
 from tfarm.arm import AnyLaw, Arm, Law, arm_and_law, as_law, must_be_arm
 from tfarm.arm.chain import chain_or_usual, file_text
 from tfarm.assessment.card import loop_card
+from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.dsp.stages import admit
 from tfarm.errors import ConvergenceError, ParameterError, must_be_known, require
@@ -95,7 +96,7 @@ class ExportTask:
         """The facts that a file begins with, by label: arm, law, stability and margins of the sampled loop, version."""
         shown = {}
         with suppress(ConvergenceError):
-            shown = dict(facts_of(loop_card("sampled", self.arm, as_law(law), self.chain, found)))
+            shown = dict(facts_of(loop_card("sampled", Case(self.arm, law, self.chain), found)))
         return {
             "arm": self.arm.name,
             "controller": self.law.name,

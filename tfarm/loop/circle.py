@@ -83,7 +83,8 @@ class Discs:
         return Discs(self.middle + other.middle, self.radius + other.radius)
 
     def __mul__(self, other: Discs) -> Discs:
-        mine, theirs = abs(self.middle) + self.radius, abs(other.middle)
+        mine = abs(self.middle) + self.radius
+        theirs = abs(other.middle)
         return Discs(self.middle * other.middle, mine * other.radius + theirs * self.radius)
 
     def times(self, factor: complex) -> Discs:
@@ -110,6 +111,10 @@ class Arcs(NamedTuple):
         """z^-n."""
         return Discs(np.exp(-1j * n * self.middle), n * (self.half + 4 * MACHINE_EPS))
 
+    def polynomial(self, *coefficients: float) -> Discs:
+        """The sum of coefficients times z^-n, from n = 0 on."""
+        return reduce(Discs.__add__, (self.turned(n).times(each) for n, each in enumerate(coefficients)))
+
 
 @dataclass
 class Circle:
@@ -129,7 +134,8 @@ class Circle:
 
     def __post_init__(self) -> None:
         ends = np.linspace(0.0, np.pi, ARCS + 1)
-        self.low, self.high = ends[:-1], ends[1:]
+        self.low = ends[:-1]
+        self.high = ends[1:]
         self.parts = self._parts(self.low, self.high)
 
     def count(self, weights: Sequence[float]) -> int | None:
@@ -142,7 +148,8 @@ class Circle:
             rough = ~(abs(F.middle) > F.radius)
             if not rough.any():
                 steps = np.angle(F.middle[1:] / F.middle[:-1])
-                start, end = np.angle(F.middle[0]), np.angle(F.middle[-1])
+                start = np.angle(F.middle[0])
+                end = np.angle(F.middle[-1])
                 return -round(float(steps.sum() + _to_the_axis(start) - _to_the_axis(end)) / np.pi)
             width = self.high[rough] - self.low[rough]
             if width.min() < SHORTEST_ARC or (PIECES_OF_ARC - 1) * rough.sum() + rough.size > MOST_ARCS:
@@ -163,7 +170,8 @@ class Circle:
 
     def characteristic(self, weights: Sequence[float]) -> Discs:
         """x^k F z^-n on every arc, k the least that leaves no pole at z = 1."""
-        row, x = (*weights, 1.0), self.parts[0]
+        row = (*weights, 1.0)
+        x = self.parts[0]
         used = [
             (row[part] * gain, int((roots == 0).sum()) - self.orders[signal], self.parts[n])
             for n, (part, signal, gain, roots) in enumerate(self.terms, start=1)
@@ -174,8 +182,10 @@ class Circle:
 
     def _parts(self, low: Real, high: Real) -> Discs:
         """x, and the terms of F z^-n without powers of x, on arcs."""
-        arcs, order = Arcs((low + high) / 2, (high - low) / 2), self.loop.in_z.poles.size
-        sums, n = self.summed(arcs, self.weights), len(self.orders) - 1
+        arcs = Arcs((low + high) / 2, (high - low) / 2)
+        order = self.loop.in_z.poles.size
+        sums = self.summed(arcs, self.weights)
+        n = len(self.orders) - 1
         signals = [self._output(row, arcs, sums[row] + sums[n + row] * arcs.turned(1), sums[-1]) for row in range(n)]
         found = [arcs.x]
         for _, row, _, roots in self.terms:
@@ -185,16 +195,20 @@ class Circle:
 
     def _output(self, row: int, arcs: Arcs, of_poles: Discs, pair: Discs) -> Discs:
         """Return x^n times an output's pulse transfer function, n its order at z = 1, from the sums over the poles."""
-        plant, pulse, order = self.loop.plant, self.loop.pulse, self.orders[row]
-        T, f, (twice, once) = pulse.sampling.period, pulse.sampling.fraction, plant.rigid[row]
-        x, late = arcs.x, arcs.turned(1)
+        plant = self.loop.plant
+        pulse = self.loop.pulse
+        order = self.orders[row]
+        twice, once = plant.rigid[row]
+        f = pulse.sampling.fraction
+        T = pulse.sampling.period
+        x = arcs.x
+        late = arcs.turned(1)
         at_rest = float(plant.static[row] - (plant.residues[row] / plant.poles)[~self.kept].real.sum())
         held = of_poles + late.times(at_rest) + Discs(0 * x.middle, self.missing[row])
         total = power(x, order) * held
-        push = arcs.turned(0).times((1 - f) * T) + late.times(f * T)
+        push = arcs.polynomial((1 - f) * T, f * T)
         if order == 2:  # then there is no 1/s: an arm that turns freely has no friction at the hub
-            ramp = arcs.turned(0).times(pulse.ramps[0]) + late.times(pulse.ramps[1])
-            total = total + ((push * late).times(T) + x * ramp).times(twice) * late
+            total = total + ((push * late).times(T) + x * arcs.polynomial(*pulse.ramps)).times(twice) * late
         elif order == 1:
             total = total + (push * late if self.braked is None else pair * self._braked_pair(arcs)).times(once)
         return total * arcs.turned(pulse.sampling.whole_delay)
@@ -204,11 +218,13 @@ class Circle:
     def _cut(self, rough: NDArray[np.bool_]) -> None:
         """Cut some arcs into shorter ones."""
         ends = np.linspace(self.low[rough], self.high[rough], PIECES_OF_ARC + 1)
-        new_low, new_high = ends[:-1].ravel(), ends[1:].ravel()
+        new_low = ends[:-1].ravel()
+        new_high = ends[1:].ravel()
         new = self._parts(new_low, new_high)
         all_low = np.r_[self.low[~rough], new_low]
         order = np.argsort(all_low)
-        self.low, self.high = all_low[order], np.r_[self.high[~rough], new_high][order]
+        self.high = np.r_[self.high[~rough], new_high][order]
+        self.low = all_low[order]
         old = self.parts
         self.parts = Discs(
             np.c_[old.middle[:, ~rough], new.middle][:, order], np.c_[old.radius[:, ~rough], new.radius][:, order]
@@ -220,11 +236,15 @@ class Circle:
 
         (r/p) (a - 1), and (r/p) (b - a) that is to be multiplied by 1/z; and -p of a braked hub.
         """
-        plant, sampling = self.loop.plant, self.loop.chain.sampling
-        p, T, late = plant.poles, sampling.period, sampling.fraction * sampling.period
+        plant = self.loop.plant
+        sampling = self.loop.chain.sampling
+        p = plant.poles
+        T = sampling.period
+        late = sampling.fraction * sampling.period
         is_braked = np.arange(p.size) == (-1 if self.braked is None else self.braked)
         share = (plant.residues + np.outer(plant.rigid[:, 1], is_braked)) / p  # the rest is in `_braked_pair`
-        now, before = np.expm1(p * (T - late)), np.exp(p * (T - late)) * np.expm1(p * late)
+        now = np.expm1(p * (T - late))
+        before = np.exp(p * (T - late)) * np.expm1(p * late)
         return np.vstack([*np.where(self.kept, [share * now, share * before], 0.0), np.where(is_braked, -p, 0.0)])
 
     @cached_property
@@ -235,20 +255,26 @@ class Circle:
 
     def _braked_pair(self, arcs: Arcs) -> Discs:
         """(c0 + c1/z + c2/z^2): x times the pulse transfer function of 1/s - 1/(s - p), without -p/(z - e^{pT})."""
-        T, late = self.loop.chain.sampling.period, self.loop.chain.sampling.fraction * self.loop.chain.sampling.period
+        T = self.loop.chain.sampling.period
+        late = self.loop.chain.sampling.fraction * self.loop.chain.sampling.period
         p = float(self.loop.plant.poles[self.braked].real)
-        first, last = (T - late) ** 2 * phi(p * (T - late)), late**2 * np.exp(p * T) * phi(-p * late)
+        first = (T - late) ** 2 * phi(p * (T - late))
+        last = late**2 * np.exp(p * T) * phi(-p * late)
         middle = T * np.expm1(p * T) / p - first - last
-        return arcs.turned(0).times(first) + arcs.turned(1).times(middle) + arcs.turned(2).times(last)
+        return arcs.polynomial(first, middle, last)
 
     def summed(self, arcs: Arcs, weights: Complex) -> Discs:
         """sum over the poles p of the plant of weight/(z - b) on arcs: discs (weights, arcs)."""
-        p, T = self.loop.plant.poles, self.loop.chain.sampling.period
-        b, room = np.exp(p * T), np.maximum(-np.expm1(p.real * T), ON_IT)
+        p = self.loop.plant.poles
+        T = self.loop.chain.sampling.period
+        b = np.exp(p * T)
+        room = np.maximum(-np.expm1(p.real * T), ON_IT)
         blur = MACHINE_EPS * (4 + abs(p * T))
-        middles, radii = [], []
+        middles = []
+        radii = []
         for some in np.array_split(np.arange(arcs.half.size), 1 + arcs.half.size * p.size // TERMS_AT_A_TIME):
-            away, h = np.exp(1j * arcs.middle[some])[:, None] - b, arcs.half[some][:, None]
+            away = np.exp(1j * arcs.middle[some])[:, None] - b
+            h = arcs.half[some][:, None]
             away = np.where(away == 0, ON_IT, away)
             near = 1 / abs(away)
             least = 1 / np.maximum(1 / near - h, room)
@@ -309,8 +335,10 @@ class Band:
 
 def complete_band(loop: Sampled) -> Band | None:
     """Return the highest band in which the loop's plant is certified to be complete; None without one, as at C = 0."""
-    plant, sampling = loop.plant, loop.chain.sampling
-    C, remaining = plant.arm.damping, sampling.period * (1 - sampling.fraction)
+    plant = loop.plant
+    sampling = loop.chain.sampling
+    C = plant.arm.damping
+    remaining = sampling.period * (1 - sampling.fraction)
     if C == 0.0:
         return None
     line = min(TOWARD_SINGULAR / C, DECAYED_EXPONENT / remaining)
@@ -324,7 +352,8 @@ def complete_band(loop: Sampled) -> Band | None:
 
 def _highest(loop: Sampled, line: float) -> float | None:
     """The top of the highest box right of the line in which the exact arm has the plant's poles alone."""
-    plant, function = loop.plant, function_of(modes(loop.plant.model.arm, 1).system)
+    plant = loop.plant
+    function = function_of(modes(loop.plant.model.arm, 1).system)
     poles = np.r_[plant.poles[(plant.mode > 0) | (plant.poles.imag != 0)], plant.model.single]
     poles = poles[poles.real > -line]
 
@@ -345,8 +374,11 @@ def _highest(loop: Sampled, line: float) -> float | None:
 
 def _left_of(loop: Sampled, line: float, top: float) -> Real | None:
     """The bound on all poles of the band left of the line; None where the integral does not converge."""
-    sampling, exact, analog = loop.chain.sampling, loop.rig.exact, np.array(loop.rig.analog)[:, None]
-    T, remaining = sampling.period, sampling.period * (1 - sampling.fraction)
+    sampling = loop.chain.sampling
+    exact = loop.rig.exact
+    analog = np.array(loop.rig.analog)[:, None]
+    T = sampling.period
+    remaining = sampling.period * (1 - sampling.fraction)
 
     def sizes(s: Complex) -> Real:
         damped = np.exp(s.real * remaining) / -np.expm1(s.real * T)
@@ -371,13 +403,15 @@ def _integral(size: Callable[[Real], Real], ends: Real) -> Real | None:
         values = size((ends[1:] + ends[:-1]) / 2) @ np.diff(ends)
         if before is not None and (abs(values - before) <= SURE * np.maximum(values, before)).all():
             return np.maximum(values, before)
-        before, ends = values, np.sort(np.r_[ends, (ends[1:] + ends[:-1]) / 2])
+        before = values
+        ends = np.sort(np.r_[ends, (ends[1:] + ends[:-1]) / 2])
     return None
 
 
 def _of_the_filter(loop: Sampled, line: float) -> Real:
     """The bound on the error of the filter's own pole, whose residue has the model's value at -wc, not the arm's."""
-    sampling, plant = loop.chain.sampling, loop.plant
+    sampling = loop.chain.sampling
+    plant = loop.plant
     corner = sampling.antialias_corner
     if corner >= line or not any(loop.rig.analog):  # then none of the kept poles is it, and the integral has it right
         return np.zeros(len(loop.rig.analog))

@@ -53,7 +53,8 @@ def line_of(loop: Sampled, name: str) -> Line:
         unit[1:] = loop.weights
         # the least factor on a law that is searched: with less it is none
         return Line.of(loop.row, unit, 1.0, 1e-9, MOST_FACTOR)
-    place, value = 1 + loop.part(name), loop.number(name)
+    place = 1 + loop.part(name)
+    value = loop.number(name)
     gain = ON.get(name, name)
     most = most_gain(loop.plant.arm, gain) if gain in NAMES else MOST_FACTOR * (abs(value) or 1.0)
     unit[place] = 1.0
@@ -68,7 +69,8 @@ def crossings_along(grid: CircleGrid, lines: Sequence[Line]) -> list[Crossings]:
     vanishes: it falls towards that end where it is positive just before.
     """
     found = []
-    (first, last), at_end = grid.terms[:, [0, -1]].T, grid.rig.terms(np.array([-1.0 + 0j]), None, np.ones(1))[:, 0]
+    first, last = grid.terms[:, [0, -1]].T
+    at_end = grid.rig.terms(np.array([-1.0 + 0j]), None, np.ones(1))[:, 0]
     for line, here in zip(lines, crossings(grid, lines), strict=True):
         others, alone, low, high = line
         ways = [1 if ((others @ rows) * (alone @ rows).conj()).imag >= 0 else -1 for rows in (first, last)]
@@ -98,7 +100,8 @@ def _real_gain(A: Any, B: Any) -> float:
 
 def windows_of(loop: Sampled, names: Sequence[str]) -> dict[str, list[Window]]:
     """Return every stability interval of some numbers of the law, the others constant, confirmed by the poles."""
-    lines, windows = [line_of(loop, name) for name in names], []
+    lines = [line_of(loop, name) for name in names]
+    windows = []
     for name, line, found in zip(names, lines, crossings_along(loop.rig.grid, lines), strict=True):
 
         def is_stable(value: float, line: Line = line) -> bool:
@@ -159,17 +162,18 @@ def sampled_map(
     (D-decomposition) for two gains of its parts, and along such a gain for each value of any other number.  For two
     others poles are counted at every point.  Raises ConvergenceError where crossings and a count by eigenvalues differ.
     """
-    x, y = ascending(vary[0], x, 1, MOST_GAINS), ascending(vary[1], y, 1, MOST_GAINS)
+    x = ascending(vary[0], x, 1, MOST_GAINS)
+    y = ascending(vary[1], y, 1, MOST_GAINS)
     across, up = (loop.place(name) for name in vary)
     if up is None and across is not None:
         turned = sampled_map(loop, y, x, (vary[1], vary[0]))
         return GainMap(loop, vary, turned.y, turned.x, turned.unstable.T, [])
-    make = loop.having if across is not None else lambda name, value: loop.under(loop.law.having(name, value))
-    loops = {value: make(vary[0], value) for value in x.tolist()}
+    loops = {value: loop.having(vary[0], value) for value in x.tolist()}
     if up is None:
-        points = [[each.under(each.law.having(vary[1], value)) for value in y.tolist()] for each in loops.values()]
+        points = [[each.having(vary[1], value) for value in y.tolist()] for each in loops.values()]
         return GainMap(loop, vary, x, y, np.array([[each.poles.unstable for each in row] for row in points]), [])
-    at, lines = _off_the_edge(y), [line_of(each, vary[1]) for each in loops.values()]
+    at = _off_the_edge(y)
+    lines = [line_of(each, vary[1]) for each in loops.values()]
     if across is None:
         there = np.array([each.having(vary[1], at).poles.unstable for each in loops.values()])
         found = [crossings_along(each.rig.grid, [line])[0] for each, line in zip(loops.values(), lines, strict=True)]
@@ -209,7 +213,8 @@ def with_more(plane: GainMap, x: Real) -> GainMap:
         return plane
     more = sampled_map(plane.loop, fresh, plane.y, plane.vary)
     order = np.argsort(both := np.r_[plane.x, fresh], kind="stable")
-    found, unstable = plane.crossings + more.crossings, np.concatenate([plane.unstable, more.unstable])
+    found = plane.crossings + more.crossings
+    unstable = np.concatenate([plane.unstable, more.unstable])
     return replace(plane, x=both[order], unstable=unstable[order], crossings=[found[n] for n in order])
 
 

@@ -31,8 +31,9 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import FED_BACK, GAINS, Arm, HubFeedback, Law, law_of
+from tfarm.arm import FED_BACK, Arm, HubFeedback, Law, law_of
 from tfarm.arm.chain import Chain, Sampling
+from tfarm.arm.feedback import OUTPUT_OF
 from tfarm.arrays import LEAST_SIZE, MACHINE_EPS, Complex, Real, Whole
 from tfarm.case import Case
 from tfarm.dsp.discretise import (
@@ -64,7 +65,6 @@ LAST_STEP = 1e-12  # of the offset: below its rounding
 UNMOVED = 1e-50  # an offset this small is a pole that the loop does not move
 LEAST_SQUARE = -1.0 + 1e-15  # for |z|^2 - 1 of a pole at z = 0, the base of no root
 FADED_RADIUS = 0.2  # a pole nearer to z = 0 is stable and not polished
-OUTPUT_OF = {gain.name: gain.output for gain in GAINS}
 
 
 @frozen
@@ -175,7 +175,8 @@ class Sampled(Loop):
 
     def place(self, name: str) -> int | None:
         """The part whose weight is a number, by its name in `Law.having`; None of any other number."""
-        known, name = self.unit_law.part_gains, OUTPUT_OF.get(name, name).removesuffix(".gain")
+        known = self.unit_law.part_gains
+        name = OUTPUT_OF.get(name, name).removesuffix(".gain")
         return next((known[key][0] for key in (name, f"{name}.gain") if key in known), None)
 
     def number(self, name: str) -> float:
@@ -193,8 +194,9 @@ class Sampled(Loop):
         return replace(self, weights=tuple(weights))
 
     def having(self, name: str, value: float) -> Sampled:
-        """Return the same loop with another value of the gain or factor of one part of its law."""
-        place = self.part(name)
+        """Return the same loop with another value of one number of its law; cheap where that is a gain or factor."""
+        if (place := self.place(name)) is None:
+            return super().having(name, value)
         return self.weighted([*self.weights[:place], value, *self.weights[place + 1 :]])
 
     def times(self, factor: float) -> Sampled:
@@ -240,7 +242,8 @@ class Sampled(Loop):
 
     def rounding(self, base: Whole, offset: Complex) -> Real:
         """Bound on the rounding error (n,) of row @ terms at the same points: of the sizes of all terms."""
-        start, is_of_law = self.rig.open_loop[base], base >= self.pulse.poles.size
+        start = self.rig.open_loop[base]
+        is_of_law = base >= self.pulse.poles.size
         scale = np.where(is_of_law, 1.0, offset)
         sizes = self.pulse.sizes(np.where(is_of_law, -1, base), scale, start + offset)
         error = abs(scale) * root_product_error(start, self.in_z.poles, offset)
@@ -266,7 +269,9 @@ class Sampled(Loop):
 
     def matrix(self) -> Real:
         """The closed-loop matrix: states of `PulseTransfer.matrices`, then those of the law."""
-        (M, b), (_, _, Ck, Dk), weights = self.rig.frame, self.in_z.matrices, np.array([self.weights])
+        M, b = self.rig.frame
+        _, _, Ck, Dk = self.in_z.matrices
+        weights = np.array([self.weights])
         return M - np.outer(b, np.hstack([weights @ Dk @ self.pulse.matrices()[2], weights @ Ck]))
 
     @cached_property
@@ -277,7 +282,8 @@ class Sampled(Loop):
 
     def reduced_matrix(self) -> Real:
         """The closed-loop matrix without the pole z = 1 of a free hub angle, or of a hub that cannot drift."""
-        A, first = self.matrix(), self.pulse.integrals_at
+        A = self.matrix()
+        first = self.pulse.integrals_at
         unfelt = 2 if not self.plant.arm.has_rigid_mode else int(self.rig.is_damped)  # its angle is the single integral
         felt = np.r_[np.arange(first), np.arange(first + unfelt, len(A))]
         A = A[np.ix_(felt, felt)]
@@ -317,7 +323,9 @@ class Sampled(Loop):
 
         Those next to z = 0 are stable, and not polished.
         """
-        z, shifts, pulse = self.eigenvalues.copy(), self.rig.open_loop, self.pulse
+        z = self.eigenvalues.copy()
+        shifts = self.rig.open_loop
+        pulse = self.pulse
         z[np.argsort(abs(z - 1), kind="stable")[: self.poles_at_one]] = 1.0
         log_radius = np.log(np.maximum(abs(z), SMALLEST_RADIUS))
         rows = np.flatnonzero((abs(z) > FADED_RADIUS) & (z != 1))
@@ -329,10 +337,12 @@ class Sampled(Loop):
             if (nearest[rows] == base[rows]).all():
                 break
             # all digits are kept from there
-            offset, base = offset + (shifts[base] - shifts[nearest]), nearest
+            offset = offset + (shifts[base] - shifts[nearest])
+            base = nearest
         own = 2 * self.in_z.poles.real + abs(self.in_z.poles) ** 2
         start = np.r_[pulse.poles.real * pulse.sampling.period, np.log1p(np.maximum(own, LEAST_SQUARE)) / 2]
-        at, o = base[rows], offset[rows]
+        at = base[rows]
+        o = offset[rows]
         ratio = o / (1 + shifts[at])
         log_radius[rows] = start[at] + np.log1p(2 * ratio.real + abs(ratio) ** 2) / 2
         z[rows] = (1 + shifts[at]) + o
@@ -379,7 +389,8 @@ def _settled(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tuple[
 
     These are the radii of Smith's discs, and the rounding of a pole of the law; 0 of the others.
     """
-    offset, error = offset.copy(), np.zeros(offset.size)
+    error = np.zeros(offset.size)
+    offset = offset.copy()
     offset[rows] = np.where(offset[rows] == 0, OFF_POLE, offset[rows])
     with np.errstate(all="ignore"):  # a root on an open-loop pole, and one that diverges
         for _ in range(MOST_STEPS):
@@ -404,17 +415,20 @@ def _settled(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tuple[
 def _weierstrass(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tuple[Complex, Complex, Complex]:
     """At some roots o F and o F/W, and their distances from all roots, 1 from themselves."""
     pulse = loop.pulse
-    b, o = base[rows], offset[rows]
+    b = base[rows]
+    o = offset[rows]
     one = loop.rig.open_loop[b]
     known = np.r_[pulse.shifts[:-1], np.full(pulse.sampling.whole_delay + 1, -1.0)]  # the other poles are at z = 1
     poles = np.r_[known, np.zeros(max(0, offset.size - known.size - loop.in_z.poles.size))]
     apart = (one[:, None] - loop.rig.open_loop[base]) + (o[:, None] - offset)
     apart[np.arange(rows.size), rows] = 1.0
     away = (one[:, None] - poles) + o[:, None]
-    of_plant, own = b < pulse.poles.size, np.where(b == pulse.poles.size - 1, known.size, b)
+    of_plant = b < pulse.poles.size
+    own = np.where(b == pulse.poles.size - 1, known.size, b)
     listed = of_plant & (own < poles.size)  # but where a free hub angle has the pole at z = 1
     away[listed, own[listed]] = 1.0  # F is times the distance from that pole
-    of_poles, others = (apart[:, : poles.size] / away).prod(axis=1), apart[:, poles.size :].prod(axis=1)
+    of_poles = (apart[:, : poles.size] / away).prod(axis=1)
+    others = apart[:, poles.size :].prod(axis=1)
     slope = np.where(of_plant & ~listed, o, 1.0) * of_poles * others
     return loop.row @ loop.rig.terms(1 + (one + o), b, o), slope, apart
 
@@ -425,8 +439,10 @@ def sampled_loop(case: Case, *, count: int = USUAL_MODES) -> Sampled:
     Raises ParameterError for a locked hub, an unknown signal, a law in z of another period, a massless hub whose moment
     is fed back (an algebraic loop), and as `discretised` does.
     """
-    law, (acting, chain) = case.feedback, acting_law(case)
-    weights, units = [1.0] * len(law.parts), acting.part_gains
+    law = case.feedback
+    acting, chain = acting_law(case)
+    weights = [1.0] * len(law.parts)
+    units = acting.part_gains
     for name, (place, value) in units.items():
         weights[place] = value
         law, acting = (each.having(name, 1.0) for each in (law, acting))

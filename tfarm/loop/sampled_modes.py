@@ -87,11 +87,14 @@ def mode_table(loop: Sampled) -> ModeTable:
     upper = np.nonzero((pulse.poles.imag > 0) & (pulse.mode > 0) & (own > -20.0))[0]
     upper = upper[np.argsort(pulse.mode[upper])]
     index = pulse.mode[upper]
-    table, T = modes(pulse.plant.arm, max(1, int(index.max(initial=1)))), pulse.sampling.period
+    table = modes(pulse.plant.arm, max(1, int(index.max(initial=1))))
+    T = pulse.sampling.period
     w = table.natural_frequency[np.searchsorted(table.index, index)]
-    by, reads = first_order(loop, upper), [part.signals for part in loop.law.parts]
+    by = first_order(loop, upper)
+    reads = [part.signals for part in loop.law.parts]
     by_rate, by_moment = (by[[each == (name,) for each in reads]].sum(axis=0) for name in ("hub_rate", "root_moment"))
-    turns, origin = np.round(w * T / (2 * np.pi)), origins(loop)
+    turns = np.round(w * T / (2 * np.pi))
+    origin = origins(loop)
     # poles from a mode's pole and its conjugate: two radii where both have become real
     conjugate = abs(pulse.poles - pulse.poles[upper].conj()[:, None]).argmin(axis=1)
     radii = [loop.poles.log_radius[np.isin(origin, pair)].max() for pair in zip(upper, conjugate, strict=True)]

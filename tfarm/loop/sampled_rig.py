@@ -81,12 +81,18 @@ class SampledRig:
         At z = e^{pT} + offset (n,), p the pole number `base`; of the law's poles, which are numbered after those of the
         plant, not times the offset.
         """
-        z, more, at, delta = np.asarray(z), 0.0, base, None
+        z = np.asarray(z)
+        more = 0.0
+        at = base
+        delta = None
         start = z - 1
         if base is not None:
-            start, more = self.open_loop[base], offset
-            is_of_law, delta = base >= self.pulse.poles.size, start + offset
-            at, offset = np.where(is_of_law, -1, base), np.where(is_of_law, 1.0, offset)
+            start = self.open_loop[base]
+            more = offset
+            is_of_law = base >= self.pulse.poles.size
+            delta = start + offset
+            at = np.where(is_of_law, -1, base)
+            offset = np.where(is_of_law, 1.0, offset)
         measured = self.pulse.scaled(z, at, offset, delta)
         rows = np.zeros((1 + len(self.in_z.part_poles), z.size), complex)
         rows[0] = offset * root_product(start, self.in_z.poles, more)
@@ -96,7 +102,9 @@ class SampledRig:
 
     def near_one(self, weights: Real) -> list[tuple[int, float]]:
         """Return the rows of `terms` times weights (1 + parts,), as (n, c) of c x^n at small x = 1 - 1/z, without 0."""
-        plant, T, at_rest = self.plant, self.chain.sampling.period, self.plant.at_rest
+        plant = self.plant
+        T = self.chain.sampling.period
+        at_rest = self.plant.at_rest
         size = abs(plant.static) + abs(plant.residues / plant.poles).sum(axis=1)
         found = [lowest_power(self.in_z.poles)] if weights[0] else []
         slopes = self.pulse.slopes_at_one
@@ -104,7 +112,8 @@ class SampledRig:
             weight = float(weights[1 + part] * gain)
             if weight:
                 n, value = lowest_power(zeros)
-                (twice, once), rest = plant.rigid[row], at_rest[row]
+                rest = at_rest[row]
+                twice, once = plant.rigid[row]
                 own = (-2, twice * T * T) if twice else (-1, once * T) if once else (0, rest)
                 if own[0] == 0 and abs(rest) <= STATIC_ZERO * size[row]:
                     own = (1, slopes[row])
@@ -164,7 +173,8 @@ def circle_grid(rig: SampledRig) -> CircleGrid:
     bases = np.nonzero((angles >= 0) & (abs(pulse.multipliers) > BRIGHT))[0]
     bases = bases[np.argsort(angles[bases], kind="stable")]
     seams = np.r_[0.0, (angles[bases][1:] + angles[bases][:-1]) / 2, np.pi]
-    base, shift = [], []
+    base = []
+    shift = []
     for pole, low, high in zip(bases, seams[:-1], seams[1:], strict=True):
         width = max(abs(pulse.poles.real[pole]) * pulse.sampling.period * WIDTH_SHARE, NARROWEST_WIDTH)
         for edge in (low - angles[pole], high - angles[pole]):

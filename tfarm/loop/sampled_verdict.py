@@ -191,11 +191,13 @@ def unaliased_poles(loop: Sampled) -> dict[int, complex]:
 
     Of several poles of a mode it is the least damped one.
     """
-    poles, table = loop.poles, modes(loop.arm, max(1, int(loop.poles.mode.max(initial=1))))
+    poles = loop.poles
+    table = modes(loop.arm, max(1, int(loop.poles.mode.max(initial=1))))
     rounding = 1e-9 * abs(poles.z)
     # a real z < 0 oscillates at half the sampling rate, one > 0 never does, whatever rounding leaves of Im z
     upper = (poles.z.imag > rounding) | ((poles.z.real < 0) & (abs(poles.z.imag) <= rounding))
-    mode, q = poles.mode[upper], abs(np.angle(poles.z[upper]))
+    mode = poles.mode[upper]
+    q = abs(np.angle(poles.z[upper]))
     own = np.where(mode > 0, np.interp(mode, table.index, table.natural_frequency) * loop.period, q)
     turns = 2 * math.pi * np.round((own + [[-1], [1]] * q) / (2 * math.pi))
     aliases = abs([[1], [-1]] * q + turns)
@@ -221,13 +223,15 @@ def sampled_verdict(case: Case, *, count: int | None = None) -> Verdict:
     largest = whole_loop(case)
     band = complete_band(largest)
     full = largest if band is None else band.full
-    proven, radius = None if band is None else band.circle.count(full.weights), full.poles.log_spectral_radius
+    proven = None if band is None else band.circle.count(full.weights)
+    radius = full.poles.log_spectral_radius
 
     def agrees(fewer: Sampled) -> bool:
         is_near = abs(fewer.poles.log_spectral_radius - radius) <= RADIUS_AGREES * abs(radius) + RADIUS_NOISE
         return is_near and fewer.poles.unstable == full.poles.unstable and proven in (None, fewer.poles.unstable)
 
-    few, most = min(FEWEST_COMPARED, full.plant.count // 2), full.plant.count
+    few = min(FEWEST_COMPARED, full.plant.count // 2)
+    most = full.plant.count
     loops = (resized(full, few << n) for n in range(most.bit_length()) if 0 < few << n < most)
     loop = next(filter(agrees, loops), full)
     is_proven = proven is not None and loop.poles.is_determined and (proven == 0) == (loop.poles.unstable == 0)
@@ -321,7 +325,8 @@ class Analysis:
 
     def interval(self, name: str) -> Window | None:
         """The stability interval around a gain; a gain of 0 on a free angle is the end of its own interval."""
-        value, windows = self.loop.number(name), self.windows[name]
+        value = self.loop.number(name)
+        windows = self.windows[name]
         if name == ANGLE_GAIN and value == 0.0 and self.verdict.is_stable:
             return next((window for window in windows if window[0] <= 0.0 < window[1]), None)
         return around(windows, value)
@@ -439,7 +444,8 @@ def sampled_brief(case: Case) -> SampledBrief:
 
 def brief_of(found: Verdict | ConvergenceError, case: Case) -> SampledBrief:
     """A verdict on a case in short, or the reason that there is none; in capitals where the loop is not stable."""
-    T, delay = case.chain.sampling.period, case.chain.sampling.delay_samples
+    T = case.chain.sampling.period
+    delay = case.chain.sampling.delay_samples
     origin = case.chain.period_from or (DEFAULT_PERIOD if Sampling().period == T else "")
     origin = LAWS_PERIOD if case.law.is_discrete else origin
     verdict = None if isinstance(found, ConvergenceError) else found

@@ -12,7 +12,6 @@ from tfarm.arm.schema import file_key, file_keys
 from tfarm.digits import how_many, unit
 from tfarm.errors import require
 from tfarm.exact.outputs import signal_words, unit_over
-from tfarm.studies.bands import study_band as response_band
 from tfarm.studies.quantities import (
     COLUMNS,
     Spread,
@@ -173,7 +172,7 @@ def study_band(found: Study, output: str = "root_moment", *, ax: Axes) -> None:
 
     The arms are even over the rows.  Raises ParameterError for an unknown output, and where no arm has that response.
     """
-    band = response_band(found, output)
+    band = found.band(output)
     omega = band.omega
     ax.fill_between(
         omega, band.low, band.high, color=BLUE, alpha=0.3, lw=0, label="5 to 95 % of the arms, at each frequency"

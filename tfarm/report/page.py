@@ -343,7 +343,7 @@ class ArmReport(NamedTuple):
     @property
     def regions(self) -> StableRegions:
         """The stability regions around the gains of the page, continuous and sampled."""
-        return stable_regions(self.arm, self.cases[0].sampled.loop.gains, self.chain)
+        return stable_regions(self.cases[0].case)
 
     def locus(self, name: str) -> Loci:
         """Return the root locus along one of the default gains, exact and of a reduced model."""
@@ -414,7 +414,7 @@ class ArmReport(NamedTuple):
 
     def tuned_regions(self, found: TunerNumbers) -> StableRegions:
         """Return the stability regions around the gains of the tuner."""
-        return stable_regions(found.arm, found.tuning.constant, found.tuning.trial.loop.chain)
+        return stable_regions(Case(found.arm, found.tuning.constant, found.tuning.trial.loop.chain))
 
     def possible_arms(self, count: int = ARMS) -> PossibleArms:
         """Return arms that the data of the fit leave possible.  Raises ConvergenceError where there are none."""

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from tfarm import tuner
-from tfarm.arm import MOMENT_GAIN, PLANE, Arm, Section, as_law
+from tfarm.arm import MOMENT_GAIN, PLANE, Arm, Section
 from tfarm.arm.checks import whole
 from tfarm.arrays import Real
 from tfarm.case import Case
@@ -202,7 +202,7 @@ def _candidates(arm: Arm, count: int, key: str, own: int, known: Mapping[str, Se
     """Return the rows of a study of that key, whose values are the last of those known; `own` is the arm's own row."""
     parameter, values = list(known.items())[-1]
     limit = f"{INTERVAL}.{MOMENT_GAIN}.high"
-    family = Subjects(Case(arm, as_law(default_gains(arm))), (key,))
+    family = Subjects(Case(arm, default_gains(arm)), (key,))
     subjects = [family.at((value,)) for value in values]
     prepare(subjects, [f"{FREQUENCY}.{count}"])
     rows = []

@@ -22,22 +22,25 @@ import scipy  # whose statistics take half a second to load
 
 from tfarm.arm import PLANE
 from tfarm.arrays import Real
-from tfarm.assessment.card import LoopCard, loop_card, words_of
+from tfarm.assessment.card import LoopCard, analysis_of, loop_card, words_of
 from tfarm.assessment.step import LoopResponse, step
-from tfarm.case import Case
+from tfarm.dsp.stages import admit_case
 from tfarm.errors import ConvergenceError, TfarmError, must_be_known, require
 from tfarm.exact.system import system_of
+from tfarm.loop.curve import decibels
 from tfarm.loop.poles import closed_loop_poles
-from tfarm.loop.sampled_verdict import sampled
+from tfarm.loop.sampled_verdict import SAMPLED_LOOP
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Interval, windows_of
+from tfarm.response import transfer
+from tfarm.response.frequency import resonant_band
 from tfarm.schema import Percent, Quantity, quantities
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.frequencies import list_frequencies
 from tfarm.spectrum.shapes import PARAMETERS
 from tfarm.tuner.tuning import tuned
 
-from .space import Subject
+from .space import Subject, Subjects
 
 FAILED = "failed"  # column of the reason of a missing result
 LISTED = 5  # modes and poles of a row
@@ -122,15 +125,13 @@ def _card_of(loop: str) -> Asked:
     """Return the entries of the card of a loop, of which stability and its certainty need the verdict alone."""
 
     def values(one: Subject, names: Set[str]) -> dict[str, Any]:
-        case = one.case
-        if loop == "continuous" and case.law.is_discrete:
+        if loop == "continuous" and one.case.law.is_discrete:
             return {}
-        if not names <= {f"{loop}.stability", f"{loop}.certainty"}:
-            card = loop_card(loop, case.arm, case.law, case.chain)
-            return {name: value for name, _, value in entries_of(LoopCard, card, loop)}
-        arm, law, chain = case.arm, case.law, case.chain
-        verdict = stability(Case(one.driven_arm, law)) if loop == "continuous" else sampled(arm, law, chain).verdict
-        return {f"{loop}.{key}": text for key, text in words_of(verdict, chain).items()}
+        if names <= {f"{loop}.stability", f"{loop}.certainty"}:
+            case = admit_case(SAMPLED_LOOP, one.case)
+            words = words_of(analysis_of(loop, case).verdict, case.chain)
+            return {f"{loop}.{key}": text for key, text in words.items()}
+        return {name: value for name, _, value in entries_of(LoopCard, loop_card(loop, one.case), loop)}
 
     return {name: column for name, column, _ in entries_of(LoopCard, None, loop)}, values
 
@@ -169,7 +170,7 @@ def intervals_of(one: Subject, names: Set[str]) -> dict[str, Any]:
     """Stability and intervals of gains at the hub; undecided, without intervals, where poles cannot be counted."""
     found: dict[str, Any] = {STABILITY: "undecided"}
     with suppress(ConvergenceError):
-        verdict = stability(Case(one.driven_arm, one.case.law))
+        verdict = stability(admit_case(SAMPLED_LOOP, one.case))
         gains = [gain for gain in PLANE if gain in verdict.loop.numbers and any(f".{gain}." in name for name in names)]
         for gain, of in windows_of(verdict, gains).items():
             found |= {f"{INTERVAL}.{gain}.{name}": getattr(of.interval, name, None) for name in Interval._fields}
@@ -184,7 +185,8 @@ def _damped_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
 
 
 def _poles_of(one: Subject, _: Set[str]) -> dict[str, float | None]:
-    found = closed_loop_poles(one.driven_arm, one.case.law)
+    case = admit_case(SAMPLED_LOOP, one.case)
+    found = closed_loop_poles(case.arm, case.law)
     s = found.values
     return {UNSTABLE: float(found.unstable), **_numbered(REAL, s.real), **_numbered(IMAGINARY, s.imag)}
 
@@ -394,7 +396,7 @@ def _driver(inputs: Mapping[str, Real], values: Real) -> tuple[str | None, float
     known = {key: scipy.stats.spearmanr(column, values) for key, column in inputs.items()
              if len(values) >= 10 and np.ptp(column) > 0 and np.ptp(values) > 0}  # fmt: skip
     # Bonferroni: of several numbers one is often near it by chance
-    level = 0.05 / max(1, len(inputs))  # Bonferroni: of several numbers one is often near it by chance
+    level = 0.05 / max(1, len(inputs))
     found = {key: float(of.statistic) for key, of in known.items() if of.pvalue < level}
     return max(found.items(), key=lambda each: abs(each[1]), default=(None, None))
 
@@ -405,3 +407,36 @@ def failures_of(table: Mapping[str, Any]) -> tuple[Failure, ...]:
     for row, text in enumerate(table["failed"]):
         rows.setdefault(re.sub(r"[-+]?\d[\d.eE+-]*", "N", text), []).append(int(table["row"][row]))
     return tuple(Failure(reason, len(own), own[0]) for reason, own in rows.items() if reason)
+
+
+# ------------------------------------------------------------------------------------------------------------ responses
+
+
+class StudyBand(NamedTuple):
+    """Magnitudes [dB] of a response at `omega` [rad/s]: `curves` (arms, n), their quantiles, and unit and label."""
+
+    omega: Real
+    curves: list[Real]
+    low: Real
+    median: Real
+    high: Real
+    label: str
+    unit: str
+
+
+def band_of(subjects: Subjects, rows: Sequence[Sequence[float]], output: str, points: int = 1200) -> StudyBand:
+    """Return the exact responses of the arms of some rows, and their quantiles at each frequency.
+
+    Raises ParameterError for an unknown output, and where no arm has that response.
+    """
+    arm = subjects.case.arm
+    omega = np.geomspace(*resonant_band(arm), points)
+    own = transfer(arm, output).rows[0]
+    curves = []
+    for row in rows:
+        # of an arm that is illegal there is none
+        with suppress(TfarmError):
+            curves.append(decibels(transfer(subjects.at(row).case.arm, output)(1j * omega)))
+    require(curves, "output", output, "no arm of the study has that response")
+    low, median, high = np.quantile(curves, [QUANTILES[end] for end in ("low", "median", "high")], axis=0)
+    return StudyBand(omega, curves, low, median, high, own.label, own.unit)

@@ -21,13 +21,11 @@ from typing import Any, NamedTuple, get_args
 import numpy as np
 import scipy  # whose statistics take half a second to load, and do so where they are used
 
-from tfarm.arm import Arm
 from tfarm.arm.checks import number
 from tfarm.arm.feedback import OUTPUT_OF
 from tfarm.arm.writing import KeyedArms, numbers_of
 from tfarm.arrays import Real
 from tfarm.case import Case
-from tfarm.dsp.plant import driven
 from tfarm.errors import ParameterError, must_be_known, naming, require
 from tfarm.files import open_file
 from tfarm.fitting.posterior import Posterior
@@ -78,11 +76,6 @@ class Subject(NamedTuple):
     case: Case
     tuner: dict[str, float]
     plan: tuning.Plan | None = None
-
-    @property
-    def driven_arm(self) -> Arm:
-        """The arm of its continuous-time loop: the analog damping of the chain's actuator is friction of its hub."""
-        return driven(self.case.arm, self.case.chain)[0]
 
 
 class Listing(NamedTuple):

@@ -25,8 +25,8 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import scipy  # whose statistics take half a second to load
 
-from tfarm.arm import AnyLaw, Arm, as_law
-from tfarm.arm.chain import Chain, chain_or_usual, file_text, load_chain
+from tfarm.arm import AnyLaw, Arm
+from tfarm.arm.chain import Chain, file_text, load_chain
 from tfarm.arm.checks import whole
 from tfarm.arm.law_tables import load_law
 from tfarm.arm.reading import AnyFile, load, load_tables, presets
@@ -49,6 +49,8 @@ from .quantities import (
     Failure,
     Spread,
     StableShare,
+    StudyBand,
+    band_of,
     column_names,
     failures_of,
     order_of,
@@ -165,6 +167,15 @@ class Study:
         """Arms without a result by reason."""
         return failures_of(self._table)
 
+    def band(self, output: str, most: int = 100) -> StudyBand:
+        """Return the responses of an output of at most that many arms, even over the rows, and their quantiles.
+
+        Raises ParameterError for an unknown output, and where no arm has that response.
+        """
+        plan = self.parts.plan
+        rows = np.column_stack([self._table[key] for key in plan.space.keys])
+        return band_of(plan.subjects, rows[:: max(1, -(-self.done // most))].tolist(), output)
+
     @property
     def shear(self) -> Annotated[str, Quantity("shear modulus", help="with a varied Young's modulus; else empty")]:
         """Shear moduli where Young's modulus is varied."""
@@ -247,7 +258,7 @@ def study(
     ConvergenceError
         Where a worker process or the scheduler was killed; another run goes on.
     """
-    case = Case(arm, as_law(default_gains(arm) if law is None else law), chain_or_usual(chain))
+    case = Case(arm, default_gains(arm) if law is None else law, chain)
     workers = usual_workers(client) if workers is None else workers
     for key, value in {"draws": draws, "seed": seed, "workers": workers, "part": 1 if part is None else part}.items():
         whole(key, value, int(key != "seed"), MOST_SEED, f"a whole number from {int(key != 'seed')}")

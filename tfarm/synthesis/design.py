@@ -10,8 +10,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm, as_law, must_turn
-from tfarm.arm.chain import chain_or_usual
+from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm, must_turn
 from tfarm.arm.stages import Consumer
 from tfarm.case import Case
 from tfarm.dsp import Chain
@@ -219,13 +218,13 @@ def design(
     ends = {key: (float(low), float(high)) for key, (low, high) in (ranges or {}).items()}
     box = ArmBox(arm, ends) if ends else None
     arms = arms_of(arm, also, box)
-    chain = chain_or_usual(chain)
+    chain = Chain() if chain is None else chain
     for each in arms:
         admit(CONSUMER, each.arm, chain)
     same_input(arms)
     form = structure_of(structure, arm, Kp=Kp, modes=modes, period=chain.sampling.period, bounds={"K1": K1, "K2": K2})
     for each in arms:
-        ContinuousLoop(Case(each.arm, as_law(form.record_at(form.origin))))
+        ContinuousLoop(Case(each.arm, form.record_at(form.origin)))
         check_bounds(form, each.arm)
     tell = progress or (lambda text: None)
     task = _Task(arm, objective, form, modes, chain, continuous, tell)
@@ -290,11 +289,10 @@ class _Task:
         law = choice.law
         x = choice.x
         own = choice.search.form
-        on_arms = tuple(
-            OnArm(each.name, each.numbers, judge.value(law), stability(Case(judge.arm, law)),
-                  sampled_brief(Case(judge.arm, law, judge.chain)))
-            for each, judge in zip(named, choice.worst.judges, strict=True)
-        )  # fmt: skip
+        on_arms = []
+        for each, judge in zip(named, choice.worst.judges, strict=True):
+            on_arm = judge.case(law)
+            on_arms.append(OnArm(each.name, each.numbers, judge.value(law), stability(on_arm), sampled_brief(on_arm)))
         at_ends = own.at_ends(x)
         return Design(
             objective=self.objective, structure=own.name, law=law,
@@ -304,7 +302,7 @@ class _Task:
             modes=self.modes, at_bound=tuple(own.names[place] for place, _ in at_ends),
             at_limit=tuple(own.names[place] for place, end in at_ends if (place, end) in own.ends(physical=True)),
             widened=choice.search.widened, loop="continuous" if self.continuous else "sampled", chain=self.chain,
-            sampled=on_arms[0].sampled, arms=on_arms, starts=choice.search.starts, agreed=choice.search.agreed,
+            sampled=on_arms[0].sampled, arms=tuple(on_arms), starts=choice.search.starts, agreed=choice.search.agreed,
             worst_case=case,
         )  # fmt: skip
 

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import AnyLaw, Arm, as_law
+from tfarm.arm import AnyLaw, Arm
 from tfarm.arm.blocks import Rational
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.case import Case
@@ -150,11 +150,24 @@ class Judge:
         shares = (reserve, 1 / reserve) * self.is_sampled + (1.0,) * (not self.objective.of_poles)
         return [*((self.model, share) for share in shares), *((each, 1.0) for each in self.also)]
 
+    def case(self, law: AnyLaw) -> Case:
+        """The case of a law on the arm."""
+        return Case(self.arm, law, self.chain)
+
     # ------------------------------------------------------------ in the model
+
+    def entries(self, law: AnyLaw) -> list[Entry]:
+        """The entries of a law of rational blocks, one for each signal."""
+        blocks = [(part.signals[0], part.block) for part in self.case(law).law.parts]
+        return [
+            Entry(name, np.array(block.num)[:, None], np.array(block.den)[:, None])
+            for name, block in blocks
+            if isinstance(block, Rational)
+        ]
 
     def score(self, law: AnyLaw) -> float:
         """The function to be minimised, of one law."""
-        return float(scores_of([self], entries_of(law), np.array([np.inf]))[0])
+        return float(scores_of([self], self.entries(law), np.array([np.inf]))[0])
 
     def aims(self, entries: Sequence[Entry]) -> Real:
         """The objective by the judge's own model alone; of its poles `LOST` and more where one is unstable."""
@@ -185,7 +198,7 @@ class Judge:
 
     def _lowest(self, law: AnyLaw, of: Callable[[Complex], Real]) -> float:
         """The least of a function of the loop function."""
-        entries = entries_of(law)
+        entries = self.entries(law)
         return lowest(lambda angles: of(self.model.loop(entries, angles)[0]), self.model.angles)[0]
 
     def peak(self, distance: Any) -> Any:
@@ -196,30 +209,29 @@ class Judge:
         """The least damping ratio; of the continuous-time loop that of its exact poles."""
         if self.is_sampled:
             return -self.score(law)
-        s = stability(Case(self.arm, law), self.model.band).poles.values
+        s = stability(self.case(law), self.model.band).poles.values
         s = s[(s.imag > 0) & (s.imag < self.model.band)]
         return float((-s.real / abs(s)).min(initial=1.0))
 
     def delay_margin(self, law: AnyLaw) -> float:
         """The delay margin [s] by the model; a lower bound where it is the longest that is looked for."""
-        late = float(delay(self.model, self.model.loop(entries_of(law)))[0])
+        late = float(delay(self.model, self.model.loop(self.entries(law)))[0])
         return late if late < longest_delay(self.model) else LowerBound(late)
 
     def simulated_residual(self, law: AnyLaw) -> float:
         """The residual of `tfarm simulate` after the slew [N m], with the converters; inf where it stops."""
         if not self.is_sampled:
             return self.score(law)
-        case = Case(self.arm, as_law(law), self.chain)
+        case = self.case(law)
         run, _ = simulated(case, slew_and_after(case.arm, self.known, case.chain))
         return np.inf if run.residual_moment is None else run.residual_moment
 
     def holds(self, law: AnyLaw) -> bool:
         """Whether the loop is stable by the exact verdicts, when sampled also with a reserve."""
         shares = (1.0, 1 / RESERVE, RESERVE) if self.is_sampled else ()
+        cases = (self.case(law.times(share)) for share in shares)
         try:
-            return stability(Case(self.arm, law)).is_stable and all(
-                sampled_verdict(Case(self.arm, law.times(share), self.chain)).is_stable for share in shares
-            )
+            return stability(self.case(law)).is_stable and all(sampled_verdict(each).is_stable for each in cases)
         except ConvergenceError:  # a pole on the axis or the circle
             return False
 
@@ -323,10 +335,3 @@ def chosen(entries: Sequence[Entry], rows: Any) -> list[Entry]:
     return [
         Entry(each.signal, *(of[:, rows] if of.shape[1] > 1 else of for of in (each.num, each.den))) for each in entries
     ]
-
-
-def entries_of(law: AnyLaw) -> list[Entry]:
-    """The entries of a law of rational blocks, one for each signal."""
-    parts = as_law(law).parts
-    blocks = [(part.signals[0], part.block) for part in parts if isinstance(part.block, Rational)]
-    return [Entry(name, np.array(block.num)[:, None], np.array(block.den)[:, None]) for name, block in blocks]

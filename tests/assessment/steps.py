@@ -1,11 +1,11 @@
-"""Figures of `tfarm step` against inverse Laplace transforms by two methods:
+"""Figures of `tfarm step` against inverse Laplace transforms by two inversions:
 
-    python -m tests.case.steps SIZE SEED
+    python -m tests.assessment.steps SIZE SEED
 
 Steps of a reference, slews and pulses; arms of `tests.plausible` and the paper's, mode 1 damped 0 to 20 %, a few with a
 spring to ground or a motor; laws of hub angle, hub rate and root moment with a delay of 0 to 10 ms and filters of order
-0 to 3.  True signals are those of `tests.case.step_truth`; where its two methods differ by more than `AGREES` of the
-peak there, or `ENOUGH` elsewhere, there is no truth.
+0 to 3.  True signals are those of `tests.assessment.step_truth`; where its two inversions differ by more than `AGREES`
+of the peak there, or `ENOUGH` elsewhere, there is no truth.
 
 A figure is wrong where it differs by more than 1 %, whatever its bound, or by 1e-6 under the word "converged"; a
 settling or a rise time where no signal so near has it, a peak time where the signal is not the peak.  A bound that a
@@ -22,7 +22,7 @@ import numpy as np
 
 import tfarm
 from tests import survey
-from tests.case.step_truth import Case, Truth, loop_function
+from tests.assessment.step_truth import Case, Truth, loop_function
 from tests.plausible.arms import draw, log
 from tests.survey import Finding
 from tfarm.arm import Motor
@@ -31,11 +31,11 @@ from tfarm.assessment import step
 from tfarm.assessment.step import PARTS, LoopResponse
 from tfarm.dsp import Chain
 
-AGREES, ENOUGH = 1e-6, 1e-4  # of the peak of a signal, there and elsewhere: two methods differ by no more
+AGREES, ENOUGH = 1e-6, 1e-4  # of the peak of a signal, there and elsewhere: two inversions differ by no more
 RIGHT, CONVERGED, BAND = 0.01, 1e-6, 0.02  # of the peak, and under that word; of the final value: settled
 MOST_UNDETERMINED, MOST_WITHOUT_TRUTH = 0.02, 0.05  # of the figures
 SLOW, FAST = 1e-3, 1e3  # of the first frequency: growth, and the end of the line along which it is looked for
-CHECKS = 40  # times at which both methods are compared, and the deciding ones
+CHECKS = 40  # times at which both inversions are compared, and the deciding ones
 SCENARIOS = ("reference", "slew", "pulse")
 FIGURES = ("peak", "peak_time", "final_value", "rise_time", "overshoot", "settling_time", "steady_state_error",
            "residual_rms")  # fmt: skip
@@ -81,7 +81,7 @@ class Signal:
         self.error = max(self.peak_error, self.disagreement([*spread, figures.settling_time]))
 
     def disagreement(self, times):
-        """Largest difference of both methods at those times that there are."""
+        """Largest difference of both inversions at those times that there are."""
         known = [each for each in times if each is not None and 0 <= each <= self.truth.duration]
         return float(self.truth.disagreement(known)[self.row].max())
 
@@ -96,7 +96,7 @@ class Signal:
             value = getattr(self.figures, name)
             error, most = (self.peak_error, AGREES) if name.startswith("peak") else (self.error, ENOUGH)
             if max(error / most, self.error / ENOUGH) > abs(self.peak):
-                yield Judged(name, "no truth", f"methods differ by {error / abs(self.peak):.2g} of the peak")
+                yield Judged(name, "no truth", f"inversions differ by {error / abs(self.peak):.2g} of the peak")
                 continue
             is_here = value is not None
             outcome = getattr(self, f"_{name}")(value)

@@ -1,11 +1,11 @@
-"""True signals of `tfarm step`: the loop closed by hand, and inverted by two methods (`tests.case.inversion`).
+"""True signals of `tfarm step`: the loop closed by hand, and inverted twice (`tests.assessment.inversion`).
 
 From the arm's transfer functions G and the coefficients C of the law
 
     U = E/(1 + L),   y = G U,   L = e^{-s tau} sum C_k G_k,   E = X_u + e^{-s tau} sum C_k X_k
 
 E, of which alone u jumps, and what returns of it by the hub's own inertia, with its kinks, are inverted in closed form,
-the rest by Durbin's and de Hoog's methods.
+the rest by Durbin's method with two periods.
 """
 
 import math
@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 import tfarm
-from tests.case.inversion import DeHoog, durbin, inverse
+from tests.assessment.inversion import durbin, inverse
 from tfarm.arm import to_toml
 from tfarm.arm.writing import law_toml
 from tfarm.assessment.step import PARTS
@@ -114,35 +114,29 @@ def input_of(case, duration):
 
 
 class Truth:
-    """Signals of hub, tip, root moment and torque (rows) of a case up to a duration, by two methods."""
+    """Signals of hub, tip, root moment and torque (rows) of a case up to a duration, by two inversions."""
 
     def __init__(self, case, duration):
         self.case, self.input, self.duration = case, input_of(case, duration), duration
         of_rate, (J, b) = case.tracked == "hub_rate", self.hub
         G = tfarm.transfer(case.arm, ["hub_angle", "tip_displacement", "root_moment"])
 
-        def groups(s):
-            """What the actuator and the law's references do, (2, rows, m), without the delay of the second."""
+        def transform(s):
+            """Signals (rows, m), what the law's references do being late by its delay."""
             angle, tip, moment = G(s)
             plant = {"hub_angle": angle, "hub_rate": s * angle, "root_moment": moment}
             C = {name: np.polyval(num, s) / np.polyval(filter_of(own), s) for name, (num, own) in case.entries.items()}
-            L = np.exp(-s * case.delay) * sum(C[name] * plant[name] for name in C)
+            late = np.exp(-s * case.delay)
+            L = late * sum(C[name] * plant[name] for name in C)
             rows = np.array([angle * s, tip * s, moment, -L] if of_rate else [angle, tip, moment, -L]) / (1 + L)
-            own = np.exp(-s * case.delay) * sum(C[name] / (J * (s + b) ** n) for name, n in self.inertial.items())
-            rows[-1] += own
-            X_u = sum(c / s**n for c, n in self.input.actuator) + 0 * s
-            X_k = sum(C[name] * c / s**n for name, (c, n) in self.input.references.items()) + 0 * s
-            return np.array([rows * X_u, rows * X_k])
+            rows[-1] += late * sum(C[name] / (J * (s + b) ** n) for name, n in self.inertial.items())
+            X_u = sum(c / s**n for c, n in self.input.actuator)
+            X_k = sum(C[name] * c / s**n for name, (c, n) in self.input.references.items())
+            return rows * (X_u + late * X_k) * sum(w * np.exp(-s * at) for at, w in self.input.edges)
 
-        def whole(s):
-            actuator, reference = groups(s)
-            edges = sum(w * np.exp(-s * at) for at, w in self.input.edges)
-            return edges * (actuator + np.exp(-s * case.delay) * reference)
-
-        shifts = [[(at + late, w) for at, w in self.input.edges] for late in (0.0, case.delay)]
         lengths = [duration / each for each in WINDOWS]
-        self.smooth = [durbin(whole, each, POINTS) for each in lengths]
-        self.second = [DeHoog(groups, shifts, each) for each in lengths]
+        self.smooth = [durbin(transform, each, POINTS) for each in lengths]
+        self.second = [durbin(transform, each, POINTS, 3.0, 28.0) for each in lengths]
 
     @property
     def hub(self):
@@ -201,12 +195,17 @@ class Truth:
         last = len(WINDOWS) - 1
         return np.maximum(last - np.searchsorted(self.duration / np.array(WINDOWS[::-1]), t * (1 - 1e-12)), 0)
 
+    def inverted(self, own, t):
+        """Signals (rows, n) at times t by one of both inversions, each time in its finest window."""
+        y, place = np.zeros((len(PARTS), t.size)), self.windows(t)
+        for n in set(place.tolist()):
+            y[:, place == n] = interpolated(*own[n], t[place == n])
+        return y
+
     def at(self, t, side=0.0):
         """Signals (rows, n) at times t, or just before or after them (`side` -1 or 1)."""
         t = np.asarray(t, float)
-        y, place = np.zeros((len(PARTS), t.size)), self.windows(t)
-        for n in set(place.tolist()):
-            y[:, place == n] = interpolated(*self.smooth[n], t[place == n])
+        y = self.inverted(self.smooth, t)
         near = t + side * 1e-15 * self.duration
         y[-1] += sum((w * each.at(near - at) for each, at, w in self.closed), np.zeros(t.size))
         return y
@@ -237,12 +236,9 @@ class Truth:
         return best
 
     def disagreement(self, t):
-        """Differences of both methods (rows, n) at times t, and the rounding of what is in closed form."""
+        """Differences of both inversions (rows, n) at times t, and the rounding of what is in closed form."""
         t = np.asarray(t, float)
-        found, place = np.zeros((len(PARTS), t.size)), self.windows(t)
-        for n in set(place.tolist()):
-            own = place == n
-            found[:, own] = abs(self.second[n].at(t[own]) - interpolated(*self.smooth[n], t[own])).min(axis=0)
+        found = abs(self.inverted(self.second, t) - self.inverted(self.smooth, t))
         found[-1] += self.rounding(t)
         return found
 
