@@ -9,7 +9,7 @@ from matplotlib.contour import QuadContourSet
 
 import tfarm
 from tests.plots.labels import complaints
-from tests.report.written import coarsen
+from tests.report.written import coarsen, report_with
 from tfarm.arm import Hub, HubFeedback
 from tfarm.arm.chain import Sampling
 from tfarm.assessment import stability_map
@@ -213,8 +213,7 @@ def test_intervals_are_short_facts_of_the_map(section):
         assert (low, high) == pytest.approx(rows[name].around, rel=5e-4)
 
 
-def test_without_recommended_gains_there_is_a_sentence(monkeypatch):
-    monkeypatch.setattr("tfarm.report.page.best", lambda arm, chain: None)
-    section = recommended_section(ArmReport(LAB, Chain()))
+def test_without_recommended_gains_there_is_a_sentence():
+    section = recommended_section(report_with(LAB, best=None))
     assert section.answer.startswith("None: the search")
     assert not section.card

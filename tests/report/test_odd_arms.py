@@ -11,16 +11,14 @@ import pytest
 import tfarm
 from tests.odd_arms import odd_arms
 from tests.report import plausible
-from tests.report.written import blocks_of
+from tests.report.written import blocks_of, report_with
 from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.arm import implausible
 from tfarm.assessment.card import margins_of
 from tfarm.case import Case
 from tfarm.dsp import Chain
-from tfarm.loop import loci as loci_room
 from tfarm.loop.continuous import ContinuousLoop
-from tfarm.loop.locus import locus
 from tfarm.loop.poles import poles_below
 from tfarm.report.blocks import prose
 from tfarm.report.loop_section import (
@@ -171,17 +169,15 @@ def test_sentences_about_the_pole_at_0_and_J_are_for_arms_that_turn_freely(name)
             assert interval is None or (interval[f"{side}_is"] == "search bound") == (interval[side] == end)
 
 
-def test_branches_that_cannot_be_followed_are_left_out_with_a_word(monkeypatch):
+def test_branches_that_cannot_be_followed_are_left_out_with_a_word():
     """And never a text of the search."""
-    arm = ARMS["rubber"]
 
-    def follow(arm, law, vary, start, stop, points, branches):
-        if vary == "K1":
+    def follow(report, name):
+        if name == "K1":
             raise tfarm.ConvergenceError("the damped mode 1 cannot be separated from its neighbours", None, None)
-        return locus(arm, law, vary, start, stop, points, branches)
+        return ArmReport.locus(report, name)
 
-    monkeypatch.setattr(loci_room, "locus", follow)
-    section = locus_section(ArmReport(arm, Chain()))
+    section = locus_section(report_with(ARMS["rubber"], locus=follow))
     words = " ".join(section.words)
     assert "separated from its neighbours" not in words
     assert "Along K1 the branches of this arm could not be followed" in words

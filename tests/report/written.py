@@ -18,11 +18,13 @@ from tests.hostile import LONG, NAME, PRINTED, Read
 from tfarm.arm import to_toml
 from tfarm.assessment import stability_map
 from tfarm.audit.published import validate
+from tfarm.dsp import Chain
 from tfarm.exported import live_loop
 from tfarm.loop import circle_crossings as sampled_regions
 from tfarm.loop import loci
 from tfarm.loop import sampled_modes as sampled_loci
 from tfarm.report import overview, page, writing
+from tfarm.report.page import ArmReport
 from tfarm.report.writing import PIECES
 
 COARSE = (
@@ -82,6 +84,11 @@ def report_elsewhere(audit_file, out):
 ANCHORS = {piece.anchor for piece in PIECES}
 HELD = replace(ARM, hub=tfarm.Hub(inertia=math.inf))  # no loop: its proofs are quick
 validated = cache(lambda: tuple(validate()))  # as this process has it
+
+
+def report_with(arm, **records):
+    """A report on an arm in which these records stand for those that it would make."""
+    return type("Report", (ArmReport,), records)(arm, Chain())
 
 
 def blocks_of(section):
