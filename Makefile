@@ -27,7 +27,6 @@ SURVEYS := \
 	spectrum.chains \
 	loop.agreement \
 	loop.loci \
-	loop.spread \
 	loop.law_counts \
 	synthesis.designs \
 	loop.nyquist_counts \

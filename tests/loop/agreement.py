@@ -13,14 +13,12 @@ from dataclasses import replace
 import numpy as np
 
 from tests import survey
-from tests.loop.arms import hub_units
+from tests.loop.arms import hub_units, verdict_of
 from tests.loop.ritz_loop import RitzLoop
 from tests.strategies import some_arm
 from tests.survey import Finding
 from tfarm import Hub, HubFeedback
-from tfarm.case import Case
 from tfarm.loop.plane import INFINITE, gain_map
-from tfarm.loop.stability import stability
 
 ARMS = 12
 NEAR = 1e-3  # of the units of the gains, from the boundary
@@ -75,7 +73,7 @@ def judge(model, law, of_map):
     rightmost = model.rightmost(law)
     if abs(rightmost) < SLOW:
         return None
-    verdict = stability(Case(model.arm, law))
+    verdict = verdict_of(model.arm, law)
     if of_map != (INFINITE if verdict.unstable_roots_infinite else verdict.unstable_roots):
         outcome = "map and count differ"
     elif verdict.word != ("stable" if of_map == 0 else "unstable"):

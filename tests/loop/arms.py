@@ -5,6 +5,19 @@ import math
 import tfarm
 from tests.strategies import some_arm
 from tfarm import Arm, Hub, HubFeedback, Link, Section
+from tfarm.case import Case
+from tfarm.loop.continuous import ContinuousLoop
+from tfarm.loop.stability import stability
+
+
+def loop_of(arm, law) -> ContinuousLoop:
+    """The continuous-time loop of an arm under a law."""
+    return ContinuousLoop(Case(arm, law))
+
+
+def verdict_of(arm, law, band=None):
+    """The verdict on it."""
+    return stability(Case(arm, law), band)
 
 
 def window_arm() -> Arm:

@@ -10,12 +10,10 @@ import numpy as np
 
 import tfarm
 from tests import survey
-from tests.loop.arms import some_loop
+from tests.loop.arms import some_loop, verdict_of
 from tests.survey import Finding, each_of
 from tfarm.arm import Law
-from tfarm.case import Case
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.loop.stability import stability
 from tfarm.reduced.modal import sensed_model
 from tfarm.response.signals import Signals
 from tfarm.spectrum.table import first_frequency
@@ -129,7 +127,7 @@ def exact(arm, law):
 def judge(arm, law):
     """ "right", "refused: ...", "wrong: ..." or "no second count"."""
     try:
-        found = stability(Case(arm, law))
+        found = verdict_of(arm, law)
     except (ConvergenceError, ParameterError) as error:
         return f"refused: {str(error).splitlines()[0]}"
     if found.unstable_roots_infinite:

@@ -5,19 +5,17 @@ they differ, so what is counted here are refusals, by reason.  A small negative 
 """
 
 from tests import survey
-from tests.loop.arms import some_loop
+from tests.loop.arms import some_loop, verdict_of
 from tests.survey import Finding, each_of
-from tfarm.case import Case
 from tfarm.errors import ConvergenceError
 from tfarm.loop.nyquist import nyquist_of
-from tfarm.loop.stability import stability
 
 
 def plots(rng):
     """ "agree", "no verdict" or "refused", with the reason; a plot whose counts are by finding poles is wrong."""
     arm, law = some_loop(rng, slenderness=(5, 60))
     try:
-        verdict = stability(Case(arm, law))
+        verdict = verdict_of(arm, law)
     except ConvergenceError:
         return Finding("no verdict")
     try:

@@ -4,7 +4,7 @@ import json
 import re
 from dataclasses import replace
 from importlib import import_module
-from itertools import pairwise
+from itertools import pairwise, product
 from types import SimpleNamespace
 
 import control
@@ -12,17 +12,18 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.loop.arms import some_loop
+from tests.loop.arms import loop_of, some_loop, verdict_of
 from tests.loop.law_counts import judge, some_delay, some_law
 from tests.shared import remember, sized, thinned
 from tests.shell import run
 from tfarm import ConvergenceError, HubFeedback, Law, ParameterError
 from tfarm.case import Case
-from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.lines import through_infinity, with_numbers
+from tfarm.loop.nyquist import nyquist_of
 from tfarm.loop.plane import between, plane
 from tfarm.loop.poles import poles_below
-from tfarm.loop.stability import Spill, stability
+from tfarm.loop.sampled_verdict import sampled_verdict
+from tfarm.loop.stability import Spill
 from tfarm.loop.theorem import absorbed, definite, is_hurwitz, on_axis, polynomial, signs_of
 from tfarm.reduced.modal import closed, sensed_model
 from tfarm.response.signals import Signals
@@ -49,7 +50,7 @@ def test_margins_of_a_law_are_those_of_python_control_on_a_model(delay):
     G = control.ss(*sensed_model(LAB, law.signals, 20))(1j * omega)[:, 0]
     L = np.exp(-1j * omega * delay) * (law.values(1j * omega) * G).sum(axis=0)
     gm, pm, _, wpc, wgc, _ = control.stability_margins(control.FRD(L, omega), returnall=True)
-    mine = stability(Case(LAB, law)).in_band
+    mine = verdict_of(LAB, law).in_band
     by_phase = [pair for pair in mine.phase_crossovers if omega[0] < pair[0] < omega[-1]]
     by_gain = [pair for pair in mine.gain_crossovers if omega[0] < pair[0] < omega[-1]]
     np.testing.assert_allclose([w for w, _ in by_gain], np.sort(wgc), rtol=2e-5)  # the model's own error at 260 rad/s
@@ -76,7 +77,7 @@ def test_poles_of_a_delayed_integrator_are_those_of_the_lambert_function():
     J = 1e6
     arm = replace(LAB, hub=replace(LAB.hub, inertia=J))
     K, tau = 1.5 * J, 2.0
-    poles = poles_below(ContinuousLoop(Case(arm, Law({"hub_rate": K}, delay=tau))), 12.0).moving
+    poles = poles_below(loop_of(arm, Law({"hub_rate": K}, delay=tau)), 12.0).moving
     expected = np.array([lambertw(-K * tau / J, n) / tau for n in range(-4, 5)])
     for pole in poles:
         assert abs(expected - pole).min() < 1e-5 * abs(pole)  # the link's share of the inertia: 1e-6 of it
@@ -86,7 +87,7 @@ def test_poles_of_a_delayed_integrator_are_those_of_the_lambert_function():
 
 def test_without_damping_a_delay_drives_ever_more_modes():
     law = Law({"hub_rate": 0.3, "root_moment": 0.3}, delay=0.005)
-    found = [stability(Case(BARE, law), band) for band in (3e3, 1e4, 3e4)]
+    found = [verdict_of(BARE, law, band) for band in (3e3, 1e4, 3e4)]
     assert all(each.unstable_roots_infinite and each.word == "unstable" for each in found)
     counts = [each.unstable_roots for each in found]
     assert all(a < b for a, b in pairwise(counts))
@@ -96,14 +97,14 @@ def test_a_law_with_a_sign_is_known_beyond_the_band_by_its_theorem():
     """A passive law drives nothing whatever holds the hub; positive position feedback must be held against too."""
     passive, ppf = (Law({"hub_angle": each}) for each in (([2.0, 1.0], [0.01, 1.0]), ([-3.0], [1.0, 2.0, 5.0])))
     for arm in (BARE, LAB, RIG):
-        found = stability(Case(arm, passive))
+        found = verdict_of(arm, passive)
         assert (found.word, found.is_known_beyond) == ("stable", True)
     for arm in (LAB, BARE):
         held = replace(arm, hub=replace(arm.hub, stiffness=0.7))
-        assert "dissipates energy" in (tail := stability(Case(held, passive)).tail)
+        assert "dissipates energy" in (tail := verdict_of(held, passive).tail)
         assert "imaginary" not in tail
-        assert "strictly negative imaginary" in stability(Case(held, ppf)).tail
-    washout = stability(Case(BARE, Law({"hub_rate": ([0.3, 0.0], [1.0, 5.0])})))
+        assert "strictly negative imaginary" in verdict_of(held, ppf).tail
+    washout = verdict_of(BARE, Law({"hub_rate": ([0.3, 0.0], [1.0, 5.0])}))
     assert washout.word == "marginal"  # the hub drifts: two poles stay at 0
     assert (washout.poles.values == 0).sum() == 2
 
@@ -121,16 +122,14 @@ def test_positive_position_feedback_needs_a_spring_that_is_stiffer():
     """-C = 3/(s^2 + 2 s + 5) is strictly negative imaginary, C(0) = -0.6."""
     filters = ([-3.0], [1.0, 2.0, 5.0])
     assert signs_of(Law({"hub_angle": filters})).kind == "negative imaginary"
-    assert stability(Case(LAB, Law({"hub_angle": filters}))).unstable_roots == 1
+    assert verdict_of(LAB, Law({"hub_angle": filters})).unstable_roots == 1
     for Kp, stable in ((0.5, False), (0.7, True)):
         held = Law.of_matrices([[-2.0, -5.0], [1.0, 0.0]], [[1.0], [0.0]], [[0.0, -3.0]], [[Kp]], ["hub_angle"])
         num = np.polyadd(Kp * np.array([1.0, 2.0, 5.0]), [-3.0])
         fraction = Law({"hub_angle": (num.tolist(), [1.0, 2.0, 5.0])})
 
-        assert stability(Case(LAB, held)).is_stable == stability(Case(LAB, fraction)).is_stable == stable
-        assert stability(
-            Case(BARE, fraction)
-        ).is_known_beyond  # a pole crosses the axis at s = 0 alone: no mode is driven
+        assert verdict_of(LAB, held).is_stable == verdict_of(LAB, fraction).is_stable == stable
+        assert verdict_of(BARE, fraction).is_known_beyond  # a pole crosses the axis at s = 0 alone: no mode is driven
 
 
 def test_signs_of_polynomials_are_those_of_their_roots():
@@ -163,15 +162,15 @@ def test_signs_of_polynomials_are_those_of_their_roots():
 )
 def test_no_loop_is_refused_by_its_key(entries, others, key):
     with pytest.raises(ParameterError) as error:
-        ContinuousLoop(Case(LAB, Law(entries, **others)))
+        loop_of(LAB, Law(entries, **others))
     assert error.value.key == key
 
 
 def test_an_unstable_cancellation_in_the_law_is_reported():
     law = Law({"hub_angle": {"zeros": [2.0], "poles": [2.0, -5.0], "gain": 1.0}, "hub_rate": 0.3})
-    (words,) = ContinuousLoop(Case(LAB, law)).warnings
+    (words,) = loop_of(LAB, law).warnings
     assert "cancels its own unstable pole" in words
-    assert stability(Case(LAB, law)).unstable_roots == 1
+    assert verdict_of(LAB, law).unstable_roots == 1
 
 
 def test_commands_take_a_law_from_a_file_or_the_arm_s_own(capsys, tmp_path, monkeypatch):
@@ -273,6 +272,26 @@ def test_turns_around_the_point_are_the_poles_that_were_found(arm, law):
     assert np.isfinite(plot.L[~plot.is_arc]).all()
 
 
+SAMPLED = {  # poles of L on the circle: of the rigid body, of all modes, of a resonator; and an unstable one of a law
+    "gains": HubFeedback(K1=0.3, K2=-0.3),
+    "late": Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002),
+    "resonator": Law({"hub_rate": ([0.3, 0.0], [1.0, 0.0, 900.0]), "root_moment": 0.2}),
+    "unstable by itself": Law(UNSTABLE),
+}
+
+
+@pytest.mark.parametrize(("arm", "name"), [*product((LAB, BARE), SAMPLED)])
+def test_around_the_circle_turns_are_the_eigenvalues_outside(arm, name):
+    """Of the closed-loop matrix; one that is on the circle to nine digits counts either way."""
+    plot = nyquist_of(sampled_verdict(Case(arm, SAMPLED[name])))
+    radii = abs(np.linalg.eigvals(plot.verdict.full.matrix()))
+    outside = int((radii > 1 + 1e-9).sum())
+    assert outside <= plot.unstable_by_nyquist <= (radii > 1 - 1e-9).sum()
+    assert plot.unstable_open == (name == "unstable by itself")
+    assert plot.encirclements == plot.unstable_open - plot.unstable_by_nyquist
+    assert plot.s.imag.max() <= np.pi / plot.verdict.full.period
+
+
 def test_parts_on_the_axis_are_those_of_the_quotient_there():
     """Real part, and imaginary part over w, of num/den at i w, times |den|^2: exact polynomials in w^2."""
     rng = np.random.default_rng(12)
@@ -289,7 +308,7 @@ def test_parts_on_the_axis_are_those_of_the_quotient_there():
 def test_however_slow_a_law_s_corner_is_its_slow_pole_is_on_its_own_side(rest):
     """s + rest on the angle and 0.3 s on top: the pole at rest is at -rest/1.3, never taken for one at 0 itself."""
     law = Law({"hub_angle": ([1.0, rest], [0.1, 1.0]), "hub_rate": 0.3})
-    found = stability(Case(tfarm.load("sasaki2012-lab"), law))
+    found = verdict_of(tfarm.load("sasaki2012-lab"), law)
     slowest = found.poles.values[abs(found.poles.values).argmin()]
     assert slowest == pytest.approx(-rest / 1.3, rel=1e-3)
     assert (found.word, found.unstable_roots) == (("stable", 0) if rest > 0 else ("unstable", 1))
@@ -313,18 +332,18 @@ LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], 
 )
 @pytest.mark.parametrize("points", sized(2, 4))
 def test_counts_are_those_of_full_searches(vary, x, y, points):
-    found = plane(ContinuousLoop(Case(LAB, LAW)), vary, between(*x, 8), between(*y, 10))
+    found = plane(loop_of(LAB, LAW), vary, between(*x, 8), between(*y, 10))
     assert len(np.unique(found.unstable)) > 2
     for i, j in np.random.default_rng(1).integers((8, 10), size=(points, 2)):
         law = with_numbers(LAW, dict(zip(vary, (found.x[i], found.y[j]), strict=True)))
-        assert stability(Case(LAB, law), found.band).unstable_roots == found.unstable[j, i], law
+        assert verdict_of(LAB, law, found.band).unstable_roots == found.unstable[j, i], law
 
 
 def test_the_impedance_matching_gain_of_a_massless_hub_moves_a_pole_to_infinity():
     """At C = 0 a hub without inertia feels the impedance of an endless beam far right: I sqrt(E rho)."""
     arm = BARE.having(hub_inertia=0.0)
     far = np.array([1e6, 1e7, 1e8], complex) * tfarm.modes(arm, 1).natural_frequency[1]
-    drive, (_, rate, _), _ = ContinuousLoop(Case(arm, Law({"hub_rate": 1.0}))).signals.parts(far)
+    drive, (_, rate, _), _ = loop_of(arm, Law({"hub_rate": 1.0})).signals.parts(far)
     assert through_infinity(drive, rate) == -1  # right of the axis at smaller gains alone, farther right
     assert through_infinity(drive * far, rate) == 0
 
@@ -334,7 +353,7 @@ def test_the_impedance_matching_gain_of_a_massless_hub_moves_a_pole_to_infinity(
 )
 def test_what_is_no_pair_of_numbers_is_refused(vary, key):
     with pytest.raises(ParameterError) as error:
-        plane(ContinuousLoop(Case(LAB, LAW)), vary, between(0, 1, 3), between(0, 1, 3))
+        plane(loop_of(LAB, LAW), vary, between(0, 1, 3), between(0, 1, 3))
     assert error.value.key == key
 
 
@@ -343,22 +362,22 @@ def test_a_map_in_which_a_filter_turns_over_is_refused(vary):
     with pytest.raises(
         ParameterError, match=r"^hub_angle.den.0 = \[-0.1, 0.03\]: a leading coefficient keeps its sign"
     ):
-        plane(ContinuousLoop(Case(LAB, LAW)), vary, np.array([-0.1, 0.03]), np.array([-0.1, 0.03]))
+        plane(loop_of(LAB, LAW), vary, np.array([-0.1, 0.03]), np.array([-0.1, 0.03]))
 
 
 def test_a_map_around_a_law_s_own_resonance_counts_as_the_verdict_does():
     """Two zeros close to each other turn the phase once around between two points of a contour of even steps."""
     law = Law({"hub_angle": 1.0, "hub_rate": 0.3, "tip_deflection": ([-100.0], [1.0, 2 * 0.02 * 39.487, 39.487**2])})
     lab, values = tfarm.load("sasaki2012-lab"), np.linspace(0.9, 1.1, 3)
-    assert stability(Case(lab, law)).is_stable
-    assert plane(ContinuousLoop(Case(lab, law)), ("hub_angle", "tip_deflection.num.0"), values, values).stable.all()
+    assert verdict_of(lab, law).is_stable
+    assert plane(loop_of(lab, law), ("hub_angle", "tip_deflection.num.0"), values, values).stable.all()
 
 
 def test_a_map_whose_counts_do_not_hold_at_its_corners_is_refused():
     """As if a pair had come into the band through its top, on the way to the last corner; one that rests is open."""
     law = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])})
     vary, across, up = ("gain", "hub_angle.den.1"), np.array([1.0, 5.0, 20.0]), np.array([0.5, 1.0, 3.0])
-    found = plane(ContinuousLoop(Case(LAB, law)), vary, across, up)
+    found = plane(loop_of(LAB, law), vary, across, up)
     found.must_agree(lambda x, y: None if x == 20.0 else 0, "")
     with pytest.raises(ConvergenceError, match=r"at gain = 20, hub_angle.den.1 = 3 2 poles .* not 0: ask for less"):
         found.must_agree(lambda x, y: 2 * (x == 20.0 and y == 3.0), "ask for less")
@@ -421,7 +440,7 @@ def test_a_wrong_argument_is_refused_with_the_form_to_give(call, words):
 
 def test_the_moment_that_a_static_law_cancels_is_its_gain_over_its_denominator():
     """A half over two is a quarter, and the rest of the law stays."""
-    share, rest = absorbed(ContinuousLoop(Case(BARE, Law({"hub_rate": 0.3, "root_moment": ([0.5], [2.0])}))))
+    share, rest = absorbed(loop_of(BARE, Law({"hub_rate": 0.3, "root_moment": ([0.5], [2.0])})))
     assert share == pytest.approx(0.25, rel=1e-15)
     assert "root_moment" not in rest.signals
     assert rest.gains.K1 == 0.3

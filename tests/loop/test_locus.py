@@ -12,14 +12,13 @@ import pytest
 
 import tfarm
 from tests.chain_elements import reached
-from tests.loop.arms import window_arm
+from tests.loop.arms import loop_of, window_arm
 from tests.loop.rig_loops import RigLoop
 from tests.shared import thinned
 from tests.shell import run
 from tfarm import Arm, Hub, HubFeedback, Law, Link, ParameterError, Payload, Section
 from tfarm.arm import Attachment, Motor
 from tfarm.case import Case
-from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.lines import line_crossings
 from tfarm.loop.loci import damping_ratios, held_branches, loci, most_damped, reduced_locus
 from tfarm.loop.locus import CONTROLLER, RIGID, frame, locus, origin_name
@@ -200,7 +199,7 @@ def test_a_branch_that_comes_to_the_accumulation_point_ends_there_and_the_others
     assert (ended.imag, -1 / C < ended.real < -0.95 / C) == (0.0, True)
     assert np.isnan(found.branches).sum() == np.isnan(found.branches[branch]).sum() == (found.gain > last).sum()
     others = np.delete(found.branches, branch, axis=0)[:, -1]
-    poles = poles_below(ContinuousLoop(Case(LAB, HubFeedback(K1=2000.0))), 0.9 * others.imag.max()).values
+    poles = poles_below(loop_of(LAB, HubFeedback(K1=2000.0)), 0.9 * others.imag.max()).values
     low = 0.8 * others.imag.max()
     assert upper(others[others.imag < low]) == pytest.approx(upper(poles[poles.imag < low]), rel=1e-9)
     assert found.spectral_abscissa[-1] == others[others != 0].real.max()
@@ -304,10 +303,7 @@ def test_a_real_pole_passes_through_0_at_its_closed_form(name):
     here = np.flatnonzero(abs(found.gain - expected) < 1e-12)
     if here.size and arm is MASSED:  # a pole at 0 has no digits to be followed by; the others are there
         row = found.branches[:, here[0]]
-        sides = [
-            poles_below(ContinuousLoop(Case(arm, law.having(vary, 1.0 + side * 1e-7))), 200.0).values
-            for side in (-1, 1)
-        ]
+        sides = [poles_below(loop_of(arm, law.having(vary, 1.0 + side * 1e-7)), 200.0).values for side in (-1, 1)]
         assert (row == 0).sum() == 1
         for pole in row[row != 0]:
             assert pole == pytest.approx(np.mean([side[abs(side - pole).argmin()] for side in sides]), rel=1e-6)

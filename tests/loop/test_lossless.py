@@ -11,18 +11,17 @@ import pytest
 
 import tfarm
 from tests.chain_elements import reached
+from tests.loop.arms import loop_of, verdict_of
 from tests.loop.rig_loops import RigLoop
 from tests.rigs import some_rig
 from tests.shared import thinned
 from tfarm import Hub, HubFeedback, Payload
 from tfarm.arm import Gauge, Motor
-from tfarm.case import Case
-from tfarm.loop.continuous import ContinuousLoop, band_of
+from tfarm.loop.continuous import band_of
 from tfarm.loop.lines import line_crossings
 from tfarm.loop.margins import margins
 from tfarm.loop.nyquist import nyquist_of
 from tfarm.loop.plane import gain_map
-from tfarm.loop.stability import stability
 from tfarm.loop.theorem import lyapunov
 from tfarm.spectrum.table import default_gains
 
@@ -50,7 +49,7 @@ RIGS |= {f"seed {seed}": lossless_rig(seed) for seed in (4, 6)}
 
 def edges_of(arm):
     """Gains and frequencies of the edges along K2 in the band of twelve modes, by frequency."""
-    loop = ContinuousLoop(Case(arm, HubFeedback(K1=default_gains(arm).K1)))
+    loop = loop_of(arm, HubFeedback(K1=default_gains(arm).K1))
     found = line_crossings(loop, "K2", -50.0, 50.0, band_of(arm, 12))
     kept = (found.at > 0) & (abs(found.gain) < 1e6)
     order = np.argsort(found.at[kept])
@@ -96,8 +95,8 @@ def test_verdict_windows_and_map_follow_the_edges(name):
     assert found.windows["K2"].around[1] == pytest.approx(high, rel=DIFFERENCE)
     assert found.in_band.gain[1] == pytest.approx(high / inside.K2, rel=DIFFERENCE)
     assert nyquist_of(found.stability).unstable_by_nyquist == 0
-    assert not lyapunov(ContinuousLoop(Case(arm, inside))).proven
-    assert stability(Case(arm, law.having("K2", 1.001 * high))).word == "unstable"
+    assert not lyapunov(loop_of(arm, inside)).proven
+    assert verdict_of(arm, law.having("K2", 1.001 * high)).word == "unstable"
     plane = gain_map(arm, np.array([0.1, 1.0]) * law.K1, np.array([0.0, 0.5, 0.999, 1.001]) * high)
     assert plane.unstable.tolist() == [[n, n] for n in (0, 0, 0, 2)]
     ((low, top),) = plane.stable_intervals[-1]
@@ -109,14 +108,14 @@ def test_what_a_mode_far_above_the_band_does_is_not_determined():
 
     In the elements' terms that growth is 3e-13 of the frequency: below rounding.
     """
-    verdict = stability(Case(with_radius(0.0, 0.02), HubFeedback(K1=0.3, K2=-2.0)))
+    verdict = verdict_of(with_radius(0.0, 0.02), HubFeedback(K1=0.3, K2=-2.0))
     assert verdict.word == "stable"
     assert not verdict.is_known_beyond
     assert "not determined beyond" in verdict.tail
 
 
 def test_without_a_rate_gain_nothing_decides():
-    verdict = stability(Case(with_radius(0.05), HubFeedback(K2=0.3)))
+    verdict = verdict_of(with_radius(0.05), HubFeedback(K2=0.3))
     assert verdict.word == "marginal"
     assert not verdict.is_known_beyond
 
@@ -124,7 +123,7 @@ def test_without_a_rate_gain_nothing_decides():
 def test_massless_hub_with_a_radius_is_refused():
     arm = replace(with_radius(0.05), hub=replace(ARM.hub, inertia=0.0, radius=0.05))
     with pytest.raises(tfarm.ParameterError, match="through infinity"):
-        stability(Case(arm, HubFeedback(K1=0.3, K2=0.3)))
+        verdict_of(arm, HubFeedback(K1=0.3, K2=0.3))
 
 
 ELASTIC = tfarm.load("sasaki2012")
@@ -151,7 +150,7 @@ def test_the_window_of_K1_ends_where_the_hub_loses_nothing(arm, K2):
     for K1, side in ((-1.02 * LOSS, 1), (-0.98 * LOSS, -1), (1.0, -1)):
         s = loop.eigenvalues(HubFeedback(K1=K1, K2=K2))
         assert (np.sign(s.real[(abs(s) > 1e-3) & (abs(s) < omega[6])]) == side).all()
-    assert stability(Case(arm, HubFeedback(K1=-LOSS, K2=K2))).word == "marginal"
+    assert verdict_of(arm, HubFeedback(K1=-LOSS, K2=K2)).word == "marginal"
 
 
 @pytest.mark.parametrize("arm", [ROOT, CLAMP, LAGGING], ids=lambda arm: arm.name)
@@ -161,7 +160,7 @@ def test_the_map_agrees_with_the_verdict(arm):
     found = gain_map(arm, K1, K2)
     for row, b in enumerate(K2):
         for column, a in enumerate(K1):
-            there, count = stability(Case(arm, HubFeedback(K1=float(a), K2=float(b)))), found.unstable[row, column]
+            there, count = verdict_of(arm, HubFeedback(K1=float(a), K2=float(b))), found.unstable[row, column]
             assert bool(found.stable[row, column]) == there.is_stable
             assert (count == -1) == there.unstable_roots_infinite
             assert count in (-1, there.unstable_roots) or (
@@ -187,6 +186,6 @@ def test_of_a_hub_without_inertia_nothing_below_its_losses_is_called_stable(seed
     found = gain_map(arm, np.array([-b - 0.3 * unit, 0.5 * unit]), np.array([-1.3, 0.3]) * arm.input_per_torque)
     assert not found.stable[:, 0].any()
     s = tfarm.modes(arm, 12).natural_frequency[-1] * np.geomspace(1.0, 1e15, 61) + 0j
-    L = ContinuousLoop(Case(arm, law.having("K1", -3.0 * b))).loop_function(s)
+    L = loop_of(arm, law.having("K1", -3.0 * b)).loop_function(s)
     if not arm.clamp.damping:  # or else that is lost in the clamp too
         assert (1 + L).real.min() < 0 < (1 + L).real.max()  # it changes its sign: there is a real pole on the right

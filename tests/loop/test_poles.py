@@ -1,20 +1,29 @@
-"""Exact closed-loop poles against the paper's determinant, modal models, winding numbers and equivalent arms."""
+"""Exact closed-loop poles, and where searches start: against the paper's determinant, models and closed forms."""
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.interpolate import BarycentricInterpolator
 
 import tfarm
-from tests.loop.arms import window_arm
+from tests.loop.arms import loop_of, verdict_of, window_arm
+from tests.rigs import some_rig
 from tests.shared import thinned
 from tests.spectrum.independent import newton_step
-from tfarm import Hub, HubFeedback, Law, ParameterError
-from tfarm.case import Case
-from tfarm.errors import ConvergenceError
-from tfarm.loop.poles import closed_loop_poles
-from tfarm.loop.stability import stability
+from tfarm import Hub, HubFeedback, Law
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.loop.continuous import band_of
+from tfarm.loop.locus import BranchCrossing, Locus
+from tfarm.loop.nyquist import compressed
+from tfarm.loop.panels import CHEBYSHEV, Positions, loop_panels, positions, sensed_places
+from tfarm.loop.plane import Axis, moment_axis, rate_axis, stable_edge
+from tfarm.loop.poles import Poles, closed_loop_poles, count_with_mirrors, first_poles, poles_below, starting_points
+from tfarm.loop.stability import poles_on_axis
+from tfarm.spectrum.box import Box
+from tfarm.spectrum.table import rate_unit
 
 ARM = tfarm.load("sasaki2012")
 LAB = tfarm.load("sasaki2012-lab")
@@ -124,7 +133,7 @@ def far_poles(found):
 def test_acceleration_fed_forward_beyond_the_hubs_inertia_is_unstable_far_beyond_the_modes():
     """-2 J s^2 up to a corner takes more than all of the hub's inertia, which counts above the link's own impedance."""
     arm = LAB.having(hub_inertia=J)
-    found = stability(Case(arm, PUSHED))
+    found = verdict_of(arm, PUSHED)
     assert (found.word, found.unstable_roots) == ("unstable", 2)
     rate = tfarm.transfer(arm, "hub_rate", method="appendix")
     for s in far_poles(found):
@@ -140,7 +149,7 @@ def test_a_rate_gain_beyond_the_links_impedance_drives_a_pin_without_inertia(sha
     rate = tfarm.transfer(arm, "hub_rate", method="appendix")
     impedance = 1 / complex(rate(1e12 + 0j)).real
     K1 = -share * impedance
-    far = far_poles(stability(Case(arm, HubFeedback(K1=K1, Kp=1e-3))))
+    far = far_poles(verdict_of(arm, HubFeedback(K1=K1, Kp=1e-3)))
     assert far.size == number
     for s in far:
         assert (K1 + 1e-3 / s) * complex(rate(complex(s))).real == pytest.approx(-1, rel=1e-9)
@@ -150,7 +159,7 @@ def test_a_rate_gain_beyond_the_links_impedance_drives_a_pin_without_inertia(sha
 def test_a_corner_beyond_double_range_leaves_the_gain_alone(corner):
     """A gain on the rate through a corner so fast is that gain alone."""
     law = Law({"hub_rate": ((0.1 * corner,), (1.0, corner)), "hub_angle": 0.1})
-    found, alone = stability(Case(LAB, law)), stability(Case(LAB, Law({"hub_rate": 0.1, "hub_angle": 0.1})))
+    found, alone = verdict_of(LAB, law), verdict_of(LAB, Law({"hub_rate": 0.1, "hub_angle": 0.1}))
     assert far_poles(found).size == 0
     assert found.word == alone.word == "stable"
     np.testing.assert_allclose(found.poles.values[:4], alone.poles.values[:4], rtol=1e-6)
@@ -162,6 +171,228 @@ def test_a_pole_of_the_law_beyond_all_boxes_is_named(lead, verdict):
     law = Law({"hub_rate": ((0.5,), (lead, 1.0, 1e3) if lead else (1.0, 1e3))})
     if verdict is None:
         with pytest.raises(ConvergenceError, match=r"pole at 2\.5e\+10"):
-            stability(Case(LAB, law))
+            verdict_of(LAB, law)
     else:
-        assert stability(Case(LAB, law)).word == verdict
+        assert verdict_of(LAB, law).word == verdict
+
+
+def listed(*values):
+    box = Box(-50.0, 10.0, -60.0, 60.0)
+    return Poles(loop_of(LAB, HubFeedback(K1=0.3)), np.array(values, complex), box)
+
+
+def test_a_shorter_list_has_a_lower_box_between_its_last_pole_and_the_next():
+    poles = listed(-3.0, -1.0, -2 + 4j, -1 + 10j, -1 + 40j)
+    for count, top in ((2, 2.0), (3, 7.0), (4, 25.0), (5, 60.0)):
+        some = first_poles(poles, count)
+        np.testing.assert_array_equal(some.values, poles.values[:count])
+        assert some.box == Box(-50.0, 10.0, -top, top)
+        assert some.box.holds(some.values).all()
+        assert not some.box.holds(poles.values[count:]).any()
+    with pytest.raises(ParameterError, match="2 poles are real"):
+        first_poles(poles, 1)
+    assert count_with_mirrors(poles.values) == poles.count == 8
+
+
+def test_without_a_number_ten_are_listed_and_every_real_one():
+    swinging = [-1 + 1j * n for n in range(1, 16)]
+    assert first_poles(listed(*swinging), None).values.size == 10
+    assert first_poles(listed(-1.0, -2.0, *swinging), None).values.size == 10
+    assert first_poles(listed(*(-1.0 - n for n in range(12)), *swinging), None).values.size == 12
+
+
+def test_the_rightmost_pole_is_not_one_at_0():
+    poles = listed(0.0, 0.0, -3.0, -1 + 10j)
+    assert poles.spectral_abscissa == -1.0
+    np.testing.assert_array_equal(poles.moving, [-3.0, -1 + 10j])
+    assert (poles.unstable, listed(2.0, 3 + 1j, -1 + 2j).unstable) == (0, 3)
+
+
+LEAD = {"hub_angle": ([0.7, 3.0, 20.0], [0.002, 0.3, 1.0]), "root_moment": ([0.2], [1e-4, 2e-2, 1.0])}
+LAWS = {
+    "lead": Law(LEAD),
+    "late": Law(LEAD, delay=0.004),
+    "integral": Law({"hub_angle": ([1.0, 5.0], [1.0, 0.0]), "hub_rate": 0.4}),
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_slope_of_the_function_is_its_difference_quotient(name):
+    """Of higher order and wider: by the values of the function alone, its zeros at 0 divided out."""
+    loop = loop_of(LAB, LAWS[name])
+    for s in (0.3 + 2j, -5 + 40j, 2.0 + 0j, 1e-3 + 1e-2j):
+        h = 1e-3 * abs(s)
+        at = loop.function(s + h * np.array([0, -2, -1, 1, 2]))
+        values = at.value * np.exp(at.scale - at.scale[0])
+        difference = (values[1] - 8 * values[2] + 8 * values[3] - values[4]) / (12 * h)
+        assert difference == pytest.approx(at.slope[0], rel=1e-6)
+
+
+def test_a_finding_has_three_crossings_and_counts_the_others():
+    each = [
+        BranchCrossing(gain=0.5 * n, omega=2 * math.pi * n, branch=n, direction=d)
+        for n, d in enumerate(("stable", "unstable") * 3)
+    ]
+
+    def finding(crossings):
+        return Locus.finding.fget(SimpleNamespace(vary="K2", crossings=crossings))
+
+    assert finding([]) == "no branch crosses the imaginary axis"
+    assert finding(each[:1]) == "a pole becomes stable at K2 = 0"
+    assert finding(each[:3]) == "a pole becomes stable at K2 = 0, unstable at K2 = 0.5, stable at K2 = 1"
+    assert finding(each) == finding(each[:3]) + " and 3 more"
+    assert each[3].frequency == pytest.approx(3.0, rel=1e-15)
+
+
+@pytest.mark.parametrize("arm", [LAB, STOCKY], ids=lambda arm: arm.name)
+def test_the_rate_axis_is_linear_up_to_the_power_of_ten_below_the_default_gain(arm):
+    axis, K1 = rate_axis(arm), tfarm.default_gains(arm).K1
+    assert axis.linear <= K1 < 10 * axis.linear
+    assert math.log10(axis.linear) == pytest.approx(round(math.log10(axis.linear)), abs=1e-12)
+    assert (axis.low, axis.high) == (-axis.linear, pytest.approx(10 * rate_unit(arm), rel=1e-12))
+
+
+def test_the_moment_axis_holds_the_default_range_and_all_that_is_unstable_below():
+    """-4 to 2 where nothing below is unstable; else the picture shows the end of what is, in between logarithmic."""
+    for arm in (BARE, LAB):
+        assert moment_axis(arm, rate_axis(arm)) == Axis(-4.0, 2.0)
+    arm, x = window_arm(), Axis(0.99, 1.01)  # unstable down to about -41 at K1 = 1
+    assert moment_axis(arm, x) == Axis(-50.0, 2.0, 2.0)
+    assert not tfarm.map(arm, x.grid(3), np.linspace(-42.0, -4.0, 40)).stable.all()
+
+
+def test_the_stable_edge_has_stable_points_on_one_side():
+    """Of the crossings in each column those where the verdict is stable above or below, but not both."""
+    x, y = Axis(0.02, 3.0, 0.02), Axis(-4.0, 2.0)
+    points = stable_edge(tfarm.map(LAB, x.grid(60), y.grid(90)))
+    assert len(points) > 20
+    assert ((points[:, 0] > 0) & (points[:, 0] <= 3.0) & (points[:, 1] >= -4.0) & (points[:, 1] <= 2.0)).all()
+    for K1, K2, omega in points[:: len(points) // 6]:
+        sides = [verdict_of(LAB, HubFeedback(K1=K1, K2=K2 + way)).is_stable for way in (-1e-6, 1e-6)]
+        assert sides[0] != sides[1]
+        poles = poles_below(loop_of(LAB, HubFeedback(K1=K1, K2=K2)), 1.1 * omega).values
+        assert abs(poles - 1j * omega).min() < 1e-9 * omega
+
+
+WIDE = some_rig(np.random.default_rng(53))  # polynomials miss the second panel, and half of it, by up to 1e-8
+
+
+@pytest.mark.parametrize(("arm", "modes"), [(LAB, 5), (BARE, 5), (WIDE, 12)], ids=["lab", "paper", "halved twice"])
+def test_between_its_samples_a_panel_is_the_loop_function_too(arm, modes, monkeypatch):
+    """By SciPy's interpolation through them; from 0 to the band without a gap, the first panel on both sides of 0."""
+    band, law = band_of(arm, modes), HubFeedback(K1=0.3, K2=-0.7, Kp=2.0)
+    found = loop_panels(arm, band)
+    assert (found.low[0], found.high[-1]) == (-found.high[0], band)
+    np.testing.assert_array_equal(found.low[1:], found.high[:-1])
+    assert found.error <= 1e-11
+    inside = np.array([-0.93, -0.31, 0.07, 0.55, 0.99])
+    for low, high, values in zip(found.low, found.high, np.moveaxis(found.values, 1, 0), strict=True):
+        assert arm is WIDE or abs(values).max() == pytest.approx(1.0, rel=1e-15)  # or else a value between is
+        order = np.argsort(CHEBYSHEV)
+        d, theta, m = (BarycentricInterpolator(CHEBYSHEV[order], part[order])(inside) for part in values)
+        s = 1j * ((low + high) / 2 + (high - low) / 2 * inside)
+        fed_back = (law.Kp + law.K1 * s) * theta + law.K2 * m * s**2
+        whole = loop_of(arm, law).loop_function(s)
+        np.testing.assert_allclose(fed_back / (d * s**found.order), whole, rtol=1e-6 * (1 + abs(whole).max()))
+    if arm is WIDE:
+        width = np.diff(found.high)[1:4]  # of the panel that was halved, and its first half again
+        np.testing.assert_allclose(width / width[0], [1.0, 1.0, 2.0])
+        monkeypatch.setattr("tfarm.loop.panels.MOST_PANELS", len(found.low) - 1)
+        with pytest.raises(ConvergenceError, match="do not follow"):
+            loop_panels(arm, band)
+
+
+def test_a_contour_passes_the_poles_of_a_law_on_the_axis_below_its_band():
+    """Where it rings without damping, and its integrator if the rig has no zero there."""
+    slow, fast = ([1.0, 0.0, w**2] for w in (30.0, 900.0))
+    loop = loop_of(LAB, Law({"hub_rate": ([1.0], slow), "root_moment": ([1.0], fast)}))
+    np.testing.assert_allclose(poles_on_axis(loop, 400.0), [0.0, 30.0], rtol=1e-9)
+    np.testing.assert_allclose(poles_on_axis(loop, 1000.0), [0.0, 30.0, 900.0], rtol=1e-9)
+    np.testing.assert_allclose(poles_on_axis(loop, 10.0), [0.0])
+    bare = loop_of(BARE, Law({"root_moment": ([1.0], slow)}))  # finite at rest, where the arm turns
+    omega = tfarm.modes(BARE, 3).natural_frequency[1:]
+    expected = np.sort([30.0, *omega[omega < 400.0]])
+    np.testing.assert_allclose(poles_on_axis(bare, 400.0), expected, rtol=1e-9)
+
+
+def test_resonators_in_one_fraction_are_passed_as_they_are_in_several():
+    """The roots of their product are off the axis by rounding; turns and poles found still agree."""
+    slow, fast = ([1.0, 0.0, w**2] for w in (30.0, 200.0))
+    den = np.polymul(slow, fast)
+    num = np.polyadd(0.3 * den, [0.5, 0.0, 0.0, 0.0])
+    law = Law({"hub_rate": (num.tolist(), den.tolist())})
+    assert law.poles.real.any()
+    found = tfarm.nyquist(LAB, law)
+    np.testing.assert_allclose(found.poles, [0.0, 30.0, 200.0], rtol=1e-9)
+    assert (found.unstable_open, found.unstable_by_nyquist) == (0, found.verdict.unstable_roots)
+
+
+def test_the_plane_is_drawn_in_a_disc():
+    """r at r/(1 + r), its direction kept: back again r/(1 - r); what is infinite at 1."""
+    L = np.array([0.0, 0.3 - 0.4j, -1.0, 7j, -1e8 + 1e8j])
+    drawn = compressed(L)
+    assert (abs(drawn) < 1).all()
+    np.testing.assert_allclose(drawn / (1 - abs(drawn)), L, rtol=1e-7)
+    assert compressed(np.array([complex(np.inf, 3.0)])).tolist() == [1.0]
+
+
+@pytest.mark.parametrize("C", [2e-4, 0.01, 0.1, pytest.param(1e-4, marks=pytest.mark.survey)])
+@pytest.mark.parametrize(("sensor", "share"), [("displacement", 1.0), ("moment", 0.3)])
+def test_at_each_zero_of_a_sensor_its_response_vanishes(C, sensor, share):
+    """The tip moves against the hub at first, so it has real ones on the right; -1/C may be below mode 1."""
+    arm = LAB.having(damping=C)
+    x = share * arm.length
+    found, G = positions(arm, sensor, np.array([x]), 4), tfarm.transfer(arm, sensor, x=x)
+    (zeros,) = found.zeros
+    assert (abs(G(zeros)) < 1e-6 * abs(G(zeros * 1.01))).all()
+    assert ((zeros.imag == 0) & (zeros.real > 0)).any() == (sensor == "displacement" or C < 1e-3)
+    assert ((zeros.real > 0) | (zeros.imag > 0)).all()
+    assert (zeros.real <= found.band).all()
+
+
+@pytest.mark.parametrize("name", ["sasaki2012", "quanser-2dsfl"])
+def test_a_sensor_at_a_node_has_a_zero_at_the_mode(name):
+    arm = tfarm.load(name)
+    modes = tfarm.modes(arm, count=3)
+    node = modes.nodes[-1][0]
+    found = positions(arm, "displacement", np.array([node, arm.length]), 3)
+    assert found.participation[2, 0] == pytest.approx(0.0, abs=1e-9)
+    assert abs(found.zeros[0] - 1j * modes.natural_frequency[-1]).min() < 1e-7 * modes.natural_frequency[-1]
+
+
+def test_participation_is_the_shape_over_its_largest():
+    arm = tfarm.load("stocky-steel")
+    x = np.linspace(0.0, arm.length, 5)[1:]
+    found, modes = positions(arm, "displacement", x, 2), tfarm.modes(arm, count=2)
+    w = modes.shape(x)[1:]
+    assert found.participation == pytest.approx(w / abs(w).max(axis=1)[:, None])
+    assert found.natural_frequency == pytest.approx(modes.natural_frequency[1:])
+
+
+def test_of_a_zero_what_is_no_more_than_its_error_is_left_out():
+    zeros = np.array([3.0 + 4e-9j, 1e-9 + 5j, -2.0 + 2j])
+    found = Positions(np.array([0.5]), 10.0, np.ones(1), np.ones((1, 1)), (zeros, zeros[:0]))
+    assert [each.tolist() for each in found.known_zeros] == [[3.0, 5j, -2.0 + 2j], []]
+
+
+def test_an_end_that_no_mode_moves_is_no_place_for_a_sensor():
+    """The clamp of a hub without radius does not move, nor does the tip without payload bend."""
+    arm = tfarm.load("sasaki2012").having(payload_mass=0.0, payload_inertia=0.0)
+    x = np.linspace(0.0, arm.length, 5)
+    assert sensed_places(arm, "displacement", x, 3).tolist() == x[1:].tolist()
+    assert sensed_places(arm, "moment", x, 3).tolist() == x[:-1].tolist()
+
+
+def test_an_arm_that_cannot_turn_has_no_such_zeros():
+    with pytest.raises(tfarm.ParameterError):
+        positions(tfarm.load("sasaki2012").having(hub_inertia=math.inf), "moment", np.array([0.1]), 2)
+
+
+def test_poles_of_a_long_delay_have_starts_next_to_them():
+    """A delay of half a second has a pole every 2 pi/delay; three of four starts are within a hundredth of that."""
+    loop = loop_of(LAB, Law({"hub_rate": 30.0}, delay=0.5))
+    poles, starts = poles_below(loop, 300.0).values, starting_points(loop, 300.0)
+    upper = poles[poles.imag > 0]
+    away = np.abs(upper[:, None] - starts).min(axis=1)
+    assert upper.size == 26  # 300 delay/(2 pi), and those of two modes
+    assert np.quantile(away, 0.7) < 0.01 * 2 * math.pi / loop.law.delay

@@ -8,17 +8,14 @@ import pytest
 from matplotlib.scale import SymmetricalLogTransform
 
 import tfarm
-from tests.loop.arms import held
+from tests.loop.arms import held, loop_of, verdict_of
 from tests.loop.ritz_loop import RitzLoop
 from tests.loop.test_lossless import RIGS
 from tests.shared import thinned
 from tfarm import HubFeedback
-from tfarm.case import Case
 from tfarm.errors import ParameterError
-from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.plane import INFINITE, LINEAR_SCALE, Axis, between, edge, gain_map, ranges_of, static_edges
 from tfarm.loop.poles import poles_below
-from tfarm.loop.stability import stability
 from tfarm.schema import to_dict
 from tfarm.spectrum.table import default_gains
 
@@ -39,7 +36,7 @@ def of_model(arm, terms):
 def test_counts_of_the_lab_arm_are_those_of_an_independent_model(Kp) -> None:
     K1, K2 = between(-1, 3, 5), between(-2, 2.5, 6)
     found = gain_map(LAB, K1, K2, Kp)
-    low = counts_by(lambda law: poles_below(ContinuousLoop(Case(LAB, law)), found.band).unstable, K1, K2, Kp)
+    low = counts_by(lambda law: poles_below(loop_of(LAB, law), found.band).unstable, K1, K2, Kp)
     np.testing.assert_array_equal(found.unstable, low)
     np.testing.assert_array_equal(found.stable, counts_by(of_model(LAB, 10), K1, K2, Kp) == 0)
 
@@ -58,9 +55,7 @@ def test_a_column_without_rate_feedback_steps_where_the_effective_inertia_vanish
     limit = J / (J - LAB.hub.inertia)
     K2 = np.array([-20.0, -2.0, 0.5, limit * (1 - 1e-6), limit * (1 + 1e-6), 40.0])
     found = gain_map(LAB, np.array([-0.5, 0.0, 0.5]), K2)
-    counted = [
-        [stability(Case(LAB, HubFeedback(K1=a, K2=float(b)))).unstable_roots for a in (-0.5, 0.0, 0.5)] for b in K2
-    ]
+    counted = [[verdict_of(LAB, HubFeedback(K1=a, K2=float(b))).unstable_roots for a in (-0.5, 0.0, 0.5)] for b in K2]
     assert found.unstable.tolist() == counted
     assert found.unstable[4, 1] == found.unstable[3, 1] + 1
     assert not found.stable[:, 1].any()
@@ -75,7 +70,7 @@ def test_at_no_damping_finite_counts_are_those_of_a_verdict_at_each_point(arm, K
     K1, K2 = np.sort(np.r_[between(-5, 5, 4), 0.0]), np.sort(np.r_[between(-2, 5, 5), 1.0])
     found = gain_map(arm, K1, K2, Kp)
     for (j, i), count in np.ndenumerate(found.unstable):
-        there = stability(Case(arm, HubFeedback(K1=float(K1[i]), K2=float(K2[j]), Kp=Kp)))
+        there = verdict_of(arm, HubFeedback(K1=float(K1[i]), K2=float(K2[j]), Kp=Kp))
         assert count == (INFINITE if there.unstable_roots_infinite else there.unstable_roots)
         assert found.stable[j, i] == (there.word == "stable")
         if count != INFINITE and K2[j] != 1.0:  # where the model has no inertia left
@@ -171,11 +166,8 @@ def test_the_edge_between_the_grids_frequencies_is_that_of_the_law_with_its_angl
     for K1, K2, omega in new[:: len(new) // 5]:
         law = HubFeedback(K1=K1, K2=K2, Kp=Kp)
         s = np.array([1j * omega])
-        parts = [
-            abs(ContinuousLoop(Case(LAB, HubFeedback(**{name: law[name]}))).loop_function(s)[0])
-            for name in ("K1", "K2", "Kp")
-        ]
-        assert abs(1 + ContinuousLoop(Case(LAB, law)).loop_function(s)[0]) < 2000 * EPS * (1 + sum(parts))
+        parts = [abs(loop_of(LAB, HubFeedback(**{name: law[name]})).loop_function(s)[0]) for name in ("K1", "K2", "Kp")]
+        assert abs(1 + loop_of(LAB, law).loop_function(s)[0]) < 2000 * EPS * (1 + sum(parts))
 
 
 @pytest.mark.parametrize(("name", "K1", "K2"), [("free", 0.0, None), ("held", None, 1.0)])
@@ -185,9 +177,7 @@ def test_a_real_pole_passes_through_0_on_the_line_that_is_drawn(name, K1, K2):
     found = static_edges(tfarm.map(arm, np.linspace(0.1, 1.0, 3), np.linspace(0.0, 0.5, 3)))
     assert found == (K1, K2 if K2 is None else pytest.approx(K2, abs=1e-12))
     before, after = (
-        stability(
-            Case(arm, HubFeedback(K1=0.3 if K1 is None else way, K2=0.3 if K2 is None else K2 + way))
-        ).unstable_roots
+        verdict_of(arm, HubFeedback(K1=0.3 if K1 is None else way, K2=0.3 if K2 is None else K2 + way)).unstable_roots
         for way in (-1e-3, 1e-3)
     )
     assert {before, after} == {0, 1}

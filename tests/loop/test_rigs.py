@@ -9,17 +9,17 @@ import pytest
 
 import tfarm
 from tests.chain_elements import reached
+from tests.loop.arms import loop_of, verdict_of
 from tests.loop.rig_loops import RigLoop
 from tests.rigs import some_rig
 from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling
-from tfarm.loop.continuous import ContinuousLoop, band_of
+from tfarm.loop.continuous import band_of
 from tfarm.loop.plane import INFINITE, gain_map
 from tfarm.loop.poles import closed_loop_poles, poles_below
 from tfarm.loop.sampled_verdict import sampled_verdict
-from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
 from tfarm.spectrum.table import default_gains, gain_unit
 
@@ -69,9 +69,9 @@ def test_no_bound_is_claimed_where_elastic_links_ring_beyond_the_band():
     """A voltage behind an inductance, C = 0: with K2 < 0 modes far above the band are driven, each by very little."""
     arm = REAL["quanser-flexlink"]
     law = default_gains(arm).having("K2", -0.015)
-    verdict = stability(Case(arm, law))
+    verdict = verdict_of(arm, law)
     assert "not determined beyond" in verdict.tail
-    beyond = poles_below(ContinuousLoop(Case(arm, law)), 3e4)
+    beyond = poles_below(loop_of(arm, law), 3e4)
     driven = beyond.moving[beyond.moving.real > 1e-12 * abs(beyond.moving)]
     assert driven.size
     assert driven.imag.min() > verdict.band
@@ -85,7 +85,7 @@ def test_at_an_edge_of_a_window_poles_of_the_elements_cross(name, gain):
     """Just inside none is unstable, just outside one or two are, at the crossing's frequency."""
     arm = RIGS[name]
     law = default_gains(arm)
-    window = windows_of(stability(Case(arm, law)), [gain])[gain]
+    window = windows_of(verdict_of(arm, law), [gain])[gain]
     assert window.around is not None
     for edge in window.around:
         at = window.crossings.at[abs(window.crossings.gain - edge) <= 1e-6 * abs(edge)]  # of elastic links all at once
@@ -118,12 +118,12 @@ def test_more_than_the_whole_moment_drives_every_mode_behind_friction(K2):
     """Each higher band has as many more unstable poles as it has modes, two each; below the whole moment none."""
     arm = REAL["quanser-2dsfl"]
     law = default_gains(arm).having("K2", K2 * arm.input_per_torque)
-    verdict = stability(Case(arm, law))
+    verdict = verdict_of(arm, law)
     driven = K2 > 1
     assert verdict.unstable_roots_infinite == driven
     assert verdict.is_known_beyond
     heights = [band_of(arm, number) for number in (4, 8)]
-    low, high = (poles_below(ContinuousLoop(Case(arm, law)), height).unstable for height in heights)
+    low, high = (poles_below(loop_of(arm, law), height).unstable for height in heights)
     assert high - low == 8 * driven
     plane = gain_map(
         arm, np.array([0.5, 1.0]) * law.K1, np.array([1.0, 1.01]) * law.K2 if driven else np.array([1.0, 0.9]) * law.K2

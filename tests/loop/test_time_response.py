@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.loop.arms import loop_of
 from tests.shared import thinned
 from tfarm.arm import as_law
-from tfarm.case import Case
 from tfarm.exact.appendix import response as appendix_response
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.time_response import ACTUATOR, Excitation, time_response, usual_poles
 from tfarm.reduced.modal import modal_model, sensed_model
 
@@ -73,7 +72,7 @@ def exact_signals(arm, law, excitation, s):
 def test_a_smooth_pulse_is_that_of_bromwichs_integral(arm, law, width, duration):
     """Twelve digits of each peak; elsewhere within the bound and what the integral itself leaves out."""
     excitation = versine(width)
-    found = time_response(usual_poles(ContinuousLoop(Case(arm, as_law(law)))), NAMES, excitation, duration)
+    found = time_response(usual_poles(loop_of(arm, law)), NAMES, excitation, duration)
     t, expected = durbin(lambda s: exact_signals(arm, law, excitation, s), duration)
     t, expected = t[t <= duration], expected[:, t <= duration]
     y, bound = found.at(t)[:-1], found.remainder(t)[:-1]
@@ -96,7 +95,7 @@ def test_twelve_digits_of_a_peak_at_the_precision_of_mpmath():
         return 10 / (32 * s) + sum(c * s / (32 * (s * s + (n * w) ** 2)) for n, c in ((1, -15), (2, 6), (3, -1)))
 
     excitation = Excitation({ACTUATOR: pulse}, (0.0, WIDTH), (1.0, -1.0), (1j * w, 2j * w, 3j * w))
-    found = time_response(usual_poles(ContinuousLoop(Case(LAB, as_law(law)))), NAMES, excitation, 1.0)
+    found = time_response(usual_poles(loop_of(LAB, law)), NAMES, excitation, 1.0)
     at, value, bound, _ = found.peaks(np.linspace(0.05, 0.3, 600))["hub_angle"]
     assert found.remainder(np.array([at]))[0, 0] < 1e-30 * value  # the omitted poles; the sum itself is rounded
     assert 1.1e-16 * value < bound < 4.5e-16 * value
@@ -116,7 +115,7 @@ def test_twelve_digits_of_a_peak_at_the_precision_of_mpmath():
 @pytest.mark.parametrize("arm", [LAB, LOSSLESS], ids=["damped", "undamped"])
 def test_the_rest_of_four_times_as_many_modes_is_within_the_bound(arm):
     """Of a step of the torque, which excites every mode."""
-    loop, step = ContinuousLoop(Case(arm, as_law(LAW))), Excitation({ACTUATOR: lambda s: 1 / s})
+    loop, step = loop_of(arm, LAW), Excitation({ACTUATOR: lambda s: 1 / s})
     few, many = (time_response(usual_poles(loop, count), NAMES, step, 1.0) for count in (20, 160))
     t = np.linspace(0.0, 1.0, 3001)[1:]
     whole = many.at(t)[: len(NAMES)]
@@ -132,7 +131,7 @@ def test_the_rest_of_four_times_as_many_modes_is_within_the_bound(arm):
 def test_without_feedback_it_is_the_modal_sum(arm, name):
     """The rigid body and the residues of the modal model under a step of the torque, its remainder left out."""
     step = Excitation({ACTUATOR: lambda s: 1 / s})
-    found = time_response(usual_poles(ContinuousLoop(Case(arm, as_law(tfarm.HubFeedback())))), (name,), step, 0.5)
+    found = time_response(usual_poles(loop_of(arm, as_law(tfarm.HubFeedback()))), (name,), step, 0.5)
     model, t = modal_model(arm, name, 60), np.linspace(0.0, 0.5, 101)[1:]
     p, r = model.eigenvalues.ravel(), model.residues[0].ravel()
     p, r = np.r_[p, model.single], np.r_[r, model.single_residues[0]]
@@ -153,7 +152,7 @@ def test_python_control_on_a_model_of_forty_modes_has_the_same_step_response(arm
     t = np.linspace(0.0, 1.0, 501)
     expected = law.Kp * control.step_response(closed, t).outputs[[0, 3, 2], 0]
     step = Excitation({"hub_angle": lambda s: 1 / s})
-    y = time_response(usual_poles(ContinuousLoop(Case(arm, as_law(law)))), NAMES, step, 1.0).at(t)
+    y = time_response(usual_poles(loop_of(arm, law)), NAMES, step, 1.0).at(t)
     peak = abs(expected).max(axis=1, keepdims=True)
     assert (abs(y[:-1] - expected) <= 1e-4 * peak)[:, 1:].all()
     torque = law.Kp * (1 - y[0]) - law.K1 * control.step_response(closed, t).outputs[1, 0] * law.Kp - law.K2 * y[2]
@@ -165,16 +164,14 @@ def test_the_final_value_is_that_of_the_theorem(stiffness):
     """Kp/(Kp + k): a spring at the hub leaves an error, as no integrator removes it."""
     arm, law = replace(LAB, hub=replace(LAB.hub, stiffness=stiffness)), tfarm.HubFeedback(K1=0.5, K2=0.3, Kp=3.0)
     step = Excitation({"hub_angle": lambda s: 1 / s})
-    found = time_response(usual_poles(ContinuousLoop(Case(arm, as_law(law)))), NAMES, step, 200.0).at(
-        np.array([200.0])
-    )[:, 0]
+    found = time_response(usual_poles(loop_of(arm, law)), NAMES, step, 200.0).at(np.array([200.0]))[:, 0]
     theta = law.Kp / (law.Kp + stiffness)
     np.testing.assert_allclose(found[:2], [theta, theta * arm.reach], rtol=1e-9)
     np.testing.assert_allclose(found[2:], [0.0, stiffness * theta], atol=1e-9)
 
 
 def test_a_growing_response_beyond_doubles_is_refused_with_a_duration():
-    poles = usual_poles(ContinuousLoop(Case(LAB, as_law(tfarm.HubFeedback(K1=-30.0)))))
+    poles = usual_poles(loop_of(LAB, as_law(tfarm.HubFeedback(K1=-30.0))))
     with pytest.raises(tfarm.ParameterError, match=r"duration = 1000.0: the loop is unstable .* at most [\d.]+ s"):
         time_response(poles, NAMES, versine(), 1000.0)
 
@@ -194,7 +191,7 @@ def test_until_twice_the_delay_the_torque_is_the_laws_own_step_response(damping,
     tau, den = 0.01, np.polymul([1 / corner, 1.0], [1 / corner, 1.0] if order == 2 else [1.0])
     law = tfarm.Law({"hub_angle": ([1.0, 3.0], list(den))}, delay=tau, references=("hub_angle",))
     assert np.unique(law.poles).size == (2 if corner == 300.0 else 1)
-    found = time_response(usual_poles(ContinuousLoop(Case(LAB.having(damping=damping), law))), NAMES, STEP, 1.0)
+    found = time_response(usual_poles(loop_of(LAB.having(damping=damping), law)), NAMES, STEP, 1.0)
     after = np.array([0.0, 1e-6, 1e-4, 5e-4, 1e-3, 3e-3, 9e-3])
     x = corner * after
     own = 3 + np.exp(-x) * (corner - 3 if order == 1 else corner * x - 3 * (1 + x))
@@ -207,13 +204,13 @@ def test_until_twice_the_delay_the_torque_is_the_laws_own_step_response(damping,
 def test_the_largest_torque_is_found_on_both_sides_of_a_jump():
     """1000 N m after the delay, at no sample of the record; and the end of a ramp that jumps back to 0."""
     law = tfarm.Law({"hub_angle": ([1.0, 3.0], [0.001, 1.0])}, delay=0.005, references=("hub_angle",))
-    found = time_response(usual_poles(ContinuousLoop(Case(LAB, law))), NAMES, STEP, 4.0)
+    found = time_response(usual_poles(loop_of(LAB, law)), NAMES, STEP, 4.0)
     peak = found.peaks(np.linspace(0.0, 4.0, 1000))["torque"]
     assert peak[:2] == pytest.approx((0.005, 1000.0), rel=1e-12)
     assert peak.value <= peak.most <= 1000.0 + 1e-6
     ramp = Excitation({ACTUATOR: lambda s: 1 / s**2}, (0.0, 0.3), (1.0, -1.0))
     stopped = Excitation({ACTUATOR: lambda s: 1 / s**2 - 0.3 / s * np.exp(0 * s)}, (0.0,), (1.0,))
-    free = usual_poles(ContinuousLoop(Case(LAB, as_law(tfarm.HubFeedback()))))
+    free = usual_poles(loop_of(LAB, as_law(tfarm.HubFeedback())))
     t = np.linspace(0.0, 0.5, 101)
     np.testing.assert_allclose(time_response(free, NAMES, ramp, 0.5).at(t)[-1], np.minimum(t, 0.3), atol=1e-9)
     start = time_response(free, NAMES, stopped, 0.5).peaks(np.linspace(0.1, 0.5, 30))["torque"]
@@ -226,7 +223,7 @@ def test_one_filter_of_three_signals_adds_its_poles_once(corners):
     den = np.poly(-np.array(corners)) / np.prod(corners)
     gains = {"hub_angle": 3.0, "hub_rate": 0.3, "root_moment": 0.3}
     law = tfarm.Law({name: ([gain], den) for name, gain in gains.items()}, delay=0.002)
-    poles = usual_poles(ContinuousLoop(Case(LAB, law)))
+    poles = usual_poles(loop_of(LAB, law))
     assert law.order == 9
     assert (abs(poles.values[:, None] + np.array(corners)) > 1e-3).all()
     excitation = versine()
@@ -240,7 +237,7 @@ def test_equal_filters_in_series_keep_their_digits():
     """Their poles are split by rounding; until twice the delay the torque is the law's own, in closed form."""
     c, tau = 2480.0, 0.01
     law = tfarm.Law({"hub_angle": ([0.1, 1.0], np.poly([-c] * 3) / c**3)}, delay=tau, references=("hub_angle",))
-    found = time_response(usual_poles(ContinuousLoop(Case(LAB, law))), NAMES, STEP, 1.0)
+    found = time_response(usual_poles(loop_of(LAB, law)), NAMES, STEP, 1.0)
     after = np.linspace(0.0, 0.9 * tau, 40)
     x = c * after
     own = 1 - np.exp(-x) * (1 + x + x**2 / 2) + 0.1 * c * np.exp(-x) * x**2 / 2
@@ -253,7 +250,7 @@ def test_the_largest_of_many_maxima_is_found_whatever_the_record():
     """That of a torque of two frequencies over forty periods, as on a grid of two million times."""
     w = np.array([50.0, 50.0 * 2**0.5])
     two = Excitation({ACTUATOR: lambda s: sum(0.5 * each / (s * s + each**2) for each in w)}, poles=tuple(1j * w))
-    found = time_response(usual_poles(ContinuousLoop(Case(LAB, as_law(tfarm.HubFeedback())))), NAMES, two, 5.0)
+    found = time_response(usual_poles(loop_of(LAB, as_law(tfarm.HubFeedback()))), NAMES, two, 5.0)
     t = np.linspace(0.0, 5.0, 2_000_001)
     expected = abs(0.5 * np.sin(np.outer(w, t)).sum(axis=0)).max()
     for points in (400, 701, 1000):

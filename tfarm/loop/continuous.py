@@ -115,9 +115,14 @@ class ContinuousLoop(Loop):
         return theorem_of(self)
 
     @property
+    def is_moved_at_hub_alone(self) -> bool:
+        """Whether all energy comes and goes at the hub: gains there, on a rig that loses at its hub alone."""
+        return self.is_of_gains and self.arm.loses_at_hub_alone
+
+    @property
     def numbers(self) -> dict[str, float]:
         """The numbers of the law in which D is linear, by name: the gains at the hub, or `Law.numbers`."""
-        return self.law.numbers if self.gains is None else self.gains.by_name
+        return self.gains.by_name if self.gains else self.law.numbers
 
     @cached_property
     def feeds_back(self) -> bool:

@@ -7,15 +7,16 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from tfarm.arm import Arm, Law
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import LEAST_SIZE, Complex, Real
+from tfarm.crossing import Window
 from tfarm.loop.loop import Loop
 from tfarm.loop.loop_margins import LoopMargins, PhaseCrossover, margins_along
 from tfarm.records import frozen
@@ -87,6 +88,24 @@ class LoopCurve:
         return (self,) if self.continuous is None else (self.continuous, self)
 
 
+class LoopContour(NamedTuple):
+    """What Nyquist's criterion reads of a loop: its contour runs up the curve, and closes through points `closing`.
+
+    `grid` are frequencies [rad/s] that resolve L, `on_curve` those of the poles of L on the curve, `closed` the
+    closed-loop poles s [1/s], Im s >= 0, apart from those at rest.  `unstable_open` poles of L are unstable, and
+    `unstable` of the loop, `clear` of them by more than rounding; `near_axis` more may be on the curve.
+    """
+
+    grid: Real
+    on_curve: Real
+    closed: Complex
+    closing: Complex
+    unstable_open: int
+    unstable: int
+    clear: int
+    near_axis: int
+
+
 class LoopVerdict(ABC):
     """The verdict on a loop over either curve, with margins of a stable loop, and the curve of its loop function.
 
@@ -132,6 +151,11 @@ class LoopVerdict(ABC):
     def margins_end(self) -> float:
         """The end of the frequency range of margins [rad/s]."""
 
+    @property
+    @abstractmethod
+    def contour(self) -> LoopContour:
+        """Nyquist's contour of the loop, with the poles on both sides of the curve."""
+
     @abstractmethod
     def gain_limits(self, by_phase: tuple[PhaseCrossover, ...]) -> tuple[float, float]:
         """Return the factors on the law between which the loop is stable."""
@@ -157,6 +181,31 @@ class LoopVerdict(ABC):
             L=L,
             margins=self.in_band,
         )
+
+
+class LoopAnalysis(ABC):
+    """Verdict, margins and limits of stability of a loop over either curve."""
+
+    verdict: LoopVerdict
+
+    @property
+    def curve(self) -> LoopCurve:
+        """The loop function on a grid that resolves it."""
+        return self.verdict.curve
+
+    @property
+    @abstractmethod
+    def stability_intervals(self) -> Sequence[Any]:
+        """A row for each number of the law: the intervals in which the loop is stable, the others constant."""
+
+    @property
+    @abstractmethod
+    def delay_margin_seconds(self) -> float | None:
+        """The smallest further delay [s] that destabilises the loop, as far as it is known."""
+
+    @abstractmethod
+    def factor_intervals(self, delays: Real) -> list[Sequence[Window]]:
+        """Return the intervals of a factor on the law in which the loop is stable, at each further delay [s] (n,)."""
 
 
 def next_limits(factors: Iterable[float]) -> tuple[float, float]:

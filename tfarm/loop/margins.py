@@ -7,13 +7,16 @@ to a band are listed in addition, with the band.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Annotated
 
 from tfarm.arm import AnyLaw, Arm
+from tfarm.arrays import Real
 from tfarm.case import Case
-from tfarm.loop.curve import IN_RANGE, LoopCurve
+from tfarm.crossing import Window
+from tfarm.loop.curve import IN_RANGE, LoopAnalysis
 from tfarm.loop.loop_margins import (
     DELAY_MARGIN,
     DISK_MARGIN,
@@ -23,6 +26,7 @@ from tfarm.loop.loop_margins import (
     LoopMargins,
     PhaseCrossover,
 )
+from tfarm.loop.plane import between, plane
 from tfarm.loop.stability import Stability, is_quiet, stability
 from tfarm.loop.theorem import Lyapunov, Signs, lyapunov, signs_of_loop
 from tfarm.loop.windows import Windows, reach_words, windows_of
@@ -34,7 +38,7 @@ GAIN_CROSSOVERS = Quantity("gain crossovers, abs(L) = 1", help="all in the frequ
 
 
 @frozen
-class Margins:
+class Margins(LoopAnalysis):
     """Verdict and margins of a loop; `windows` are the stability intervals of each number of the law, by its name.
 
     `in_band` are the margins up to the verdict's band; `exact_delay`, `exact_disk` and `exact_peak` those of the whole
@@ -47,14 +51,9 @@ class Margins:
     damping_limit = None  # is searched at the samples alone
 
     @property
-    def verdict(self) -> Stability:
+    def verdict(self) -> Stability:  # type: ignore[override]
         """The verdict."""
         return self.stability
-
-    @property
-    def curve(self) -> LoopCurve:
-        """The loop function on a grid that resolves it."""
-        return self.stability.curve
 
     @property
     def in_band(self) -> Annotated[LoopMargins | None, IN_RANGE]:
@@ -104,6 +103,11 @@ class Margins:
     def delay_margin_seconds(self) -> float | None:
         """The delay margin [s], or that in the frequency range where the exact one is not determined."""
         return self.in_band.delay if self.in_band is not None and self.exact_delay is None else self.exact_delay
+
+    def factor_intervals(self, delays: Real) -> list[Sequence[Window]]:
+        """Return the intervals of a factor on the law, 0 to 4, at each further delay [s] (n,), from a map of both."""
+        loop = self.stability.loop
+        return [*plane(loop, ("delay", "gain"), loop.law.delay + delays, between(0.0, 4.0, 40)).stable_intervals]
 
     @cached_property
     def windows(self) -> dict[str, Windows]:

@@ -1,8 +1,11 @@
-"""Nyquist's criterion on the exact loop function: encirclements of -1 counted and compared with the poles found.
+"""Nyquist's criterion on the loop function: encirclements of -1 counted and compared with the poles found.
 
 The contour runs up the imaginary axis, passes each pole of L on it by a small semicircle on the right, and closes along
 the edges of the box in which the verdict's poles were counted.  L is evaluated on all of it, so the encirclements of -1
 are counted.  Clockwise ones are closed-loop poles inside the contour, as no pole of L is in there.
+
+Around the unit circle s = ln(z)/T runs up the axis to half the sampling rate, and passes poles outside the circle.
+There the contour is closed: L is real from z = -1 to infinity and back to z = 1.
 """
 
 import math
@@ -20,18 +23,16 @@ from tfarm.exact.characteristic import Analytic
 from tfarm.records import frozen
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.schema import At, Quantity
-from tfarm.spectrum import flexible_frequencies
 from tfarm.spectrum.box import turned
 
-from .continuous import ContinuousLoop, band_of, grid
-from .poles import count_with_mirrors
-from .stability import Stability, stability
+from .continuous import band_of
+from .curve import LoopContour, LoopVerdict
+from .loop import Loop
+from .stability import stability
 
 INDENT_RADIUS = 0.05  # radius of a semicircle around a pole of L, in units of its residue: |L| is about 20 on it
 NEARER = 0.1  # of the way to the nearest closed-loop pole: no arc around a pole of L leaves an unstable one out
-AROUND_LAW_POLE = np.linspace(-4.0, 4.0, 41)  # points around a pole of the law, in its distances from the axis
 SLOW_POINTS = 200  # points between that and the arm's own grid
-EDGE_POINTS = 750  # points along an edge of the box, to begin with
 ARC = np.linspace(-math.pi / 2, math.pi / 2, 41)  # rad, along a semicircle around a pole of L
 APPROACH = np.geomspace(1.05, 1e3, 40)  # radii of such an arc: points of the axis on either side, a dozen a decade
 RESIDUE_AT = 1e-6  # of a pole's frequency: so near to it L is the pole's share alone
@@ -56,20 +57,13 @@ class Nyquist:
     is_arc: NDArray[np.bool_]
     poles: Real
     encirclements: Annotated[int, Quantity("encirclements of -1", help="counter-clockwise positive")]
-    verdict: Annotated[Stability, Quantity(flat=True)]
+    verdict: Annotated[LoopVerdict, Quantity(flat=True)]
     unstable_open: Annotated[int, Quantity("unstable poles of L", help="controller's poles inside the contour")] = 0
 
     @property
     def on_axis(self) -> Annotated[int, ON_AXIS]:
-        """Number of poles of the box on the axis to working precision, apart from that at 0."""
-        moving = self.verdict.poles.moving
-        return count_with_mirrors(moving[abs(moving.real) <= AXIS_SHARE * abs(moving)])
-
-    @property
-    def clear(self) -> int:
-        """Number of poles of the box right of the axis by more than working precision."""
-        moving = self.verdict.poles.moving
-        return count_with_mirrors(moving[moving.real > AXIS_SHARE * abs(moving)])
+        """Number of poles on the axis to working precision, apart from that at 0."""
+        return self.verdict.contour.near_axis
 
     @property
     def unstable_by_nyquist(self) -> Annotated[int, BY_NYQUIST]:
@@ -91,57 +85,41 @@ def nyquist(arm: Arm, law: AnyLaw) -> Nyquist:
     return nyquist_of(stability(Case(arm, law)))
 
 
-def nyquist_of(verdict: Stability) -> Nyquist:
-    """Return the same for a verdict: the contour encloses the right part of its box, so both counts have one region."""
-    loop, band = verdict.loop, verdict.band
-    poles = poles_on_axis(loop, band)
-    s, is_arc = smooth(loop, *upper_contour(loop, poles, band, verdict.poles.moving))
-    corner = complex(verdict.poles.box.re_max, band)
-    across, down = np.linspace(1j * band, corner, EDGE_POINTS), np.linspace(corner, corner.real, EDGE_POINTS)
-    angle = turned(lambda at: _difference(loop, at), np.r_[s, across[1:], down[1:]], abs(corner))
-    own = loop.law.poles
-    inside = int(((own.real > AXIS_SHARE * abs(own)) & (abs(own.imag) < band)).sum())
-    plot = Nyquist(s, loop.loop_function(s), is_arc, poles, round(angle / math.pi), verdict, inside)
-    found = min(plot.clear, verdict.unstable_roots)
-    if not found <= plot.unstable_by_nyquist <= found + plot.on_axis:
-        counted, found_in_box = plot.unstable_by_nyquist, verdict.unstable_roots
-        text = f"{counted} unstable poles by the encirclements of -1, {found_in_box} by finding all in a box"
-        raise ConvergenceError(text, plot, plot.unstable_by_nyquist - verdict.unstable_roots)
+def nyquist_of(verdict: LoopVerdict) -> Nyquist:
+    """Return the same for a verdict on either curve: both counts have one region."""
+    loop, contour = verdict.full, verdict.contour
+    s, is_arc = smooth(loop, *upper_contour(loop, contour, verdict.margins_end))
+    path = np.r_[s, contour.closing]
+    angle = turned(lambda at: _difference(loop, at), path, float(abs(path).max()))
+    encirclements, open_poles = round(angle / math.pi), contour.unstable_open
+    plot = Nyquist(s, loop.loop_function(s), is_arc, contour.on_curve, encirclements, verdict, open_poles)
+    counted, least = plot.unstable_by_nyquist, min(contour.clear, contour.unstable)
+    if not least <= counted <= least + contour.near_axis:
+        text = f"{counted} unstable poles by the encirclements of -1, {contour.unstable} by finding all in a box"
+        raise ConvergenceError(text, plot, counted - contour.unstable)
     return plot
 
 
-def _difference(loop: ContinuousLoop, s: Complex) -> Analytic:
+def _difference(loop: Loop, s: Complex) -> Analytic:
     """1 + L without its slope, as the contour is dense where it is steep."""
     return Analytic(1 + loop.loop_function(s), np.zeros_like(s), np.zeros_like(s))
 
 
-def poles_on_axis(loop: ContinuousLoop, band: float) -> Real:
-    """Poles of L on the imaginary axis [rad/s], from 0 up: of the rigid body and the law, and at C = 0 of all modes."""
-    arm = loop.arm
-    flexible = np.asarray(flexible_frequencies(arm, band)) if arm.is_undamped else np.empty(0)
-    own = loop.law.poles
-    on_axis = abs(own.real) <= AXIS_SHARE * abs(own)  # of a product of resonators roots are off it by rounding
-    ringing = own.imag[on_axis & (own.imag > 0) & (own.imag < band)]
-    integrators = loop.k.at_rest + int((own == 0).sum())
-    return np.unique(np.r_[[0.0] * (integrators > loop.zeros_at_origin), flexible, ringing])
-
-
-def upper_contour(loop: ContinuousLoop, poles: Real, band: float, closed: Complex) -> tuple[Complex, NDArray[np.bool_]]:
+def upper_contour(loop: Loop, contour: LoopContour, band: float) -> tuple[Complex, NDArray[np.bool_]]:
     """The contour from s = 0 (or right of a pole there) up the axis to the band, past each pole on its right.
 
-    `closed` are the closed-loop poles: each arc around a pole of L is smaller than its distance to the nearest of them.
-    The radius is that where |L| is about 20, and at most a thousandth of the pole's frequency (at 0: of the first).
+    Each arc around a pole of L is smaller than its distance to the nearest closed-loop pole.  The radius is that where
+    |L| is about 20, and at most a thousandth of the pole's frequency (at 0: of the first).
     """
-    own, omega = loop.law.poles[loop.law.poles.imag > 0], np.asarray(grid(loop.arm, band))
-    near = (own.imag[:, None] + abs(own.real)[:, None] * AROUND_LAW_POLE).ravel()
+    poles, omega = contour.on_curve, contour.grid
     scale, pole = np.where(poles == 0, band_of(loop.arm, 1), poles), poles[:, None]
-    step, away = RESIDUE_AT * scale, abs(closed - 1j * pole)
+    step, away = RESIDUE_AT * scale, abs(contour.closed - 1j * pole)
     of_residue = INDENT_RADIUS * step * abs(loop.loop_function(np.where(poles == 0, step, 1j * (poles + step))))
     nearest = np.where(away > AXIS_SHARE * pole, away, math.inf).min(axis=1, initial=math.inf)
     radius = np.minimum(np.minimum(of_residue, WIDEST_INDENT * scale), NEARER * nearest)[:, None]
     slow = np.geomspace(radius[0, 0], omega[0], SLOW_POINTS) if 0 in poles else omega[:0]
     approach = (pole + radius * np.r_[-APPROACH, APPROACH]).ravel()
-    axis = np.unique(np.r_[omega, near[near > omega[0]], slow, approach])
+    axis = np.unique(np.r_[omega, slow, approach])
     axis = axis[(axis > 0) & (axis <= band) & (abs(axis - pole) > radius).all(axis=0)]
     arcs = (1j * pole + radius * np.exp(1j * ARC)).ravel()
     arcs = arcs[arcs.imag >= 0]
@@ -150,7 +128,7 @@ def upper_contour(loop: ContinuousLoop, poles: Real, band: float, closed: Comple
     return s[order], is_arc[order]
 
 
-def smooth(loop: ContinuousLoop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, NDArray[np.bool_]]:
+def smooth(loop: Loop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, NDArray[np.bool_]]:
     """The contour with more points on the axis where the drawn curve would have corners."""
     for _ in range(TURN_ROUNDS):
         length = abs(np.diff(compressed(loop.loop_function(s))))

@@ -130,17 +130,17 @@ class Plane(PlaneOfCounts):
     @property
     def is_of_gains(self) -> bool:
         """Whether it is the plane of K1 and K2."""
-        return self.vary == PLANE and self.law.gains is not None
+        return self.vary == PLANE and self.loop.is_of_gains
 
     @property
     def is_known(self) -> bool:
         """Whether a theorem decides every mode at each point: no damping in the links, gains at the hub alone."""
-        return self.is_of_gains and _is_known_everywhere(self.arm)
+        return self.is_of_gains and _is_known_everywhere(self.loop)
 
     @property
     def Kp(self) -> float:
         """The constant gain on the hub angle."""
-        return 0.0 if self.law.gains is None else self.law.gains.Kp
+        return self.loop.numbers.get(ANGLE_GAIN, 0.0)
 
     @property
     def upright(self) -> float:
@@ -193,7 +193,7 @@ def gain_map(
         return plane(ContinuousLoop(Case(arm, HubFeedback(Kp=Kp))), PLANE, K1, K2)
     loop = ContinuousLoop(Case(arm, law))
     require(not Kp, ANGLE_GAIN, Kp, "give Kp in the law, or no law")
-    vary = PLANE if vary is None and loop.gains is not None else vary
+    vary = PLANE if vary is None and loop.is_of_gains else vary
     match vary:
         case (str() as across, str() as up):
             return plane(loop, (across, up), K1, K2)
@@ -207,17 +207,18 @@ def plane(loop: ContinuousLoop, vary: tuple[str, str], x: Real, y: Real) -> Plan
     counted.
     """
     require(vary[0] != vary[1], "vary", list(vary), "two different numbers of the law")
-    if vary == PLANE and loop.gains is not None:
+    is_of_gains = vary == PLANE and loop.is_of_gains
+    if is_of_gains:
         loop = loop.under(with_numbers(loop.law, dict.fromkeys(PLANE, 0.0)))
     # most values of a map, along one number of a law, and along one gain
-    most = 400 if loop.gains is None else 2000
+    most = 2000 if loop.is_of_gains else 400
     x, y = ascending(vary[0], x, 2, most), ascending(vary[1], y, 2, most)
     across, up = (float(x[0]), float(x[-1])), (float(y[0]), float(y[-1]))
     for name, (low, high) in zip(vary, (across, up), strict=True):
         remedy = "a leading coefficient keeps its sign in a map, as without it the order is another: a range without 0"
         require(not name.endswith(LEADING) or low * high > 0, name, [low, high], remedy)
     corners = [_at(loop, vary, each) for each in itertools.product(across, up)]
-    if loop.gains is not None and _is_known_everywhere(loop.arm) and tuple(ON.get(n, n) for n in vary) == PLANE:
+    if _is_known_everywhere(loop) and tuple(ON.get(n, n) for n in vary) == PLANE:
         counts = _known_counts(loop, x, y)
         return Plane(loop, vary, x, y, counts, np.empty((0, 3)), 0.0, [])
     if vary[1] == "delay":
@@ -229,9 +230,7 @@ def plane(loop: ContinuousLoop, vary: tuple[str, str], x: Real, y: Real) -> Plan
     at = 0.0 if vary == PLANE else float(y[_farthest(y, crossing)])  # at K2 = 0 the hub is passive
     there = _counts_across(loop.having(vary[1], at), vary[0], x, band)
     unstable = counts_over(y, found, at, there).T.copy()
-    edge = np.empty((0, 3))
-    if vary == PLANE and loop.gains is not None:
-        edge = boundary(loop, np.asarray(grid(loop.arm, band)))
+    edge = boundary(loop, np.asarray(grid(loop.arm, band))) if is_of_gains else np.empty((0, 3))
     done = Plane(loop, vary, x, y, unstable, edge, band, found)
 
     def counted(*point: float) -> int | None:
@@ -263,9 +262,9 @@ def _at(loop: ContinuousLoop, vary: tuple[str, str], point: tuple[float, ...]) -
     return loop.under(with_numbers(loop.law, dict(zip(vary, point, strict=True))))
 
 
-def _is_known_everywhere(arm: Arm) -> bool:
+def _is_known_everywhere(loop: ContinuousLoop) -> bool:
     """Whether a theorem decides every mode for any K1 and K2."""
-    return arm.loses_at_hub_alone and arm.reads_hub_moment and not arm.input_lags
+    return loop.is_moved_at_hub_alone and loop.arm.reads_hub_moment and not loop.arm.input_lags
 
 
 def _known_counts(loop: ContinuousLoop, K1: Real, K2: Real) -> NDArray[np.int64]:

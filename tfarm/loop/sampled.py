@@ -252,13 +252,17 @@ class Sampled(Loop):
         return error
 
     def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
-        """Return denominator and numerator of L at s = i w, up to pi/T."""
-        grid = self.rig.grid
-        q = np.ravel(np.imag(s)) * self.chain.sampling.period
+        """Return denominator and numerator of L at z = e^{sT}, s = i w up to pi/T, or off the axis."""
+        grid, at = self.rig.grid, np.ravel(s) * self.period
+        is_on = at.real == 0
+        q = at.imag[is_on]
         base = grid.base[np.minimum(np.searchsorted(grid.q, q), grid.q.size - 1)]
-        own, *rows = grid.at(base, q - grid.angles[base])
-        fed_back = np.asarray(np.array(self.weights) @ np.array(rows), dtype=np.complex128)
-        return own.reshape(np.shape(s)), fed_back.reshape(np.shape(s))
+        rows = np.empty((1 + len(self.weights), at.size), complex)
+        rows[:, is_on] = grid.at(base, q - grid.angles[base])
+        if q.size < at.size:
+            rows[:, ~is_on] = self.rig.terms(np.exp(at[~is_on]), None, np.ones(at.size - q.size))
+        fed_back = np.asarray(np.array(self.weights) @ rows[1:], dtype=np.complex128)
+        return rows[0].reshape(np.shape(s)), fed_back.reshape(np.shape(s))
 
     def __call__(self, z: Complex) -> Complex:
         """F(z) at an array of z."""

@@ -20,7 +20,7 @@ from tfarm.dsp.stages import admit_case, not_covered
 from tfarm.errors import ConvergenceError
 from tfarm.loop.circle import Band, complete_band
 from tfarm.loop.circle_crossings import FACTOR, around, stable_windows, windows_of
-from tfarm.loop.curve import LoopCurve, LoopVerdict, next_limits
+from tfarm.loop.curve import LoopAnalysis, LoopContour, LoopVerdict, next_limits
 from tfarm.loop.edges import (
     DelayMargin,
     Figure,
@@ -53,6 +53,7 @@ FEWEST_COMPARED = 8  # modes of the smallest loop, twice as many in each next
 LARGEST_LOG = 700.0  # whose exponential is a double
 RADIUS_AGREES = 1e-4  # of ln of the spectral radius: its largest error with fewer modes
 RADIUS_NOISE = 1e-12  # and its rounding error
+ON_CIRCLE = 1e-12  # of ln|z|: an open-loop pole so near to the circle is on it
 MOST_COUNT = 400  # modes that may be asked for
 DEFAULT_PERIOD, LAWS_PERIOD = "tfarm's default period", "the controller's period"  # origins of a sampling period
 
@@ -177,6 +178,24 @@ class Verdict(OfLoop, LoopVerdict):
         return math.pi / self.full.period
 
     @cached_property
+    def contour(self) -> LoopContour:
+        """Around the upper half of the circle, as s = ln(z)/T, and outside the poles on it."""
+        loop, poles = self.full, self.full.poles
+        s = np.log(1 + loop.rig.open_loop[loop.rig.open_loop != -1])
+        is_near = abs(s.real) <= ON_CIRCLE
+        closed = np.asarray(poles.log_radius + 1j * abs(np.angle(poles.z)), dtype=np.complex128)
+        return LoopContour(
+            grid=self.frequencies,
+            on_curve=np.unique(s.imag[is_near & (s.imag >= 0) & (s.imag < math.pi)]) / loop.period,
+            closed=closed / loop.period,
+            closing=np.empty(0, complex),
+            unstable_open=int((s.real > ON_CIRCLE).sum()),
+            unstable=poles.unstable,
+            clear=poles.unstable,
+            near_axis=int((poles.log_radius == 0).sum()),
+        )
+
+    @cached_property
     def factors(self) -> list[Window]:
         """Every stability interval of a factor on the whole law, with the modes of the verdict."""
         return stable_windows(self.loop, FACTOR)
@@ -249,7 +268,7 @@ class SampledNumber(NamedTuple):
 
 
 @frozen
-class Analysis:
+class Analysis(LoopAnalysis):
     """A sampled loop: its verdict, and, computed when first read, its limits of stability and its modes.
 
     `shown`, `delay` and `damping` are limits with their certified digits, or those that other modes confirm; the
@@ -258,11 +277,6 @@ class Analysis:
 
     verdict: Annotated[Verdict, Quantity(flat=True, help="stability of the loop")]
     damping_modes: int = UNDAMPED_MODES
-
-    @property
-    def curve(self) -> LoopCurve:
-        """The loop function on a grid that resolves it."""
-        return self.verdict.curve
 
     @property
     def in_band(self) -> LoopMargins | None:
@@ -377,6 +391,12 @@ class Analysis:
     def damping_limit(self) -> Figure | Limit | None:
         """The same with a test of its digits, which takes as long as the search."""
         return damping_limit(self.loop, self.damping_modes) if self.loop.is_of_gains else None
+
+    def factor_intervals(self, delays: Real) -> list[Sequence[Window]]:
+        """Return the intervals of a positive factor on the law at each further delay [s] (n,)."""
+        sampling = self.loop.chain.sampling
+        late = sampling.delay_samples + delays / sampling.period
+        return [stable_windows(self.loop.with_delay(each), FACTOR) for each in late.tolist()]
 
     @property
     def stable_gain_factors(self) -> Annotated[list[Window] | None, Quantity("stable factors on the controller",

@@ -26,7 +26,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import AnyLaw, Arm
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN, AnyLaw, Arm
 from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
 from tfarm.arm.stages import Consumer
@@ -35,13 +35,14 @@ from tfarm.case import Case
 from tfarm.errors import ConvergenceError, ParameterError, require
 from tfarm.records import frozen
 from tfarm.reduced.modal import modal_model, sensed_model
+from tfarm.response.frequency import AXIS_SHARE
 from tfarm.schema import Quantity
-from tfarm.spectrum import modes, modes_below
+from tfarm.spectrum import flexible_frequencies, modes, modes_below
 
 from .continuous import MOST_BAND_MODES, QUIET_REACH, ContinuousLoop, band_of, grid, quiet_places
-from .curve import LoopVerdict, next_limits
+from .curve import LoopContour, LoopVerdict, next_limits
 from .loop_margins import PhaseCrossover
-from .poles import HUB, Poles, box_of, poles_below, poles_by_mode, poles_of_model
+from .poles import HUB, Poles, box_of, count_with_mirrors, poles_below, poles_by_mode, poles_of_model
 from .theorem import GIVES, TAKES, Theorem
 
 LEAST_BAND_MODES = 12  # flexible modes in the band at C = 0, and at least
@@ -166,18 +167,49 @@ class Stability(LoopVerdict):
         slow = np.geomspace(0.05 * slowest, omega[0], 400) if slowest < omega[0] else omega[:0]
         return np.unique(np.r_[omega, close[(close > 0) & (close < omega[-1])], slow])
 
+    @cached_property
+    def contour(self) -> LoopContour:
+        """Up the axis to the band, and around the right part of the box in which the poles were counted."""
+        loop, band, moving = self.loop, self.band, self.poles.moving
+        own, omega = loop.law.poles, np.asarray(grid(loop.arm, band))
+        ringing = own[own.imag > 0]
+        # points around a pole of the law, in its distances from the axis
+        near = (ringing.imag[:, None] + abs(ringing.real)[:, None] * np.linspace(-4.0, 4.0, 41)).ravel()
+        corner = complex(self.poles.box.re_max, band)
+        edges = np.linspace(1j * band, corner, 750)[1:], np.linspace(corner, corner.real, 750)[1:]
+        return LoopContour(
+            grid=np.r_[omega, near[near > omega[0]]],
+            on_curve=poles_on_axis(loop, band),
+            closed=moving,
+            closing=np.concatenate(edges),
+            unstable_open=int(((own.real > AXIS_SHARE * abs(own)) & (abs(own.imag) < band)).sum()),
+            unstable=self.unstable_roots,
+            clear=count_with_mirrors(moving[moving.real > AXIS_SHARE * abs(moving)]),
+            near_axis=count_with_mirrors(moving[abs(moving.real) <= AXIS_SHARE * abs(moving)]),
+        )
+
     def gain_limits(self, by_phase: tuple[PhaseCrossover, ...]) -> tuple[float, float]:
         """Return the factors on all of the law at which a pole reaches the axis, from where L < 0.
 
         Without damping all modes may reach it at one factor, where rounding alone decides whether L < 0.  There the
         factor follows from a theorem.
         """
-        gains, arm = self.loop.gains, self.loop.arm
-        if gains is None or not arm.loses_at_hub_alone or self.loop.theorem.energy is None:
+        if not self.loop.is_moved_at_hub_alone or self.loop.theorem.energy is None:
             return next_limits(t for _, t in by_phase)
-        found = [t for w, t in by_phase if w == 0]
-        found += [arm.input_per_torque / gains.K2] if gains.K2 else []
-        return next_limits(found + ([-arm.rate_loss / gains.K1] if gains.K1 and arm.rate_loss else []))
+        arm, numbers = self.loop.arm, self.loop.numbers
+        ends = (arm.input_per_torque, numbers[MOMENT_GAIN]), (-arm.rate_loss, numbers[RATE_GAIN])
+        return next_limits([*(t for w, t in by_phase if w == 0), *(end / gain for end, gain in ends if end and gain)])
+
+
+def poles_on_axis(loop: ContinuousLoop, band: float) -> Real:
+    """Poles of L on the imaginary axis [rad/s], from 0 up: of the rigid body and the law, and at C = 0 of all modes."""
+    arm = loop.arm
+    flexible = np.asarray(flexible_frequencies(arm, band)) if arm.is_undamped else np.empty(0)
+    own = loop.law.poles
+    on_axis = abs(own.real) <= AXIS_SHARE * abs(own)  # of a product of resonators roots are off it by rounding
+    ringing = own.imag[on_axis & (own.imag > 0) & (own.imag < band)]
+    integrators = loop.k.at_rest + int((own == 0).sum())
+    return np.unique(np.r_[[0.0] * (integrators > loop.zeros_at_origin), flexible, ringing])
 
 
 def stability(case: Case, band: float | None = None) -> Stability:

@@ -96,14 +96,14 @@ def windows_of(verdict: Stability, names: Iterable[str] | None = None) -> dict[s
     one band: high enough for both ends of each range, or that of a verdict beyond which nothing is known.
     """
     loop, numbers = verdict.loop, verdict.loop.numbers
-    if loop.gains is None and (verdict.word == "marginal" or loop.arm.has_elastic_link):
+    if not loop.is_of_gains and (verdict.word == "marginal" or loop.arm.has_elastic_link):
         return {}
     ranges = {name: looked_at(loop, name) for name in names or numbers}
     solved = {name: pair for name, pair in ranges.items() if pair[0] < pair[1] and not is_decided_along(loop, name)}
     lines, band = _lines(verdict, solved)
     done: dict[str, Windows] = {}
     for name, limits in ranges.items():
-        value, unit, reach = numbers[name], "" if loop.gains is None else shown_unit(name, loop.arm), math.inf
+        value, unit, reach = numbers[name], shown_unit(name, loop.arm) if loop.is_of_gains else "", math.inf
         if name in lines:
             try:
                 found, reach = lines[name](), band
@@ -127,7 +127,7 @@ def looked_at(loop: ContinuousLoop, name: str) -> Window:
     Of a leading coefficient without which high modes are unstable: from a tenth of its value on, with its sign.
     """
     arm, value = loop.arm, loop.numbers[name]
-    if loop.gains is None:
+    if not loop.is_of_gains:
         if name.endswith(LEADING) and value and not is_known_without(loop, name):
             low, high = sorted((value / BEYOND_LAW, value * BEYOND_LAW))
             return low, high
@@ -148,7 +148,7 @@ def _lines(verdict: Stability, ranges: dict[str, Window]) -> tuple[dict[str, Cal
     loop, band = verdict.loop, verdict.band
     if not ranges:
         return {}, band
-    if verdict.is_known_beyond or loop.gains is not None:
+    if verdict.is_known_beyond or loop.is_of_gains:
         ends = (loop.having(name, end) for name, pair in ranges.items() for end in critical(name, pair))
         band = max(band, band_of_family(ends)[0])
     terms = LawTerms(loop.signals, loop.law, ranges)
@@ -174,7 +174,7 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
         there = verdict_on(loop.having(name, at), band)
         count = 0 if there.is_stable else max(1, there.unstable_roots)
     stable = intervals(found, *limits, at, count)
-    if loop.gains is None and not verdict.is_known_beyond:
+    if not (loop.is_of_gains or verdict.is_known_beyond):
 
         def unstable_at(number: float) -> int:
             return unstable_below(loop.having(name, number), band)
@@ -182,7 +182,7 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
         carried = count + found.passed(np.array(limits)) - found.passed(at)
         if carried.tolist() != [unstable_at(end) for end in limits]:
             stable = joined([pair for pair in pairs if unstable_at(sum(pair) / 2) == 0])
-    if name == RATE_GAIN and loop.gains is not None and not loop.arm.hub_side_inertia:
+    if name == RATE_GAIN and not loop.arm.hub_side_inertia:
         least = 0.0 - loop.arm.rate_loss  # where friction is cancelled a pole of such a hub passes through infinity
         stable = [(max(start, least), end) for start, end in stable if end > least]
     return stable
@@ -194,11 +194,11 @@ def without_losses(loop: ContinuousLoop, name: str, found: Crossings) -> Crossin
     There D is even in s but for the part of the rate gain: poles are on the axis where that part vanishes, for all
     values of the other gains.  Elsewhere they reach it where K2 cancels the whole moment on the hub.
     """
-    gains, arm = loop.gains, loop.arm
-    if gains is None or not arm.loses_at_hub_alone:
+    if not loop.is_moved_at_hub_alone:
         return found
+    arm = loop.arm
     at, reach = 0.0 - arm.rate_loss, 1.0
-    if name != RATE_GAIN and at == gains.K1:
+    if name != RATE_GAIN and at == loop.numbers[RATE_GAIN]:
         return Crossings.of([])
     if name == MOMENT_GAIN and is_decided_along(loop, name):
         at, reach = arm.input_per_torque, 1e-9
@@ -213,9 +213,9 @@ def without_losses(loop: ContinuousLoop, name: str, found: Crossings) -> Crossin
 
 def is_decided_along(loop: ContinuousLoop, name: str) -> bool:
     """Whether a theorem without losses decides the stability of the loop for every value of this gain."""
-    if loop.gains is None or not loop.arm.loses_at_hub_alone or loop.arm.input_lags:
+    if not loop.is_moved_at_hub_alone or loop.arm.input_lags:
         return False
-    return loop.arm.reads_hub_moment or (name != MOMENT_GAIN and loop.gains.K2 == 0)
+    return loop.arm.reads_hub_moment or (name != MOMENT_GAIN and loop.numbers[MOMENT_GAIN] == 0)
 
 
 def theorem_edges(loop: ContinuousLoop, name: str, limits: Window) -> Crossings:
@@ -245,7 +245,7 @@ def is_held(loop: ContinuousLoop) -> bool:
 def _with_proven_ends(loop: ContinuousLoop, name: str, pair: Window, limits: Window) -> Window:
     """The interval with ends of the search replaced by infinity where a theorem holds beyond them."""
     end, beyond = (0, -math.inf) if name == MOMENT_GAIN else (1, math.inf)
-    if loop.gains is None or pair[end] != limits[end] or not is_held(loop.having(name, pair[end])):
+    if not loop.is_of_gains or pair[end] != limits[end] or not is_held(loop.having(name, pair[end])):
         return pair
     return (beyond, pair[1]) if end == 0 else (pair[0], beyond)
 

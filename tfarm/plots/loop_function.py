@@ -194,15 +194,15 @@ def sensitivity(found: Margins | LoopCurve, *, ax: Axes) -> None:
 def _words(data: Nyquist, name: str) -> str:
     """Controller and verdict, gains, and both counts."""
     verdict = data.verdict
-    gains = gains_words(verdict.loop.law).removeprefix(f"{name}, ")
-    counts = f"encirclements of −1: {data.encirclements:d};  unstable poles: {verdict.unstable_roots}"
+    gains = gains_words(verdict.full.law).removeprefix(f"{name}, ")
+    counts = f"encirclements of −1: {data.encirclements:d};  unstable poles: {verdict.contour.unstable}"
     return f"{safe(name)}{': ' * bool(name)}{verdict.word.upper()}\n{safe(gains)}\n{counts}"
 
 
 @picture(
     (Nyquist, "tfarm.nyquist returns"),
     size=(9.6, 5.6),
-    title=lambda data: f"{data.verdict.loop.arm.name}: the loop function L(iω)",
+    title=lambda data: f"{data.verdict.full.arm.name}: the loop function L(iω)",
 )
 def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     """L on the imaginary axis (from `tfarm.nyquist`), linear, and next to it a zoom at -1; the axes of the whole.
@@ -247,7 +247,7 @@ def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
 @picture(
     (Nyquist, "tfarm.nyquist returns"),
     size=(5.0, 6.1),
-    title=lambda data: f"{data.verdict.loop.arm.name}: the loop function L(iω)",
+    title=lambda data: f"{data.verdict.full.arm.name}: the loop function L(iω)",
 )
 def disc(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     """L on all of Nyquist's contour (from `tfarm.nyquist`), stability and encirclements above it; the axes.
