@@ -1,6 +1,7 @@
 """The record of arm, controller and chain, and the face with its questions."""
 
 import pickle
+from inspect import isfunction, signature
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import tfarm
 from tfarm.arm import AT_HUB, Law
 from tfarm.arm.chain import Chain, Sampling
 from tfarm.case import Case
+from tfarm.face import CaseFace, Question
 from tfarm.schema.quantities import to_dict
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -68,6 +70,28 @@ def test_other_cases_differ_in_one_part():
     assert case.through(Chain(sampling=Sampling(period=0.005))).chain.sampling.period == 0.005
     assert case == Case(LAB, GAINS)
     assert pickle.loads(pickle.dumps(case)) == case
+
+
+QUESTIONS = {each.name: method for method, each in vars(CaseFace).items() if isinstance(each, Question)}
+PARAMETERS = {
+    name: signature(getattr(tfarm, name)).parameters for name in tfarm.__all__ if isfunction(getattr(tfarm, name))
+}
+
+
+@pytest.mark.parametrize("name", [name for name, of in PARAMETERS.items() if {"arm", "law"} <= of.keys()])
+def test_each_question_of_arm_and_law_is_a_method_with_the_parts_of_the_case(name):
+    case = tfarm.Case(LAB, GAINS, Chain(sampling=Sampling(period=0.005)))
+    asked = signature(getattr(case, QUESTIONS[name])).parameters
+    left = {"arm", "law", "chain"} & asked.keys()
+    assert all(asked[part].default == getattr(case, part) for part in left)
+    assert asked.keys() | {"arm", "law", "chain"} == PARAMETERS[name].keys() | {"arm", "law", "chain"}
+
+
+def test_a_map_of_the_face_is_that_of_its_controller():
+    law = tfarm.HubFeedback(K1=0.3, K2=0.3, Kp=0.5)
+    x, y = np.linspace(0.1, 1, 4), np.linspace(-1, 3, 5)
+    found = tfarm.Case(LAB, law).map(x, y)
+    assert found.unstable.tolist() == tfarm.map(LAB, x, y, 0.5).unstable.tolist()
 
 
 @pytest.mark.parametrize("name", ["margins", "sampled", "card", "poles", "step"])

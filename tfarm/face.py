@@ -1,6 +1,6 @@
 """`tfarm.Case`: a case with the questions of the package as methods, `tfarm.Case(arm, law).margins()`.
 
-Each method is the function `tfarm.NAME(arm, law, chain, ...)` with what the case has of its first arguments.
+Each method is the function `tfarm.NAME(arm, law, chain, ...)` with what the case has of its arguments.
 """
 
 from __future__ import annotations
@@ -18,8 +18,6 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.response.signals import controller
 from tfarm.schema.terminal import table_lines
 
-OF_A_CASE = ("arm", "law", "chain")  # first arguments of the functions
-
 
 @dataclass(frozen=True)
 class Question:
@@ -31,8 +29,12 @@ class Question:
         function = getattr(tfarm, self.name)
         if case is None:
             return function
-        known = takewhile(OF_A_CASE.__contains__, signature(function).parameters)
-        return partial(function, *(getattr(case, each) for each in known))
+        parts = {"arm": case.arm, "law": case.law, "chain": case.chain}
+        names = signature(function).parameters
+        first = list(takewhile(parts.__contains__, names))
+        # the others by name: what comes between is of the method
+        others = {each: parts[each] for each in names if each in parts and each not in first}
+        return partial(function, *(parts[each] for each in first), **others)
 
 
 class CaseFace(Case):
@@ -61,6 +63,7 @@ class CaseFace(Case):
     margins = Question("margins")
     nyquist = Question("nyquist")
     locus = Question("locus")
+    map = Question("map")
     spill = Question("spill")
     sampled = Question("sampled")
     card = Question("result_card")
@@ -69,6 +72,7 @@ class CaseFace(Case):
     simulate = Question("simulate")
     export = Question("export")
     explore = Question("explore")
+    study = Question("study")
 
     def __repr__(self) -> str:
         name = controller(self.law, self.arm).law

@@ -121,6 +121,17 @@ def geared(rng, arm):
     return replace(arm, motor=motor, input=str(rng.choice(["motor_voltage", "motor_current", "hub_torque"])))
 
 
+def values_of(arm, keys):
+    """Numbers of an arm by their keys."""
+    family = KeyedArms(arm, list(keys))
+    return {key: family.value(key) for key in keys}
+
+
+def elsewhere(rng, truth):
+    """A start of each number, up to `OFF` away."""
+    return {key: value * (1 + rng.uniform(-OFF, OFF)) for key, value in truth.items()}
+
+
 def planted_rig(rng):
     """The same as `planted` of a rig, every second one of `tests.rigs`."""
     is_geared, arm = rng.random() < 0.5, None
@@ -135,13 +146,12 @@ def planted_rig(rng):
     pairs = [pairs[n] for n in rng.choice(len(pairs), size=rng.integers(1, 4), replace=False)]
     link = "link" if len(arm.links) == 1 else "link.1"
     numbers = (f"{link}.damping", *RIG_NUMBERS, *(MOTOR_NUMBERS if arm.input.startswith("motor") else ()))
-    family = KeyedArms(arm, [f"{link}.youngs_modulus", *numbers])
-    there = [key for key in numbers if math.isfinite(family.value(key)) and family.value(key) != 0]
+    there = [key for key, value in values_of(arm, numbers).items() if math.isfinite(value) and value != 0]
     chosen = rng.choice(there, size=min(len(there), rng.integers(1, 5)), replace=False).tolist()
-    truth = {key: family.value(key) for key in (f"{link}.youngs_modulus", *chosen)}
+    truth = values_of(arm, (f"{link}.youngs_modulus", *chosen))
     responses = zip(pairs, elements_response(arm, omega, pairs), strict=True)
     data = [with_noise(rng, pair, omega, H) for pair, H in responses]
-    return arm, data, list(truth), truth, {key: value * (1 + rng.uniform(-OFF, OFF)) for key, value in truth.items()}
+    return arm, data, list(truth), truth, elsewhere(rng, truth)
 
 
 def planted(rng):
@@ -152,20 +162,15 @@ def planted(rng):
     some = rng.choice(len(PAIRS), size=rng.integers(2, 4), replace=False)
     pairs = [PAIRS[n] for n in some]
     keys = [*ALWAYS, *rng.choice(SOMETIMES, size=rng.integers(1, 4), replace=False)]
-    truth = {
-        "link.youngs_modulus": arm.link.youngs_modulus, "hub.inertia": arm.hub.inertia,
-        "link.damping": arm.link.damping, "payload.mass": arm.payload.mass, "payload.inertia": arm.payload.inertia,
-        "clamp.stiffness": arm.clamp.stiffness,
-    }  # fmt: skip
+    truth = values_of(arm, [key for key in keys if "." in key])
     gains = [float(rng.choice([-1, 1]) * 10 ** rng.uniform(-1, 1)) if "gain" in keys else 1.0 for _ in pairs]
     delays = [float(rng.uniform(0, 0.3) / omega[-1]) if "delay" in keys else 0.0 for _ in pairs]
     data = []
     for (output, under), H, gain, delay in zip(pairs, elements_response(arm, omega, pairs), gains, delays, strict=True):
         data.append(with_noise(rng, (output, under), omega, gain * H * np.exp(-1j * omega * delay)))
+    start = elsewhere(rng, truth)
     for n in range(len(data)):
-        label = f":{n + 1}" if len(data) > 1 else ""
-        truth |= {f"gain{label}": gains[n], f"delay{label}": delays[n]}
-    start = {key: truth[key] * (1 + rng.uniform(-OFF, OFF)) for key in keys if key in truth and "." in key}
+        truth |= {f"gain:{n + 1}": gains[n], f"delay:{n + 1}": delays[n]}
     return arm, data, keys, truth, start
 
 
@@ -203,12 +208,8 @@ def planted_pair(rng):
     (H,) = elements_response(arm, omega, [pair])
     data = with_noise(rng, pair, omega, H, least=-2.0)
     both = ["link.youngs_modulus", "link.density" if by_ratio else "link.section.second_moment"]
-    own = {
-        "link.youngs_modulus": link.youngs_modulus, "link.density": link.density, "link.damping": arm.damping,
-        "link.section.second_moment": section.second_moment, "hub.inertia": inertia,
-    }  # fmt: skip
     keys = [*both, "link.damping", *([] if by_ratio else ["hub.inertia"])]
-    return arm, data, keys, {key: own[key] * (1 + rng.uniform(-OFF, OFF)) for key in keys}, both
+    return arm, data, keys, elsewhere(rng, values_of(arm, keys)), both
 
 
 def judged_pair(seed):
@@ -225,12 +226,11 @@ def judged_rig(seed):
     """Whether the sum of squares of one fit is at most the truth's."""
     arm, data, keys, truth, start = planted_rig(np.random.default_rng([852780, seed]))
     found = fit(arm, data, free=keys, start=start, profile=False)
-    at_truth, starts = chi_squared_at(found, truth), found.starts
+    at_truth = chi_squared_at(found, truth)
     if is_called_a_miss(found):
         return "called a miss", {}, found
-    is_worse = found.chi_squared > at_truth * (1 + 1e-9)
-    words = f"above the truth: {found.chi_squared:.5g} > {at_truth:.5g} of {found.freedom}, {starts} starts: {keys}"
-    return words if is_worse else "right", {}, found
+    words = f"above the truth: {found.chi_squared:.5g} > {at_truth:.5g}, {found.starts} starts: {keys}"
+    return words if found.chi_squared > at_truth * (1 + 1e-9) else "right", {}, found
 
 
 MISSES = ("gain", "delay", "sign", "arm")  # of one response, by a factor of 3 and by 5 ms; of the arm by a body
@@ -252,9 +252,7 @@ def planted_miss(seed):
     responses[wrong] = responses[wrong] * factors.get(kind, 1.0)
     data = [with_noise(rng, pair, omega, H) for pair, H in zip(pairs, responses, strict=True)]
     data = data if seed // len(MISSES) % 2 else [replace(each, sigma=None) for each in data]
-    truth = (arm.link.youngs_modulus, arm.hub.inertia, arm.link.damping)
-    start = {key: value * (1 + rng.uniform(-OFF, OFF)) for key, value in zip(ALWAYS, truth, strict=True)}
-    return kind, arm, data, list(ALWAYS), start, wrong
+    return kind, arm, data, list(ALWAYS), elsewhere(rng, values_of(arm, ALWAYS)), wrong
 
 
 def judged_miss(seed):
@@ -295,10 +293,5 @@ def share_right(name, judge, least):
 
 
 if __name__ == "__main__":
-    judges = (
-        ("arms", judged, MOSTLY),
-        ("pairs", judged_pair, MOSTLY),
-        ("rigs", judged_rig, 1.0),
-        ("misses", judged_miss, 1.0),
-    )
-    survey.main(*(share_right(*each) for each in judges))
+    mostly = share_right("arms", judged, MOSTLY), share_right("pairs", judged_pair, MOSTLY)
+    survey.main(*mostly, share_right("rigs", judged_rig, 1.0), share_right("misses", judged_miss, 1.0))

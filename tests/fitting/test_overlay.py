@@ -10,7 +10,6 @@ import pytest
 import tfarm
 from tests.shared import refusal
 from tests.shell import answer, refused, run
-from tfarm.errors import ParameterError
 from tfarm.fitting.data import Measured, noise_of
 from tfarm.fitting.overlay import Ratio, overlay
 from tfarm.fitting.resonances import _around, matched_peaks, must_be_in_unit, peaks_of, resonance_at
@@ -107,7 +106,7 @@ def test_frequencies_in_another_unit_than_the_header_are_one_line(scale, message
 
 def test_peaks_a_third_off_and_missing_ones_are_no_other_unit():
     """Of an arm's frequencies up to 35 % off, each seen or not: in 120 draws none is taken for another unit."""
-    rng, refused = np.random.default_rng(5), 0
+    rng = np.random.default_rng(5)
     arms = (BARE, tfarm.load("quanser-2dsfl"))
     spectra = [tfarm.modes(arm, count=40).natural_frequency[-40:] for arm in arms]
     for n in range(120):
@@ -116,14 +115,9 @@ def test_peaks_a_third_off_and_missing_ones_are_no_other_unit():
         w = np.sort(own[first : first + count] * rng.uniform(0.7, 1.35) * np.exp(0.04 * rng.standard_normal(count)))
         omega = np.r_[0.5 * w[0], np.repeat(w, 3) * np.tile([0.99, 1.0, 1.01], count), 1.5 * w[-1]]
         heights = np.r_[1.0, np.ravel([(1.0, 9.0 if rng.random() < 0.85 else 1.0, 1.0) for _ in w]), 1.0]
-        if (np.diff(omega) <= 0).any():
-            continue
-        data = Measured(output="hub_angle", input="hub_torque", omega=omega, values=heights)
-        try:
+        if (np.diff(omega) > 0).all():
+            data = Measured(output="hub_angle", input="hub_torque", omega=omega, values=heights)
             must_be_in_unit(data, 0.01 * heights, 1j * own)
-        except ParameterError:
-            refused += 1
-    assert refused == 0
 
 
 def test_pairs_are_in_order_and_of_least_cost():
@@ -161,10 +155,10 @@ def test_the_command_prints_writes_and_draws(sweep, tmp_path, capsys):
     assert "single changes that explain a mode" in out
     assert "N m/(N m)" in out
     given = answer(capsys, *options)
-    one = overlay(BARE, measured("root_moment", "hub_torque"))
-    hz = [row["measured_hz"] for row in given["modes"]]
-    assert hz == pytest.approx([abs(row.measured.pole) / (2 * np.pi) for row in one.modes], rel=1e-4)
-    assert [row["exact_hz"] for row in given["modes"]] == [abs(row.pole) / (2 * np.pi) for row in one.modes]
+    rows = zip(given["modes"], overlay(BARE, measured("root_moment", "hub_torque")).modes, strict=True)
+    for row, own in rows:
+        assert row["measured_hz"] == pytest.approx(abs(own.measured.pole) / (2 * np.pi), rel=1e-4)
+        assert row["exact_hz"] == abs(own.pole) / (2 * np.pi)
     changes = {(each["parameter"], each["mode"]): each["change_percent"] for each in given["required_percent"]}
     assert changes["youngs_modulus", 1] == pytest.approx(20.0, abs=0.5)
     assert given["power_at_zero"] == -0
@@ -185,8 +179,7 @@ def test_options_that_do_not_go_with_it_are_refused(extra, message, sweep, capsy
 
 
 def test_without_an_output_the_command_has_the_root_moment_and_no_picture_without_a_measurement(capsys, tmp_path):
-    code, out, _ = run(capsys, "response", "sasaki2012-lab", "--s", "1j", "--json")
-    assert (code, '"output": "root_moment"' in out) == (0, True)
+    assert answer(capsys, "response", "sasaki2012-lab", "--s", "1j")["output"] == "root_moment"
     assert "needs --measured" in refused(capsys, "response", "sasaki2012-lab", "--png", str(tmp_path / "a.png"))
 
 
@@ -256,8 +249,7 @@ def test_residues_are_those_by_the_derivative():
     ],
 )
 def test_signals_that_the_arm_does_not_have_are_refused(arm, output, input, message):
-    with pytest.raises(ParameterError, match=message):
-        Ratio(arm, output, input)(S)
+    assert message in str(refusal(Ratio, arm, output, input))
 
 
 def test_a_current_that_is_measured_is_the_current_that_drives():

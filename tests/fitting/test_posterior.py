@@ -20,9 +20,8 @@ from tests.shared import refusal, sized, thinned
 from tests.shell import refused, run
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
-from tfarm.fitting.fit import arms_drawn, fit, repeats, save_fit
-from tfarm.fitting.possible import response_band, stable_share
-from tfarm.fitting.posterior import Posterior, PosteriorNumber, load_posterior
+from tfarm.fitting.fit import arms_drawn, fit, response_band, save_fit, stable_share
+from tfarm.fitting.posterior import Posterior, PosteriorNumber, load_posterior, repeats
 from tfarm.plots.frequency import draw_band, draw_share
 from tfarm.report.page import ArmReport
 from tfarm.report.response_sections import fit_section
@@ -111,10 +110,7 @@ def test_an_open_direction_needs_a_range(pair):
 
 @pytest.mark.parametrize("fits", sized(16, 100))
 def test_the_posterior_covers_the_truth_at_its_rate(fits):
-    """The squared distances of the truth, over the covariance, are those of chi squared: their sum, and 80 % of them.
-
-    Noise of known size on finite elements.
-    """
+    """Squared distances of the truth, over the covariance, are those of chi squared: their sum, and 80 % of them."""
     squares = []
     for seed in range(fits):
         found = fit(LAB, measured(pairs=PAIRS[:1], share=0.1, seed=seed), free=[E, "link.damping"], profile=False)
@@ -159,13 +155,9 @@ def test_intervals_of_the_file_are_the_profiles(capfd, monkeypatch, tmp_path):
     assert sorted(each.name for each in tmp_path.iterdir()) == ["fitted.posterior.json", "fitted.toml"]
 
 
-def test_a_study_of_a_file_reads_the_posterior_next_to_it(saved, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
+def test_a_study_reads_the_posterior_next_to_its_file_and_names_the_number_without_a_range(capsys, saved, tmp_path):
     (saved / "study.toml").write_text('arm = "fitted.toml"\nposterior = "fitted.posterior.json"\n')
     assert load_posterior(load_study(str(saved / "study.toml"))["posterior"]).arm == "sasaki2012-lab-fitted"
-
-
-def test_a_study_names_the_number_without_a_range(capsys, saved, tmp_path):
     options = ("study", str(saved / "fitted.toml"), "--posterior", str(saved / "fitted.posterior.json"), "--draws", "3",
                "--ask", "modes", "--out", str(tmp_path / "out"))  # fmt: skip
     assert "--over link." in refused(capsys, *options)
@@ -216,7 +208,7 @@ def test_a_deviation_below_a_millionth_is_written_as_such(pair):
 
 @pytest.fixture(scope="module")
 def known():
-    return fit(LAB, measured(share=0.1), free=["link.youngs_modulus", "link.damping"], profile=False)
+    return fit(LAB, measured(share=0.1), free=[E, "link.damping"], profile=False)
 
 
 def test_intervals_by_the_covariance_reach_its_quantile_to_both_sides(known):
@@ -237,21 +229,18 @@ def test_drawn_arms_are_spread_by_the_covariance(known):
     assert spread[0, 1] / np.sqrt(spread[0, 0] * spread[1, 1]) == pytest.approx(correlation, abs=5 / np.sqrt(400))
 
 
-def test_drawn_arms_agree_with_the_data(known):
+def test_drawn_arms_agree_with_the_data():
     """Their own sum of squares, numbers of the sensor at their best, is within the quantile of chi squared: 99.9 %."""
-    free = ["link.youngs_modulus", "link.damping", "gain"]
-    found = fit(LAB, measured(pairs=PAIRS[:1], share=0.1), free=free, profile=False)
+    found = fit(LAB, measured(pairs=PAIRS[:1], share=0.1), free=[E, "link.damping", "gain"], profile=False)
     limit = found.chi_squared + chi2.ppf(0.999, df=2)
     for arm in arms_drawn(found, count=10):
-        numbers = {"link.youngs_modulus": arm.link.youngs_modulus, "link.damping": arm.damping}
+        numbers = {E: arm.link.youngs_modulus, "link.damping": arm.damping}
         sums = [chi_squared_at(found, numbers | {"gain": gain}) for gain in np.linspace(0.8, 1.2, 201)]
         assert min(sums) < limit
 
 
-def test_of_an_unknown_pair_the_product_hardly_varies():
-    free = ["link.youngs_modulus", "link.section.second_moment"]
-    found = fit(LAB, measured(pairs=PAIRS[:1]), free=free, profile=False)
-    arms = arms_drawn(found, count=30)
+def test_of_an_unknown_pair_the_product_hardly_varies(pair):
+    arms = arms_drawn(pair, count=30)
     E, EI = (np.log([getattr(arm.link, name) for arm in arms]) for name in ("youngs_modulus", "EI"))
     assert np.std(E) > 0.3
     assert np.std(EI) < 1e-3
@@ -294,7 +283,7 @@ OMEGA = np.geomspace(8.0, 600.0, 60)
 
 def records(moduli):
     """A record of each of these arms."""
-    arms = [replace(LAB, link=replace(LAB.link, youngs_modulus=E)) for E in moduli]
+    arms = [replace(LAB, link=replace(LAB.link, youngs_modulus=each)) for each in moduli]
     return [measured(arm, PAIRS[:1], seed=n, omega=OMEGA)[0] for n, arm in enumerate(arms)]
 
 
@@ -303,22 +292,16 @@ def test_the_scatter_between_records(scatter):
     """E that differs by 1 % from sweep to sweep: of its mean over eight records that leaves 1 %/sqrt(8)."""
     shares = np.array([-1.2, 0.7, 0.1, 1.4, -0.6, -1.1, 0.9, -0.2])
     moduli = LAB.link.youngs_modulus * (1 + scatter * shares)
-    found = fit(LAB, records(moduli), free=["link.youngs_modulus"], profile=False)
-    several = repeats(found, draws=12)
-    each = [row["link.youngs_modulus"] for row in several.each]
-    assert each == pytest.approx(moduli, rel=5e-3 if scatter else 2e-3)
-    times = several.times_wider["link.youngs_modulus"]
+    found = fit(LAB, records(moduli), free=[E], profile=False)
+    several = repeats(found, found.parameters, draws=12)
+    assert [row[E] for row in several.each] == pytest.approx(moduli, rel=5e-3 if scatter else 2e-3)
+    times = several.times_wider[E]
     if not scatter:
         assert 0.4 < times < 1.8  # of eight records: a deviation is known to 1/sqrt(14)
         return
     spread = times * found.parameters[0].deviation / LAB.link.youngs_modulus
     assert spread == pytest.approx(scatter * shares.std(ddof=0) / np.sqrt(8), rel=0.5)
     assert times > 5
-    low, high = several.intervals["link.youngs_modulus"]
+    low, high = several.intervals[E]
     assert low < LAB.link.youngs_modulus < high
-
-
-def test_two_records_have_no_scatter():
-    assert (
-        repeats(fit(LAB, records([LAB.link.youngs_modulus] * 2), free=["link.youngs_modulus"], profile=False)) is None
-    )
+    assert fit(LAB, records(moduli[:2]), free=[E], profile=False).records is None

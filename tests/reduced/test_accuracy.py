@@ -15,16 +15,12 @@ import pytest
 import tfarm
 from tests import survey
 from tests.outputs import OF_ONE_LINK
+from tests.reduced.test_modal import by_matrices
 from tests.shared import thinned
 from tests.strategies import some_arm
 from tests.survey import Finding, each_of
 from tfarm.reduced import modal_model, reduce
 from tfarm.reduced.partial_fractions import EXACT_ROUNDING, FOUND_TO_WORST, Ruler, values_and_norm
-
-
-def norm_of(ruler, w):
-    """|G| + |w G'| of the only output."""
-    return values_and_norm(ruler.G, w)[1][0]
 
 
 def test_a_planted_error_is_found_whole(arm):
@@ -63,19 +59,12 @@ def test_the_margin_covers_a_peak_that_is_not_closed_in_on(arm):
     centre, height = ruler.w[at].copy(), np.full(17, 1e-3)
     centre[8], height[8] = centre[8] + gap[8] / 2, 1.015e-3
     p = -width + 1j * centre
-    r = height * width * norm_of(ruler, centre) * (-1.0) ** np.arange(17)
+    r = height * width * values_and_norm(ruler.G, centre)[1][0] * (-1.0) ** np.arange(17)
     pair = [np.stack([each, each.conj()], axis=-1).astype(complex) for each in (p, r)]
-    planted = replace(
-        model,
-        index=np.r_[model.index, np.zeros(17, dtype=np.int64)],
-        natural_frequency=np.r_[model.natural_frequency, abs(p)],
-        eigenvalues=np.concatenate([model.eigenvalues, pair[0]]),
-        residues=np.concatenate([model.residues, pair[1][None]], axis=1),
-        participation=np.r_[model.participation, np.ones(17)],
-    )
+    planted = model.with_pairs(pair[0], pair[1][None], model.static, np.ones(17))
     w = (centre[:, None] + width[:, None] * np.linspace(-1, 1, 401)).ravel()
     s = 1j * w[:, None]
-    true = float((abs((r / (s - p) + r / (s - p.conj())).sum(axis=1)) / norm_of(ruler, w)).max())
+    true = float((abs((r / (s - p) + r / (s - p.conj())).sum(axis=1)) / values_and_norm(ruler.G, w)[1][0]).max())
     printed = float(ruler.measure(planted)[0][0])
     assert printed / FOUND_TO_WORST < 0.998 * true, "the search found it after all: a test of nothing"
     assert true <= printed
@@ -113,19 +102,13 @@ def measure(rng, points, *, damping=0.0):
     method = [None, "modal"][rng.integers(2)] if damping == 0 else None
     order = 2 * int(rng.integers(2, 12)) + (int(rng.integers(2)) if damping else 0)
     reduced = reduce(arm, names, order=order, method=method, band=band, x=x)
-    w = grid(rng, band, points)
-    found, at = true_error(reduced, w)
+    # a third even, a third logarithmic, a third random
+    third = points // 3
+    w = np.r_[np.linspace(*band, third), np.geomspace(*band, third), rng.uniform(*band, third)]
+    found, at = true_error(reduced, np.clip(w, *band))
     if found > reduced.worst_error:  # rounding of the exact values, or a real miss: proven digits decide
         found, at = true_error(reduced, np.array([at]), proven=True)
     return reduced, found, at
-
-
-def grid(rng, band, points):
-    """A third of the frequencies even, a third logarithmic, a third random."""
-    third = points // 3
-    low, high = band
-    w = np.r_[np.linspace(low, high, third), np.geomspace(low, high, third), rng.uniform(low, high, third)]
-    return np.clip(w, low, high)
 
 
 def true_error(reduced, w, *, proven=False):
@@ -135,24 +118,9 @@ def true_error(reduced, w, *, proven=False):
     if proven:
         exact = np.array([[complex(float(re), float(im)) for re, im in G.digits(1j * each, 17)] for each in w]).T
     size = abs(exact) + abs(w * G.derivative(1j * w))
-    gap = abs(by_matrices(reduced, w) - exact)
-    error = np.where(size > 0, gap / np.where(size > 0, size, 1.0), np.where(gap > 0, math.inf, 0.0)).max(axis=0)
+    gap = abs(by_matrices(reduced, 1j * w) - exact)
+    error = np.divide(gap, size, out=np.where(gap > 0, math.inf, 0.0), where=size > 0).max(axis=0)
     return float(error.max()), float(w[error.argmax()])
-
-
-def by_matrices(reduced, w):
-    """C (i w - A)^-1 B + D, blocks of two states at a time by Cramer's rule, as no function of the model has it."""
-    A, B, C, D = reduced.matrices()
-    s, value = 1j * w, np.zeros((len(C), w.size), complex) + D
-    if len(A) % 2:
-        value += C[:, -1:] * B[-1, 0] / (s - A[-1, -1])
-    for i in range(0, len(A) - 1, 2):
-        (a, b), (c, d) = A[i : i + 2, i : i + 2]
-        determinant = (s - a) * (s - d) - b * c
-        x1 = ((s - d) * B[i, 0] + b * B[i + 1, 0]) / determinant
-        x2 = (c * B[i, 0] + (s - a) * B[i + 1, 0]) / determinant
-        value += C[:, i, None] * x1 + C[:, i + 1, None] * x2
-    return value
 
 
 def reductions(rng):

@@ -9,8 +9,9 @@ import pytest
 
 import tfarm
 from tests.reduced.test_modal import norm_error
+from tests.shared import refusal
 from tests.strategies import some_arm
-from tfarm import Hub, ParameterError, Payload
+from tfarm import Hub, Payload
 from tfarm.reduced import modal_model, rational_model, reduce
 from tfarm.reduced.rational import aaa_poles
 
@@ -92,11 +93,8 @@ def test_aaa_finds_the_poles_of_a_rational_function():
     np.testing.assert_allclose(found, poles, rtol=1e-7)
 
 
-def test_what_is_refused(arm):
-    lab = tfarm.load("sasaki2012-lab")
-    with pytest.raises(ParameterError, match="C = 0"):
-        rational_model(lab, HUB, 6, 1000.0)
-    with pytest.raises(ParameterError, match="pairs"):
-        rational_model(arm, HUB, 3, 1000.0)
-    with pytest.raises(ParameterError, match="band"):
-        rational_model(arm, HUB, 6, 1e9)
+@pytest.mark.parametrize(
+    ("C", "pairs", "high", "key"), [(1e-4, 6, 1e3, "method"), (0, 3, 1e3, "pairs"), (0, 6, 1e9, "band")]
+)
+def test_what_is_refused(arm, C, pairs, high, key):
+    assert refusal(rational_model, arm.having(damping=C), HUB, pairs, high).key == key

@@ -182,7 +182,7 @@ def real(name):
 def test_a_step_over_the_measured_one_is_that_of_python_control(name):
     """The sampled plant and the controller's matrices closed by hand, driven by the recorded reference."""
     law, measured = real(name)
-    mine = compare_run(PRESET, law, Chain(), measured)
+    mine = compare_run(Case(PRESET, law, Chain()), measured)
     count = 8
     led = measured.scenario(0.01).hub_angle
     np.testing.assert_allclose(led, measured.reference - measured.reference[0], atol=1e-15)  # every row is a sample
@@ -198,7 +198,7 @@ def test_what_is_measured_and_computed_of_the_real_controllers():
     chain = load_chain(DATA / "chain.toml")
     for name, (over, end) in {"lqg": (0.40895, 0.04873), "hinf": (4.84993, 0.48027)}.items():  # all of theta11
         law, measured = real(name)
-        found = compare_run(PRESET, law, chain, measured)
+        found = compare_run(Case(PRESET, law, chain), measured)
         assert np.degrees(measured.step) == pytest.approx(30.0, abs=1e-5)
         goal = measured.reference[-1]
         assert 100 * overshoot(measured.hub_angle, measured.step, goal) == pytest.approx(over, abs=1e-3)

@@ -16,7 +16,7 @@ from tests.transition import response
 from tfarm import Attachment, Hub, Payload, RotarySpring
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.exact.system import system_of
-from tfarm.reduced.modal import end_residues, undamped_residues
+from tfarm.reduced.modal import end_residues, modal_model
 from tfarm.spectrum.frequencies import list_frequencies
 
 NAMES = ("hub_angle", "root_moment", "root_shear", "tip_displacement", "tip_deflection")
@@ -92,11 +92,11 @@ def residue_of(arm, p, names):
 @pytest.mark.parametrize("drive", thinned(["motor_current", "hub_torque", "hub_angle"], 2))
 def test_residues_of_an_undamped_rig(drive):
     arm = replace(lossless(rig()), input=drive)
-    table, wanted = tfarm.modes(arm, 3), [OUTPUTS[name] for name in NAMES]
-    found = undamped_residues(table, wanted, table.system, 0.0)
-    for n, omega in enumerate(table.natural_frequency[table.index > 0]):
-        exact = 2j * omega * residue_of(arm, 1j * omega, NAMES[drive == "hub_angle" :])
-        assert found[drive == "hub_angle" :, n] == pytest.approx(exact.real, rel=1e-9, abs=1e-12 * abs(exact).max())
+    names = NAMES[drive == "hub_angle" :]
+    model = modal_model(arm, names, 3)
+    for s, found in zip(model.eigenvalues[:, 0], model.residues[:, :, 0].T, strict=True):
+        exact = residue_of(arm, s, names)
+        assert found == pytest.approx(exact, rel=1e-9, abs=1e-12 * abs(exact).max())
 
 
 @pytest.mark.parametrize("drive", thinned(["motor_voltage", "hub_torque", "hub_angle"], 2))

@@ -39,9 +39,6 @@ from tfarm.schema import Column, Quantity, Table
 
 CONFIDENCE = 0.95  # of every interval of a fit: the usual one
 LEAST_SHARE = 1e-5  # of |H|: no measured response is better known than that, whatever its coherence
-# digits of what was measured, and of the frequencies of its lines
-SIX = singly(general, 6)
-NINE = singly(general, 9)
 
 
 def require_all(key: str, values: Real, is_good: NDArray[np.bool_], remedy: str) -> None:
@@ -75,8 +72,9 @@ class Measured:
 
     def __post_init__(self) -> None:
         for name, kind in {"omega": float, "values": complex, "sigma": float, "coherence": float}.items():
-            if getattr(self, name) is not None:
-                array: NDArray[Any] = np.atleast_1d(np.asarray(getattr(self, name), dtype=kind))
+            value = getattr(self, name)
+            if value is not None:
+                array: NDArray[Any] = np.array(value, dtype=kind, ndmin=1)
                 object.__setattr__(self, name, array)
                 remedy = f"one for each of the {self.omega.size} frequencies"
                 require(array.shape == self.omega.shape, f"{self.name} {name}", array.shape, remedy)
@@ -132,8 +130,12 @@ class Measured:
         """A row a frequency, in the columns that `read_measured` reads."""
         columns = {"re": self.values.real, "im": self.values.imag, "sigma": self.sigma, "coherence": self.coherence}
         titles = {"re": f"Re {self.name}", "im": f"Im {self.name}"}
-        rows = [Column("hz", "frequency", "Hz", of=self.omega / HERTZ, digits=NINE)]
-        rows += [Column(key, titles.get(key, key), of=x, digits=SIX) for key, x in columns.items() if x is not None]
+        rows = [Column("hz", "frequency", "Hz", of=self.omega / HERTZ, digits=singly(general, 9))]
+        rows += [
+            Column(key, titles.get(key, key), of=x, digits=singly(general, 6))
+            for key, x in columns.items()
+            if x is not None
+        ]
         rows += [Column("averages", "averages", of=[self.averages] * self.points)] * (self.averages is not None)
         return Table(columns=tuple(rows))
 
@@ -192,13 +194,11 @@ def noise_of(data: Measured) -> Noise:
     size = abs(data.values)
     with np.errstate(divide="ignore"):
         share = np.maximum(np.sqrt((1.0 - g) / (2.0 * (data.averages or 1) * g)), LEAST_SHARE)
-    sigma = np.where((g == 0) | (size == 0), np.inf, size * share)  # a share of nothing is no deviation
-    known = data.averages is not None
-    return Noise(
-        sigma=sigma,
-        is_known=known,
-        source=f"coherence of {data.averages} averages" if known else "coherence, up to a factor",
-    )
+    # a share of nothing is no deviation
+    sigma = np.where((g == 0) | (size == 0), np.inf, size * share)
+    if data.averages is None:
+        return Noise(sigma=sigma, is_known=False, source="coherence, up to a factor")
+    return Noise(sigma=sigma, is_known=True, source=f"coherence of {data.averages} averages")
 
 
 def _scatter(values: NDArray[Any]) -> Real:
@@ -210,20 +210,19 @@ def _scatter(values: NDArray[Any]) -> Real:
     if size.size < 5:
         return np.maximum(size, LEAST_SHARE * size.max())
     # x_k less the parabola through x_(k-2), x_(k-1), x_(k+1), x_(k+2): weights -1/6, 2/3, 2/3, -1/6 of these
-    weights = np.array([1 / 6, -2 / 3, 1.0, -2 / 3, 1 / 6])
+    weights = np.array([1, -4, 6, -4, 1]) / 6
     inside = size[2:-2]
-    away = abs(np.convolve(values, weights, mode="valid"))[inside > 0] / np.sqrt((weights**2).sum())
+    away = abs(np.convolve(values, weights, mode="valid"))[inside > 0] / np.linalg.norm(weights)
     # the median of |x + i y| of normal x and y of deviation 1 is sqrt(2 ln 2)
     typical = np.median(away / inside[inside > 0]) / 1.17741 if away.size else 1.0
-    least = max(1e-3 * np.median(size), 1e-6 * size.max())  # which a value of 0 is taken for
+    # which a value of 0 is taken for
+    least = max(1e-3 * np.median(size), 1e-6 * size.max())
     return np.maximum(size, least) * max(typical, LEAST_SHARE)
 
 
 MOST_RECORD_BYTES = 256 * 1024 * 1024  # of a record; an hour of two signals at 1 kHz as text has 150 MB
 FREQUENCIES = {"hz": ("Hz", 2 * np.pi), "rad_s": ("rad/s", 1.0)}  # its unit, and rad/s in one
 VALUES = ("re", "im", "abs", "db", "deg")
-KNOWN_COLUMNS = (*FREQUENCIES, *VALUES, "coherence", "sigma", "averages")
-UFF = r"\.uff|\.unv|\.uf"  # ends of its names
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"  # as it is written in a cell or an option
 
 
@@ -324,7 +323,7 @@ def read_measured(path: str | os.PathLike[str], output: str, input: str) -> Meas
     check_signal(output, "output")
     check_signal(input, "input")
     name = os.fspath(path)
-    if uff := re.fullmatch(rf"(.*(?:{UFF}))(?:#(\d{{1,9}}))?", name, re.DOTALL | re.IGNORECASE):
+    if uff := re.fullmatch(r"(.*\.(?:uff|unv|uf))(?:#(\d{1,9}))?", name, re.DOTALL | re.IGNORECASE):
         return _of_uff(uff[1], uff[2] or "", output, input)
     sheet = read_sheet(path, key=f"{output}/{input}")
     with naming(name):
@@ -360,8 +359,9 @@ def check_signal(name: str, key: str) -> None:
 # ------------------------------------------------------------ CSV
 def _frequencies(sheet: Sheet) -> Real:
     """The frequencies [rad/s], once the header is known to be one and they ascend."""
+    known = (*FREQUENCIES, *VALUES, "coherence", "sigma", "averages")
     for name in sheet.columns:
-        require(name in KNOWN_COLUMNS, "header", name, did_you_mean(name.lower(), KNOWN_COLUMNS))
+        require(name in known, "header", name, did_you_mean(name.lower(), known))
     found = [name for name in FREQUENCIES if name in sheet.columns]
     require(len(found) == 1, "header", [*sheet.columns], "one column of frequencies: hz or rad_s")
     (name,) = found
@@ -411,6 +411,10 @@ def _of_uff(path: str, number: str, output: str, input: str) -> Measured:
         values: NDArray[Any] = np.asarray(found[f"data{place - 1}"], dtype=complex)
         kept = slice(int(omega.size > 0 and omega[0] == 0), None)  # the line at 0 Hz that spectra begin with
         return Measured(
-            output=output, input=input, omega=omega[kept], values=values[kept], digest=hashlib.sha256(data).hexdigest(),
+            output=output,
+            input=input,
+            omega=omega[kept],
+            values=values[kept],
             source=f"{path}#{number}" if number else path,
-        )  # fmt: skip
+            digest=hashlib.sha256(data).hexdigest(),
+        )

@@ -127,23 +127,20 @@ def ring(
     Raises ParameterError for a signal or times that are not there and for too few samples, ConvergenceError where the
     oscillations are not found.
     """
-    y = recording.signal(name, "--signal")
+    whole = recording.signal(name, "--signal")
     times = recording.times
-    low = times[0] if start is None else start
+    low = float(times[0] if start is None else start)
     high = times[-1] if stop is None else stop
-    rounding = recording.period / 2 * 1e-6
-    kept = (times >= low - rounding) & (times <= high + rounding)
-    most, least = 20, 4 * (EACH * modes + 1)
-    require(1 <= modes <= most, "--modes", modes, f"a whole number from 1 to {most}")
-    found = f"{kept.sum()} samples from {low:g} to {high:g} s; {modes} modes take {least}"
-    remedy = f"{found} (the record goes from {times[0]:g} to {times[-1]:g} s)"
-    require(kept.sum() >= least, "--from", float(low), remedy, recording.source)
-    require(np.ptp(y[kept]) > 0, "--signal", name, "does not move there", recording.source)
-    return ring_of(recording, name, times[kept], y[kept], modes)
-
-
-def ring_of(recording: Recording, name: str, times: Real, y: Real, modes: int) -> Ring:
-    """The modes of a decay of samples y at some of the times of a record."""
+    # within half a millionth of a sample: rounding of times
+    kept = abs(2 * times - low - high) <= high - low + 1e-6 * recording.period
+    require(1 <= modes <= 20, "--modes", modes, "a whole number from 1 to 20")
+    least = 4 * (EACH * modes + 1)
+    taken = f"{kept.sum()} samples from {low:g} to {high:g} s; {modes} modes take {least}"
+    remedy = f"{taken} (the record goes from {times[0]:g} to {times[-1]:g} s)"
+    require(kept.sum() >= least, "--from", low, remedy, recording.source)
+    times = times[kept]
+    y = whole[kept]
+    require(np.ptp(y) > 0, "--signal", name, "does not move there", recording.source)
     t = times - times[0]
     poles = starting_poles(t, y, modes)
     found = nearest_sum(t, y, poles) if poles.size == modes else None
@@ -155,24 +152,22 @@ def ring_of(recording: Recording, name: str, times: Real, y: Real, modes: int) -
     white = 1.0 if squares <= y.size * (rounding * abs(y).max()) ** 2 else whiteness(found.e)
     notes = [recording.note] if recording.note else []
     if white < NOT_WHITE:
-        rare = 1e-9
-        chance = f"{white:.1g}" if white > rare else f"below {rare:g}"
+        chance = f"{white:.1g}" if white > 1e-9 else "below 1e-09"
         notes.append(
             f"the residuals are correlated (probability {chance} if they were white noise): intervals are "
             "by their autocovariance, and may be too narrow, above all if the residuals are no noise"
         )
     spread = found.covariance(is_white=white >= NOT_WHITE)
-    (early, of_early), (late, of_late) = (
-        by_part(t[part], y[part], found.poles) for part in (slice(t.size // 2), slice(t.size // 2, None))
-    )
+    halves = zip(np.array_split(t, [t.size // 2]), np.array_split(y, [t.size // 2]), strict=True)
+    w, variance = np.swapaxes([by_part(*half, found.poles) for half in halves], 0, 1)
+    apart = np.sqrt(variance.sum(axis=0))
+    # by more than four standard deviations
+    is_drifting = abs(np.subtract(*w)) > 4.0 * apart + rounding * found.poles.imag
     rows = []
     for number, n in enumerate(np.argsort(-found.energy, kind="stable").tolist(), start=1):
-        first, second = early[n] / HERTZ, late[n] / HERTZ
-        apart = math.sqrt(of_early[n] + of_late[n])
-        both = (first, second) if math.isfinite(apart) else (None, None)
-        rows.append(found.mode(n, number, spread, both))
-        # by more than four standard deviations
-        if abs(early[n] - late[n]) > 4.0 * apart + rounding * found.poles[n].imag:
+        first, second = (w[:, n] / HERTZ).tolist()
+        rows.append(found.mode(n, number, spread, (first, second) if np.isfinite(apart[n]) else (None, None)))
+        if is_drifting[n]:
             notes.append(
                 f"mode {number} rings at {first:.4g} Hz in its first half, {second:.4g} Hz in its "
                 "second: no linear decay, or friction, or another mode"
@@ -190,12 +185,12 @@ def ring_of(recording: Recording, name: str, times: Real, y: Real, modes: int) -
     )
 
 
-def by_part(t: Real, y: Real, poles: Complex) -> tuple[list[float], list[float]]:
+def by_part(t: Real, y: Real, poles: Complex) -> tuple[Real, Real]:
     """w by a part of the record, from the whole's poles on, and its variance.
 
     Where the part does not determine it, w of the whole and an infinite variance.
     """
-    w = poles.imag
+    w = np.asarray(poles.imag, float)
     variance = np.full(w.size, np.inf)
     found = nearest_sum(t - t[0], y, poles) if y.size > 2 * (EACH * w.size + 1) else None
     if found is not None:
@@ -203,8 +198,8 @@ def by_part(t: Real, y: Real, poles: Complex) -> tuple[list[float], list[float]]
         _, of_w, of_a, of_b = np.diag(spread)[:-1].reshape(EACH, w.size)
         # deviations of the amplitude of an oscillation that is determined: noise has 4
         variance = np.where(found.amplitude**2 > 8.0**2 * (of_a + of_b) / 2, of_w, np.inf)
-        w = found.poles.imag
-    return w.tolist(), variance.tolist()
+        w = np.asarray(found.poles.imag, float)
+    return w, variance
 
 
 def basis(poles: Complex, t: Real) -> Real:
@@ -228,8 +223,7 @@ class DampedSum:
         n = self.poles.size
         columns = basis(self.poles, self.t)
         by_time = self.t[:, None]
-        cosines = columns[:, :n]
-        sines = columns[:, n:-1]
+        cosines, sines = np.hsplit(columns[:, :-1], 2)
         a, b = self.linear[:-1].reshape(2, n)
         return np.c_[-by_time * (a * cosines + b * sines), by_time * (b * cosines - a * sines), columns]
 
@@ -241,9 +235,8 @@ class DampedSum:
     @property
     def energy(self) -> Real:
         """(n,): the sum of squares of each mode alone."""
-        n = self.poles.size
-        parts = (basis(self.poles, self.t) * self.linear)[:, :-1]
-        return ((parts[:, :n] + parts[:, n:]) ** 2).sum(axis=0)
+        cosines, sines = np.hsplit((basis(self.poles, self.t) * self.linear)[:, :-1], 2)
+        return ((cosines + sines) ** 2).sum(axis=0)
 
     @property
     def freedom(self) -> int:
@@ -262,28 +255,34 @@ class DampedSum:
     def mode(self, n: int, number: int, covariance: Real, halves: Sequence[float | None]) -> DecayMode:
         """Mode n by its number, with intervals (Student's t); d zeta = (w^2 d sigma - sigma w d w)/|s|^3."""
         s = complex(self.poles[n])
+        size = abs(s)
         places = [n, n + self.poles.size]
-        slope = np.array([s.imag**2, s.real * s.imag]) / abs(s) ** 3
+        slope = np.array([s.imag**2, s.real * s.imag]) / size**3
         own = covariance[np.ix_(places, places)]
         reach = float(stdtrit(self.freedom, 0.5 + CONFIDENCE / 2))
         f = s.imag / HERTZ
         df = math.sqrt(own[1, 1]) / HERTZ
-        z = -s.real / abs(s)
+        z = -s.real / size
         dz = math.sqrt(slope @ own @ slope)
-        damping = f",{z:.6g}~{dz:.3g}" if 0 < z < 1 and dz > 0 else ""  # `tfarm fit --mode` takes positive ones alone
-        return DecayMode(
-            number, f, f - reach * df, f + reach * df, df, abs(s) / HERTZ, z, z - reach * dz, z + reach * dz, dz,
-            float(self.amplitude[n]), f"{f:.8g}hz~{df:.3g}{damping}", *halves,
-        )  # fmt: skip
+        # `tfarm fit --mode` takes positive ones alone
+        damping = f",{z:.6g}~{dz:.3g}" if 0 < z < 1 and dz > 0 else ""
+        option = f"{f:.8g}hz~{df:.3g}{damping}"
+        frequency = (f, f - reach * df, f + reach * df, df, size / HERTZ)
+        ratio = (z, z - reach * dz, z + reach * dz, dz)
+        return DecayMode(number, *frequency, *ratio, float(self.amplitude[n]), option, *halves)
 
 
 def nearest_sum(t: Real, y: Real, start: Complex) -> DampedSum | None:
     """The sum with the least squares next to the poles of a start; None where that is no oscillation in the record."""
-    n = start.size
     period = t[1] - t[0]
+
+    def poles_at(x: Real) -> Complex:
+        real, imaginary = x.reshape(2, -1)
+        return real + 1j * imaginary
+
     first = np.r_[start.real, start.imag]
-    found = least_projected(lambda x: basis(x[:n] + 1j * x[n:], t), y, first, xtol=1e-12)
-    poles = found.x[:n] + 1j * found.x[n:]
+    found = least_projected(lambda x: basis(poles_at(x), t), y, first, xtol=1e-12)
+    poles = poles_at(found.x)
     is_inside = (poles.imag > 0) & (poles.imag < np.pi / period) & (abs(poles.real) < 2 / period)
     if not (found.success and is_inside.all()):
         return None
@@ -312,9 +311,9 @@ def starting_poles(t: Real, y: Real, modes: int) -> Complex:
         thin *= 4
     s = np.concatenate(found)
     # a pole of the start may grow by e^3 during the record
-    s = s[(s.imag > math.pi / duration) & (s.real * period > -1) & (s.real * duration < 3.0)]
+    s = np.unique(s[(s.imag > math.pi / duration) & (s.real * period > -1) & (s.real * duration < 3.0)])
     chosen = s[:0]
-    while chosen.size < min(modes, np.unique(s).size):
+    while chosen.size < min(modes, s.size):
         tried = [np.r_[chosen, each] for each in s if each not in chosen]
         chosen = min(tried, key=lambda poles: (project(basis(poles, t), y)[1] ** 2).sum())
     return chosen

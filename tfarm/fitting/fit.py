@@ -3,16 +3,14 @@
 Arms that the data leave possible are drawn from the posterior, along what the data do not determine with a deviation of
 a factor of e, and kept where the true sum of squares agrees with the data.
 
-Of several records of one response there are the numbers by each record, and a bootstrap over them.  The noise within a
-record is not all that differs from one sweep to the next: amplitudes, temperatures, the hand that clamped the link.
-Drawing whole records anew (Efron 1979) gives intervals that include it.
+Curves over frequency and gains have the arms that the data leave possible as a band, or a share of them.
 """
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -28,14 +26,16 @@ from tfarm.arrays import Complex, Real
 from tfarm.digits import listed
 from tfarm.errors import ConvergenceError, one_line, require
 from tfarm.files import is_standard_output, write_file
+from tfarm.loop.plane import gain_map
 from tfarm.records import frozen
+from tfarm.response import transfer
 from tfarm.schema import Quantity
 
 from .data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of, rms
 from .misses import Miss, Remedy, misses_of, remedies_of
 from .model import SENSOR_DELAY, SENSOR_GAIN, Problem, Response, RingMode, parameters
 from .overlay import ResonanceShift, ratio_of, resonance_shifts
-from .posterior import SUFFIX, Posterior, posterior_of
+from .posterior import SUFFIX, Posterior, Repeats, posterior_of, repeats
 from .solve import (
     FIT_SEED,
     BetterError,
@@ -112,6 +112,14 @@ class Fit(Solution):
         return tuple(each.data for each in self.problem.responses)
 
     @property
+    def curves(self) -> Iterator[tuple[Real, Complex, Complex]]:
+        """Frequencies [rad/s] of each measured response, with its values at the start and at the fitted numbers."""
+        for number, one in enumerate(self.responses):
+            omega = np.unique(np.r_[np.geomspace(*one.band, 1200), one.omega])
+            problem = self.problem.at(number, omega)
+            yield omega, problem.computed(0 * self.point)[0], problem.computed(self.point)[0]
+
+    @property
     def response_list(
         self,
     ) -> Annotated[
@@ -122,21 +130,10 @@ class Fit(Solution):
         rows = []
         for one, residuals in zip(self.problem.responses, self.parts, strict=True):
             of = one.data
+            names = (of.name, of.label, of.unit, of.source, of.digest)
             chi_squared = float(residuals @ residuals)
-            rows.append(FittedResponse(
-                of.name, of.label, of.unit, of.source, of.digest, of.points, *of.range_hz, one.noise.source, chi_squared
-            ))  # fmt: skip
+            rows.append(FittedResponse(*names, of.points, *of.range_hz, one.noise.source, chi_squared))
         return rows
-
-    @cached_property
-    def curves(self) -> tuple[tuple[Real, Complex, Complex], ...]:
-        """Frequencies [rad/s] of each measured response, with its values at the start and at the fitted numbers."""
-        found = []
-        for number, one in enumerate(self.responses):
-            omega = np.unique(np.r_[np.geomspace(one.omega[0], one.omega[-1], 1200), one.omega])
-            problem = self.problem.at(number, omega)
-            found.append((omega, problem.computed(0 * self.point)[0], problem.computed(self.point)[0]))
-        return tuple(found)
 
     @cached_property
     def resonances(
@@ -174,7 +171,7 @@ class Fit(Solution):
         Repeats | None, Quantity("scatter between records", help="numbers fitted to each record of one response alone")
     ]:
         """The scatter between the records of one response."""
-        return repeats(self)
+        return repeats(self, self.parameters)
 
     @cached_property
     def rms_log_error(
@@ -186,10 +183,8 @@ class Fit(Solution):
         """The root mean square of ln(computed/measured), complex, over all values; None where there are none."""
         if not self.responses:
             return None
-        computed = self.problem.computed(self.point)
-        pairs = zip(computed, self.responses, strict=True)
-        away = np.concatenate([np.log(H / each.values)[each.values != 0] for H, each in pairs])
-        return rms(away)
+        pairs = zip(self.problem.computed(self.point), self.responses, strict=True)
+        return rms(np.concatenate([np.log(H / each.values)[each.values != 0] for H, each in pairs]))
 
     @property
     def is_explained(
@@ -266,13 +261,10 @@ class Fit(Solution):
         """The remedy that helps most, or that none of those tried is enough; None where the curve does not miss."""
         if not self.misses:
             return None
-        best = next(iter(self.remedies), None)
-        if best is not None and best.is_enough:
-            return best.in_words
-        most = f"; most helps {best.change}" if best is not None else ""
-        return (
-            f"no gain, delay, sign or bound is enough: free other numbers of the arm, or add a part that it lacks{most}"
-        )
+        words = "no gain, delay, sign or bound is enough: free other numbers of the arm, or add a part that it lacks"
+        for best in self.remedies[:1]:
+            return best.in_words if best.is_enough else f"{words}; most helps {best.change}"
+        return words
 
 
 def fit(
@@ -325,9 +317,10 @@ def _assumptions(fit: Fit, before: Sequence[str]) -> tuple[str, ...]:
     for text in before:
         labels = [file_key(key).label for key in family.keys if is_named(key, family.value(key), text)]
         mark = f"Before the fit of {listed(labels)}: " if labels else ""
-        texts.append(text if text.startswith(mark) else mark + text)
-    numbers = [(each.label, each.value, file_key(each.key).unit) for each in fit.parameters if "." in each.key]
-    values = [f"{label} = {value:.6g} {unit}".rstrip() for label, value, unit in numbers] or ["sensors alone"]
+        texts.append(mark + text.removeprefix(mark))
+    numbers = [each for each in fit.parameters if "." in each.key]
+    values = [f"{each.label} = {each.value:.6g} {file_key(each.key).unit}".rstrip() for each in numbers]
+    values = values or ["sensors alone"]
     texts.append(f"Fitted: {listed(values)}, from the arm {fit.before.name}; {fit.in_words}.")
     for each in fit.responses:
         digest = each.digest or "none"
@@ -342,9 +335,9 @@ def is_named(key: str, value: float, text: str) -> bool:
     # a symbol ends a label: I_h, Kt
     symbol = last if len(last) <= 3 else ""
     label = " ".join(words) if symbol else of.label
-    patterns = [rf"(?i:\b{re.escape(label)}\b)", *([rf"(?<!\d )\b{symbol}(?=,| and | of | =)"] if symbol else [])]
+    pattern = rf"(?i:\b{re.escape(label)}\b)" + rf"|(?<!\d )\b{symbol}(?=,| and | of | =)" * bool(symbol)
     values = re.findall(rf"({NUMBER}) {re.escape(of.unit)}(?![\w^/]| m\^)", text) if of.unit else []
-    return any(re.search(each, text) for each in patterns) or any(float(each) == value for each in values)
+    return bool(re.search(pattern, text)) or value in map(float, values)
 
 
 def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: Any, rings: Any) -> Problem:
@@ -368,7 +361,6 @@ def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: An
 
 
 ARMS = 40  # that a report draws
-DRAWS = 40  # of records
 
 
 def arms_drawn(fit: Fit, count: int) -> tuple[Arm, ...]:
@@ -378,12 +370,12 @@ def arms_drawn(fit: Fit, count: int) -> tuple[Arm, ...]:
     data, or the sum of squares is so far from a parabola that draws of one are none of it.
     """
     own = fit.problem.of_the_arm
-    J = fit.jacobian
-    of_sensors = -np.linalg.pinv(J[:, len(own) :]) @ J[:, : len(own)]
     if fit.misses:
         raise ConvergenceError("the fitted curve misses the data", [], 0)
-    each_time = 10  # draws for each arm wanted, at most
-    normal = np.random.default_rng(FIT_SEED).standard_normal((each_time * count, len(own)))
+    J, of_the_sensors = np.split(fit.jacobian, [len(own)], axis=1)
+    of_sensors = -np.linalg.pinv(of_the_sensors) @ J
+    # ten draws for each arm wanted, at most
+    normal = np.random.default_rng(FIT_SEED).standard_normal((10 * count, len(own)))
     # of draws of a normal distribution: one whose sum of squares is larger is none of them
     most = fit.chi_squared + 2.0 * gammaincinv(len(own) / 2, 0.999)  # the quantile of chi squared
     kept: list[Arm] = []
@@ -398,84 +390,36 @@ def arms_drawn(fit: Fit, count: int) -> tuple[Arm, ...]:
     raise ConvergenceError(words, kept, len(kept))
 
 
-@frozen
-class Repeats:
-    """The fitted numbers by each record of `response` alone, `each` [SI], and by draws of records.
+class ResponseBand(NamedTuple):
+    """Magnitudes of a response at `omega` [rad/s]: of the arm that fits best, least and largest of possible ones."""
 
-    `intervals` hold 95 % of the draws, `times_wider` is their standard deviation over that by the noise.
-    """
-
-    response: Annotated[str, Quantity("response", help="response of which there are several records")]
-    each: Annotated[list[dict[str, float]], Quantity(help="fitted numbers by each record alone")]
-    intervals: Annotated[
-        dict[str, list[float]], Quantity("intervals by records", help="95 % of bootstrap draws of whole records")
-    ]
-    times_wider: Annotated[
-        dict[str, float],
-        Quantity(
-            "times wider than by noise",
-            help="standard deviation over draws of records, over that by the noise within a record",
-        ),
-    ]
-
-    @property
-    def count(self) -> Annotated[int, Quantity("records", help="number of records of that response")]:
-        """The number of records."""
-        return len(self.each)
-
-    @property
-    def in_words(
-        self,
-    ) -> Annotated[
-        str, Quantity("finding", key="in_words", help="numbers whose scatter exceeds what the noise explains")
-    ]:
-        """The numbers whose scatter is larger than the noise explains."""
-        # a scatter that is 1.5 times that by the noise is named
-        larger = [f"{key} {times:.3g} times" for key, times in self.times_wider.items() if times > 1.5]
-        return f"larger than the noise explains: {listed(larger)}" if larger else "as the noise explains"
+    omega: Real
+    best: Real
+    low: Real
+    high: Real
 
 
-def repeats(fit: Fit, draws: int = DRAWS) -> Repeats | None:
-    """The scatter between the records of the response that there are most of; None where there are fewer than three.
+def response_band(fit: Fit, arms: Sequence[Arm], output: str) -> ResponseBand:
+    """Return the band of a response over these arms, in the range of all measurements."""
+    ends = [end for each in fit.responses for end in each.band]
+    # about one frequency to a pixel
+    omega = np.geomspace(min(ends), max(ends), 800)
+    best, *others = (abs(transfer(each, output)(1j * omega)) for each in (fit.arm, *arms))
+    return ResponseBand(omega, best, np.min(others, axis=0), np.max(others, axis=0))
 
-    Each least sum over some of the responses begins at that over all; sensors of the others are held, and so is what
-    all together do not determine.
-    """
-    from scipy.stats import bootstrap
 
-    own = fit.problem
-    names = [each.data.label for each in own.responses]
-    most = max(names, key=names.count, default="")
-    records = [n for n, name in enumerate(names) if name == most]
-    if len(records) < 3:
-        return None
-    others = [n for n, name in enumerate(names) if name != most]
-    identified = {n: each for n, each in enumerate(fit.parameters) if each.identified}
-    # a key with a colon is of one record's sensor, which others do not know
-    known = {n: each for n, each in identified.items() if each.deviation and ":" not in each.key}
+class ShareOfArms(NamedTuple):
+    """The share (up, across) of arms that each pair of gains stabilises in continuous time."""
 
-    def numbers(chosen: Sequence[int]) -> Real:
-        some = replace(own, responses=tuple(own.responses[n] for n in (*chosen, *others)))
-        sensors = {place for each in some.responses for place in (each.gain, each.delay)}
-        used = identified.keys() & (sensors | set(range(len(own.of_the_arm))))
-        held = {n: float(x) for n, x in enumerate(fit.point) if n not in used}
-        point = nearest_minimum(some, fit.point, held).point
-        return np.array([own.value(point, n) for n in known])
+    across: Real
+    up: Real
+    share: Real
 
-    drawn = bootstrap(
-        (records,), numbers, n_resamples=draws, vectorized=False, method="percentile", confidence_level=CONFIDENCE,
-        rng=FIT_SEED,
-    )  # fmt: skip
 
-    def by_key(values: Real) -> dict[str, Any]:
-        return dict(zip([each.key for each in known.values()], values.tolist(), strict=True))
-
-    return Repeats(
-        response=most,
-        each=[by_key(numbers([n])) for n in records],
-        intervals=by_key(np.array(drawn.confidence_interval).T),
-        times_wider=by_key(drawn.standard_error / np.array([each.deviation for each in known.values()])),
-    )
+def stable_share(arms: Sequence[Arm], ranges: Sequence[tuple[float, float]]) -> ShareOfArms:
+    """Return the share of these arms over the `ranges` of both gains."""
+    across, up = (np.linspace(*ends, 60) for ends in ranges)
+    return ShareOfArms(across, up, np.mean([gain_map(arm, across, up).unstable == 0 for arm in arms], axis=0))
 
 
 def save_fit(fit: Fit, path: Path) -> None:

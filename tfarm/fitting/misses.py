@@ -66,9 +66,10 @@ def misses_of(found: Solution) -> tuple[Miss, ...]:
 
 def _miss(one: Response, computed: Complex) -> Miss | None:
     """Return how one response is missed, None where it is not."""
-    kept = np.isfinite(one.noise.sigma) & (one.data.values != 0)
-    omega = one.data.omega[kept]
-    ratio = computed[kept] / one.data.values[kept]
+    data = one.data
+    kept = np.isfinite(one.noise.sigma) & (data.values != 0)
+    omega = data.omega[kept]
+    ratio = computed[kept] / data.values[kept]
     if omega.size < 2:
         return None
     away = np.log(ratio)
@@ -83,7 +84,7 @@ def _miss(one: Response, computed: Complex) -> Miss | None:
         return None
     off = away[abs(away) > limit]
     return Miss(
-        response=one.data.name,
+        response=data.name,
         factor=math.exp(rms(off.real)),
         degrees=math.degrees(rms(off.imag)),
         low=float(omega[alike[0]]) / HERTZ,
@@ -96,14 +97,12 @@ def remedies_of(found: Solution) -> tuple[Remedy, ...]:
 
     A number more is worth `EXCLUDED` of a sum of squares, so that a sign goes before the gain that has it.
     """
-    tried = [
-        (there.misfit + EXCLUDED / 2 * there.point.size, Remedy(
-            change=change, log_likelihood=found.misfit - there.misfit, is_enough=not misses_of(there),
-            is_explained=is_explained(there),
-        ))
-        for change, there in _tries(found)
-    ]  # fmt: skip
-    return tuple(remedy for _, remedy in sorted(tried, key=lambda each: (not each[1].is_enough, each[0])))
+    tried = []
+    for change, there in _tries(found):
+        misses = misses_of(there)
+        rank = bool(misses), there.misfit + EXCLUDED / 2 * there.point.size
+        tried.append((rank, Remedy(change, found.misfit - there.misfit, not misses, is_explained(there))))
+    return tuple(remedy for _, remedy in sorted(tried, key=lambda each: each[0]))
 
 
 def _searched(problem: Problem) -> Solution:
@@ -121,14 +120,10 @@ def _tries(found: Solution) -> Iterator[tuple[str, Solution]]:
         values = [there.problem.value(there.point, getattr(each, key)) for each in there.problem.responses]
         yield f"a free {key} (--free {key}): {listed([f'{each:.4g}{unit}' for each in values])}", there
         if min(values) < 0 and key == SENSOR_GAIN:
-            responses, names = [], []
-            for each, value in zip(problem.responses, values, strict=True):
-                data = each.data
-                if value < 0:
-                    names.append(data.name)
-                    data = replace(data, values=-data.values)
-                responses.append(replace(each, data=data))
-            yield f"the other sign of {listed(names)}", _searched(replace(problem, responses=tuple(responses)))
+            pairs = list(zip(problem.responses, values, strict=True))
+            names = [each.data.name for each, value in pairs if value < 0]
+            turned = (replace(each, data=replace(each.data, values=np.sign(x) * each.data.values)) for each, x in pairs)
+            yield f"the other sign of {listed(names)}", _searched(replace(problem, responses=tuple(turned)))
     yield from _beyond_bounds(found)
 
 

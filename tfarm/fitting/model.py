@@ -21,16 +21,18 @@ from functools import cached_property
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-from scipy.optimize import newton
 
 from tfarm.arm import INPUTS, Arm, Input
 from tfarm.arm.writing import KeyedArms
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError, did_you_mean, require
+from tfarm.exact.characteristic import characteristic
 from tfarm.exact.outputs import OUTPUTS
+from tfarm.exact.system import system_of
 from tfarm.records import frozen
 from tfarm.response.signals import Signals
 from tfarm.spectrum import modes
+from tfarm.spectrum.box import newton
 from tfarm.spectrum.table import first_frequency
 
 from .data import NUMBER, Measured, Noise, in_parts
@@ -165,53 +167,30 @@ def mode_of(text: str) -> RingMode:
     spread = rf"(?:~\s*{some})?"
     form = rf"\s*(\d{{1,3}})\s*=\s*{some}(?:hz|rad_s)\s*{spread}(?:,\s*{some}{spread})?"
     found = re.fullmatch(form, text, re.IGNORECASE | re.ASCII)
-    number, w, dw, ratio, spread_of_ratio = found.groups() if found else ("0",) * 5
-    unit = 2 * math.pi if "hz" in text.lower() else 1.0
-    frequency = float(w) * unit
-    mode = RingMode(
-        number=int(number),
-        frequency=frequency,
-        frequency_deviation=float(dw) * unit if dw else 2e-3 * frequency,
-        ratio=float(ratio) if ratio else None,
-        ratio_deviation=float(spread_of_ratio or 0.1 * float(ratio or math.inf)),
-    )
-    is_ratio = mode.ratio is None or (0 < mode.ratio < 1 and mode.ratio_deviation > 0)
-    is_frequency = mode.frequency_deviation > 0 and 0 < frequency * mode.frequency_deviation < math.inf
     remedy = "write N=FREQUENCY,RATIO such as 1=2.52hz,0.006 (hz or rad_s; a deviation after ~: 2.52hz~0.01)"
-    require(1 <= mode.number <= 100 and is_frequency and is_ratio, "--mode", text, remedy)
-    return mode
-
-
-def ring_residuals(arm: Arm, rings: Sequence[RingMode]) -> Real:
-    """Computed less measured over its deviation (n,), of logarithms of frequencies and of ratios."""
-    rows: list[float] = []
-    for each, s in ((each, eigenvalue(arm, each.number)) for each in rings):
-        rows.append(math.log(s.imag / each.frequency) * each.frequency / each.frequency_deviation)
-        if each.ratio is not None:
-            rows.append((-s.real / abs(s) - each.ratio) / each.ratio_deviation)
-    return np.array(rows)
+    number, *given = found.groups() if found else ("0",) * 5
+    w, dw, ratio, of_ratio = (float(each) if each else None for each in given)
+    unit = 2 * math.pi if "hz" in text.lower() else 1.0
+    frequency = (w or 0.0) * unit
+    deviation = 2e-3 * frequency if dw is None else dw * unit
+    of_ratio = 0.1 * (math.inf if ratio is None else ratio) if of_ratio is None else of_ratio
+    is_ratio = ratio is None or 0 < ratio < 1
+    is_positive = min(frequency, deviation, of_ratio) > 0 and frequency * deviation < math.inf
+    require(1 <= int(number) <= 100 and is_positive and is_ratio, "--mode", text, remedy)
+    return RingMode(int(number), frequency, deviation, ratio, of_ratio)
 
 
 def eigenvalue(arm: Arm, number: int) -> complex:
-    """The eigenvalue s [1/s] of a flexible mode, by the secant method on the drive.
+    """The eigenvalue s [1/s] of a flexible mode, by Newton's method.
 
     It starts from the undamped natural frequency; ConvergenceError where a damped mode does not ring near that.
     """
-    read = Signals(arm, ("hub_angle",))
-    start = 1j * modes(arm, number).natural_frequency[-1]
-    reference = read.parts(np.array([start]))[2][0]
-
-    def drive(s: complex) -> complex:
-        (value,), _, (scale,) = read.parts(np.array([s]))
-        return complex(value * np.exp(scale - reference))
-
-    s, of = cast("Any", newton)(
-        drive, start, x1=start * (1 + 1e-6), tol=1e-12 * abs(start), maxiter=30, full_output=True, disp=False
-    )
-    if not (of.converged and s.imag > 0):
-        words = f"mode {number} of {arm.name} does not ring near its undamped frequency"
-        raise ConvergenceError(words, s, abs(drive(s)))
-    return complex(s)
+    system = system_of(arm)
+    start = 1j * modes(arm, number).natural_frequency[-1:]
+    found = newton(lambda s: characteristic(system, s), start)
+    if not (found.imag > 0).any():
+        raise ConvergenceError(f"mode {number} of {arm.name} does not ring near its undamped frequency", found, None)
+    return complex(found[0])
 
 
 # of a sensor, as `Response` has them: free like the arm's numbers
@@ -269,8 +248,8 @@ class Problem:
     @cached_property
     def bounds(self) -> tuple[Real, Real]:
         """Lowest and highest coordinates."""
-        low, high = zip(*(each.bounds for each in self.parameters), strict=True)
-        return np.array(low), np.array(high)
+        low, high = np.transpose([each.bounds for each in self.parameters])
+        return low, high
 
     @property
     def start(self) -> Real:
@@ -301,31 +280,28 @@ class Problem:
     def fractions(self, point: Real, share: float = 0.0) -> list[Fraction]:
         """Each response at s = (i + share) w; those of one grid of frequencies and one drive are computed together."""
         arm = self.arm(point)
-        found: dict[int, Fraction] = {}
-        grids: dict[tuple[bytes, str], dict[int, Measured]] = {}
-        for n, each in enumerate(self.responses):
+        grids: dict[tuple[bytes, str], set[str]] = {}
+        keys = []
+        for each in self.responses:
+            of = each.data
             # the input of the response, or where that is a signal the arm's own
-            is_driven = each.data.input in INPUTS and each.data.input not in OUTPUTS
-            grid = each.data.omega.tobytes(), each.data.input if is_driven else arm.input
-            grids.setdefault(grid, {})[n] = each.data
-        for (_, driven), own in grids.items():
-            names = tuple(
-                dict.fromkeys(name for of in own.values() for name in (of.output, of.input) if name != driven)
-            )
-            under_drive = arm if arm.input == driven else replace(arm, input=cast("Input", driven))
-            s = (1j + share) * next(iter(own.values())).omega
-            drive, numerators, scale = Signals(under_drive, names).parts(s)
-            known = dict(zip(names, numerators, strict=True)) | {driven: drive}
-            for n, of in own.items():
-                found[n] = Fraction(known[of.output] * self._sensor(n, point), known[of.input], np.asarray(scale.real))
-        return [found[n] for n in range(len(self.responses))]
-
-    def _sensor(self, n: int, point: Real) -> Complex:
-        """Gain and delay of the sensor of a response, at its frequencies."""
-        one = self.responses[n]
-        gain = 1.0 if one.gain is None else self.value(point, one.gain)
-        delay = 0.0 if one.delay is None else self.value(point, one.delay)
-        return gain * np.exp(-1j * delay * one.data.omega)
+            driven = of.input if of.input in INPUTS and of.input not in OUTPUTS else arm.input
+            keys.append((of.omega.tobytes(), driven))
+            grids.setdefault(keys[-1], set()).update({of.output, of.input} - {driven})
+        known: dict[tuple[bytes, str], tuple[dict[str, Complex], Real]] = {}
+        for (grid, drives), signals in grids.items():
+            names = tuple(sorted(signals))
+            under_drive = arm if arm.input == drives else replace(arm, input=cast("Input", drives))
+            drive, numerators, scale = Signals(under_drive, names).parts((1j + share) * np.frombuffer(grid))
+            known[grid, drives] = {drives: drive} | dict(zip(names, numerators, strict=True)), np.asarray(scale.real)
+        found = []
+        for each, key in zip(self.responses, keys, strict=True):
+            gain = 1.0 if each.gain is None else self.value(point, each.gain)
+            delay = 0.0 if each.delay is None else self.value(point, each.delay)
+            sensor = gain * np.exp(-1j * delay * each.data.omega)
+            values, lacking = known[key]
+            found.append(Fraction(values[each.data.output] * sensor, values[each.data.input], lacking))
+        return found
 
     def with_sensors(self, free: Sequence[str]) -> Problem:
         """The problem with "gain" or "delay" of each sensor free, too."""
@@ -384,8 +360,14 @@ class Problem:
         return self.fractions(point), np.r_[self.decays(point, self.rings), priors]
 
     def decays(self, point: Real, rings: Sequence[RingMode]) -> Real:
-        """What decays leave: the arm is made for them alone."""
-        return ring_residuals(self.arm(point), rings) if rings else np.empty(0)
+        """What decays leave, over its deviation (n,), of logarithms of frequencies and of ratios."""
+        rows: list[float] = []
+        for each in rings:
+            s = eigenvalue(self.arm(point), each.number)
+            rows.append(math.log(s.imag / each.frequency) * each.frequency / each.frequency_deviation)
+            if each.ratio is not None:
+                rows.append((-s.real / abs(s) - each.ratio) / each.ratio_deviation)
+        return np.array(rows)
 
 
 def walled(residuals: Callable[[Real], Real], first: Real) -> Callable[[Real], Real]:

@@ -26,7 +26,7 @@ from tfarm.exact.outputs import unit_over
 from tfarm.records import frozen
 from tfarm.response import TransferFunction, transfer
 from tfarm.response.frequency import HERTZ, refined_grid, without_cancelled
-from tfarm.response.signals import Signals
+from tfarm.response.signals import Signals, placed
 from tfarm.response.transfer import Roots
 from tfarm.schema import Column, Quantity, Table
 from tfarm.spectrum import modes as modes_of
@@ -88,15 +88,11 @@ class Ratio:
         require(self.output != self.input, "input", self.input, "a signal over itself is 1")
         for key, name, each in (("output", self.output, self.above), ("input", self.input, self.below)):
             # a response that is not 0 throughout is not 0 at this s [1/s]
-            is_held = each is not None and each(0.37 + 0.73j) == 0
-            require(not is_held, key, name, "does not move on this arm: it is held")
-        is_idle = self.is_driven and self.driven.is_locked and self.input != "hub_angle"
-        require(
-            not is_idle,
-            "input",
-            self.input,
-            "drives no locked hub; name what was measured: hub_angle where the angle drives it, or another signal",
-        )
+            is_moving = each is None or each(0.37 + 0.73j)
+            require(is_moving, key, name, "does not move on this arm: it is held")
+        remedy = "drives no locked hub; name what was measured: hub_angle where the angle drives it, or another signal"
+        is_felt = not self.is_driven or not self.driven.is_locked or self.input == "hub_angle"
+        require(is_felt, "input", self.input, remedy)
 
     @property
     def is_driven(self) -> bool:
@@ -159,14 +155,8 @@ class Ratio:
 
 def _transfer(arm: Arm, name: str) -> TransferFunction:
     """To a signal with its place after an @."""
-    signals = Signals(arm, (name,))
-    wanted = signals.outputs[0]
-    place = signals.places[0]
-    return transfer(arm, wanted, x=place * arm.length if wanted.place == "x" else None)
-
-
-SAME_MODE = 0.1  # of its frequency: how near a pole of a damped arm is to that mode of the arm without damping
-LARGEST_FACTOR = 3.0  # the factor on a number beyond which it is no explanation
+    wanted, x = placed(name, arm.length)
+    return transfer(arm, wanted, x=x if wanted.place == "x" else None)
 
 
 @frozen(kw_only=True)
@@ -312,10 +302,9 @@ class Overlay:
         float, Quantity("rms of ln(measured/exact)", digits=4, help="root mean square over frequencies above the noise")
     ]:
         """The root mean square of ln |measured/exact|, over frequencies above the noise."""
-        kept = (abs(self.measured.values) > self.noise.sigma) & np.isfinite(self.exact) & (self.exact != 0)
-        if not kept.any():
-            return math.inf
-        return rms(np.log(abs(self.measured.values[kept] / self.exact[kept])))
+        values = self.measured.values
+        kept = (abs(values) > self.noise.sigma) & np.isfinite(self.exact) & (self.exact != 0)
+        return rms(np.log(abs(values[kept] / self.exact[kept]))) if kept.any() else math.inf
 
     @cached_property
     def required_changes(
@@ -331,7 +320,7 @@ class Overlay:
         """A row a parameter of `Modes.sensitivity` and mode: the change of it that alone would explain the mode.
 
         It is exp(ln(measured/exact)/S) - 1 with S = d ln w/d ln p: exact for a power law, as of Young's modulus or the
-        density, else to first order.  Without factors beyond LARGEST_FACTOR, or of a number that hardly moves the mode.
+        density, else to first order.  Without factors beyond 3, or of a number that hardly moves the mode.
         """
         ratios = {row.mode: row.frequency_ratio for row in self.modes if row.mode and row.frequency_ratio is not None}
         if not ratios:
@@ -343,7 +332,8 @@ class Overlay:
                 slope = slopes[table.index == mode][0]
                 # a number with a smaller d ln w/d ln p does not move the mode
                 exponent = math.log(ratio) / slope if abs(slope) > 1e-3 else math.inf
-                if abs(exponent) <= math.log(LARGEST_FACTOR):
+                # a larger factor on a number is no explanation
+                if abs(exponent) <= math.log(3.0):
                     found.append(RequiredChange(name, mode, 100 * (math.exp(exponent) - 1)))
         return tuple(found)
 
@@ -369,8 +359,7 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
         check_unit(arm, measured)
     at = {j: int(places[i]) for i, j in pairs}
     shown = [(pole, at.get(j)) for j, pole in enumerate(own.tolist()) if j in at or is_inside[j]]
-    grid = refined_grid(measured.band, np.r_[roots.poles, roots.zeros]) if low < high else measured.omega
-    omega = np.asarray(grid, dtype=float)
+    omega = refined_grid(measured.band, np.r_[roots.poles, roots.zeros]) if low < high else measured.omega
     return Overlay(
         arm=arm,
         measured=measured,
@@ -392,7 +381,9 @@ def _counterparts(
 
     The arm's modes are named where they are the poles of the ratio, each by the nearest natural frequency.
     """
-    up_to = (1 + SAME_MODE) * max((abs(pole) for pole, _ in shown), default=0.0)
+    # of its frequency: how near a pole of a damped arm is to that mode of the arm without damping
+    same = 0.1
+    up_to = (1 + same) * max((abs(pole) for pole, _ in shown), default=0.0)
     are_modes = ratio.is_driven and up_to > 0 and modes_below(ratio.driven, up_to) > 0
     table = modes_of(ratio.driven, up_to=up_to) if are_modes else None
     found = []
@@ -401,7 +392,7 @@ def _counterparts(
         size = abs(pole)
         if table is not None:
             away = abs(table.natural_frequency / size - 1)
-            mode = int(table.index[np.argmin(away)]) if away.min() < SAME_MODE else 0
+            mode = int(table.index[away.argmin()]) * (away.min() < same)
         row = Counterpart(pole=pole, mode=mode or None, exact=size / HERTZ, damping_ratio=-pole.real / size + 0.0)
         found.append(row if place is None else _seen(row, ratio.residue(pole, roots), measured, noise, place))
     return tuple(found)
@@ -413,20 +404,22 @@ def _seen(row: Counterpart, residue: complex, measured: Measured, noise: Noise, 
     peak = float(measured.omega[place])
     at = peak if own is None else abs(own.pole)
     share = at / abs(row.pole)
-    row = replace(
-        row, peak=peak, frequency=at / HERTZ, frequency_ratio=share, off=100 * (share - 1), is_peak_only=own is None
-    )
+    found: dict[str, Any] = {"peak": peak, "frequency": at / HERTZ, "frequency_ratio": share, "off": 100 * (share - 1)}
     if own is None:
-        return row
+        return replace(row, **found, is_peak_only=True)
     of_damping, of_frequency = own.std.tolist()
-    row = replace(
-        row, measured=own, frequency_std=of_frequency / HERTZ, measured_damping=own.damping_ratio,
+    level = own.residue / residue if residue else 0.0
+    if level:
+        degrees = math.degrees(np.angle(level))
+        found |= {"level": level, "level_db": 20 * math.log10(abs(level)), "level_degrees": degrees}
+    return replace(
+        row,
+        **found,
+        measured=own,
+        frequency_std=of_frequency / HERTZ,
+        measured_damping=own.damping_ratio,
         damping_std=of_damping / at,
-    )  # fmt: skip
-    if not residue or not own.residue:
-        return row
-    level = own.residue / residue
-    return replace(row, level=level, level_db=20 * math.log10(abs(level)), level_degrees=math.degrees(np.angle(level)))
+    )
 
 
 class ResonanceShift(NamedTuple):
@@ -454,17 +447,15 @@ def resonance_shifts(before: Arm, after: Arm, responses: Sequence[Response]) -> 
                 for arm in (before, after)
             )
             w = abs(new)
-            first = abs(old)
             peaks = data.omega[peaks_of(data, one.noise.sigma)]
-            places, earlier = (
-                dict(matched_peaks(these, those, data.band)[0]) for these, those in ((peaks, w), (w, first))
-            )
+            places = dict(matched_peaks(peaks, w, data.band)[0])
+            earlier = dict(matched_peaks(w, abs(old), data.band)[0])
             for n, peak in enumerate(peaks.tolist()):
                 start = end = None
-                own = places.get(n, int(np.argmin(abs(np.log(w / peak)))) if w.size else None)
+                own = places.get(n, abs(np.log(w / peak)).argmin() if w.size else None)
                 # of ln w: a peak farther from all of the arm's is none of them, a broad one by twice its damping ratio
                 if own is not None and abs(math.log(w[own] / peak)) < 0.1 - 2.0 * new[own].real / w[own]:
-                    start = float(first[earlier[own]]) / HERTZ if own in earlier else None
+                    start = float(abs(old[earlier[own]])) / HERTZ if own in earlier else None
                     end = float(w[own]) / HERTZ
                 # peaks of two responses that are nearer, of ln w, are one
                 found[data.input, round(math.log(peak) / 0.02)] = ResonanceShift(start, end, peak / HERTZ)

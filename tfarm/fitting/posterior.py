@@ -4,22 +4,31 @@ The coordinates x are those of the search: ln(p/best) of a number p that cannot 
 J the residuals over their deviations differentiated by x, the information is J'J, and the covariance is its inverse in
 the directions that the data determine.  Gains and delays of sensors are marginalised.  The intervals are those of the
 fit, by profiles where these were computed: they show where the distribution is not normal.
+
+Of several records of one response there are the numbers by each record, and a bootstrap over them.  The noise within a
+record is not all that differs from one sweep to the next: amplitudes, temperatures, the hand that clamped the link.
+Drawing whole records anew (Efron 1979) gives intervals that include it.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Literal
+from dataclasses import replace
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import ConfigDict, Field
 
 from tfarm.arm.schema import StrictTable, validated_file
 from tfarm.arrays import LEAST_SIZE, Real
+from tfarm.digits import listed
 from tfarm.errors import require
+from tfarm.records import frozen
+from tfarm.schema import Quantity
 
-from .solve import OPEN_DEVIATION, Fitted, Solution, principal_axes
+from .data import CONFIDENCE
+from .solve import FIT_SEED, OPEN_DEVIATION, Fitted, Solution, nearest_minimum, principal_axes
 
 SUFFIX = ".posterior.json"
 NO_VARIANCE = 1e-13  # of the largest variance: a smaller one is rounding
@@ -84,15 +93,17 @@ class Posterior(StrictTable):
         """
         known = [n for n, key in enumerate(self.keys) if key in ranged]
         rest = [n for n, key in enumerate(self.keys) if key not in ranged]
-        value, size = (np.array([getattr(each, name) for each in self.numbers]) for name in ("value", "size"))
         P = self.information
         x_r = np.empty((len(known), len(normal)))
         for row, n in zip(x_r, known, strict=True):
-            p = np.asarray(ranged[self.keys[n]])
-            row[:] = (p - value[n]) / size[n] if size[n] else np.log(np.maximum(p / value[n], LEAST_SIZE))
-        L = np.linalg.cholesky(P[np.ix_(rest, rest)])  # unique: independent of the processor
+            of = self.numbers[n]
+            p = np.asarray(ranged[of.key])
+            row[:] = (p - of.value) / of.size if of.size else np.log(np.maximum(p / of.value, LEAST_SIZE))
+        # unique: independent of the processor
+        L = np.linalg.cholesky(P[np.ix_(rest, rest)])
         x_o = np.linalg.solve(L.T, normal.T - np.linalg.solve(L, P[np.ix_(rest, known)] @ x_r)).T
-        return np.where(size[rest] > 0, value[rest] + size[rest] * x_o, value[rest] * np.exp(x_o))
+        value, size = np.transpose([(self.numbers[n].value, self.numbers[n].size) for n in rest]).reshape(2, -1)
+        return np.where(size > 0, value + size * x_o, value * np.exp(x_o))
 
 
 def posterior_of(found: Solution, fitted: Sequence[Fitted], not_determined: Sequence[str], arm: str) -> Posterior:
@@ -127,3 +138,88 @@ def load_posterior(path: str | os.PathLike[str]) -> Posterior:
     for each in found.numbers:
         require(each.size or each.value > 0, each.key, each.value, "give a positive number, as size is 0", file)
     return found
+
+
+@frozen
+class Repeats:
+    """The fitted numbers by each record of `response` alone, `each` [SI], and by draws of records.
+
+    `intervals` hold 95 % of the draws, `times_wider` is their standard deviation over that by the noise.
+    """
+
+    response: Annotated[str, Quantity("response", help="response of which there are several records")]
+    each: Annotated[list[dict[str, float]], Quantity(help="fitted numbers by each record alone")]
+    intervals: Annotated[
+        dict[str, list[float]], Quantity("intervals by records", help="95 % of bootstrap draws of whole records")
+    ]
+    times_wider: Annotated[
+        dict[str, float],
+        Quantity(
+            "times wider than by noise",
+            help="standard deviation over draws of records, over that by the noise within a record",
+        ),
+    ]
+
+    @property
+    def count(self) -> Annotated[int, Quantity("records", help="number of records of that response")]:
+        """The number of records."""
+        return len(self.each)
+
+    @property
+    def in_words(
+        self,
+    ) -> Annotated[
+        str, Quantity("finding", key="in_words", help="numbers whose scatter exceeds what the noise explains")
+    ]:
+        """The numbers whose scatter is larger than the noise explains."""
+        # a scatter that is 1.5 times that by the noise is named
+        larger = [f"{key} {times:.3g} times" for key, times in self.times_wider.items() if times > 1.5]
+        return f"larger than the noise explains: {listed(larger)}" if larger else "as the noise explains"
+
+
+def repeats(fit: Solution, fitted: Sequence[Fitted], draws: int = 40) -> Repeats | None:
+    """The scatter between the records of the response that there are most of; None where there are fewer than three.
+
+    Each least sum over some of the responses begins at that over all; sensors of the others are held, and so is what
+    all together do not determine.
+    """
+    from scipy.stats import bootstrap
+
+    own = fit.problem
+    names = [each.data.label for each in own.responses]
+    most = max(names, key=names.count, default="")
+    records = [each for each in own.responses if each.data.label == most]
+    if len(records) < 3:
+        return None
+    others = [each for each in own.responses if each.data.label != most]
+    identified = {n: each for n, each in enumerate(fitted) if each.identified}
+    # a key with a colon is of one record's sensor, which others do not know
+    known = {n: each for n, each in identified.items() if each.deviation and ":" not in each.key}
+
+    def numbers(chosen: Sequence[int]) -> Real:
+        some = (*(records[n] for n in chosen), *others)
+        sensors = {place for each in some for place in (each.gain, each.delay)}
+        used = identified.keys() & {*sensors, *range(len(own.of_the_arm))}
+        held = {n: float(x) for n, x in enumerate(fit.point) if n not in used}
+        point = nearest_minimum(replace(own, responses=some), fit.point, held).point
+        return np.array([own.value(point, n) for n in known])
+
+    drawn = bootstrap(
+        (range(len(records)),),
+        numbers,
+        n_resamples=draws,
+        vectorized=False,
+        method="percentile",
+        confidence_level=CONFIDENCE,
+        rng=FIT_SEED,
+    )
+
+    def by_key(values: Real) -> dict[str, Any]:
+        return dict(zip([each.key for each in known.values()], values.tolist(), strict=True))
+
+    return Repeats(
+        response=most,
+        each=[by_key(numbers([n])) for n in range(len(records))],
+        intervals=by_key(np.array(drawn.confidence_interval).T),
+        times_wider=by_key(drawn.standard_error / np.array([each.deviation for each in known.values()])),
+    )

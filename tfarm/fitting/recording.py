@@ -37,8 +37,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import AnyLaw, Arm, as_law
-from tfarm.arm.chain import TIME_ROUNDING, Chain
+from tfarm.arm.chain import TIME_ROUNDING
 from tfarm.arm.reading import AnyFile, load_tables
 from tfarm.arm.schema import StrictTable, validated
 from tfarm.arrays import Complex, Real
@@ -53,9 +52,6 @@ from tfarm.schema import Quantity, Table
 
 from .data import MOST_RECORD_BYTES, Measured, check_signal, read_sheet
 
-REFERENCE_COLUMN = "reference:hub_angle"
-ANGLE_COLUMN = "hub_angle"
-MOMENT_COLUMN = "root_moment"
 MOST_SAMPLE = 1e70  # of a signal: the fourth power is a number, as spectra are squared
 LEAST_SAMPLES = 8  # of a record and of a segment
 
@@ -107,8 +103,8 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
     name = os.fspath(path)
     if name.lower().endswith(".mat"):
         found, data = read_mat(name, MOST_RECORD_BYTES, key="record")
-        held = {each: np.asarray(value, dtype=float) for each, value in found.items()
-                if value.ndim == 2 and value.dtype.kind in "biuf"}  # fmt: skip
+        numbers = {each: value for each, value in found.items() if value.ndim == 2 and value.dtype.kind in "biuf"}
+        held = {each: value.astype(float) for each, value in numbers.items()}
         units = dict.fromkeys(held, "")
         digest = hashlib.sha256(data).hexdigest()
     else:
@@ -145,25 +141,21 @@ def _timing(times: Real) -> tuple[float, float, float]:
     """Start and period [s] of even samples, and the largest distance from them as a share of the period."""
     require(times.size >= LEAST_SAMPLES, "samples", times.size, f"a record has {LEAST_SAMPLES} samples at least")
     steps = np.diff(times)
-    back = int(np.argmax(steps <= 0))
-    usual = float(np.median(steps))
-    require(
-        steps[back] > 0,
-        f"t of sample {back + 2}",
-        float(times[back + 1]),
-        "is not later than the sample before; sort the rows, and leave doubled ones out",
-    )
-    period = float((times[-1] - times[0]) / (times.size - 1))
+    usual = np.median(steps)
+
+    def require_at(at: int, is_met: bool, remedy: str) -> None:
+        require(is_met, f"t of sample {at + 2}", float(times[at + 1]), remedy)
+
+    back = int((steps <= 0).argmax())
+    remedy = "is not later than the sample before; sort the rows, and leave doubled ones out"
+    require_at(back, steps[back] > 0, remedy)
+    period = float(np.ptp(times) / steps.size)
     require(period > 1 / MOST_SAMPLE, "period of t", period, "times are in seconds")
-    gap = int(np.argmax(abs(steps - usual)))
+    gap = int(abs(steps - usual).argmax())
     jitter = float(abs(times - times[0] - period * np.arange(times.size)).max() / period)
     # a sample further off its place has been dropped or doubled, or the sampling is uneven
-    require(
-        jitter <= 0.1,
-        f"t of sample {gap + 2}",
-        float(times[gap + 1]),
-        f"{steps[gap]:.6g} s after the one before, where {usual:.6g} s is usual: samples have to be even",
-    )
+    remedy = f"{steps[gap]:.6g} s after the one before, where {usual:.6g} s is usual: samples have to be even"
+    require_at(gap, jitter <= 0.1, remedy)
     return float(times[0]), period, jitter
 
 
@@ -217,32 +209,28 @@ class RunComparison:
         return self.run.at_samples.hub_angle + self.measured.reference[0]
 
 
-def compare_run(arm: Arm, law: AnyLaw, chain: Chain, measured: MeasuredRun) -> RunComparison:
+def compare_run(case: Case, measured: MeasuredRun) -> RunComparison:
     """The sampled loop under the reference of a measured run, with as many modes as its signals take.
 
     Raises ParameterError as `simulate` does.
     """
-    case = Case(arm, as_law(law), chain)
-    run, _ = simulated(case, measured.scenario(chain.sampling.period))
+    run, _ = simulated(case, measured.scenario(case.chain.sampling.period))
     return RunComparison(measured, run)
 
 
-def departures(
-    arm: Arm, law: AnyLaw, chain: Chain, measured: MeasuredRun, count: int, longer: float, share: float = 0.05
-) -> list[float]:
+def departures(case: Case, measured: MeasuredRun, count: int, longer: float, share: float = 0.05) -> list[float]:
     """Return the times [s] after a measured run at which the computed hub angle is off its end, by a share of the step.
 
     The reference stays for that much `longer` [s], of 10,000 samples at most; `count` modes are in the loop.
     """
-    period = chain.sampling.period
+    period = case.chain.sampling.period
     end = float(measured.t[-1])
     t = np.append(measured.t, end + min(longer, 10_000 * period))
     held = replace(measured, t=t, reference=np.append(measured.reference, measured.reference[-1]))
-    case = Case(arm, as_law(law), chain)
     run = Simulator(case, held.scenario(period), count=count).run().at_samples
     settled = run.hub_angle[run.t <= end][-1]
     away = abs(run.hub_angle - settled) > share * abs(measured.step)
-    return [float(t) for t in run.t[away & (run.t > end)]]
+    return run.t[away & (run.t > end)].tolist()
 
 
 def overshoot(angle: Real, step: float, end: float) -> float:
@@ -261,14 +249,14 @@ def load_run(name_or_path: AnyFile) -> MeasuredRun | None:
     with naming(file):
         table = validated(RunTable, tables["measured"], "measured")
         found = read_recording(Path(file).parent / table.file)
-        reference = found.signal(REFERENCE_COLUMN, "measured.file")
+        reference = found.signal("reference:hub_angle", "measured.file")
         require(
-            {ANGLE_COLUMN, MOMENT_COLUMN} & set(found.signals),
+            {"hub_angle", "root_moment"} & found.signals.keys(),
             "measured.file",
             table.file,
-            f"has neither {ANGLE_COLUMN} [rad] nor {MOMENT_COLUMN} [N m] with {REFERENCE_COLUMN} [rad]",
+            "has neither hub_angle [rad] nor root_moment [N m] with reference:hub_angle [rad]",
         )
-    angle, moment = (found.signals.get(name, np.empty(0)) for name in (ANGLE_COLUMN, MOMENT_COLUMN))
+    angle, moment = (found.signals.get(name, np.empty(0)) for name in ("hub_angle", "root_moment"))
     return MeasuredRun(found.times - found.start, reference, angle, moment, table.source)
 
 
@@ -357,7 +345,8 @@ def frequency_response(
     names = columns or (output, input)
     y = recording.signal(names[0], "--output")
     x = recording.signal(names[1], "--input")
-    size, step = _cut(recording, segment, (0.5 if window == "hann" else 0.0) if overlap is None else overlap)
+    overlap = 0.5 * (window == "hann") if overlap is None else overlap
+    size, step = _cut(recording, segment, overlap)
     how = {"window": window, "nperseg": size, "noverlap": size - step}
     lines, values, coherence = _estimated(estimator, x, y, how)
     require(lines.size, "record", names[1], "does not move", recording.source)
@@ -366,13 +355,25 @@ def frequency_response(
     duration = size * recording.period
     averages = independent_averages(get_window(window, size), step, count)
     measured = Measured(
-        output=output, input=input, omega=np.asarray(2 * np.pi * lines / duration, dtype=float), values=values,
-        coherence=coherence, averages=max(1, math.floor(averages)), source=recording.source, digest=recording.digest,
-    )  # fmt: skip
+        output=output,
+        input=input,
+        omega=np.asarray(2 * np.pi * lines / duration, dtype=float),
+        values=values,
+        coherence=coherence,
+        averages=max(1, math.floor(averages)),
+        source=recording.source,
+        digest=recording.digest,
+    )
     return Estimate(
-        measured=measured, estimator=estimator, window=window, segment=duration, segments=count,
-        overlap=1.0 - step / size, independent=averages, note=recording.note,
-    )  # fmt: skip
+        measured=measured,
+        estimator=estimator,
+        window=window,
+        segment=duration,
+        segments=count,
+        overlap=1.0 - step / size,
+        independent=averages,
+        note=recording.note,
+    )
 
 
 def _estimated(estimator: str, x: Real, y: Real, how: dict[str, Any]) -> tuple[NDArray[np.intp], Complex, Real]:
@@ -388,10 +389,12 @@ def _estimated(estimator: str, x: Real, y: Real, how: dict[str, Any]) -> tuple[N
     lines = np.arange(1, S_xx.size - 1)
     # of the largest line of the input: below it there are rounding errors alone
     lines = lines[S_xx[lines] > 1e-24 * S_xx.max()]
-    S_xx, S_xy, S_yy, cross = S_xx[lines], S_xy[lines], S_yy[lines], abs(S_xy[lines])
+    S_xx = S_xx[lines]
+    S_yy = S_yy[lines]
+    cross = abs(S_xy[lines])
     with np.errstate(divide="ignore", invalid="ignore"):
         sizes = {"H1": cross / S_xx, "H2": np.where(cross == 0, 0.0, S_yy / cross), "Hv": np.sqrt(S_yy / S_xx)}
-        phase = np.where(cross == 0, 1.0, S_xy / cross)
+        phase = np.where(cross == 0, 1.0, S_xy[lines] / cross)
         coherence = np.where(S_yy > 0, cross**2 / (S_xx * S_yy), 0.0)
     return lines, sizes[estimator] * phase, np.clip(coherence, 0.0, 1.0)
 
@@ -410,11 +413,7 @@ def _cut(recording: Recording, segment: float | None, overlap: float) -> tuple[i
     least = LEAST_SAMPLES * recording.period
     # by default 15 segments, half overlapped
     wanted = whole / 8 if segment is None else segment
-    require(
-        least <= wanted <= whole / 2 * (1 + 1e-9),
-        "--segment",
-        wanted,
-        f"seconds between {least:.4g} and {whole / 2:.4g}, half the record: one average has no coherence",
-    )
+    remedy = f"seconds between {least:.4g} and {whole / 2:.4g}, half the record: one average has no coherence"
+    require(least <= wanted <= whole / 2 * (1 + 1e-9), "--segment", wanted, remedy)
     size = min(round(wanted / recording.period), recording.count // 2)
     return size, max(1, round(size * (1 - overlap)))

@@ -71,14 +71,13 @@ def matched_peaks(
 
     n = measured.size
     m = own.size
-    cost = np.zeros((n + m, m + n))
-    cost[:n, :m] = abs(np.log(measured)[:, None] - np.log(own))
-    cost[:n, m:] = UNPAIRED
-    cost[n:, :m] = np.where((own >= band[0]) & (own <= band[1]), UNPAIRED, 0.0)
+    alone = np.broadcast_to(UNPAIRED * ((own >= band[0]) & (own <= band[1])), (m, m))
+    pairs = abs(np.log(measured)[:, None] - np.log(own))
+    cost = np.block([[pairs, np.full((n, n), UNPAIRED)], [alone, np.zeros((m, n))]])
     rows, columns = linear_sum_assignment(cost)
     paired = (rows < n) & (columns < m)
-    pairs = zip(rows[paired].tolist(), sorted(columns[paired].tolist()), strict=True)
-    return list(pairs), float(cost[rows, columns].sum())
+    found = zip(rows[paired].tolist(), sorted(columns[paired].tolist()), strict=True)
+    return list(found), float(cost[rows, columns].sum())
 
 
 def peaks_among(poles: Complex) -> Complex:
@@ -134,23 +133,23 @@ def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
     """The pole and residue of the peak at a place; None where its lines do not determine them."""
     kept = _around(data, place)
     omega = data.omega[kept]
+    sigma = sigma[kept]
     # the number of coefficients c
     background = min(5, 2 * omega.size - 6)
     if background < 1:
         return None
     s = 1j * omega
     w = data.omega[place]
-    powers = [(s / w) ** n for n in range(background)]
+    powers = (s / w) ** np.arange(background)[:, None]
 
     def columns(x: Real) -> Real:
         """Those of Re r, Im r and the c."""
         up = 1 / (s + x[0] - 1j * x[1])
         down = 1 / (s + x[0] + 1j * x[1])
-        terms: Complex = np.array([up + down, 1j * (up - down), *powers], dtype=np.complex128)
-        return in_parts(terms / sigma[kept]).T
+        return in_parts(np.r_["0,2", up + down, 1j * (up - down), powers] / sigma).T
 
-    y = in_parts(data.values[kept] / sigma[kept])
-    half = max(_half_width(data, place), (omega[-1] - omega[0]) / (4 * omega.size))
+    y = in_parts(data.values[kept] / sigma)
+    half = max(_half_width(data, place), np.ptp(omega) / (4 * omega.size))
     found = least_projected(columns, y, np.array([half, w]))
     sigma_p, w_p = found.x.tolist()
     if not found.success or not omega[0] < w_p < omega[-1] or abs(sigma_p) > w_p:
@@ -163,9 +162,8 @@ def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
 def _half_width(data: Measured, place: int) -> float:
     """Half the width [rad/s] of a peak where it has lost 3 dB, to the nearer side."""
     size = abs(data.values)
-    limit = abs(data.values[place]) / math.sqrt(2)
     away = abs(data.omega - data.omega[place])
-    return float(away[size < limit].min(initial=data.omega[-1] - data.omega[0]))
+    return float(away[size < size[place] / math.sqrt(2)].min(initial=np.ptp(data.omega)))
 
 
 def _around(data: Measured, place: int) -> slice:

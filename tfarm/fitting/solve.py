@@ -36,8 +36,6 @@ from tfarm.schema import Quantity
 from .data import CONFIDENCE, in_parts
 from .model import Problem, walled
 
-DRAWS = 300  # points about one that the equation errors lead to
-STARTS = ((0, (0.1,)), (DRAWS, (0.1,)), (DRAWS, (1.0, 0.3, 0.1)))  # draws, and shares of w one after another
 LINES = 400  # of a response, at most
 FIT_SEED = 852780  # of all that a fit draws: the number of the paper's article, any would do
 
@@ -94,11 +92,12 @@ def with_gains(problem: Problem, point: Real) -> tuple[Problem, Real]:
     parameters = list(problem.parameters)
     point = point.copy()
     for H, each in zip(problem.computed(point), problem.responses, strict=True):
+        omega = each.data.omega
         ratio = each.data.values / H
         if each.delay is not None:
-            delay = aligning_delay(each.data.omega, ratio)
+            delay = aligning_delay(omega, ratio)
             point[each.delay] += delay / parameters[each.delay].size
-            ratio = ratio * np.exp(1j * delay * each.data.omega)
+            ratio = ratio * np.exp(1j * delay * omega)
         if each.gain is not None:
             own = parameters[each.gain]
             if np.median(ratio.real / abs(ratio)) < 0:
@@ -115,8 +114,8 @@ def aligning_delay(omega: Real, ratio: Complex) -> float:
     period = 2 * math.pi / omega[0]
     count = math.ceil(16 * min(omega[-1] / omega[0], LINES))
     delays = np.linspace(-period, period, 2 * count + 1)
-    phases = ratio[ratio != 0] / abs(ratio[ratio != 0])
-    aligned = abs(np.exp(1j * np.outer(delays, omega[ratio != 0])) @ phases)
+    phases = np.sign(ratio)
+    aligned = abs(np.exp(1j * np.outer(delays, omega)) @ phases)
     return float(delays[aligned.argmax()]) if aligned.max() > 1.5 * aligned[count] else 0.0
 
 
@@ -124,12 +123,10 @@ def thinned(problem: Problem, most: int) -> Problem:
     """The problem at a number of each response's frequencies at most."""
     responses = []
     for each in problem.responses:
-        w = each.data.omega
-        values = each.data.values
-        sigma = each.noise.sigma
-        kept = np.unique(np.linspace(0, w.size - 1, min(w.size, most)).astype(int))
-        kept = kept[np.isfinite(sigma[kept]) & (values[kept] != 0)]
-        responses.append(each.at(w[kept], values[kept], sigma[kept]))
+        data = each.data
+        kept = np.unique(np.linspace(0, data.points - 1, min(data.points, most)).astype(int))
+        kept = kept[np.isfinite(each.noise.sigma[kept]) & (data.values[kept] != 0)]
+        responses.append(each.at(data.omega[kept], data.values[kept], each.noise.sigma[kept]))
     return replace(problem, responses=tuple(responses))
 
 
@@ -164,8 +161,8 @@ class Solution:
     @cached_property
     def parts(self) -> tuple[Real, ...]:
         """The residuals of each response, over their deviations."""
-        sizes = [each.size for each in self.problem.responses]
-        return tuple(np.split(self.residuals, np.cumsum(sizes))[: len(sizes)])
+        ends = np.cumsum([each.size for each in self.problem.responses], dtype=int)
+        return tuple(np.split(self.residuals, ends)[:-1])
 
     @property
     def freedom(
@@ -188,8 +185,8 @@ class Solution:
     @property
     def misfit(self) -> float:
         """Minus ln of the likelihood, but for a constant: with the noise, where that is from the residuals."""
-        sigmas = (each.noise.sigma for each in self.problem.responses)
-        return self.chi_squared / 2 + sum(2 * np.log(sigma[np.isfinite(sigma)]).sum() for sigma in sigmas)
+        sigma = np.concatenate([np.empty(0), *(each.noise.sigma for each in self.problem.responses)])
+        return self.chi_squared / 2 + 2 * float(np.log(sigma[np.isfinite(sigma)]).sum())
 
     @property
     def quantile(self) -> float:
@@ -205,7 +202,8 @@ def best_solution(problem: Problem, is_enough: Callable[[Solution], bool | None]
     is there only between two lines.  Then the fit's own start is tried too.
     """
     found: list[Solution] = []
-    for draws, shares in STARTS:
+    # draws about the point that the equation errors lead to, and their shares of w one after another
+    for draws, shares in ((0, [0.1]), (300, [0.1]), (300, [1.0, 0.3, 0.1])):
         found.append(_rescaled(nearest_minimum(*start_by(problem, draws, shares))))
         best = min(found, key=lambda each: each.misfit)
         if best.converged and (is_enough or is_explained)(best):
@@ -226,20 +224,22 @@ def _nearest(found: Solution) -> Solution:
     A valley may be open where the search began and closed where it ended, where noise exceeds an effect too small to be
     measured (the rotary inertia of E I).  The point moves only where the sum of squares stays what it is.
     """
+    least = found.chi_squared
+    problem = found.problem
     for limit, most in ((OPEN_DEVIATION, SAME_SUM), (0.1, EXCLUDED)):
         some = open_axes(found.jacobian, limit)
         if not some.size:
             continue
         start = found.point - some.T @ (some @ found.point)
-        back = nearest_minimum(found.problem, start, {int(n): float(start[n]) for n in abs(some).argmax(axis=1)})
-        again = nearest_minimum(found.problem, back.point)  # a logarithm may have ended where it changes nothing
-        if again.converged and again.chi_squared < found.chi_squared - SAME_SUM:
+        back = nearest_minimum(problem, start, {int(n): float(start[n]) for n in abs(some).argmax(axis=1)})
+        # a logarithm may have ended where it changes nothing
+        again = nearest_minimum(problem, back.point)
+        if again.converged and again.chi_squared < least - SAME_SUM:
             return _nearest(again)
-        back = replace(back, jacobian=found.problem.jacobian(back.point), converged=found.converged)
+        back = replace(back, jacobian=problem.jacobian(back.point), converged=found.converged)
         fewest = max(1, len(open_axes(found.jacobian)))
-        if back.chi_squared < found.chi_squared + most and len(open_axes(back.jacobian)) >= fewest:
-            is_same = back.chi_squared < found.chi_squared + SAME_SUM
-            return back if is_same else replace(found, jacobian=back.jacobian)
+        if back.chi_squared < least + most and len(open_axes(back.jacobian)) >= fewest:
+            return back if back.chi_squared < least + SAME_SUM else replace(found, jacobian=back.jacobian)
     return found
 
 
@@ -284,10 +284,16 @@ def nearest_minimum(problem: Problem, start: Real, held: dict[int, float] | None
     first = problem.inside(point)[free]
     low, high = problem.bounds
     found = least_squares(
-        walled(lambda x: problem.residuals(at(x)), first), first, jac=jacobian,
-        bounds=(low[free], high[free]), x_scale="jac", xtol=1e-7, ftol=1e-9,
-        gtol=None, max_nfev=MOST_EVALUATIONS,
-    )  # fmt: skip
+        walled(lambda x: problem.residuals(at(x)), first),
+        first,
+        jac=jacobian,
+        bounds=(low[free], high[free]),
+        x_scale="jac",
+        xtol=1e-7,
+        ftol=1e-9,
+        gtol=None,
+        max_nfev=MOST_EVALUATIONS,
+    )
     slopes = np.zeros((found.fun.size, start.size))
     slopes[:, free] = np.asarray(found.jac)
     return Solution(problem, at(found.x), found.fun, slopes, bool(found.status > 0), 1)
@@ -310,7 +316,6 @@ def _rescaled(found: Solution) -> Solution:
 Progress = Callable[[int, int, str], object]
 
 TAKES_PART = 0.1  # of a unit vector: a smaller component has no part in it
-REACHES = (0.5, 1.0, 2.0, 4.0, 6.0, 9.0)  # of ln p: where a number that does not matter is tried
 
 
 @frozen(kw_only=True)
@@ -355,12 +360,13 @@ def confidence_intervals(
     parameters = found.problem.parameters
     quantile = found.quantile
     sizes, axes = principal_axes(found.jacobian)
-    is_open = sizes < 1.0 / OPEN_DEVIATION
-    deviations = np.linalg.norm(axes[~is_open] / sizes[~is_open, None], axis=0).tolist()
-    part = abs(axes[is_open]) > TAKES_PART
-    largest = abs(axes[is_open]).argmax(axis=1).tolist()
+    is_known = sizes >= 1.0 / OPEN_DEVIATION
+    deviations = np.linalg.norm(axes[is_known] / sizes[is_known, None], axis=0).tolist()
+    unknown = axes[~is_known]
+    part = abs(unknown) > TAKES_PART
+    largest = abs(unknown).argmax(axis=1).tolist()
     held = {n: float(found.point[n]) for n in largest}
-    words = [_undetermined(axis, [each.key for each in parameters]) for axis in axes[is_open]]
+    words = [_undetermined(axis, [each.key for each in parameters]) for axis in unknown]
     alone = {n: k for k, n in enumerate(largest) if part[k].sum() == 1}
     fitted = []
     for n, each in enumerate(parameters):
@@ -368,20 +374,31 @@ def confidence_intervals(
             progress(n, len(parameters), f"interval of {each.key}")
         low = high = deviation = None
         point = float(found.point[n])
+        value = each.value(point)
         own = deviations[n]
         if not part[:, n].any():
-            ends = [_end(found, n, way, own, quantile, held) if profile else point + way * quantile * own
-                    for way in (-1, 1)]  # fmt: skip
+            ends = [point - quantile * own, point + quantile * own]
+            if profile:
+                ends = [_end(found, n, end, quantile, held) for end in ends]
             low, high = each.ends(ends)
-            deviation = own * each.per_coordinate(each.value(point))
+            deviation = own * each.per_coordinate(value)
         elif n in alone:
             low, high = _one_sided(found, n, quantile)
             words[alone[n]] = words[alone[n]] if low is None else ""
         of = file_key(each.key)
-        fitted.append(Fitted(
-            label=of.label, key=each.key, unit=of.unit or "1", value=each.value(point), low=low, high=high,
-            deviation=deviation, identified=low is not None and high is not None, start=each.start,
-        ))  # fmt: skip
+        fitted.append(
+            Fitted(
+                label=of.label,
+                key=each.key,
+                unit=of.unit or "1",
+                value=value,
+                low=low,
+                high=high,
+                deviation=deviation,
+                identified=None not in (low, high),
+                start=each.start,
+            )
+        )
         if (low is None) != (high is None):
             end = f"at most {high:.4g}" if low is None else f"at least {low:.4g}"
             words.append(f"{each.key} is {end}: one-sided bound")
@@ -398,39 +415,39 @@ def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float | None, 
     if each.size:
         return None, None
     low, high = (each[n] for each in found.problem.bounds)
+    own = found.point[n]
+    along = np.eye(found.point.size)[n]
 
     def excess(at: float) -> float:
-        point = found.point.copy()
-        point[n] = at
-        return sum_of_squares(found.problem, point) - found.chi_squared - quantile**2
+        return sum_of_squares(found.problem, found.point + (at - own) * along) - found.chi_squared - quantile**2
 
     def end(way: int) -> float | None:
-        steps = (found.point[n] + way * reach for reach in REACHES)
+        # of ln p: where a number that does not matter is tried
+        steps = (own + way * reach for reach in (0.5, 1.0, 2.0, 4.0, 6.0, 9.0))
         beyond = next((at for at in steps if low <= at <= high and excess(at) > 0), None)
-        return None if beyond is None else each.value(float(brentq(excess, found.point[n], beyond, xtol=1e-4)))
+        return None if beyond is None else each.value(float(brentq(excess, own, beyond, xtol=1e-4)))
 
     lower = end(-1)
     upper = end(1)
     return (None, None) if lower is None and upper is None else (lower or 0.0, upper)
 
 
-def _end(found: Solution, n: int, way: int, deviation: float, quantile: float, held: dict[int, float]) -> float:
-    """Where the least sum of squares with coordinate n held has grown by quantile^2, on one side of the best.
+def _end(found: Solution, n: int, at: float, quantile: float, held: dict[int, float]) -> float:
+    """Where the least sum of squares with coordinate n held has grown by quantile^2, on the side of the best of `at`.
 
     The root of that growth is nearly linear in the coordinate, so a secant finds it in two or three steps.
     """
     low, high = (each[n] for each in found.problem.bounds)
     rest = [m for m in range(found.point.size) if m != n and m not in held]
-    slope = np.zeros(found.point.size)  # of the others where n is held elsewhere
+    # of the others where n is held elsewhere
+    slope = np.eye(found.point.size)[n]
     slope[rest] = -np.linalg.lstsq(found.jacobian[:, rest], found.jacobian[:, n], rcond=None)[0]
-    slope[n] = 1.0
-    near = found.point[n]
+    own = near = found.point[n]
     root_near = 0.0
-    at = near + way * quantile * deviation
     # three steps do but in a crooked valley
     for _ in range(12):
         at = np.clip(at, low, high)
-        start = found.point + slope * (at - found.point[n])
+        start = found.point + slope * (at - own)
         there = nearest_minimum(found.problem, start, held | {n: at})
         growth = there.chi_squared - found.chi_squared
         # of a sum of squares: a profile that falls by more has left the valley of the best
@@ -440,8 +457,12 @@ def _end(found: Solution, n: int, way: int, deviation: float, quantile: float, h
         # of a deviation: there the profile has reached its level
         if abs(root - quantile) < 0.01 or (at in (low, high) and root < quantile):
             return float(at)
-        step = (quantile - root) * (at - near) / (root - root_near) if root != root_near else 2 * (at - near)
-        near, root_near, at = at, root, at + np.clip(step, -3 * abs(at - near), 3 * abs(at - near))
+        last = at - near
+        # of the last step: no farther than three of it
+        times = np.clip((quantile - root) / (root - root_near), -3, 3) if root != root_near else 2
+        near = at
+        root_near = root
+        at = at + times * last
     return float(at)
 
 
@@ -449,13 +470,15 @@ def _undetermined(axis: Real, keys: Sequence[str]) -> str:
     """A direction along which nothing changes, in words; of two numbers, the combination that is known instead."""
     part = [n for n in np.argsort(-abs(axis)) if abs(axis[n]) > TAKES_PART]
     names = [keys[n] for n in part]
+    shares = axis[part] / abs(axis[part[0]])
     if len(part) == 1:
         return f"{names[0]} is not determined by these data"
     if len(part) == 2:
-        power = -axis[part[0]] / axis[part[1]]  # first * second^power does not change along the axis
-        known = f"{names[0]} {'*' if power > 0 else '/'} {names[1]}"
-        # a power so near to 1 is written as 1
-        known += "" if abs(abs(power) - 1) < 0.02 else f"^{abs(power):.3g}"
-        return f"{names[0]} and {names[1]} are not determined by these data: only {known} is"
-    shares = ", ".join(f"{name} {axis[n] / abs(axis[part[0]]):+.3g} %" for name, n in zip(names, part, strict=True))
-    return f"not determined by these data: {shares} together change nothing"
+        # first * second^power does not change along the axis
+        power = -shares[0] / shares[1]
+        # one so near to 1 is written as 1
+        exponent = "" if abs(abs(power) - 1) < 0.02 else f"^{abs(power):.3g}"
+        known = f"{names[0]} {'*' if power > 0 else '/'} {names[1]}{exponent}"
+        return f"{' and '.join(names)} are not determined by these data: only {known} is"
+    words = ", ".join(f"{name} {share:+.3g} %" for name, share in zip(names, shares, strict=True))
+    return f"not determined by these data: {words} together change nothing"

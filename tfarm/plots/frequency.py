@@ -14,9 +14,8 @@ from tfarm.arm import PLANE, HubFeedback, Law
 from tfarm.arrays import Complex, Real
 from tfarm.exact.outputs import signal_words, unit_over
 from tfarm.fitting.data import Measured
-from tfarm.fitting.fit import Fit
+from tfarm.fitting.fit import Fit, ResponseBand, ShareOfArms
 from tfarm.fitting.overlay import Overlay
-from tfarm.fitting.possible import ResponseBand, ShareOfArms
 from tfarm.loop.curve import decibels
 from tfarm.response.frequency import Bode
 

@@ -6,9 +6,8 @@ A truncated Mittag-Leffler series, exact at s -> 0.  At C = 0 the poles are exac
 At C > 0 the undamped modes do not diagonalise the damping, so the residues are those of the damped eigenvalues.
 
 An output is G = N/D with N and the drive D analytic, so its residue at a simple zero p of D is N(p)/D'(p).  Where hub
-angle or moment is a small difference there, it is computed from the balance of the hub.  At double frequencies the
-residue is c b of the mode shapes for C = 0 (Meirovitch, Fundamentals of Vibrations, 2001, ch. 7) and Cauchy's integral
-around p for C > 0.
+angle or moment is a small difference there, it is computed from the balance of the hub.  Where both are 0 it is
+Cauchy's integral around p.  Two frequencies of an undamped arm that are equal to eight digits have none.
 
 State spaces from the input to the signals of a controller, in series and in a loop with it.
 """
@@ -57,10 +56,6 @@ def slow_remainder(C: float, missing: Callable[[Complex], Complex]) -> tuple[Rea
     return CORNER_RATIOS / C, shares
 
 
-UNIT_CIRCLE = np.exp(
-    2j * np.pi * np.arange(32) / 32
-)  # of Cauchy's integral: a pole 4 radii away adds 4^-32 of its residue
-OF_SHAPES = ("theta", "W", "Y", "Phi", "M", "Q")  # quantities of a table of modes
 AT_HUB = (  # moment and shear force of the link at the hub, and the hub's angle
     Output(quantity="M", place="root", label="moment at the root"),
     OUTPUTS["root_shear"],
@@ -68,21 +63,9 @@ AT_HUB = (  # moment and shear force of the link at the hub, and the hub's angle
 )
 
 
-def undamped_residues(table: Modes, wanted: Sequence[Output], k: System, x: float) -> Real:
-    """Return residues in s^2 of each output over s^power at the flexible modes (C = 0): (outputs, modes).
-
-    c b, with c the output of the mode and b its hub participation (its root moment where the hub is locked).
-    `x` is a share of the length.
-    """
-    omega, powers = table.flexible, np.array([[each.power] for each in wanted])
-    residues, doubtful = end_residues(k, wanted, 1j * omega, x)
-    products: Real = (residues * 2j * omega / (1j * omega) ** powers).real
-    # 1e-6: relative gap under which only shapes separate two modes
-    close = np.r_[False, np.diff(omega) < 1e-6 * omega[1:], False]
-    by_shapes = close[:-1] | close[1:] | doubtful
-    if by_shapes.any() and all(each.quantity in OF_SHAPES and each.side == "outer" for each in wanted):
-        products[:, by_shapes] = _from_shapes(table, wanted, k, x)[:, by_shapes]
-    return products
+def powers_of(wanted: Sequence[Output]) -> NDArray[np.int64]:
+    """Return the powers of s of the outputs (outputs, 1)."""
+    return np.array([[each.power] for each in wanted])
 
 
 def end_residues(k: System, wanted: Sequence[Output], p: Complex, x: float = 0.0) -> tuple[Complex, NDArray[np.bool_]]:
@@ -111,47 +94,28 @@ def end_residues(k: System, wanted: Sequence[Output], p: Complex, x: float = 0.0
     return residues, np.asarray(~np.isfinite(residues).all(axis=0))
 
 
-def contour_residues(k: System, wanted: Sequence[Output], p: Complex, x: float) -> Complex:
-    """Return residues (outputs, p) by the trapezoid rule on circles around p, which converges geometrically.
+def contour_residues(k: System, wanted: Sequence[Output], p: Complex, known: Complex, x: float) -> Complex:
+    """Return residues (outputs, p) by the trapezoid rule on a circle around p, which converges geometrically.
 
-    A circle shrinks until one of a third of its radius agrees with it.
-    Raises ConvergenceError where none does: two eigenvalues are one to the last digits.
+    Every other one of the `known` eigenvalues is at least 4 radii away.
+    Raises ConvergenceError where one is too close.
     """
-    apart = abs(p[:, None] - p) + np.where(np.eye(p.size, dtype=bool), np.inf, 0.0)
-    away = [apart.min(axis=1, initial=np.inf), abs(p), *(abs(p - point) for point in k.singular)]
-    # another pole is at least 4 radii away
-    radius = np.min(away, axis=0) / 4
-    # ten circles, each a third of the one before
-    falls = 3.0 ** -np.arange(10)
-    arrow = falls[:, None, None] * radius[:, None] * UNIT_CIRCLE
-    values = evaluate_outputs(k, wanted, (p[:, None] + arrow).ravel(), x).reshape(len(wanted), *arrow.shape) * arrow
-    residues, size = values.mean(axis=-1), abs(values).max(axis=-1)  # (outputs, radii, p)
-    larger = np.maximum(size[:, 1:], size[:, :-1])
-    # 1e-11 of the largest value on the circle: the largest difference of two radii
-    agree = (abs(np.diff(residues, axis=1)) <= 1e-11 * larger).all(axis=0)
-    for worst in p[~agree.any(axis=0)].tolist():
+    away = abs(p[:, None] - np.r_[known, known.conj(), 0.0, k.singular])
+    radius = np.where(away > 0, away, np.inf).min(axis=1) / 4
+    _must_be_apart(p[radius < 1e-9 * abs(p)])
+    # a pole 4 radii away adds 4^-32 of its residue
+    arrow = np.outer(radius, np.exp(2j * np.pi * np.arange(32) / 32))
+    values = evaluate_outputs(k, wanted, (p[:, None] + arrow).ravel(), x).reshape(len(wanted), *arrow.shape)
+    return np.asarray((values * arrow).mean(axis=-1))
+
+
+def _must_be_apart(p: Complex) -> None:
+    """Raise ConvergenceError for the first of some eigenvalues."""
+    for worst in p.tolist():
         raise ConvergenceError(f"no residue at the eigenvalue {worst:.10g} 1/s: another one is too close", worst, 0.0)
-    return residues[:, agree.argmax(axis=0), np.arange(p.size)]
-
-
-def _from_shapes(table: Modes, wanted: Sequence[Output], k: System, x: float) -> Real:
-    """Return c b (outputs, modes) of the flexible modes by the mode shapes."""
-    length, theta = float(k.length), table.hub_participation
-    drive = table.modal_moment if k.is_locked else theta
-    of: dict[str, Callable[[float], Real]] = {
-        "theta": lambda _: theta,
-        "W": table.shape,
-        "Y": lambda at: table.shape(at) - (at + float(k.radius) * length) * theta,
-        "Phi": lambda at: table.rotation(at) - theta,
-        "M": table.moment,
-        "Q": table.shear,
-    }
-    return np.array([of[each.quantity](each.share(x) * length) * drive for each in wanted])[:, table.index > 0]
 
 
 MOST_MODELLED = 1000  # of a model: its matrices of 2000 states take 32 MB
-LARGE_MODEL, NAMING_STEPS = 40, 1_000  # modes from which on a model has no need of all names, and steps: time alone
-NEXT_TO_REST = 1e-3  # of the first frequency: a pole nearer to 0 leaves 1e-15 of itself five terms on
 
 
 ModalModel = PartialFractions  # pairs assigned to no mode come last, with the index 0 and |s| for a frequency
@@ -177,7 +141,7 @@ def modal_model(
         remedy = f"s^{each.power} makes it improper, which no state space is; choose a lower derivative"
         # r s^2/(s^2 + w^2) of a mode is bounded, and with s^3 it is not
         require(each.power <= 2, "outputs", each.name, remedy)
-    table = modes(arm, max(1, int(count)))
+    table = modes(arm, max(1, count))
     collocated = OUTPUTS["root_moment" if arm.is_locked else "hub_angle"]
     index, p, single = _eigenvalues(arm, table, reach)
     r, alone = _residues(table, k, [*wanted, collocated], share, p, single)
@@ -206,8 +170,9 @@ def relaxed_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None)
     At C > 0 the omitted bending modes are overdamped with slow poles near -1/C: c b/w^2/(1 + C s), no static gain.  So
     the remainder is D + E/(1 + C s), from G and G' at 0.  Raises ParameterError at C = 0.
     """
-    model, C = modal_model(arm, outputs, count, x), arm.damping
+    C = arm.damping
     require(C, "link.damping", C, "without damping nothing relaxes; take modal_model")
+    model = modal_model(arm, outputs, count, x)
     exact, kept = _at_rest(transfer(arm, model.rows, x=x), model.single, modes(arm, 1))
     slope = exact[:, 3] + (model.residues / model.eigenvalues**2).real.sum(axis=(1, 2))
     slope += (model.single_residues / model.single**2)[:, kept].sum(axis=1)
@@ -225,8 +190,9 @@ def slow_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) ->
 
     They are in pairs, with the index 0.  Raises ParameterError at C = 0.
     """
-    model, C = modal_model(arm, outputs, count, x), arm.damping
+    C = arm.damping
     require(C, "link.damping", C, "without damping nothing is slow; take modal_model")
+    model = modal_model(arm, outputs, count, x)
     exact = transfer(arm, outputs, x=x)
     corners, shares = slow_remainder(C, lambda s: exact(s).reshape(-1, s.size) - model(s))
     residues = (shares * corners).reshape(len(shares), -1, 2)
@@ -238,49 +204,53 @@ def _at_rest(G: TransferFunction, single: Real, table: Modes) -> tuple[Real, NDA
 
     The slow pole of a hub with hardly any friction is left out of the coefficients of 1 and s.
     """
-    expansion, kept = G.expansion, np.ones(single.size, np.bool_)
     slowest = abs(single).min(initial=math.inf)
-    if G.arm.has_rigid_mode and slowest < NEXT_TO_REST * table.flexible[0]:
-        expansion = np.c_[expansion[:, :2], without_slow_pole(G.system, G.rows, G.share)]
-        kept = abs(single) > slowest
-    return expansion, kept
+    # of the first frequency: a pole nearer to 0 leaves 1e-15 of itself five terms on
+    if G.arm.has_rigid_mode and slowest < 1e-3 * table.flexible[0]:
+        expansion = np.c_[G.expansion[:, :2], without_slow_pole(G.system, G.rows, G.share)]
+        return expansion, abs(single) > slowest
+    return G.expansion, np.ones(single.size, np.bool_)
 
 
 def _eigenvalues(arm: Arm, table: Modes, reach: float) -> tuple[NDArray[np.int64], Complex, Real]:
     """Return the mode of each pair (n,), 0 of one assigned to none, the pairs (n, 2), and single real ones (m,)."""
     flexible = table.index > 0
+    index = table.index[flexible]
     if arm.is_undamped:
-        return (
-            table.index[flexible],
-            1j * np.outer(table.flexible, [1, -1]),
-            np.array(single_zeros(table)),
-        )
-    damped = damped_modes(table, steps=NAMING_STEPS if len(table) > LARGE_MODEL else math.inf, reach=reach)
-    pairs, more = damped.eigenvalues[flexible], damped.unassigned_pairs
-    whole, rings = np.isfinite(pairs).all(axis=1), more[:, 0].imag > 0
+        return index, 1j * np.outer(table.flexible, [1, -1]), np.array(single_zeros(table))
+    # a large model has no need of all names: a limit of time alone
+    damped = damped_modes(table, steps=1_000 if len(table) > 40 else math.inf, reach=reach)
+    pairs = damped.eigenvalues[flexible]
+    more = damped.unassigned_pairs
+    whole = np.isfinite(pairs).all(axis=1)
+    rings = more[:, 0].imag > 0
     halves = pairs[~whole & np.isfinite(pairs[:, 0]), 0].real
-    index = np.r_[table.index[flexible][whole], np.zeros(rings.sum(), np.int64)]
-    single = np.concatenate([damped.single, halves, more[~rings, 0].real, entered(damped)])
-    return index, np.concatenate([pairs[whole], more[rings]]), single
+    single = np.r_[damped.single, halves, more[~rings, 0].real, entered(damped)]
+    return np.r_[index[whole], np.zeros(rings.sum(), np.int64)], np.r_[pairs[whole], more[rings]], single
 
 
 def _residues(
     table: Modes, k: System, wanted: list[Output], share: float, p: Complex, single: Real
 ) -> tuple[Complex, Real]:
     """Return residues (outputs, n, 2) at pairs of eigenvalues (n, 2), and at single real ones (outputs, m)."""
-    if table.arm.is_undamped and not single.size:
-        powers, s = np.array([[each.power] for each in wanted]), p[:, 0]
-        upper = undamped_residues(table, wanted, k, share) * s**powers / (2 * s)
-        return np.stack([upper, upper.conj()], axis=2), np.empty((len(wanted), 0))
-    s = np.r_[p.ravel(), single]
+    rings = p[:, 0].imag > 0
+    s = np.r_[p[:, 0], p[~rings, 1], single]
     found, doubtful = end_residues(k, wanted, s, share)
-    doubtful[p.size :] |= table.arm.is_undamped  # the pole of the circuit, where the current is 0 over 0
+    if table.arm.is_undamped:
+        close = np.diff(table.flexible) < 1e-8 * table.flexible[1:]
+        _must_be_apart(p[1:, 0][close])
+        # the pole of the circuit, where the current is 0 over 0
+        doubtful[len(p) :] = True
     if doubtful.any():
-        found[:, doubtful] = contour_residues(k, wanted, s[doubtful], share)
-    residues, pair = found[:, : p.size].reshape(len(wanted), *p.shape), p[:, 0].imag > 0
-    residues[:, pair, 1] = residues[:, pair, 0].conj()
-    residues[:, ~pair] = residues[:, ~pair].real
-    return residues, found[:, p.size :].real.astype(float)
+        found[:, doubtful] = contour_residues(k, wanted, s[doubtful], s, share)
+    if table.arm.is_undamped and not single.size:
+        # exactly lossless: a power of s times a real function of s^2
+        power = s ** powers_of(wanted)
+        found = (found * 2 * s / power).real * power / (2 * s)
+    upper, others, alone = np.split(found, [len(p), s.size - single.size], axis=1)
+    residues = np.stack([upper, upper.conj()], axis=2)
+    residues[:, ~rings] = np.stack([upper[:, ~rings], others], axis=2).real
+    return residues, alone.real.astype(float)
 
 
 ALGEBRAIC = 1e-9  # distance from -1 of a feedthrough of the loop that leaves its input undetermined
@@ -292,16 +262,18 @@ def sensed_model(arm: Arm, signals: Sequence[str], count: int) -> Matrices:
     Raises ParameterError for an unknown or improper signal and a count out of range.
     """
     read = Signals(arm, tuple(signals))
-    extra = [] if arm.is_locked else [OUTPUTS["hub_angle"]]  # so that every model has the states of the rigid body
-    rows: dict[int, Real] = {}  # of C and D side by side
+    # so that every model has the states of the rigid body
+    extra = [] if arm.is_locked else [OUTPUTS["hub_angle"]]
+    # C and D side by side
+    both: dict[int, Real] = {}
     for share in dict.fromkeys(read.places):
         mine = [n for n, place in enumerate(read.places) if place == share]
         wanted = [*extra, *(read.outputs[n] for n in mine)]
         x = share * arm.length if any(each.place == "x" for each in wanted) else None
         A, B, C, D = modal_model(arm, wanted, count, x).matrices()
-        rows |= zip(mine, np.hstack([C, D])[len(extra) :], strict=True)
-    both = np.array([rows[n] for n in range(len(rows))])
-    return A, B, both[:, :-1], both[:, -1:]
+        both |= zip(mine, np.c_[C, D][len(extra) :], strict=True)
+    C, D = np.split(np.array([both[n] for n in sorted(both)]), [-1], axis=1)
+    return A, B, C, D
 
 
 def closed(plant: Matrices, law: Matrices) -> Real:
@@ -314,16 +286,17 @@ def closed(plant: Matrices, law: Matrices) -> Real:
     whole = 1.0 + (Dk @ D)[0, 0]
     remedy = "the feedthroughs of the law and the model have the product -1: an algebraic loop"
     require(abs(whole) >= ALGEBRAIC, "law", whole - 1.0, remedy)
-    v = np.hstack([-Dk @ C, -Ck]) / whole  # of plant and law states
-    y = np.hstack([C, np.zeros((len(C), len(Ak)))]) + D @ v
-    return block_diag(A, Ak) + np.vstack([B @ v, Bk @ y])
+    # of plant and law states
+    v = np.c_[-Dk @ C, -Ck] / whole
+    y = np.c_[C, np.zeros((len(C), len(Ak)))] + D @ v
+    return block_diag(A, Ak) + np.r_[B @ v, Bk @ y]
 
 
 def pade(delay: float, order: int) -> Rational:
     """Return the Pade approximation of e^{-s delay}, numerator and denominator of that order."""
     powers = np.arange(order, -1, -1)
-    sizes = [math.comb(order, k) * math.factorial(2 * order - k) / math.factorial(2 * order) for k in powers]
-    terms = np.array(sizes) * delay**powers
+    sizes = np.array([math.comb(order, k) / math.perm(2 * order, k) for k in powers])
+    terms = sizes * delay**powers
     return Rational(tuple(terms * (-1.0) ** powers), tuple(terms))
 
 
@@ -332,4 +305,4 @@ def in_series(first: Matrices, second: Matrices) -> Matrices:
     A, B, C, D = first
     a, b, c, d = second
     whole = np.block([[A, np.zeros((len(A), len(a)))], [b @ C, a]])
-    return whole, np.vstack([B, b @ D]), np.hstack([d @ C, c]), d @ D
+    return whole, np.r_[B, b @ D], np.c_[d @ C, c], d @ D

@@ -18,7 +18,7 @@ from scipy.linalg import block_diag
 
 from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import MACHINE_EPS, Complex, Real
 from tfarm.errors import require
 from tfarm.exact.outputs import Output
 from tfarm.records import frozen
@@ -188,12 +188,8 @@ class PartialFractions:
 
 FOUND_TO_WORST = 1.02  # times the largest error found: tuned on random arms
 EXACT_ROUNDING = 1e-14  # error of the exact values in the same norm
-TERM_ROUNDING = 4 * float(np.finfo(float).eps)  # of a model's terms, which cancel where G is small, in their sum
 CLEAR_OF_POLES = 1e-12  # of a frequency: the least distance of a sample from a pole
-POLE_DISTANCES = 10.0 ** -np.arange(1, 8)  # of samples from a pole, as shares of its frequency
-LEAST_SAMPLES, EVEN_SAMPLES, BETWEEN_POLES = 200, 400, 24  # more of these, in even steps, and between two poles
-POLES_BEYOND = 1.5  # times the end of the range: samples keep clear of poles up to there
-REFINEMENTS, REFINED_POINTS = 3, 17  # of such a peak, each to an eighth of its width
+REFINED_POINTS = 17  # of a peak of the error: a refinement is to an eighth of its width
 
 
 class Ruler:
@@ -203,30 +199,32 @@ class Ruler:
         self.G = transfer(arm, transfer(arm, outputs, x=x).rows, x=x)
         self.band = band
         self._poles = frequencies_around(arm, band[1])
-        w = _samples(*band, self._poles)
-        w = w[self._is_clear(w)]
+        w = self._clear(_samples(*band, self._poles))
         for _ in range(2):
-            w = np.union1d(w, self._dips(w))
-            w = w[self._is_clear(w)]
-        self.w, (self._values, self._size) = w, values_and_norm(self.G, w)
+            w = self._clear(np.union1d(w, self._dips(w)))
+        self.w = w
+        self._exact = values_and_norm(self.G, w)
 
     def rough(self, model: PartialFractions) -> float:
         """Return the largest error at the samples, a little below the worst one."""
-        return float(_errors(model, self.w, self._values, self._size).max())
+        return float(_errors(model, self.w, *self._exact).max())
 
     def measure(self, model: PartialFractions) -> tuple[Real, Real]:
         """Return the largest error of each output, with a margin, and its frequency [rad/s]; high peaks are refined."""
-        errors = _errors(model, self.w, self._values, self._size)
-        worst, at = errors.max(axis=1), self.w[errors.argmax(axis=1)]
+        errors = _errors(model, self.w, *self._exact)
+        worst = errors.max(axis=1)
+        at = self.w[errors.argmax(axis=1)]
         for row, error in enumerate(errors):
             low, high = self._brackets(error)
-            for _ in range(REFINEMENTS):
+            for _ in range(3):
                 inner = np.linspace(low, high, REFINED_POINTS)
-                found, clear = np.zeros(inner.shape), self._is_clear(inner)
+                found = np.zeros(inner.shape)
+                clear = self._is_clear(inner)
                 found[clear] = _errors(model, inner[clear], *values_and_norm(self.G, inner[clear]))[row]
                 best = np.unravel_index(found.argmax(), found.shape)
                 if found[best] > worst[row]:
-                    worst[row], at[row] = found[best], inner[best]
+                    worst[row] = found[best]
+                    at[row] = inner[best]
                 around = np.clip(np.add(found.argmax(axis=0), [[-1], [1]]), 0, REFINED_POINTS - 1)
                 low, high = np.take_along_axis(inner, around, axis=0)
         return worst * FOUND_TO_WORST + EXACT_ROUNDING, at
@@ -238,7 +236,8 @@ class Ruler:
         (peaks,) = np.nonzero((error >= padded[:-2]) & (error >= padded[2:]) & (error >= 0.2 * error.max()))
         # 12: local maxima of the error that are refined, the highest first
         peaks = peaks[np.argsort(-error[peaks])][:12]
-        return self.w[np.maximum(peaks - 1, 0)], self.w[np.minimum(peaks + 1, self.w.size - 1)]
+        low, high = np.clip(np.add(peaks, [[-1], [1]]), 0, self.w.size - 1)
+        return self.w[low], self.w[high]
 
     def _dips(self, w: Real) -> Real:
         """Return points around the dips of |G| and |G'|, where the norm is small."""
@@ -252,6 +251,9 @@ class Ruler:
 
     def _is_clear(self, w: Real) -> NDArray[np.bool_]:
         return distance(w, self._poles) > CLEAR_OF_POLES * w
+
+    def _clear(self, w: Real) -> Real:
+        return w[self._is_clear(w)]
 
 
 def values_and_norm(G: TransferFunction, w: Real) -> tuple[Complex, Real]:
@@ -268,23 +270,27 @@ def distance(w: Real, poles: Real) -> Real:
 
 
 def frequencies_around(arm: Arm, high: float) -> Real:
-    """Return the flexible natural frequencies [rad/s] below `POLES_BEYOND` times `high`, and the next one."""
-    return modes(arm, modes_below(arm, POLES_BEYOND * high) + 1).flexible
+    """Return the flexible natural frequencies [rad/s] below 1.5 times `high`, and the next one."""
+    return modes(arm, modes_below(arm, 1.5 * high) + 1).flexible
 
 
 def _samples(low: float, high: float, poles: Real) -> Real:
     """Return frequencies in even and in geometric steps, more between neighbouring poles and around each."""
-    # 60 of the even grid; peaks between are refined
-    count = LEAST_SAMPLES + int(60 * np.log10(high / low))
-    crowd = np.concatenate([poles[:, None] * (1 - POLE_DISTANCES), poles[:, None] * (1 + POLE_DISTANCES)]).ravel()
+    # 60 more a decade; peaks between are refined
+    count = 200 + int(60 * np.log10(high / low))
+    # of samples from a pole, as shares of its frequency
+    distances = 10.0 ** -np.arange(1, 8)
+    crowd = np.outer(poles, [*(1 - distances), *(1 + distances)]).ravel()
+    # 24 between two poles
     knots = np.r_[low, poles[(poles > low) & (poles < high)], high]
-    share = (1 - np.cos(np.linspace(0, np.pi, BETWEEN_POLES + 2)[1:-1])) / 2
-    between = (knots[:-1, None] + np.diff(knots)[:, None] * share).ravel()
-    w = np.concatenate([np.geomspace(low, high, count), np.linspace(low, high, EVEN_SAMPLES), crowd, between])
+    share = (1 - np.cos(np.linspace(0, np.pi, 26)[1:-1])) / 2
+    between = (knots[:-1, None] + np.outer(np.diff(knots), share)).ravel()
+    w = np.r_[np.geomspace(low, high, count), np.linspace(low, high, 400), crowd, between]
     return np.unique(np.clip(w, low, high))
 
 
 def _errors(model: PartialFractions, w: Real, exact: Complex, size: Real) -> Real:
     """Return |dG| and the rounding of a state space, over the norm; 0 for an output that is zero throughout."""
-    gap = abs(model(1j * w) - exact) + TERM_ROUNDING * model.magnitude(1j * w)
+    # the terms of a model cancel where G is small: four roundings in their sum
+    gap = abs(model(1j * w) - exact) + 4 * MACHINE_EPS * model.magnitude(1j * w)
     return np.divide(gap, size, out=np.where(gap > 0, np.inf, 0.0), where=size > 0)

@@ -23,11 +23,8 @@ from tfarm.exact.series import expansion_at_zero
 from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.spectrum import modes_below
 
-from .modal import MOST_MODELLED, modal_model
+from .modal import MOST_MODELLED, modal_model, powers_of
 from .partial_fractions import PartialFractions, distance, frequencies_around, values_and_norm
-
-OFF_POLE = 1e-9  # of its frequency: the least distance of a sample from a pole of the arm
-PATIENCE = 3  # degrees without progress before the search ends
 
 
 @dataclass(frozen=True)
@@ -92,8 +89,10 @@ def _remainders(G: TransferFunction, inside: PartialFractions, high: float, freq
     """Return the remainders at samples of the range."""
     # denser towards the end of the range, where poles above have most effect; below 1 % of it S = 0 is enough
     w = high * np.sin(np.linspace(0.01, np.pi / 2, 300))
-    w = w[distance(w, frequencies) > OFF_POLE * w]
-    S, power = -(w**2), np.array([[each.power] for each in G.rows])
+    # none next to a pole of the arm
+    w = w[distance(w, frequencies) > 1e-9 * w]
+    S = -(w**2)
+    power = powers_of(G.rows)
     bases = [each.base for each in G.rows]
     at_zero = np.array([expansion_at_zero(G.system, base, G.share) for base in bases])
     by_S = ((at_zero[:, 0] != 0) | (power[:, 0] > 0))[:, None]
@@ -125,8 +124,8 @@ def _best_poles(rest: _Remainders, most: int) -> tuple[Real, Real, float]:
         idle += 1
         if error < least:
             best, least, idle = (np.sqrt(square), shares), error, 0
-        # 1e-14: a weighted error below this is rounding; more poles would fit noise
-        if least < 1e-14 or idle == PATIENCE:
+        # 1e-14: a weighted error below this is rounding; more poles would fit noise, as after three without progress
+        if least < 1e-14 or idle == 3:
             break
     return *best, least
 
@@ -138,7 +137,9 @@ def _checked(rest: _Remainders, square: Real) -> tuple[Real, Real, float]:
     """
     sign = 1.0 if rest.by_S[0] else -1.0
     while True:
-        basis, shares = rest.S[:, None] / (rest.S[:, None] + square), np.empty((len(rest.F), square.size))
+        S = rest.S[:, None]
+        basis = S / (S + square)
+        shares = np.empty((len(rest.F), square.size))
         for row, (F, weight) in enumerate(zip(rest.F, rest.weight, strict=True)):
             columns = basis * weight[:, None]
             size = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
@@ -156,9 +157,10 @@ def aaa_poles(S: Real, F: Real, weight: Real, degree: int) -> Iterator[Real]:
     is largest, and their weights minimise the linearised one (smallest singular vector of the Loewner matrix).
     """
     unit = abs(S).max()
-    S, F = np.r_[0.0, S / unit], np.c_[np.zeros(len(F)), F]
-    weight = np.c_[np.zeros(len(F)), weight]
-    support, error = [0], abs(F) * weight
+    S = np.r_[0.0, S / unit]
+    F, weight = (np.pad(each, ((0, 0), (1, 0))) for each in (F, weight))
+    support = [0]
+    error = abs(F) * weight
     for _ in range(degree):
         support.append(int(error.max(axis=0).argmax()))
         others = np.setdiff1d(np.arange(S.size), support)
@@ -169,8 +171,11 @@ def aaa_poles(S: Real, F: Real, weight: Real, degree: int) -> Iterator[Real]:
         fit = ((w * F[:, support]) @ cauchy.T) / (cauchy @ w)
         error = np.zeros_like(F)
         error[:, others] = abs(fit - F[:, others]) * weight[:, others]
-        arrow, mass = np.diag(np.r_[0.0, S[support]]), np.diag(np.r_[0.0, np.ones(len(support))])
-        arrow[0, 1:], arrow[1:, 0] = w, 1.0  # its finite eigenvalues are the zeros of sum w_j/(S - S_j)
+        # its finite eigenvalues are the zeros of sum w_j/(S - S_j)
+        arrow = np.diag(np.r_[0.0, S[support]])
+        arrow[0, 1:] = w
+        arrow[1:, 0] = 1.0
+        mass = np.diag(np.r_[0.0, np.ones(len(support))])
         numerator, denominator = scipy.linalg.eigvals(arrow, mass, homogeneous_eigvals=True)
         # 1e-13 of the numerator: an eigenvalue with a smaller denominator is infinite
         finite = abs(denominator) > 1e-13 * abs(numerator)
@@ -181,7 +186,7 @@ def aaa_poles(S: Real, F: Real, weight: Real, degree: int) -> Iterator[Real]:
 
 def _assembled(inside: PartialFractions, rest: _Remainders, poles: Real, shares: Real) -> PartialFractions:
     """Return the exact modes and the poles above them as one model, without the hub's own output."""
-    power = np.array([[each.power] for each in inside.rows])
+    power = powers_of(inside.rows)
     s = 1j * poles
     in_S = np.where(rest.by_S[:, None], shares, -shares * poles**2)
     upper = in_S * s**power / (2 * s)

@@ -41,7 +41,6 @@ BAND = (0.1, 1000.0)  # rad/s, by default
 NORM = "|dG| / (|G| + |w dG/dw|)"  # of the printed errors
 MOST_STATES = 400  # of a model within an error
 MOST_TAILS = 12  # pairs of poles above the range: more would fit rounding
-REDUCTION_BAND = "two frequencies in rad/s, 0 < low < high, such as 0.1,1000"  # the expected form
 
 
 class Channel(NamedTuple):
@@ -182,8 +181,7 @@ def reduce(
     """
     rows = transfer(arm, outputs, x=x).rows
     names = tuple(each.name for each in rows)
-    # 1e12: the largest ratio of its ends
-    band = known_band(band, REDUCTION_BAND, 1e12)
+    band = known_band(band, 1e12)
     require(len(set(names)) == len(names), "outputs", names, "name each output once")
     is_known = method is None or method in get_args(Reduction)
     require(is_known, "method", method, "modal or aaa, or leave it out for the better one")

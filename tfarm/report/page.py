@@ -37,9 +37,8 @@ from tfarm.dsp.discretise import acting_law
 from tfarm.errors import ConvergenceError, ParameterError, one_line
 from tfarm.exported.live_loop import LiveNumbers, law_data, live_data
 from tfarm.fitting.data import Measured
-from tfarm.fitting.fit import ARMS, Fit, arms_drawn
+from tfarm.fitting.fit import ARMS, Fit, ResponseBand, ShareOfArms, arms_drawn, response_band, stable_share
 from tfarm.fitting.overlay import Overlay, overlay
-from tfarm.fitting.possible import ResponseBand, ShareOfArms, response_band, stable_share
 from tfarm.fitting.recording import MeasuredRun, RunComparison, compare_run, departures
 from tfarm.loop.continuous import ContinuousLoop, band_of
 from tfarm.loop.curve import LoopCurve
@@ -214,7 +213,7 @@ class ReportedCase:
     @property
     def run(self) -> RunComparison | None:
         """The measured run with that of the sampled loop, if one was measured."""
-        return None if self.measured is None else compare_run(self.arm, self.law, self.chain, self.measured)
+        return None if self.measured is None else compare_run(self.case, self.measured)
 
     @property
     def growth(self) -> float:
@@ -229,7 +228,7 @@ class ReportedCase:
         # as much longer as an unstable loop may seem settled
         longer = 20 * self.growth
         count = self.sampled.verdict.modes_used
-        return departures(self.arm, self.law, self.chain, self.measured, count, longer)
+        return departures(self.case, self.measured, count, longer)
 
     @property
     def live(self) -> LiveNumbers:

@@ -10,7 +10,7 @@ at every zero on it, the limit of vanishing damping.  Elsewhere the phase of the
 
 Peaks and dips are local maxima and minima of |G(i omega)|.  A damped pole with a small residue may have no peak.  The
 slope of ln |G| may vanish where it changes, from one interval to the next, by more than its size.  Such intervals are
-halved until no extremum above `LEAST` fits in them.  A parabola through three points then gives the frequency.
+halved until no extremum above rounding fits in them.  A parabola through three points then gives the frequency.
 """
 
 import itertools
@@ -45,23 +45,21 @@ def worst_error(arm: Arm, output: str, band: tuple[float, float]) -> float | Non
     """
     G = transfer(arm, output)
     s = 1j * np.geomspace(*band, BAND_POINTS)
-    values, slopes = G(s), G.derivative(s)
-    if not np.any(values):
+    values = G(s)
+    if not values.any():
         return None
     errors = []
-    for point, value, slope in zip(s, values, slopes, strict=True):
-        with suppress(CertificationError, ConvergenceError):  # a zero of G, without a relative error
-            # 30 of the reference value: twice those of float64
-            parts = zip(G.digits(complex(point), 30), (value.real, value.imag), strict=True)
-            off = complex(*(float(Fraction(exact) - Fraction(float(part))) for exact, part in parts))
-            errors.append(float(abs(off) / (abs(value) + abs(point * slope))))
+    for point, value, slope in zip(*map(np.ndarray.tolist, (s, values, G.derivative(s))), strict=True):
+        # a zero of G has no relative error
+        with suppress(CertificationError, ConvergenceError):
+            # 30 digits of the reference value: twice those of float64
+            re, im = map(Fraction, G.digits(point, 30))
+            off = complex(re - Fraction(value.real), im - Fraction(value.imag))
+            errors.append(abs(off) / (abs(value) + abs(point * slope)))
     return max(errors, default=None)
 
 
 HERTZ = 2 * math.pi  # rad/s
-LEAST = 1e-9  # of |G|: the least rise and fall of a peak, above rounding
-ROUNDING = 1e-14  # relative error of a value, over |s/(s - p)| of the nearest pole or zero p
-HALVINGS = 40  # of an interval of the grid, at most: to the spacing of float64 numbers
 NARROWEST = 4 * float(np.finfo(float).eps)  # relative width below which no interval is halved
 
 Response = Callable[[Complex], Any]
@@ -117,31 +115,35 @@ def extrema(
 
 def _height(G: Response, omega: Real) -> Real:
     """Return ln |G(i omega)|."""
-    return np.asarray(np.log(abs(G(1j * omega))), float)
+    return np.log(abs(G(1j * omega)))
 
 
 def _least(omega: Real, roots: Complex) -> Real:
     """Return the least rise and fall of ln |G| at a peak, at each frequency."""
     distance = abs(1j * omega[:, None] - roots).min(axis=1, initial=np.inf)
-    return np.asarray(LEAST + ROUNDING * omega / np.maximum(distance, NARROWEST * omega), float)
+    # of |G|: 1e-9 above rounding, and its own error, 1e-14 over |s/(s - p)| of the nearest pole or zero p
+    return 1e-9 + 1e-14 * omega / np.maximum(distance, NARROWEST * omega)
 
 
 def _halved(G: Response, omega: Real, height: Real, roots: Complex) -> tuple[Real, Real]:
     """Return the grid with more points where the slope of ln |G| may vanish between two of its points."""
-    for _ in range(HALVINGS):
+    # 40 halvings of an interval: to the spacing of float64 numbers
+    for _ in range(40):
         with np.errstate(invalid="ignore"):
             slope = np.diff(height) / np.diff(omega)
             change = abs(np.diff(slope))
         change[~np.isfinite(change)] = 0.0  # next to a root on the axis the slope is steep
         near = np.maximum(np.r_[0.0, change], np.r_[change, 0.0])
         found = np.flatnonzero(abs(slope) <= near)
-        left, right = omega[found], omega[found + 1]
-        hidden = near[found] * (right - left) > _least(left, roots)
-        found = found[hidden & (right - left > NARROWEST * right)]
+        left = omega[found]
+        width = omega[found + 1] - left
+        hidden = near[found] * width > _least(left, roots)
+        found = found[hidden & (width > NARROWEST * omega[found + 1])]
         if not found.size:
             break
         middle = (omega[found] + omega[found + 1]) / 2
-        omega, height = np.insert(omega, found + 1, middle), np.insert(height, found + 1, _height(G, middle))
+        omega = np.insert(omega, found + 1, middle)
+        height = np.insert(height, found + 1, _height(G, middle))
     return omega, height
 
 
@@ -158,15 +160,6 @@ def _refined(G: Response, omega: Real, height: Real, places: Whole) -> tuple[Ext
     return tuple(Extremum(*finite.get(i) or (float(omega[i]), limit[float(height[i])])) for i in places.tolist())
 
 
-GRID_RANGE = Quantity("frequency range", "rad/s", help="first and last frequency", key="range_rad_s")
-POLES_IN = Quantity(
-    "poles complete in Re s", "1/s", help="all with Im s up to the last frequency", key="poles_between_re_1_s"
-)
-ZEROS_IN = Quantity(
-    "zeros complete in Re s", "1/s", help="all with Im s up to the last frequency", key="zeros_between_re_1_s"
-)
-BODE_BAND = "two frequencies in rad/s, the lower first, at most 30 decades apart: (1.0, 1000.0)"  # the expected form
-RESONANCES_SHOWN = 10  # flexible modes in the range, by default
 EVEN_PER_DECADE = 120  # points of the even grid
 NEAREST = 1e-6  # relative distance of the nearest point to a root on the axis
 AXIS_SHARE = 1e-12  # |Re s|/|s| below which a root is on the imaginary axis
@@ -195,8 +188,18 @@ class Bode:
     at_zeros: Real  # and of each zero; 0 on the axis
     peaks: Annotated[tuple[Extremum, ...], Quantity("peaks", help="local maxima of the magnitude")]  # ascending
     dips: Annotated[tuple[Extremum, ...], Quantity("dips", help="local minima of the magnitude")]
-    pole_width: Annotated[tuple[float, float], POLES_IN]
-    zero_width: Annotated[tuple[float, float], ZEROS_IN]
+    pole_width: Annotated[
+        tuple[float, float],
+        Quantity(
+            "poles complete in Re s", "1/s", help="all with Im s up to the last frequency", key="poles_between_re_1_s"
+        ),
+    ]
+    zero_width: Annotated[
+        tuple[float, float],
+        Quantity(
+            "zeros complete in Re s", "1/s", help="all with Im s up to the last frequency", key="zeros_between_re_1_s"
+        ),
+    ]
 
     @property
     def arm_name(self) -> Annotated[str, Quantity("arm", help="name of the arm", key="arm")]:
@@ -241,19 +244,24 @@ class Bode:
         return f"{self.poles.size} poles and {self.zeros.size} zeros up to {self.band[1]:.6g} rad/s"
 
     @property
-    def band(self) -> Annotated[tuple[float, float], GRID_RANGE]:
+    def band(
+        self,
+    ) -> Annotated[
+        tuple[float, float],
+        Quantity("frequency range", "rad/s", help="first and last frequency", key="range_rad_s"),
+    ]:
         """First and last frequency [rad/s]."""
         return float(self.omega[0]), float(self.omega[-1])
 
     @property
     def infinite(self) -> Real:
         """Frequencies [rad/s] where the response is infinite."""
-        return np.asarray(self.poles.imag[_on_axis(self.poles)], float)
+        return _on_axis(self.poles)
 
     @property
     def vanishing(self) -> Real:
         """Frequencies [rad/s] where the response is zero."""
-        return np.asarray(self.zeros.imag[_on_axis(self.zeros)], float)
+        return _on_axis(self.zeros)
 
     @property
     def resonances(self) -> Complex:
@@ -278,23 +286,26 @@ class Bode:
     @property
     def input_label(self) -> str:
         """The input in words."""
-        name = "hub_angle" if self.arm.is_locked else self.arm.input
-        return "torque" if name == "hub_torque" else name.replace("_", " ")
+        return "torque" if self.input == "hub_torque" else self.input.replace("_", " ")
 
 
-def resonant_band(arm: Arm, resonances: int = RESONANCES_SHOWN) -> tuple[float, float]:
+def resonant_band(arm: Arm, resonances: int = 10) -> tuple[float, float]:
     """Return the range [rad/s] from far below the first flexible mode to midway from the last to the next."""
-    table = modes(arm, resonances + 1)
-    low = table.flexible[0] / 20
+    omega = modes(arm, resonances + 1).flexible.tolist()
+    low = omega[0] / 20
     decade = 10.0 ** math.floor(math.log10(low))
-    start = max(step for step in (decade, 2 * decade, 5 * decade) if step <= low * (1 + 1e-12))
-    return float(start), float(math.sqrt(table.flexible[-2] * table.flexible[-1]))
+    start = max(step * decade for step in (1, 2, 5) if step * decade <= low * (1 + 1e-12))
+    return start, math.sqrt(omega[-2] * omega[-1])
 
 
 def bode(
-    arm: Arm, output: str | Output, band: tuple[float, float] | None = None, *, x: float | None = None,
+    arm: Arm,
+    output: str | Output,
+    band: tuple[float, float] | None = None,
+    *,
+    x: float | None = None,
     input: str | None = None,
-) -> Bode:  # fmt: skip
+) -> Bode:
     """Return the exact frequency response of one output over a range `band` [rad/s], refined at every pole and zero.
 
     `x` [m] is the place of an output along the arm, `input` another input at the hub (see `tfarm.transfer`).  By
@@ -303,7 +314,7 @@ def bode(
     """
     G = transfer(arm, output, x=x, input=input)
     arm, (row,) = G.arm, G.rows
-    band = resonant_band(arm) if band is None else known_band(band, BODE_BAND, 1e30)
+    band = resonant_band(arm) if band is None else known_band(band, 1e30)
     G.must_be_of_the_hub("a Bode plot, with its zeros,")
     if not np.any(G(1j * np.geomspace(*band, 3))):
         return _no_motion(arm, row, G.x, band)
@@ -314,10 +325,11 @@ def bode(
         poles = poles[:0]
     omega = refined_grid(band, np.r_[poles, zeros])
     value = G(1j * omega)
-    inside_poles, inside_zeros = poles[poles.imag < band[1]], zeros[zeros.imag < band[1]]
-    on_axis = (each.imag[_on_axis(each)] for each in (inside_poles, inside_zeros))
-    infinite, vanishing = (np.asarray(each[each > band[0]], float) for each in on_axis)
-    peaks, dips = extrema(G, omega, value, np.r_[poles, zeros], infinite, vanishing)
+    inside_poles = poles[poles.imag < band[1]]
+    inside_zeros = zeros[zeros.imag < band[1]]
+    infinite, vanishing = map(_on_axis, (inside_poles, inside_zeros))
+    roots = np.r_[poles, zeros]
+    peaks, dips = extrema(G, omega, value, roots, infinite[infinite > band[0]], vanishing[vanishing > band[0]])
     return Bode(
         arm=arm,
         row=row,
@@ -332,8 +344,8 @@ def bode(
         at_zeros=_magnitude_at(G, inside_zeros, on_axis=0.0),
         peaks=peaks,
         dips=dips,
-        pole_width=(all_poles.box[0], all_poles.box[1]),
-        zero_width=(all_zeros.box[0], all_zeros.box[1]),
+        pole_width=all_poles.box[:2],
+        zero_width=all_zeros.box[:2],
     )
 
 
@@ -342,23 +354,39 @@ def _upper(roots: Complex) -> Complex:
     return roots[(roots.imag >= 0) & (roots != 0)]
 
 
-def known_band(band: tuple[float, float], remedy: str, widest: float = math.inf) -> tuple[float, float]:
+def known_band(band: tuple[float, float], widest: float) -> tuple[float, float]:
     """Return the two ends of a range, with a ratio of at most `widest`.  Raises ParameterError for another value."""
     try:
         low, high = map(float, band)
     except (TypeError, ValueError):
         low = high = math.nan
+    decades = f"at most {math.log10(widest):g} decades apart"
+    remedy = f"two frequencies in rad/s, the lower first, {decades}: (1.0, 1000.0)"
     require(0 < low < high < math.inf and high / low <= widest, "band", band, remedy)
     return low, high
 
 
 def _no_motion(arm: Arm, row: Output, x: float | None, band: tuple[float, float]) -> Bode:
-    omega, none, real = np.array(band), np.empty(0, complex), np.empty(0)
-    zero, everywhere = np.zeros(2, complex), (-math.inf, math.inf)
+    zero = np.zeros(2, complex)
+    none = zero[:0]
+    everywhere = -math.inf, math.inf
     return Bode(
-        arm=arm, row=row, x=x, omega=omega, value=zero, phase=zero.real, poles=none, zeros=none,
-        rigid=zero, at_poles=real, at_zeros=real, peaks=(), dips=(), pole_width=everywhere, zero_width=everywhere,
-    )  # fmt: skip
+        arm=arm,
+        row=row,
+        x=x,
+        omega=np.array(band),
+        value=zero,
+        phase=zero.real,
+        poles=none,
+        zeros=none,
+        rigid=zero,
+        at_poles=none.real,
+        at_zeros=none.real,
+        peaks=(),
+        dips=(),
+        pole_width=everywhere,
+        zero_width=everywhere,
+    )
 
 
 def without_cancelled(poles: Complex, zeros: Complex) -> tuple[Complex, Complex]:
@@ -377,7 +405,7 @@ def refined_grid(band: tuple[float, float], roots: Complex) -> Real:
     low, high = band
     even = np.geomspace(low, high, 1 + math.ceil(EVEN_PER_DECADE * math.log10(high / low)))
     grid = np.unique(np.r_[even, *(_around(root) for root in roots if root.imag > 0)])
-    on_axis = roots.imag[_on_axis(roots)]
+    on_axis = _on_axis(roots)
     if on_axis.size:  # none so near to a root that the value is rounding
         gap = abs(grid[:, None] / on_axis - 1).min(axis=1)
         grid = grid[gap >= 0.5 * NEAREST]
@@ -404,26 +432,31 @@ def phase_of(omega: Real, value: Complex, poles: Complex, zeros: Complex, *, is_
 
     `is_real`: without losses or lag a response is real, or imaginary for a rate.
     """
-    start = 0.0 if value[0].real > 0 else -180.0
+    first = value[0]
+    start = 0.0 if first.real > 0 else -180.0
     if not is_real:
         phase = np.degrees(np.unwrap(np.angle(value)))
         return phase - 360.0 * np.round((phase[0] - start) / 360.0)
-    passed = (np.searchsorted(np.sort(roots.imag[_on_axis(roots)]), omega) for roots in (zeros, poles))
-    if abs(value[0].imag) > abs(value[0].real):
-        start = 90.0 if value[0].imag > 0 else -90.0
-    return np.asarray(start + 180.0 * np.subtract(*passed), float)
+    passed = (np.searchsorted(np.sort(_on_axis(roots)), omega) for roots in (zeros, poles))
+    if abs(first.imag) > abs(first.real):
+        start = 90.0 if first.imag > 0 else -90.0
+    return start + 180.0 * np.subtract(*passed)
 
 
-def _on_axis(roots: Complex) -> NDArray[np.bool_]:
+def _is_on_axis(roots: Complex) -> NDArray[np.bool_]:
     """Return which roots are on the positive imaginary axis."""
     return (abs(roots.real) <= AXIS_SHARE * abs(roots)) & (roots.imag > 0)
+
+
+def _on_axis(roots: Complex) -> Real:
+    """Return the frequencies [rad/s] of the roots on the positive imaginary axis."""
+    return np.asarray(roots.imag[_is_on_axis(roots)], float)
 
 
 def _magnitude_at(G: TransferFunction, roots: Complex, *, on_axis: float) -> Real:
     """Return |G(i Im s)| at each root, `on_axis` for those on the axis."""
     result = np.full(roots.size, on_axis)
-    off = ~_on_axis(roots)
-    if off.any():
-        at = np.where(roots.imag[off] > 0, roots.imag[off], abs(roots[off]))
-        result[off] = abs(G(1j * at))
+    off = ~_is_on_axis(roots)
+    at = np.where(roots.imag > 0, roots.imag, abs(roots))
+    result[off] = abs(G(1j * at[off]))
     return result

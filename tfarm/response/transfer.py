@@ -89,9 +89,8 @@ def zeros_of(arm: Arm, wanted: Output, up_to: float, x: float) -> Roots:
 
 
 def _on_axis(frequencies: NDArray[np.float64], at_zero: int, up_to: float) -> Roots:
-    pairs = np.repeat(1j * frequencies, 2)
-    pairs[1::2] *= -1
-    return Roots(np.r_[np.zeros(at_zero, complex), pairs], (-math.inf, math.inf, -up_to, up_to), "count")
+    values = 1j * np.r_[np.zeros(at_zero), np.outer(frequencies, [1, -1]).ravel()]
+    return Roots(values, (-math.inf, math.inf, -up_to, up_to), "count")
 
 
 def _near_poles(arm: Arm, up_to: float) -> Complex:
@@ -101,8 +100,7 @@ def _near_poles(arm: Arm, up_to: float) -> Complex:
 
 def _starts_by_sampling(size_at: Callable[[Complex], Real], up_to: float) -> Complex:
     """Return dips of the numerator's size along the imaginary and the real axis."""
-    line = np.r_[np.geomspace(1e-4 * up_to, up_to, 400), np.linspace(0.01 * up_to, up_to, 1600)]
-    line.sort()
+    line: Any = np.sort(np.r_[np.geomspace(1e-4 * up_to, up_to, 400), np.linspace(0.01 * up_to, up_to, 1600)])
     starts = []
     for direction in (1j, 1.0, -1.0):
         size = size_at(direction * line)
@@ -139,9 +137,6 @@ def _in_box(k: System, function: Function, at_zero: int, up_to: float, starts: C
 if TYPE_CHECKING:
     import control
 
-POINTS_AT_ONCE = 1 << 13  # points s at once: what each output needs of memory stays in the cache
-LARGEST_S = 1e20  # 1/s: far above any arm, and powers of s do not overflow
-MOST_DIGITS = 1000  # of a value
 A_FREQUENCY = "a positive, finite frequency in rad/s"
 
 
@@ -212,9 +207,8 @@ class TransferFunction:
     @property
     def input(self) -> str:
         """The input of the arm, "hub_angle" [rad] where the hub is locked, or the load."""
-        if self.load is not None:
-            return str(self._input)
-        return "hub_angle" if self.arm.is_locked else self.arm.input
+        own = "hub_angle" if self.arm.is_locked else self.arm.input
+        return own if self.load is None else str(self._input)
 
     @property
     def input_unit(self) -> str:
@@ -255,7 +249,7 @@ class TransferFunction:
 
         s and the arm's parameters are exact float64 numbers.  Raises CertificationError at a pole.
         """
-        digits = whole("digits", digits, 1, MOST_DIGITS, f"a whole number of digits from 1 to {MOST_DIGITS}")
+        digits = whole("digits", digits, 1, 1000, "a whole number of digits from 1 to 1000")
         self.must_be_of_the_hub("digits")
         point = complex(_finite(s))
         pairs = [digits_of(self.system, wanted, point, digits, self.share) for wanted in self.rows]
@@ -279,13 +273,9 @@ class TransferFunction:
             return np.array(list(map(nearest_float, balls)), complex).reshape(len(self.rows), s.size)
         if self.method != "closed-form":
             return slow_values(self.method, self.arm, self.system, self.rows, s, self.share)
-        if s.size <= POINTS_AT_ONCE:
-            return evaluate_outputs(self.system, self.rows, s, self.share)
-        found = np.empty((len(self.rows), s.size), complex)
-        for first in range(0, s.size, POINTS_AT_ONCE):
-            here = slice(first, first + POINTS_AT_ONCE)
-            found[:, here] = evaluate_outputs(self.system, self.rows, s[here], self.share)
-        return found
+        # 2^13 points s at once: the memory that each output needs stays in the cache
+        blocks = np.array_split(s, 1 + (s.size >> 13))
+        return np.hstack([evaluate_outputs(self.system, self.rows, each, self.share) for each in blocks])
 
     def _shaped(self, values: NDArray[Any]) -> Any:
         """Return values (outputs, ...) without the first axis for a single output, a scalar as a Python number."""
@@ -348,10 +338,13 @@ def _finite(s: ArrayLike) -> Complex:
     points = np.asarray(s, dtype=complex)
     # without an array of a million sizes
     ends = [end(part, initial=0.0) for part in (points.real, points.imag) for end in (np.min, np.max)]
-    if not all(abs(each) <= LARGEST_S for each in ends):  # NaN too
+    # far above any arm, and powers of s do not overflow
+    largest = 1e20
+    # False of NaN too
+    if not all(abs(each) <= largest for each in ends):
         worst = complex(points.ravel()[abs(points.ravel()).argmax()])  # of NaN its first
         require(np.isfinite(worst), "s", worst, "a transfer function needs finite s in 1/s")
-        require(False, "s", worst, f"at most {LARGEST_S:g} 1/s")
+        require(False, "s", worst, f"at most {largest:g} 1/s")
     return points
 
 
@@ -390,16 +383,17 @@ class Points:
     def _numbers(self) -> Complex:
         if isinstance(self.value, np.ndarray):
             return self.value
-        return np.array([complex(float(re), float(im)) for re, im in self.value])
+        return np.array(self.value, dtype=float) @ [1, 1j]
 
     @property
     def csv_table(self) -> Table:
         """A row for each point."""
         first = roots_table(self.s, Quantity("s", "1 / s", 12)).columns
-        pairs = self.value if isinstance(self.value, list) else [(each.real, each.imag) for each in self.value.tolist()]
-        parts = zip(("re", "im"), zip(*pairs, strict=True), strict=True)
+        value = self.value
+        pairs = zip(*value, strict=True) if isinstance(value, list) else (value.real.tolist(), value.imag.tolist())
         values = (
-            Column(f"{part}_{self.output}", f"{part} {self.output}", self.gain_unit, of=list(of)) for part, of in parts
+            Column(f"{part}_{self.output}", f"{part} {self.output}", self.gain_unit, of=list(of))
+            for part, of in zip(("re", "im"), pairs, strict=True)
         )
         names = (Column(f"{each.key}_s", each.title, "1/s", of=each.of, shown=each.shown) for each in first)
         return Table(columns=(*names, *values))
