@@ -41,7 +41,7 @@ from tfarm.response import bode as bode
 from tfarm.response import transfer as transfer
 from tfarm.spectrum import damped_modes as damped_modes
 from tfarm.spectrum import modes as modes
-from tfarm.spectrum.table import default_gains as default_gains
+from tfarm.spectrum.gains import default_gains as default_gains
 from tfarm.studies.study import study as study
 from tfarm.synthesis.design import design as design
 from tfarm.tuner import tune as tune

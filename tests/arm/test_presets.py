@@ -26,8 +26,6 @@ def test_the_paper_s_arm_has_the_numbers_of_its_table_1(name):
 
 
 RIGS: dict[str, str | Path] = {path.stem: path for path in sorted((Path(__file__).parents[1] / "rigs").glob("*.toml"))}
-
-
 RIGS |= {name: name for name in presets() if not load(name).is_uniform}
 
 

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.shared import refusal
 from tfarm.arm import Arm, Hub, Link, Payload, Section, load, presets
 from tfarm.arm.reading import MOST_ARM_BYTES
 from tfarm.arm.schema import arm_of_table
@@ -43,9 +44,7 @@ def refused(tmp_path):
     def refuse(content):
         path = tmp_path / "arm.toml"
         path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
-        with pytest.raises(ParameterError) as caught:
-            load(path)
-        text = str(caught.value)
+        text = str(refusal(load, path))
         assert text.startswith(f"{path}: ")
         assert text.isprintable()
         assert len(text) < 1000
@@ -141,31 +140,24 @@ def test_a_file_that_chokes_a_parser_is_refused_at_once(refused, case):
     assert message in refused(content)
 
 
-def refusal(name):
-    with pytest.raises(ParameterError) as caught:
-        load(name)
-    assert str(caught.value).isprintable()
-    return str(caught.value)
-
-
 def test_a_misspelt_preset():
-    text = refusal("saski2012")
+    text = str(refusal(load, "saski2012"))
     assert text.startswith("arm = 'saski2012': no such preset: did you mean \"sasaki2012\"?")
     assert all(name in text for name in presets())
     for name in ("", "  ", "a\0b.toml", None, 3):
-        assert "give a preset (quanser-2dsfl, " in refusal(name)
+        assert "give a preset (quanser-2dsfl, " in str(refusal(load, name))
 
 
 def test_what_is_no_regular_file(tmp_path):
     os.mkfifo(tmp_path / "pipe.toml")
     os.symlink("loop.toml", tmp_path / "loop.toml")
-    assert "is a folder; give a .toml file" in refusal(tmp_path)
-    assert "is no regular file" in refusal(tmp_path / "pipe.toml")
-    assert "is no regular file" in refusal("/dev/zero")
-    assert "cannot be read (Too many levels of symbolic links)" in refusal(tmp_path / "loop.toml")
-    assert "cannot be read (No such file or directory)" in refusal(tmp_path / "none.toml")
-    assert "cannot be read (No such file or directory)" in refusal("two\nlines.toml")
-    assert "cannot be read (File name too long)" in refusal("x" * 5000 + ".toml")
+    assert "is a folder; give a .toml file" in str(refusal(load, tmp_path))
+    assert "is no regular file" in str(refusal(load, tmp_path / "pipe.toml"))
+    assert "is no regular file" in str(refusal(load, "/dev/zero"))
+    assert "cannot be read (Too many levels of symbolic links)" in str(refusal(load, tmp_path / "loop.toml"))
+    assert "cannot be read (No such file or directory)" in str(refusal(load, tmp_path / "none.toml"))
+    assert "cannot be read (No such file or directory)" in str(refusal(load, "two\nlines.toml"))
+    assert "cannot be read (File name too long)" in str(refusal(load, "x" * 5000 + ".toml"))
 
 
 def test_a_file_needs_no_ending_and_a_preset_precedes_a_file_of_its_name(tmp_path, monkeypatch):

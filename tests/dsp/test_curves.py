@@ -25,7 +25,7 @@ from tfarm.dsp.traces import (
     reference_angle,
 )
 from tfarm.report.sampled_section import response_columns
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 STEEL = tfarm.load("stocky-steel")
 

@@ -25,7 +25,7 @@ from tfarm.fitting.posterior import Posterior, PosteriorNumber, load_posterior, 
 from tfarm.plots.frequency import draw_band, draw_share
 from tfarm.report.page import ArmReport
 from tfarm.report.response_sections import fit_section
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 from tfarm.studies.study import load_study
 
 MASS, OFFSET, E, I = "payload.mass", "payload.offset", "link.youngs_modulus", "link.section.second_moment"

@@ -25,7 +25,7 @@ from tfarm.loop.locus import CONTROLLER, RIGID, frame, locus, origin_name
 from tfarm.loop.poles import poles_below
 from tfarm.schema import curve_table
 from tfarm.spectrum.damped import damped_modes
-from tfarm.spectrum.table import default_gains, rate_unit
+from tfarm.spectrum.gains import default_gains, rate_unit
 
 EPS = np.finfo(float).eps
 LAB, PAPER, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))

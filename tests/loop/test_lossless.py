@@ -23,7 +23,7 @@ from tfarm.loop.margins import margins
 from tfarm.loop.nyquist import nyquist_of
 from tfarm.loop.plane import gain_map
 from tfarm.loop.theorem import lyapunov
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 ARM = tfarm.load("sasaki2012")
 CANTILEVER = np.array([1.8751040687119611, 4.6940911329741746, 7.8547574382376126, 10.995540734875467])  # k_n L

@@ -28,7 +28,7 @@ from tfarm.loop.stability import Stability
 from tfarm.reduced import relaxed_model
 from tfarm.schema import to_dict
 from tfarm.spectrum.box import Box
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 margins = cache(tfarm.margins)  # several tests need those of the same loops
 

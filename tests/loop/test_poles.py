@@ -23,7 +23,7 @@ from tfarm.loop.plane import Axis, moment_axis, rate_axis, stable_edge
 from tfarm.loop.poles import Poles, closed_loop_poles, count_with_mirrors, first_poles, poles_below, starting_points
 from tfarm.loop.stability import poles_on_axis
 from tfarm.spectrum.box import Box
-from tfarm.spectrum.table import rate_unit
+from tfarm.spectrum.gains import rate_unit
 
 ARM = tfarm.load("sasaki2012")
 LAB = tfarm.load("sasaki2012-lab")

@@ -17,7 +17,7 @@ from tfarm.errors import ParameterError
 from tfarm.loop.plane import INFINITE, LINEAR_SCALE, Axis, between, edge, gain_map, ranges_of, static_edges
 from tfarm.loop.poles import poles_below
 from tfarm.schema import to_dict
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 

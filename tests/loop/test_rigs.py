@@ -21,7 +21,7 @@ from tfarm.loop.plane import INFINITE, gain_map
 from tfarm.loop.poles import closed_loop_poles, poles_below
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.windows import windows_of
-from tfarm.spectrum.table import default_gains, gain_unit
+from tfarm.spectrum.gains import default_gains, gain_unit
 
 REAL = {name: tfarm.load(name) for name in ("quanser-2dsfl", "quanser-flexlink")}
 REAL["bench-rig"] = tfarm.load(str(Path(__file__).parents[1] / "rigs" / "bench-rig.toml"))

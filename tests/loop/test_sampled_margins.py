@@ -25,7 +25,7 @@ from tfarm.loop.edges import DelayMargin, Figure, delay_margin, required_damping
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_verdict import Analysis, Verdict, sampled_verdict
 from tfarm.schema import text, to_dict
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 GAINS = HubFeedback(K1=0.3, K2=0.3)
 room = import_module("tfarm.loop.sampled_verdict")

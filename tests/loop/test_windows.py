@@ -21,7 +21,7 @@ from tfarm.loop.lines import line_crossings, unstable_below
 from tfarm.loop.margins import margins
 from tfarm.loop.poles import poles_below
 from tfarm.loop.windows import windows_of
-from tfarm.spectrum.table import default_gains, most_gain
+from tfarm.spectrum.gains import default_gains, most_gain
 
 LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
 

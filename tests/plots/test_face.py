@@ -27,7 +27,7 @@ from tfarm.loop.loci import reduced_locus
 from tfarm.loop.nyquist import compressed
 from tfarm.plots.regions import colours, contours
 from tfarm.plots.style import number_label
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 from tfarm.tuner import Plan
 
 mpl.use("Agg")

@@ -9,7 +9,7 @@ from tfarm.digits import plain
 from tfarm.loop.locus import locus
 from tfarm.plots import locus as locus_plot
 from tfarm.plots.roots import Z_RATIOS, s_grid, z_grid
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 LAB = tfarm.load("sasaki2012-lab")
 LAW = default_gains(LAB)

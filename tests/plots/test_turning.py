@@ -15,7 +15,7 @@ from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_modes import sampled_loci
 from tfarm.plots import locus as locus_plot
 from tfarm.plots.roots import draw_sampled_loci
-from tfarm.spectrum.table import default_gains, rate_unit
+from tfarm.spectrum.gains import default_gains, rate_unit
 
 LAB, STOCKY = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
 MOST = 5.0  # degrees from one piece of a line to the next

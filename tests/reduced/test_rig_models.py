@@ -16,7 +16,7 @@ from tfarm.dsp import Chain, Sampling, pulse_transfer
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.reduced.modal import modal_model
 from tfarm.spectrum.damped import entered
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 MEASURED = ("hub_angle", "hub_rate", "root_moment")
 S = np.array([0.01 + 0.02j, 5 + 40j, 3 - 20j])

@@ -13,7 +13,7 @@ from tfarm.plots.motion import modes
 from tfarm.plots.regions import overlay
 from tfarm.plots.style import save_figure
 from tfarm.response.frequency import bode, resonant_band
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 PICTURES = Path(__file__).parents[2] / "reports" / "pictures"
 DOTS = 100  # an inch: pictures of a README are shown at their own size

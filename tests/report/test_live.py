@@ -17,11 +17,9 @@ import pytest
 import tfarm
 from tests.report.written import Unmakeable
 from tests.shared import remember, remembered, thinned
-from tfarm.arm import HubFeedback, Law
+from tfarm.arm import AT_HUB, HubFeedback, Law
 from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling, load_chain
-from tfarm.exact.characteristic import float_units, loop_parts
-from tfarm.exact.system import system_of
 from tfarm.exported.live_loop import law_data, live_data, sensor_numbers, slew_numbers
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.panels import MOST_MISS, loop_panels
@@ -29,6 +27,7 @@ from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.report import page as report_page
 from tfarm.report.live import has_sliders, save_live
 from tfarm.report.page import ArmReport, GivenLaw
+from tfarm.response.signals import Signals
 
 SIGNALS = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
 ARMS = ("sasaki2012-lab", "stocky-steel", "quanser-flexlink")
@@ -71,11 +70,9 @@ def test_samples_are_the_parts_of_the_loop_function(case):
 def test_the_error_that_the_page_states_is_not_exceeded(case):
     """Each part between the samples, at places that were not looked at when the page was written."""
     arm, data, page = case
-    k = system_of(arm)
     for low, high in zip(data["low"], data["high"], strict=True):
         omega = np.linspace(max(low, 1e-3 * high), high, 23)[1:-1]
-        drive, numerators, scale = loop_parts(k, 1j * omega)
-        theta, _, gauge = float_units(k) * numerators
+        drive, (theta, _, gauge), scale = Signals(arm, AT_HUB).parts(1j * omega)
         s = 1j * omega
         exact = np.stack([drive / s ** data["order"], theta, gauge / s**2]) * np.exp(scale - scale.real.max())
         held = page.at(omega)

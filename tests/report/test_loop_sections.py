@@ -30,7 +30,7 @@ from tfarm.report.loop_section import (
     recommended_section,
 )
 from tfarm.report.page import ArmReport, GivenLaw, has_loop
-from tfarm.spectrum.table import PAPER_GAINS, default_gains
+from tfarm.spectrum.gains import PAPER_GAINS, default_gains
 
 LAB, PURE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
 EPS = np.finfo(float).eps

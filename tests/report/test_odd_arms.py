@@ -38,7 +38,7 @@ from tfarm.report.response_sections import (
 )
 from tfarm.report.writing import pieces_of
 from tfarm.spectrum import DampedModes
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 ARMS = odd_arms()
 DAMPED = [name for name, arm in ARMS.items() if arm.link.damping]

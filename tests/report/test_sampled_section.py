@@ -27,7 +27,7 @@ from tfarm.report.blocks import DRAWN_DIGITS, prose, save_block
 from tfarm.report.page import FILM_FRAMES, ArmReport, GivenLaw
 from tfarm.report.sampled_section import sampled_section, slews
 from tfarm.schema import text
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 GAINS = HubFeedback(K1=0.3, K2=0.3)

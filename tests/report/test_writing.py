@@ -43,7 +43,7 @@ from tfarm.report.response_sections import arm_section
 from tfarm.report.trust import write_trust, written_proofs
 from tfarm.report.writing import PIECES, QUESTIONS, kept, make_section, navigation, pieces_of, write_index
 from tfarm.schema import Column, quantities, to_dict
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 # ------------------------------------------------------------ the same bytes
 

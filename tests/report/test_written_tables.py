@@ -15,7 +15,7 @@ from tests.report.written import ARM
 from tfarm.report.blocks import DRAWN_DIGITS
 from tfarm.report.response_sections import sensitivity_table
 from tfarm.schema import curve_table
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 
 def rows_of(pages, stem):

@@ -18,7 +18,7 @@ from tfarm.loop.circle_crossings import stable_windows
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import stability
-from tfarm.spectrum.table import (
+from tfarm.spectrum.gains import (
     DEFAULT_DIGITS,
     PAPER_GAINS,
     RATE_SHARE,
@@ -31,12 +31,7 @@ from tfarm.synthesis.design import design
 
 STOCKY, LAB = tfarm.load("stocky-steel"), tfarm.load("sasaki2012-lab")
 EPS = 2.0**-52
-
-
-def similar(arm, size, stiffness, density):
-    """The arm with its lengths, moduli and densities multiplied: times grow by size sqrt(density/stiffness)."""
-    units = Units(density * size**3, size, size * math.sqrt(density / stiffness))
-    return units.arm(arm), units.time, units.of(INERTIA)
+LARGE = Units(1e6, 100.0, 100.0)  # of the same material, a hundred times as long
 
 
 def test_the_papers_arms_keep_the_papers_gains():
@@ -53,7 +48,7 @@ def test_the_papers_arms_keep_the_papers_gains():
 
 def test_a_gain_is_too_large_for_an_arm_and_not_by_itself():
     """K1 = 2e9 N m s/rad is ordinary for an arm of J w1 = 5e9; LAB has a limit of its own, which is reported."""
-    large, time, _ = similar(LAB, 100.0, 1.0, 1.0)
+    large, time = LARGE.arm(LAB), LARGE.time
     assert rate_unit(large) > 1e9
     law = HubFeedback(K1=0.5 * rate_unit(large), K2=0.3, Kp=0.1 * angle_unit(large))
     small = HubFeedback(K1=0.5 * rate_unit(LAB), K2=0.3, Kp=0.1 * angle_unit(LAB))
@@ -68,7 +63,7 @@ def test_a_gain_is_too_large_for_an_arm_and_not_by_itself():
 
 def test_windows_and_designs_of_a_large_arm_are_those_of_a_similar_small_one():
     """Nothing on the way compares a gain with a number: K1 goes beyond 1e9 N m s/rad here, continuous and sampled."""
-    large, time, inertia = similar(LAB, 100.0, 1.0, 1.0)
+    large, time, inertia = LARGE.arm(LAB), LARGE.time, LARGE.of(INERTIA)
     slow = Chain(sampling=Sampling(period=0.01 * time))
     chains, arms = (Chain(), slow), (LAB, large)
     laws = [HubFeedback(K1=2 * rate_unit(arm), K2=0.3) for arm in arms]

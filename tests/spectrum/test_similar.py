@@ -12,8 +12,8 @@ from tests.shared import thinned
 from tests.similar import EITHER, FAST, FREQUENCY, INERTIA, LENGTH, SLOW, TORQUE
 from tfarm.errors import ConvergenceError
 from tfarm.schema import quantities
+from tfarm.spectrum.gains import DEFAULT_DIGITS, angle_unit, check_gains, default_gains, gain_unit, most_gain, rate_unit
 from tfarm.spectrum.listing import ListedMode, listed_modes
-from tfarm.spectrum.table import DEFAULT_DIGITS, angle_unit, check_gains, default_gains, gain_unit, most_gain, rate_unit
 
 LAB = tfarm.load("sasaki2012-lab")
 HEAVY = tfarm.load("quanser-2dsfl")

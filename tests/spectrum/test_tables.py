@@ -17,6 +17,7 @@ from tfarm.spectrum.table import hub_locked, modes_below
 
 EPS = 2.0**-52
 LAB, STEEL = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
+RUBBED = replace(LAB, name="rubbed", hub=replace(LAB.hub, friction=0.4))
 PINNED = replace(STEEL, hub=tfarm.Hub(inertia=0.0), payload=tfarm.Payload(mass=math.inf))
 
 
@@ -97,12 +98,6 @@ def test_a_count_or_frequency_out_of_range_is_refused(given, words):
         tfarm.modes(LAB, **given)
 
 
-RIG = tfarm.load("quanser-2dsfl")
-
-
-RUBBED = replace(LAB, name="rubbed", hub=replace(LAB.hub, friction=0.4))
-
-
 @pytest.mark.parametrize(("arm", "count"), thinned([(LAB.having(damping=1e-3), 8), (LAB, 4), (RUBBED, 3)], 2))
 def test_each_disc_is_in_the_row_of_its_eigenvalue(arm, count):
     rows = listed_modes(tfarm.modes(arm, count), 15, certify=True).modes
@@ -121,24 +116,6 @@ def test_each_disc_is_in_the_row_of_its_eigenvalue(arm, count):
     assert compared >= count - 3
 
 
-def test_modes_that_are_not_followed_have_their_rows(monkeypatch):
-    """They keep their frequency; their damping is not determined."""
-    monkeypatch.setattr("tfarm.spectrum.damped.MOST_MODES", 2)
-    modes = tfarm.modes(RIG, 4)
-    followed = len(tfarm.damped_modes(modes).index)
-    assert followed < len(modes)
-    rows = listed_modes(modes).modes
-    assert len(rows) == len(modes)
-    assert [row.eigenvalue is None for row in rows] == [n >= followed for n in range(len(modes))]
-    assert all(row.damping_ratio is None for row in rows[followed:])
-
-
-STIFF = replace(LAB.link, damping=0.0)
-
-
-TWO = replace(LAB, outer=(replace(LAB.link, damping=3e-4),))
-
-
 @pytest.mark.parametrize("theory", THEORIES)
 def test_short_waves_are_overdamped_without_shear_and_hardly_damped_with_it(theory):
     """Of the 400 first waves between two pins the last, whose k^2 EI C is far above the inertia."""
@@ -152,8 +129,9 @@ def test_short_waves_are_overdamped_without_shear_and_hardly_damped_with_it(theo
 
 
 def test_segments_of_different_damping_are_distinguished():
-    assert "-1/C of the most damped segment, -3333.33 1/s" in beyond_the_box(TWO)
-    partly = replace(LAB, outer=(STIFF,), theory="rayleigh")
+    damped, stiff = (replace(LAB.link, damping=C) for C in (3e-4, 0.0))
+    assert "-1/C of the most damped segment, -3333.33 1/s" in beyond_the_box(replace(LAB, outer=(damped,)))
+    partly = replace(LAB, outer=(stiff,), theory="rayleigh")
     assert "segments without damping have lightly damped modes" in beyond_the_box(partly)
     assert beyond_the_box(LAB.elastic) == "their damping decreases with frequency, as no segment has damping (C = 0)"
 

@@ -8,7 +8,7 @@ import pytest
 
 import tfarm
 from tfarm.schema import to_dict
-from tfarm.spectrum.table import PAPER_GAINS
+from tfarm.spectrum.gains import PAPER_GAINS
 from tfarm.studies.candidates import assumptions, hub_study, section_study
 
 PAPER = tfarm.load("sasaki2012")

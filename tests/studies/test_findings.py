@@ -16,7 +16,7 @@ from tfarm.arm.law_tables import load_law
 from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 from tfarm.studies import quantities as room
 from tfarm.studies import running
 from tfarm.studies.candidates import learning_curves

@@ -16,7 +16,7 @@ from tests.odd_arms import odd_arms
 from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling
 from tfarm.loop.sampled import sampled_loop
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 from tfarm.tuner import (
     baselines,
     best_constant,

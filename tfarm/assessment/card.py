@@ -36,7 +36,7 @@ from tfarm.records import frozen
 from tfarm.schema import Percent, Quantity, Table, Tabled, across, text
 from tfarm.schema.html import as_html, with_symbols
 from tfarm.spectrum import modes
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 GRADES = UNDEFINED, GOOD, LOW, POOR = "-", "good", "low", "poor"  # the first of a margin which is not defined
 GRADED = {  # names of the graded margins in the grade of the loop

@@ -28,7 +28,7 @@ from tfarm.schema import Difference, Percent, Quantity
 from tfarm.schema import compare as compare_records
 from tfarm.spectrum import damped_modes
 from tfarm.spectrum import modes as modes_of
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 MOST_COMPARED = 30  # flexible modes of a table that a person reads
 LONGEST_SIDE_NAME = 60  # characters of a name: of two in one legend

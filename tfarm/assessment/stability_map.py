@@ -31,7 +31,8 @@ from tfarm.loop.sampled import Sampled
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.records import frozen
 from tfarm.schema import Column
-from tfarm.spectrum.table import default_gains, first_frequency
+from tfarm.spectrum.gains import default_gains
+from tfarm.spectrum.table import first_frequency
 from tfarm.synthesis.judge import damping_of
 from tfarm.synthesis.models import continuous_model
 from tfarm.synthesis.structures import ONE, Entry

@@ -15,8 +15,8 @@ from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.response.frequency import worst_error
 from tfarm.schema import Quantity
 from tfarm.spectrum import DampedModes, damped_modes, modes
+from tfarm.spectrum.gains import default_gains
 from tfarm.spectrum.proofs import Certificate
-from tfarm.spectrum.table import default_gains
 
 PROVEN_OUTPUTS = ("root_moment", "tip_displacement")
 UNPROVEN = "not proven"

@@ -281,7 +281,7 @@ def load_law(
     `default_gains` names those that are not given and have a default, `default_gains_in_words` is their values.
     """
     from tfarm.arm.law_tables import load_law as read
-    from tfarm.spectrum.table import default_words
+    from tfarm.spectrum.gains import default_words
 
     if other is not None:
         file = load_tables(other)

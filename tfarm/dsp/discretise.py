@@ -34,7 +34,7 @@ from tfarm.errors import ParameterError, require
 from tfarm.exact.rationals import block_factors
 from tfarm.records import frozen
 from tfarm.schema import Quantity
-from tfarm.spectrum.table import check_gains
+from tfarm.spectrum.gains import check_gains
 
 ROUNDINGS = 8  # of each term of F: of its product of n factors they add up as the root of n
 RULE = Quantity("discretisation", help="rule by which the continuous-time controller is made discrete")

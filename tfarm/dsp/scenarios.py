@@ -15,7 +15,7 @@ from tfarm.dsp.plant import driven
 from tfarm.errors import must_be_known, require
 from tfarm.records import frozen
 from tfarm.schema import Quantity
-from tfarm.spectrum.table import turning_inertia
+from tfarm.spectrum.gains import turning_inertia
 
 MOST_TASK_SAMPLES = 4_000_000  # of a record, a few hundred MB of signals
 TRIAL_COST = (1.0, 2.6)  # 1/(N m)^2 s: weights a and b of the paper's (23), of vibration and of the law's own share

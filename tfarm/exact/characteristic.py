@@ -31,19 +31,17 @@ import flint
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import GAINS, Law
+from tfarm.arm import Law
 from tfarm.arrays import Complex, Real
 
 from .balls import Ball, Sweep, across_waves, in_chain, point, rational, summed
-from .layout import UNIT, Layout, laid_out, readings
-from .outputs import OUTPUTS, Output
+from .layout import Layout, laid_out, readings
+from .outputs import Output
 from .rationals import polynomials
 from .system import Place, Segment, System
 from .values import free_of, free_slopes
 from .waves import Plane, Row
 
-FED = tuple(OUTPUTS[gain.output] for gain in GAINS)
-assert all(each.place != "x" for each in FED)  # a gain is on an output with a place of its own
 NEXT_TO_REST = 1e-60  # 1/s, for s = 0: there D over a power of s is at its limit, and no power is 0
 DIFFERENCE_STEP = 1e-6  # of |s|, or of the way to -1/C, for differences
 
@@ -57,7 +55,7 @@ class Analytic(NamedTuple):
 
 
 class LoopParts(NamedTuple):
-    """Drive (n,), numerators (gains, n), and scale (n,) of the free response times e^{-scale}, for s of any shape."""
+    """Drive (n,), numerators (signals, n), and scale (n,) of the free response times e^{-scale}, for s of any shape."""
 
     drive: Complex
     numerators: Complex
@@ -89,36 +87,29 @@ def quick_characteristics(k: System, s: Complex, at_zero: int = 0) -> Analytic:
     s = off_rest(np.asarray(s, dtype=complex))
     h = difference_steps(k, s)
     at = np.array([s, s + h, s - h])
-    free = free_of(readings(k, (), 0.0), at.ravel())
-    values, scale = free.drive.reshape(at.shape) / at**at_zero, free.scale.reshape(at.shape)
-    up, down = values[1:] * np.exp(scale[1:] - scale[0])
-    return Analytic(values[0], (up - down) / (2.0 * h), scale[0])
+    D, scale = drive_of(k, at)
+    # divided first: next to rest the slope of D is lost in that of its zero there
+    here, up, down = D / at**at_zero * np.exp(scale - scale[0])
+    return Analytic(here, (up - down) / (2.0 * h), scale[0])
+
+
+def drive_of(k: System, s: Complex) -> tuple[Complex, Complex]:
+    """Return D e^{-scale} of a system without a law, and scale, at s of any shape."""
+    free = free_of(readings(k, (), 0.0), s.ravel())
+    return free.drive.reshape(s.shape), free.scale.reshape(s.shape)
 
 
 def has_slope(k: System, s: Complex) -> NDArray[np.bool_]:
     """Return where D grows by less than a factor of e over the difference of a slope."""
-    growth = loop_parts(k, np.array([s, s + difference_steps(k, s)])).scale.real
+    growth = drive_of(k, np.array([s, s + difference_steps(k, s)]))[1].real
     # where ln abs(D) changes by more than 1 between two of these points a difference is no slope
     return np.asarray(abs(growth[1] - growth[0]) < 1.0)
-
-
-def float_units(k: System) -> Real:
-    """Return the SI value of each numerator of 1, as a column of doubles."""
-    return readings(k, FED, 0.0).table[:, UNIT, None]
 
 
 def difference_steps(k: System, s: Complex) -> Real:
     """Return h [1/s] for a slope at s from values at s +- h: a share of |s|, or of the way to a -1/C."""
     near = np.min([np.ones(s.shape), *(abs(1.0 - s / each) for each in k.singular)], axis=0)
     return np.asarray(DIFFERENCE_STEP * np.maximum(abs(s) * near, 1e-300))
-
-
-def loop_parts(k: System, s: NDArray[Any]) -> LoopParts:
-    """Return drive, numerators and scale at s, with D = drive + gains . numerators."""
-    layout = readings(k, FED, 0.0)
-    free = free_of(layout, np.asarray(s, dtype=complex).ravel())
-    numerators = free.outputs / layout.table[:, UNIT, None]
-    return LoopParts(*(part.reshape(*part.shape[:-1], *s.shape) for part in (free.drive, numerators, free.scale)))
 
 
 Polynomial = Any  # flint.fmpq_poly, which comes without types

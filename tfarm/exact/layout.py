@@ -61,9 +61,6 @@ class Reading(NamedTuple):
     input: int = 0
 
 
-UNIT = Reading._fields.index("unit")  # its column in a table
-
-
 class Layout:
     """A chain cut and marked at places, with the readings `each` there: rows of the compiled sweeps, and elements.
 

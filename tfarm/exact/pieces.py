@@ -51,8 +51,7 @@ class Work(NamedTuple):
     `planes` j + 1 is inside of the element, 0 at the tip's end; that of a mark becomes its state on the way back.  It
     was divided by 2^`powers` after the element; a mark's state times e^`scales` 2^`shifts` has the scale of the plane
     at the axis.  Of a segment `low` are the slow points.  `back` is the condition on the way back, W - r theta and
-    Psi - theta, r the distance from the axis, nan beyond a segment that is not slow.  `watched` are points next to a
-    segment's shear cut-off.
+    Psi - theta, r the distance from the axis, nan beyond a segment that is not slow.
     """
 
     planes: Complex
@@ -64,7 +63,6 @@ class Work(NamedTuple):
     back: Complex
     scale: Complex
     theta: Complex
-    watched: NDArray[np.bool_]
 
 
 @inlined
@@ -103,7 +101,7 @@ def plane_at(buffer: Any, i: int) -> Plane:
 def cross(points: Any, row: Any, j: int, work: Work, lost: Any) -> None:
     """Compute the plane at the inner end of a segment, row j, from that at its outer one, at the points of a block.
 
-    Scales are added to `work.scale`, lost digits and points next to the shear cut-off are marked.
+    Scales are added to `work.scale`, lost digits are marked.
     """
     outer, inner, waves, low, slow = work.planes[j], work.planes[j + 1], work.waves[j], work.low[j], 0
     for i in range(BLOCK):
@@ -118,8 +116,6 @@ def cross(points: Any, row: Any, j: int, work: Work, lost: Any) -> None:
         for i in range(BLOCK):
             z1, z2 = waves[ONE + i], waves[TWO + i]
             work.scale[i] += 0.0 if low[i] else waves[ONE + PHASE + i] + waves[TWO + PHASE + i]
-            # a wave with little phase along the segment
-            work.watched[i] |= (not low[i]) & (magnitude(z2) < 1.0)
             lost[i] |= (not low[i]) & (magnitude(z1 - z2) < PARALLEL * (magnitude(z1) + magnitude(z2)))
     if slow:
         _fill_series(points, row, waves)

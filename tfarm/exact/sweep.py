@@ -83,7 +83,6 @@ def _work(rows: int) -> Work:
         np.empty(PLANE_SIZE, number),
         np.empty(BLOCK, number),
         np.empty(BLOCK, number),
-        np.empty(BLOCK, np.bool_),
     )
 
 
@@ -92,7 +91,7 @@ def _sweep(points: Any, rows: Any, ends: Any, work: Work, lost: Any) -> None:
     """Compute the plane inside of each element, and the scale of that at the axis; mark lost digits."""
     for i in range(BLOCK):
         put(work.planes[0], i, end_plane(*tip_conditions(ends, points[i] * points[i])))
-        work.scale[i], lost[i], work.watched[i] = 0.0, False, False
+        work.scale[i], lost[i] = 0.0, False
     for j in range(len(rows)):
         row, outer, inner = rows[j], work.planes[j], work.planes[j + 1]
         for i in range(BLOCK):
@@ -170,8 +169,6 @@ def _go_back(points: Any, rows: Any, outermost: int, work: Work, differs: bool, 
             for i in range(BLOCK):
                 work.scales[j, i], work.shifts[j, i] = scale[i], shift[i]
             _meet(work.planes[j + 1], work, is_root, reach, shift)
-            for i in range(BLOCK):
-                lost[i] = lost[i] or (work.watched[i] and not is_root)  # there W, M and Q may have lost digits
             continue
         if row.kind == SEGMENT:
             if differs:

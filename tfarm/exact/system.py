@@ -216,8 +216,8 @@ SYSTEMS_KEPT = 64  # arms whose exact numbers are cached: one page needs those o
 class System:
     """An arm or rig: its elements from the payload inwards, the conditions of both ends, and the units.
 
-    `gauge` is the place of the moment that a law feeds back; `radius` and `offset` of hub and payload are shares of the
-    link's `length` [m]; `EI` [N m^2] is that at the hub.
+    `gauge` is the place of the moment that a law feeds back; with `has_rigid_mode` it can turn freely; `radius` and
+    `offset` of hub and payload are shares of the link's `length` [m]; `EI` [N m^2] is that at the hub.
     """
 
     elements: tuple[Element, ...]
@@ -227,6 +227,7 @@ class System:
     radius: Fraction
     offset: Fraction
     gauge: Place
+    has_rigid_mode: bool
     length: Fraction
     EI: Fraction
 
@@ -255,13 +256,6 @@ class System:
     def is_locked(self) -> bool:
         """Whether the hub angle is the input."""
         return not self.drive.turns
-
-    @property
-    def has_rigid_mode(self) -> bool:
-        """Whether it can turn as a rigid body: without infinite inertias and springs to ground."""
-        ends, bodies = (self.tip_mass, self.tip_inertia), (each for each in self.elements if isinstance(each, Body))
-        springs = any(each.stiffness or each.rotational_stiffness for each in bodies) or self.drive.stiffness
-        return not (springs or self.is_locked) and all(isinstance(end, Fraction) for end in ends)
 
     @property
     def at_rest(self) -> int:
@@ -356,6 +350,7 @@ def system_of(arm: Arm, theory: Theory | None = None) -> System:
         radius=Fraction(arm.hub.radius) / unit_length,
         offset=Fraction(arm.payload.offset) / unit_length,
         gauge=Place(min(Fraction(arm.gauge.x) / unit_length, ONE), arm.gauge.side),
+        has_rigid_mode=arm.has_rigid_mode,
         length=unit_length,
         EI=EI,
     )

@@ -172,12 +172,12 @@ def fill_wave_numbers(s: Any, rows: Any, found: Any) -> None:
 @inlined
 def wave_functions(z: complex, t: complex, dt: complex) -> Row:
     """Return c = cosh t e^{-t}, S = sinh t / t e^{-t}, e = e^{-t} and t, with t + dt for t."""
-    decay, phase = math.exp(-t.real), t + dt
-    e = decay * complex(math.cos(t.imag), -math.sin(t.imag))
-    if abs(z.real) + abs(z.imag) < 1.0:  # 1 - e^2 would cancel; here e is a common factor
+    e = math.exp(-t.real) * complex(math.cos(t.imag), -math.sin(t.imag))
+    # 1 - e^2 would cancel; here e^{-t} is a scale alone, and t that of this very scale: next to the cut-off dt is large
+    if abs(z.real) + abs(z.imag) < 1.0:
         c, s = even_functions(z)
-        return e * c, e * s, e, phase
-    e = e - e * dt
+        return e * c, e * s, e, t
+    e, phase = e - e * dt, t + dt
     half_square = 0.5 * (e * e)
     return 0.5 + half_square, (0.5 - half_square) * reciprocal(phase), e, phase
 

@@ -58,7 +58,7 @@ from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import band_of_family, stability
 from tfarm.loop.windows import windows_of
 from tfarm.response import transfer
-from tfarm.spectrum.table import angle_unit, default_gains
+from tfarm.spectrum.gains import angle_unit, default_gains
 
 CONSUMER = Consumer(
     "live page",

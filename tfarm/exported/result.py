@@ -25,7 +25,7 @@ from tfarm.files import move_into, place_in
 from tfarm.loop.sampled_verdict import Analysis, sampled
 from tfarm.records import frozen
 from tfarm.schema import Quantity
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 What = Literal["controller", "tuner", "plant", "loop"]
 Form = Literal["c", "fmu", "mat", "py"]

@@ -36,7 +36,7 @@ from tfarm.loop.sampled import OfLoop, Sampled
 from tfarm.loop.sampled_rig import CircleGrid
 from tfarm.records import frozen
 from tfarm.schema import Quantity
-from tfarm.spectrum.table import most_gain
+from tfarm.spectrum.gains import most_gain
 
 FACTOR = "gain"  # the name of a factor on the whole law
 MOST_FACTOR = 1e9  # with more its gain is beyond any number

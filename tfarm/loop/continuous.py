@@ -42,7 +42,8 @@ from tfarm.response.signals import Controller, Signals, controller
 from tfarm.schema import Quantity
 from tfarm.spectrum import flexible_frequencies, modes, modes_below
 from tfarm.spectrum.frequencies import ARMS_KEPT
-from tfarm.spectrum.table import LEAST_UNITS, check_gains, first_frequency
+from tfarm.spectrum.gains import LEAST_UNITS, check_gains
+from tfarm.spectrum.table import first_frequency
 
 FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: far right, where L of an improper law must fall, and poles come from infinity
 FALL_FACTOR = 0.5  # L must fall by this there, from one to the next

@@ -20,13 +20,12 @@ from typing import Literal
 
 import numpy as np
 
-from tfarm.arm import AT_HUB, FED_BACK, Arm, must_turn
+from tfarm.arm import AT_HUB, Arm, must_turn
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, require
-from tfarm.exact.characteristic import float_units, loop_parts
-from tfarm.exact.system import system_of
 from tfarm.records import frozen
 from tfarm.response import transfer
+from tfarm.response.signals import Signals
 from tfarm.spectrum import Modes, modes
 
 from .continuous import ContinuousLoop, band_of, steep_places
@@ -95,9 +94,7 @@ def loop_panels(arm: Arm, band: float, loop: ContinuousLoop | None = None) -> Pa
 
 def _hub_rows(arm: Arm, order: int, s: Complex) -> Complex:
     """d, theta and m; without losses real: the imaginary part is rounding, and would be a loss next to a resonance."""
-    k = system_of(arm)
-    drive, numerators, scale = loop_parts(k, s)
-    theta, _, gauge = (float_units(k) * numerators)[[FED_BACK.index(output) for output in AT_HUB]]
+    drive, (theta, _, gauge), scale = Signals(arm, AT_HUB).parts(s)
     both = np.stack([drive / s**order, theta, gauge / s**2]) * np.exp(scale - scale.real.max())
     return both.real + 0j if arm.is_reactive else both
 

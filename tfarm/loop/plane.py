@@ -49,7 +49,8 @@ from tfarm.records import frozen
 from tfarm.response.signals import Controller, controller
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
-from tfarm.spectrum.table import PAPER_GAINS, default_gains, hub_locked, rate_unit
+from tfarm.spectrum.gains import PAPER_GAINS, default_gains, rate_unit
+from tfarm.spectrum.table import hub_locked
 
 COUNTS = Quantity(key="unstable_roots", help="unstable poles at each point, rows upwards; inf where infinitely many")
 BOUNDARY = Quantity(key="boundary", help="both gains and the frequency [rad/s] with poles on the imaginary axis")

@@ -20,7 +20,8 @@ from tfarm.loop.stability import Stability, band_of_family, is_known_without, ve
 from tfarm.loop.theorem import TAKES, absorbed
 from tfarm.records import frozen
 from tfarm.schema import Quantity
-from tfarm.spectrum.table import first_frequency, gain_unit, most_gain
+from tfarm.spectrum.gains import gain_unit, most_gain
+from tfarm.spectrum.table import first_frequency
 
 End = Literal["edge", "search bound", "no limit"]
 SEARCH_RANGE = Quantity("search range", digits=5, key="search_range", help="values between which limits were searched")

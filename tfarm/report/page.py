@@ -56,9 +56,9 @@ from tfarm.report.blocks import argument, prose
 from tfarm.response.frequency import Bode, bode
 from tfarm.response.signals import Signals, sign_of
 from tfarm.spectrum import DampedModes, Modes, modes
+from tfarm.spectrum.gains import default_gains, rate_unit
 from tfarm.spectrum.listing import ModeList, listed_modes
 from tfarm.spectrum.proofs import Certificate
-from tfarm.spectrum.table import default_gains, rate_unit
 from tfarm.studies.candidates import (
     Candidates,
     TunerNumbers,

@@ -107,9 +107,7 @@ class Table:
         return (dict(zip(keys, row, strict=True)) for row in zip(*(column.of for column in self.columns), strict=True))
 
 
-def table(
-    rows: Any, names: Sequence[str] = (), *, parent: Any = None, stem: str = "", title: str = "", caption: str = ""
-) -> Table:
+def table(rows: Any, names: Sequence[str] = (), *, parent: Any = None, stem: str = "", title: str = "") -> Table:
     """A row a record (or an entry of a record of columns), a column a quantity: those with a label, or these.
 
     A column without any value is left out unless it is named.  `parent` is the record that has these rows.
@@ -125,7 +123,7 @@ def table(
             ]
             columns.append(Column(of.key, of.label, of.unit, of=list(map(to_json_value, values)), shown=cells,
                                   folds=_folds(cells), help=of.help))  # fmt: skip
-    return Table(columns=tuple(columns), stem=stem, title=title, caption=caption)
+    return Table(columns=tuple(columns), stem=stem, title=title)
 
 
 def _folds(cells: Sequence[str]) -> bool:
@@ -133,9 +131,7 @@ def _folds(cells: Sequence[str]) -> bool:
     return max(map(len, cells), default=0) > LONGEST_LINE
 
 
-def across(
-    records: Mapping[str, Any], *, keys: Sequence[str] = (), stem: str = "", title: str = "", caption: str = ""
-) -> Table:
+def across(records: Mapping[str, Any], *, keys: Sequence[str] = (), title: str = "") -> Table:
     """A row a quantity that has one value, a column a record; the records are named, `keys` are those of columns."""
     found = [{label: (of, value) for label, of, value in entries(each)} for each in records.values()]
     known = {label: of for each in found for label, (of, _) in each.items()}
@@ -150,10 +146,10 @@ def across(
                   for _, value in pairs]  # fmt: skip
         cells = [with_unit(value, replace(of, unit="")) for of, value in pairs]
         columns.append(Column(key, name, of=values, shown=cells, folds=_folds(cells)))
-    return Table(columns=tuple(columns), stem=stem, title=title, caption=caption, leading=2)
+    return Table(columns=tuple(columns), title=title, leading=2)
 
 
-def roots_table(values: Any, of: Quantity, *, stem: str = "", title: str = "", caption: str = "") -> Table:
+def roots_table(values: Any, of: Quantity) -> Table:
     """A row a complex number: its real and imaginary part, and of a pole or zero in 1/s its damping ratio."""
     roots = [complex(value) for value in values]
     shown = [parts(root, of.digits) for root in roots]
@@ -165,10 +161,10 @@ def roots_table(values: Any, of: Quantity, *, stem: str = "", title: str = "", c
     if of.unit == "1/s":
         ratios = [within(-s.real / abs(s), COMPLEX_ERROR, RATIO_DIGITS) if s.imag else NO_VALUE for s in roots]
         columns.append(Column("damping_ratio", "damping ratio", of=ratios))
-    return Table(columns=tuple(columns), stem=stem, title=title, caption=caption)
+    return Table(columns=tuple(columns))
 
 
-def curve_table(record: Any, *, stem: str = "", title: str = "") -> Table:
+def curve_table(record: Any) -> Table:
     """The curves of a record, a row a point; complex ones in two columns.  Without any, the first list of records."""
     if hasattr(record, "csv_table"):
         return record.csv_table
@@ -184,7 +180,7 @@ def curve_table(record: Any, *, stem: str = "", title: str = "") -> Table:
             columns.append(Column(of.key, of.label, of.unit, of=value))
         elif not columns and is_list_of_records(value):
             return table(value)
-    return Table(columns=tuple(columns), stem=stem, title=title)
+    return Table(columns=tuple(columns))
 
 
 # --------------------------------------------------------------------------------------------------------- sections

@@ -330,25 +330,18 @@ def complete_box(f: Function, listed: Complex, others: Complex, C: float) -> Box
 
     `others` are known zeros that are not listed.
     """
-    known, heights = np.concatenate([listed, others])[:, 0], _heights(listed, others, C)
-    low, high = 0, len(heights) - 1
-    best: Box | None = None
-    while low <= high:
-        middle = high if best is None and high == len(heights) - 1 else (low + high) // 2
-        box = _box(float(heights[middle]), known, C)
-        inside = int(box.holds(listed.ravel()).sum())
+    known = np.concatenate([listed, others])[:, 0]
+    for height in reversed(_heights(listed, others, C).tolist()):
+        box = _box(height, known, C)
+        inside = int(box.holds(listed).sum())
         try:
             # time alone
             there = winding_number(f, box, points=FIRST_POINTS + 8 * inside)
         except ConvergenceError:
             return None
-        if there < inside:
-            return None
-        if there == inside:
-            best, low = box, middle + 1
-        else:
-            high = middle - 1
-    return best
+        if there <= inside:
+            return box if there == inside else None
+    return None
 
 
 def filled_box(

@@ -20,7 +20,7 @@ from tfarm.arm.checks import on_the_arm
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
-from tfarm.exact.characteristic import loop_parts
+from tfarm.exact.characteristic import drive_of
 from tfarm.exact.system import System
 from tfarm.records import frozen
 from tfarm.schema import Quantity
@@ -214,27 +214,15 @@ def _searched(undamped: Modes, steps: float, reach: float) -> DampedModes:
     """Return all eigenvalues in a box, assigned to their modes where that is certain."""
     k, arm, theory = undamped.system, undamped.arm, undamped.theory
     count = int(undamped.index.max())
-    beyond = modes(arm, count + COMPANY, theory=theory).flexible[count:]
-    single, every = named(undamped, count + int((k.damping * beyond < reach).sum()), steps)
-    pairs, company = every[:count], every[count:]
+    omega = modes(arm, count + COMPANY, theory=theory).flexible
+    single, every = named(undamped, count + int((k.damping * omega[count:] < reach).sum()), steps)
+    pairs, company, omega = every[:count], every[count:], omega[: count + 1]
     lost = np.flatnonzero(np.isnan(pairs[:, 0]))
-    free = single[single.imag != 0]
-    listed = np.concatenate([np.stack([single, np.full(single.size, LOST)], axis=1), pairs])
-    box = None
-    if np.isfinite(listed[:, 0]).all():
-        box = complete_box(function_of(k), listed, company, k.damping)
-    if box is None:
-        omega = modes(arm, count + 1, theory=theory).flexible
-        starts = np.r_[listed.ravel(), company.ravel(), damped_starts(arm, omega)]
-        # unknown ones may be above known ones
-        below = listed[:0] if lost.size else listed
-        box, found = filled_box(function_of(k), below, company, float(omega[-2:].mean()), starts, k.damping)
-        for zeros in (single, pairs):
-            zeros[box.holds(zeros) & ~is_among(zeros, found)] = LOST
-        free = np.r_[free, found[(found.imag >= 0) & ~is_among(found, np.r_[single, pairs.ravel()])]]
-        inside = found.size
-    else:
-        inside = int(box.holds(listed).sum())
+    box, found = _boxed(undamped, omega, _with_single(single, pairs), company)
+    for zeros in (single, pairs):
+        zeros[box.holds(zeros) & ~is_among(zeros, found)] = LOST
+    unnamed = found[(found.imag >= 0) & ~is_among(found, np.r_[single, pairs.ravel()])]
+    free = np.r_[single[single.imag != 0], unnamed]
     # zeros of the drive may be in the place of modes
     if free.size:
         of_drive = np.reshape([each != NOT_ASSIGNED for each in origins_of(k, pairs.ravel())], pairs.shape).any(axis=1)
@@ -255,10 +243,31 @@ def _searched(undamped: Modes, steps: float, reach: float) -> DampedModes:
         undamped,
         np.concatenate([rigid, pairs]),
         box,
-        inside + k.at_rest,
+        found.size + k.at_rest,
         others=tuple(real.tolist()),
         unassigned=tuple(map(Unassigned, origins_of(k, np.array(upper, complex)), upper)),
     )
+
+
+def _boxed(undamped: Modes, omega: Real, listed: Complex, company: Complex) -> tuple[Box, Complex]:
+    """Return the highest box in which the listed pairs (n, 2) are all eigenvalues, or one that is searched, with all.
+
+    `company` are pairs that are not listed, `omega` the undamped frequencies of the list and the next one.
+    """
+    k = undamped.system
+    f, is_whole = function_of(k), bool(np.isfinite(listed[:, 0]).all())
+    box = complete_box(f, listed, company, k.damping) if is_whole else None
+    if box is not None:
+        return box, listed[box.holds(listed)]
+    starts = np.r_[listed.ravel(), company.ravel(), damped_starts(undamped.arm, omega)]
+    # unknown ones may be above known ones
+    below = listed if is_whole else listed[:0]
+    return filled_box(f, below, company, float(omega[-2:].mean()), starts, k.damping)
+
+
+def _with_single(single: Complex, pairs: Complex) -> Complex:
+    """Return single eigenvalues (m,), each with NaN as the other, and pairs (n, 2) below them."""
+    return np.concatenate([np.stack([single, np.full(single.size, LOST)], axis=1), pairs])
 
 
 def _plainly(omega: Real, mode: int, found: Complex, free: Complex) -> complex | None:
@@ -309,7 +318,7 @@ def entered(damped: DampedModes) -> Real:
     at = -np.geomspace(min(SLOWEST * lowest, reach / 2), reach, REAL_POINTS)
 
     def signed(s: Real) -> Real:
-        drive, _, scale = loop_parts(k, s + 0j)
+        drive, scale = drive_of(k, s + 0j)
         return np.asarray((drive * np.exp(1j * scale.imag)).real)
 
     alone = damped.unassigned_pairs[:, 0]

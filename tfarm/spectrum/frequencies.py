@@ -20,8 +20,8 @@ from typing import Any
 
 import flint
 import numpy as np
-from numpy.typing import NDArray
 
+from tfarm.arrays import Real, Whole
 from tfarm.errors import ConvergenceError
 from tfarm.exact.balls import Ball, Sweep, across_waves, first_success, in_chain, precision, rational
 from tfarm.exact.count import DOUBLINGS, chain_counts, list_steps, rows_to_count
@@ -31,15 +31,9 @@ from tfarm.exact.waves import Plane
 from tfarm.records import read_only
 
 
-class Counter:
-    """N(omega) of a system: the number of natural frequencies [rad/s] below omega, with the rigid-body mode."""
-
-    def __init__(self, system: System) -> None:
-        self._rows, self._ends = rows_to_count(Layout(system.undamped))
-
-    def __call__(self, omega: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return the counts at omega (1-D, rad/s, positive)."""
-        return chain_counts(np.ascontiguousarray(omega, dtype=float), self._rows, self._ends)
+def counts_below(k: System, omega: Real) -> Whole:
+    """Return the number of natural frequencies below each omega (1-D, positive) [rad/s], with the rigid-body mode."""
+    return np.asarray(chain_counts(np.ascontiguousarray(omega, dtype=float), *rows_to_count(Layout(k.undamped))))
 
 
 MOST_AXIS_BITS = 40_000  # of working precision: a root that needs more is double
@@ -200,7 +194,7 @@ LISTS_KEPT = 32  # lists of modes in a cache
 ARMS_KEPT = 64  # arms whose single numbers are in the cache
 
 
-def natural_frequencies(k: System, first: int, last: int) -> NDArray[np.float64]:
+def natural_frequencies(k: System, first: int, last: int) -> Real:
     """Return the natural frequencies [rad/s] number first..last of the undamped arm, from 1, double ones twice.
 
     Raises ConvergenceError if the count does not reach `last` (see `list_frequencies`).
@@ -248,17 +242,17 @@ def _separated(k: System, omega: float, number: int) -> float:
     low, high = omega * (1 - PAIR_REACH), omega * (1 + PAIR_REACH)
     # 256 of working precision, for a double frequency to its last float64 digit
     with precision(256):
-        axis, count = RealAxis(k), Counter(k)
+        axis = RealAxis(k)
         while low < (middle := 0.5 * (low + high)) < high:
             below = axis.count(rational(middle))
-            below = int(count(np.array([middle]))[0]) if below is None else below
+            below = count_below(k, middle) if below is None else below
             low, high = (low, middle) if below >= number else (middle, high)
     return high
 
 
 def count_below(k: System, omega: float) -> int:
     """Return the number of natural frequencies below omega [rad/s]."""
-    return int(Counter(k)(np.array([omega]))[0])
+    return int(counts_below(k, np.array([omega]))[0])
 
 
 def _estimate(k: System, last: int) -> float:

@@ -5,8 +5,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-import numpy as np
-
 from tfarm.arm import WITH_SHEAR, Arm
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError
@@ -199,7 +197,7 @@ def _rows(
         omega, still = found.digits(digits), locked.digits(digits)[-locked.flexible.size :]
     brackets = [(None, None)] * len(found) if proof is None else [*[(None, None)] * rigid, *proof.brackets]
     theories, sensitivity = compare_theories(found), found.sensitivity
-    enclosures = _discs_by_row(found, damped, discs)
+    enclosures = _discs_by_mode(damped, discs)
     for row in range(len(found)):
         first, second, ratio = (None, None, None) if damped is None else _damped(damped, row)
         yield ListedMode(
@@ -210,7 +208,7 @@ def _rows(
             nodes=found.nodes[row].tolist(),
             theories={str(name): float(values[row]) for name, values in theories.items()},
             sensitivity={name: float(values[row]) for name, values in sensitivity.items()},
-            lower=brackets[row][0], upper=brackets[row][1], discs=enclosures[row],
+            lower=brackets[row][0], upper=brackets[row][1], discs=enclosures.get(int(found.index[row])),
         )  # fmt: skip
 
 
@@ -224,17 +222,13 @@ def _damped(damped: DampedModes, row: int) -> tuple[complex | None, float | None
     return p, q.real if both else None, float(damped.damping_ratio[row])
 
 
-def _discs_by_row(
-    found: Modes, damped: DampedModes | None, discs: Sequence[Sequence[Disc]] | None
-) -> list[tuple[Disc, ...] | None]:
-    """Return the discs of each mode, also of the rigid body with friction."""
+def _discs_by_mode(damped: DampedModes | None, discs: Sequence[Sequence[Disc]] | None) -> dict[int, tuple[Disc, ...]]:
+    """Return the discs of each mode by its number, also of the rigid body with friction."""
     if damped is None or discs is None:
-        return [None] * len(found)
-    each: list[tuple[Disc, ...] | None] = list(map(tuple, discs))
-    flexible = int(np.sum(damped.index > 0))
-    alone = each[flexible : flexible + damped.single.size - len(damped.others)]
-    rows = (alone or [None] * (len(found) - found.flexible.size)) + each[:flexible]
-    return rows + [None] * (len(found) - len(rows))
+        return {}
+    numbers = damped.index[damped.index > 0].tolist()
+    has_friction = damped.single.size > len(damped.others)
+    return dict(zip([*numbers, 0] if has_friction else numbers, map(tuple, discs), strict=False))
 
 
 def beyond_the_box(arm: Arm) -> str:

@@ -410,21 +410,23 @@ def _densities(piece: Segment, omega: Any, W: Any, Psi: Any, M: Any, Q: Any) -> 
 def _hub(arm: Arm, shapes: Shapes) -> Doubled:
     """Return those of hub, rotor, clamp and joint; behind the clamp the rotation is Psi - M/k, at the joint theta."""
     chain, hub, square = shapes.system, arm.hub, shapes.omega**2
-    per_rotation, theta = float(chain.length / chain.EI), shapes.theta()
+    per_rotation = float(chain.length / chain.EI)
+    turning = per_rotation * shapes.theta() ** 2
     _, Psi, M, Q = shapes.states((AT_HUB,))[0][..., 0]
-    found = {"hub_inertia": -hub.inertia * per_rotation * theta**2 if not arm.is_locked else np.zeros_like(theta)}
+    found = {"hub_inertia": -(0.0 if arm.is_locked else hub.inertia) * turning}
     if not arm.clamp.is_rigid:
-        found["clamp_stiffness"] = M**2 / (arm.clamp.stiffness * per_rotation) / square
-        Psi = Psi - M / (arm.clamp.stiffness * per_rotation)
+        bent = M / (arm.clamp.stiffness * per_rotation)
+        found["clamp_stiffness"] = M * bent / square
+        Psi = Psi - bent
     if hub.radius:
         found["hub_radius"] = -2 * float(chain.radius) * Q * Psi / square
         M = M + float(chain.radius) * Q
     if not arm.joint.is_rigid:
         found["joint_stiffness"] = M**2 / (arm.joint.stiffness * per_rotation) / square
     if hub.stiffness:
-        found["hub_stiffness"] = hub.stiffness * per_rotation * theta**2 / square
+        found["hub_stiffness"] = hub.stiffness * turning / square
     if arm.motor is not None and arm.motor.rotor_inertia:
-        rotor = -arm.motor.reflected_inertia * per_rotation * theta**2 * (not arm.is_locked)
+        rotor = -arm.motor.reflected_inertia * turning
         found |= {"rotor_inertia": rotor, "gear_ratio": 2 * rotor}
     return found
 
@@ -435,8 +437,7 @@ def _payload(arm: Arm, shapes: Shapes) -> Doubled:
     W, Psi, _, Q = shapes.tip()
     motions = (("mass", chain.tip_mass, W + float(chain.offset) * Psi), ("inertia", chain.tip_inertia, Psi))
     found = {
-        f"payload_{name}": -float(inertia) * motion**2 if math.isfinite(inertia) else np.zeros_like(motion)
-        for name, inertia, motion in motions
+        f"payload_{name}": -float(size if math.isfinite(size) else 0) * motion**2 for name, size, motion in motions
     }
     if arm.payload.offset:
         found["payload_offset"] = -2 * float(chain.offset) * Q * Psi / square

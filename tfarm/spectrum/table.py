@@ -1,12 +1,7 @@
-"""The modal table of an arm: frequencies, shapes, hub participation, nodes and exact sensitivities; its default gains.
-
-The natural unit of a rate gain K1 is J w1 and that of an angle gain Kp is J w1^2, with J the arm's inertia about the
-hub and w1 its first flexible frequency.
-"""
+"""The modal table of an arm: frequencies, shapes, hub participation, nodes and exact sensitivities."""
 
 import math
-from collections.abc import Iterable
-from dataclasses import field, replace
+from dataclasses import field
 from fractions import Fraction
 from functools import cached_property, lru_cache
 
@@ -14,22 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import (
-    GAINS,
     THEORIES,
     Arm,
-    Hub,
-    HubFeedback,
-    Payload,
-    Section,
     Theory,
-    input_words,
     must_be_arm,
-    written_unit,
 )
 from tfarm.arm.checks import on_the_arm, whole
 from tfarm.arrays import Real, Whole
 from tfarm.digits import DOUBLE_DIGITS, general, singly
-from tfarm.errors import ConvergenceError, ParameterError, require
+from tfarm.errors import ConvergenceError, require
 from tfarm.exact.system import System, shear_flexibility, system_of
 from tfarm.exact.values import (
     APPENDIX_DIGITS,
@@ -270,18 +258,14 @@ def modes(arm: Arm, count: int | None = None, *, up_to: float | None = None, the
     theory = arm.theory if theory is None else theory
     k = system_of(arm, theory).undamped
     rigid = arm.has_rigid_mode
-    if (count is None) == (up_to is None):
-        raise ParameterError(key="count", value=count, remedy="give either a count of modes or a frequency up_to")
-    if up_to is not None:
-        if not 0 < up_to < math.inf:
-            raise ParameterError(key="up_to", value=up_to, remedy="a positive, finite frequency in rad/s")
-        count = modes_below(arm, up_to, theory=theory)
-    else:
+    require((count is None) != (up_to is None), "count", count, "give either a count of modes or a frequency up_to")
+    if up_to is None:
         count = whole("count", count, 1, math.inf, f"a whole number of modes from 1 to {MOST_TABLE_MODES}")
-    if count == 0:
-        raise ParameterError(key="up_to", value=up_to, remedy="no flexible mode lies below it; choose a higher one")
-    if count > MOST_TABLE_MODES:
-        raise ParameterError(key="count", value=count, remedy=f"at most {MOST_TABLE_MODES} modes")
+    else:
+        require(0 < up_to < math.inf, "up_to", up_to, "a positive, finite frequency in rad/s")
+        count = modes_below(arm, up_to, theory=theory)
+        require(count, "up_to", up_to, "no flexible mode lies below it; choose a higher one")
+    require(count <= MOST_TABLE_MODES, "count", count, f"at most {MOST_TABLE_MODES} modes")
     flexible = natural_frequencies(k, rigid + 1, rigid + count)
     index = np.arange(1 - rigid, count + 1)
     return Modes(arm, theory, index, np.concatenate([[0.0] * rigid, flexible]), k)
@@ -320,97 +304,7 @@ def flexible_frequencies(arm: Arm, up_to: float) -> Real:
     return modes(arm, up_to=up_to).flexible
 
 
-PAPER_GAINS = HubFeedback(K1=0.3, K2=0.3)  # of the paper's arms
-RATE_SHARE = 6.42e-3  # of J w1: K1 = 0.3 N m s/rad on the preset sasaki2012
-LEAST_UNITS = 1e-12  # of J w1, 1 and J w1^2: a smaller gain moves no pole in a lifetime
-MOST_UNITS = 1e9  # of J w1, 1 and J w1^2: practically infinite, far from overflow
-DEFAULT_DIGITS = 3  # of a default K1
-# Section, hub and payload of the paper's arms, with density [kg/m^3] and C [s] as in their presets.
-PAPER_SECTION = Section.general(area=6e-4, second_moment=1.8e-9, shear_factor=5 / 6)
-PAPER_ENDS = Hub(inertia=0.1), Payload()
-PAPER_MATERIALS = ((2766.7, 0.0), (2766.7, 1e-4), (2.7667, 0.0))
-
-
-@lru_cache(maxsize=ARMS_KEPT)  # each loop of a search checks its gains
-def turning_inertia(arm: Arm) -> float:
-    """Return J, the arm's inertia about the hub without infinite parts.
-
-    In kg m^2 for a torque, else in the unit of the input times s^2.
-    """
-    parts = (arm.hub.inertia, arm.payload.mass, arm.payload.inertia)
-    hub, mass, inertia = (each if np.isfinite(each) else 0.0 for each in parts)
-    payload = replace(arm.payload, mass=mass, inertia=inertia)
-    return replace(arm, hub=replace(arm.hub, inertia=hub), payload=payload).turned_inertia
-
-
-def rate_unit(arm: Arm) -> float:
-    """Return J w1 [N m s/rad], the natural unit of K1."""
-    return turning_inertia(arm) * first_frequency(arm)
-
-
-def angle_unit(arm: Arm) -> float:
-    """Return J w1^2 [N m/rad], the natural unit of Kp."""
-    return turning_inertia(arm) * first_frequency(arm) ** 2
-
-
-UNITS_OF_OUTPUTS = {"hub_angle": ("J w1^2", angle_unit), "hub_rate": ("J w1", rate_unit)}  # of a gain on each, else 1
-
-
-def gain_unit(arm: Arm, name: str) -> float:
-    """Return the natural unit of the gain of that name on this arm, in its SI unit."""
-    (output,) = (gain.output for gain in GAINS if gain.name == name)
-    return UNITS_OF_OUTPUTS[output][1](arm) if output in UNITS_OF_OUTPUTS else arm.input_per_torque
-
-
-def most_gain(arm: Arm, name: str) -> float:
-    """Return the largest magnitude of the gain of that name on this arm."""
-    return MOST_UNITS * gain_unit(arm, name)
-
-
-def check_gains(arm: Arm, law: HubFeedback, least: float = LEAST_UNITS) -> None:
-    """Raise ParameterError for a gain that is too large for the arm, or too small: 0 to `least` of its unit."""
-    for gain in GAINS:
-        size, own = abs(law[gain.name]), gain_unit(arm, gain.name)
-        unit = UNITS_OF_OUTPUTS[gain.output][0] if gain.output in UNITS_OF_OUTPUTS else "1"
-        remedy = f"for this arm at most {MOST_UNITS:g} times {unit} in size, {MOST_UNITS * own:.3g}"
-        require(not size or size <= MOST_UNITS * own, gain.name, law[gain.name], remedy)
-        remedy = f"for this arm 0, or at least {least:g} times {unit} in size, {least * own:.3g}"
-        require(not size or size >= least * own, gain.name, law[gain.name], remedy)
-
-
-def default_gains(arm: Arm) -> HubFeedback:
-    """Return the default law of an arm: K1 = 0.00642 J w1 to three digits, K2 = 0.3.
-
-    On the paper's arm and its presets K1 = 0.3 N m s/rad.  For a hub without inertia K2 = 0, as any other value is an
-    algebraic loop.
-    """
-    must_be_arm(arm)
-    if _is_of_the_paper(arm):
-        return PAPER_GAINS
-    K1 = float(f"{RATE_SHARE * rate_unit(arm):.{DEFAULT_DIGITS}g}")
-    K2 = float(f"{PAPER_GAINS.K2 * arm.input_per_torque:.{DEFAULT_DIGITS}g}")
-    return HubFeedback(K1=K1, K2=0.0 if arm.has_massless_hub else K2)
-
-
-def default_words(arm: Arm, names: Iterable[str] = ("K1", "K2")) -> str:
-    """Return the default gains of these names and their reason, in one clause."""
-    law, is_paper = default_gains(arm), _is_of_the_paper(arm)
-    why = "as in the paper" if is_paper else f"{RATE_SHARE:g} J w1 of this arm"
-    units = {name: written_unit(name, arm) for name in ("K1", "K2")}
-    words = {"K1": f"K1 = {law.K1:g}{units['K1']} ({why})", "K2": f"K2 = {law.K2:g}{units['K2']}"}
-    driven = f", through {input_words(arm)}" if arm.input_per_torque != 1.0 else ""
-    return " and ".join(words[name] for name in names) + driven
-
-
 @lru_cache(maxsize=ARMS_KEPT)
 def first_frequency(arm: Arm) -> float:
     """Return w1 [rad/s], the lowest flexible frequency of the undamped arm."""
     return float(modes(arm.elastic, 1).natural_frequency[-1])
-
-
-def _is_of_the_paper(arm: Arm) -> bool:
-    """Whether link, hub and payload are those of one of the paper's presets."""
-    link = arm.link
-    is_material = (link.density, link.damping) in PAPER_MATERIALS
-    is_link = (link.length, link.youngs_modulus, link.shear_modulus) == (1.0, 6.8944e10, 2.6517e10)
-    return is_material and is_link and (link.section, arm.hub, arm.payload) == (PAPER_SECTION, *PAPER_ENDS)

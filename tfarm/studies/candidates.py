@@ -23,7 +23,7 @@ from tfarm.errors import require
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 from tfarm.tuner import LearningCurves, Tuning, compare_controllers, tried_loops, tune
 from tfarm.tuner.baselines import Outcomes, quantised_chain
 from tfarm.tuner.tuning import tuned, usual_plan

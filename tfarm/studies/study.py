@@ -40,7 +40,7 @@ from tfarm.fitting.posterior import load_posterior
 from tfarm.processes import shared
 from tfarm.records import frozen
 from tfarm.schema import Column, Quantity, Table
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 
 from .quantities import (
     CARD,

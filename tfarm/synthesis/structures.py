@@ -26,7 +26,8 @@ from tfarm.errors import must_be_known, require
 from tfarm.loop.continuous import band_of
 from tfarm.records import frozen
 from tfarm.spectrum import modes as natural_modes
-from tfarm.spectrum.table import check_gains, first_frequency, rate_unit, turning_inertia
+from tfarm.spectrum.gains import check_gains, rate_unit, turning_inertia
+from tfarm.spectrum.table import first_frequency
 
 Bounds = tuple[float, float]
 

@@ -43,7 +43,7 @@ from tfarm.errors import must_be_known, naming, require
 from tfarm.files import write_file
 from tfarm.loop.sampled import Sampled, sampled_loop
 from tfarm.records import frozen
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 from tfarm.tuner import kernel
 from tfarm.tuner.guard import GuardKind
 from tfarm.tuner.kernel import CONSUMER, PAPER_INPUTS, Limits, Network

@@ -20,7 +20,7 @@ from tfarm.dsp.simulate import RESIDUAL
 from tfarm.errors import require
 from tfarm.records import frozen
 from tfarm.schema import Quantity
-from tfarm.spectrum.table import default_gains
+from tfarm.spectrum.gains import default_gains
 from tfarm.tuner.baselines import SHAPERS, BestConstant, Outcomes, best_constant, lq_bound, shaped_trial
 from tfarm.tuner.guard import Guard, GuardKind, find_guard
 from tfarm.tuner.kernel import PAPER_HIDDEN, PAPER_INPUTS, Network, initial_network

@@ -1,0 +1,101 @@
+"""Natural units of the gains of an arm, their limits, and its default gains.
+
+The natural unit of a rate gain K1 is J w1 and that of an angle gain Kp is J w1^2, with J the arm's inertia about the
+hub and w1 its first flexible frequency.
+"""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from tfarm.arm import Arm, Hub, HubFeedback, Payload, Section, input_words, must_be_arm, written_unit
+from tfarm.errors import require
+from tfarm.spectrum.frequencies import ARMS_KEPT
+from tfarm.spectrum.table import first_frequency
+
+PAPER_GAINS = HubFeedback(K1=0.3, K2=0.3)  # of the paper's arms
+RATE_SHARE = 6.42e-3  # of J w1: K1 = 0.3 N m s/rad on the preset sasaki2012
+LEAST_UNITS = 1e-12  # of J w1, 1 and J w1^2: a smaller gain moves no pole in a lifetime
+MOST_UNITS = 1e9  # of J w1, 1 and J w1^2: practically infinite, far from overflow
+DEFAULT_DIGITS = 3  # of a default K1
+# Section, hub and payload of the paper's arms, with density [kg/m^3] and C [s] as in their presets.
+PAPER_SECTION = Section.general(area=6e-4, second_moment=1.8e-9, shear_factor=5 / 6)
+PAPER_ENDS = Hub(inertia=0.1), Payload()
+PAPER_MATERIALS = ((2766.7, 0.0), (2766.7, 1e-4), (2.7667, 0.0))
+
+
+@lru_cache(maxsize=ARMS_KEPT)  # each loop of a search checks its gains
+def turning_inertia(arm: Arm) -> float:
+    """Return J, the arm's inertia about the hub without infinite parts.
+
+    In kg m^2 for a torque, else in the unit of the input times s^2.
+    """
+    parts = (arm.hub.inertia, arm.payload.mass, arm.payload.inertia)
+    hub, mass, inertia = (each if np.isfinite(each) else 0.0 for each in parts)
+    payload = replace(arm.payload, mass=mass, inertia=inertia)
+    return replace(arm, hub=replace(arm.hub, inertia=hub), payload=payload).turned_inertia
+
+
+def rate_unit(arm: Arm) -> float:
+    """Return J w1 [N m s/rad], the natural unit of K1."""
+    return turning_inertia(arm) * first_frequency(arm)
+
+
+def angle_unit(arm: Arm) -> float:
+    """Return J w1^2 [N m/rad], the natural unit of Kp."""
+    return turning_inertia(arm) * first_frequency(arm) ** 2
+
+
+def gain_unit(arm: Arm, name: str) -> float:
+    """Return the natural unit of the gain of that name on this arm, in its SI unit."""
+    units = {"Kp": angle_unit, "K1": rate_unit}
+    return units[name](arm) if name in units else arm.input_per_torque
+
+
+def most_gain(arm: Arm, name: str) -> float:
+    """Return the largest magnitude of the gain of that name on this arm."""
+    return MOST_UNITS * gain_unit(arm, name)
+
+
+def check_gains(arm: Arm, law: HubFeedback, least: float = LEAST_UNITS) -> None:
+    """Raise ParameterError for a gain that is too large for the arm, or too small: 0 to `least` of its unit."""
+    for name, unit in {"Kp": "J w1^2", "K1": "J w1", "K2": "1"}.items():
+        value, own = law[name], gain_unit(arm, name)
+        remedy = f"for this arm at most {MOST_UNITS:g} times {unit} in size, {MOST_UNITS * own:.3g}"
+        require(abs(value) <= MOST_UNITS * own, name, value, remedy)
+        remedy = f"for this arm 0, or at least {least:g} times {unit} in size, {least * own:.3g}"
+        require(not value or abs(value) >= least * own, name, value, remedy)
+
+
+def default_gains(arm: Arm) -> HubFeedback:
+    """Return the default law of an arm: K1 = 0.00642 J w1 to three digits, K2 = 0.3.
+
+    On the paper's arm and its presets K1 = 0.3 N m s/rad.  For a hub without inertia K2 = 0, as any other value is an
+    algebraic loop.
+    """
+    must_be_arm(arm)
+    if _is_of_the_paper(arm):
+        return PAPER_GAINS
+    K1 = float(f"{RATE_SHARE * rate_unit(arm):.{DEFAULT_DIGITS}g}")
+    K2 = float(f"{PAPER_GAINS.K2 * arm.input_per_torque:.{DEFAULT_DIGITS}g}")
+    return HubFeedback(K1=K1, K2=0.0 if arm.has_massless_hub else K2)
+
+
+def default_words(arm: Arm, names: Iterable[str] = ("K1", "K2")) -> str:
+    """Return the default gains of these names and their reason, in one clause."""
+    law, is_paper = default_gains(arm), _is_of_the_paper(arm)
+    why = "as in the paper" if is_paper else f"{RATE_SHARE:g} J w1 of this arm"
+    units = {name: written_unit(name, arm) for name in ("K1", "K2")}
+    words = {"K1": f"K1 = {law.K1:g}{units['K1']} ({why})", "K2": f"K2 = {law.K2:g}{units['K2']}"}
+    driven = f", through {input_words(arm)}" if arm.input_per_torque != 1.0 else ""
+    return " and ".join(words[name] for name in names) + driven
+
+
+def _is_of_the_paper(arm: Arm) -> bool:
+    """Whether link, hub and payload are those of one of the paper's presets."""
+    link = arm.link
+    is_material = (link.density, link.damping) in PAPER_MATERIALS
+    is_link = (link.length, link.youngs_modulus, link.shear_modulus) == (1.0, 6.8944e10, 2.6517e10)
+    return is_material and is_link and (link.section, arm.hub, arm.payload) == (PAPER_SECTION, *PAPER_ENDS)
