@@ -41,7 +41,6 @@ SURVEYS := \
 	exported.laws \
 	exported.worst \
 	exported.tuners \
-	exported.unit_loops \
 	cli.fuzz \
 	cli.stops \
 	assessment.steps \

@@ -92,9 +92,8 @@ def tuned(arm, chain):
 def exported(form, what, tuned=None):
     def export(arm, chain):
         precision = "float" if (form, what) == ("c", "controller") else "double"
-        task = result.ExportTask(
-            arm=arm, given=GAINS, chain=chain, what=what, form=form, precision=precision, anyway=True, tuned=tuned
-        )
+        case = Case(arm, GAINS, chain)
+        task = result.ExportTask(case=case, what=what, form=form, precision=precision, anyway=True, tuned=tuned)
         module, _, function = result.WRITERS[what, form].partition(":")
         made = getattr(import_module(f"tfarm.exported.{module}"), function)(task)
         return made.contents, made.verdict
@@ -140,7 +139,7 @@ ANSWERS = {
     systems.CONSUMER: exported("py", "loop"),
     live_loop.CONSUMER: lambda arm, chain: (
         live_loop.sampled_numbers(sampled_verdict(Case(arm, GAINS, chain), count=3).loop),
-        live_loop.slew_numbers(arm, chain, GAINS),
+        live_loop.slew_numbers(Case(arm, GAINS, chain)),
     ),
 }  # fmt: skip
 PUBLIC = {  # the functions that users call, which refuse before any work
@@ -206,7 +205,7 @@ WALKED = [pytest.param(each, id=each.name, marks=[pytest.mark.survey] * (each is
 def test_a_key_changes_the_answer_or_is_named_in_it(consumer, monkeypatch):
     monkeypatch.setattr(result.ExportTask, "sha256", "of the inputs")
     monkeypatch.setattr("tfarm.exported.fmu.binary_of", lambda sources, identifier: ({}, "none"))
-    for place in ("exported.result.sampled", "exported.controller.sampled", "assessment.step.sampled_verdict"):
+    for place in ("exported.result.sampled", "assessment.step.sampled_verdict"):
         few = partial(sampled if place.endswith("sampled") else sampled_verdict, count=3)
         monkeypatch.setattr(f"tfarm.{place}", few)
     ask = remembered(lambda chain: str(ANSWERS[consumer](ARM, chain)))

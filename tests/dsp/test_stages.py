@@ -196,7 +196,7 @@ console.log(JSON.stringify({ torque: [...torque], moment, angle, tip }));
 @vectors(live_loop.CONSUMER)
 def test_the_page_in_javascript(stages):
     chain = chain_of(stages)
-    data = live_loop.slew_numbers(ARM, chain, LAW)
+    data = live_loop.slew_numbers(Case(ARM, LAW, chain))
     truth = vector(chain, data["modes"])
     task = truth.scenario
     ideal = [task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference, task.rigid_moment]

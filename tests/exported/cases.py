@@ -1,14 +1,13 @@
 """Laws and chains of exported controllers, and the parts of an export that tests compare."""
 
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 import tfarm
-from tfarm.arm.law import arm_and_law
 from tfarm.arm.law_tables import load_law
+from tfarm.case import Case
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, load_chain
 from tfarm.dsp.kernel import AMPLIFIER, ENCODER
 from tfarm.dsp.simulate import quantisers
@@ -43,27 +42,24 @@ CASES = {  # arm, law, chain
 
 def task_of(case, precision="double", **others):
     """The task of a case of `CASES`, or of an arm, a law and a chain."""
-    arm, law, chain = CASES[case] if isinstance(case, str) else case
-    ranges = {name: size for name, size in RANGES.items() if precision == "q31"} | others.pop("ranges", {})
+    case = Case(*(CASES[case] if isinstance(case, str) else case))
+    ranges = others.pop("ranges", {})
     if precision == "q31":
-        names = {*tfarm.arm.as_law(law).signals, "output", "feedforward"}
-        ranges = {name: size for name, size in ranges.items() if name in names}
-    return ExportTask(
-        arm=arm, given=law, chain=chain, what="controller", form="c", precision=precision, ranges=ranges, **others
-    )
+        names = (*case.law.signals, "output", "feedforward")
+        ranges = {name: size for name, size in (RANGES | ranges).items() if name in names}
+    return ExportTask(case=case, what="controller", form="c", precision=precision, ranges=ranges, **others)
 
 
-@cache
 def hinf():
-    """The H-infinity controller of the rig, its arm with the controller's input, and its chain."""
-    arm, law = tfarm.load(RIG / "rig.toml"), load_law(RIG / "hinf.toml")
-    return arm_and_law(arm, law)[0], law, load_chain(RIG / "chain.toml")
+    """The H-infinity controller of the rig, its arm, and its chain."""
+    return tfarm.load(RIG / "rig.toml"), load_law(RIG / "hinf.toml"), load_chain(RIG / "chain.toml")
 
 
 def realised(task):
     """The realised controller of a task, and its exact sampled loop."""
-    loop = tfarm.sampled(task.arm, task.law, task.chain).verdict.loop
-    return controller_of(least_noise(in_z(task.law, task.chain), loop)[0], task), loop
+    case = task.case
+    loop = tfarm.sampled(case.arm, case.law, case.chain).verdict.loop
+    return controller_of(least_noise(in_z(case), loop)[0], task), loop
 
 
 def on_steps(values, chain, row):

@@ -1,12 +1,17 @@
-"""Exported controllers of random laws: equal to C bit for bit; `worst` has their bounds.
+"""Exported controllers of random laws: equal to C bit for bit; `worst` has their bounds.  Units of random loops.
 
     python -m tests.exported.laws SIZE SEED
 
 Laws of order 0 to 8 of one to three signals on the laboratory's arm: lags, notches, integrals, state spaces, in s under
 each rule.  Each runs in float and in Q31 under random inputs, 5,000 samples, in Python and in C.
+
+Functional mock-up units of as many random arms (`tests.strategies`), laws and chains every 10 ms: delays of up to three
+samples, analog filters, encoders, converters, limits of the actuator, float32.  Signals of 200 samples of a slew under
+a random disturbance are compared with those of the simulator with as many modes, relative to the largest.
 """
 
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +20,11 @@ import tfarm
 from tests import survey
 from tests.exported.cases import IDEAL, LAB, RANGES, realised, task_of
 from tests.exported.compilers import random_inputs, stepped
-from tests.survey import Finding
+from tests.exported.units import Unit, driven, inputs_of, modes_of_units
+from tests.strategies import some_arm
+from tests.survey import Finding, each_of
+from tfarm.case import Case
+from tfarm.dsp import Actuator, Chain, Converters, Sampling, Simulator, scenario
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exported.controller import source_files
 from tfarm.exported.result import write_into
@@ -81,5 +90,53 @@ def laws(size, seed):
         yield from (each for each in found if each is not None)
 
 
+def some_chain(rng, arm):
+    """A chain; each imperfection in about half of all cases, ranges about the torque of the slew."""
+
+    def perhaps(value, ideal=None):
+        return value if rng.random() < 0.5 else ideal
+
+    size = abs(scenario("slew", arm, Chain(), 0.5).feedforward).max() * rng.uniform(0.5, 5.0)
+    return Chain(
+        sampling=Sampling(
+            delay_samples=perhaps(rng.uniform(0, 3), 0.0),
+            antialias_corner=perhaps(rng.uniform(50, 900), np.inf),
+        ),
+        converters=Converters(
+            encoder_counts=perhaps(int(rng.integers(500, 9000))), hub_rate=perhaps("difference", "ideal"),
+            rate_filter=perhaps(rng.uniform(20, 500), np.inf), moment_bits=perhaps(int(rng.integers(6, 16))),
+            moment_range=float(size), torque_bits=perhaps(int(rng.integers(6, 16))), torque_range=float(size),
+            arithmetic=perhaps("float32", "float64"),
+        ),
+        actuator=Actuator(torque_limit=perhaps(float(size * rng.uniform(0.3, 1.0)), np.inf)),
+    )  # fmt: skip
+
+
+def unit(rng):
+    """The finding of one functional mock-up unit; None where there is no export."""
+    try:
+        arm = some_arm(rng)
+        law, chain = replace(some_law(rng), delay=0.0), some_chain(rng, arm)
+        with tempfile.TemporaryDirectory() as place, modes_of_units(3):
+            tfarm.export(arm, law, what="loop", form="fmu", folder=place, chain=chain, anyway=True)
+            made = Unit(Path(place) / "loop.fmu", Path(place) / "unpacked")
+        task = scenario("slew", arm, chain, 200 * chain.sampling.period)
+        task = replace(task, disturbance=0.1 * abs(task.feedforward).max() * rng.normal(size=task.t.size))
+        truth = Simulator(Case(arm, law, chain), task, count=3).run()
+    except (ParameterError, ConvergenceError):
+        return None
+    made.start()
+    found, n, is_stopped = driven(made, inputs_of(task), task.t.size), truth.t.size, truth.stopped is not None
+    off = np.inf
+    if found["torque"].size == n + (not is_stopped):
+        signals = [(found[name][:n], truth.at_samples.signal(name)) for name in truth.at_samples.names]
+        off = max(float(abs(own - of).max() / max(abs(of).max(), 1e-300)) for own, of in signals)
+    is_wrong = not off <= 1e-12
+    outcome = "stopped" if is_stopped else "saturated" if any(truth.saturated.values()) else "ran"
+    return Finding(outcome, f"{arm!r} {law!r} {chain!r}: {off:.3g}" if is_wrong else "", is_wrong, {"difference": off})
+
+
+units = each_of(unit)
+
 if __name__ == "__main__":
-    survey.main(laws)
+    survey.main(laws, units)

@@ -3,7 +3,7 @@
 import pytest
 
 import tfarm
-from tests.exported.cases import GAINS, IDEAL, LAB, RIG, hinf, task_of
+from tests.exported.cases import GAINS, IDEAL, LAB, hinf, task_of
 from tests.exported.compilers import build, run
 from tests.shell import answer, refused
 
@@ -62,9 +62,7 @@ def test_the_hash_is_that_of_arm_law_and_chain():
 def test_a_law_of_another_input_is_in_its_unit(tmp_path):
     """A controller of the motor's current, on the file of its arm."""
     arm, law, chain = hinf()
-    wanted = {"what": "controller", "form": "c", "folder": tmp_path, "chain": chain, "anyway": True}
-    found = tfarm.export(tfarm.load(RIG / "rig.toml"), law, **wanted)
-    assert arm.input == "motor_current"
+    found = tfarm.export(arm, law, what="controller", form="c", folder=tmp_path, chain=chain, anyway=True)
     assert b" * Output: motor_current [A]\n" in found.contents["controller.h"]
     assert found.details.realisation == "balanced state space"
     gains = {each.realisation: each.gain for each in found.details.noise_gains}

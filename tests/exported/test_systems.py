@@ -8,7 +8,7 @@ import pytest
 
 import tfarm
 from tfarm import HubFeedback, Law
-from tfarm.arm import AT_HUB, as_law
+from tfarm.arm import AT_HUB
 from tfarm.case import Case
 from tfarm.dsp import Actuator, Chain, Converters, Sampling
 from tfarm.dsp.scenarios import scenario
@@ -40,7 +40,7 @@ EVERY = pytest.mark.parametrize(("law", "chain"), CASES.values(), ids=CASES)
 
 
 def systems(law, chain):
-    plant, controller = (make(LAB, as_law(law), chain) for make in (plant_system, controller_system))
+    plant, controller = (make(Case(LAB, law, chain)) for make in (plant_system, controller_system))
     return plant, controller, loop_system(plant, controller)
 
 

@@ -6,11 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from tests.exported.cases import GAINS, IDEAL, LAB, task_of
+from tests.exported.cases import GAINS, IDEAL, LAB, NOTCH, task_of
 from tests.exported.compilers import build, needed, run
 from tests.hostile import C_TEXTS, NAME
 from tests.shared import thinned
-from tfarm.arm import as_law
 from tfarm.exported.controller import c_controller
 from tfarm.exported.result import write_into
 from tfarm.exported.systems import listed, plain
@@ -54,8 +53,8 @@ def test_literals_are_read_back(words):
 def test_hostile_names_compile_to_the_same_code(tmp_path, words, compiler):
     """Of controller and identifiers: a comment that ends, a trigraph, a line that continues, a keyword."""
     needed(compiler)
-    plain = c_controller(task_of((LAB, GAINS, IDEAL), name="x")).contents["controller.c"]
-    law = replace(as_law(GAINS), name=words)
+    plain = c_controller(task_of((LAB, NOTCH, IDEAL), name="x")).contents["controller.c"]
+    law = replace(NOTCH, name=words)
     found = c_controller(task_of((replace(LAB, name=NAME), law, IDEAL), name=words))
     write_into(tmp_path, found.contents)
     assert run(build(tmp_path, compiler, *["-trigraphs"] * (compiler == "gcc"))).startswith(b"0 of 1000")

@@ -21,6 +21,7 @@ from tests.exported.cases import IDEAL, LAB, realised
 from tests.exported.laws import some_law
 from tests.survey import Finding
 from tfarm.arm.law import REFERENCE
+from tfarm.case import Case
 from tfarm.dsp import Actuator, Converters
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exported.controller import SATURATED, STATE_SATURATED, in_z, word_length
@@ -61,19 +62,21 @@ def some_task(rng):
     ranges = {name: float(rng.uniform(0.1, 10.0)) for name in dict.fromkeys(names)}
     ranges["output"] = chain.converters.torque_range or float(rng.uniform(0.5, 5.0))
     ranges["feedforward"] = ranges["output"] * float(rng.choice([1.0, 0.3]))
-    return ExportTask(arm=LAB, given=law, chain=chain, what="controller", form="c", ranges=ranges, anyway=True)
+    return ExportTask(case=Case(LAB, law, chain), what="controller", form="c", ranges=ranges, anyway=True)
 
 
 def columns_of(task, controller, inputs):
     """Whole numbers e (n, columns) of whole inputs (n, k), by the definition of the law."""
-    law, names = task.law, [*controller.signals, *controller.references]
+    law, names = task.case.law, [*controller.signals, *controller.references]
     count, known = len(controller.signals), {}
     for j, name in enumerate(names):
         known[name, j >= count] = inputs[:, j]
     if controller.hub:
-        T = Fraction(task.chain.sampling.period)
+        T = Fraction(task.case.chain.sampling.period)
         with mpmath.workprec(2 * DIGITS):
-            pole = int(mpmath.nint(mpmath.exp(-mpmath.mpf(task.chain.converters.rate_filter) * float(T)) * 2**DIGITS))
+            pole = int(
+                mpmath.nint(mpmath.exp(-mpmath.mpf(task.case.chain.converters.rate_filter) * float(T)) * 2**DIGITS)
+            )
         angle, rate, found = known["hub_angle", False], 0, []
         for now, before in zip(angle, [angle[0], *angle[:-1]], strict=True):
             step = (now - before) * T.denominator // T.numerator
@@ -146,11 +149,12 @@ def in_kind(controller, values, sizes):
 def judged(rng, task, kind):
     """The finding of one law in one arithmetic."""
     task = replace(task, precision=kind)
-    if kind == "q31" and task.chain.converters.hub_rate == "difference":
-        task = replace(task, chain=replace(task.chain, converters=replace(task.chain.converters, hub_rate="ideal")))
+    if kind == "q31" and task.case.chain.converters.hub_rate == "difference":
+        converters = replace(task.case.chain.converters, hub_rate="ideal")
+        task = replace(task, case=task.case.through(replace(task.case.chain, converters=converters)))
     task = replace(task, ranges={name: size for name, size in task.ranges.items() if is_known(task, name)})
     if kind == "q31":
-        names = [*task.law.signals, *(name.removeprefix(REFERENCE) for name in task.law.wanted)]
+        names = [*task.case.law.signals, *(name.removeprefix(REFERENCE) for name in task.case.law.wanted)]
         task = replace(task, ranges=dict.fromkeys(names, 1.0) | dict(task.ranges))
     try:
         controller, _ = realised(task)
@@ -172,21 +176,25 @@ def judged(rng, task, kind):
             values[:, at] = np.clip(values[:, at], -most, most) * (1 - 1e-6)
         values[:, -1] = halfway(rng, task, controller, values, sizes)
         own, exact = in_kind(controller, values, sizes)
-        law = in_z(task.law, task.chain)
+        law = in_z(task.case)
         whole = WHOLE(exact)
         truth = output_of(law, columns_of(task, controller, whole)) + whole[:, -1]
         size, level, fault = compared(controller, own, truth, bounds.error)
         share, reach, words = max(share, size), max(reach, level / bounds.output), words or fault
     is_wrong = bool(words) or share > 1 or reach > 1
-    words = f"{kind} {task.law!r} {task.chain.converters!r}: {share:.4g} of the bound, {words}" if is_wrong else ""
+    words = (
+        f"{kind} {task.case.law!r} {task.case.chain.converters!r}: {share:.4g} of the bound, {words}"
+        if is_wrong
+        else ""
+    )
     outcome = f"{kind}{', DAC' if controller.dac[0] else ''}{', estimate' if controller.hub else ''}"
     return Finding(outcome, words, is_wrong, {f"error over bound, {outcome}": share, "output over its bound": reach})
 
 
 def is_known(task, name):
     """Whether a range is of this task: a hub angle is an input of an estimate too."""
-    is_estimated = task.chain.converters.hub_rate == "difference" and "hub_rate" in task.law.signals
-    return name in (*task.law.signals, "output", "feedforward") or (name == "hub_angle" and is_estimated)
+    is_estimated = task.case.chain.converters.hub_rate == "difference" and "hub_rate" in task.case.law.signals
+    return name in (*task.case.law.signals, "output", "feedforward") or (name == "hub_angle" and is_estimated)
 
 
 def halfway(rng, task, controller, values, sizes):
@@ -196,7 +204,7 @@ def halfway(rng, task, controller, values, sizes):
         return r
     _, exact = in_kind(controller, values, sizes)
     whole = WHOLE(exact)
-    u = output_of(in_z(task.law, task.chain), columns_of(task, controller, whole))
+    u = output_of(in_z(task.case), columns_of(task, controller, whole))
     u = np.array([float(Fraction(int(each), 2**DIGITS)) for each in u])
     middle = (np.rint((u + r) / step - 0.5) + 0.5) * step * (1 + rng.choice([-1e-7, 0.0, 1e-7], r.size))
     return np.where(abs(middle - u) <= sizes[-1], middle - u, r)

@@ -45,7 +45,7 @@ def test_its_least_rate_gain_is_an_upright_edge_of_the_picture():
     stable = np.array([bool(each) for each in plane.stable_intervals])
     assert plane.K1[stable].min() == pytest.approx(-FRICTION, rel=1e-8)
     assert not stable[plane.K1 < -FRICTION].any()
-    areas = live_data(LOSSY, Chain())["continuous"]
+    areas = live_data(Case(LOSSY, tfarm.default_gains(LOSSY)))["continuous"]
     assert min(row["K1"] for row in areas) >= -FRICTION
 
 

@@ -20,7 +20,7 @@ from tests.shared import remember, remembered, thinned
 from tfarm.arm import AT_HUB, HubFeedback, Law
 from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling, load_chain
-from tfarm.exported.live_loop import law_data, live_data, sensor_numbers, slew_numbers
+from tfarm.exported.live_loop import live_data, sensor_numbers, slew_numbers
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.panels import MOST_MISS, loop_panels
 from tfarm.loop.sampled_verdict import sampled_verdict
@@ -38,7 +38,9 @@ data_of = remembered(live_data)
 @pytest.fixture(scope="module", params=thinned(ARMS, 2))
 def case(request):
     arm = replace(tfarm.load(request.param), name=request.param + ODD)
-    data = json.loads(json.dumps(data_of(arm, load_chain(request.param), None), allow_nan=False))
+    data = json.loads(
+        json.dumps(data_of(Case(arm, tfarm.default_gains(arm), load_chain(request.param))), allow_nan=False)
+    )
     return arm, data, Page(data)
 
 
@@ -141,7 +143,7 @@ def test_zeros_of_sensors_that_are_not_determined_have_their_reason(monkeypatch,
 
 def test_a_slew_of_too_many_samples_is_left_to_the_command():
     arm, fast = tfarm.load("sasaki2012"), Chain(sampling=Sampling(period=1e-4))
-    assert slew_numbers(arm, fast, HubFeedback(K1=0.3)) is None
+    assert slew_numbers(Case(arm, HubFeedback(K1=0.3), fast)) is None
 
 
 def policy_of(page):
@@ -215,7 +217,7 @@ LAW = Law({"hub_angle": ([0.4, 3.0], [0.02, 1.0]), "tip_displacement": ([-0.2], 
 @pytest.fixture(scope="module", params=["sasaki2012-lab", "quanser-flexlink"])
 def law_page(request):
     arm, chain = tfarm.load(request.param), load_chain(request.param)
-    return arm, chain, json.loads(json.dumps(law_data(arm, chain, LAW), allow_nan=False))
+    return arm, chain, json.loads(json.dumps(live_data(Case(arm, LAW, chain)), allow_nan=False))
 
 
 def test_only_few_rational_parts_in_s_have_sliders():

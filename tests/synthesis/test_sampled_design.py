@@ -237,7 +237,7 @@ def test_the_optimal_trial_has_the_moment_of_its_own_torque():
     trial = tuner.slew_trial(LAB, chain, signals="total", duration=1.2)
     bound = tuner.lq_bound(trial)
     task = replace(trial.task, feedforward=bound.e)
-    moved = trial.simulator(task=task).linear(HubFeedback())
+    moved = replace(trial, task=task).simulator().linear(HubFeedback())
     np.testing.assert_allclose(bound.moment, moved.at_samples.root_moment, atol=1e-9 * abs(bound.moment).max())
 
 

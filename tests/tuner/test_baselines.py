@@ -29,9 +29,23 @@ from tfarm.tuner import (
 from tfarm.tuner.baselines import quantised_chain, shaped, shaper, tried_loops
 from tfarm.tuner.tuning import usual_plan
 
+GAINS = tfarm.HubFeedback(K1=0.3, K2=1.0)
 
-def best_of(monkeypatch, cost, windows):
-    """The best constant gain of a trial with that cost, and every gain that was tried."""
+
+@pytest.mark.parametrize(
+    ("cost", "windows", "best", "off"),
+    [
+        # the lowest of two valleys is the narrower one
+        (lambda K: min((K - 0.3) ** 2, 50 * (K - 0.8) ** 2 - 0.1), [(0.0, 1.0)], 0.8, 1e-7),
+        (lambda K: (K - 1.2) ** 2, [(0.0, 0.5), (1.0, 1.5)], 1.2, 1e-7),
+        # no moment feedback is not stable
+        (lambda K: K, [(0.2, 1.0)], 0.2, 1e-5),
+        (lambda K: 2.0 + K, [(0.0, 1.0)], 0.0, 0.0),
+        (lambda K: 2.0 + K, [], 0.0, 0.0),
+    ],
+)
+def test_the_best_constant_gain_has_the_lowest_cost_of_the_stability_intervals(monkeypatch, cost, windows, best, off):
+    """Costs with a minimum in closed form; no other gain is tried, but 0 where no gain is stable."""
     tried = []
 
     def with_constant(K):
@@ -39,27 +53,11 @@ def best_of(monkeypatch, cost, windows):
         return SimpleNamespace(cost=cost(K))
 
     monkeypatch.setattr(baselines, "constant_windows", lambda loop: windows)
-    return best_constant(SimpleNamespace(loop=None, n=300, with_constant=with_constant)), tried
-
-
-def test_the_lowest_of_two_valleys_is_found_though_it_is_the_narrower(monkeypatch):
-    found, _ = best_of(monkeypatch, lambda K: min((K - 0.3) ** 2, 50 * (K - 0.8) ** 2 - 0.1), [(0.0, 1.0)])
-    assert found == (pytest.approx(0.8, abs=1e-7), pytest.approx(-0.1, rel=1e-12))
-
-
-def test_only_gains_inside_the_stability_intervals_are_tried(monkeypatch):
-    found, tried = best_of(monkeypatch, lambda K: (K - 1.2) ** 2, [(0.0, 0.5), (1.0, 1.5)])
-    assert found.gain == pytest.approx(1.2, abs=1e-7)
-    assert all(0 <= K < 0.5 or 1.0 < K < 1.5 for K in tried)
-    found, tried = best_of(monkeypatch, lambda K: K, [(0.2, 1.0)])  # no moment feedback is not stable
-    assert 0.2 < min(tried) <= found.gain == pytest.approx(0.2, abs=1e-5)
-
-
-@pytest.mark.parametrize("windows", [[(0.0, 1.0)], []])
-def test_zero_gain_is_tried_too_and_alone_where_none_is_stable(monkeypatch, windows):
-    found, tried = best_of(monkeypatch, lambda K: 2.0 + K, windows)
-    assert found == (0.0, 2.0)
+    found = best_constant(SimpleNamespace(loop=None, n=300, with_constant=with_constant))
+    assert found.gain == pytest.approx(best, abs=off)
+    assert found.cost == cost(found.gain)
     assert len(tried) > 1 or not windows
+    assert all(any(low <= K < high for low, high in windows) or not (windows or K) for K in tried)
 
 
 POLES = [0.999 * np.exp(0.3j), 0.97 * np.exp(0.71j), np.exp(1j * math.pi / 4), 0.9 * np.exp(2.04j)]
@@ -145,7 +143,7 @@ def test_the_scales_of_the_tuner_are_the_arms_own(name):
     assert 2 < torque / plan.scale < 4.5  # one digit of a third: the paper's 3 N m over its 1 N m
     cost = plan.trial(arm, chain).cost
     assert (cost.a * plan.scale**2, cost.b * plan.scale**2) == pytest.approx((1.0, 2.6))
-    conditioned = {each.name: each.arm for each in tried_loops(arm, chain)}
+    conditioned = {each.name: each.case.arm for each in tried_loops(Case(arm, GAINS, chain))}
     loads = [each.payload.mass for key, each in conditioned.items() if key.startswith("payload")]
     of_mass, wanted = (arm.payload.mass, [0.5, 1.5, 2.0]) if arm.payload.mass else (arm.own_mass, [0.06, 0.15, 0.3])
     assert loads == pytest.approx([share * of_mass for share in wanted], rel=0.05)  # two digits
@@ -157,14 +155,14 @@ def test_the_scales_of_the_tuner_are_the_arms_own(name):
 
 def test_the_papers_arm_keeps_the_papers():
     lab = tfarm.load("sasaki2012-lab")
-    names = [each.name for each in tried_loops(lab, Chain())]
+    names = [each.name for each in tried_loops(Case(lab, GAINS))]
     assert names[4:] == [
         "payload 0.1 kg", "payload 0.25 kg", "payload 0.5 kg", "hub -20%", "hub +20%", "C = 0 s", "C = 1e-05 s",
         "C = 0.001 s",
     ]  # fmt: skip
     assert names[2:4] == ["one sample of delay", "quantised, one sample of delay"]
     late = Chain(sampling=Sampling(delay_samples=0.5))
-    assert [each.name for each in tried_loops(lab, late)][2:4] == [
+    assert [each.name for each in tried_loops(Case(lab, GAINS, late))][2:4] == [
         each.replace("one", "one more") for each in names[2:4]
     ]
     converters = quantised_chain(lab, Chain()).converters
@@ -175,7 +173,7 @@ def test_the_papers_arm_keeps_the_papers():
 def test_an_arm_without_damping_is_tried_with_two_dampings_of_its_first_mode(hub, wanted):
     """0.0358 and 3.58 per cent of critical, but that C is rounded to one digit."""
     arm = tfarm.load("sasaki2012").having(hub_inertia=hub)
-    given = [each.arm for each in tried_loops(arm, Chain()) if each.name.startswith("C =")]
+    given = [each.case.arm for each in tried_loops(Case(arm, GAINS)) if each.name.startswith("C =")]
     assert [each.damping for each in given] == wanted
     ratios = [tfarm.damped_modes(tfarm.modes(each, 1)).damping_ratio[-1] for each in given]
     assert ratios == pytest.approx([3.575e-4, 3.575e-2], rel=0.1)

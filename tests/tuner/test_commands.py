@@ -117,7 +117,7 @@ def test_the_comparison_is_of_one_run():
     """On the arm as trained it repeats the tuning's costs, by the simulator; the bound bounds every unshaped row."""
     lab = tfarm.load("sasaki2012-lab")
     tuning = tune(lab, Plan(trials=40, guard="frozen"))
-    listed = [each for each in tried_loops(lab, tuning.trial.loop.chain) if "C =" not in each.name]
+    listed = [each for each in tried_loops(tuning.trial.case) if "C =" not in each.name]
     assert len(listed) == 9
     rows = compare_controllers(tuning.trial, tuning.gain(), tuning.training.guard, listed[:1] + listed[3:5])
     first = rows[0]
@@ -133,7 +133,7 @@ def test_the_comparison_is_of_one_run():
     assert first.bound.cost == pytest.approx(tuning.bound.cost, rel=1e-10)
     for kind in ("ZV", "EI"):
         assert getattr(first, kind).cost == pytest.approx(tuning.shaped[kind].cost, rel=1e-10)
-    loaded = replace(slew_trial(listed[4].arm, K1=0.3), task=tuning.trial.task)
+    loaded = replace(slew_trial(listed[4].case.arm, K1=0.3), task=tuning.trial.task)
     assert listed[4].name == "payload 0.1 kg"
     shaped_slew = replace(loaded, task=shaped_trial(tuning.trial, "ZV").task)  # by the poles of the arm it was made for
     assert rows[2].ZV.cost == pytest.approx(shaped_slew.with_constant(0.0).cost, rel=1e-10)

@@ -83,35 +83,24 @@ def test_there_and_back(tuning, tmp_path, changed):
     np.testing.assert_array_equal(result.K, tuning.training.result.K)
 
 
-def change(name, value):
-    return lambda content: content | {name: value}
-
-
+WRONG = {
+    "W1": [[[0.1] * 6] * 6, [[0.1] * 7, [0.1] * 6], []],
+    "w2": [[0.1] * 5, ["0.1"] * 6, *([0.1, 0.2, 0.3, 0.4, 0.5, each] for each in (None, math.nan, math.inf))],
+    "scales": [[1.0] * 6 + [-1.0]],
+    "guard": [[0.5, 0.2], None],
+    "guard_kind": ["none", "wide"],
+    "signals": ["both"],
+    "format": ["tfarm tuner 99"],
+    "a": [-1.0],
+    "period": [0.0],
+    "arm": ["x" * 81],
+    "extra": [1],
+}
 BROKEN = [
-    change("W1", [[0.1] * 6] * 6),
-    change("W1", [[0.1] * 7, [0.1] * 6]),
-    change("W1", []),
-    change("w2", [0.1] * 5),
-    change("w2", [0.1, 0.2, 0.3, 0.4, 0.5, None]),
-    change("w2", [0.1, 0.2, 0.3, 0.4, 0.5, float("nan")]),
-    change("w2", [0.1, 0.2, 0.3, 0.4, 0.5, float("inf")]),
-    change("w2", ["0.1"] * 6),
-    change("scales", [1.0] * 6 + [-1.0]),
-    change("guard", [0.5, 0.2]),
-    change("guard", None),
-    change("guard_kind", "none"),
-    change("guard_kind", "wide"),
-    change("signals", "both"),
-    change("format", "tfarm tuner 99"),
-    change("a", -1.0),
-    change("period", 0.0),
-    change("arm", "x" * 81),
-    change("extra", 1),
+    *(lambda content, name=name, value=value: content | {name: value} for name in WRONG for value in WRONG[name]),
     lambda content: {name: value for name, value in content.items() if name != "K1"},
     lambda content: [content],
 ]
-
-
 TEXTS = ["", "{", "null", "\x00", "[" * 100_000, '{"w2": [' + "1," * 3_000_000]
 
 

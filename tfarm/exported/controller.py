@@ -19,18 +19,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Law
-from tfarm.arm.chain import Chain
 from tfarm.arm.checks import positive
 from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import Real, Whole
+from tfarm.case import Case
 from tfarm.dsp.discretise import discretised, system_matrix
 from tfarm.dsp.kernel import DAC, estimate, law_step, quantise, rounded
 from tfarm.dsp.simulate import quantisers
 from tfarm.errors import must_be_known, require
 from tfarm.exact.compiled import compiled, inlined
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.exported.result import Export, ExportTask, Name, is_certified, names_of
+from tfarm.exported.result import Export, ExportTask, Name, names_of
 from tfarm.exported.texts import facts_of, identifiers, literal, name_in_c, render
 from tfarm.exported.word_length import (
     ANGLE,
@@ -46,7 +46,6 @@ from tfarm.exported.word_length import (
     with_system_matrix,
     word_of,
 )
-from tfarm.loop.sampled_verdict import Analysis, sampled
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 
@@ -157,15 +156,19 @@ class Controller:
 
 
 def c_controller(task: ExportTask) -> Export:
-    """The files of a controller in C99, and its finite word length."""
-    exact = task.analysis(task.law)
-    law, name, gains = least_noise(in_z(task.law, task.chain), exact.verdict.loop)
+    """The files of a controller in C99, and its finite word length.
+
+    Raises ParameterError where the loop with the coefficients as exported is not certified stable, unless `anyway`.
+    """
+    law = in_z(task.case)
+    law, name, gains = least_noise(law, task.analysis(task.case).verdict.loop)
     controller = controller_of(law, task)
     word = controller.word
-    found = judged(task, word)
+    case = task.case.under(word.rounded)
+    found = task.judged(case, "precision", task.precision, f"rounded to {task.precision} the loop", "take more digits")
     details = word_length(controller, name, gains, word.limit_cycle(found.verdict.loop))
     bounds = dict(facts_of(details)) | ({} if details.samples else {"samples of these bounds": "all"})
-    contents, names = source_files(task, controller, [*task.facts(word.rounded, found).items()], [*bounds.items()])
+    contents, names = source_files(task, controller, [*task.facts(case, found).items()], [*bounds.items()])
     return task.exported(contents, names, found.verdict.sentence, details)
 
 
@@ -213,22 +216,24 @@ def source_files(
     return {file: render(file, **values) for file in FILES}, names_of(name, signals, references)
 
 
-def in_z(law: Law, chain: Chain) -> Law:
-    """The law in z of one state space.
+def in_z(case: Case) -> Law:
+    """The law of a case in z, of one state space.
 
     Raises ParameterError for a delay of its own that is no whole number of samples.
     """
-    samples = law.delay / chain.sampling.period
+    law, period = case.law, case.chain.sampling.period
+    samples = law.delay / period
     remedy = f"is {samples:.6g} samples: C code has a delay of whole samples; write another one into the law's states"
     # but for the rounding of a delay
     require(abs(samples - round(samples)) <= 1e-9, "law.delay", law.delay, remedy)
-    law = discretised(law, chain.sampling.period)
+    law = discretised(law, period)
     return with_system_matrix(law, system_matrix(law))
 
 
 def controller_of(law: Law, task: ExportTask) -> Controller:
     """A realised law in the numbers of a task.  Raises ParameterError as `word_of` does."""
-    of, T, dac = task.chain.converters, task.chain.sampling.period, quantisers(task.chain)[DAC]
+    chain = task.case.chain
+    of, T, dac = chain.converters, chain.sampling.period, quantisers(chain)[DAC]
     is_estimated = of.hub_rate == "difference" and RATE in law.signals
     remedy = 'with q31 the hub rate is an input, or the law reads hub_angle: set converters.hub_rate = "ideal"'
     require(not (is_estimated and task.precision == FIXED), "converters.hub_rate", of.hub_rate, remedy)
@@ -248,17 +253,6 @@ def controller_of(law: Law, task: ExportTask) -> Controller:
     remedy = f"q31 has steps of a DAC that are a power of 2 of its own: output={limit!r}, or this times a power of 2"
     require(task.precision != FIXED or steps.is_integer(), "range.output", word.output, remedy)
     return Controller(word, signals, references, ranges, dac, round(law.delay / T), hub)
-
-
-def judged(task: ExportTask, word: Word) -> Analysis:
-    """The sampled loop with the coefficients as exported.
-
-    Raises ParameterError where it is not certified stable, unless it is exported anyway.
-    """
-    found = sampled(task.arm, word.rounded, task.chain)
-    remedy = f"rounded to {task.precision} the loop is not certified stable: {found.verdict.sentence}; take more digits"
-    require(task.anyway or is_certified(found), "precision", task.precision, remedy)
-    return found
 
 
 # ------------------------------------------------------------ its arithmetic, that of C and of a simulation
@@ -329,7 +323,8 @@ def run_fixed(table: Any, shifts: Any, plan: Any, inputs: Any, dac: Any, outputs
 def values_of(task: ExportTask, controller: Controller, ports: Sequence[Port]) -> dict[str, Any]:
     """The values of the templates, but for name and facts."""
     word, is_fixed, (real, suffix, largest) = controller.word, task.precision == FIXED, REAL[task.precision]
-    dac, unit = controller.whole_dac if is_fixed else controller.dac, task.arm.input_unit
+    arm = task.case.arm
+    dac, unit = controller.whole_dac if is_fixed else controller.dac, arm.input_unit
     cast, zero = ("(int64_t)", "") if is_fixed else ("", f"0.0{suffix}")
     known = [*(f"{cast}input->{each.identifier}" for each in ports), f"({real})rate", zero]
     return {
@@ -342,8 +337,8 @@ def values_of(task: ExportTask, controller: Controller, ports: Sequence[Port]) -
         "converter": bool(np.isfinite(dac).all()), "delay": controller.delay, "step": dac.tolist()[0],
         "dac": [literal(each, "") for each in dac.tolist()], "statuses": statuses(controller),
         "hub": controller.hub and (ports[controller.signals.index(ANGLE)].identifier, *map(float.hex, controller.hub)),
-        "output": f"{task.arm.input} over {word.output!r} {unit}" if is_fixed else f"{task.arm.input} [{unit}]",
-        "period": repr(task.chain.sampling.period),
+        "output": f"{arm.input} over {word.output!r} {unit}" if is_fixed else f"{arm.input} [{unit}]",
+        "period": repr(task.case.chain.sampling.period),
     }  # fmt: skip
 
 
@@ -366,7 +361,7 @@ def ports_of(task: ExportTask, controller: Controller, *known: dict[str, str]) -
             size = ranges.get(name, 1.0)
             text = f"{title}{name} [{OUTPUTS[name.partition('@')[0]].unit}]{steps * (name == ANGLE)}{over(size)}"
             found.append(Port(own, text, size))
-    text = f"{FEEDFORWARD} [{task.arm.input_unit}]{over(word.output)}"
+    text = f"{FEEDFORWARD} [{task.case.arm.input_unit}]{over(word.output)}"
     return [*found, Port(FEEDFORWARD, text, word.feedforward)]
 
 

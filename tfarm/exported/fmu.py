@@ -25,7 +25,6 @@ from tfarm.arm import Law
 from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex, Real
-from tfarm.case import Case
 from tfarm.dsp import Simulator, scenario
 from tfarm.dsp.plant import MODES_USED, RECORDED
 from tfarm.dsp.results import simulated
@@ -120,8 +119,8 @@ def fmu(task: ExportTask) -> Export:
     prepared, has_plant, name = prepared_simulator(task), task.what != "controller", task.name or task.what
     variables, own = variables_of(task.what, prepared), identifiers([name], "fmu_")
     law = None if task.what == "plant" else law_code(task, prepared.law, variables)
-    verdict, period = law.verdict if law else "", repr(float(task.chain.sampling.period))
-    about = f"{task.what} of {task.arm.name}, sampled every {period} s{verdict and f': {verdict}'}"
+    verdict, period = law.verdict if law else "", repr(float(task.case.chain.sampling.period))
+    about = f"{task.what} of {task.case.arm.name}, sampled every {period} s{verdict and f': {verdict}'}"
     modes = prepared.plant.count if has_plant else None
     guid = hashlib.sha256(repr((task.sha256, name, about, modes, variables, version("tfarm"))).encode()).hexdigest()
     head: dict[str, Any] = {"variables": variables, "has_plant": has_plant, "period": period, "about": about}
@@ -142,13 +141,13 @@ def law_code(task: ExportTask, law: Law, variables: Sequence[Variable]) -> LawCo
     """
     remedy = "a functional mock-up unit has a controller in double or float; take c for fixed point"
     require(task.precision != FIXED, "precision", task.precision, remedy)
-    is_loop, is_single = task.what == "loop", task.chain.converters.is_single
-    task = replace(task, precision="float" if is_single else task.precision)
-    controller = controller_of(in_z(replace(law, delay=0.0) if is_loop else law, task.chain), task)
+    task = replace(task, precision="float" if task.case.chain.converters.is_single else task.precision)
+    acting = replace(law, delay=0.0) if task.what == "loop" else law
+    controller = controller_of(in_z(task.case.under(acting)), task)
     controller = replace(controller, hub=None, signals=law.signals, dac=np.array([0.0, -np.inf, np.inf]))
-    rounded = replace(controller.word.rounded, delay=task.law.delay)
-    found = task.analysis(rounded)
-    files, (first, *_) = source_files(task, controller, [*task.facts(rounded, found).items()])
+    case = task.case.under(replace(controller.word.rounded, delay=task.case.law.delay))
+    found = task.analysis(case)
+    files, (first, *_) = source_files(task, controller, [*task.facts(case, found).items()])
     place: dict[str, str] = {}
     for of, array in (("output", "out"), ("input", "in")):
         names = [each.name for each in variables if each.causality == of]
@@ -165,7 +164,7 @@ def prepared_simulator(task: ExportTask) -> Simulator:
 
     A plant alone has no delay of the law.
     """
-    case = Case(task.arm, replace(task.law, delay=0.0) if task.what == "plant" else task.law, task.chain)
+    case = task.case.under(replace(task.case.law, delay=0.0)) if task.what == "plant" else task.case
     try:
         run = scenario("slew", case.arm, case.chain, TRIAL_DURATION)
     except ParameterError:  # an arm that cannot turn

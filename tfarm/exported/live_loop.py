@@ -13,20 +13,9 @@ from typing import Any, cast, get_args
 
 import numpy as np
 
-from tfarm.arm import (
-    ANGLE_GAIN,
-    FED_BACK,
-    GAINS,
-    MOMENT_GAIN,
-    PLANE,
-    AnyLaw,
-    Arm,
-    HubFeedback,
-    Law,
-    as_law,
-    unit_of,
-)
+from tfarm.arm import FED_BACK, MOMENT_GAIN, NAMES, PLANE, Arm, HubFeedback, Law, unit_of
 from tfarm.arm.blocks import Rational
+from tfarm.arm.feedback import OUTPUT_OF
 from tfarm.arm.stages import Consumer
 from tfarm.arm.writing import law_toml
 from tfarm.arrays import Complex
@@ -52,7 +41,7 @@ from tfarm.loop.circle_crossings import GainMap
 from tfarm.loop.continuous import ContinuousLoop, steep_places
 from tfarm.loop.edges import LONGEST_DELAY_SAMPLES
 from tfarm.loop.panels import Sensor, loop_panels, positions, sensed_places
-from tfarm.loop.plane import Plane, gain_map, moment_axis, rate_axis, rate_columns
+from tfarm.loop.plane import Axis, Plane, gain_map, moment_axis, rate_axis, rate_columns
 from tfarm.loop.sampled import Sampled
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import band_of_family, stability
@@ -82,60 +71,64 @@ def packed(values: Any) -> str:
 # ------------------------------------------------------------ of gains at the hub, and of a law of rational parts
 
 
-def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> LiveNumbers:
-    """Return all numbers of a loop of gains at the hub.  `law` is where the page begins, else the default gains.
+def live_data(case: Case) -> LiveNumbers:
+    """Return all numbers of the page of a loop, which begins with the law of the case.
 
-    Raises what `gain_map` and `loop_panels` raise.
+    That of gains at the hub has their plane and the slew.  That of a law of rational parts varies the gain of each.
+    Raises ParameterError for other laws, and what `gain_map` and `loop_panels` raise.
     """
+    return _of_parts(case) if case.gains is None else _of_gains(case, case.gains)
+
+
+def _of_gains(case: Case, start: HubFeedback) -> LiveNumbers:
+    """Return the numbers of the page of gains at the hub."""
+    arm = case.arm
     x = rate_axis(arm)
     y = moment_axis(arm, x)
-    axes: dict[str, LiveNumbers] = {
-        name: {"low": axis.low, "high": axis.high, "linear": None if axis.is_linear else axis.linear}
-        for name, axis in zip(PLANE, (x, y), strict=True)
-    }
     stiffest = 0.1 * angle_unit(arm)
-    axes[ANGLE_GAIN] = {"low": 0.0, "high": stiffest, "linear": 1e-4 * stiffest}
+    axes = dict(zip(NAMES, (*map(_range, (x, y)), _range(Axis(0.0, stiffest, 1e-4 * stiffest))), strict=True))
     ends = product(*((of["low"], of["high"]) for of in axes.values()))
-    corners = [as_law(HubFeedback(**dict(zip(axes, each, strict=True)))) for each in ends]
+    corners = [case.under(HubFeedback(**dict(zip(NAMES, each, strict=True)))) for each in ends]
     reference = default_gains(arm)
-    start = law or reference
     across = np.unique(np.r_[rate_columns(arm, x, LIVE_COLUMNS), x.high])
     continuous = gain_map(arm, across, np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE]))
-    sampled = sampled_region(arm, x, y, chain)
+    sampled = sampled_region(arm, x, y, case.chain)
     return {
-        **_of_any_law(arm, chain, corners, reference),
-        "names": ["K1", "K2", "Kp"],
+        **_of_any_law(case.under(reference), corners),
+        "names": NAMES,
         "labels": {"K1": "hub rate", "K2": "root moment", "Kp": "hub angle"},
         "plane": PLANE,
         # of each gain a part of the samples, and the power of s on it
         "rows": [[1, 1], [2, 2], [1, 0]],
         "of_law": None,
-        "units": {gain.name: unit_of(gain.name, arm) for gain in GAINS},
+        "units": {name: unit_of(name, arm) for name in NAMES},
         "axes": axes,
-        "start": {gain.name: start[gain.name] for gain in GAINS},
+        "start": start.by_name,
         "reference": {name: reference[name] for name in PLANE},
         "continuous": _areas(continuous),
         "sampled_map": None if sampled is None else _sampled_map(sampled),
         "sampled_loop": None if sampled is None else sampled_numbers(sampled.loop),
-        "slew": slew_numbers(arm, chain, start),
+        "slew": slew_numbers(case),
         "lyapunov": arm.is_uniform,
-        "default": {gain.name: reference[gain.name] for gain in GAINS},
-        "outputs": {gain.name: gain.output for gain in GAINS},
+        "default": reference.by_name,
+        "outputs": OUTPUT_OF,
     }
 
 
-def law_data(arm: Arm, chain: Chain, law: Law, reach: float = 10.0) -> LiveNumbers:
-    """Return the same for a law of rational parts: the gain of each part is a number of the page.
+def _range(axis: Axis) -> LiveNumbers:
+    """Return the range of a gain."""
+    return {"low": axis.low, "high": axis.high, "linear": None if axis.is_linear else axis.linear}
 
-    `reach` is the range of each gain, up and down.  The slew is of gains at the hub alone.  Raises ParameterError for
-    other laws.
-    """
+
+def _of_parts(case: Case) -> LiveNumbers:
+    """Return the numbers of the page of a law of rational parts: each gain from a tenth to ten times its value."""
+    law = case.law
     gains = {name: value for name, (_, value) in law.part_gains.items()}
-    corners = [law.weighted(each) for each in product((1 / reach, reach), repeat=len(gains))]
+    corners = [case.under(law.weighted(each)) for each in product((0.1, 10.0), repeat=len(gains))]
     unit = law.weighted([1.0 / value for value in gains.values()])
     blocks = zip(gains, unit.signals, _blocks(unit), strict=True)
     return {
-        **_of_any_law(arm, chain, corners, law, unit),
+        **_of_any_law(case, corners, unit),
         "names": list(gains),
         "labels": {name: "" if name in law.signals else "factor" for name in gains},
         "plane": list(gains)[:2] if len(gains) > 1 else None,
@@ -146,38 +139,39 @@ def law_data(arm: Arm, chain: Chain, law: Law, reach: float = 10.0) -> LiveNumbe
         },
         "units": dict.fromkeys(gains, "1"),
         # without 0, at which poles may join those at s = 0
-        "axes": {name: _slider(value, reach) for name, value in gains.items()},
+        "axes": {name: _around(value) for name, value in gains.items()},
         "start": gains,
         "reference": gains,
         **dict.fromkeys(("continuous", "sampled_map", "slew", "lyapunov", "default", "outputs")),
-        "sampled_loop": law_in_page(sampled_verdict(Case(arm, law, chain)).full, list(gains)),
+        "sampled_loop": _in_page(case, unit),
     }
 
 
-def _slider(value: float, reach: float) -> LiveNumbers:
-    low, high = sorted((value / reach, value * reach))
-    return {"low": low, "high": high, "linear": abs(value) / reach}
+def _around(value: float) -> LiveNumbers:
+    """Return the range of a gain around its value."""
+    low, high = sorted((value / 10, value * 10))
+    return _range(Axis(low, high, abs(value) / 10))
 
 
 def _blocks(law: Law) -> list[Rational]:
     return [cast(Rational, part.block) for part in law.parts]
 
 
-def _of_any_law(arm: Arm, chain: Chain, corners: Sequence[Law], law: AnyLaw, unit: Law | None = None) -> LiveNumbers:
-    """Return what every page has: `corners` of its gains, `law` its reference, `unit` one with gains of 1.
+def _of_any_law(case: Case, corners: Sequence[Case], unit: Law | None = None) -> LiveNumbers:
+    """Return what every page has: `case` is its reference, `corners` are of its gains, `unit` the law with gains of 1.
 
     Gains at the hub have no `unit`.
     """
-    samples, is_quiet = _samples(arm, corners, unit)
+    arm, period = case.arm, case.chain.sampling.period
+    samples, is_quiet = _samples(case, corners, unit)
     return {
         **sensor_numbers(arm),
-        "period": chain.sampling.period,
-        "longest_delay": LONGEST_DELAY_SAMPLES * chain.sampling.period,
+        "period": period,
+        "longest_delay": LONGEST_DELAY_SAMPLES * period,
         "limits": {"gain": GAIN_LIMITS, "phase": PHASE_LIMITS, "periods": PERIOD_LIMITS, "peak": PEAK_LIMITS},
         **samples,
         **_known(arm, is_quiet, unit is None),
-        "reference_count": stability(Case(arm, law), samples["band"]).unstable_roots,
-        "graded": _graded(arm, corners, chain, law, unit) if arm.has_elastic_link else None,
+        "graded": _graded(case, corners, unit) if arm.has_elastic_link else None,
         "margin_names": dict(zip(("up", "down", "phase", "delay", "peak"), GRADED.values(), strict=True)),
     }
 
@@ -185,15 +179,15 @@ def _of_any_law(arm: Arm, chain: Chain, corners: Sequence[Law], law: AnyLaw, uni
 # ------------------------------------------------------------ in continuous time
 
 
-def _samples(arm: Arm, corners: Sequence[Law], law: Law | None = None) -> tuple[LiveNumbers, bool]:
-    """Return samples of the loop's parts in the band of these laws, and whether small gain holds beyond it.
+def _samples(case: Case, corners: Sequence[Case], unit: Law | None) -> tuple[LiveNumbers, bool]:
+    """Return samples of the loop's parts in the band of these cases, and whether small gain holds beyond it.
 
-    They are those of hub angle and gauge, or of each part of `law`, whose poles and zeros are steep places too.
+    They are those of hub angle and gauge, or of each part of `unit`, whose poles and zeros are steep places too.
     """
-    band, is_quiet = band_of_family(ContinuousLoop(Case(arm, each)) for each in corners)
-    samples = loop_panels(arm, band, None if law is None else ContinuousLoop(Case(arm, law)))
-    blocks = [] if law is None else _blocks(law)
-    own = [abs(s) for block in blocks for s in (*block.poles, *block.zeros) if s]
+    arm = case.arm
+    band, is_quiet = band_of_family(map(ContinuousLoop, corners))
+    samples = loop_panels(arm, band, None if unit is None else ContinuousLoop(case.under(unit)))
+    own = [abs(s) for block in _blocks(unit) for s in (*block.poles, *block.zeros) if s] if unit else []
     return {
         # by panel, part and point
         "samples": packed(samples.values.transpose(1, 0, 2)),
@@ -203,21 +197,16 @@ def _samples(arm: Arm, corners: Sequence[Law], law: Law | None = None) -> tuple[
         "error": float(f"{samples.error:.0e}"),
         "places": np.unique(np.r_[steep_places(arm, 1.05 * samples.band), own]).tolist(),
         "band": samples.band,
+        "reference_count": stability(case, samples.band).unstable_roots,
     }, is_quiet
 
 
-def _graded(arm: Arm, corners: Sequence[Law], chain: Chain, law: AnyLaw, unit: Law | None) -> LiveNumbers:
+def _graded(case: Case, corners: Sequence[Case], unit: Law | None) -> LiveNumbers:
     """Return the loop with whose damping an undamped arm is graded, and the words for that: `tfarm.assessment.card`."""
-    C = reference_damping(arm)
-    damped = arm.having(damping=C)
-    sampled = sampled_verdict(Case(damped, law, chain)).full
-    samples, _ = _samples(damped, corners, unit)
-    return samples | {
-        "kind": "band",
-        "reference_count": stability(Case(damped, law), samples["band"]).unstable_roots,
-        "sampled_loop": sampled_numbers(sampled) if unit is None else law_in_page(sampled, list(unit.part_gains)),
-        "words": UNDAMPED.format(C),
-    }
+    C = reference_damping(case.arm)
+    damped = case.arm.having(damping=C)
+    samples, _ = _samples(case.on(damped), [each.on(damped) for each in corners], unit)
+    return samples | {"kind": "band", "sampled_loop": _in_page(case.on(damped), unit), "words": UNDAMPED.format(C)}
 
 
 def _known(arm: Arm, is_quiet: bool, are_gains: bool) -> LiveNumbers:
@@ -284,6 +273,12 @@ def sampled_numbers(loop: Sampled) -> LiveNumbers:
     return {**_sampling(loop.chain), **_plant(folded), "states": _orders(plant)[0], "modes": plant.count}
 
 
+def _in_page(case: Case, unit: Law | None) -> LiveNumbers:
+    """Return the sampled loop of a case, of gains at the hub or of the parts of `unit`."""
+    loop = sampled_verdict(case).full
+    return sampled_numbers(loop) if unit is None else law_in_page(loop, list(unit.part_gains))
+
+
 def law_in_page(loop: Sampled, names: Sequence[str]) -> LiveNumbers:
     """Return the sampled loop of a law: `columns` are its parts by name, in delta = z - 1; `ones` poles at z = 1."""
     plant = loop.pulse.plant
@@ -336,26 +331,26 @@ def _pairs(values: Complex) -> list[list[float]]:
 # ------------------------------------------------------------ in time
 
 
-def slew_numbers(arm: Arm, chain: Chain, law: HubFeedback, most: int = 5000) -> LiveNumbers | None:
-    """Return the slew of the chain for three times as long as it takes, with the modes that it takes under `law`.
+def slew_numbers(case: Case) -> LiveNumbers | None:
+    """Return the slew of the chain for three times as long as it takes, with the modes that it takes under the gains.
 
-    None where there is no such slew, and of one of more than `most` samples, 160 kB of references: it is left to
+    None where there is no such slew, and of one of more than 5000 samples, 160 kB of references: it is left to
     `tfarm simulate`.
     """
+    arm, chain = case.arm, case.chain
     try:
         task = scenario("slew", arm, chain, traces.RECORD_LENGTH * chain.slew.rise_time)
-        if task.t.size > most:
+        if task.t.size > 5000:
             return None
-        case = Case(arm, law, chain)
-        ideal_case = case.through(ideal_chain(chain))
-        count = enough_modes(lambda number: Simulator(ideal_case, task, count=number).run()).modes
+        ideal = case.through(ideal_chain(chain))
+        count = enough_modes(lambda number: Simulator(ideal, task, count=number).run()).modes
         plant = _upper(Simulator(case, task, count=count).plant)
-        ideal = np.c_[task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference, task.rigid_moment]
+        signals = task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference, task.rigid_moment
         return {
             **_sampling(chain),
             **_plant(plant),
             **_shapes(arm, plant),
-            "ideal": packed(ideal),
+            "ideal": packed(np.stack(signals, axis=1)),
             "converters": [[x if math.isfinite(x) else None for x in row] for row in quantisers(chain).tolist()],
             "single": chain.converters.is_single,
             "bound": FOLDED_UP * arm.bending_scale,

@@ -13,13 +13,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, get_args
 
-from tfarm.arm import AnyLaw, Arm, Law, arm_and_law, as_law, must_be_arm
-from tfarm.arm.chain import chain_or_usual, file_text
+from tfarm.arm import AnyLaw, Arm
+from tfarm.arm.chain import file_text
 from tfarm.assessment.card import loop_card
 from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.dsp.stages import admit
-from tfarm.errors import ConvergenceError, ParameterError, must_be_known, require
+from tfarm.errors import ConvergenceError, must_be_known, require
 from tfarm.exported.texts import facts_of
 from tfarm.files import move_into, place_in
 from tfarm.loop.sampled_verdict import Analysis, sampled
@@ -42,15 +42,13 @@ class Name(NamedTuple):
 
 @frozen(kw_only=True)
 class ExportTask:
-    """What to export, and how: an arm, a law (by default the default gains), and the chain of its sampled loop.
+    """What to export, and how: an arm, a controller, by default the default gains, and the chain of its sampled loop.
 
     `ranges` are the largest absolute values of signals, feedforward and output by name, in SI units.  `tuned` is the
     file of a trained tuner.  `anyway`: also a loop that is not certified stable.
     """
 
-    arm: Arm
-    given: AnyLaw | None
-    chain: Chain
+    case: Case
     what: What
     form: Form
     tuned: Path | None = None
@@ -58,31 +56,33 @@ class ExportTask:
     ranges: Mapping[str, float] = field(default_factory=dict)
     name: str = ""
     anyway: bool = False
-
-    @cached_property
-    def law(self) -> Law:
-        """The law as given; the default gains without one."""
-        return as_law(default_gains(self.arm) if self.given is None else self.given)
+    is_default: bool = False
 
     @cached_property
     def sha256(self) -> str:
-        """SHA-256 of arm, chain, law and tuner."""
-        law = None if self.given is None else asdict(self.law)
+        """SHA-256 of arm, chain, law (none of default gains) and tuner."""
+        law = None if self.is_default else asdict(self.case.law)
         tuned = "" if self.tuned is None else self.tuned.read_text(encoding="utf-8")
-        text = json.dumps([file_text(self.arm, self.chain), law, tuned], sort_keys=True, default=lambda a: a.tolist())
+        inputs = [file_text(self.case.arm, self.case.chain), law, tuned]
+        text = json.dumps(inputs, sort_keys=True, default=lambda a: a.tolist())
         return hashlib.sha256(text.encode()).hexdigest()
 
-    def analysis(self, law: AnyLaw) -> Analysis:
-        """The sampled loop of a law, in most cases the given one as its numbers are rounded in the files.
+    def analysis(self, case: Case) -> Analysis:
+        """The sampled loop of a case, in most cases that of the task with its numbers as they are rounded in the files.
 
         Code in C has a realisation of its own, whose rounded numbers are judged once it is chosen: here the law is in
         float64.  Raises ParameterError for a loop that is not certified stable, unless `anyway`.
         """
-        exact = replace(self.chain, converters=replace(self.chain.converters, arithmetic="float64"))
-        found = sampled(self.arm, law, exact if self.form == "c" else self.chain)
-        if not (self.anyway or is_certified(found)):
-            remedy = f"the sampled loop is not certified stable: {found.verdict.sentence}; --anyway exports it"
-            raise ParameterError(key="law", value=self.law.name, remedy=remedy)
+        if self.form == "c":
+            converters = replace(case.chain.converters, arithmetic="float64")
+            case = case.through(replace(case.chain, converters=converters))
+        return self.judged(case, "law", self.case.law.name, "the sampled loop", "--anyway exports it")
+
+    def judged(self, case: Case, key: str, value: str, loop: str, remedy: str) -> Analysis:
+        """The sampled loop of a case.  Raises ParameterError where it is not certified stable, unless `anyway`."""
+        found = sampled(case.arm, case.law, case.chain)
+        words = f"{loop} is not certified stable: {found.verdict.sentence}; {remedy}"
+        require(self.anyway or is_certified(found), key, value, words)
         return found
 
     def exported(
@@ -92,17 +92,18 @@ class ExportTask:
         own = {"what": self.what, "form": self.form, "sha256": self.sha256}
         return Export(contents=contents, names=names, verdict=verdict, details=details, **own)
 
-    def facts(self, law: AnyLaw, found: Analysis) -> dict[str, str]:
+    def facts(self, case: Case, found: Analysis) -> dict[str, str]:
         """The facts that a file begins with, by label: arm, law, stability and margins of the sampled loop, version."""
+        sampling = self.case.chain.sampling
         shown = {}
         with suppress(ConvergenceError):
-            shown = dict(facts_of(loop_card("sampled", Case(self.arm, law, self.chain), found)))
+            shown = dict(facts_of(loop_card("sampled", case, found)))
         return {
-            "arm": self.arm.name,
-            "controller": self.law.name,
+            "arm": self.case.arm.name,
+            "controller": self.case.law.name,
             **({} if is_certified(found) else {"warning": ANYWAY}),
-            "sampling period [s]": repr(self.chain.sampling.period),
-            "delay beyond this code [samples]": repr(self.chain.sampling.delay_samples),
+            "sampling period [s]": repr(sampling.period),
+            "delay beyond this code [samples]": repr(sampling.delay_samples),
             **shown,
             "SHA-256 of the inputs": self.sha256,
             "tfarm": version("tfarm"),
@@ -125,9 +126,9 @@ class Export:
     form: Annotated[str, Quantity("form", help="c, fmu, mat or py")]
     contents: Mapping[str, bytes] = field(repr=False)
     names: Annotated[list[Name], Quantity("names", help="identifiers of names in the exported files")]
-    verdict: Annotated[str, Quantity("stability", help="stability of the loop as exported, with its certainty")] = ""
-    details: Annotated[Any, Quantity(flat=True, help="numbers of the form of the export")] = None
-    sha256: Annotated[str, Quantity("SHA-256 of the inputs", help="hash of arm, chain, law and tuner")] = ""
+    verdict: Annotated[str, Quantity("stability", help="stability of the loop as exported, with its certainty")]
+    details: Annotated[Any, Quantity(flat=True, help="numbers of the form of the export")]
+    sha256: Annotated[str, Quantity("SHA-256 of the inputs", help="hash of arm, chain, law and tuner")]
 
     @property
     def files(self) -> Annotated[tuple[str, ...], Quantity("files", help="names of the written files")]:
@@ -212,24 +213,28 @@ def export(
     ParameterError
         For a loop that is not certified stable (unless `anyway`), and where the target does not have what it needs.
     """
-    must_be_arm(arm)
+    case = Case(arm, default_gains(arm) if law is None else law, chain)
     for key, value, known in (("what", what, What), ("as", form, Form), ("precision", precision, Precision)):
         must_be_known(key, value, get_args(known))
-    if (what, form) not in WRITERS:
-        forms = ", ".join(each for of, each in WRITERS if of == what)
-        raise ParameterError(key="as", value=form, remedy=f"a {what} is exported as: {forms}")
-    chain = chain_or_usual(chain)
+    forms = ", ".join(each for of, each in WRITERS if of == what)
+    require((what, form) in WRITERS, "as", form, f"a {what} is exported as: {forms}")
     module, _, function = WRITERS[what, form].partition(":")
     writer = import_module(f"tfarm.exported.{module}")
-    admit(writer.CONSUMER, arm, chain)
+    admit(writer.CONSUMER, case.arm, case.chain)
     remedy = f"the code is in {precision}: take precision float, or leave this key out"
-    is_other = form == "c" and chain.converters.is_single and precision != "float"
+    is_other = form == "c" and case.chain.converters.is_single and precision != "float"
     require(not is_other, "converters.arithmetic", "float32", remedy)
     task = ExportTask(
-        arm=arm if law is None else arm_and_law(arm, law)[0], given=law, chain=chain,
-        what=what, form=form, tuned=None if tuned is None else Path(tuned), precision=precision,
-        ranges=dict(ranges or {}), name=name, anyway=anyway,
-    )  # fmt: skip
+        case=case,
+        what=what,
+        form=form,
+        tuned=None if tuned is None else Path(tuned),
+        precision=precision,
+        ranges=dict(ranges or {}),
+        name=name,
+        anyway=anyway,
+        is_default=law is None,
+    )
     found: Export = getattr(writer, function)(task)
     write_into(Path(folder), found.contents)
     return found

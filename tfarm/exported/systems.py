@@ -21,21 +21,20 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import block_diag
 
-from tfarm.arm import Arm, Law, arm_and_law
+from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices, StateSpace
 from tfarm.arm.law import REFERENCE, Part
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex
 from tfarm.case import Case
-from tfarm.dsp import Chain
 from tfarm.dsp.discretise import acting_law, with_estimate
 from tfarm.dsp.plant import USUAL_MODES, PulseTransfer, driven, sensed_plant
 from tfarm.dsp.stages import not_covered
 from tfarm.errors import require
 from tfarm.exported.result import Export, ExportTask, names_of
 from tfarm.exported.texts import comment, matlab_text, render
+from tfarm.exported.word_length import closed
 from tfarm.files import is_standard_output, mat_content, write_file
 from tfarm.records import frozen
 from tfarm.reduced import BAND, ReducedModel, modal_model, reduce
@@ -79,15 +78,16 @@ class NamedSystem:
 # ------------------------------------------------------------ controller and sampled loop
 
 
-def controller_system(arm: Arm, law: Law, chain: Chain) -> NamedSystem:
+def controller_system(case: Case) -> NamedSystem:
     """Return the controller in z, from its signals and then their references to its share of the input."""
-    acting, _ = acting_law(Case(arm, law, chain))
+    acting, _ = acting_law(case)
     parts = tuple(_with_references(part, acting.references) for part in acting.parts)
-    acting = with_estimate(replace(acting, parts=parts, references=()), chain)
+    acting = with_estimate(replace(acting, parts=parts, references=()), case.chain)
     columns = (*acting.signals, *acting.wanted)
     a, b, c, d = acting.matrices(columns)
     states = tuple(f"controller{n + 1}" for n in range(len(a)))
-    return NamedSystem(law.name, (a, b, 0.0 - c, 0.0 - d), columns, (arm.input,), states, chain.sampling.period)
+    period = case.chain.sampling.period
+    return NamedSystem(case.law.name, (a, b, 0.0 - c, 0.0 - d), columns, (case.arm.input,), states, period)
 
 
 def _with_references(part: Part, references: tuple[str, ...]) -> Part:
@@ -98,15 +98,16 @@ def _with_references(part: Part, references: tuple[str, ...]) -> Part:
     return Part((*part.signals, *names), StateSpace(A, np.c_[B, -B[:, at]], C, np.c_[D, -D[:, at]]))
 
 
-def plant_system(arm: Arm, law: Law, chain: Chain) -> NamedSystem:
+def plant_system(case: Case) -> NamedSystem:
     """Return the sampled plant from its input to the signals of the law and the tip, exact for its modal model."""
-    acting, late = acting_law(Case(arm, law, chain))
-    signals = with_estimate(acting, chain).signals
-    sensed = sensed_plant(arm, late, list(dict.fromkeys((*signals, "tip_displacement"))), USUAL_MODES)
+    acting, late = acting_law(case)
+    signals = with_estimate(acting, late).signals
+    sensed = sensed_plant(case.arm, late, list(dict.fromkeys((*signals, "tip_displacement"))), USUAL_MODES)
     A, B, C = PulseTransfer(sensed.together, late.sampling).folded().matrices()
-    matrices, states = (A, B[:, None], C, np.zeros((len(C), 1))), tuple(f"plant{n + 1}" for n in range(len(A)))
-    name = f"{arm.name}, sampled"
-    return NamedSystem(name, matrices, (arm.input,), sensed.read.names, states, chain.sampling.period)
+    matrices = A, B[:, None], C, np.zeros((len(C), 1))
+    states = tuple(f"plant{n + 1}" for n in range(len(A)))
+    name = f"{case.arm.name}, sampled"
+    return NamedSystem(name, matrices, (case.arm.input,), sensed.read.names, states, late.sampling.period)
 
 
 def loop_system(plant: NamedSystem, controller: NamedSystem) -> NamedSystem:
@@ -116,13 +117,13 @@ def loop_system(plant: NamedSystem, controller: NamedSystem) -> NamedSystem:
     """
     (A, B, C, _), (a, b, c, d) = plant.matrices, controller.matrices
     n = sum(not name.startswith(REFERENCE) for name in controller.inputs)
-    # outputs and input by the states of both, and the input by feedforward and references
-    y, u = np.pad(C, ((0, 0), (0, len(a)))), np.c_[d[:, :n] @ C[:n], c]
-    through = np.c_[np.ones((1, 1)), d[:, n:]]
+    matrix, _, u = closed(A, B, C[:n], a, b[:, :n], c, d[:, :n])
+    # the input by feedforward and references
+    through = np.c_[1.0, d[:, n:]]
     matrices = (
-        block_diag(A, a) + np.r_[B @ u, b[:, :n] @ y[:n]],
+        matrix,
         np.r_[B @ through, np.pad(b[:, n:], ((0, 0), (1, 0)))],
-        np.r_[y, u],
+        np.r_[np.pad(C, ((0, 0), (0, len(a)))), u],
         np.pad(through, ((len(C), 0), (0, 0))),
     )
     return NamedSystem(
@@ -190,22 +191,28 @@ class Linear(NamedTuple):
 
 def linear(task: ExportTask) -> Linear:
     """Return the systems of a task.  Raises ParameterError for a loop that is not certified stable."""
-    law, chain, what = task.law, task.chain, task.what
-    arm, _ = arm_and_law(task.arm, law)
-    own = {"arm": arm.name, "sampled plant": f"linear{not_covered(CONSUMER, chain)}"}
-    facts, verdict = {**own, "SHA-256 of the inputs": task.sha256, "tfarm": version("tfarm")}, ""
+    case, what = task.case, task.what
+    facts = {
+        "arm": case.arm.name,
+        "sampled plant": f"linear{not_covered(CONSUMER, case.chain)}",
+        "SHA-256 of the inputs": task.sha256,
+        "tfarm": version("tfarm"),
+    }
+    verdict = ""
     if what != "plant":
-        judged = task.analysis(law)
-        facts, verdict = task.facts(law, judged), judged.verdict.sentence
-    controller, head = controller_system(arm, law, chain), [f"{label}: {value}" for label, value in facts.items()]
+        judged = task.analysis(case)
+        facts = task.facts(case, judged)
+        verdict = judged.verdict.sentence
+    head = [f"{label}: {value}" for label, value in facts.items()]
+    controller = controller_system(case)
     if what == "controller":
         return Linear({what: controller}, head, {}, verdict)
-    plant = plant_system(arm, law, chain)
-    read = Signals(driven(arm, chain)[0], plant.outputs)
+    plant = plant_system(case)
+    read = Signals(driven(case.arm, case.chain)[0], plant.outputs)
     systems = {"plant": plant, **reduced_systems(read.arm, read.names)}
     if what == "loop":
         systems = {what: loop_system(plant, controller), "controller": controller, **systems}
-    return Linear(systems, head, response_data(read.arm, arm.input, read.names, BAND, read.values), verdict)
+    return Linear(systems, head, response_data(read.arm, case.arm.input, read.names, BAND, read.values), verdict)
 
 
 def mat(task: ExportTask) -> Export:
@@ -257,7 +264,7 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
     other = next(reversed(contents))
     text = ""
     with suppress(OSError):  # a file that cannot be read is not ours
-        text = other.read_text("utf-8", errors="replace") if other.is_file() else ""
+        text = other.read_text("utf-8", errors="replace")
     # as in the first line of every script, load.m
     is_ours = not os.path.exists(other) or ("written by tfarm" in text and matlab_text(path.name) in text)
     remedy = f"{other.name} in that folder is not its script and would be replaced; choose another name"

@@ -34,7 +34,6 @@ import numpy as np
 from tfarm.arm import HubFeedback
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import Real, Whole
-from tfarm.case import Case
 from tfarm.dsp import Measurement
 from tfarm.errors import MISSING, ParameterError, must_be_known, require
 from tfarm.exact.compiled import compiled, inlined
@@ -235,20 +234,21 @@ def c_tuner(task: ExportTask) -> Export:
     """
     if task.tuned is None:
         raise ParameterError(key="tuned", value=MISSING, remedy="give the file of tfarm tune ARM --save FILE.json")
-    saved, period = load_tuner(task.tuned, "tuned"), task.chain.sampling.period
+    case = task.case
+    saved, period = load_tuner(task.tuned, "tuned"), case.chain.sampling.period
     remedy = f"the tuner was trained every {saved.period!r} s: sample so, or train one at this period"
     require(saved.period == period, "sampling.period", period, remedy)
     tuner = ExportedTuner(saved, task.precision)
     of = tuner.numbers
-    servo = HubFeedback(K1=float(of.K1), K2=1.0, Kp=float(of.Kp))
-    loop = sampled_loop(Case(task.arm, servo, task.chain), count=TRIAL_MODES)
+    gains = HubFeedback(K1=float(of.K1), K2=1.0, Kp=float(of.Kp))
+    loop = sampled_loop(case.under(gains), count=TRIAL_MODES)
     guard = sector_guard(loop, float(of.lo), float(of.hi))
     certainty = "not certified for a gain that varies" if guard is None else guard.sentence
     is_proven = guard is not None and guard.is_proven
     remedy = f"on this arm the gain is {certainty}; --anyway exports it"
     require(is_proven or task.anyway, "tuned", str(task.tuned), remedy)
     facts = {
-        "arm": task.arm.name, "tuner": f"trained on {saved.arm}", **({} if is_proven else {"warning": ANYWAY}),
+        "arm": case.arm.name, "tuner": f"trained on {saved.arm}", **({} if is_proven else {"warning": ANYWAY}),
         "sampling period": f"{period!r} s", "moment gain": certainty,
         "network": f"{of.scales.size}-{of.w2.size}-1, {task.precision}",
         "SHA-256 of the tuner": hashlib.sha256(task.tuned.read_bytes()).hexdigest(),
@@ -264,13 +264,13 @@ def written(task: ExportTask, tuner: ExportedTuner, name: str, facts: dict[str, 
     of, (real, suffix, _) = tuner.numbers, REAL[task.precision]
     kept: dict[str, Any] = of._asdict()
     ports = [
-        Port(key, f"{meaning} [{unit or task.arm.input_unit}]", 1.0 if "rad" in unit else tuner.scale)
+        Port(key, f"{meaning} [{unit or task.case.arm.input_unit}]", 1.0 if "rad" in unit else tuner.scale)
         for key, (_, meaning, unit) in tuner.inputs.items()
     ]
     values = {
         "name": name, "facts": list(facts.items()), "fixed": False, "real": real, "suffix": suffix, "header": "tuner.h",
         "bounds": (), "statuses": {"INPUT_ERROR": INPUT_ERROR, "OVERFLOW": OVERFLOW},
-        "fields": ports, "output": f"{task.arm.input} [{task.arm.input_unit}]", "of": of, "ulps": ULPS,
+        "fields": ports, "output": f"{task.case.arm.input} [{task.case.arm.input_unit}]", "of": of, "ulps": ULPS,
         "scalars": {key: literal(float(x), suffix) for key, x in kept.items() if isinstance(x, np.floating)},
         "tables": {
             key: [literal(x, suffix) for x in each.ravel().tolist()]

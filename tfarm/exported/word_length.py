@@ -97,34 +97,47 @@ def with_system_matrix(law: Law, S: Real) -> Law:
     return replace(law, parts=(Part(columns, block),), sign=-1)
 
 
+def closed(A: Real, B: Real, C: Real, a: Real, b: Real, c: Real, d: Real) -> tuple[Real, Real, Real]:
+    """Matrix, rows of y and row of u of the loop of x' = A x + B u, y = C x and k' = a k + b y, u = c k + d y."""
+    y = np.pad(C, ((0, 0), (0, len(a))))
+    u = np.c_[d @ C, c]
+    return block_diag(A, a) + np.r_[B @ u, b @ y], y, u
+
+
 def around(law: Law, loop: Sampled) -> Around:
     """The closed loop of `Sampled.matrix`, around a law of one state space."""
     A, B, C = loop.pulse.matrices()
     own, Bk, Ck, Dk = with_estimate(law, loop.chain).matrices(loop.in_z.signals)
-    n, m, order = len(A), len(own), law.order
-    output, push = -np.hstack([Dk @ C, Ck])[0], np.r_[B, np.zeros(m)]
+    matrix, reads, output = closed(A, B[:, None], C, own, Bk, -Ck, -Dk)
+    states = slice(len(A), len(A) + law.order)
+    push = np.r_[B, np.zeros(len(own))]
     return Around(
-        matrix=np.block([[A, np.zeros((n, m))], [Bk @ C, own]]) + np.outer(push, output),
-        of_signals=np.vstack([np.outer(B, -Dk[0]), Bk]),
-        of_rounding=np.c_[np.eye(n + m)[:, n : n + order], push],
-        output=output,
-        reads=np.hstack([C, np.zeros((len(C), m))]),
-        states=slice(n, n + order),
+        matrix=matrix,
+        of_signals=np.r_[np.outer(B, -Dk[0]), Bk],
+        of_rounding=np.c_[np.eye(len(matrix))[:, states], push],
+        output=output[0],
+        reads=reads,
+        states=states,
     )
+
+
+def sum_of_squares(M: Real, Q: Real, rows: slice) -> Real | None:
+    """Q + M Q M^T + M^2 Q M^2^T + ...; None where the sum of these rows does not converge."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(MOST_DOUBLINGS):
+            more = M @ Q @ M.T
+            Q, M = Q + more, M @ M
+            if abs(more[rows, rows]).max() <= SUMMED * abs(Q[rows, rows]).max() < np.inf:
+                return Q
+    return None
 
 
 def gramians(of: Around) -> tuple[Real, Real] | None:
     """K over the variance of u, and W, of the states of the law; None where their sums do not converge."""
-    M, K, W = of.matrix, of.of_signals @ of.of_signals.T, np.outer(of.output, of.output)
     rows = of.states
-    with np.errstate(over="ignore", invalid="ignore"):
-        for _ in range(MOST_DOUBLINGS):
-            more, seen = M @ K @ M.T, M.T @ W @ M
-            K, W, M = K + more, W + seen, M @ M
-            left = [(abs(a[rows, rows]).max(), abs(b[rows, rows]).max()) for a, b in ((more, K), (seen, W))]
-            if all(last <= SUMMED * whole < np.inf for last, whole in left):
-                return K[rows, rows] / (of.output @ K @ of.output), W[rows, rows]
-    return None
+    K = sum_of_squares(of.matrix, of.of_signals @ of.of_signals.T, rows)
+    W = sum_of_squares(of.matrix.T, np.outer(of.output, of.output), rows)
+    return None if K is None or W is None else (K[rows, rows] / (of.output @ K @ of.output), W[rows, rows])
 
 
 def balancing(K: Real, W: Real) -> Real | None:
@@ -362,7 +375,8 @@ def _fixed(word: Word) -> Word:
     X, is_whole = absolute_sum(S[:n, :n], np.eye(n), S[:n, n:])
     reach = X @ E
     # a state without a bound saturates beyond four ranges of u
-    of_output = np.divide(4 * U, abs(S[n, :n]), out=np.full(n, np.inf), where=S[n, :n] != 0)
+    with np.errstate(divide="ignore"):
+        of_output = 4 * U / abs(S[n, :n])
     if not is_whole:  # a state whose sum still grows has the scale of u
         earlier, _ = absolute_sum(S[:n, :n], np.eye(n), S[:n, n:], MOST_SUMMED // 2)
         of_output[np.isfinite(reach) & (reach <= (1 + SUMMED) * (earlier @ E))] = np.inf
@@ -377,8 +391,8 @@ def _fixed(word: Word) -> Word:
         raise ParameterError(key="law", value=law.name, remedy=remedy)
     # with room for roundings
     scale = np.exp2(np.ceil(np.log2((1 + 2.0**-10) * size)))
-    scaled = with_system_matrix(law, S * np.r_[scale, np.ones(R.size)] / np.r_[scale, 1.0][:, None])
-    table = system_matrix(scaled) * np.r_[one, R] / np.r_[one, U][:, None]
+    scaled = S * np.r_[scale, np.ones(R.size)] / np.r_[scale, 1.0][:, None]
+    table = scaled * np.r_[one, R] / np.r_[one, U][:, None]
     sums = abs(table) @ np.r_[one, E / R] + np.r_[np.zeros(n), 1.0]  # of u with the feedforward
     most = 2.0**FRACTION_BITS - len(table) - R.size
     # at most those of a sum of products
@@ -386,4 +400,4 @@ def _fixed(word: Word) -> Word:
     is_largest = abs(table) == abs(table).max(axis=1)[:, None]
     _check(table, is_largest & (shifts < 1)[:, None], "q31 at these ranges")
     whole = np.rint(np.ldexp(table, shifts[:, None])).astype(np.int64)
-    return replace(word, law=scaled, table=whole, shifts=shifts)
+    return replace(word, law=with_system_matrix(law, scaled), table=whole, shifts=shifts)

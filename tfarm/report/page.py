@@ -35,7 +35,7 @@ from tfarm.case import Case
 from tfarm.dsp import Chain, Simulation, load_chain, results, traces
 from tfarm.dsp.discretise import acting_law
 from tfarm.errors import ConvergenceError, ParameterError, one_line
-from tfarm.exported.live_loop import LiveNumbers, law_data, live_data
+from tfarm.exported.live_loop import LiveNumbers, live_data
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import ARMS, Fit, ResponseBand, ShareOfArms, arms_drawn, response_band, stable_share
 from tfarm.fitting.overlay import Overlay, overlay
@@ -233,9 +233,7 @@ class ReportedCase:
     @property
     def live(self) -> LiveNumbers:
         """The numbers of the live page that begins with this controller."""
-        if self.case.gains is None:
-            return law_data(self.arm, self.chain, self.law)
-        return live_data(self.arm, self.chain, self.case.gains)
+        return live_data(self.case)
 
     def check(self) -> None:
         """Raise ParameterError for a law that does not suit the arm or the sampling period of the chain."""

@@ -289,7 +289,7 @@ def tuner_numbers(arm: Arm, chain: Chain) -> TunerNumbers:
     trial = tuning.trial
     # the first are those of the arm itself, of which the last is quantised and late
     late = 3
-    listed = tried_loops(arm, trial.loop.chain, quantised_chain(arm, chain))
+    listed = tried_loops(trial.case, quantised_chain(arm, chain))
     rows = compare_controllers(
         trial,
         tuning.gain(),
@@ -301,7 +301,7 @@ def tuner_numbers(arm: Arm, chain: Chain) -> TunerNumbers:
         arm=arm,
         tuning=tuning,
         slews=_simulated(tuning, trial.loop.chain),
-        coarse=_simulated(tuning, listed[late].chain),
+        coarse=_simulated(tuning, listed[late].case.chain),
         curves=learning_curves(arm, plan, own, curve_seeds(plan.trials * trial.n)),
         rows=tuple(rows),
     )

@@ -37,6 +37,7 @@ from scipy.optimize import minimize_scalar
 from tfarm.arm import MOMENT_GAIN, Arm
 from tfarm.arm.chain import TIME_ROUNDING
 from tfarm.arrays import Real
+from tfarm.case import Case
 from tfarm.dsp import Chain, Converters, Scenario, Simulation
 from tfarm.dsp.scenarios import torque_unit
 from tfarm.errors import ConvergenceError
@@ -91,14 +92,13 @@ def lq_bound(trial: Trial) -> Record:
         closed = A - np.outer(B, gains[k])
         P = closed.T @ P @ closed + b * np.outer(gains[k], gains[k]) + a * np.outer(c, c)
         P = (P + P.T) / 2
-    states, e = np.zeros_like(gains), np.zeros(trial.n)
-    states[:, -1] = 1.0
-    for k in range(trial.n):
-        e[k] = -gains[k] @ states[k]
-        states[k + 1 : k + 2, :-1] = model.A @ states[k, :-1] + model.B * (e[k] + trial.reference.rest[k])
-    x = states[:, :-1] @ model.moment - m
+    states, e = np.zeros((trial.n + 1, B.size - 1)), np.zeros(trial.n)
+    for k, gain in enumerate(gains):
+        e[k] = -gain[:-1] @ states[k] - gain[-1]
+        states[k + 1] = model.A @ states[k] + model.B * (e[k] + trial.reference.rest[k])
+    x = states[:-1] @ model.moment - m
     cost = float((a * x @ x + b * e @ e) / 2)
-    return Record(trial.task.t, x, e, e, np.zeros(trial.n), states[:, :-1] @ model.own, cost, None)
+    return Record(trial.task.t, x, e, e, np.zeros(trial.n), states[:-1] @ model.own, cost, None)
 
 
 def zero_vibration(z: complex) -> Real:
@@ -198,11 +198,10 @@ class Outcomes:
 
 
 class NamedLoop(NamedTuple):
-    """An arm and a chain under their name."""
+    """A case under its name."""
 
     name: str
-    arm: Arm
-    chain: Chain
+    case: Case
 
 
 def quantised_chain(arm: Arm, chain: Chain) -> Chain:
@@ -224,33 +223,34 @@ def quantised_chain(arm: Arm, chain: Chain) -> Chain:
     return replace(chain, converters=converters)
 
 
-def tried_loops(arm: Arm, chain: Chain, quantised: Chain | None = None) -> list[NamedLoop]:
+def tried_loops(case: Case, quantised: Chain | None = None) -> list[NamedLoop]:
     """Return the trained condition, that with converters, with delay, and with both; then other arms.
 
     `quantised` is the chain with converters, by default that of `quantised_chain`.
     """
-    quantised = quantised_chain(arm, chain) if quantised is None else quantised
-    delay = chain.sampling.delay_samples
-    sampling, late = replace(chain.sampling, delay_samples=delay + 1), f"one {'more ' * bool(delay)}sample of delay"
+    arm = case.arm
+    coarse = case.through(quantised or quantised_chain(arm, case.chain))
+    delay = case.chain.sampling.delay_samples
+    sampling = replace(case.chain.sampling, delay_samples=delay + 1)
+    late = f"one {'more ' * bool(delay)}sample of delay"
     # shares of the payload, or of the arm's mass: 0.1, 0.25 and 0.5 kg on the paper's
     mass, masses = (arm.payload_mass, (0.5, 1.5, 2.0)) if arm.payload_mass else (arm.own_mass, (0.06, 0.15, 0.3))
     payloads = [float(f"{share * mass:.2g}") for share in masses]
+    # by damping ratios of mode 1: 1e-5 and 1e-3 s on the paper's
+    dampings = [float(f"{2 * zeta / first_frequency(arm):.1g}") for zeta in (3.575e-4, 3.575e-2)]
     if arm.damping:
         dampings = [0.0, *(float(f"{share * arm.damping:.3g}") for share in (0.1, 10.0))]
-    else:
-        # by damping ratios of mode 1: 1e-5 and 1e-3 s on the paper's
-        dampings = [float(f"{2 * zeta / first_frequency(arm):.1g}") for zeta in (3.575e-4, 3.575e-2)]
+    others = {
+        **{f"payload {each:g} kg": arm.having(payload_mass=each) for each in payloads},
+        **{f"hub {share - 1:+.0%}": arm.having(hub_inertia=share * arm.hub_inertia) for share in (0.8, 1.2)},
+        **{f"C = {C:g} s": arm.having(damping=C) for C in dampings},
+    }
     return [
-        NamedLoop("as trained", arm, chain),
-        NamedLoop("quantised", arm, quantised),
-        NamedLoop(late, arm, replace(chain, sampling=sampling)),
-        NamedLoop(f"quantised, {late}", arm, replace(quantised, sampling=sampling)),
-        *(NamedLoop(f"payload {each:g} kg", arm.having(payload_mass=each), chain) for each in payloads),
-        *(
-            NamedLoop(f"hub {share - 1:+.0%}", arm.having(hub_inertia=share * arm.hub_inertia), chain)
-            for share in (0.8, 1.2)
-        ),
-        *(NamedLoop(f"C = {C:g} s", arm.having(damping=C), chain) for C in dampings),
+        NamedLoop("as trained", case),
+        NamedLoop("quantised", coarse),
+        NamedLoop(late, case.through(replace(case.chain, sampling=sampling))),
+        NamedLoop(f"quantised, {late}", coarse.through(replace(coarse.chain, sampling=sampling))),
+        *(NamedLoop(name, case.on(each)) for name, each in others.items()),
     ]
 
 
@@ -263,10 +263,10 @@ def compare_controllers(
 ) -> list[Outcomes]:
     """Return the outcomes in each condition; `trial` is that of the training, `nominal` its best constant gain."""
     nominal = best_constant(trial).gain if nominal is None else nominal
-    late = {kind: shaped_trial(trial, kind).task for kind in SHAPERS}
+    slews = {kind: shaped_trial(trial, kind).task for kind in SHAPERS}
     found = []
-    for condition in tried_loops(trial.arm, trial.loop.chain) if listed is None else listed:
-        here = trial.on(condition.arm, condition.chain, gain.servo)
+    for condition in tried_loops(trial.case) if listed is None else listed:
+        here = trial.on(condition.case)
         own, bound = best_constant(here), lq_bound(here)
         found.append(
             Outcomes(
@@ -275,8 +275,8 @@ def compare_controllers(
                 best_constant=_constant(here, nominal),
                 own_constant=_constant(here, own.gain),
                 own_gain=own.gain,
-                ZV=_constant(here, 0.0, late["ZV"]),
-                EI=_constant(here, 0.0, late["EI"]),
+                ZV=_constant(replace(here, task=slews["ZV"]), 0.0),
+                EI=_constant(replace(here, task=slews["EI"]), 0.0),
                 tuner=_outcome(gain.run(here.simulator()), here),
                 bound=Outcome(bound.cost, residual_rms(bound, here.task), None),
                 proven=guard.is_proven and _proven(here, guard),
@@ -292,12 +292,11 @@ def _proven(here: Trial, guard: Guard) -> bool:
     return False
 
 
-def _constant(trial: Trial, K: float, task: Scenario | None = None) -> Outcome:
-    """The outcome of a constant gain, on the slew of the trial unless another is given."""
-    return _outcome(trial.simulator(task=task).linear(trial.loop.gains.having(MOMENT_GAIN, K)), trial)
+def _constant(trial: Trial, K: float) -> Outcome:
+    """The outcome of a constant gain."""
+    return _outcome(trial.simulator().linear(trial.loop.gains.having(MOMENT_GAIN, K)), trial)
 
 
 def _outcome(run: Simulation, trial: Trial) -> Outcome:
     """The outcome of a simulation, by the cost of a trial."""
-    record = judged(run, trial.cost, trial.signals)
-    return Outcome(record.cost, residual_rms(record, run.scenario), tip_off(run, trial))
+    return Outcome(judged(run, trial.cost, trial.signals).cost, run.residual_moment, tip_off(run, trial))

@@ -45,14 +45,13 @@ from scipy.linalg import LinAlgError, solve_discrete_are, solve_triangular
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN
 from tfarm.arrays import Real
-from tfarm.case import Case
 from tfarm.dsp.plant import first_distinct, held_amplitude
 from tfarm.dsp.stages import not_covered
 from tfarm.errors import CertificationError, ConvergenceError, must_be_known
 from tfarm.exact.rationals import exact_matrix, falls, is_positive_definite
 from tfarm.loop.circle_crossings import around, stable_windows
 from tfarm.loop.loop_margins import lowest
-from tfarm.loop.sampled import Sampled, sampled_loop
+from tfarm.loop.sampled import Sampled
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.tuner.kernel import CONSUMER, Limits
@@ -247,14 +246,14 @@ def find_guard(loop: Sampled, kind: GuardKind, best_constant: float) -> Guard:
     find, sector = (_frozen, "constant gain") if kind == "frozen" else (_moving, "sector of time-varying gains")
     if guard := find(_larger(loop), best_constant):
         return guard
-    arm, angle_gain = loop.plant.arm, loop.number(ANGLE_GAIN)
-    at = f"{RATE_GAIN} = {loop.number(RATE_GAIN):g}{f', {ANGLE_GAIN} = {angle_gain:g}' if angle_gain else ''}"
+    arm, gains = loop.plant.arm, loop.gains
+    at = ", ".join(f"{name} = {gains[name]:g}" for name in (RATE_GAIN, ANGLE_GAIN) if name == RATE_GAIN or gains[name])
     start = f"{arm.name}: no {sector} is certified stable at {at}, C = {arm.damping:g} s"
     # the least damping with a guard, of a few [s]
     for C in filter(arm.damping.__lt__, np.geomspace(1e-12, 1e-2, 11).tolist()):
         with suppress(ConvergenceError):
-            damped = sampled_loop(Case(arm.having(damping=C), loop.gains, loop.chain), count=loop.plant.count)
-            if (other := find(_larger(damped), 0.0)) and other.is_settled:
+            other = find(_larger(loop.on(arm.having(damping=C), loop.plant.count)), 0.0)
+            if other and other.is_settled:
                 raise CertificationError(f"{start}; with a damping of C = {C:.1e} s there is one")
     remedy = f"take another {RATE_GAIN}, or a shorter period or delay"
     raise CertificationError(f"{start}, nor with any damping up to 0.01 s; {remedy}")
@@ -268,16 +267,15 @@ def constant_windows(loop: Sampled) -> list[tuple[float, float]]:
 def _frozen(loops: list[Sampled], best_constant: float) -> Guard | None:
     """The stability interval common to all models, without its outermost hundredth."""
     found = []
-    for loop in loops:
-        windows = constant_windows(loop)
+    for windows in map(constant_windows, loops):
         if not windows:
             return None
         found.append(around(windows, best_constant) or min(windows, key=lambda w: abs(sum(w) / 2 - best_constant)))
-    low, high = max(low for low, _ in found), min(high for _, high in found)
+    low = max(low for low, _ in found)
+    high = min(high for _, high in found)
     edge = (1 - RADIUS_SHARE) * (high - low)
-    if high - low < NARROWEST_SECTOR:
-        return None
-    return _guard("frozen", loops, found, low + edge * (low > 0), high - edge)
+    is_wide = high - low >= NARROWEST_SECTOR
+    return _guard("frozen", loops, found, low + edge * (low > 0), high - edge) if is_wide else None
 
 
 def _moving(loops: list[Sampled], best_constant: float) -> Guard | None:

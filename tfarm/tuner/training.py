@@ -20,7 +20,7 @@ from typing import Annotated, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from tfarm.arm.checks import not_negative, positive, whole
+from tfarm.arm.checks import check_annotated, not_negative, positive, whole
 from tfarm.arrays import Real
 from tfarm.errors import must_be_known, require
 from tfarm.exact.compiled import compiled, inlined
@@ -205,6 +205,7 @@ Rule = Literal["dynamic", "clipped", "plain"]
 Sensitivity = Literal["one-step", "whole"]
 
 QUARTILES = (0.25, 0.5, 0.75)  # of learning curves over the seeds
+MOMENTUM = "the momentum factor lies in [0, 1)"
 
 
 @frozen(kw_only=True)
@@ -218,19 +219,16 @@ class Learning:
     mode: Mode = "trial"
     rule: Rule = "dynamic"
     sensitivity: Sensitivity = "one-step"
-    eta: float = 0.8
-    alpha: float = 0.6
-    clip: float = 0.5
-    enough: float = 0.0
+    eta: Annotated[float, positive, "a learning rate is positive and finite, 0.8 in the paper"] = 0.8
+    alpha: Annotated[float, not_negative, MOMENTUM] = 0.6
+    clip: Annotated[float, positive, "the largest norm of a gradient is positive and finite"] = 0.5
+    enough: Annotated[float, not_negative, "the error to stop at is zero or positive, in N m"] = 0.0
 
     def __post_init__(self) -> None:
         for key, kind in {"mode": Mode, "rule": Rule, "sensitivity": Sensitivity}.items():
             must_be_known(key, getattr(self, key), get_args(kind))
-        positive("eta", self.eta, "a learning rate is positive and finite, 0.8 in the paper")
-        momentum = not_negative("alpha", self.alpha, "the momentum factor lies in [0, 1)")
-        require(momentum < 1.0, "alpha", momentum, "the momentum factor lies in [0, 1), below 1")
-        positive("clip", self.clip, "the largest norm of a gradient is positive and finite")
-        not_negative("enough", self.enough, "the error to stop at is zero or positive, in N m")
+        check_annotated(self, "")
+        require(self.alpha < 1.0, "alpha", self.alpha, MOMENTUM)
 
 
 @dataclass(frozen=True)
@@ -312,8 +310,8 @@ def train(trial: Trial, network: Network, guard: Guard, learning: Learning, tria
     """
     trials = whole("trials", trials, 1, 1_000_000, "a whole number of trials from 1 to 1000000")
     weights, costs = network.weights, np.zeros(trials)
-    longest = math.inf if learning.rule == "plain" else float(learning.clip)
-    steps = Steps(float(learning.eta), float(learning.alpha), longest, float(learning.enough))
+    longest = math.inf if learning.rule == "plain" else learning.clip
+    steps = Steps(learning.eta, learning.alpha, longest, learning.enough)
     common = (trial.setting(network, guard.limits), steps, weights, costs, *trial.room(network))
     if learning.mode == "trial":
         made, sample = learn_by_trials(*common, learning.rule == "dynamic")

@@ -31,7 +31,7 @@ from pydantic import Field
 
 from tfarm.arm import FED_BACK, Arm, HubFeedback, must_not_be_algebraic
 from tfarm.arm.chain import Reading
-from tfarm.arm.checks import check_annotated, not_negative, number, positive
+from tfarm.arm.checks import check_annotated, not_negative, positive
 from tfarm.arm.schema import StrictTable, validated_file
 from tfarm.arrays import Real
 from tfarm.case import Case
@@ -62,6 +62,9 @@ class Cost:
     def __post_init__(self) -> None:
         check_annotated(self, "")
         require(self.a or self.b, "a", self.a, "a and b are both zero: one of them has to be positive")
+
+
+DEFAULT_COST = Cost()
 
 
 @frozen
@@ -136,14 +139,19 @@ class Trial:
         """Arguments of the compiled loops, without weights."""
         return kernel.Setting(self.model, self.reference, self.numbers, network.scales, guard)
 
-    def on(self, arm: Arm, chain: Chain, servo: HubFeedback) -> Trial:
-        """The same slew on another loop, with the references of this one's arm."""
-        return replace(self, loop=sampled_loop(Case(arm, replace(servo, K2=1.0), chain), count=self.loop.plant.count))
+    @property
+    def case(self) -> Case:
+        """The arm under its servo with a moment gain of 1, and the chain."""
+        return Case(self.arm, self.loop.gains, self.loop.chain)
 
-    def simulator(self, *, chain: Chain | None = None, task: Scenario | None = None) -> Simulator:
+    def on(self, case: Case) -> Trial:
+        """The same slew in another case, with the references of this one's arm."""
+        return replace(self, loop=sampled_loop(case, count=self.loop.plant.count))
+
+    def simulator(self, chain: Chain | None = None) -> Simulator:
         """A simulator of the loop, with the converters of a chain, by default that of the trial."""
-        case = Case(self.arm, HubFeedback(), chain or self.loop.chain)
-        return Simulator(case, task or self.task, count=self.loop.plant.count)
+        case = self.case if chain is None else self.case.through(chain)
+        return Simulator(case, self.task, count=self.loop.plant.count)
 
     def room(self, network: Network) -> tuple[kernel.Run, kernel.Work]:
         """Empty record and buffers of a trial with that network."""
@@ -157,10 +165,10 @@ class Trial:
         """The trial with a fixed network; the cost is inf where it was stopped."""
         run, work = self.room(network)
         done = int(kernel.forward(self.setting(network, guard), network.weights, run, work))
+        is_whole = done == self.n
+        cost = float(kernel.trial_cost(done, self.numbers, run)) if is_whole else math.inf
         t, x, u, e, K, moment = (each[:done] for each in (self.task.t, run.x, run.u, run.e, run.K, run.moment))
-        if done < self.n:
-            return Record(t, x, u, e, K, moment, math.inf, done)
-        return Record(t, x, u, e, K, moment, float(kernel.trial_cost(done, self.numbers, run)), None)
+        return Record(t, x, u, e, K, moment, cost, None if is_whole else done)
 
     def with_constant(self, K: float) -> Record:
         """The trial with a constant gain: a guard of one gain, for any network."""
@@ -174,7 +182,7 @@ def slew_trial(
     *,
     K1: float | None = None,
     Kp: float = 0.0,
-    cost: Cost | None = None,
+    cost: Cost = DEFAULT_COST,
     signals: Reading = "vibration",
     duration: float = TRIAL_DURATION,
     count: int = TRIAL_MODES,
@@ -187,15 +195,14 @@ def slew_trial(
     must_be_known("signals", signals, get_args(Reading))
     Kp = not_negative("Kp", Kp, ANGLE_REMEDY)
     arm, chain = admit(CONSUMER, arm, chain)
-    K1 = usual_rate_gain(arm, Kp) if K1 is None else K1
-    rate_gain = number("K1", K1, "the hub rate gain is a finite number of N m s/rad")
+    gains = HubFeedback(K1=usual_rate_gain(arm, Kp) if K1 is None else K1, K2=1.0, Kp=Kp)
     length = positive("duration", duration, "a trial lasts a positive number of seconds")
     chain = with_signals(chain, signals)
     rise = chain.slew.rise_time
     require(length >= rise, "duration", length, f"a trial lasts at least as long as its slew, {rise:g} s")
     must_not_be_algebraic(arm, "hub.inertia", 0.0)
-    loop = sampled_loop(Case(arm, HubFeedback(K1=rate_gain, K2=1.0, Kp=Kp), chain), count=count)
-    return Trial(loop, scenario("slew", arm, chain, length), Cost() if cost is None else cost, signals)
+    loop = sampled_loop(Case(arm, gains, chain), count=count)
+    return Trial(loop, scenario("slew", arm, chain, length), cost, signals)
 
 
 def usual_rate_gain(arm: Arm, Kp: float) -> float:
@@ -261,14 +268,15 @@ def judged(simulation: Simulation, cost: Cost, signals: Reading) -> Record:
 
     So x has passed the anti-alias filter where there is one, but no quantisation.
     """
-    task, done = simulation.scenario, simulation.torque.size
-    rest = 0.0 if signals == "total" else task.feedforward[:done]
+    task = simulation.scenario
+    done = simulation.torque.size
+    is_whole = simulation.stopped is None
     x = simulation.measured[:, FED_BACK.index("root_moment")] - task.moment_reference[:done]
-    e = simulation.torque - rest
+    e = simulation.torque - (signals != "total") * task.feedforward[:done]
     K = np.zeros(done) if simulation.gain is None else simulation.gain
-    stopped = done if simulation.stopped is not None else None
-    total = np.inf if stopped is not None else float(task.period * np.sum(cost.a * x**2 + cost.b * e**2) / 2)
-    return Record(simulation.t, x, e + K * x, e, K, simulation.at_samples.root_moment, total, stopped)
+    total = float(task.period * np.sum(cost.a * x**2 + cost.b * e**2) / 2) if is_whole else math.inf
+    moment = simulation.at_samples.root_moment
+    return Record(simulation.t, x, e + K * x, e, K, moment, total, None if is_whole else done)
 
 
 def tip_off(simulation: Simulation, trial: Trial) -> float | None:

@@ -9,8 +9,9 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, as_law, must_be_arm
-from tfarm.arm.chain import Reading, chain_or_usual
+from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, must_be_arm
+from tfarm.arm.chain import Reading
+from tfarm.arm.checks import check_annotated, positive
 from tfarm.arrays import Real
 from tfarm.case import Case
 from tfarm.dsp import Chain, scenario
@@ -65,10 +66,10 @@ class Plan:
     count: int = TRIAL_MODES
     hidden: int = PAPER_HIDDEN
     seventh_input: bool = False
-    scale: float = 1.0
+    scale: Annotated[float, positive, "a scale is a positive, finite number of N m"] = 1.0
 
     def __post_init__(self) -> None:
-        require(0.0 < self.scale < np.inf, "scale", self.scale, "a scale is a positive, finite number of N m")
+        check_annotated(self, "")
 
     def trial(self, arm: Arm, chain: Chain | None) -> Trial:
         """The trial on an arm, with the weights of the cost on moments and torques in units of the scale."""
@@ -128,9 +129,10 @@ class Tuning:
 
 def usual_plan(arm: Arm, chain: Chain | None = None) -> Plan:
     """Return the paper's figures at the arm's default rate gain, in its unit of torque, for three times its slew."""
-    chain = chain_or_usual(chain)
+    gains = default_gains(arm)
+    chain = Case(arm, gains, chain).chain
     return Plan(
-        K1=default_gains(arm).K1,
+        K1=gains.K1,
         signals=chain.slew.reading,
         duration=TRIAL_SLEWS * chain.slew.rise_time,
         scale=torque_unit(arm, chain),
@@ -345,8 +347,8 @@ def controlled_run(
     Its guard is certified for the loop of its training, not for another arm or chain.
     """
     chain, gain = with_signals(chain, saved.signals), saved.gain()
+    case = Case(arm, gain.servo, chain)
     task = scenario(name, arm, chain, duration)
-    case = Case(arm, as_law(gain.servo), chain)
     run, used = simulated(case, task, count, between, outputs, gain.run)
     trained = {
         "trained_on": saved.arm, "guard_kind": saved.guard_kind, "guard": list(gain.guard), "K1": saved.K1,
