@@ -14,8 +14,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, cast
 
 from tfarm.arm.chain import Chain, chain_or_usual
-from tfarm.arm.feedback import HubFeedback
-from tfarm.arm.law import AnyLaw, Law, as_law, full_law
+from tfarm.arm.feedback import AT_HUB, GAINS, HubFeedback
+from tfarm.arm.law import AnyLaw, Law, as_law
 from tfarm.arm.records import Arm, must_be_arm
 from tfarm.exact.system import System
 from tfarm.moved import moved
@@ -46,7 +46,7 @@ class Case:
         if law.input not in (None, self.arm.input):
             # the record refuses an input that the arm has no motor for
             object.__setattr__(self, "arm", replace(self.arm, input=law.input))  # type: ignore[arg-type]
-        gains = law.gains if set(law.signals) <= set(law.references) else None
+        gains = law.gains if _follows_all(law) else None
         object.__setattr__(self, "law", law if gains is None else Law.of_gains(gains))
         object.__setattr__(self, "chain", chain_or_usual(self.chain))
 
@@ -90,6 +90,29 @@ class Case:
     def through(self, chain: Chain) -> Case:
         """Return the case with another chain."""
         return replace(self, chain=chain)
+
+
+def _follows_all(law: Law) -> bool:
+    """Whether each signal of a controller follows a reference."""
+    return set(law.signals) <= set(law.references)
+
+
+def full_law(law: AnyLaw) -> Law:
+    """Return a controller; for gains at the hub with a part for each of the three, also for 0.
+
+    Where each of its signals follows a reference the three of them do.
+    """
+    law = as_law(law)
+    if law.gains is None:
+        return law
+    references = AT_HUB if _follows_all(law) else law.references
+    return Law({gain.output: law.gains[gain.name] for gain in GAINS}, name="gains at the hub", references=references)
+
+
+def tracked(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
+    """Return the arm with the input of a controller, and that as gains at the hub if those follow all references."""
+    case = Case(arm, law)
+    return case.arm, case.gains if case.gains is not None and _follows_all(case.law) else law
 
 
 # names that this module, a room then, had up to version 1.0

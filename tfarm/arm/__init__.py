@@ -22,11 +22,12 @@ from tfarm.arm.feedback import (
     unit_of,
     written_unit,
 )
-from tfarm.arm.law import AnyLaw, Law, arm_and_law, as_law, cancelled, full_law, must_not_be_algebraic, tracked
+from tfarm.arm.law import AnyLaw, Law, arm_and_law, as_law, cancelled, must_not_be_algebraic
 from tfarm.arm.parts import Attachment, Gauge, Hub, Link, Motor, Payload, RotarySpring, Section
 from tfarm.arm.reading import implausible, load, presets
 from tfarm.arm.records import Arm, must_be_arm, must_have_free_hub, must_turn
 from tfarm.arm.writing import to_toml
+from tfarm.moved import moved
 
 __all__ = [
     "ANGLE_GAIN",
@@ -64,7 +65,6 @@ __all__ = [
     "arm_and_law",
     "as_law",
     "cancelled",
-    "full_law",
     "implausible",
     "input_words",
     "law_of",
@@ -76,7 +76,9 @@ __all__ = [
     "presets",
     "shown_unit",
     "to_toml",
-    "tracked",
     "unit_of",
     "written_unit",
 ]
+
+# names that this room had up to version 1.0
+__getattr__ = moved(__name__, dict.fromkeys(("full_law", "tracked"), "tfarm.case"))

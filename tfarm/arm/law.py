@@ -340,18 +340,6 @@ def as_law(law: AnyLaw) -> Law:
     return law
 
 
-def full_law(law: AnyLaw) -> Law:
-    """Return a Law; for gains at the hub with a part for each of the three, also for 0.
-
-    Where each of its signals follows a reference the three of them do.
-    """
-    law = as_law(law)
-    if law.gains is None:
-        return law
-    references = AT_HUB if set(law.signals) <= set(law.references) else law.references
-    return Law({gain.output: law.gains[gain.name] for gain in GAINS}, name="gains at the hub", references=references)
-
-
 def of_common_blocks(law: Law) -> Law:
     """Return the law with ratios of the same denominator as one block: apart, each adds poles that no signal shows."""
     alike: dict[object, list[Part]] = {}
@@ -382,16 +370,6 @@ def arm_and_law(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
     if law.input is not None and law.input != arm.input:
         arm = replace(arm, input=law.input)  # type: ignore[arg-type]  # the record refuses what is none
     return arm, law.gains or law
-
-
-def tracked(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
-    """Return arm and law of a loop with a reference: gains at the hub have references on all of their signals.
-
-    So a law of gains alone is returned as gains only where each of its signals is among its references.
-    """
-    driven, gains = arm_and_law(arm, law)
-    full = as_law(law)
-    return driven, gains if set(full.signals) <= set(full.references) else law
 
 
 def must_not_be_algebraic(arm: Arm, key: str, value: object) -> None:

@@ -49,7 +49,6 @@ RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")  # of a 
 MODES_USED = Quantity("flexible modes", help="number of flexible modes of the arm in the model of the sampled loop")
 USUAL_MODES = 20  # flexible, of a sampled loop or a simulation by default
 SLOW = 0.1  # |p| T below which a pole is slow: its two parts are then more than ten times their sum
-PHI_TERMS = 12  # of a series in |p| T, below `SLOW`: 0.1^12/14! is left
 OVERDAMPED = 2.5  # C w from which on a mode surely is: following it further costs a hundred times as much
 FORGOTTEN = 40.0  # e^-40 = 4e-18: such a pole has settled before the next sample
 
@@ -475,7 +474,8 @@ def pulse_transfer(
 
 def phi(u: float) -> float:
     """(e^u - 1 - u)/u^2, by its series: |u| is below `SLOW`."""
-    return math.fsum(u**k / math.factorial(k + 2) for k in range(PHI_TERMS))
+    # of 12 terms 0.1^12/14! is left
+    return math.fsum(u**k / math.factorial(k + 2) for k in range(12))
 
 
 def held_amplitude(p: Complex, duration: float) -> Complex:

@@ -31,7 +31,6 @@ from tfarm.schema import Column, Quantity, Table
 MODE_COUNTS = (10, 20, 40)  # flexible modes; 80 would take a heavily damped arm 8 s of CPU time
 ENOUGH_CHANGE = 1e-4  # of each signal's largest value: the digits of a table of a simulation
 CYCLE_LASTS = 0.7  # a limit cycle keeps at least this much of its amplitude over a quarter of the record
-GROWS = 1.02  # in a quarter of the record, of an unstable ideal loop: a smaller change may be one of sampled peaks
 
 
 class Enough(NamedTuple):
@@ -229,7 +228,8 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
     is_clipped = bool(simulation.saturated_at[last].any())
     # fewer turns of the moment about its mean are a drift and no vibration
     is_transient = is_clipped and (earlier < CYCLE_LASTS * size or turns < 1)
-    is_unstable = ideal.stopped is not None or _left(ideal, last) > GROWS * _left(ideal, before)
+    # in a quarter of the record: a smaller change may be one of sampled peaks
+    is_unstable = ideal.stopped is not None or _left(ideal, last) > 1.02 * _left(ideal, before)
     # twice the vibration of an ideal chain at that time
     is_own = (is_clipped and is_unstable) or size > 2 * _left(ideal, last)
     if size == 0.0 or size < CYCLE_LASTS * earlier or is_transient or not is_own:

@@ -61,15 +61,7 @@ PIECES_OF_ARC = 4  # into which one is cut that is too long
 MOST_ARCS = 60_000  # a loop that takes more is not shown
 ON_IT = 1e-100  # distance from the circle of a pole on it: its disc is wide, and contains 0
 ROUNDINGS = 8  # of a factor of the law: of its root, of its middle, and of the products
-TERMS_AT_A_TIME = 1 << 19  # terms 1/(z - b) at a time, lest they leave the cache
-DECAYED_EXPONENT = 30.0  # e^-30 = 1e-13 is left over a sample of the poles on the line
-HIGHER = (2.0, 8.0, 32.0, 128.0, 512.0)  # times the last pole of the model: heights up to which there may be no other
-ABOVE_MODEL = 1.02  # times the last pole of the model: the least height at which all of them are in the box
-FINER = 10  # times finer than the distance of the line from the axis: the first panel up that line
-NEAREST_LEFT, FARTHEST_LEFT = 0.01, 45.0  # of 1/remaining: panels along the top, until e^-45 = 3e-20 is left
-PANEL_ENDS = 40  # of panels, that are halved where quadratures differ: time alone
 SURE = 0.1  # by which two quadratures of an absolute value may differ; the larger counts, with as much again
-MOST_MIDPOINTS = 200_000  # of a quadrature, which has not converged if that is not enough
 
 
 @frozen
@@ -272,7 +264,8 @@ class Circle:
         blur = MACHINE_EPS * (4 + abs(p * T))
         middles = []
         radii = []
-        for some in np.array_split(np.arange(arcs.half.size), 1 + arcs.half.size * p.size // TERMS_AT_A_TIME):
+        # terms 1/(z - b) at a time, lest they leave the cache
+        for some in np.array_split(np.arange(arcs.half.size), 1 + arcs.half.size * p.size // 2**19):
             away = np.exp(1j * arcs.middle[some])[:, None] - b
             h = arcs.half[some][:, None]
             away = np.where(away == 0, ON_IT, away)
@@ -341,7 +334,8 @@ def complete_band(loop: Sampled) -> Band | None:
     remaining = sampling.period * (1 - sampling.fraction)
     if C == 0.0:
         return None
-    line = min(TOWARD_SINGULAR / C, DECAYED_EXPONENT / remaining)
+    # e^-30 = 1e-13 is left over a sample of the poles on the line
+    line = min(TOWARD_SINGULAR / C, 30.0 / remaining)
     top = _highest(loop, line)
     missing = None if top is None else _left_of(loop, line, top)
     if top is None or missing is None:
@@ -365,9 +359,12 @@ def _highest(loop: Sampled, line: float) -> float | None:
             return False
 
     heights = np.r_[0.0, np.sort(poles.imag[poles.imag > 0])]
-    tops = [*((heights[1:] + heights[:-1]) / 2).tolist(), float(ABOVE_MODEL * heights[-1] or line)]
+    # 1.02 times the last pole of the model: all of them are in that box
+    tops = [*((heights[1:] + heights[:-1]) / 2).tolist(), float(1.02 * heights[-1] or line)]
     if is_complete(tops[-1]):
-        return tops[-1] * max([1.0, *takewhile(lambda factor: is_complete(factor * tops[-1]), HIGHER)])
+        # times the last pole of the model: heights up to which there may be no other
+        higher = (2.0, 8.0, 32.0, 128.0, 512.0)
+        return tops[-1] * max([1.0, *takewhile(lambda factor: is_complete(factor * tops[-1]), higher)])
     number = bisect_left(tops[:-1], True, key=lambda top: not is_complete(top))
     return tops[number - 1] if number else None
 
@@ -384,22 +381,24 @@ def _left_of(loop: Sampled, line: float, top: float) -> Real | None:
         damped = np.exp(s.real * remaining) / -np.expm1(s.real * T)
         return abs(exact(s) * np.where(analog, 1 / (1 + s / sampling.antialias_corner), 1.0) / s) * damped
 
-    up = _integral(lambda w: sizes(-line + 1j * w), np.r_[0.0, _graded(line / FINER, top)])
-    away = _integral(
-        lambda c: sizes(-c + 1j * top), line + np.r_[0.0, _graded(NEAREST_LEFT / remaining, FARTHEST_LEFT / remaining)]
-    )
+    # the first panel up the line is ten times finer than its distance from the axis
+    up = _integral(lambda w: sizes(-line + 1j * w), np.r_[0.0, _graded(line / 10, top)])
+    # along the top from 0.01 of 1/remaining on, until e^-45 = 3e-20 is left
+    away = _integral(lambda c: sizes(-c + 1j * top), line + np.r_[0.0, _graded(0.01 / remaining, 45.0 / remaining)])
     return None if up is None or away is None else (up + away) * (2 / np.pi) * (1 + 2 * SURE)
 
 
 def _graded(first: float, last: float) -> Real:
     """Ends of panels from `first` to `last`, geometric."""
-    return np.geomspace(min(first, last / 2), last, PANEL_ENDS)
+    # panels are halved where quadratures differ: their number is time alone
+    return np.geomspace(min(first, last / 2), last, 40)
 
 
 def _integral(size: Callable[[Real], Real], ends: Real) -> Real | None:
     """The integral (outputs,) of an absolute value by midpoints, halved until it converges; None if it does not."""
     before: Real | None = None
-    while ends.size < MOST_MIDPOINTS:
+    # a quadrature for which that is not enough has not converged
+    while ends.size < 200_000:
         values = size((ends[1:] + ends[:-1]) / 2) @ np.diff(ends)
         if before is not None and (abs(values - before) <= SURE * np.maximum(values, before)).all():
             return np.maximum(values, before)

@@ -58,10 +58,7 @@ from tfarm.records import frozen
 from tfarm.response.signals import Controller
 from tfarm.schema import Quantity
 
-SMALLEST_RADIUS = 5e-324  # the smallest double, for the logarithm of 0
-OFF_POLE = 1e-17  # for an offset of 0: next to 1 that is none
 MOST_STEPS = 200  # of all roots together: a cluster of nine takes 24
-LAST_STEP = 1e-12  # of the offset: below its rounding
 UNMOVED = 1e-50  # an offset this small is a pole that the loop does not move
 LEAST_SQUARE = -1.0 + 1e-15  # for |z|^2 - 1 of a pole at z = 0, the base of no root
 FADED_RADIUS = 0.2  # a pole nearer to z = 0 is stable and not polished
@@ -331,7 +328,8 @@ class Sampled(Loop):
         shifts = self.rig.open_loop
         pulse = self.pulse
         z[np.argsort(abs(z - 1), kind="stable")[: self.poles_at_one]] = 1.0
-        log_radius = np.log(np.maximum(abs(z), SMALLEST_RADIUS))
+        # the smallest double, for the logarithm of 0
+        log_radius = np.log(np.maximum(abs(z), 5e-324))
         rows = np.flatnonzero((abs(z) > FADED_RADIUS) & (z != 1))
         base = _nearest(self, z - 1)
         offset: Complex = (z - 1) - shifts[base]
@@ -395,7 +393,8 @@ def _settled(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tuple[
     """
     error = np.zeros(offset.size)
     offset = offset.copy()
-    offset[rows] = np.where(offset[rows] == 0, OFF_POLE, offset[rows])
+    # for an offset of 0: next to 1 that is none
+    offset[rows] = np.where(offset[rows] == 0, 1e-17, offset[rows])
     with np.errstate(all="ignore"):  # a root on an open-loop pole, and one that diverges
         for _ in range(MOST_STEPS):
             o = offset[rows]
@@ -404,7 +403,8 @@ def _settled(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tuple[
             others = W / apart[:, rows]
             np.fill_diagonal(others, 0.0)
             step = np.nan_to_num(W / (1 + others.sum(axis=1)), posinf=0.0, neginf=0.0)
-            moving = abs(step) > LAST_STEP * abs(o)
+            # of the offset: a smaller step is below its rounding
+            moving = abs(step) > 1e-12 * abs(o)
             offset[rows] = np.where(abs(o - step) < UNMOVED, UNMOVED, o - step)
             if (abs(f[moving]) <= loop.rounding(base[rows[moving]], o[moving])).all():
                 break

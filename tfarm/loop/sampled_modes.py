@@ -28,7 +28,6 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
 FOLLOWING_STEPS = 24  # of the continuation from zero gain
-LOOPS_KEPT = 4  # whose origins are kept: memory against time, of no effect on a result
 SAMPLED_LOCUS_VALUES = 61  # of a gain along its locus, to begin with
 RIM = 1.12  # radius up to which the z-plane is shown
 DRAWN_RADIUS = 1.2 * RIM  # and up to which a branch is drawn, so that its line runs out of the picture
@@ -126,7 +125,8 @@ def followed_branches(poles: Sequence[Complex], values: Real) -> Complex:
     return np.array(rows)
 
 
-@lru_cache(maxsize=LOOPS_KEPT)
+# four loops are kept: memory against time, of no effect on a result
+@lru_cache(maxsize=4)
 def origins(loop: Sampled) -> NDArray[np.int64]:
     """For each closed-loop pole the open-loop pole where its branch begins, or -1.
 

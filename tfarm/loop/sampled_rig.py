@@ -23,7 +23,6 @@ from tfarm.dsp.discretise import LawInZ, lowest_power, root_product
 from tfarm.dsp.plant import Plant, PulseTransfer, SensedPlant, is_analog
 from tfarm.records import frozen
 
-STATIC_ZERO = 1e-11  # of its terms: a static gain that is 0, summed over 400 modes
 NARROWEST_WIDTH = 1e-17  # rad, of a pole: closer to it angles are not distinct
 WIDTH_SHARE = 1e-2  # of the distance of a pole from the circle: the grid begins so near to it
 BRIGHT = 1e-2  # poles and roots nearer to z = 0 have no narrow feature on the circle
@@ -115,7 +114,8 @@ class SampledRig:
                 rest = at_rest[row]
                 twice, once = plant.rigid[row]
                 own = (-2, twice * T * T) if twice else (-1, once * T) if once else (0, rest)
-                if own[0] == 0 and abs(rest) <= STATIC_ZERO * size[row]:
+                # 1e-11 of its terms: a static gain that is 0, summed over 400 modes
+                if own[0] == 0 and abs(rest) <= 1e-11 * size[row]:
                     own = (1, slopes[row])
                 found.append((n + own[0], float(own[1] * value * weight)))
         return found

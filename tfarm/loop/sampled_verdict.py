@@ -47,10 +47,7 @@ SAMPLED_LOOP = Consumer(
     partly=("arithmetic",),
     none=("reference", "volts"),
 )
-LAW_DELAY_DIGITS = 4  # of the delay margin of a law that is more than gains at the hub
 UNDAMPED_MODES = 20  # of an undamped arm, whose verdict is of the first modes alone
-FEWEST_COMPARED = 8  # modes of the smallest loop, twice as many in each next
-LARGEST_LOG = 700.0  # whose exponential is a double
 RADIUS_AGREES = 1e-4  # of ln of the spectral radius: its largest error with fewer modes
 RADIUS_NOISE = 1e-12  # and its rounding error
 ON_CIRCLE = 1e-12  # of ln|z|: an open-loop pole so near to the circle is on it
@@ -109,7 +106,8 @@ class Verdict(OfLoop, LoopVerdict):
     def spectral_radius(self) -> Annotated[float, Quantity("spectral radius", digits=12,
             help="largest |z| of the closed-loop poles but z = 1 of a free hub angle; below 1 if stable")]:  # fmt: skip
         """Largest |z|; infinity where it overflows."""
-        return math.exp(self.log_radius) if self.log_radius < LARGEST_LOG else math.inf
+        # of 700 the exponential is a double
+        return math.exp(self.log_radius) if self.log_radius < 700.0 else math.inf
 
     @property
     def unstable_poles(self) -> Annotated[int, Quantity("unstable poles",
@@ -249,7 +247,8 @@ def sampled_verdict(case: Case, *, count: int | None = None) -> Verdict:
         is_near = abs(fewer.poles.log_spectral_radius - radius) <= RADIUS_AGREES * abs(radius) + RADIUS_NOISE
         return is_near and fewer.poles.unstable == full.poles.unstable and proven in (None, fewer.poles.unstable)
 
-    few = min(FEWEST_COMPARED, full.plant.count // 2)
+    # 8 modes of the smallest loop, twice as many in each next
+    few = min(8, full.plant.count // 2)
     most = full.plant.count
     loops = (resized(full, few << n) for n in range(most.bit_length()) if 0 < few << n < most)
     loop = next(filter(agrees, loops), full)
@@ -374,7 +373,8 @@ class Analysis(LoopAnalysis):
         if self.loop.is_of_gains:
             return delay_limit(self.loop, self.verdict.band)
         found = delay_margin(self.loop)
-        return Figure(found.samples, LAW_DELAY_DIGITS, None, self.verdict.modes_used, found.is_bound)
+        # four digits of the delay margin of a law that is more than gains at the hub
+        return Figure(found.samples, 4, None, self.verdict.modes_used, found.is_bound)
 
     @property
     def delay_margin(self) -> DelayMargin:
