@@ -11,6 +11,7 @@ import pytest
 import tfarm
 from tests.shared import sized
 from tests.shell import answer, run
+from tests.synthesis.held_loop import HeldLoop
 from tfarm.assessment import card
 from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling, load_chain
@@ -64,6 +65,50 @@ def test_margins_of_random_loops_are_those_of_python_control(name, model, count)
         n = phase.argmin()
         assert own.phase_margin[:2] == pytest.approx((phase[n], crossings[n]), rel=1e-3)
         assert own.peak_sensitivity.value == pytest.approx(max(1.0, (1 / abs(1 + curve)).max()), rel=1e-3)
+
+
+def crossings(omega, L, zero):
+    """Frequencies [rad/s] and values of L where `zero` (n,) changes its sign, along a line between two points."""
+    n = np.flatnonzero(zero[1:] * zero[:-1] <= 0)
+    share = zero[n] / (zero[n] - zero[n + 1])
+    return omega[n] + share * np.diff(omega)[n], L[n] + share * np.diff(L)[n]
+
+
+@pytest.mark.parametrize(("loop", "error"), [("continuous", 1e-5), ("sampled", 1e-3)])
+def test_margins_are_those_of_a_dense_grid(loop, error):
+    """Of L by the arm's transfer functions, and of the samples by a Galerkin model under a hold."""
+    own = getattr(tfarm.result_card(LAB, LAW), loop)
+    if loop == "continuous":
+        omega = np.geomspace(1e-2, 1e4, 400_000)
+        L = 0.3 * tfarm.transfer(LAB, ["hub_rate", "root_moment"])(1j * omega).sum(axis=0)
+        w, at = crossings(omega, L, abs(L) - 1)
+        late = np.mod(math.pi + np.angle(at), 2 * math.pi) / w
+        assert own.delay_margin.value == pytest.approx(1e3 * late.min(), rel=error)
+    else:
+        omega = np.linspace(0.1, 100 * math.pi, 10_000)
+        L = HeldLoop(LAB, 0.01).loop(LAW, 0.01 * omega)
+        w, at = crossings(omega, L, abs(L) - 1)
+    phase = np.degrees(abs(np.angle(-at)))
+    assert own.phase_margin[:2] == pytest.approx((phase.min(), w[phase.argmin()]), rel=error)
+    factors = -1 / crossings(omega, L, L.imag)[1].real
+    assert 10 ** (own.gain_margin.value / 20) == pytest.approx(factors[factors > 1].min(), rel=error)
+    assert own.peak_sensitivity.value == pytest.approx(1 / abs(1 + L).min(), rel=error)
+    assert own.disk_margin == pytest.approx((2 * abs(1 + L) / abs(1 - L)).min(), rel=error)
+
+
+def test_of_a_small_rate_gain_the_card_is_that_of_a_rigid_arm():
+    """L = K1/(J s), and K1 T/(J (z - 1)) of the samples, but for (w/w1)^2 = 1e-9 of the first mode."""
+    T, w = 0.01, 4e-4 / LAB.total_inertia
+    both = tfarm.result_card(LAB, tfarm.HubFeedback(K1=4e-4))
+    turn = 2 * math.asin(w * T / 2)
+    for own, omega, phase, slowest in (
+        (both.continuous, w, 90.0, 1 / w),
+        (both.sampled, turn / T, 90.0 - math.degrees(turn / 2), -T / math.log(1 - w * T)),
+    ):
+        assert own.phase_margin[:2] == pytest.approx((phase, omega), rel=1e-6)
+        assert own.time_constant == pytest.approx(slowest, rel=1e-6)
+    assert both.continuous.delay_margin.value == pytest.approx(1e3 * math.pi / 2 / w, rel=1e-6)
+    assert (both.continuous.peak_sensitivity.value, both.continuous.disk_margin) == pytest.approx((1.0, 2.0), rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -124,10 +169,12 @@ def test_print_and_notebook_show_the_card_and_a_narrow_terminal_opens_with_value
     assert any(re.fullmatch(r"phase margin +deg +7.901 at 63.28 rad/s, poor", line) for line in narrow)
 
 
-def test_default_gains_are_no_design():
+def test_default_gains_are_no_design_and_a_law_in_z_has_a_sampled_card_alone():
     at_default = tfarm.result_card(LAB, tfarm.default_gains(LAB)).notes
     assert [note.partition(";")[0] for note in at_default] == ["default gains: scaled from the paper's, not a design"]
     assert tfarm.result_card(LAB, tfarm.HubFeedback(K1=0.3, K2=0.31)).notes == ()
+    in_z = tfarm.result_card(LAB, tfarm.Law({"hub_rate": ([0.3, 0.0], [1.0, -0.1])}, period=0.01))
+    assert (in_z.continuous, in_z.sampled.stability) == (None, "stable")
 
 
 def test_damping_ratios_of_the_sampled_loop_tend_to_those_of_the_continuous_one():
@@ -186,12 +233,6 @@ def test_a_delay_margin_at_the_end_of_its_search_is_a_lower_bound():
     own, found = tfarm.result_card(rig, law, chain), tfarm.sampled(rig, law, chain)
     assert found.is_lower_bound
     assert own.sampled.delay_margin.as_text(4) == f"≥ {1e3 * found.delay_margin_seconds:g}, good"
-
-
-def test_a_law_in_z_has_a_sampled_card_alone():
-    own = tfarm.result_card(LAB, tfarm.Law({"hub_rate": ([0.3, 0.0], [1.0, -0.1])}, period=0.01))
-    assert own.continuous is None
-    assert own.sampled.stability == "stable"
 
 
 @pytest.mark.parametrize("command", ["margins", "sampled"])

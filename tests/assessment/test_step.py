@@ -18,6 +18,7 @@ from tfarm.loop.time_response import Peak
 LAB, LOSSLESS = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
 SERVO = tfarm.HubFeedback(K1=1.0, K2=0.3, Kp=3.0)
+IN_Z = tfarm.Law({"hub_rate": 0.3}, period=0.01)
 
 
 def test_figures_of_a_second_order_system_are_those_of_the_textbook():
@@ -121,12 +122,6 @@ def test_the_peak_of_the_torque_of_a_delayed_filter_is_the_laws_own():
     assert not any(y[before].any() for y in found.continuous.signals.values())
 
 
-def test_the_duration_is_that_of_the_record():
-    """Of samples of 10 ms."""
-    found = tfarm.step(LAB, LAW, duration=0.5049)
-    assert (found.duration, found.t[-1]) == (0.5, 0.5)
-
-
 def test_settling_counts_from_the_end_of_the_motion_within_the_band():
     """Of the sampled signals by hand: the last time outside the band of the travel, less the slew; none is negative."""
     found = tfarm.step(LAB, SERVO, scenario_name="slew", duration=3.0, settling_band=0.0005)
@@ -180,10 +175,8 @@ def test_an_unstable_loop_has_a_response_and_no_figures():
 
 
 def test_a_law_in_z_has_the_sampled_response_alone():
-    law = tfarm.Law({"hub_rate": ([0.3], [1.0])}, period=0.01, references=("hub_rate",))
-    found = tfarm.step(LAB, law, duration=10.0)
-    assert found.continuous is None
-    assert list(found.loops) == ["sampled, 10 ms"]
+    found = tfarm.step(LAB, replace(IN_Z, references=("hub_rate",)), duration=10.0)
+    assert (found.continuous, list(found.loops)) == (None, ["sampled, 10 ms"])
     assert found.sampled.hub.signal == "hub_rate"
     assert found.sampled.hub.settling_time > 0
 
@@ -201,7 +194,6 @@ def test_a_column_of_references_is_the_reference_of_its_signal():
 
 
 PINNED = LAB.having(payload_mass=math.inf)
-IN_Z = tfarm.Law({"hub_rate": 0.3}, period=0.01)
 REFUSED = {  # arm, law, scenario, and words of the refusal
     "locked": (LAB.having(hub_inertia=math.inf), LAW, "slew", "locked hub"),
     "driven angle": (replace(LAB, input="hub_angle"), LAW, "slew", "input = .hub_angle."),
@@ -223,21 +215,16 @@ def test_what_has_no_response_is_refused_in_a_line(what):
         tfarm.step(arm, law, scenario_name=scenario)
 
 
-@pytest.mark.parametrize(
-    ("arm", "law", "scenario"),
-    [(LAB, LAW, "deflection"), (LAB.having(hub_inertia=0.0), tfarm.HubFeedback(K1=0.3), "pulse")],
-)
-def test_a_released_mode_and_a_massless_hub_have_a_response(arm, law, scenario):
-    found = tfarm.step(arm, law, scenario_name=scenario, duration=0.2)
-    assert found.continuous.stability == "stable"
-    assert all(np.isfinite(y).all() for y in found.continuous.signals.values())
-
-
 @pytest.mark.parametrize("scenario", ["reference", "slew", "pulse", "deflection"])
-def test_a_record_shorter_than_a_period_is_refused(scenario):
+def test_a_record_has_whole_samples_and_one_shorter_than_a_period_is_refused(scenario):
+    """Others are of whole samples, of 10 ms; a released mode and a massless hub have a response too."""
     with pytest.raises(tfarm.ParameterError, match=r"duration = 0\.004: at least one sampling period, 0\.01 s"):
         tfarm.step(LAB, LAW, None, scenario, 0.004)
     assert tfarm.step(LAB, LAW, None, scenario, 0.011).t[-1] >= 0.01
+    arm, law = (LAB.having(hub_inertia=0.0), tfarm.HubFeedback(K1=0.3)) if scenario == "pulse" else (LAB, LAW)
+    found = tfarm.step(arm, law, None, scenario, 0.2049)
+    assert (found.duration, found.t[-1], found.continuous.stability) == (0.2, 0.2, "stable")
+    assert all(np.isfinite(y).all() for y in found.continuous.signals.values())
 
 
 def test_the_command_prints_both_loops_and_writes_their_signals(capsys, tmp_path):

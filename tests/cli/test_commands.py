@@ -34,19 +34,20 @@ def test_response_json(capsys, points, expected):
 
 
 def test_csv_is_the_same_table(capsys, tmp_path):
+    """A file with the usual permissions, and no other."""
     file = tmp_path / "root.csv"
-    code, out, err = run(
-        capsys, "response", "sasaki2012", "--output", "root_moment", "--omega", "1,2", "--csv", str(file)
-    )
-    assert err == f"written: {file}\n"
-    largest = abs(tfarm.transfer(tfarm.load("sasaki2012"), "root_moment")(2j))
-    assert code == 0
-    assert re.search(rf"^largest magnitude +{largest:.6g} N m / N m\nat s +0\+2i 1/s$", out, re.MULTILINE)
+    words = ("response", "sasaki2012", "--output", "root_moment", "--omega", "1,2", "--csv", str(file))
+    code, out, err = run(capsys, *words)
+    assert (code, err) == (0, f"written: {file}\n")
+    value = tfarm.transfer(tfarm.load("sasaki2012"), "root_moment")(2j)
+    assert re.search(rf"^largest magnitude +{abs(value):.6g} N m / N m\nat s +0\+2i 1/s$", out, re.MULTILINE)
     header, *rows = csv.reader(file.read_text().splitlines())
     assert header == ["re_s [1/s]", "im_s [1/s]", "re_root_moment [N m / N m]", "im_root_moment [N m / N m]"]
-    value = tfarm.transfer(tfarm.load("sasaki2012"), "root_moment")(2j)
     assert [float(cell) for cell in rows[1]] == [0.0, 2.0, value.real, value.imag]
     assert list(tmp_path.iterdir()) == [file]
+    other = tmp_path / "other"
+    other.touch()
+    assert stat.S_IMODE(file.stat().st_mode) == stat.S_IMODE(other.stat().st_mode)
 
 
 def test_files_have_all_rows_of_which_a_person_reads_the_first_and_the_last(capsys, tmp_path):
@@ -160,13 +161,6 @@ def test_a_file_is_read_once_in_a_command(tmp_path):
     words = [sys.executable, "-c", OPENED, *lines]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
     assert done.stdout.splitlines() == list(lines.values())
-
-
-def test_files_get_the_usual_permissions(capsys, tmp_path):
-    file, other = tmp_path / "a.csv", tmp_path / "b"
-    other.touch()
-    run(capsys, "response", "sasaki2012", "--output", "root_moment", "--omega", "1", "--csv", str(file))
-    assert stat.S_IMODE(file.stat().st_mode) == stat.S_IMODE(other.stat().st_mode)
 
 
 def test_modes_that_cannot_be_followed_are_listed_with_a_note(capsys, monkeypatch):

@@ -14,49 +14,32 @@ from tests.shell import answer, run
 
 LAB = "sasaki2012-lab"
 BENCH = str(Path(__file__).parents[1] / "rigs" / "bench-rig.toml")
-LAW = """
-[law]
-delay = 0.002
-[law.hub_angle]
-num = [2.0, 1.0]
-den = [0.01, 1.0]
-"""
+LAW = "[law]\ndelay = 0.002\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
 
 
-@pytest.fixture
-def law(tmp_path):
-    file = tmp_path / "law.toml"
-    file.write_text(LAW, encoding="utf-8")
-    return str(file)
+DRAWN = (
+    "bode LAB --to 300",
+    "nyquist LAB",
+    "nyquist LAB --disc",
+    "bode LAB --loop --period 0.01",
+    "nichols LAB --law LAW",
+    "sensitivity LAB",
+    "nyquist LAB --law LAW",
+    "locus LAB --vary K2 --from 0 --to 2 --points 40 --branches 3",
+    "locus LAB --law LAW --vary gain --from 0 --to 40 --points 20 --branches 2",
+    "map LAB --points 21",
+    "simulate LAB --duration 2 --modes 8",
+    "step LAB --scenario deflection --duration 1",
+    "map LAB --law LAW --points 8 --vary hub_angle.num.0=0,20 --vary delay=0,0.02",
+)
 
 
-DRAWN = {
-    "bode": ["bode", LAB, "--to", "300"],
-    "nyquist": ["nyquist", LAB],
-    "nyquist disc": ["nyquist", LAB, "--disc"],
-    "loop": ["bode", LAB, "--loop", "--period", "0.01"],
-    "nichols of a law": ["nichols", LAB, "--law", "LAW"],
-    "sensitivity": ["sensitivity", LAB],
-    "nyquist of a law": ["nyquist", LAB, "--law", "LAW"],
-    "locus": ["locus", LAB, "--vary", "K2", "--from", "0", "--to", "2", "--points", "40", "--branches", "3"],
-    "locus of a law": [
-        *("locus", LAB, "--law", "LAW", "--vary", "gain", "--from", "0", "--to", "40"),
-        *("--points", "20", "--branches", "2"),
-    ],
-    "map": ["map", LAB, "--points", "21"],
-    "simulate": ["simulate", LAB, "--duration", "2", "--modes", "8"],
-    "step": ["step", LAB, "--scenario", "deflection", "--duration", "1"],
-    "map of a law": [
-        *("map", LAB, "--law", "LAW", "--points", "8"),
-        *("--vary", "hub_angle.num.0=0,20", "--vary", "delay=0,0.02"),
-    ],
-}
-
-
-@pytest.mark.parametrize("words", thinned([(each,) for each in DRAWN.values()], 3), ids=DRAWN)
-def test_a_picture_is_written_and_named(words, law, tmp_path, capsys):
+@pytest.mark.parametrize("line", thinned(DRAWN, 3))
+def test_a_picture_is_written_and_named(line, tmp_path, capsys):
+    (tmp_path / "law.toml").write_text(LAW, encoding="utf-8")
+    names = {"LAB": LAB, "LAW": str(tmp_path / "law.toml")}
     file = tmp_path / "drawn.png"
-    code, out, err = run(capsys, *(law if word == "LAW" else word for word in words), "--png", str(file))
+    code, out, err = run(capsys, *(names.get(word, word) for word in line.split()), "--png", str(file))
     assert (code, err) == (0, f"written: {file}\n")
     assert out
     pixels = image.imread(file)

@@ -65,16 +65,16 @@ def test_hub_frequencies_fall_and_interlace_with_those_of_pin_and_lock(arm):
     assert np.all(np.array([row.sensitivity for row in study.candidates]) < 0)
 
 
-def test_a_hub_without_an_inertia_has_no_candidates_and_no_loop():
-    for arm in (LOCKED, PINNED):
-        answer = to_dict(assumptions(arm, 1))
-        assert answer["hub"] is None
-        assert {(row["verdict"], row["K2_below"]) for row in answer["section"]["candidates"]} == {("no loop", None)}
-
-
 def test_verdicts_are_those_of_the_loop_itself():
-    """The arm's own row is that of `margins`, and every row that of its own closed-loop poles."""
+    """The arm's own row is that of `margins`, and every row that of its own closed-loop poles.
+
+    A hub without an inertia has no candidates and no loop.
+    """
     arm = tfarm.load("sasaki2012-lab")
+    for odd in (LOCKED, PINNED):
+        found = to_dict(assumptions(odd, 1))
+        assert found["hub"] is None
+        assert {(row["verdict"], row["K2_below"]) for row in found["section"]["candidates"]} == {("no loop", None)}
     study = hub_study(arm)
     assert own_row(study).K2_below == pytest.approx(tfarm.margins(arm, PAPER_GAINS).windows["K2"].around[1], rel=1e-12)
     for row in study.candidates[1::2]:

@@ -86,7 +86,11 @@ def test_any_processes_and_the_declared_study_have_the_same_bytes(whole, tmp_pat
 
 
 def test_csv_has_the_numbers_of_parquet(tmp_path, monkeypatch):
-    parquet = STUDY(out=tmp_path / "a", draws=6, part=4, workers=1).table()
+    """Progress has the time left from the first part on."""
+    seen = []
+    parquet = STUDY(out=tmp_path / "a", draws=6, part=4, workers=1, progress=lambda *each: seen.append(each)).table()
+    assert [each[:2] for each in seen] == [(0, 2), (1, 2), (2, 2)]
+    assert all("s left" in text for *_, text in seen[1:])
     monkeypatch.setattr(running.importlib.util, "find_spec", lambda _: None)
     csv = STUDY(out=tmp_path / "b", draws=6, part=4, workers=1)
     assert {path.suffix for path in (tmp_path / "b").glob("part-*")} == {".csv"}
@@ -170,6 +174,11 @@ def test_sobol_samples_and_the_search_for_the_worst_arm_are_resumed(tmp_path, mo
         assert rows == []
         assert findings(SAMPLED(out=tmp_path / "once")) == findings(whole)
         assert len(rows) == expected
+    SAMPLED(out=tmp_path / "late", worst="", sobol=0)
+    with monkeypatch.context() as patch:
+        rows = counted(patch)
+        found = SAMPLED(out=tmp_path / "late", stop_after=0.0)  # begins no part of any kind
+        assert (found.sobol, found.worst, len(rows)) == ((), None, pilot)
     total, runs = 0, 0
     while runs < 40:
         with monkeypatch.context() as patch:
@@ -187,16 +196,6 @@ def test_sobol_samples_and_the_search_for_the_worst_arm_are_resumed(tmp_path, mo
     files = [{path.name: path.read_bytes() for path in (tmp_path / name).glob("_*")} for name in ("parts", "whole")]
     assert files[0] == files[1]
     assert {name[:6] for name in files[0]} == {"_sobol", "_worst"}
-
-
-def test_after_its_time_a_study_begins_no_part_of_any_kind(tmp_path, monkeypatch):
-    SAMPLED(out=tmp_path, worst="", sobol=0)
-    with monkeypatch.context() as patch:
-        rows = counted(patch)
-        found = SAMPLED(out=tmp_path, stop_after=0.0)
-        assert (found.sobol, found.worst) == ((), None)
-        assert len(rows) == 1 + running.PILOT
-    assert SAMPLED(out=tmp_path).worst.evaluations > 0
 
 
 def full(call, most):
@@ -246,13 +245,6 @@ def test_chunks_last_5_to_30_s_and_workers_end_together():
                     assert last == workers  # chunks in the last round
 
 
-def test_first_progress_has_the_time_left(tmp_path):
-    seen = []
-    STUDY(out=tmp_path, draws=8, part=4, workers=1, progress=lambda *each: seen.append(each))
-    assert [each[:2] for each in seen] == [(0, 2), (1, 2), (2, 2)]
-    assert all("s left" in text for *_, text in seen[1:])
-
-
 def test_a_law_of_matrices_is_kept_with_its_delay_and_references(tmp_path):
     law = tfarm.Law.of_matrices(
         [[-1.0, 0.5], [0.0, -2.0]], [[1.0, 0.0], [0.0, 1.0]], [[0.3, 0.1]], [[0.2, 0.1]], ["hub_rate", "root_moment"],
@@ -265,15 +257,10 @@ def test_a_law_of_matrices_is_kept_with_its_delay_and_references(tmp_path):
     assert (found.delay, found.references, found.signals) == (0.001, ("hub_rate",), law.signals)
 
 
-def test_missing_extras_and_silent_schedulers_are_one_line(tmp_path, monkeypatch):
+def test_missing_extras_and_silent_schedulers_are_one_line(monkeypatch):
     monkeypatch.setattr(running, "PATIENCE", 0.5)
-    with (
-        pytest.raises(ParameterError, match="no scheduler with a worker answers"),
-        running.cluster("tcp://127.0.0.1:9"),
-    ):
-        pass
-    with pytest.raises(ParameterError, match="no scheduler with a worker answers"), running.cluster("nowhere"):
-        pass
+    for place in ("tcp://127.0.0.1:9", "nowhere"):
+        refused("no scheduler with a worker answers", running.cluster, place)
     for name, words in (("distributed", "tfarm\\[cluster\\]"), ("pyarrow", "tfarm\\[study\\]")):
         monkeypatch.setitem(sys.modules, name, None)
         refused(f"needs {name}: pip install '{words}'", extra, name, words[7:-2], "key", "value")

@@ -9,7 +9,7 @@ from scipy.signal import cont2discrete
 
 from tests.loop.ritz_loop import RitzLoop
 from tfarm import Arm, HubFeedback
-from tfarm.arm import as_law
+from tfarm.case import Case
 
 ROWS = ("hub_angle", "hub_rate", "root_moment")
 
@@ -47,7 +47,7 @@ class HeldLoop:
     def poles(self, law):
         """Closed-loop poles under any law: eigenvalues of the loop's whole state matrix, block after block."""
         A, B, sense = self.parts
-        for row, num, den in blocks(as_law(law), self.period):
+        for row, num, den in blocks(Case(self.arm, law).law, self.period):
             order, num = len(den) - 1, np.r_[np.zeros(len(den) - len(num)), num] / den[0]
             den = den / den[0]
             through, rest = num[0], num[1:] - num[0] * den[1:]
@@ -61,14 +61,14 @@ class HeldLoop:
     def radius(self, law):
         """The spectral radius, z = 1 of a free hub angle that the law does not read left out."""
         z = self.poles(law)
-        return float(abs(z if "hub_angle" in as_law(law).signals else z[abs(z - 1) > 1e-7]).max())
+        return float(abs(z if "hub_angle" in Case(self.arm, law).law.signals else z[abs(z - 1) > 1e-7]).max())
 
     def loop(self, law, q):
         """L at e^{iq}."""
         A, B, sense = self.parts
         z, eye = np.exp(1j * q), np.eye(len(A))
         H = np.array([sense @ np.linalg.solve(each * eye - A, B) for each in z]).T
-        found = blocks(as_law(law), self.period)
+        found = blocks(Case(self.arm, law).law, self.period)
         return sum(np.polyval(num, z) / np.polyval(den, z) * H[row] for row, num, den in found)
 
     def damping(self, law, modes, steps=300):

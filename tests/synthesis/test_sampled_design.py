@@ -41,7 +41,7 @@ HELD = HeldLoop(LAB, 0.01)
 
 
 @pytest.mark.parametrize("name", thinned(tfarm.presets(), 8))
-def test_what_is_recommended_holds_when_sampled(name) -> None:
+def test_what_is_recommended_holds_when_sampled(name):
     """By the whole verdict, at the gains and a quarter to either side, and in continuous time."""
     found = design(tfarm.load(name), chain=tfarm.dsp.load_chain(name))
     laws = [found.law.times(share) for share in (1 / RESERVE, 1.0, RESERVE)]
@@ -55,21 +55,20 @@ def found():
     return {objective: design(LAB, objective) for objective in ("damping", "margin", "residual")}
 
 
-def test_the_best_continuous_time_gains_are_unstable_when_sampled(found) -> None:
-    """K1 = 26, K2 = -3 has a radius of 2.5 at 10 ms; the recommended gains stay inside, by another model."""
+def test_the_best_continuous_time_gains_are_unstable_when_sampled(found):
+    """K1 = 26, K2 = -3 has a radius of 2.5 at 10 ms; the recommended gains stay inside, by another model.
+
+    12 Ritz terms have the first two frequencies to 1e-6, and aliases of the higher ones do not count for the damping.
+    """
     assert HELD.radius(HubFeedback(K1=26.0, K2=-3.0)) == pytest.approx(2.5, abs=0.1)
     for each in found.values():
         assert HELD.radius(each.law) < 1.0
         # on the edge of the reserve a radius is 1, and the Ritz model's is right to 1e-6
         assert max(HELD.radius(each.law.times(share)) for share in (1 / RESERVE, RESERVE)) < 1.0 + 1e-6
-
-
-def test_the_damping_is_that_of_poles_followed_from_the_open_loop(found) -> None:
-    """12 Ritz terms have the first two frequencies to 1e-6, and aliases of the higher ones do not count."""
     assert HELD.damping(found["damping"].law, 2) == pytest.approx(found["damping"].value, rel=1e-4)
 
 
-def test_random_gains_are_no_better(found) -> None:
+def test_random_gains_are_no_better(found):
     rng, grid = np.random.default_rng(8), np.linspace(1e-3, np.pi, 200)
     tried = 0
     for K1, K2 in zip(20 * rng.random(24) ** 2, rng.uniform(-1, 1, 24), strict=True):
@@ -86,7 +85,7 @@ def test_random_gains_are_no_better(found) -> None:
     assert tried > 6
 
 
-def test_the_cost_is_that_of_the_tuners_trial_and_no_gains_cost_less() -> None:
+def test_the_cost_is_that_of_the_tuners_trial_and_no_gains_cost_less():
     """Its trial has another model, of six modes; neighbours and the best constant K of the default K1 cost more."""
     found = design(LAB, "cost", K1=(0.05, 5.0), K2=(-0.9, 0.9))
     gains = [(found.law.K1, found.law.K2), (0.3, best_constant(slew_trial(LAB, K1=0.3)).gain)]
@@ -98,7 +97,7 @@ def test_the_cost_is_that_of_the_tuners_trial_and_no_gains_cost_less() -> None:
         design(LAB, "cost", continuous=True)
 
 
-def test_the_residual_moment_scales_with_the_mass_of_a_similar_arm() -> None:
+def test_the_residual_moment_scales_with_the_mass_of_a_similar_arm():
     """Density, stiffnesses and hub times 1e4: all torques are, and K1; 4 kN m of a stable law are no instability."""
     own = LAB.link
     link = replace(own, density=1e4 * own.density, youngs_modulus=1e4 * own.youngs_modulus,
@@ -110,13 +109,10 @@ def test_the_residual_moment_scales_with_the_mass_of_a_similar_arm() -> None:
     np.testing.assert_allclose([found.law.K1, found.law.K2], [1e4 * small.law.K1, small.law.K2], rtol=0.05)
 
 
-def test_where_nothing_holds_nothing_is_recommended() -> None:
+def test_gains_for_a_random_rig_hold_on_another_model_and_nothing_is_recommended_where_nothing_holds():
     late = Chain(sampling=Sampling(delay_samples=3.0))
     with pytest.raises(ConvergenceError, match="widen the bounds"):
         design(replace(LAB, name="late"), K1=(30.0, 60.0), K2=(-3.0, -2.0), chain=late)
-
-
-def test_gains_for_a_random_rig_hold_on_another_model():
     over, own, _ = excess(np.random.default_rng([1, 0]), (TWO_GAINS,))
     assert over <= 0
     assert own < 0

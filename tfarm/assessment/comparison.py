@@ -409,12 +409,12 @@ def _modes_of_arm(arm: Arm, count: int, most: int) -> tuple[list[ArmMode], dict[
 def _sampled_poles(found: Analysis, most: int) -> tuple[Complex, dict[int, complex]]:
     """The first poles s = ln(z)/T [1/s] of a sampled loop with Im s >= 0, ascending in Im s, that outlive a sample.
 
-    And those of the rig by itself with Im z > 0, by flexible mode.
+    And those of the rig by itself, by flexible mode, 0 for none.
     """
     T, pulse, z = found.loop.chain.sampling.period, found.loop.pulse, found.loop.poles.z
     z = np.where(abs(z.imag) <= 1e-12, z.real, z)  # but for rounding
     s = np.log(z[(abs(z) > 1e-3) & (z.imag >= 0)]) / T  # of others a thousandth is left after a sample
-    upper = np.nonzero((pulse.mode > 0) & (pulse.poles.imag > 0))[0]
+    upper = pulse.poles.imag > 0
     own = np.log(pulse.multipliers[upper]) / T
     by_mode = zip(pulse.mode[upper].tolist(), (own.real + 1j * abs(own.imag)).tolist(), strict=True)
     return np.asarray(s[np.lexsort((s.real, s.imag))][:most]), dict(by_mode)

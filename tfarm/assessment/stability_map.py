@@ -169,10 +169,6 @@ def least_damping(plane: Plane) -> Real:
     """
     signals = tuple(each.output for name in PLANE for each in GAINS if each.name == name)
     model = continuous_model(plane.arm, signals, DESIGNED_MODES, 8, first_frequency(plane.arm))
-    points = np.reshape(np.meshgrid(*plane.axes), (2, -1))
-    found = []
-    # five hundred points at a time for memory, whatever the grid
-    for part in np.array_split(points, math.ceil(points.shape[1] / 500), axis=1):
-        law = [Entry(name, row[None], ONE) for name, row in zip(signals, part, strict=True)]
-        found.append(damping_of(model, model.poles(law)))
-    return np.concatenate(found).reshape(plane.y.size, plane.x.size)
+    grids = np.meshgrid(*plane.axes)
+    laws = [Entry(name, grid.reshape(1, -1), ONE) for name, grid in zip(signals, grids, strict=True)]
+    return damping_of(model, model.poles(laws)).reshape(grids[0].shape)

@@ -156,10 +156,10 @@ class _Record:
         """The continuous-time loop; `omitted` ends its certainty."""
         t = np.union1d(self.t, response.near_starts(float(self.t[-1])))
         y = response.at(t)
-        more = np.setdiff1d(self._crossings(t, dict(zip(response.names, y, strict=True))), t)
-        places = np.searchsorted(t, more)
-        t, y = np.insert(t, places, more), np.insert(y, places, response.at(more), axis=1)
-        bound, peaks = response.remainder(t), response.peaks(t)
+        t = np.union1d(t, self._crossings(t, dict(zip(response.names, y, strict=True))))
+        y = response.at(t)
+        bound = response.remainder(t)
+        peaks = response.peaks(t)
         curves = {name: (t, y[n], bound[n], peaks[name]) for n, name in enumerate(response.names)}
         is_converged = all(
             (error <= CONVERGED * abs(peak.value)).all() and peak.bound <= CONVERGED * abs(peak.value)

@@ -202,7 +202,7 @@ def _columns(name: str, label: str, unit: str, meaning: str) -> dict[str, Quanti
 
 
 def _tuner_of(one: Subject, _: Set[str]) -> dict[str, Any]:
-    tuning = tuned(one.case.arm, one.case.chain, one.plan, **one.tuner)
+    tuning = tuned(one.case.arm, one.case.chain, None, **one.tuner)
     training = tuning.training
     return {
         **_numbered(TRIAL_COST, training.costs),
@@ -352,28 +352,31 @@ class Failure(NamedTuple):
     row: Annotated[int, Quantity("first row", help="number of the first of these rows")]
 
 
-def least_share(successes: int, count: int, confidence: float = CONFIDENCE) -> float:
-    """Return the share that is exceeded with that confidence, one-sided (Clopper and Pearson, 1934)."""
+def least_share(successes: int, count: int) -> float:
+    """Return the share that is exceeded with 95 % confidence, one-sided (Clopper and Pearson, 1934)."""
     test = scipy.stats.binomtest(successes, count, alternative="greater")
-    return float(test.proportion_ci(confidence, method="exact").low)
+    return float(test.proportion_ci(CONFIDENCE, method="exact").low)
 
 
 def shares_of(table: Mapping[str, Any], names: Sequence[str], is_independent: bool) -> tuple[StableShare, ...]:
     """Return the stable shares of the loops whose stability was computed."""
     found = []
     for loop in [each for each in LOOPS if f"{each}.stability" in names]:
-        words = table[f"{loop}.stability"]
-        stable = int((words == STABLE).sum())
-        open_ = int((words == "").sum())
-        count = len(words)
-        texts = table.get(f"{loop}.certainty", np.full(count, ""))[words == STABLE].tolist()
-        known = [text.partition(" ")[0].rstrip(",") for text in texts]
+        words = table[f"{loop}.stability"].tolist()
+        stable = words.count(STABLE)
+        undetermined = words.count("")
+        texts = table.get(f"{loop}.certainty", [""] * len(words))
+        known = [text.partition(" ")[0].rstrip(",") for text, word in zip(texts, words, strict=True) if word == STABLE]
         weakest = ["exact", "certified", "converged", "approximate", "not determined", ""]
-        found.append(StableShare(
-            loop=loop.replace("continuous", "continuous-time"), stable=stable, open=open_, other=count - stable - open_,
+        share = StableShare(
+            loop=loop.replace("continuous", "continuous-time"),
+            stable=stable,
+            other=len(words) - stable - undetermined,
+            open=undetermined,
             certainty=max(known, key=weakest.index, default=""),
-            at_least=Percent(least_share(stable, count)) if is_independent else None,
-        ))  # fmt: skip
+            at_least=Percent(least_share(stable, len(words))) if is_independent else None,
+        )
+        found.append(share)
     return tuple(found)
 
 

@@ -28,7 +28,6 @@ from tfarm.case import Case
 from tfarm.errors import ConvergenceError, ParameterError, TfarmError, one_line, require
 from tfarm.files import write_file
 from tfarm.records import frozen
-from tfarm.tuner import Plan as TunerPlan
 
 from .quantities import FAILED, Values, prepare, quantity_of, sources_of, values_of
 from .space import Space, Subject, Subjects, extra, parquet
@@ -64,7 +63,6 @@ class Plan:
     case: Case
     space: Space
     names: tuple[str, ...]
-    tuner: TunerPlan | None = None  # the usual one of each arm by default
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -85,7 +83,7 @@ class Plan:
     def subjects(self) -> Subjects:
         """The arms and loops of the rows."""
         fitted = self.space.posterior.keys if self.space.posterior else ()
-        return Subjects(self.case, self.space.keys, self.tuner, fitted)
+        return Subjects(self.case, self.space.keys, fitted)
 
 
 def chunk(plan: Plan, first: int, last: int, listed: Real | None = None) -> Chunk:
@@ -108,6 +106,11 @@ def table_of(plan: Plan, first: int, rows: Real) -> Chunk:
             for name, column in table.items():
                 column.append(found.get(name))
     return table
+
+
+def rows_of(table: Mapping[str, Sequence[Any]]) -> list[Row]:
+    """Return the rows of a table."""
+    return [dict(zip(table, values, strict=True)) for values in zip(*table.values(), strict=True)]
 
 
 def _attempt(function: Callable[..., Any], *arguments: Any) -> Any:
@@ -323,19 +326,17 @@ def searched(parts: Parts, search: Callable[[Callable[[Real], Row]], object], de
     Each is written as a part and computed once: an interrupted search goes on where it was.  None where it has no end
     before the deadline [s].
     """
-    columns = parts.column(*parts.plan.columns)
+    known = rows_of(parts.column(*parts.plan.columns))
     seen = list[Row]()
-    rows = zip(*columns.values(), strict=True)
-    known = {int(values[0]): dict(zip(columns, values, strict=True)) for values in rows}
 
     def result(values: Real) -> Row:
         n = len(seen)
-        if n not in known:
+        if n == len(known):
             if time.monotonic() >= deadline:
                 raise TimeoutError
             table = table_of(parts.plan, n, values)
             parts.write(n, table)
-            known[n] = {name: of[0] for name, of in table.items()}
+            known.extend(rows_of(table))
         seen.append(known[n])
         return known[n]
 

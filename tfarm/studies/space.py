@@ -21,6 +21,7 @@ from typing import Any, NamedTuple, get_args
 import numpy as np
 import scipy  # whose statistics take half a second to load, and do so where they are used
 
+from tfarm.arm.chain import CHAIN_TABLES
 from tfarm.arm.checks import number
 from tfarm.arm.feedback import OUTPUT_OF
 from tfarm.arm.writing import KeyedArms, numbers_of
@@ -41,14 +42,12 @@ LONGEST_LINE = 1 << 20  # characters, of some ten thousand numbers
 LIST = "a CSV or Parquet file with a column a key"
 MOST_SEED = 2**63
 ENDS = 2.0**-54, 1 - 2.0**-53  # of uniform numbers: at 0 and 1 the inverse of a normal distribution is infinite
-FORMS: dict[str, tuple[str, Callable[..., Any]]] = {  # kind of a distribution: its numbers in words, and SciPy's
-    "uniform": ("LOW, HIGH", lambda low, high: low < high and scipy.stats.uniform(low, high - low)),
-    "loguniform": ("LOW, HIGH, above 0", lambda low, high: 0 < low < high and scipy.stats.loguniform(low, high)),
-    "normal": ("MEAN, DEVIATION", lambda mean, deviation: deviation > 0 and scipy.stats.norm(mean, deviation)),
-    "lognormal": (
-        "MEDIAN, DEVIATION of ln",
-        lambda median, s: min(median, s) > 0 and scipy.stats.lognorm(s, scale=median),
-    ),
+# kind of a distribution: its numbers in words, and SciPy's, whose quantiles are NaN for others
+FORMS: dict[str, tuple[str, Callable[..., Any]]] = {
+    "uniform": ("LOW, HIGH", lambda low, high: scipy.stats.uniform(low, high - low)),
+    "loguniform": ("LOW, HIGH, above 0", lambda low, high: scipy.stats.loguniform(low, high)),
+    "normal": ("MEAN, DEVIATION", lambda mean, deviation: scipy.stats.norm(mean, deviation)),
+    "lognormal": ("MEDIAN, DEVIATION of ln", lambda median, s: scipy.stats.lognorm(s, scale=median)),
 }
 GRIDS: dict[str, tuple[str, Callable[..., Any]]] = {
     "grid": ("LOW, HIGH, COUNT", lambda low, high, count:
@@ -71,11 +70,10 @@ class Distribution(NamedTuple):
 
 
 class Subject(NamedTuple):
-    """One case of a study, with numbers and plan of the tuner."""
+    """One case of a study, with numbers of the tuner."""
 
     case: Case
     tuner: dict[str, float]
-    plan: tuning.Plan | None = None
 
 
 class Listing(NamedTuple):
@@ -193,8 +191,8 @@ def _distribution(place: str, entry: Any) -> Distribution:
     is_finite = False
     with suppress(TypeError), np.errstate(all="ignore"):  # TypeError: no list, or another count of numbers
         found = Distribution(kind, tuple(number(place, each, remedy) for each in numbers))
-        made = all(map(math.isfinite, found.numbers)) and found.frozen
-        is_finite = made and np.isfinite(made.ppf(ENDS) if kind in FORMS else made).all()
+        points = found.frozen.ppf(ENDS) if kind in FORMS else found.frozen
+        is_finite = points is not False and len(points) > 0 and bool(np.isfinite(points).all())
     require(is_finite, place, numbers, remedy)
     return found
 
@@ -207,18 +205,15 @@ class Subjects:
     a Young's modulus that is `fitted`: a fit has changed both.  Raises ParameterError for an unknown one.
     """
 
-    def __init__(
-        self, case: Case, keys: Sequence[str], plan: tuning.Plan | None = None, fitted: Collection[str] = ()
-    ) -> None:
+    def __init__(self, case: Case, keys: Sequence[str], fitted: Collection[str] = ()) -> None:
         self.case = case
         self.keys = keys
-        self.plan = plan
-        chain = case.chain
         numbers = {
-            f"{table.name}.{each.name}": (table.name, each.name)
-            for table in fields(chain) if table.name != "period_from"
-            for each in fields(getattr(chain, table.name)) if float in (each.type, *get_args(each.type))
-        }  # fmt: skip
+            f"{table}.{each.name}": (table, each.name)
+            for table in CHAIN_TABLES
+            for each in fields(getattr(case.chain, table))
+            if float in (each.type, *get_args(each.type))
+        }
         self._of_chain = {key: numbers[key] for key in keys if key in numbers}
         self._of_law = [key for key in keys if key.startswith(LAW)]
         signals = []
@@ -251,7 +246,7 @@ class Subjects:
         for key, (table, name) in self._of_chain.items():
             chain = replace(chain, **{table: replace(getattr(chain, table), **{name: values[key]})})
         tuner = {key.removeprefix(TUNER): values[key] for key in self._of_tuner}
-        return Subject(Case(arm, law, chain), tuner, self.plan)
+        return Subject(Case(arm, law, chain), tuner)
 
 
 # ------------------------------------------------------------------------------------------------------------ lists

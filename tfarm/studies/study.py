@@ -69,6 +69,7 @@ from .running import (
     Row,
     complete,
     on_cluster,
+    rows_of,
     run,
     searched,
     seconds_an_arm,
@@ -361,7 +362,8 @@ def badness(order: Sequence[str], values: Mapping[str, Any]) -> float:
         return -math.inf
     # of these by their size
     size = abs(value) if any(name in order[0] for name in ("peak", "steady_state_error")) else value
-    return min(max(size if any(name in order[0] for name in LARGER_IS_WORSE) else -size, -BEYOND), BEYOND / 2)
+    is_larger_worse = any(name in order[0] for name in LARGER_IS_WORSE)
+    return float(np.clip(size if is_larger_worse else -size, -BEYOND, BEYOND / 2))
 
 
 def worst_arm(study: Study, order: Sequence[str], deadline: float) -> WorstArm | None:
@@ -370,8 +372,7 @@ def worst_arm(study: Study, order: Sequence[str], deadline: float) -> WorstArm |
     None where the search has no end before the deadline [s].
     """
     table = study.table()
-    columns = {name: table[name].tolist() for name in order}
-    ranks = [badness(order, {name: of[n] for name, of in columns.items()}) for n in range(study.done)]
+    ranks = [badness(order, row) for row in rows_of({name: table[name].tolist() for name in order})]
     first = int(np.argmax(ranks))
     require(ranks[first] > -math.inf, "worst", order[0], "no arm has a value of it")
     drawn = {name: of[first] for name, of in table.items()}

@@ -398,14 +398,12 @@ class Slews:
         The rigid arm's is 0 then.  Angle and rate have references here, the moment has none.  Of the reference angle,
         rate and acceleration are states of their own: the acceleration is constant over each half of the slew.
         """
-        names = self.model.signals
         slew = self.chain.slew
         A, B, C, D = self._driven(entries, 0)
-        signals = np.zeros((1 + len(names), 3))
-        signals[0, 1:] = self.known.rate_loss, self.known.turned_inertia
-        for column, name in enumerate(("hub_angle", "hub_rate")):
-            if name in names:
-                signals[1 + names.index(name), column] = 1.0
+        # the feed-forward and the references by angle, rate and acceleration
+        followed = {"hub_angle": (1.0, 0.0, 0.0), "hub_rate": (0.0, 1.0, 0.0)}
+        forward = (0.0, self.known.rate_loss, self.known.turned_inertia)
+        signals = np.array([forward, *(followed.get(name, (0.0, 0.0, 0.0)) for name in self.model.signals)])
         size = A.shape[1]
         whole = np.zeros((len(A), size + 3, size + 3))
         whole[:, :size, :size], whole[:, :size, size:] = A, B @ signals
