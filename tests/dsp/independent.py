@@ -65,18 +65,20 @@ def read_analog(arm, law, chain, count):
     return whole, np.vstack([B, corner * D[rows]]), seen, through
 
 
+def held(A, B, duration):
+    """What a time [s] makes of the states, and what a unit input held so long adds."""
+    n = len(A)
+    both = expm(duration * np.block([[A, np.reshape(B, (n, 1))], [np.zeros((1, n + 1))]]))
+    return both[:n, :n], both[:n, n]
+
+
 def stepped(arm, law, chain, count=MODES):
     """The closed loop's matrix of a modal model: matrix exponentials, held inputs and the law's states."""
     A, B, C, D = read_analog(arm, law, chain, count)
     T, d = chain.sampling.period, chain.sampling.whole_delay
     f = chain.sampling.fraction
     n = len(A)
-
-    def held(duration):
-        both = expm(duration * np.block([[A, B], [np.zeros((1, n + 1))]]))
-        return both[:n, :n], both[:n, n]
-
-    (first, late), (second, early) = held(f * T), held((1 - f) * T)
+    (first, late), (second, early) = held(A, B, f * T), held(A, B, (1 - f) * T)
     Ak, Bk, Ck, Dk = law.matrices()
     m = len(Ak)
     size = n + d + 1 + m  # the arm, u_{k-1} .. u_{k-d-1}, the law

@@ -6,10 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 
 import tfarm
-from tests.dsp.independent import stepped
+from tests.dsp.independent import held, stepped
 from tests.rigs import some_rig
 from tests.shared import thinned
 from tfarm.arm import HubFeedback, Law, RotarySpring
@@ -43,14 +42,13 @@ def test_signals_are_those_of_the_modal_state_space(arm, delay):
     run = Simulator(Case(arm, HubFeedback(), chain), task, count=4, between=4, outputs=OTHERS).linear(GAINS)
     names = (*RECORDED, *OTHERS)
     A, B, C, D = modal_model(arm, names, 4).matrices()
-    n = len(A)
-    step = expm(np.block([[A, B], [np.zeros((1, n + 1))]]) * chain.sampling.period / 5)
-    x, found = np.zeros(n), [np.zeros(len(names))]
+    step, by_torque = held(A, B, chain.sampling.period / 5)
+    x, found = np.zeros(len(A)), [np.zeros(len(names))]
     for j in range(5 * task.t.size):
         k, late = j // 5, (j - round(5 * delay)) // 5
-        held = task.disturbance[k] + (run.torque[late] if late >= 0 else 0.0)
-        x = step[:n, :n] @ x + step[:n, n] * held
-        found.append(C @ x + D[:, 0] * held)
+        torque = task.disturbance[k] + (run.torque[late] if late >= 0 else 0.0)
+        x = step @ x + by_torque * torque
+        found.append(C @ x + D[:, 0] * torque)
     assert run.at_samples.names == names
     for name, signal in zip(names, np.array(found[:-1]).T.reshape(len(names), -1, 5), strict=True):
         for trace, exact in ((run.at_samples, signal[:, 0]), (run.between, signal[:, 1:].ravel())):

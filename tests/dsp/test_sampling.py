@@ -41,6 +41,16 @@ def test_the_state_space_is_the_pulse_transfer_function(lab):
     np.testing.assert_allclose(system(z)[:, 0], H(z), rtol=1e-12)
 
 
+@pytest.mark.parametrize("delay", [0.0, 0.3, 1.0, 2.6])
+def test_the_states_of_a_braked_hub_are_its_pulse_transfer_function(lab, delay):
+    """With friction that leaves the digits of both."""
+    braked = replace(lab, hub=replace(lab.hub, friction=0.3))
+    H = pulse_transfer(braked, ["hub_angle", *BOTH], Sampling(delay_samples=delay))
+    assert H.plant.braked(0.1 / T) is not None
+    z = np.array([1.2j, 0.95 * np.exp(0.3j), -1.1 + 0.2j])
+    np.testing.assert_allclose(H.state_space()(z)[:, 0], H(z), rtol=1e-9)
+
+
 def test_lossless_poles_stay_on_the_circle(lossless):
     H = pulse_transfer(lossless, BOTH, Sampling(), count=100)
     assert abs(abs(H.multipliers) - 1).max() <= 2 * np.finfo(float).eps

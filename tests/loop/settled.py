@@ -10,9 +10,10 @@ must agree, or one of 240 polynomials decides; a growth below 1e-7 a sample is n
 from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import block_diag, expm
+from scipy.linalg import block_diag
 
 from tests import survey
+from tests.dsp.independent import held
 from tests.models import Ritz
 from tests.plausible.arms import log
 from tests.strategies import arm_of
@@ -126,7 +127,7 @@ class HoldModel:
         """The largest ln|z|, the hub angle's own pole at z = 1 apart (Kp = 0)."""
         T, delay = chain.sampling.period, chain.sampling.delay_samples
         d, n = int(np.floor(delay)), self.B.size
-        (before, late), (after, early) = self._held((delay - d) * T), self._held((1 - delay + d) * T)
+        (before, late), (after, early) = (held(self.A, self.B, f * T) for f in (delay - d, 1 - delay + d))
         step, newest = np.zeros((n + d + 1, n + d + 1)), np.zeros(n + d + 1)  # then u_{k-1} ... u_{k-d-1}
         step[:n, :n], step[:n, -1] = after @ before, after @ late
         if d:
@@ -137,12 +138,6 @@ class HoldModel:
         step[:, :n] -= np.outer(newest, gains.K1 * self.rate + gains.K2 * np.eye(n)[-1])
         z = np.linalg.eigvals(step)
         return float(np.log(abs(np.delete(z, abs(z - 1).argmin())).max()))
-
-    def _held(self, time):
-        """What a time [s] makes of the states, and what a unit torque held so long adds."""
-        n = self.B.size
-        whole = expm(np.block([[self.A, self.B[:, None]], [np.zeros((1, n + 1))]]) * time)
-        return whole[:n, :n], whole[:n, n]
 
 
 if __name__ == "__main__":

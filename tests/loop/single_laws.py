@@ -17,6 +17,7 @@ from scipy.signal import cont2discrete
 
 import tfarm
 from tests import survey
+from tests.loop.law_orders import balls
 from tests.survey import Finding, each_of
 from tfarm import Law
 from tfarm.arm.blocks import Rational, StateSpace
@@ -82,10 +83,6 @@ def true_log_radius(blocks, K1):
         return max(moving), len(moving) < len(values)
     finally:
         flint.ctx.prec = before
-
-
-def balls(values):
-    return np.vectorize(flint.arb, otypes=[object])(values)
 
 
 def growth(law, chain, impulse):

@@ -11,7 +11,7 @@ import tfarm
 from tests.shared import circle_crossings
 from tfarm.arm import FED_BACK, HubFeedback, Law
 from tfarm.case import Case
-from tfarm.dsp import Chain, Converters, Sampling, pulse_transfer
+from tfarm.dsp import Chain, Converters, Sampling
 from tfarm.loop import circle as circle_module
 from tfarm.loop.circle import Arcs, Circle, Discs, complete_band, product
 from tfarm.loop.circle_crossings import FACTOR
@@ -155,15 +155,3 @@ def test_a_verdict_on_a_hub_with_friction_is_proven(arm, chain, law):
     verdict = sampled_verdict(Case(arm, law, chain))
     assert verdict.is_settled
     assert verdict.is_stable == (np.abs(np.linalg.eigvals(verdict.loop.reduced_matrix())).max() < 1)
-
-
-@pytest.mark.parametrize("delay", [0.0, 0.3, 1.0, 2.6])
-def test_the_state_space_of_a_braked_hub_is_its_pulse_transfer_function(delay):
-    """C (z - A)^-1 B against the sum over poles, with friction that leaves both their digits."""
-    arm = replace(LAB, hub=replace(LAB.hub, friction=0.3))
-    pulse = pulse_transfer(arm, ["hub_angle", "hub_rate", "root_moment"], Sampling(period=0.01, delay_samples=delay))
-    assert pulse.plant.braked(0.1 / 0.01) is not None
-    A, B, C = pulse.matrices()
-    z = np.array([1.2j, 0.95 * np.exp(0.3j), -1.1 + 0.2j])
-    states = np.array([C @ np.linalg.solve(each * np.eye(len(A)) - A, B) for each in z]).T
-    np.testing.assert_allclose(states, pulse(z), rtol=1e-9)

@@ -284,7 +284,7 @@ def _factors(part: Part, law: Law, chain: Chain) -> tuple[Complex, list[tuple[st
 
 def root_product(start: Complex, roots: Complex, more: Any = 0.0) -> Complex:
     """prod(delta - roots) at delta = start + more (n,), without loss where a root is the start."""
-    return np.asarray(((start[:, None] - roots) + np.reshape(more, (-1, 1))).prod(axis=1))
+    return ((start[:, None] - roots) + np.reshape(more, (-1, 1))).prod(axis=1)
 
 
 def root_product_error(start: Complex, roots: Complex, more: Any) -> Real:
@@ -293,4 +293,4 @@ def root_product_error(start: Complex, roots: Complex, more: Any) -> Real:
     sizes = abs(away + np.reshape(more, (-1, 1)))
     blur = np.where(away == 0, 0.0, MACHINE_EPS * (abs(start)[:, None] + abs(roots)))
     most = (sizes + blur).prod(axis=1)
-    return np.asarray(most - sizes.prod(axis=1) + MACHINE_EPS * ROUNDINGS * most)
+    return most - sizes.prod(axis=1) + MACHINE_EPS * ROUNDINGS * most

@@ -103,7 +103,7 @@ class Plant:
     @property
     def at_rest(self) -> Real:
         """G_o(0) of every output that does not turn with the arm (outputs,), and H_o(1) at any period."""
-        return np.asarray(self.static - (self.residues / self.poles).sum(axis=1).real)
+        return self.static - (self.residues / self.poles).sum(axis=1).real
 
     def braked(self, slower_than: float) -> int | None:
         """The pole of a hub that friction brings to rest, if |p| is below `slower_than` [1/s]; else None.
@@ -229,7 +229,7 @@ class SensedPlant:
         """The row of C that reads the arm's own root moment, one of the signals, ahead of the anti-alias filter."""
         alone = self.unfiltered.rows([self.read.names.index("root_moment")], ("root_moment",))
         pulse = PulseTransfer(self.together.joined(alone), sampling).folded()
-        return np.asarray(pulse.matrices()[2][-1])
+        return pulse.matrices()[2][-1]
 
     def with_modes(self, count: int) -> SensedPlant:
         """The same with another number of modes; cheap where the models have as many."""

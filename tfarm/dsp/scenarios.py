@@ -63,12 +63,12 @@ class Scenario:
 
     def residual(self, moment: Real) -> Real:
         """The root moment (samples, ...) less the rigid arm's [N m], at the samples from the end of the slew on."""
-        return np.asarray((moment.T - self.rigid_moment).T[self.is_after])
+        return (moment.T - self.rigid_moment).T[self.is_after]
 
     @property
     def is_after(self) -> NDArray[np.bool_]:
         """Whether each sample (n,) is from the end of the slew on."""
-        return np.asarray(self.t >= self.busy_until * (1 - TIME_ROUNDING))
+        return self.t >= self.busy_until * (1 - TIME_ROUNDING)
 
     def residual_rms(self, moment: Real) -> float | None:
         """Root mean square of the residual of a root moment (n,) [N m]; None of a record that ends before."""

@@ -41,7 +41,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, reduce
 from itertools import takewhile
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -210,17 +210,17 @@ class Circle:
     def _cut(self, rough: NDArray[np.bool_]) -> None:
         """Cut some arcs into shorter ones."""
         ends = np.linspace(self.low[rough], self.high[rough], PIECES_OF_ARC + 1)
-        new_low = ends[:-1].ravel()
-        new_high = ends[1:].ravel()
-        new = self._parts(new_low, new_high)
-        all_low = np.r_[self.low[~rough], new_low]
-        order = np.argsort(all_low)
-        self.high = np.r_[self.high[~rough], new_high][order]
-        self.low = all_low[order]
-        old = self.parts
-        self.parts = Discs(
-            np.c_[old.middle[:, ~rough], new.middle][:, order], np.c_[old.radius[:, ~rough], new.radius][:, order]
-        )
+        low = ends[:-1].ravel()
+        high = ends[1:].ravel()
+        new = self._parts(low, high)
+        order = np.argsort(np.r_[self.low[~rough], low])
+
+        def merged(old: Any, new: Any) -> Any:
+            return np.concatenate([old[..., ~rough], new], axis=-1)[..., order]
+
+        self.low = merged(self.low, low)
+        self.high = merged(self.high, high)
+        self.parts = Discs(merged(self.parts.middle, new.middle), merged(self.parts.radius, new.radius))
 
     @cached_property
     def weights(self) -> Complex:

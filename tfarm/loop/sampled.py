@@ -228,7 +228,7 @@ class Sampled(Loop):
         for part, row, gain, zeros in self.in_z.terms:
             entries[row] += self.weights[part] * gain * root_product(delta, zeros)
         whole = np.maximum(abs(root_product(delta, self.in_z.poles)), LEAST_SIZE)
-        return np.asarray(abs(entries * self.plant.residues).sum(axis=0) / whole)
+        return abs(entries * self.plant.residues).sum(axis=0) / whole
 
     # ------------------------------------------------------------ characteristic function
 
@@ -264,7 +264,7 @@ class Sampled(Loop):
     def __call__(self, z: Complex) -> Complex:
         """F(z) at an array of z."""
         z = np.asarray(z, dtype=complex)
-        return np.asarray(self.row @ self.rig.terms(z.ravel(), None, np.ones(z.size))).reshape(z.shape)
+        return (self.row @ self.rig.terms(z.ravel(), None, np.ones(z.size))).reshape(z.shape)
 
     # ------------------------------------------------------------ poles
 
@@ -296,7 +296,7 @@ class Sampled(Loop):
         shift[first] = 1.0  # and the states of the law where the hub is at rest at that angle
         shift[len(A) - len(own) :] = np.linalg.lstsq(np.eye(len(own)) - own, B @ angle, rcond=None)[0]
         others = np.arange(len(A)) != first  # the quotient by that direction
-        return np.asarray(A[others][:, others] - np.outer(shift[others], A[first, others]))
+        return A[others][:, others] - np.outer(shift[others], A[first, others])
 
     @cached_property
     def eigenvalues(self) -> Complex:
@@ -383,7 +383,7 @@ def _nearest(loop: Sampled, delta: Complex) -> Whole:
     away[:, abs(1 + loop.rig.open_loop) <= FADED_RADIUS] = np.inf
     if not loop.plant.rigid.any():
         away[:, loop.pulse.poles.size - 1] = np.inf
-    return np.asarray(away.argmin(axis=1))
+    return away.argmin(axis=1)
 
 
 def _settled(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tuple[Complex, Real]:
