@@ -19,9 +19,9 @@ from tfarm.errors import ConvergenceError
 from tfarm.loop.circle_crossings import GainMap, ends_of_K1, rounded_map, sampled_map, with_both_sides, with_more
 from tfarm.loop.plane import (
     Axis,
-    DrawnBoundary,
+    BoundaryLines,
     Plane,
-    drawn_boundary,
+    boundary_lines,
     gain_map,
     moment_axis,
     rate_axis,
@@ -129,7 +129,7 @@ class StabilityMap:
     x: Axis
     y: Axis
     region: Plane
-    boundary: DrawnBoundary
+    boundary: BoundaryLines
     coarse: Plane
     damping: Real
     sampled: GainMap | None
@@ -159,7 +159,7 @@ def stability_map(arm: Arm, chain: Chain) -> StabilityMap:
     across, up = (np.r_[axis.low, each[2::4], axis.high] for axis, each in zip((x, y), found.axes, strict=True))
     coarse = gain_map(arm, across, up)
     sampled = sampled_region(arm, x, y, chain)
-    return StabilityMap(arm, x, y, found, drawn_boundary(found, x, y), coarse, least_damping(coarse), sampled)
+    return StabilityMap(arm, x, y, found, boundary_lines(found, x, y), coarse, least_damping(coarse), sampled)
 
 
 def least_damping(plane: Plane) -> Real:

@@ -63,7 +63,7 @@ SHORT_SEGMENT = 0.008  # of the picture: longer pieces of the boundary look stra
 LONG_SEGMENT = 0.03  # of the picture: a piece longer than that after all cuts is a jump through infinity, and not drawn
 
 
-class DrawnBoundary(NamedTuple):
+class BoundaryLines(NamedTuple):
     """The exact boundary in a picture of the plane of both gains.
 
     `points` (n, 3) are both gains and w [rad/s], with rows of nan where it leaves the picture.  A real pole passes
@@ -149,9 +149,9 @@ class Plane(PlaneOfCounts):
         return 0.0 - self.arm.rate_loss
 
     @cached_property
-    def drawn_boundary(self) -> DrawnBoundary:
+    def boundary_lines(self) -> BoundaryLines:
         """The boundary in a picture of the plane as it is."""
-        return drawn_boundary(self, *map(Axis.of, self.axes))
+        return boundary_lines(self, *map(Axis.of, self.axes))
 
     @property
     def stable_intervals(self) -> list[list[Window]]:
@@ -440,12 +440,12 @@ def stable_edge(found: Plane) -> Real:
     return points[(points[:, 0] > 0) & (points[:, 2] > 0) & np.isfinite(points[:, 2])]
 
 
-def drawn_boundary(found: Plane, x: Axis, y: Axis) -> DrawnBoundary:
+def boundary_lines(found: Plane, x: Axis, y: Axis) -> BoundaryLines:
     """Return the boundary in a picture with these axes."""
     if found.arm.loses_at_hub_alone:
         none = np.empty((0, 3))
-        return DrawnBoundary(none, None, None, none, hub_locked(modes(found.arm, 3)).natural_frequency)
-    return DrawnBoundary(edge(found, x, y), *static_edges(found), stable_edge(found), np.empty(0))
+        return BoundaryLines(none, None, None, none, hub_locked(modes(found.arm, 3)).natural_frequency)
+    return BoundaryLines(edge(found, x, y), *static_edges(found), stable_edge(found), np.empty(0))
 
 
 def static_edges(found: Plane) -> tuple[float | None, float | None]:

@@ -20,7 +20,7 @@ from tfarm.assessment.stability_map import StabilityMap
 from tfarm.crossing import Window, pieces
 from tfarm.digits import how_many, plain, scientific, significant
 from tfarm.loop.circle_crossings import GainMap
-from tfarm.loop.plane import INFINITE, LINEAR_SCALE, Axis, DrawnBoundary, Plane
+from tfarm.loop.plane import INFINITE, LINEAR_SCALE, Axis, BoundaryLines, Plane
 
 from .frequency import bode
 from .loop_function import draw_loops
@@ -73,7 +73,7 @@ def gain_map(found: Plane | GainMap, *, ax: Axes) -> None:
     else:
         ground(found, x, y, ax)
         if found.is_of_gains:
-            draw_boundary(found, found.drawn_boundary, x, y, ax)
+            draw_boundary(found, found.boundary_lines, x, y, ax)
             return
     points = [
         (at, t) for at, each in zip(found.x, found.crossings, strict=False) for t in each.within(y.low, y.high).gain
@@ -159,7 +159,7 @@ def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
     ax.plot([], [], color=SLATE, lw=0.8, label="least damping ratio of the first two modes")
 
 
-def draw_boundary(found: Plane, boundary: DrawnBoundary, x: Axis, y: Axis, ax: Axes) -> None:
+def draw_boundary(found: Plane, boundary: BoundaryLines, x: Axis, y: Axis, ax: Axes) -> None:
     """The exact boundary with its frequencies; without damping an upright line and a level one."""
     if found.arm.loses_at_hub_alone:
         _undamped_boundary(found, boundary.resting, x, y, ax)

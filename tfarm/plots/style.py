@@ -145,7 +145,7 @@ class Drawing:
     rows: Sequence[float]
     grid: Callable[..., Any] | None
 
-    def as_given(self, axes: Sequence[Axes]) -> Any:
+    def one_or_all(self, axes: Sequence[Axes]) -> Any:
         """Return the only axes, or all."""
         return axes[0] if self.grid is None and len(self.rows) == 1 else tuple(axes)
 
@@ -166,7 +166,7 @@ class Drawing:
                 self.grid(drawn, *found)
                 if _place.get() == "phone":
                     stack(drawn)
-            self.draw(*found, ax=self.as_given(drawn.axes), **bound.kwargs)
+            self.draw(*found, ax=self.one_or_all(drawn.axes), **bound.kwargs)
             for ax in drawn.axes[: len(self.rows) - 1] if self.grid is None else []:
                 ax.set_xlabel("")
             finish(drawn, self.title(*found))
@@ -181,13 +181,13 @@ class Drawing:
 
             # loads the backend here: inside a style, the mode of a notebook's would be reset
             pyplot.draw_if_interactive()  # type: ignore[no-untyped-call]
-            return self.as_given(self.figure(*found, new=pyplot.figure, **how).axes)
+            return self.one_or_all(self.figure(*found, new=pyplot.figure, **how).axes)
         axes = list(np.ravel(np.asarray(ax, dtype=object)))
         remedy = "{0} axes, as figure.subplots({0}) makes them".format(len(self.rows))
         require(self.grid or len(self.rows) == len(axes), "ax", len(axes), remedy)
         with style():
-            self.draw(*found, ax=self.as_given(axes), **how)
-        return self.as_given(axes)
+            self.draw(*found, ax=self.one_or_all(axes), **how)
+        return self.one_or_all(axes)
 
 
 def picture(

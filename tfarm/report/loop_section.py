@@ -21,7 +21,7 @@ from tfarm.loop.poles import Poles
 from tfarm.plots import loop_function, regions, roots
 from tfarm.report.blocks import Fact, PageSection, Picture, columns_of, picture, prose, sheet, upper
 from tfarm.report.overview import results
-from tfarm.report.page import ArmReport, ReportedCase, has_loop, sign_words
+from tfarm.report.page import ArmReport, PageCase, has_loop, sign_words
 from tfarm.response.signals import Signals, sign_convention
 from tfarm.schema import Column, Quantity, Table, across, curve_table, quantities, roots_table, table, text
 
@@ -48,7 +48,7 @@ def margins_section(report: ArmReport) -> PageSection:
     return PageSection(title="Stability and stability margins", words=words, blocks=blocks)
 
 
-def margin_table(found: Sequence[tuple[ReportedCase, Margins]]) -> Table:
+def margin_table(found: Sequence[tuple[PageCase, Margins]]) -> Table:
     """A row a quantity, a column a controller."""
     leads = [each.name for each, it in found if it.in_band is not None and it.in_band.phase < 0]
     undamped = any(it.stability.loop.arm.is_undamped for _, it in found)
@@ -56,7 +56,7 @@ def margin_table(found: Sequence[tuple[ReportedCase, Margins]]) -> Table:
     return sheet("margins", own, undamped=undamped, leads=leads)
 
 
-def _bode_picture(each: ReportedCase) -> Picture:
+def _bode_picture(each: PageCase) -> Picture:
     """Bode plot of the continuous-time and the sampled loop function; of the first alone where the other has none."""
     curve = each.loop_function
     rows = (
@@ -125,7 +125,7 @@ class LawEntry(NamedTuple):
     denominator: Annotated[list[float] | str, Quantity("denominator", help="coefficients in descending powers")]
 
 
-def entries_of(each: ReportedCase) -> Iterator[LawEntry]:
+def entries_of(each: PageCase) -> Iterator[LawEntry]:
     """Every signal of a law with every digit; matrices are in its file alone."""
     law = each.law
     for part in law.parts:

@@ -85,7 +85,7 @@ class GivenLaw:
 
 
 @frozen
-class ReportedCase:
+class PageCase:
     """A case of a page with its records.
 
     `name` is for reading, `key` for the columns and names of files, "law" or of several "law_1", "law_2" ...
@@ -185,7 +185,7 @@ class ReportedCase:
         return sampled_brief(self.case)
 
     @property
-    def delayed(self) -> Iterator[tuple[float, Verdict]]:
+    def delays(self) -> Iterator[tuple[float, Verdict]]:
         """Further delays [ms] of none, half a sample and one, with the verdict on the sampled loop."""
         yield 0.0, self.sampled.verdict
         sampling = self.chain.sampling
@@ -277,21 +277,21 @@ class ArmReport(NamedTuple):
         """The default gains of the arm."""
         return default_gains(self.arm)
 
-    def case_of(self, given: GivenLaw, name: str, key: str) -> ReportedCase:
+    def case_of(self, given: GivenLaw, name: str, key: str) -> PageCase:
         """Return the case of a controller on the arm, under a name of its own."""
-        return ReportedCase(Case(self.arm, given.law, self.chain), name, key, given)
+        return PageCase(Case(self.arm, given.law, self.chain), name, key, given)
 
     @property
-    def default(self) -> ReportedCase:
+    def default(self) -> PageCase:
         """The case of the default gains."""
         return self.case_of(GivenLaw(self.gains), "default gains", "default")
 
     @property
-    def cases(self) -> tuple[ReportedCase, ...]:
+    def cases(self) -> tuple[PageCase, ...]:
         """A case for each law under a name that no other has; else that of the default gains."""
         if not self.laws:
             return (self.default,)
-        found: list[ReportedCase] = []
+        found: list[PageCase] = []
         for number, given in enumerate(self.laws, 1):
             key = f"law_{number}" if len(self.laws) > 1 else "law"
             each = self.case_of(given, "the gains given", key)
@@ -301,14 +301,14 @@ class ArmReport(NamedTuple):
         return tuple(found)
 
     @property
-    def in_s(self) -> tuple[ReportedCase, ...]:
+    def in_s(self) -> tuple[PageCase, ...]:
         """The cases of continuous-time controllers: those given, else the default gains and the best ones."""
         found = None if self.laws else self.best
         more = () if found is None else (self.case_of(GivenLaw(found.law), "best damping", "best"),)
         return tuple(each for each in (*self.cases, *more) if not each.law.is_discrete)
 
     @property
-    def bare(self) -> ReportedCase:
+    def bare(self) -> PageCase:
         """The default gains without that of the root moment."""
         return self.case_of(GivenLaw(self.gains.having(MOMENT_GAIN, 0.0)), f"{MOMENT_GAIN} = 0", "without")
 

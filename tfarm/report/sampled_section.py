@@ -20,7 +20,7 @@ from tfarm.fitting.recording import RunComparison, overshoot
 from tfarm.loop.sampled_verdict import Analysis
 from tfarm.plots import animation, motion, regions, roots, style
 from tfarm.report.blocks import Fact, PageSection, Picture, columns_of, picture, prose, sheet
-from tfarm.report.page import ArmReport, ReportedCase, has_loop
+from tfarm.report.page import ArmReport, PageCase, has_loop
 from tfarm.schema import Column, Quantity, Table, across, table, text
 from tfarm.studies.candidates import WITHOUT, TunerNumbers
 
@@ -73,14 +73,14 @@ def chain_words(arm: Arm, chain: Chain) -> str:
     return prose("chain", chain=chain, unit=arm.input_unit, is_default=chain == Chain())
 
 
-def _stem(name: str, each: ReportedCase) -> str:
+def _stem(name: str, each: PageCase) -> str:
     """The name of a controller's table; the first has no more than the name."""
     return f"sampled-{name}" if each.key in ("default", "law") else f"sampled-{name}-{each.key.replace('_', '-')}"
 
 
 def delays_table(report: ArmReport) -> Table:
     """Return the verdict on each controller as it is, and with half a sample and a whole one of further delay."""
-    rows = [(each.name, *row) for each in report.cases for row in each.delayed]
+    rows = [(each.name, *row) for each in report.cases for row in each.delays]
     names, delays, verdicts = zip(*rows, strict=True)
     columns = (
         Column("law", "controller", of=names),
@@ -143,7 +143,7 @@ def slews(report: ArmReport) -> tuple[list[Picture | Table], list[str], list[Fac
     if all(each.measured is not None for each in report.cases):
         return [], [], []
     runs: dict[str, Simulation] = {}
-    simulated: list[ReportedCase] = []
+    simulated: list[PageCase] = []
     words: list[str] = []
     for each in report.cases if report.laws else (report.bare, *report.cases):
         try:
@@ -190,14 +190,14 @@ def tip_facts(found: Step) -> Iterator[Fact]:
             yield Fact(label, text(loop.tip.settling_time, 4), "s", residual)
 
 
-def film_picture(each: ReportedCase, run: Simulation) -> Picture:
+def film_picture(each: PageCase, run: Simulation) -> Picture:
     """Return the film of a slew, and of what follows for half as long."""
     found = each.film(run)
     still = picture("slew_film", animation.draw_motion.figure(found), name=each.name, found=found)
     return still._replace(film=animation.film(found).gif)
 
 
-def settling_fact(each: ReportedCase, run: Simulation, is_named: bool) -> Fact:
+def settling_fact(each: PageCase, run: Simulation, is_named: bool) -> Fact:
     """The settling time of a slew, or the time within which it is not reached."""
     label = f"settling time of the root moment{f', {each.name}' if is_named else ''}"
     if run.stopped is not None:
@@ -274,7 +274,7 @@ def measured_blocks(report: ArmReport) -> Iterator[Picture | Table]:
     yield sheet("sampled_overshoot", table(rows))
 
 
-def growth_words(each: ReportedCase, found: Analysis) -> str:
+def growth_words(each: PageCase, found: Analysis) -> str:
     """State the growth of an unstable loop; after a measured run also when the hub angle shows it."""
     return prose(
         "growth",
