@@ -29,7 +29,6 @@ SURVEYS := \
 	loop.loci \
 	loop.law_counts \
 	synthesis.designs \
-	loop.nyquist_counts \
 	reduced.test_accuracy \
 	loop.settled \
 	loop.law_orders \

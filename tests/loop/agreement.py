@@ -1,8 +1,8 @@
 """Map and count of random loops against a model's eigenvalues:  python -m tests.loop.agreement SIZE SEED
 
 A dozen random arms (slenderness 5 to 60, free or held tip, a third of them at C = 0), and for each a grid of random
-gains: the region's number of unstable poles, that of `stability`, and the rightmost eigenvalue of a Legendre-Ritz
-model of the loop, which shares nothing with tfarm.
+gains: the region's number of unstable poles, that of `stability`, encirclements of -1, and the rightmost eigenvalue of
+a Legendre-Ritz model of the loop, which shares nothing with tfarm.
 
 Left out are gains within 1e-3 (of the hub's own unit) of the boundary, and loops that grow or decay by less than 1e-5
 a sample of 10 ms.
@@ -18,6 +18,8 @@ from tests.loop.ritz_loop import RitzLoop
 from tests.strategies import some_arm
 from tests.survey import Finding
 from tfarm import Hub, HubFeedback
+from tfarm.errors import ConvergenceError
+from tfarm.loop.nyquist import nyquist_of
 from tfarm.loop.plane import INFINITE, gain_map
 
 ARMS = 12
@@ -74,7 +76,14 @@ def judge(model, law, of_map):
     if abs(rightmost) < SLOW:
         return None
     verdict = verdict_of(model.arm, law)
-    if of_map != (INFINITE if verdict.unstable_roots_infinite else verdict.unstable_roots):
+    try:
+        nyquist_of(verdict)
+        turns = ""
+    except ConvergenceError as error:  # a plot that passes -1 too near is refused, and so are two counts that differ
+        turns = str(error)
+    if "by finding" in turns:
+        outcome = "turns and count differ"
+    elif of_map != (INFINITE if verdict.unstable_roots_infinite else verdict.unstable_roots):
         outcome = "map and count differ"
     elif verdict.word != ("stable" if of_map == 0 else "unstable"):
         outcome = "verdict and count differ"

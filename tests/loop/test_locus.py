@@ -14,9 +14,9 @@ import tfarm
 from tests.chain_elements import reached
 from tests.loop.arms import loop_of, window_arm
 from tests.loop.rig_loops import RigLoop
-from tests.shared import thinned
+from tests.shared import refusal, thinned
 from tests.shell import run
-from tfarm import Arm, Hub, HubFeedback, Law, Link, ParameterError, Payload, Section
+from tfarm import Arm, Hub, HubFeedback, Law, Link, Payload, Section
 from tfarm.arm import Attachment, Motor
 from tfarm.case import Case
 from tfarm.loop.lines import line_crossings
@@ -253,12 +253,9 @@ def test_crossings_are_those_of_the_line_of_laws(name):
     assert [way * each.gain for each in found.crossings] == sorted(way * each.gain for each in found.crossings)
 
 
-def test_without_damping_nothing_is_made_up():
-    assert not locus(DEEP.having(damping=0.0), HubFeedback(K1=1.0), "K2", -14.0, -6.0, 5, 9).crossings
-
-
 def test_at_no_damping_every_mode_crosses_at_once():
     """At C = 0 (Lyapunov): all flexible modes at K2 = 1, where they are those of the locked hub; all at K1 = 0."""
+    assert not locus(DEEP.having(damping=0.0), HubFeedback(K1=1.0), "K2", -14.0, -6.0, 5, 9).crossings
     found = locus(PAPER, K1, "K2", 0.8, 1.1, 31, 9).crossings
     locked = tfarm.modes(replace(PAPER, hub=Hub(inertia=math.inf)), 7).natural_frequency
     assert [each.direction for each in found] == ["unstable"] * 7
@@ -408,6 +405,4 @@ REFUSED = [
 @pytest.mark.parametrize(("change", "words"), REFUSED)
 def test_bad_input_is_refused_in_one_line(change, words):
     given = {"arm": LAB, "law": HubFeedback(), "vary": "K1", "start": 0.0, "stop": 1.0, "points": 5, "branches": 3}
-    with pytest.raises(ParameterError, match=words) as error:
-        locus(**(given | change))
-    assert "\n" not in str(error.value)
+    assert words in str(refusal(locus, **(given | change)))

@@ -11,10 +11,10 @@ from scipy.interpolate import BarycentricInterpolator
 import tfarm
 from tests.loop.arms import loop_of, verdict_of, window_arm
 from tests.rigs import some_rig
-from tests.shared import thinned
+from tests.shared import refusal, thinned
 from tests.spectrum.independent import newton_step
 from tfarm import Hub, HubFeedback, Law
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError
 from tfarm.loop.continuous import band_of
 from tfarm.loop.locus import BranchCrossing, Locus
 from tfarm.loop.nyquist import compressed
@@ -65,9 +65,7 @@ def test_a_lossless_loop_neither_grows_nor_decays(arm, law) -> None:
 
 @pytest.mark.parametrize("count", [0, 1001, 2.0, True])
 def test_counts_that_are_refused(count) -> None:
-    with pytest.raises(ParameterError, match="whole number") as refused:
-        closed_loop_poles(ARM, LAW, count)
-    assert "\n" not in str(refused.value)
+    assert "whole number" in str(refusal(closed_loop_poles, ARM, LAW, count))
 
 
 @pytest.mark.parametrize("C", [1e-5, 1e-3])
@@ -115,8 +113,7 @@ def test_a_spring_far_too_weak_for_the_flexible_arm_swings_the_rigid_one() -> No
 @pytest.mark.parametrize("ask", [closed_loop_poles, tfarm.sampled])
 @pytest.mark.parametrize("gains", [{"K1": 5e-324}, {"K2": -9e-13}])
 def test_a_gain_far_below_its_unit_is_refused(ask, gains) -> None:
-    with pytest.raises(ParameterError, match=r"for this arm 0, or at least 1e-12 times"):
-        ask(LAB, HubFeedback(**gains))
+    assert "for this arm 0, or at least 1e-12 times" in str(refusal(ask, LAB, HubFeedback(**gains)))
 
 
 BARE = tfarm.load("sasaki2012")
@@ -182,6 +179,7 @@ def listed(*values):
 
 
 def test_a_shorter_list_has_a_lower_box_between_its_last_pole_and_the_next():
+    """Of as many as are asked for; without a number ten, and every real one."""
     poles = listed(-3.0, -1.0, -2 + 4j, -1 + 10j, -1 + 40j)
     for count, top in ((2, 2.0), (3, 7.0), (4, 25.0), (5, 60.0)):
         some = first_poles(poles, count)
@@ -189,16 +187,12 @@ def test_a_shorter_list_has_a_lower_box_between_its_last_pole_and_the_next():
         assert some.box == Box(-50.0, 10.0, -top, top)
         assert some.box.holds(some.values).all()
         assert not some.box.holds(poles.values[count:]).any()
-    with pytest.raises(ParameterError, match="2 poles are real"):
-        first_poles(poles, 1)
+    assert "2 poles are real" in str(refusal(first_poles, poles, 1))
     assert count_with_mirrors(poles.values) == poles.count == 8
-
-
-def test_without_a_number_ten_are_listed_and_every_real_one():
     swinging = [-1 + 1j * n for n in range(1, 16)]
-    assert first_poles(listed(*swinging), None).values.size == 10
-    assert first_poles(listed(-1.0, -2.0, *swinging), None).values.size == 10
-    assert first_poles(listed(*(-1.0 - n for n in range(12)), *swinging), None).values.size == 12
+    for number, shown in ((0, 10), (2, 10), (12, 12)):
+        real = [-1.0 - n for n in range(number)]
+        assert first_poles(listed(*real, *swinging), None).values.size == shown
 
 
 def test_the_rightmost_pole_is_not_one_at_0():
@@ -206,26 +200,6 @@ def test_the_rightmost_pole_is_not_one_at_0():
     assert poles.spectral_abscissa == -1.0
     np.testing.assert_array_equal(poles.moving, [-3.0, -1 + 10j])
     assert (poles.unstable, listed(2.0, 3 + 1j, -1 + 2j).unstable) == (0, 3)
-
-
-LEAD = {"hub_angle": ([0.7, 3.0, 20.0], [0.002, 0.3, 1.0]), "root_moment": ([0.2], [1e-4, 2e-2, 1.0])}
-LAWS = {
-    "lead": Law(LEAD),
-    "late": Law(LEAD, delay=0.004),
-    "integral": Law({"hub_angle": ([1.0, 5.0], [1.0, 0.0]), "hub_rate": 0.4}),
-}
-
-
-@pytest.mark.parametrize("name", LAWS)
-def test_the_slope_of_the_function_is_its_difference_quotient(name):
-    """Of higher order and wider: by the values of the function alone, its zeros at 0 divided out."""
-    loop = loop_of(LAB, LAWS[name])
-    for s in (0.3 + 2j, -5 + 40j, 2.0 + 0j, 1e-3 + 1e-2j):
-        h = 1e-3 * abs(s)
-        at = loop.function(s + h * np.array([0, -2, -1, 1, 2]))
-        values = at.value * np.exp(at.scale - at.scale[0])
-        difference = (values[1] - 8 * values[2] + 8 * values[3] - values[4]) / (12 * h)
-        assert difference == pytest.approx(at.slope[0], rel=1e-6)
 
 
 def test_a_finding_has_three_crossings_and_counts_the_others():
@@ -384,8 +358,7 @@ def test_an_end_that_no_mode_moves_is_no_place_for_a_sensor():
 
 
 def test_an_arm_that_cannot_turn_has_no_such_zeros():
-    with pytest.raises(tfarm.ParameterError):
-        positions(tfarm.load("sasaki2012").having(hub_inertia=math.inf), "moment", np.array([0.1]), 2)
+    refusal(positions, tfarm.load("sasaki2012").having(hub_inertia=math.inf), "moment", np.array([0.1]), 2)
 
 
 def test_poles_of_a_long_delay_have_starts_next_to_them():

@@ -11,9 +11,8 @@ import tfarm
 from tests.loop.arms import held, loop_of, verdict_of
 from tests.loop.ritz_loop import RitzLoop
 from tests.loop.test_lossless import RIGS
-from tests.shared import thinned
+from tests.shared import refusal, thinned
 from tfarm import HubFeedback
-from tfarm.errors import ParameterError
 from tfarm.loop.plane import INFINITE, LINEAR_SCALE, Axis, between, edge, gain_map, ranges_of, static_edges
 from tfarm.loop.poles import poles_below
 from tfarm.schema import to_dict
@@ -41,10 +40,10 @@ def test_counts_of_the_lab_arm_are_those_of_an_independent_model(Kp) -> None:
     np.testing.assert_array_equal(found.stable, counts_by(of_model(LAB, 10), K1, K2, Kp) == 0)
 
 
-@pytest.mark.parametrize("Kp", [0.0, -30.0])
-def test_counts_of_a_held_arm_step_where_its_stiffness_vanishes(Kp) -> None:
-    """At K1 < 0 the real pole goes the other way there than at K1 > 0."""
-    K1, K2 = between(-6, 6, 5), between(-2, 3, 9)
+@pytest.mark.parametrize(("Kp", "K2"), [(0.0, (-2, 3)), (-30.0, (-2, 3)), (0.0, (1.2, 1.4)), (-30.0, (1.2, 1.4))])
+def test_counts_of_a_held_arm_step_where_its_stiffness_vanishes(Kp, K2) -> None:
+    """At K1 < 0 the real pole goes the other way there than at K1 > 0; the range may begin beyond that step."""
+    K1, K2 = between(-6, 6, 5), between(*K2, 9)
     counts = counts_by(of_model(held(1e-3), 10), K1, K2, Kp)
     np.testing.assert_array_equal(gain_map(held(1e-3), K1, K2, Kp).unstable, counts)
 
@@ -102,8 +101,7 @@ def test_the_answer_holds_the_boundary_inside_the_map_to_its_very_corner() -> No
 
 @pytest.mark.parametrize("K1", [[1.0], [1.0, 1.0], [2.0, 1.0], [0.0, math.nan], np.linspace(0, 1, 2001)])
 def test_an_empty_or_unordered_range_is_refused(K1) -> None:
-    with pytest.raises(ParameterError, match="K1"):
-        gain_map(LAB, np.array(K1), np.array([0.0, 1.0]))
+    assert "K1" in str(refusal(gain_map, LAB, np.array(K1), np.array([0.0, 1.0])))
 
 
 def test_without_damping_the_intervals_of_a_held_arm_end_where_it_falls_statically() -> None:
@@ -144,15 +142,14 @@ def test_an_axis_is_matplotlibs_own(axis):
     assert axis.place(x) == pytest.approx((theirs.transform(x) - low) / (high - low), abs=8 * EPS)
 
 
-@pytest.mark.parametrize("axis", [Axis(-0.1, 500.0, 0.1), Axis(-50.0, 2.0, 2.0), Axis(-4.0, 2.0)])
-def test_a_grid_is_even_as_seen(axis):
-    assert axis.place(axis.grid(40)) == pytest.approx((np.arange(40) + 0.5) / 40, abs=16 * EPS)
-
-
 def test_a_grid_finds_its_own_axis():
-    assert Axis.of(np.linspace(-1.0, 3.0, 41)) == Axis(-1.0, 3.0)
-    assert Axis.of(np.geomspace(0.02, 3.0, 41)) == Axis(0.02, 3.0, 0.02)
-    assert Axis.of(np.array([-3.0, -1.0, -0.5, 0.0, 2.0, 6.0])) == Axis(-3.0, 6.0, 0.5)
+    for values, axis in (
+        (np.linspace(-1.0, 3.0, 41), Axis(-1.0, 3.0)),
+        (np.geomspace(0.02, 3.0, 41), Axis(0.02, 3.0, 0.02)),
+        (np.array([-3.0, -1.0, -0.5, 0.0, 2.0, 6.0]), Axis(-3.0, 6.0, 0.5)),
+    ):
+        assert Axis.of(values) == axis
+        assert axis.place(axis.grid(40)) == pytest.approx((np.arange(40) + 0.5) / 40, abs=16 * EPS)  # even as seen
 
 
 @pytest.mark.parametrize("Kp", [0.0, 5.0])

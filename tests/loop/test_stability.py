@@ -169,10 +169,9 @@ def test_a_law_as_stiff_as_the_spring_has_its_pole_at_0_and_none_next_to_it(more
 
 
 def test_without_losses_two_poles_meet_there():
-    arm = replace(LAB.elastic, hub=Hub(inertia=0.1, stiffness=SPRING))
-    poles = tfarm.closed_loop_poles(arm, HubFeedback(Kp=-SPRING), 4)
-    assert (poles.values == 0).sum() == 2
-    assert tfarm.margins(arm, HubFeedback(Kp=-SPRING)).stability.word == "marginal"
+    arm, feedback = replace(LAB.elastic, hub=Hub(inertia=0.1, stiffness=SPRING)), HubFeedback(Kp=-SPRING)
+    assert (tfarm.closed_loop_poles(arm, feedback, 4).values == 0).sum() == 2
+    assert verdict_of(arm, feedback).word == "marginal"
 
 
 def test_a_map_may_have_it_among_its_points():
@@ -219,7 +218,6 @@ def test_where_no_weights_exist(arm, feedback, words: str) -> None:
     found = lyapunov(loop_of(arm, feedback))
     assert (found.proven, found.a1_over_a2, found.kind) == (False, None, "unproven")
     assert words in found.reason
-    assert "\n" not in found.reason
 
 
 @pytest.mark.parametrize("seed", thinned(range(4), 2))
@@ -364,8 +362,7 @@ def test_friction_at_the_hub_alone_damps_every_mode_that_the_hub_takes_part_in(f
         assert zeros_in(BARE, law, mpmath.mpc(pole), -pole.real / 9) == 1  # left of the axis, on which roots are cut
 
 
-def test_without_losses_the_verdict_is_marginal_and_friction_at_a_held_tip_is_stable():
-    assert verdict_of(BARE, HubFeedback()).word == "marginal"
+def test_friction_at_a_held_tip_is_stable():
     held = replace(BARE, hub=Hub(inertia=0.1, friction=0.5), payload=Payload(mass=math.inf))
     found = verdict_of(held, HubFeedback())
     assert (found.word, (found.poles.values == 0).any()) == ("stable", False)

@@ -11,10 +11,8 @@ import tfarm
 from tests.loop.agreement import some_free_arm, some_gains
 from tests.loop.arms import loop_of, verdict_of, window_arm
 from tests.loop.ritz_loop import RitzLoop
-from tests.shared import thinned
-from tfarm import ConvergenceError, Hub, HubFeedback, Law, ParameterError, Payload, RotarySpring
-from tfarm.arm.blocks import Rational
-from tfarm.arm.law import Part
+from tests.shared import refusal, thinned
+from tfarm import ConvergenceError, Hub, HubFeedback, Law, Payload, RotarySpring
 from tfarm.arm.law_tables import load_law
 from tfarm.loop import lines as lines_module
 from tfarm.loop.lines import line_crossings, unstable_below
@@ -108,6 +106,8 @@ def test_an_end_of_the_search_is_no_edge() -> None:
         poles = poles_below(loop_of(LAB, HubFeedback(K1=0.3, K2=value)), 2e3).moving
         assert (abs(poles.real / abs(poles)).min() < 1e-12) == (found.end(value) == "edge")
     assert [windows(BARE, HubFeedback(K1=0.3), "K1").end(value) for value in (0.0, math.inf)] == ["edge", "no limit"]
+    for arm in (BARE, LAB):
+        assert margins(arm, default_gains(arm)).intervals_note is None
 
 
 @pytest.mark.parametrize("C", [0.0, 1e-4])
@@ -133,22 +133,12 @@ def test_behind_an_inductance_the_lowest_K2_is_that_of_its_band():
     assert 0.5 * low < higher[higher < 0].max() < 0
 
 
-@pytest.mark.parametrize(("name", "reach"), [("sasaki2012", math.inf), ("sasaki2012-lab", None)])
-def test_exact_intervals_have_no_note(name, reach):
-    arm = tfarm.load(name)
-    found = margins(arm, default_gains(arm))
-    assert found.intervals_note is None
-    assert reach in (None, found.windows["K2"].band)
-
-
 @pytest.mark.parametrize(
     ("inertia", "law", "words"),
     [(math.inf, HubFeedback(K1=0.3), "has no loop"), (0.0, HubFeedback(K1=0.3, K2=0.1), "an algebraic loop")],
 )
-def test_where_there_is_no_loop(inertia: float, law, words: str) -> None:
-    with pytest.raises(ParameterError, match=words) as refused:
-        loop_of(replace(BARE, hub=Hub(inertia=inertia)), law)
-    assert "\n" not in str(refused.value)
+def test_where_there_is_no_loop(inertia, law, words) -> None:
+    assert words in str(refusal(loop_of, replace(BARE, hub=Hub(inertia=inertia)), law))
 
 
 LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], [0.02, 1.0])}, delay=0.002)
@@ -238,13 +228,6 @@ def test_below_a_band_through_whose_top_poles_pass_each_interval_is_counted(name
     for value in np.linspace(*found.looked_at, 8)[1:-1].tolist():
         count = unstable_below(loop_of(LAB, law.having(name, value)), found.band)
         assert holds(found, value) == (count == 0)
-
-
-def test_no_number_of_a_signal_in_two_parts_has_a_window():
-    """`having` could not choose; of the rest each has its own."""
-    parts = [Part(("hub_angle",), Rational((3.0,), (0.1, 1.0))), Part(("hub_angle",), Rational((-0.5,), (0.1, 1.0)))]
-    law = Law({}, parts=(*parts, Part(("hub_rate",), Rational((0.3,), (0.001, 1.0)))))
-    assert list(law.numbers) == ["gain", "hub_rate.num.0", "hub_rate.den.0", "hub_rate.den.1"]
 
 
 @pytest.mark.parametrize("damping", [3e-8, 1e-7])

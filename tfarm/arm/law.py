@@ -148,7 +148,7 @@ class Law:
         """Its own poles [1/s], or in z."""
         return np.concatenate([np.empty(0, complex), *(part.block.poles for part in self.parts)])
 
-    @property
+    @cached_property
     def gains(self) -> HubFeedback | None:
         """The law as gains at the hub; None where it has more than those."""
         if not self.is_static or not set(self.signals) <= set(ON):

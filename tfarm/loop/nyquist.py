@@ -10,7 +10,7 @@ There the contour is closed: L is real from z = -1 to infinity and back to z = 1
 
 import math
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ from tfarm.spectrum.box import turned
 from .continuous import band_of
 from .curve import LoopContour, LoopVerdict
 from .loop import Loop
-from .stability import stability
+from .stability import Stability, stability
 
 INDENT_RADIUS = 0.05  # radius of a semicircle around a pole of L, in units of its residue: |L| is about 20 on it
 NEARER = 0.1  # of the way to the nearest closed-loop pole: no arc around a pole of L leaves an unstable one out
@@ -57,7 +57,7 @@ class Nyquist:
     is_arc: NDArray[np.bool_]
     poles: Real
     encirclements: Annotated[int, Quantity("encirclements of -1", help="counter-clockwise positive")]
-    verdict: Annotated[LoopVerdict, Quantity(flat=True)]
+    verdict: Annotated[Stability | Any, Quantity(flat=True)]  # any `LoopVerdict`
     unstable_open: Annotated[int, Quantity("unstable poles of L", help="controller's poles inside the contour")] = 0
 
     @property

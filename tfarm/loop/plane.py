@@ -226,9 +226,11 @@ def plane(loop: ContinuousLoop, vary: tuple[str, str], x: Real, y: Real) -> Plan
         turned = plane(loop, (vary[1], vary[0]), y, x)
         return replace(turned, vary=vary, x=x, y=y, unstable=turned.unstable.T.copy(), crossings=[])
     band, is_quiet = band_of_family(corners)
-    found = _columns(loop, vary, x, up, band)
+    # from K2 = 0, where the hub is passive, a count is carried to the range: real poles between pass through 0 too
+    reach = (min(up[0], 0.0), max(up[1], 0.0)) if vary == PLANE else up
+    found = _columns(loop, vary, x, reach, band)
     crossing = np.concatenate([y[:0], *(each.gain for each in found)])
-    at = 0.0 if vary == PLANE else float(y[_farthest(y, crossing)])  # at K2 = 0 the hub is passive
+    at = 0.0 if vary == PLANE else float(y[_farthest(y, crossing)])
     there = _counts_across(loop.having(vary[1], at), vary[0], x, band)
     unstable = counts_over(y, found, at, there).T.copy()
     edge = boundary(loop, np.asarray(grid(loop.arm, band))) if is_of_gains else np.empty((0, 3))

@@ -43,7 +43,7 @@ from .continuous import MOST_BAND_MODES, QUIET_REACH, ContinuousLoop, band_of, g
 from .curve import LoopContour, LoopVerdict, next_limits
 from .loop_margins import PhaseCrossover
 from .poles import HUB, Poles, box_of, count_with_mirrors, poles_below, poles_by_mode, poles_of_model
-from .theorem import GIVES, TAKES, Theorem
+from .theorem import GIVES, TAKES
 
 LEAST_BAND_MODES = 12  # flexible modes in the band at C = 0, and at least
 QUIET = 0.5  # |L| beyond the band, with damping
@@ -229,11 +229,11 @@ def verdict_on(loop: ContinuousLoop, band: float | None = None) -> Stability:
     delayed = DELAYED if loop.arm.is_undamped and loop.law.delay and loop.feeds_back else ""
     tail = theorem.reason if theorem.energy is not None else SMALL_GAIN if quiet else delayed
     is_infinite = theorem.energy == GIVES or tail == DELAYED
-    verdict, words = _verdict(poles, theorem, is_infinite), tail or UNKNOWN_ABOVE.format(band=height)
+    verdict, words = _verdict(poles, is_infinite), tail or UNKNOWN_ABOVE.format(band=height)
     return Stability(loop, verdict, poles.unstable, is_infinite, poles.box.im_max, words, poles, bool(tail))
 
 
-def _verdict(poles: Poles, theorem: Theorem, is_infinite: bool) -> str:
+def _verdict(poles: Poles, is_infinite: bool) -> str:
     """The verdict from the poles of the band, and from the theorem where rounding hides the side of the axis.
 
     Raises ConvergenceError where one of a damped loop may be on the axis, and none is right of it.
@@ -246,7 +246,7 @@ def _verdict(poles: Poles, theorem: Theorem, is_infinite: bool) -> str:
         return "marginal"
     on_axis = moving[share > -MARGIN_OF_ZERO]
     if arm.loses_at_hub_alone:
-        known = theorem.energy == TAKES or not on_axis.size
+        known = poles.loop.theorem.energy == TAKES or not on_axis.size
         return "stable" if known and is_controllable(arm.lossless_hub, poles.box.im_max) else "marginal"
     if on_axis.size:
         text = f"the pole at {on_axis[0]:.6g} 1/s is on the imaginary axis to working precision: not determined"
@@ -404,15 +404,15 @@ class Spill:
         words = f"{which} is unstable in the exact loop, at {abs(self.driven[0]):.6g} rad/s"
         if not self.content.size:
             return f"{words}, and every model is unstable"
-        first, last = int(self.content[0]), int(self.content[-1])
-        models = f"models of {first} to {last} modes"
-        if first == last:
-            models = f"the model of {first} mode{'s' * (first > 1)}"
-        elif last - first + 1 != self.content.size:
-            models = f"{self.content.size} of the models up to {last} modes"
+        first, last = self.content[[0, -1]].tolist()
+        count = self.content.size
+        models = f"models of {first} to {last} modes are"
+        if count == 1:
+            models = f"the model of {first} mode{'s' * (first > 1)} is"
+        elif last - first + 1 != count:
+            models = f"{count} of the models up to {last} modes are"
         end = f"those from {self.shown_from} modes on are not" if self.shown_from else "the largest among them"
-        verb = "is" if first == last else "are"
-        return f"{words}; {models} {verb} stable, {end}"
+        return f"{words}; {models} stable, {end}"
 
 
 def spill(arm: Arm, law: AnyLaw, most: int = USUAL_SPILL_MODES) -> Spill:
