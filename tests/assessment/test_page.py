@@ -80,7 +80,7 @@ def test_names_are_text_and_every_file_is_there(compared, folder, tmp_path):
 
 def test_an_index_leads_to_the_comparison_and_back(compared, tmp_path, monkeypatch):
     """One that is there; an arm's page that is made later leads to it too."""
-    monkeypatch.setattr("tfarm.report.page.save_figure", lambda *_, **__: None)
+    monkeypatch.setattr("tfarm.report.blocks.save_figure", lambda *_, **__: None)
     index, arm = tmp_path / "index.html", tmp_path / LAB.name
     index.write_text("an old index", encoding="utf-8")
     shown = write_comparison(compared, tmp_path)

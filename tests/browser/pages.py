@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page, sync_playwright
 
 import tfarm
-from tfarm.arm import Arm, HubFeedback, Law, as_law
+from tfarm.arm import Arm, HubFeedback, Law
 from tfarm.arm.law_tables import load_law
 from tfarm.assessment.card import LoopCard, reference_damping
 from tfarm.case import Case
@@ -343,7 +343,7 @@ def test_a_chord_of_the_loop_function_is_within_a_pixel_of_it(browser, folder, n
         pixels = page.evaluate("live.room('nyquist')[0]") / 5.0  # of 1, where that is the shorter side
         graded = arm.having(damping=reference_damping(arm)) if arm.has_elastic_link else arm
         of = arm if sampled_verdict(Case(arm, law, chain)).word == "unstable" else graded
-        exact = (ContinuousLoop(Case(graded, as_law(law))).parts, sampled_verdict(Case(of, law, chain)).full.parts)
+        exact = (ContinuousLoop(Case(graded, law)).parts, sampled_verdict(Case(of, law, chain)).full.parts)
         for key, parts in zip(("curve", "zcurve"), exact, strict=True):
             rows = page.evaluate(f"live.now.{key}(live.now.from).map(row => [row.w, row.x, row.y])")
             w, x, y = np.array(rows).T
@@ -539,7 +539,7 @@ def test_keys_undo_and_link_reach_every_state_and_the_file_is_a_law(browser, fol
         with page.expect_download() as download:
             page.locator("#save").click()
         download.value.save_as(tmp_path / "law.toml")
-        assert load_law(tmp_path / "law.toml") == as_law(HubFeedback(**law))
+        assert load_law(tmp_path / "law.toml") == Law.of_gains(HubFeedback(**law))
         page.locator("#map").focus()
         page.keyboard.press("z")
         page.wait_for_function("document.querySelector('button[value=nyquist]').ariaPressed === 'true'")
@@ -576,7 +576,7 @@ def test_a_page_without_sampled_loop_slew_and_sensor_has_the_rest(browser, folde
     (text,) = re.findall(r'id="live-data">(.*?)</script>', (folder / ARMS[0] / "live.html").read_text("utf-8"), re.S)
     missing = dict.fromkeys(("sampled_map", "sampled_loop", "slew", "sensor"))
     data = json.loads(text) | missing | {"no_sensor": "no polynomial follows"}
-    monkeypatch.setattr("tfarm.report.live.live_data", lambda *_: data)
+    monkeypatch.setattr("tfarm.report.page.live_data", lambda *_: data)
     (tmp_path / "arm").mkdir()
     save_live(ArmReport(tfarm.load(ARMS[0]), load_chain(ARMS[0])), tmp_path / "arm")
     write_assets(tmp_path / ASSETS)

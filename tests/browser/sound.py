@@ -28,8 +28,7 @@ from tfarm.fitting.fit import fit
 from tfarm.report import write, writing
 from tfarm.report.live import ASSETS, save_live, write_assets
 from tfarm.report.page import ArmReport, GivenLaw
-from tfarm.report.study_page import write_study
-from tfarm.report.writing import PIECES, pieces_of, write_comparison
+from tfarm.report.writing import PIECES, pieces_of, write_comparison, write_study
 
 LAB = replace(tfarm.load("sasaki2012-lab"), name=NAME, assumptions=ARM.assumptions)
 LAW = tfarm.Law({"hub_angle": ([2.0, 8.0], [0.02, 1.0]), "hub_rate": 0.4}, name=TEXT)

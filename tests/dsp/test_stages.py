@@ -29,7 +29,7 @@ from tfarm.exported import controller, fmu, live_loop, tuner_code
 from tfarm.exported.controller import c_controller
 from tfarm.exported.result import write_into
 from tfarm.loop.sampled import sampled_loop
-from tfarm.report.page import TEMPLATES
+from tfarm.report.blocks import TEMPLATES
 from tfarm.tuner import kernel as tuner
 from tfarm.tuner.trial import Cost, Trial
 

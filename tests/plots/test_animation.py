@@ -66,11 +66,6 @@ def test_the_motion_is_the_runs_own_through_converters_and_from_rest_or_not(name
     assert abs(places - found.link[:, -1]).max() < 1e-9 * arm.reach
 
 
-def test_the_still_has_the_largest_deflection_of_the_tip(run, motion):
-    tip = run.between.tip_displacement - LAB.reach * run.between.hub_angle
-    assert abs(motion.t[motion.still] - run.between.t[np.argmax(abs(tip))]) < 0.02
-
-
 def test_the_reference_is_the_slew_of_the_rigid_arm(run, motion):
     x, y = draw_motion.figure(motion._replace(still=motion.t.size - 1)).axes[0].lines[0].get_data()
     assert np.arctan2(y[-1], x[-1]) == pytest.approx(run.scenario.hub_angle[-1], rel=1e-6)
@@ -112,11 +107,12 @@ def test_a_frame_is_the_picture_drawn_anew(motion, share):
     assert abs(shown - whole).mean() < 0.2
 
 
-def test_a_deflection_is_to_scale_where_it_is_seen_and_else_named(run, motion):
+def test_the_still_has_the_largest_deflection_to_scale_where_it_is_seen_and_else_named(run, motion):
     assert [exaggeration(share) for share in (0.0, 0.3, 0.02, 0.019, 0.004, 0.0011)] == [1, 1, 1, 5, 20, 50]
     words = draw_motion.figure(motion).axes[0].get_xlabel()
     assert words == f"hub to tip 1 m, thin: reference,\ndeflection × {motion.factor}, speed × 0.2"
     tip = run.between.tip_displacement - LAB.reach * run.between.hub_angle
+    assert abs(motion.t[motion.still] - run.between.t[np.argmax(abs(tip))]) < 0.02
     assert 0.04 < motion.factor * abs(tip).max() / LAB.reach <= 0.1
     plain: Motion = motion._replace(factor=1, speed=1)
     assert draw_motion.figure(plain).axes[0].get_xlabel().endswith(",\ndeflection to scale")
@@ -132,12 +128,9 @@ def test_an_unstable_loop_that_was_stopped_and_another_radius_have_a_film():
     assert np.isfinite(found.link).all()
 
 
-def test_other_records_are_refused(run):
+def test_other_records_and_a_run_of_one_sample_have_no_film():
     with pytest.raises(tfarm.ParameterError, match=r"tfarm\.simulate returns"):
         tfarm.plots.animate(LAB, tfarm.modes(LAB, 2))
-
-
-def test_a_run_of_one_sample_has_no_film():
     run = tfarm.simulate(LAB, GAINS, Chain(sampling=Sampling(period=0.5)), duration=1.0, count=4)
     short = replace(run, at_samples=replace(run.at_samples, t=run.t[:1]))
     with pytest.raises(tfarm.ParameterError, match="more than one sample"):

@@ -19,7 +19,7 @@ from tfarm.loop.locus import locus
 from tfarm.loop.stability import stability
 from tfarm.plots import gain_map, overlay, style
 from tfarm.plots import locus as locus_plot
-from tfarm.report.page import TEMPLATES
+from tfarm.report.blocks import TEMPLATES
 from tfarm.spectrum.gains import default_gains
 
 LAB = tfarm.load("sasaki2012-lab")

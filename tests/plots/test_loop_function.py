@@ -12,7 +12,6 @@ from tests.odd_arms import odd_arms
 from tests.plots.labels import complaints
 from tfarm.assessment.card import card_of, reference_damping
 from tfarm.dsp import Chain, Sampling
-from tfarm.loop.curve import refined
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
@@ -125,15 +124,6 @@ def test_the_curve_has_each_frequency_once_and_reaches_its_peak(T):
     assert 10 ** (found.sensitivity.max() / 20) == pytest.approx(found.margins.peak_sensitivity, rel=1e-2)
 
 
-def test_a_refined_grid_has_each_frequency_once():
-    """Also where L jumps between neighbouring numbers, and where the grid has one twice."""
-    low = 1.0
-    high = np.nextafter(low, 2.0)
-    omega, L = refined(lambda s: np.where(s.imag > low, 100.0, 1.0) + 0j, np.array([0.5, low, low, high, 2.0]))
-    np.testing.assert_array_equal(omega, [0.5, low, high, 2.0])
-    np.testing.assert_array_equal(L, [1.0, 1.0, 100.0, 100.0])
-
-
 def test_the_sampled_loop_is_that_of_a_hold_and_a_sampler(both):
     """At low frequency the hold and the delay of its half period alone: L(iw) e^{-iwT/2} w T/2 over its sine."""
     side, T = both, CHAIN.sampling.period
@@ -165,20 +155,14 @@ def test_the_circle_of_its_ms_touches_the_nyquist_curve():
 
 
 @pytest.mark.parametrize("name", ["loop", "nichols", "sensitivity"])
-def test_an_unstable_loop_has_a_curve_and_no_margins(name):
-    found = tfarm.margins(LAB, LAW.having("K2", 1.5))
-    figure = getattr(tfarm.plots, name).figure(found)
-    assert labels(*figure.axes) == {}
-    assert complaints(figure) == []
-    assert "continuous-time: unstable" in " ".join(figure.axes[0].get_legend_handles_labels()[1])
-
-
-@pytest.mark.parametrize("name", ["loop", "nichols", "sensitivity"])
-def test_without_feedback_s_is_one_and_nothing_crosses(name):
-    curve = tfarm.loop_function(LAB, tfarm.HubFeedback())
-    assert not curve.sensitivity.any()
-    figure = getattr(tfarm.plots, name).figure(curve)
-    assert (labels(*figure.axes), complaints(figure)) == ({}, [])
+def test_an_unstable_loop_and_one_without_feedback_have_curves_and_no_margins(name):
+    """Without feedback S is one and nothing crosses."""
+    bare = tfarm.loop_function(LAB, tfarm.HubFeedback())
+    assert not bare.sensitivity.any()
+    for found, word in ((tfarm.margins(LAB, LAW.having("K2", 1.5)), "unstable"), (bare, bare.stability)):
+        figure = getattr(tfarm.plots, name).figure(found)
+        assert (labels(*figure.axes), complaints(figure)) == ({}, [])
+        assert f"continuous-time: {word}" in " ".join(figure.axes[0].get_legend_handles_labels()[1])
 
 
 def test_of_a_law_in_z_it_is_the_sampled_loop_alone():

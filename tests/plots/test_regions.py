@@ -13,7 +13,7 @@ from tfarm.dsp import Chain
 from tfarm.exported.live_loop import live_data
 from tfarm.loop.plane import moment_axis, rate_axis, rate_columns
 from tfarm.loop.stability import stability
-from tfarm.report.page import prose
+from tfarm.report.blocks import prose
 
 LAB = tfarm.load("sasaki2012-lab")
 FRICTION = 0.02

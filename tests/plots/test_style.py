@@ -32,7 +32,7 @@ from tfarm.plots.style import (
     UNSTABLE,
     save_figure,
 )
-from tfarm.report.page import TEMPLATES
+from tfarm.report.blocks import TEMPLATES
 from tfarm.response.frequency import bode
 
 mpl.use("Agg")

@@ -10,10 +10,10 @@ from matplotlib import pyplot
 import tfarm
 from tests.report.written import coarsen
 from tfarm.dsp import Chain
-from tfarm.report.arm_section import arm_section
+from tfarm.report.blocks import PICTURES, save_section
 from tfarm.report.loop_section import locus_section, nyquist_section
-from tfarm.report.page import PICTURES, ArmReport, command_of, save_section
-from tfarm.report.response_sections import bode_section, modes_section
+from tfarm.report.page import ArmReport, command_of
+from tfarm.report.response_sections import arm_section, bode_section, modes_section
 
 mpl.use("Agg")
 

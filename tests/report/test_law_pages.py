@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -93,6 +94,17 @@ def test_the_loop_function_of_an_unstable_loop_has_no_margins(given):
 
 
 # ------------------------------------------------------------ pages
+
+
+def test_a_page_of_several_laws_has_the_verdict_of_each_of_their_loops(tmp_path):
+    """Continuous-time and sampled, two of them unstable in both; of a controller in z the sampled one alone."""
+    gains = [HubFeedback(K1=0.3, K2=0.3), HubFeedback(K1=0.3, K2=1.5), HubFeedback(K1=-0.1, K2=0.3)]
+    laws = [*gains, Law({"hub_rate": 0.3}, period=0.01, name="z")]
+    page = writing.write([LAB], tmp_path, laws=[tuple(map(GivenLaw, laws))], only=("law",))
+    words = re.findall(r'<span class="verdict [\w-]+">(\w+)', page.read_text(encoding="utf-8"))
+    verdicts = [tfarm.sampled(LAB, law).verdict for law in laws]
+    verdicts += [tfarm.margins(LAB, law).stability for law in gains]
+    assert Counter(words) == Counter(each.word for each in verdicts) == {"stable": 3, "unstable": 4}
 
 
 def test_a_page_is_about_its_law_and_its_file_repeats_it(file, tmp_path, capsys):
@@ -237,7 +249,7 @@ def _with_run(name):
 
 def test_laws_of_one_name_are_numbered_and_a_signal_that_no_arm_has_is_refused():
     two = tuple(GivenLaw(Law({"hub_rate": ([gain], [0.01, 1.0])}, name="PD")) for gain in (0.3, 0.6))
-    assert [each.name for each in ArmReport(LAB, Chain(), two).controllers] == ["PD", "PD (2)"]
+    assert [each.name for each in ArmReport(LAB, Chain(), two).cases] == ["PD", "PD (2)"]
     assert to_json({"rows": law_section(ArmReport(LAB, Chain(), two)).blocks[0]}).count("PD (2)") == 1
     with pytest.raises(ParameterError, match="hub_spin"):
         writing.write([LAB], Path("nowhere"), laws=[(GivenLaw(Law({"hub_spin": 1.0})),)])

@@ -24,7 +24,7 @@ from tfarm.exported.live_loop import live_data, sensor_numbers, slew_numbers
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.panels import MOST_MISS, loop_panels
 from tfarm.loop.sampled_verdict import sampled_verdict
-from tfarm.report import live
+from tfarm.report import page as report_page
 from tfarm.report.live import has_sliders, save_live
 from tfarm.report.page import ArmReport, GivenLaw
 from tfarm.response.signals import Signals
@@ -100,19 +100,6 @@ def test_sampled_poles_of_the_plant_in_the_page_are_the_librarys(case):
         assert (abs(z).max() < 1) == known.is_stable or abs(known.log_radius) < error, law
 
 
-def test_the_slew_of_the_plant_in_the_page_is_the_librarys(case):
-    arm, data, _ = case
-    held = data["slew"]
-    gains = HubFeedback(**data["start"])
-    for law in (gains, gains.having("K2", 0.0).having("Kp", 0.3 * gains.K1)):
-        found = tfarm.simulate(arm, law, chain_of(arm), duration=3 * held["rise"], count=held["modes"])
-        torque, outputs = Plant(held, 1.0).slew(held, law)
-        pairs = [(torque, found.torque)]
-        pairs += [(row, getattr(found.at_samples, name)) for row, name in zip(outputs[3:], SIGNALS, strict=True)]
-        for here, there in pairs:
-            assert abs(here - there).max() < 1e-9 * abs(there).max()
-
-
 def test_the_arm_bends_in_its_own_shapes(case):
     """Displacement over that of the tip at each pole, against the shapes of the modes."""
     arm, data, _ = case
@@ -169,7 +156,7 @@ def policy_of(page):
 
 
 def test_the_page_stays_small_and_has_its_text_alone(tmp_path, monkeypatch):
-    monkeypatch.setattr("tfarm.report.live.live_data", data_of)
+    monkeypatch.setattr("tfarm.report.page.live_data", data_of)
     odd = replace(tfarm.load(ARMS[0]), name=ARMS[0] + ODD)
     save_live(ArmReport(odd, chain_of(odd)), tmp_path)
     page = (tmp_path / "live.html").read_text(encoding="utf-8")
@@ -192,7 +179,7 @@ def test_explore_writes_the_page_that_a_report_has_and_opens_it(tmp_path, monkey
     opened = []
     monkeypatch.setattr("webbrowser.open", opened.append)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    remember(monkeypatch, live, "live_data")
+    remember(monkeypatch, report_page, "live_data")
     arm, law, chain = tfarm.load(ARMS[0]), HubFeedback(K1=0.25, K2=0.4), Chain(sampling=Sampling(period=0.005))
     found = tfarm.explore(arm, law, chain)
     (tmp_path / "report").mkdir()
@@ -344,14 +331,3 @@ class Plant:
     def poles(self, law):
         """Closed-loop poles."""
         return np.linalg.eigvals(self.A - np.outer(self.B, np.array(law.row) @ self.C[:3]))
-
-    def slew(self, data, law):
-        """Torque, and every output at the samples (outputs, n)."""
-        ideal = np.frombuffer(base64.b64decode(data["ideal"]), "<f8").reshape(-1, 5)
-        x, torque, outputs = np.zeros(len(self.A)), [], []
-        for r, theta, rate, moment, _ in ideal:
-            y = self.C @ x
-            torque.append(r + law.Kp * (theta - y[0]) + law.K1 * (rate - y[1]) - law.K2 * (y[2] - moment))
-            outputs.append(y)
-            x = self.A @ x + self.B * torque[-1]
-        return np.array(torque), np.array(outputs).T

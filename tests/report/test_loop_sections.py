@@ -9,7 +9,7 @@ from matplotlib.contour import QuadContourSet
 
 import tfarm
 from tests.plots.labels import complaints
-from tests.report.written import coarsen
+from tests.report.written import coarsen, report_with
 from tfarm.arm import Hub, HubFeedback
 from tfarm.arm.chain import Sampling
 from tfarm.assessment import stability_map
@@ -22,13 +22,14 @@ from tfarm.loop.loci import loci
 from tfarm.loop.nyquist import nyquist
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.report import write
+from tfarm.report.blocks import prose
 from tfarm.report.loop_section import (
     map_section,
     margin_table,
     margins_section,
     recommended_section,
 )
-from tfarm.report.page import ArmReport, brief_on, has_loop, on_hub, prose
+from tfarm.report.page import ArmReport, GivenLaw, has_loop
 from tfarm.spectrum.gains import PAPER_GAINS, default_gains
 
 LAB, PURE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
@@ -59,14 +60,14 @@ def coarse():
 
 def test_the_edge_is_smooth_and_inside_the_picture(lab):
     """Neighbours lie close as seen, so that what is drawn between them is the curve itself."""
-    places = np.stack([lab.x.place(lab.edge[:, 0]), lab.y.place(lab.edge[:, 1])])
+    places = np.stack([lab.x.place(lab.boundary.points[:, 0]), lab.y.place(lab.boundary.points[:, 1])])
     assert np.nanmax(np.hypot(*np.diff(places))) < edges.LONG_SEGMENT
-    assert np.isnan(lab.edge[-1]).all()
+    assert np.isnan(lab.boundary.points[-1]).all()
 
 
 def test_no_part_of_the_edge_is_missing(lab):
     """Where the count changes between neighbours of the grid in a row or column, the line passes between them."""
-    edge = np.stack([lab.x.place(lab.edge[:, 0]), lab.y.place(lab.edge[:, 1])], axis=1)
+    edge = np.stack([lab.x.place(lab.boundary.points[:, 0]), lab.y.place(lab.boundary.points[:, 1])], axis=1)
     edge = edge[~np.isnan(edge[:, 0])]
     across, up = lab.x.place(lab.region.K1), lab.y.place(lab.region.K2)
     for axis in (0, 1):
@@ -116,8 +117,8 @@ def test_the_verdict_comes_before_any_margin():
     (table,) = (block for block in section.blocks if block.stem == "margins")
     quantities = table.columns[0].values
     assert quantities.index("stability") < min(n for n, name in enumerate(quantities) if "margin" in name)
-    wrong = on_hub(PURE, HubFeedback(K1=0.3, K2=1.5), "wrong", "wrong")
-    table = margin_table([(wrong, margins_of(PURE, wrong.law))])
+    (wrong,) = ArmReport(PURE, Chain(), (GivenLaw(HubFeedback(K1=0.3, K2=1.5)),)).cases
+    table = margin_table([(wrong, wrong.margins)])
     values = dict(zip(table.columns[0].values, table.columns[2].values, strict=True))
     assert values["stability"] == "unstable"
     assert not [name for name in values if "margin" in name or "peak" in name]
@@ -177,7 +178,7 @@ def test_the_map_shows_its_proof(coarse, section):
 
 def test_the_star_is_stable_at_the_period_of_its_page(section):
     """The best gains of a page are those of its own chain: both loops of their card are stable, as by the poles."""
-    assert all(brief_on(LAB, each.law, Chain()).is_stable for each in ArmReport(LAB, Chain()).in_s)
+    assert all(each.brief.is_stable for each in ArmReport(LAB, Chain()).in_s)
     labels = [text.get_text() for text in section.blocks[0].figure.legends[0].get_texts()]
     assert any(label.startswith("best damping") and "stable when sampled every 10 ms" in label for label in labels)
     quick = Chain(sampling=Sampling(period=2e-3))
@@ -212,8 +213,7 @@ def test_intervals_are_short_facts_of_the_map(section):
         assert (low, high) == pytest.approx(rows[name].around, rel=5e-4)
 
 
-def test_without_recommended_gains_there_is_a_sentence(monkeypatch):
-    monkeypatch.setattr("tfarm.report.loop_section.best", lambda arm, chain: None)
-    section = recommended_section(ArmReport(LAB, Chain()))
+def test_without_recommended_gains_there_is_a_sentence():
+    section = recommended_section(report_with(LAB, best=None))
     assert section.answer.startswith("None: the search")
     assert not section.card

@@ -11,26 +11,31 @@ import pytest
 import tfarm
 from tests.odd_arms import odd_arms
 from tests.report import plausible
-from tests.report.written import blocks_of
+from tests.report.written import blocks_of, report_with
 from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.arm import implausible
 from tfarm.assessment.card import margins_of
 from tfarm.case import Case
 from tfarm.dsp import Chain
-from tfarm.loop import loci as loci_room
 from tfarm.loop.continuous import ContinuousLoop
-from tfarm.loop.locus import locus
 from tfarm.loop.poles import poles_below
-from tfarm.report import loop_section
-from tfarm.report.arm_section import arm_section, assumptions_section, derived_table
+from tfarm.report.blocks import prose
 from tfarm.report.loop_section import (
+    interval_facts,
     locus_section,
     margin_table,
     margins_section,
 )
-from tfarm.report.page import ArmReport, GivenLaw, has_loop, on_hub, prose, sign_words
-from tfarm.report.response_sections import bode_section, damped_tables, modal_table
+from tfarm.report.page import ArmReport, GivenLaw, has_loop, sign_words
+from tfarm.report.response_sections import (
+    arm_section,
+    assumptions_section,
+    bode_section,
+    damped_tables,
+    derived_table,
+    modal_table,
+)
 from tfarm.report.writing import pieces_of
 from tfarm.spectrum import DampedModes
 from tfarm.spectrum.gains import default_gains
@@ -64,8 +69,8 @@ def test_a_locked_hub_is_not_turned_by_a_torque():
 @pytest.mark.parametrize("name", ARMS)
 def test_cells_of_the_modal_table_are_its_numbers_with_a_few_digits(name):
     """None rounded away, none with more decimals than it has a use for; nodes lie within the arm, and not at 0."""
-    modes = tfarm.modes(ARMS[name], count=6)
-    table = modal_table(modes)
+    modes = tfarm.modes(ARMS[name], count=10)
+    table = modal_table(ArmReport(ARMS[name], Chain()))
     for each in table.columns[1:5]:
         assert [number(cell) for cell in each.cells] == pytest.approx(list(each.values), rel=5e-4, abs=0)
         assert max(len(cell) for cell in each.cells) <= 17
@@ -80,7 +85,7 @@ def test_rows_outside_the_certified_box_are_marked(name, monkeypatch):
     """The box and the count that the caption prints hold just the rows marked as inside."""
     monkeypatch.setattr(DampedModes, "certify", lambda self, digits: ())  # seconds, and its own tests
     arm = ARMS[name]
-    table, *_ = damped_tables(tfarm.modes(arm, count=6))
+    table, *_ = damped_tables(ArmReport(arm, Chain()), 6)
     count = int(re.search(r"All (\d+) eigenvalues", table.caption)[1])
     edges = re.search(r"with (\S+) < Re s < (.+?) 1/s and .Im s. < (.+?) rad", table.caption)
     left, right, top = (number(edge) for edge in edges.groups())
@@ -143,7 +148,7 @@ def is_stable(arm, law, up_to):
 def test_the_interval_of_K2_is_that_of_the_poles(name):
     """On either side of an edge; at the end of a search nothing happens, and no edge is claimed."""
     arm, law = ARMS[name], default_gains(ARMS[name])
-    _, fact = loop_section.interval_facts(arm)
+    _, fact = interval_facts(ArmReport(arm, Chain()))
     down, up = (number(end.strip("<> ()")) for end in re.search(r"\(.+?\)", fact.value)[0].split(", "))
     band = 3 * tfarm.modes(arm, 3).natural_frequency[-1]
     assert is_stable(arm, replace(law, K2=0.999 * up), band)
@@ -164,17 +169,15 @@ def test_sentences_about_the_pole_at_0_and_J_are_for_arms_that_turn_freely(name)
             assert interval is None or (interval[f"{side}_is"] == "search bound") == (interval[side] == end)
 
 
-def test_branches_that_cannot_be_followed_are_left_out_with_a_word(monkeypatch):
+def test_branches_that_cannot_be_followed_are_left_out_with_a_word():
     """And never a text of the search."""
-    arm = ARMS["rubber"]
 
-    def follow(arm, law, vary, start, stop, points, branches):
-        if vary == "K1":
+    def follow(report, name):
+        if name == "K1":
             raise tfarm.ConvergenceError("the damped mode 1 cannot be separated from its neighbours", None, None)
-        return locus(arm, law, vary, start, stop, points, branches)
+        return ArmReport.locus(report, name)
 
-    monkeypatch.setattr(loci_room, "locus", follow)
-    section = locus_section(ArmReport(arm, Chain()))
+    section = locus_section(report_with(ARMS["rubber"], locus=follow))
     words = " ".join(section.words)
     assert "separated from its neighbours" not in words
     assert "Along K1 the branches of this arm could not be followed" in words
@@ -198,14 +201,13 @@ def test_a_free_pin_has_its_rate_loop():
 
 
 def test_a_margin_without_end_has_no_frequency():
-    named = on_hub(ARMS["pinned"], HubFeedback(K1=5.0338, K2=-3.0), "default gains", "default")
-    found = margins_of(ARMS["pinned"], named.law)
-    table = margin_table([(named, found)])
+    (named,) = ArmReport(ARMS["pinned"], Chain(), (GivenLaw(HubFeedback(K1=5.0338, K2=-3.0)),)).cases
+    table = margin_table([(named, named.margins)])
     rows = dict(zip(column(table, "quantity").values, table.columns[2].values, strict=True))
     assert rows["margins in the frequency range: phase margin for lead"] == math.inf
     assert rows["margins in the frequency range: phase margin for lag"][1] == pytest.approx(488.89, rel=1e-4)
-    passive = margins_of(ARMS["free-pin"], HubFeedback(K1=0.283))
-    table = margin_table([(named, passive)])
+    (passive,) = ArmReport(ARMS["free-pin"], Chain(), (GivenLaw(HubFeedback(K1=0.283)),)).cases
+    table = margin_table([(passive, passive.margins)])
     rows = dict(zip(column(table, "quantity").values, table.columns[2].values, strict=True))
     assert rows["margins in the frequency range: disk margin"] == pytest.approx(2.0)
 

@@ -15,11 +15,10 @@ from tfarm.arm import Gauge, written_unit
 from tfarm.dsp import Chain
 from tfarm.loop.circle_crossings import sampled_map
 from tfarm.plots.motion import sketch
-from tfarm.report.arm_section import arm_section, assumptions_section
 from tfarm.report.overview import summary
 from tfarm.report.page import ArmReport, has_loop, sign_words
-from tfarm.report.response_sections import locked_table
-from tfarm.report.tuner_section import why_not
+from tfarm.report.response_sections import arm_section, assumptions_section, locked_table
+from tfarm.report.sampled_section import why_not
 
 RIGS = {arm.name: arm for arm in map(tfarm.load, ("tests/rigs/bench-rig.toml", "quanser-2dsfl", "quanser-flexlink"))}
 
@@ -66,7 +65,7 @@ def test_the_sketch_has_each_segment_where_it_is_and_the_payload_at_its_centre()
 
 def test_free_and_locked_frequencies_are_those_of_the_commands():
     arm = RIGS["quanser-2dsfl"]
-    columns = {each.key: list(each.values) for each in locked_table(tfarm.modes(arm, 6)).columns}
+    columns = {each.key: list(each.values) for each in locked_table(ArmReport(arm, Chain()), 6).columns}
     assert columns["index"] == list(range(1, 7))
     assert columns["natural_frequency_rad_s"] == tfarm.modes(arm, 6).natural_frequency[1:].tolist()
     held = tfarm.modes(arm.having(hub_inertia=math.inf), 6)

@@ -23,8 +23,9 @@ from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
 from tfarm.plots.regions import overlay
 from tfarm.report import sampled_section as page
-from tfarm.report.page import DRAWN_DIGITS, ArmReport, GivenLaw, prose, save_block
-from tfarm.report.sampled_section import FILM_FRAMES, sampled_section, slews
+from tfarm.report.blocks import DRAWN_DIGITS, prose, save_block
+from tfarm.report.page import FILM_FRAMES, ArmReport, GivenLaw
+from tfarm.report.sampled_section import sampled_section, slews
 from tfarm.schema import text
 from tfarm.spectrum.gains import default_gains
 

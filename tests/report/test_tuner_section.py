@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.report.written import blocks_of, values_of
+from tests.report.written import blocks_of, report_with, values_of
 from tests.shared import once
 from tests.shell import answer
 from tfarm.dsp import Chain, Sampling
 from tfarm.dsp.traces import away
 from tfarm.errors import CertificationError
-from tfarm.report.page import ArmReport, prose
-from tfarm.report.tuner_section import section_of, tuner_in_short, tuner_section
+from tfarm.report.blocks import prose
+from tfarm.report.page import ArmReport
+from tfarm.report.sampled_section import tuner_in_short, tuner_section
 from tfarm.schema.html import with_symbols
 from tfarm.studies import candidates as tuned
 from tfarm.tuner import Learning, LearningCurves, Plan, initial_network, train
@@ -33,7 +34,7 @@ def small(tmp_path_factory):
         patch.setattr(tuned, "LONG_TRIAL", 300)
         patch.setattr(tuned, "CURVE_SAMPLES", SEEDS * Plan().trials * 301)
         data = pickle.loads(once(tmp_path_factory, "tuner", save_study).read_bytes())
-    return data, section_of(data)
+    return data, tuner_section(report_with(LAB, tuner=data))
 
 
 def save_study(file):
@@ -110,7 +111,7 @@ def test_other_arms_have_the_reason_why_there_is_no_tuner(arm, word):
     assert not section.blocks
 
 
-def test_a_slew_that_runs_away_and_a_guard_that_fails_are_a_sentence(monkeypatch):
+def test_a_slew_that_runs_away_and_a_guard_that_fails_are_a_sentence():
     """Random arms met both: a traceback out of matplotlib, and 3.21e+06 in the middle of a sentence."""
     answer = tuner_section(ArmReport(LAB.having(damping=1e-14), Chain())).answer
     assert answer.startswith("No tuner here: no range of gains is proven stable")
@@ -118,8 +119,7 @@ def test_a_slew_that_runs_away_and_a_guard_that_fails_are_a_sentence(monkeypatch
     words = prose("tuner_unproven", error=CertificationError("no sector at K1 = 3.21e+06, C = 6.94e-05 s"))
     assert "K1 = 3.21 × 10⁶, C = 6.94 × 10⁻⁵ s" in with_symbols(words)
     runs_away = SimpleNamespace(tuning=SimpleNamespace(without=SimpleNamespace(cost=math.inf)))
-    monkeypatch.setattr("tfarm.report.tuner_section.tuner_numbers", lambda *_: runs_away)
-    assert "is unstable" in tuner_section(ArmReport(LAB, Chain())).answer
+    assert "is unstable" in tuner_section(report_with(LAB, tuner=runs_away)).answer
 
 
 @pytest.mark.parametrize(("samples", "seeds"), [(301, 20), (40_000, 20), (60_000, 13), (1_000_000, 1)])

@@ -12,7 +12,7 @@ import pytest
 import tfarm
 from tests.hostile import NAME
 from tests.report.written import ARM
-from tfarm.report.page import DRAWN_DIGITS
+from tfarm.report.blocks import DRAWN_DIGITS
 from tfarm.report.response_sections import sensitivity_table
 from tfarm.schema import curve_table
 from tfarm.spectrum.gains import default_gains

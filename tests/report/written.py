@@ -18,11 +18,13 @@ from tests.hostile import LONG, NAME, PRINTED, Read
 from tfarm.arm import to_toml
 from tfarm.assessment import stability_map
 from tfarm.audit.published import validate
+from tfarm.dsp import Chain
 from tfarm.exported import live_loop
 from tfarm.loop import circle_crossings as sampled_regions
 from tfarm.loop import loci
 from tfarm.loop import sampled_modes as sampled_loci
-from tfarm.report import overview, sampled_section, writing
+from tfarm.report import overview, page, writing
+from tfarm.report.page import ArmReport
 from tfarm.report.writing import PIECES
 
 COARSE = (
@@ -33,7 +35,7 @@ COARSE = (
     (sampled_regions, "MOST_COLUMNS", 0),  # with the corners that so few have
     (loci, "LOCUS_POINTS", 60),
     (sampled_loci, "SAMPLED_LOCUS_VALUES", 31),
-    (sampled_section, "FILM_FRAMES", 10),
+    (page, "FILM_FRAMES", 10),
     (writing, "MOST_WORKERS", 1),  # a second process would have its own grids
     (stability_map, "sampled_region", stability_map.sampled_region.__wrapped__),  # what is kept of it is of other grids
     (live_loop, "sampled_region", stability_map.sampled_region.__wrapped__),
@@ -48,7 +50,7 @@ def coarsen(put=setattr):
 
 def plain_cards(put):
     """Cards of the index with an empty picture, for tests that are not about it: a response and a drawing each."""
-    put(overview, "bode", lambda *_: None)
+    put(page, "bode", lambda *_: None)
     put(overview, "draw_card", SimpleNamespace(figure=lambda _: None))
     put(overview, "save_figure", lambda _, file: file.write_text("<svg/>"))
 
@@ -56,8 +58,8 @@ def plain_cards(put):
 ASSUMPTIONS = (PRINTED, "second assumption", LONG)
 ARM = replace(tfarm.load("stocky-steel"), name=NAME, assumptions=ASSUMPTIONS)
 REPORT = (
-    "import pickle, sys, tfarm; from pathlib import Path; from tfarm import audit; from tfarm.report import write;"
-    "rows = pickle.loads(Path(sys.argv[3]).read_bytes()); audit.kept_audit = lambda: rows;"
+    "import pickle, sys, tfarm; from pathlib import Path; from tfarm.report import page, write;"
+    "rows = pickle.loads(Path(sys.argv[3]).read_bytes()); page.kept_audit = lambda: rows;"
     "from tests.report.written import coarsen; coarsen();"  # the map and the sampled section have tests of their own
     "print(write([tfarm.load(sys.argv[1])], Path(sys.argv[2])));"
     "pyplot = sys.modules.get('matplotlib.pyplot');"  # python-control imports it; no figure may be its own
@@ -82,6 +84,11 @@ def report_elsewhere(audit_file, out):
 ANCHORS = {piece.anchor for piece in PIECES}
 HELD = replace(ARM, hub=tfarm.Hub(inertia=math.inf))  # no loop: its proofs are quick
 validated = cache(lambda: tuple(validate()))  # as this process has it
+
+
+def report_with(arm, **records):
+    """A report on an arm in which these records stand for those that it would make."""
+    return type("Report", (ArmReport,), records)(arm, Chain())
 
 
 def blocks_of(section):

@@ -19,7 +19,7 @@ from tests.rigs import some_rig
 from tests.survey import Finding, numbered
 from tfarm.errors import TfarmError
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.report.page import prose
+from tfarm.report.blocks import prose
 from tfarm.report.response_sections import bode_facts
 from tfarm.response.frequency import extrema, resonant_band
 

@@ -17,7 +17,16 @@ from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
 from tfarm.loop.circle_crossings import GainMap, ends_of_K1, rounded_map, sampled_map, with_both_sides, with_more
-from tfarm.loop.plane import Axis, Plane, edge, gain_map, moment_axis, rate_axis, rate_columns
+from tfarm.loop.plane import (
+    Axis,
+    BoundaryLines,
+    Plane,
+    boundary_lines,
+    gain_map,
+    moment_axis,
+    rate_axis,
+    rate_columns,
+)
 from tfarm.loop.sampled import Sampled
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.records import frozen
@@ -110,17 +119,17 @@ GRID_COLUMNS, GRID_ROWS = 240, 200  # of the coloured grid
 class StabilityMap:
     """The numbers of the map.
 
-    `region` is the exact count on the coloured grid, `edge` (n, 3) the exact boundary, both gains and w, within the
-    picture with rows of nan where it leaves it; `damping` (rows, columns) the least damping ratio of the first
-    `DESIGNED_MODES` modes on the `coarse` grid, of every fourth value of each gain and the frame's.  `sampled` is the
-    region of the loop sampled by a chain, None where that is not determined.
+    `region` is the exact count on the coloured grid, `boundary` the exact boundary in the picture; `damping` (rows,
+    columns) the least damping ratio of the first `DESIGNED_MODES` modes on the `coarse` grid, of every fourth value of
+    each gain and the frame's.  `sampled` is the region of the loop sampled by a chain, None where that is not
+    determined.
     """
 
     arm: Arm
     x: Axis
     y: Axis
     region: Plane
-    edge: Real
+    boundary: BoundaryLines
     coarse: Plane
     damping: Real
     sampled: GainMap | None
@@ -133,7 +142,9 @@ class StabilityMap:
             ("grid", K1, K2, math.inf if count < 0 else int(count), ratio, "")
             for K1, K2, count, ratio in zip(*map(np.ravel, values), strict=True)
         ]
-        rows += [("boundary", K1, K2, "", "", omega) for K1, K2, omega in self.edge.tolist() if not math.isnan(K1)]
+        rows += [
+            ("boundary", K1, K2, "", "", omega) for K1, K2, omega in self.boundary.points.tolist() if not math.isnan(K1)
+        ]
         rate = "_".join([PLANE[0], *shown_unit(PLANE[0], self.arm).replace("/", " ").split()])
         keys = "what", rate, PLANE[1], "unstable_poles", "least_damping_ratio", "omega_rad_s"
         return [Column(key, of=of) for key, of in zip(keys, zip(*rows, strict=True), strict=True)]
@@ -148,7 +159,7 @@ def stability_map(arm: Arm, chain: Chain) -> StabilityMap:
     across, up = (np.r_[axis.low, each[2::4], axis.high] for axis, each in zip((x, y), found.axes, strict=True))
     coarse = gain_map(arm, across, up)
     sampled = sampled_region(arm, x, y, chain)
-    return StabilityMap(arm, x, y, found, edge(found, x, y), coarse, least_damping(coarse), sampled)
+    return StabilityMap(arm, x, y, found, boundary_lines(found, x, y), coarse, least_damping(coarse), sampled)
 
 
 def least_damping(plane: Plane) -> Real:

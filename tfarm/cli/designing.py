@@ -389,7 +389,7 @@ def study(
         found = run(**arguments, out=out, workers=workers, stop_after=stop_after, progress=announce, client=client)
     page = None
     if report:
-        from tfarm.report.study_page import write_study
+        from tfarm.report.writing import write_study
 
         page = write_study(found)
     show(found, None if any(key.startswith("law.") for key in keys) else defaults, also=(page,))

@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import AnyLaw, Arm
+from tfarm.arm import Arm, Law
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.crossing import Window
@@ -37,7 +37,7 @@ class LoopCurve:
     """
 
     arm: Arm
-    law: AnyLaw
+    law: Law
     stability: Annotated[str, Quantity("stability", help="stable, marginal or unstable")]
     period: Annotated[float | None, Quantity("sampling period", "s", help="of a sampled loop, else null")] = None
     note: Annotated[str, Quantity("note", help="damping with which an undamped arm is drawn")] = ""

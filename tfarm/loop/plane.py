@@ -18,8 +18,8 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Annotated
+from functools import cached_property, partial
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +61,21 @@ LINEAR_SHARE = LINEAR_SCALE / (1 - 1 / 10)  # factor on values there
 DEEPEST_MOMENT_GAIN = -50.0  # and the lowest value at which unstable gains are searched
 SHORT_SEGMENT = 0.008  # of the picture: longer pieces of the boundary look straight, and are cut
 LONG_SEGMENT = 0.03  # of the picture: a piece longer than that after all cuts is a jump through infinity, and not drawn
+
+
+class BoundaryLines(NamedTuple):
+    """The exact boundary in a picture of the plane of both gains.
+
+    `points` (n, 3) are both gains and w [rad/s], with rows of nan where it leaves the picture.  A real pole passes
+    through 0 at the gains `upright` and `level`, None without one.  At the points `ends` (n, 3) a stability interval
+    ends.  Without losses in the links there is instead `resting`, the first frequencies [rad/s] with the hub at rest.
+    """
+
+    points: Real
+    upright: float | None
+    level: float | None
+    ends: Real
+    resting: Real
 
 
 @frozen
@@ -132,6 +147,11 @@ class Plane(PlaneOfCounts):
     def upright(self) -> float:
         """The K1 that cancels the friction of the hub."""
         return 0.0 - self.arm.rate_loss
+
+    @cached_property
+    def boundary_lines(self) -> BoundaryLines:
+        """The boundary in a picture of the plane as it is."""
+        return boundary_lines(self, *map(Axis.of, self.axes))
 
     @property
     def stable_intervals(self) -> list[list[Window]]:
@@ -422,9 +442,12 @@ def stable_edge(found: Plane) -> Real:
     return points[(points[:, 0] > 0) & (points[:, 2] > 0) & np.isfinite(points[:, 2])]
 
 
-def resting_frequencies(found: Plane, count: int) -> Real:
-    """The first natural frequencies [rad/s] with the hub at rest, those of the edge along the gain across."""
-    return hub_locked(modes(found.arm, count)).natural_frequency
+def boundary_lines(found: Plane, x: Axis, y: Axis) -> BoundaryLines:
+    """Return the boundary in a picture with these axes."""
+    if found.arm.loses_at_hub_alone:
+        none = np.empty((0, 3))
+        return BoundaryLines(none, None, None, none, hub_locked(modes(found.arm, 3)).natural_frequency)
+    return BoundaryLines(edge(found, x, y), *static_edges(found), stable_edge(found), np.empty(0))
 
 
 def static_edges(found: Plane) -> tuple[float | None, float | None]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import MaxNLocator, NullFormatter
 
-from tfarm.arm import PLANE, HubFeedback
+from tfarm.arm import PLANE, HubFeedback, Law
 from tfarm.arrays import Complex, Real
 from tfarm.exact.outputs import signal_words, unit_over
 from tfarm.fitting.data import Measured
@@ -252,7 +252,7 @@ def draw_share(fit: Fit, found: ShareOfArms, *, ax: Axes) -> None:
     """Draw the share of the possible arms that each pair of gains stabilises in continuous time."""
     mesh = ax.pcolormesh(*found, cmap="Blues", vmin=0.0, vmax=1.0, shading="nearest", rasterized=True)
     ax.figure.colorbar(mesh, ax=ax).set_label("share of the arms with a stable loop [−]")
-    name_axes(PLANE, fit.arm, HubFeedback(), ax)
+    name_axes(PLANE, fit.arm, Law.of_gains(HubFeedback()), ax)
     ax.grid(False)
 
 

@@ -21,7 +21,7 @@ from tfarm.loop.margins import Margins
 from tfarm.loop.nyquist import Nyquist, compressed
 
 from .frequency import FREQUENCY, Drawn, draw_curves, over_frequency, parted
-from .style import BLUE, FAINT, GREY, INK, UNSTABLE, Axes, arrows, gains_words, note, picture, safe
+from .style import BLUE, FAINT, GREY, INK, UNSTABLE, Axes, gains_words, note, picture, safe
 
 # dB of L that are drawn: so that the part near 0 dB shows
 HIGHEST = 60.0
@@ -273,6 +273,20 @@ def _curve(z: Complex, critical: float, edge: float, ax: Axes) -> None:
     ax.plot(z.real, -z.imag, color=BLUE, lw=0.6, alpha=0.55, zorder=2, label="ω < 0")
     arrows(np.where(z.real < edge, z, np.nan), ax, (0.12, 0.4, 0.75), BLUE)
     ax.plot([critical], [0], "+", color=UNSTABLE, ms=11, mew=2.2, zorder=6, ls="none", label="the point −1")
+
+
+def arrows(z: Complex, ax: Axes, shares: Sequence[float] = (0.5,), color: str = INK) -> None:
+    """Heads in the direction in which a curve runs, at these shares of its length in view, where that is enough."""
+    to_view = ax.transData - ax.transAxes
+    at = to_view.transform(np.c_[z.real, z.imag])
+    seen = np.flatnonzero(((at > 0) & (at < 1)).all(axis=1))
+    way = np.diff(at[seen], axis=0) * (np.diff(seen) == 1)[:, None]  # none from where it leaves the view to its return
+    along = np.cumsum(np.hypot(*way.T))
+    for n in np.searchsorted(along, along[-1] * np.array(shares)) if along.max(initial=0.0) > 0.05 else ():
+        half = 0.015 * way[n] / np.hypot(*way[n])
+        tail, head = to_view.inverted().transform(at[seen[n]] + way[n] / 2 + [-half, half]).tolist()
+        looks = {"arrowstyle": "-|>", "color": color, "lw": 0.0, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 15}
+        ax.annotate("", head, tail, arrowprops=looks, zorder=3.5)
 
 
 def _arcs(data: Nyquist, ax: Axes) -> None:

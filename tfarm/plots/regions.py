@@ -20,16 +20,7 @@ from tfarm.assessment.stability_map import StabilityMap
 from tfarm.crossing import Window, pieces
 from tfarm.digits import how_many, plain, scientific, significant
 from tfarm.loop.circle_crossings import GainMap
-from tfarm.loop.plane import (
-    INFINITE,
-    LINEAR_SCALE,
-    Axis,
-    Plane,
-    edge,
-    resting_frequencies,
-    stable_edge,
-    static_edges,
-)
+from tfarm.loop.plane import INFINITE, LINEAR_SCALE, Axis, BoundaryLines, Plane
 
 from .frequency import bode
 from .loop_function import draw_loops
@@ -37,7 +28,6 @@ from .style import (
     COLOURS,
     GREY,
     INK,
-    LYAPUNOV,
     REGIONS,
     STABLE,
     Axes,
@@ -51,6 +41,7 @@ from .style import (
     safe,
 )
 
+LYAPUNOV = "{} > 0, {} < 1".format(*PLANE)  # proven by the argument of the paper at C = 0
 SLATE = "#3d5468"  # of contours of damping: no colour of stability
 # edges of a sampled loop, and of a second one
 DASHED = (0, (5, 2.5))
@@ -82,7 +73,7 @@ def gain_map(found: Plane | GainMap, *, ax: Axes) -> None:
     else:
         ground(found, x, y, ax)
         if found.is_of_gains:
-            draw_boundary(found, edge(found, x, y), x, y, ax)
+            draw_boundary(found, found.boundary_lines, x, y, ax)
             return
     points = [
         (at, t) for at, each in zip(found.x, found.crossings, strict=False) for t in each.within(y.low, y.high).gain
@@ -168,17 +159,18 @@ def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
     ax.plot([], [], color=SLATE, lw=0.8, label="least damping ratio of the first two modes")
 
 
-def draw_boundary(found: Plane, points: Real, x: Axis, y: Axis, ax: Axes) -> None:
-    """The exact edge (n, 3) with its frequencies; without damping an upright line and a level one."""
+def draw_boundary(found: Plane, boundary: BoundaryLines, x: Axis, y: Axis, ax: Axes) -> None:
+    """The exact boundary with its frequencies; without damping an upright line and a level one."""
     if found.arm.loses_at_hub_alone:
-        _undamped_boundary(found, x, y, ax)
+        _undamped_boundary(found, boundary.resting, x, y, ax)
         return
     label = "poles on the axis at iω, exact, with ω in rad/s"
-    ax.plot(points[:, 0], points[:, 1], color=INK, lw=1.6, label=label)
-    for line, at in zip((ax.axvline, ax.axhline), static_edges(found), strict=True):
-        if at is not None:
-            line(at, color=INK, lw=1.6)
-    along = stable_edge(found)
+    ax.plot(boundary.points[:, 0], boundary.points[:, 1], color=INK, lw=1.6, label=label)
+    if boundary.upright is not None:
+        ax.axvline(boundary.upright, color=INK, lw=1.6)
+    if boundary.level is not None:
+        ax.axhline(boundary.level, color=INK, lw=1.6)
+    along = boundary.ends
     place = x.place(along[:, 0])
     first = max(0.0, float(x.place(np.array(0.0))))
     inside = (first + 0.07 < place) & (place < 0.93) & (y.low < along[:, 1]) & (along[:, 1] < y.high)
@@ -186,7 +178,7 @@ def draw_boundary(found: Plane, points: Real, x: Axis, y: Axis, ax: Axes) -> Non
         note(significant(omega, 3), (across, up), ax, (0.14, 1.0), ha="center")
 
 
-def _undamped_boundary(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
+def _undamped_boundary(found: Plane, resting: Real, x: Axis, y: Axis, ax: Axes) -> None:
     """Strong around what is stable, thin where the number of unstable poles changes.
 
     That is at the edge of each mode of the locked hub, with its frequency at the right; of a uniform arm all these
@@ -198,14 +190,14 @@ def _undamped_boundary(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
         ax.hlines(edges, found.upright, x.high, color=INK, lw=1.8, label="stability boundary, exact")
     if found.is_known:
         whole = found.arm.input_per_torque
-        omega = ", ".join(significant(float(w), 4) for w in resting_frequencies(found, 3))
+        omega = ", ".join(significant(float(w), 4) for w in resting)
         ax.hlines(whole, x.low, x.high, color=INK, lw=0.8, label=f"every mode with the hub at rest: {omega} … rad/s")
         ax.vlines(found.upright, whole, y.high, color=INK, lw=0.8)
         return
     label = "a mode with the hub at rest, ω in rad/s at the right"
-    resting = found.crossings[-1].within(y.low, y.high)
-    ax.hlines(resting.gain, found.upright, x.high, color=INK, lw=0.5, label=label)
-    for t, omega in sorted(zip(resting.gain.tolist(), resting.at.tolist(), strict=True)):
+    edges_of_modes = found.crossings[-1].within(y.low, y.high)
+    ax.hlines(edges_of_modes.gain, found.upright, x.high, color=INK, lw=0.5, label=label)
+    for t, omega in sorted(zip(edges_of_modes.gain.tolist(), edges_of_modes.at.tolist(), strict=True)):
         note(significant(omega, 4), (x.high, t), ax, (1.0, 0.05), xytext=(4, 0), fontsize=7.5)
 
 
@@ -271,8 +263,9 @@ def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes
     if continuous.arm.is_uniform:  # of a rig the argument needs more: see `tfarm.loop.theorem`
         label = f"below it: proven by energy at C = 0 ({LYAPUNOV})"
         ax.axhline(1.0, color=INK, lw=1.1, ls=(0, (5, 3)), zorder=4, label=label)
-    law = planes[0].loop.gains
-    ax.plot(*law.point, "o", color="white", mec=INK, mew=1.4, ms=7, zorder=6, ls="none", label=gains_words(law))
+    loop = planes[0].loop
+    label = gains_words(loop.law)
+    ax.plot(*loop.gains.point, "o", color="white", mec=INK, mew=1.4, ms=7, zorder=6, ls="none", label=label)
 
 
 # ------------------------------------------------------------ the map of an arm
@@ -296,7 +289,7 @@ def draw_stability_map(
     y = data.y
     ground(data.region, x, y, ax)
     contours(*data.coarse.axes, np.where(data.coarse.unstable == 0, data.damping, np.nan), ax)
-    draw_boundary(data.region, data.edge, x, y, ax)
+    draw_boundary(data.region, data.boundary, x, y, ax)
     if (plane := data.sampled) is not None:
         ms = plain(1e3 * plane.loop.chain.sampling.period)
         label = f"stable when sampled every {ms} ms (first {plane.modes_used} modes)"

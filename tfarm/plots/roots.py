@@ -15,6 +15,7 @@ from tfarm.loop.locus import BranchCrossing, Locus, frame, origin_name, view
 from tfarm.loop.sampled_modes import DRAWN_RADIUS, RIM, SampledLoci, SampledLocus
 from tfarm.response.frequency import AXIS_SHARE
 
+from .loop_function import arrows
 from .style import (
     FAINT,
     FIGURES,
@@ -27,7 +28,6 @@ from .style import (
     UNSTABLE,
     Axes,
     Figure,
-    arrows,
     gains_words,
     note,
     picture,
@@ -294,5 +294,5 @@ def _z_plane(data: SampledLoci, along: SampledLocus, ax: Axes) -> None:
     for colour, name in ((STABLE, "stable"), (UNSTABLE, "unstable")):
         ax.plot([], [], color=colour, label=name)
     span = f"{plain(along.values[0], 2)} to {plain(along.values[-1], 3)}"
-    others = gains_words(data.loop.gains, 10, but=along.gain)
+    others = gains_words(data.loop.law, 10, but=along.gain)
     ax.set_title(f"z-plane, {along.gain} from {span} ({others})", fontsize=9.5)

@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from contextvars import ContextVar
+from dataclasses import dataclass
 from functools import cache, partial, wraps
 from inspect import signature
 from itertools import count, product
@@ -31,9 +32,8 @@ from matplotlib.text import Annotation, Text
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from matplotlib.transforms import Bbox
 
-from tfarm.arm import GAINS, LISTED, PLANE, AnyLaw, Arm, as_law, shown_unit
+from tfarm.arm import GAINS, LISTED, Arm, Law, shown_unit
 from tfarm.arm.law import NUMBER
-from tfarm.arrays import Complex
 from tfarm.digits import plain
 from tfarm.errors import require
 from tfarm.exact.outputs import signal_words, unit_over
@@ -59,7 +59,6 @@ REGIONS = ("#dcecf9", "#f9cfc0", "#f2ad9b", "#e58a76", "#d46c5a")
 GOOD = GREEN
 LOW = "#735200"
 POOR = ORANGE
-LYAPUNOV = "{} > 0, {} < 1".format(*PLANE)  # proven by the argument of the paper at C = 0
 OTHER_UNITS = ARM_PARAMETERS | {"delay": "s"}  # of numbers that vary
 
 METADATA: dict[str, dict[str, str | None]] = {
@@ -68,14 +67,6 @@ METADATA: dict[str, dict[str, str | None]] = {
     "pdf": {"Creator": "tfarm", "Producer": None, "CreationDate": None},
 }
 PICTURE_DOTS = 160  # an inch, of a PNG: lines of 0.6 points are more than a pixel wide
-COORDINATES, LONG_NUMBER, PATH_LETTER = (  # in an SVG
-    re.compile(pattern) for pattern in (rb'(?<= [dxy]=")[^"]+', rb"-?\d+\.\d{3,}", rb"\s*([MLQCz])\s*")
-)
-DARK = Path(__file__).with_name("dark.svg").read_bytes()  # in an SVG: its colours on a dark page
-STYLE, COLUMN, PHONE = (Path(__file__).with_name(f"{name}.mplstyle") for name in ("tfarm", "column", "phone"))
-# inches: one and both columns of an IEEE paper
-COLUMN_WIDTH = 3.5
-PAGE_WIDTH = 7.16
 # inches at 96 pixels: half a page that is 1280 wide, and one that is 400
 HALF_WIDTH = 6.2
 PHONE_WIDTH = 3.83
@@ -85,8 +76,8 @@ _place: ContextVar[str] = ContextVar("_place", default="")
 
 def style() -> AbstractContextManager[None]:
     """The style of pictures, whatever the user's own settings are."""
-    more = {"column": [COLUMN], "phone": [PHONE]}
-    return matplotlib.style.context(["default", STYLE, *more.get(_place.get(), [])])
+    names = ("tfarm", _place.get()) if _place.get() in ("column", "phone") else ("tfarm",)
+    return matplotlib.style.context(["default", *(Path(__file__).with_name(f"{name}.mplstyle") for name in names)])
 
 
 @contextmanager
@@ -143,6 +134,62 @@ def check_records(of: Sequence[tuple[Any, str]], found: Sequence[Any]) -> None:
         require(is_right, "plot", value, f"give what {origin}")
 
 
+@dataclass(frozen=True)
+class Drawing:
+    """A function that draws records in axes, with what `picture` is given for a figure of its own."""
+
+    draw: Callable[..., None]
+    of: Sequence[tuple[Any, str]]
+    title: Callable[..., str]
+    size: Any
+    rows: Sequence[float]
+    grid: Callable[..., Any] | None
+
+    def one_or_all(self, axes: Sequence[Axes]) -> Any:
+        """Return the only axes, or all."""
+        return axes[0] if self.grid is None and len(self.rows) == 1 else tuple(axes)
+
+    def figure(self, *found: Any, new: Callable[..., Figure] = Figure, **how: Any) -> Figure:
+        """Return a figure of its own, for its place."""
+        # what is named counts for size, axes and headline too
+        bound = signature(self.draw).bind_partial(*found, **how)
+        found = bound.args
+        with style():
+            inches = self.size(*found) if callable(self.size) else self.size
+            # no label clipped
+            drawn = new(figsize=placed_size(inches, self.grid is not None), layout="constrained")
+            if new is Figure:
+                Measuring(drawn)
+            if self.grid is None:
+                drawn.subplots(len(self.rows), sharex=True, height_ratios=self.rows)
+            else:
+                self.grid(drawn, *found)
+                if _place.get() == "phone":
+                    stack(drawn)
+            self.draw(*found, ax=self.one_or_all(drawn.axes), **bound.kwargs)
+            for ax in drawn.axes[: len(self.rows) - 1] if self.grid is None else []:
+                ax.set_xlabel("")
+            finish(drawn, self.title(*found))
+        drawn.again = partial(self.figure, *found, **bound.kwargs)  # type: ignore[attr-defined]  # in another style
+        return drawn
+
+    def show(self, ax: Any, found: Sequence[Any], how: Mapping[str, Any]) -> Any:
+        """Draw checked records in the axes given, or in a figure of pyplot; return the axes."""
+        check_records(self.of, found)
+        if ax is None:
+            from matplotlib import pyplot  # not needed, and not loaded, for a page
+
+            # loads the backend here: inside a style, the mode of a notebook's would be reset
+            pyplot.draw_if_interactive()  # type: ignore[no-untyped-call]
+            return self.one_or_all(self.figure(*found, new=pyplot.figure, **how).axes)
+        axes = list(np.ravel(np.asarray(ax, dtype=object)))
+        remedy = "{0} axes, as figure.subplots({0}) makes them".format(len(self.rows))
+        require(self.grid or len(self.rows) == len(axes), "ax", len(axes), remedy)
+        with style():
+            self.draw(*found, ax=self.one_or_all(axes), **how)
+        return self.one_or_all(axes)
+
+
 def picture(
     *of: tuple[Any, str],
     title: Callable[..., str],
@@ -168,50 +215,15 @@ def picture(
     """
 
     def decorated(draw: Callable[..., None]) -> Any:
-        is_one = grid is None and len(rows) == 1
-        make = grid or (lambda figure, *_: figure.subplots(len(rows), sharex=True, height_ratios=rows))
-
-        def figure(*found: Any, new: Callable[..., Figure] = Figure, **how: Any) -> Figure:
-            bound = signature(draw).bind_partial(*found, **how)  # what is named counts for size, axes and headline too
-            found = bound.args
-            how = bound.kwargs
-            with style():
-                inches = size(*found) if callable(size) else size
-                size_here = placed_size(inches, grid is not None)
-                drawn = new(figsize=size_here, layout="constrained")  # no label clipped
-                if new is Figure:
-                    Measuring(drawn)
-                make(drawn, *found)
-                if grid is not None and _place.get() == "phone":
-                    stack(drawn)
-                draw(*found, ax=drawn.axes[0] if is_one else drawn.axes, **how)
-                for ax in drawn.axes[: len(rows) - 1] if grid is None else []:
-                    ax.set_xlabel("")
-                finish(drawn, title(*found))
-            drawn.again = partial(figure, *found, **how)  # type: ignore[attr-defined]  # in another style
-            return drawn
+        drawing = Drawing(draw, of, title, size, rows, grid)
 
         @wraps(draw)
         def shown(*found: Any, ax: Any = None, **how: Any) -> Any:
-            check_records(of, found)
-            if ax is None:
-                from matplotlib import pyplot  # not needed, and not loaded, for a page
-
-                # loads the backend here: inside a style, the mode of a notebook's would be reset
-                pyplot.draw_if_interactive()  # type: ignore[no-untyped-call]
-                axes = figure(*found, new=pyplot.figure, **how).axes
-            else:
-                axes = list(np.ravel(np.asarray(ax, dtype=object)))
-                count = len(rows)
-                remedy = f"{count} axes, as figure.subplots({count}) makes them"
-                require(grid or count == len(axes), "ax", len(axes), remedy)
-                with style():
-                    draw(*found, ax=axes[0] if is_one else axes, **how)
-            return axes[0] if is_one else tuple(axes)
+            return drawing.show(ax, found, how)
 
         for kind in get_args(of[0][0]) or (of[0][0],) if len(of) == 1 else ():
-            FIGURES.setdefault(kind, figure)
-        shown.figure = figure  # type: ignore[attr-defined]
+            FIGURES.setdefault(kind, drawing.figure)
+        shown.figure = drawing.figure  # type: ignore[attr-defined]
         return shown
 
     return decorated
@@ -223,10 +235,11 @@ def placed_size(inches: tuple[float, float], is_grid: bool) -> tuple[float, floa
     # which needs both columns
     is_wide = is_grid or inches[0] > 9.5
     match _place.get():
+        # one and both columns of an IEEE paper, less a line of a legend
         case "column" if is_wide:
-            return PAGE_WIDTH, PAGE_WIDTH * share
+            return 7.16, 7.16 * share
         case "column":
-            return COLUMN_WIDTH, COLUMN_WIDTH * share**0.4 - 0.2  # less a line of a legend
+            return 3.5, 3.5 * share**0.4 - 0.2
         case "phone":
             return PHONE_WIDTH, PHONE_WIDTH * (0.36 + 0.75 * share)
         case "page" if not is_grid and inches[0] > HALF_WIDTH:
@@ -324,20 +337,6 @@ def note(text: str, at: tuple[float, float], ax: Axes, room: tuple[float, float]
     return is_free
 
 
-def arrows(z: Complex, ax: Axes, shares: Sequence[float] = (0.5,), color: str = INK) -> None:
-    """Heads in the direction in which a curve runs, at these shares of its length in view, where that is enough."""
-    to_view = ax.transData - ax.transAxes
-    at = to_view.transform(np.c_[z.real, z.imag])
-    seen = np.flatnonzero(((at > 0) & (at < 1)).all(axis=1))
-    way = np.diff(at[seen], axis=0) * (np.diff(seen) == 1)[:, None]  # none from where it leaves the view to its return
-    along = np.cumsum(np.hypot(*way.T))
-    for n in np.searchsorted(along, along[-1] * np.array(shares)) if along.max(initial=0.0) > 0.05 else ():
-        half = 0.015 * way[n] / np.hypot(*way[n])
-        tail, head = to_view.inverted().transform(at[seen[n]] + way[n] / 2 + [-half, half]).tolist()
-        looks = {"arrowstyle": "-|>", "color": color, "lw": 0.0, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 15}
-        ax.annotate("", head, tail, arrowprops=looks, zorder=3.5)
-
-
 def by_name(records: Any, name: str = "") -> Mapping[str, Any]:
     """Several records as they are, or one under this name."""
     return records if isinstance(records, Mapping) else {name: records}
@@ -356,23 +355,21 @@ def plain_ticks(axis: Axis, digits: int = 3, subs: Sequence[float] = (1.0,)) -> 
     axis.set_minor_formatter(NullFormatter())
 
 
-def law_words(law: AnyLaw) -> str:
+def law_words(law: Law) -> str:
     """A controller by its name, where it has one of its own."""
-    name = as_law(law).name
-    return "the controller" if name == "law" else name  # which is that of one without a name
+    return "the controller" if law.name == "law" else law.name  # which is that of one without a name
 
 
-def gains_words(law: AnyLaw, digits: int = 4, but: str = "") -> str:
+def gains_words(law: Law, digits: int = 4, but: str = "") -> str:
     """Each gain with its value, for reading; `but` names one that varies and is left out.  Another law by its name."""
-    any_law = as_law(law)
-    if any_law.gains is None:
-        return f"{law_words(law)}, of {', '.join(any_law.signals)}"
-    gains = any_law.gains
+    gains = law.gains
+    if gains is None:
+        return f"{law_words(law)}, of {', '.join(law.signals)}"
     named = [gain.name for gain in LISTED if gains[gain.name] or gain.output != "hub_angle"]  # beyond the paper's law
     return ", ".join(f"{name} = {plain(gains[name], digits)}" for name in named if name != but)
 
 
-def number_label(name: str, arm: Arm, law: AnyLaw) -> str:
+def number_label(name: str, arm: Arm, law: Law) -> str:
     """A number of a controller or of the arm with its SI unit, for an axis.
 
     The coefficient of s^k in the denominator counts as s^k, in the numerator as the unit of a gain times s^k.
@@ -383,17 +380,16 @@ def number_label(name: str, arm: Arm, law: AnyLaw) -> str:
     if name in OTHER_UNITS:
         return f"{name.replace('_', ' ')} [{OTHER_UNITS[name]}]"
     signal, of, place = NUMBER.fullmatch(name).groups("")  # type: ignore[union-attr]
-    any_law = as_law(law)
-    if not place and signal not in any_law.part_gains:
+    if not place and signal not in law.part_gains:
         return f"{name}, factor on the {'controller' if signal in ('gain', 'all') else signal_words(signal)[0]} [−]"
-    (block,) = (part.block for part in any_law.parts if part.signals == (signal,))
-    power = len(getattr(block, of)) - 1 - int(place) if place and not any_law.is_discrete else 0
+    (block,) = (part.block for part in law.parts if part.signals == (signal,))
+    power = len(getattr(block, of)) - 1 - int(place) if place and not law.is_discrete else 0
     unit = "" if of == "den" else unit_over(arm.input_unit, signal_words(signal)[1])
     time = {0: "", 1: "s"}.get(power, f"s^{power}")
     return f"{name} [{f'({unit}) {time}' if unit and time else unit or time or '−'}]"
 
 
-def name_axes(vary: Sequence[str], arm: Arm, law: AnyLaw, ax: Axes) -> None:
+def name_axes(vary: Sequence[str], arm: Arm, law: Law, ax: Axes) -> None:
     """Along the axes of a plane of two numbers: their names and units."""
     across, up = (safe(number_label(name, arm, law)) for name in vary)
     ax.set(xlabel=across, ylabel=up)
@@ -431,12 +427,17 @@ def content_of(figure: Figure, kind: str, dpi: int = PICTURE_DOTS) -> bytes:
         with ticks_kept(figure.axes):
             figure.savefig(content, format=kind, dpi=dpi, metadata=METADATA[kind])
     drawn = content.getvalue()
-    return COORDINATES.sub(_short, drawn).replace(b"<defs>", DARK, 1) if kind == "svg" else drawn
+    if kind != "svg":
+        return drawn
+    # with its colours on a dark page
+    dark = Path(__file__).with_name("dark.svg").read_bytes()
+    return re.sub(rb'(?<= [dxy]=")[^"]+', _short, drawn).replace(b"<defs>", dark, 1)
 
 
 def _short(part: re.Match[bytes]) -> bytes:
     """Return two decimals, and no space around the letters of a path."""
-    return PATH_LETTER.sub(rb"\1", LONG_NUMBER.sub(lambda number: b"%.2f" % float(number[0]), part[0]))
+    short = re.sub(rb"-?\d+\.\d{3,}", lambda number: b"%.2f" % float(number[0]), part[0])
+    return re.sub(rb"\s*([MLQCz])\s*", rb"\1", short)
 
 
 def settled(figure: Figure) -> None:

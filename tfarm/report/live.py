@@ -10,27 +10,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import mkdtemp
 
-from tfarm.arm import AnyLaw, Arm, Law, as_law
-from tfarm.case import Case
+from tfarm.arm import AnyLaw, Arm, Law
 from tfarm.digits import scientific
 from tfarm.dsp import Chain
 from tfarm.dsp.stages import admit
 from tfarm.errors import TfarmError, require
-from tfarm.exported.live_loop import CONSUMER, LIVE_COLUMNS, live_data
+from tfarm.exported.live_loop import CONSUMER, LIVE_COLUMNS
 from tfarm.loop.panels import PANEL_SAMPLES
 from tfarm.plots.style import GOOD, LOW, MARGINAL, POOR, STABLE, UNSTABLE
-from tfarm.report.page import (
-    TEMPLATES,
-    ArmReport,
-    GivenLaw,
-    argument,
-    has_loop,
-    is_preset,
-    render,
-    sign_words,
-    write_text,
-)
-from tfarm.spectrum.gains import default_gains
+from tfarm.report.blocks import TEMPLATES, argument, render, write_text
+from tfarm.report.page import ArmReport, GivenLaw, has_loop, is_preset, sign_words
 
 LIVE_PAGE = "live.html"
 ASSETS = "assets"
@@ -58,21 +47,17 @@ def save_live(report: ArmReport, folder: Path) -> None:
 
     Where its numbers cannot be made the page has the reason.
     """
-    arm = report.arm
-    chain = report.chain
-    laws = report.laws
-    title = f"{arm.name}: live loop"
+    title = f"{report.arm.name}: live loop"
     out = folder / LIVE_PAGE
-    law = next((law for each in laws if has_sliders(law := as_law(each.law))), as_law(default_gains(arm)))
-    case = Case(arm, law, chain)
-    arm = case.arm
+    each = next((each for each in report.cases if has_sliders(each.law)), report.default)
+    arm = each.arm
     try:
-        admit(CONSUMER, arm, chain)
-        numbers = live_data(case)
+        admit(CONSUMER, arm, report.chain)
+        numbers = each.live
     except TfarmError as error:
         write_text(out, render("live_failed.html", title=title, why=str(error)))
         return
-    data = {"name": arm.name, "command_name": argument(arm.name, is_preset(arm, chain)), **numbers}
+    data = {"name": arm.name, "command_name": argument(arm.name, is_preset(arm, report.chain)), **numbers}
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False).replace("<", "\\u003c")
     colours = {"stable": STABLE, "marginal": MARGINAL, "unstable": UNSTABLE, "good": GOOD, "low": LOW, "poor": POOR}
     page = render(

@@ -5,52 +5,35 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Annotated, NamedTuple
 
-from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, cancelled, unit_of
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, cancelled, unit_of
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import REFERENCE, is_measured
-from tfarm.assessment.card import POOR, margins_of, result_card
-from tfarm.assessment.card import loop_function as loop_curves
-from tfarm.assessment.stability_map import DESIGNED_MODES, stability_map
-from tfarm.case import Case
+from tfarm.assessment.card import POOR
+from tfarm.assessment.stability_map import DESIGNED_MODES
 from tfarm.digits import plain, significant
-from tfarm.dsp import Chain
 from tfarm.dsp.discretise import rule_in_words
 from tfarm.errors import ConvergenceError, TfarmError
-from tfarm.loop import continuous, loci, margins, nyquist, plane, poles, stability
+from tfarm.loop.loci import Loci, held_branches
+from tfarm.loop.margins import Margins
+from tfarm.loop.nyquist import Nyquist
+from tfarm.loop.plane import DEEPEST_MOMENT_GAIN
+from tfarm.loop.poles import Poles
 from tfarm.plots import loop_function, regions, roots
+from tfarm.report.blocks import Fact, PageSection, Picture, columns_of, picture, prose, sheet, upper
 from tfarm.report.overview import results
-from tfarm.report.page import (
-    ArmReport,
-    Controller,
-    Fact,
-    PageSection,
-    Picture,
-    best,
-    brief_on,
-    columns_of,
-    has_loop,
-    picture,
-    prose,
-    sheet,
-    sign_words,
-    upper,
-)
+from tfarm.report.page import ArmReport, PageCase, has_loop, sign_words
 from tfarm.response.signals import Signals, sign_convention
 from tfarm.schema import Column, Quantity, Table, across, curve_table, quantities, roots_table, table, text
-from tfarm.spectrum.gains import default_gains, rate_unit
-
-RECOMMENDED = "Recommended gains (best damping)"
-
 
 # ------------------------------------------------------------ margins
 
 
 def margins_section(report: ArmReport) -> PageSection:
     """Verdict, margins, crossings and spillover of each controller."""
-    found = [(each, margins_of(each.arm, each.law)) for each in report.in_s]
+    found = [(each, each.margins) for each in report.in_s]
     words = [] if report.has_loop else [prose("no_loop", arm=report.arm)]
     words += [] if report.laws else [sign_words(report.arm)]
-    blocks: list[Picture | Table] = [*(_bode_picture(*pair, report.chain) for pair in found), margin_table(found)]
+    blocks: list[Picture | Table] = [*(_bode_picture(each) for each, _ in found), margin_table(found)]
     for each, it in found:
         crossovers = {"gain_crossovers": it.gain_crossovers, "phase_crossovers": it.phase_crossovers}
         for kind, rows in crossovers.items():
@@ -58,14 +41,14 @@ def margins_section(report: ArmReport) -> PageSection:
         own = table(it.stability_intervals)
         blocks.append(sheet("intervals", own, stem=each.stem("windows"), each=each, note=it.intervals_note))
         try:
-            few = stability.spill(each.arm, each.law, 12)
+            few = each.spillover
             blocks.append(sheet("spill", table(few.models), stem=each.stem("spill"), each=each, found=few))
         except TfarmError as error:
             words.append(f"Spillover of {each.name} is not determined: {error}.")
     return PageSection(title="Stability and stability margins", words=words, blocks=blocks)
 
 
-def margin_table(found: Sequence[tuple[Controller, margins.Margins]]) -> Table:
+def margin_table(found: Sequence[tuple[PageCase, Margins]]) -> Table:
     """A row a quantity, a column a controller."""
     leads = [each.name for each, it in found if it.in_band is not None and it.in_band.phase < 0]
     undamped = any(it.stability.loop.arm.is_undamped for _, it in found)
@@ -73,12 +56,9 @@ def margin_table(found: Sequence[tuple[Controller, margins.Margins]]) -> Table:
     return sheet("margins", own, undamped=undamped, leads=leads)
 
 
-def _bode_picture(each: Controller, found: margins.Margins, chain: Chain) -> Picture:
+def _bode_picture(each: PageCase) -> Picture:
     """Bode plot of the continuous-time and the sampled loop function; of the first alone where the other has none."""
-    try:
-        curve = loop_curves(each.arm, each.law, chain)
-    except ConvergenceError:
-        curve = found.curve
+    curve = each.loop_function
     rows = (
         (own.period or 0.0, *row) for own in curve.sides for row in zip(own.omega, own.L.real, own.L.imag, strict=True)
     )
@@ -94,9 +74,9 @@ def _bode_picture(each: Controller, found: margins.Margins, chain: Chain) -> Pic
 def nyquist_section(report: ArmReport) -> PageSection:
     """Return the loop function of each controller on a contour that hides nothing, its encirclements counted."""
     blocks: list[Picture | Table] = []
-    counts: dict[str, nyquist.Nyquist] = {}
+    counts: dict[str, Nyquist] = {}
     for each in report.in_s:
-        counts[each.title] = found = nyquist.nyquist_of(margins_of(each.arm, each.law).stability)
+        counts[each.title] = found = each.nyquist
         linear = loop_function.nyquist.figure(found, name=each.name)
         disc = loop_function.disc.figure(found, name=each.name)
         stem = each.stem("nyquist")
@@ -114,7 +94,7 @@ def nyquist_section(report: ArmReport) -> PageSection:
 
 def law_section(report: ArmReport) -> PageSection:
     """Each law: its signals and input, its entries, its discretisation, and its warnings."""
-    named = report.controllers
+    named = report.cases
     words = [
         prose(
             "law",
@@ -145,7 +125,7 @@ class LawEntry(NamedTuple):
     denominator: Annotated[list[float] | str, Quantity("denominator", help="coefficients in descending powers")]
 
 
-def entries_of(each: Controller) -> Iterator[LawEntry]:
+def entries_of(each: PageCase) -> Iterator[LawEntry]:
     """Every signal of a law with every digit; matrices are in its file alone."""
     law = each.law
     for part in law.parts:
@@ -166,12 +146,12 @@ def entries_of(each: Controller) -> Iterator[LawEntry]:
 def map_section(report: ArmReport) -> PageSection:
     """The stability regions of both gains, continuous and sampled."""
     arm = report.arm
-    data = stability_map(arm, report.chain)
-    designed = best(arm, report.chain)
+    data = report.map
+    designed = report.best
     laws = []
-    points = [default_gains(arm).point, *([] if designed is None else [designed.law.point])]
+    points = [report.gains.point, *([] if designed is None else [designed.law.point])]
     for each, point in zip(report.in_s, points, strict=True):
-        label = f"{each.title};\n{brief_on(arm, each.law, report.chain).short}"
+        label = f"{each.title};\n{each.brief.short}"
         laws.append(regions.MarkedLaw(point, label, each.key == "best"))
     drawn = picture(
         "map",
@@ -180,18 +160,18 @@ def map_section(report: ArmReport) -> PageSection:
         found=data,
         arm=arm,
         chain=report.chain,
-        band=continuous.band_of(arm, DESIGNED_MODES),
-        unit=f"{plain(rate_unit(arm), 4)} {unit_of(RATE_GAIN, arm)}",
-        deepest=plane.DEEPEST_MOMENT_GAIN * arm.input_per_torque,
+        band=report.band,
+        unit=f"{plain(report.rate_unit, 4)} {unit_of(RATE_GAIN, arm)}",
+        deepest=DEEPEST_MOMENT_GAIN * arm.input_per_torque,
     )
-    return PageSection(title="Stability region of both gains", facts=interval_facts(arm), blocks=(drawn,))
+    return PageSection(title="Stability region of both gains", facts=interval_facts(report), blocks=(drawn,))
 
 
-def interval_facts(arm: Arm) -> list[Fact]:
+def interval_facts(report: ArmReport) -> list[Fact]:
     """The stability intervals of each gain of the continuous-time loop, the other at its default."""
     return [
         Fact(f"{row.name}, continuous", text(row.intervals, 4) or "no value", row.unit)
-        for row in margins_of(arm, as_law(default_gains(arm))).stability_intervals
+        for row in report.cases[0].margins.stability_intervals
         if row.name in PLANE
     ]
 
@@ -201,15 +181,17 @@ def recommended_section(report: ArmReport) -> PageSection:
 
     They are recommended unless a margin of the sampled loop is poor.
     """
-    found = best(report.arm, report.chain)
+    title = "Recommended gains (best damping)"
+    found = report.best
     if found is None:
-        return PageSection(title=RECOMMENDED, answer=prose("no_best_gains", modes=DESIGNED_MODES))
+        return PageSection(title=title, answer=prose("no_best_gains", modes=DESIGNED_MODES))
     gains = ", ".join(found.law.gain_text(name, partial(significant, digits=4), report.arm) for name in PLANE)
     answer = prose("best_gains", found=found, modes=DESIGNED_MODES, gains=gains)
     each = report.in_s[-1]
-    card = results(result_card(each.arm, each.law, report.chain), each.title)
+    card = results(each.card, each.title)
     # the last is the sampled one
-    title = "Gains of best damping" if card[-1]["grade"] == POOR else RECOMMENDED
+    if card[-1]["grade"] == POOR:
+        title = "Gains of best damping"
     return PageSection(title=title, answer=answer, card=card)
 
 
@@ -220,49 +202,44 @@ def locus_section(report: ArmReport) -> PageSection:
     """Poles of the controllers; of an arm's own page root loci along each gain too."""
     words: list[str] = []
     tables: list[Table] = []
-    of = quantities(poles.Poles)["values"]
+    of = quantities(Poles)["values"]
     for each in report.in_s:
         try:
-            listed = poles.closed_loop_poles(each.arm, each.law)
+            listed = each.poles
             shown = roots_table(listed.values, of)
             tables.append(sheet("poles", shown, stem=each.stem("poles"), each=each, box=listed.box))
         except TfarmError as error:
             words.append(f"{upper(each.name)}: poles not determined, {error}.")
     if report.laws:
         return PageSection(title="Closed-loop poles", words=words, blocks=tables)
-    arm = report.arm
-    gains = default_gains(arm)
     blocks: list[Picture | Table] = []
-    ranges = {RATE_GAIN: (0.0, 2.0 * rate_unit(arm))}
-    if has_loop(arm):
-        # what balances a torque, both sides of 0 and beyond 1
-        ranges[MOMENT_GAIN] = -1.0 * arm.input_per_torque, 1.6 * arm.input_per_torque
-    found: dict[str, loci.Loci] = {}
-    for name, (start, stop) in ranges.items():
+    found: dict[str, Loci] = {}
+    for name in (RATE_GAIN, MOMENT_GAIN) if has_loop(report.arm) else (RATE_GAIN,):
         try:
-            found[name] = own = loci.loci(Case(arm, gains), name, start, stop)
-            stem = f"locus-{name}"
-            blocks += [
-                picture("locus", roots.draw_loci.figure(own), stem=stem, data=locus_data(own), found=own),
-                sheet("branches", table(own.rows), stem=f"{stem}-branches", found=own),
-                sheet("crossings", table(own.exact.crossings), stem=f"{stem}-crossings", found=own),
-            ]
+            found[name] = own = report.locus(name)
         except ConvergenceError:
             words.append(prose("not_followed", name=name))
-    first, second = (gains.gain_text(name, partial(plain, digits=4), arm) for name in PLANE)
+            continue
+        stem = f"locus-{name}"
+        blocks += [
+            picture("locus", roots.draw_loci.figure(own), stem=stem, data=locus_data(own), found=own),
+            sheet("branches", table(own.rows), stem=f"{stem}-branches", found=own),
+            sheet("crossings", table(own.exact.crossings), stem=f"{stem}-crossings", found=own),
+        ]
+    first, second = (report.gains.gain_text(name, partial(plain, digits=4), report.arm) for name in PLANE)
     others = dict(zip(PLANE, (second, first), strict=True))
     answer = prose("locus_lead", found=found, gains=others)
     return PageSection(title="Root loci", answer=answer, words=words, blocks=[*blocks, *tables])
 
 
-def locus_data(data: loci.Loci) -> Sequence[Column]:
+def locus_data(data: Loci) -> Sequence[Column]:
     """The poles of the exact and of the reduced locus, to the digits that hold on every processor."""
     return [
         Column(data.name, of=data.exact.gain),
         *(
             Column(f"{which}_{n}_{part}", of=["" if math.isnan(value) else value for value in values.tolist()])
             for which, branches in (("exact", data.exact.branches), ("reduced", data.reduced.branches))
-            for n, row in enumerate(loci.held_branches(branches))
+            for n, row in enumerate(held_branches(branches))
             for part, values in (("re", row.real), ("im", row.imag))
         ),
     ]

@@ -7,15 +7,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from tfarm.assessment.card import ResultCard, result_card
+from tfarm.assessment.card import ResultCard
 from tfarm.errors import TfarmError
 from tfarm.plots.frequency import draw_card
 from tfarm.plots.style import save_figure
-from tfarm.report.page import PICTURES, ArmReport, PageSection, SavedBlock, keep, prose
-from tfarm.response.frequency import bode
+from tfarm.report.blocks import PICTURES, PageSection, SavedBlock, keep, prose
+from tfarm.report.page import ArmReport
 from tfarm.schema import table, text, to_dict
-from tfarm.spectrum import modes
-from tfarm.spectrum.listing import listed_modes
 
 DIGITS = 4
 SHORT = {"gain_margin_db": "GM", "phase_margin_deg": "PM", "delay_margin_ms": "DM", "peak_sensitivity": "Ms"}  # a line
@@ -51,19 +49,19 @@ def save_card(report: ArmReport, folder: Path) -> None:
     arm = report.arm
     picture = ""
     with suppress(TfarmError):
-        save_figure(draw_card.figure(bode(arm, "root_moment")), folder / PICTURES / "card.svg")
+        save_figure(draw_card.figure(report.bode("root_moment")), folder / PICTURES / "card.svg")
         picture = "card.svg"
     loops: list[dict[str, Any]] = []
     notes = [] if report.has_loop else [prose("no_loop", arm=arm)]
-    for each in () if arm.is_locked else report.controllers:
+    for each in () if arm.is_locked else report.cases:
         try:
-            found = result_card(each.arm, each.law, report.chain)
+            found = each.card
             loops += results(found, each.name if report.laws else each.title)
             notes += found.notes
         except TfarmError as error:
             notes.append(f"{each.name}: not determined, {error}.")
     # the first five; the page of modes has ten
-    rows = [row for row in listed_modes(modes(arm, 5)).modes if row.index > 0]
+    rows = [row for row in report.mode_list(5).modes if row.index > 0]
     first = table(rows, ("index", "natural_frequency", "natural_frequency_hz", "damping_ratio"))
     shown = Card(arm.name, summary(report), picture, tuple(first), tuple(loops), tuple(dict.fromkeys(notes)))
     keep(folder, "card", asdict(shown))
@@ -71,7 +69,7 @@ def save_card(report: ArmReport, folder: Path) -> None:
 
 def summary(report: ArmReport) -> str:
     """The arm in one sentence, and the laws that its page is about in another."""
-    return prose("summary", arm=report.arm, laws=[each.name for each in report.laws])
+    return prose("summary", arm=report.arm, laws=[each.own_name for each in report.cases if report.laws])
 
 
 def results(found: ResultCard, controller: str) -> list[dict[str, Any]]:

@@ -1,313 +1,78 @@
-"""A page: the report that it is about, and what it is made of: texts, pictures and tables, saved before it is written.
+"""The subject of a page: an arm with a case for each controller, and every record that its pages ask for.
 
-Texts are in templates/prose.txt, pages in the other templates; here is how both are filled in.
+A page asks here for
+  each controller: margins, loop function, Nyquist plot, spillover, poles, result card, verdict on its sampled loop also
+    with further delay, slew, time response, film, and a measured run with the computed one;
+  the arm: default and best gains, the map and the regions of both, root loci in s and z, modes by four theories,
+    responses, measured ones, candidates of what the paper leaves open, the tuner, and the arms of a fit.
+The rooms below compute these records.  Sections and pictures read them.
 """
 
-import json
-import math
-import re
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from functools import cache, lru_cache
-from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from dataclasses import replace
+from functools import lru_cache
+from typing import NamedTuple
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
-from pydantic import TypeAdapter
-
-import tfarm
-from tfarm.arm import (
-    ANGLE_GAIN,
-    LISTED,
-    MOMENT_GAIN,
-    PLANE,
-    RATE_GAIN,
-    AnyLaw,
-    Arm,
-    HubFeedback,
-    Law,
-    arm_and_law,
-    as_law,
-    load,
-    presets,
-)
-from tfarm.arm.chain import file_text
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN, AnyLaw, Arm, HubFeedback, Law, Theory, load, presets
+from tfarm.arm.chain import MOST_DELAY, file_text
 from tfarm.arm.writing import law_toml
-from tfarm.assessment.card import LoopCard
-from tfarm.assessment.stability_map import DESIGNED_MODES
+from tfarm.assessment.card import ResultCard, margins_of, result_card, sampled_of
+from tfarm.assessment.card import loop_function as loop_curve
+from tfarm.assessment.stability_map import (
+    DESIGNED_MODES,
+    StabilityMap,
+    StableRegions,
+    stability_map,
+    stable_regions,
+)
+from tfarm.assessment.step import Step, step
+from tfarm.audit import AuditRow, kept_audit
+from tfarm.audit.arm_proofs import ArmProof, prove, proven_damped_modes, proven_modes
+from tfarm.audit.published import PublishedRow, validate
 from tfarm.case import Case
-from tfarm.digits import how_many, kept_digits, listed, plain, scientific, significant
-from tfarm.dsp import Chain, discretise, load_chain
+from tfarm.dsp import Chain, Simulation, load_chain, results, traces
+from tfarm.dsp.discretise import acting_law
 from tfarm.errors import ConvergenceError, ParameterError, one_line
+from tfarm.exported.live_loop import LiveNumbers, live_data
 from tfarm.fitting.data import Measured
-from tfarm.fitting.fit import Fit
-from tfarm.fitting.recording import MeasuredRun
-from tfarm.loop import sampled_verdict as verdict
-from tfarm.loop.continuous import ContinuousLoop
-from tfarm.plots.style import Figure, drawn_for, gains_words, save_figure
+from tfarm.fitting.fit import ARMS, Fit, ResponseBand, ShareOfArms, arms_drawn, response_band, stable_share
+from tfarm.fitting.overlay import Overlay, overlay
+from tfarm.fitting.recording import MeasuredRun, RunComparison, compare_run, departures
+from tfarm.loop.continuous import ContinuousLoop, band_of
+from tfarm.loop.curve import LoopCurve
+from tfarm.loop.loci import Loci, loci
+from tfarm.loop.margins import Margins, margins
+from tfarm.loop.nyquist import Nyquist, nyquist_of
+from tfarm.loop.plane import ranges_of
+from tfarm.loop.poles import Poles, closed_loop_poles
+from tfarm.loop.sampled_modes import STRONGER, SampledLoci, sampled_loci
+from tfarm.loop.sampled_verdict import Analysis, SampledBrief, Verdict, sampled_brief, sampled_verdict
+from tfarm.loop.stability import Spill, spill
+from tfarm.plots.style import gains_words
 from tfarm.records import frozen
+from tfarm.report.blocks import argument, prose
+from tfarm.response.frequency import Bode, bode
 from tfarm.response.signals import Signals, sign_of
-from tfarm.schema import Column, Table, quantities, save_table, text, to_json
-from tfarm.schema.html import as_html, with_symbols
-from tfarm.spectrum.gains import default_gains
+from tfarm.spectrum import DampedModes, Modes, modes
+from tfarm.spectrum.gains import default_gains, rate_unit
+from tfarm.spectrum.listing import ModeList, listed_modes
+from tfarm.spectrum.proofs import Certificate
+from tfarm.studies.candidates import (
+    Candidates,
+    TunerNumbers,
+    has_hub_inertia,
+    hub_study,
+    section_study,
+    tuner_numbers,
+)
 from tfarm.synthesis.design import Design, design
 
-TEMPLATES = Path(__file__).parent / "templates"
-# folders in that of an arm
-PICTURES = "pictures"
-DATA = "data"
-DRAWN_DIGITS = 7  # of the numbers of a picture in its file: a hundredth of the width of a line is four
-T = TypeVar("T")
-PART = "\ue000"  # between title and caption, which no name has in it
-PROMISES = (
-    "certified",
-    "complete",
-    "converged",
-    "default gains",
-    "enclosed",
-    "Lyapunov region",
-    "not determined",
-    "proven",
-    "small gain",
-    "winding number",
-)
+FILM_FRAMES = 80  # at most: a second of computing
 
 
-# ------------------------------------------------------------ texts
-
-
-def upper(text: str) -> str:
-    """A text as it begins a sentence."""
-    return text[:1].upper() + text[1:]
-
-
-@cache
-def templates() -> Environment:
-    """All templates; only those of pages escape what is put into them."""
-    # but for those of a pill
-    without = ("stability", "grade", "limited_by", "delay_margin_periods")
-    card_rows = {of.key: of for name, of in quantities(LoopCard).items() if name not in without}
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=lambda name: name is not None and name.endswith(".html"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    environment.globals |= {
-        "inf": math.inf,
-        "rate": RATE_GAIN,
-        "moment": MOMENT_GAIN,
-        "angle": ANGLE_GAIN,
-        "plane": " and ".join(PLANE),
-        "arm_python": arm_python,
-        "gains_python": gains_python,
-        "card_rows": card_rows,
-    }
-    environment.filters.update(
-        symbol=with_symbols,
-        text=text,
-        plain=plain,
-        significant=significant,
-        scientific=scientific,
-        upper_first=upper,
-        listed=listed,
-        how_many=how_many,
-        as_html=as_html,
-    )
-    return environment
-
-
-@cache
-def _texts() -> Any:
-    """All texts by name; a line break behind a tag is a space in them."""
-    source = (TEMPLATES / "prose.txt").read_text(encoding="utf-8").replace("¶", PART)
-    return templates().overlay(trim_blocks=False).from_string(source).module
-
-
-def prose(name: str, /, **values: Any) -> str:
-    """The text of that name in templates/prose.txt with these values."""
-    return " ".join(getattr(_texts(), name)(**values).split())
-
-
-def _parts(name: str, values: dict[str, Any]) -> list[str]:
-    return [part.strip() for part in prose(name, **values).split(PART)]
-
-
-def render(template: str, **values: Any) -> str:
-    """A page from its template."""
-    return templates().get_template(template).render(version=tfarm.__version__, **values)
-
-
-class Fact(NamedTuple):
-    """One headline number, or the word for it."""
-
-    label: str
-    value: str
-    unit: str = ""
-    note: str = ""
-
-
-class Picture(NamedTuple):
-    """A finished figure with its words.  `stem` names its files; `data` are the numbers that it draws.
-
-    `film` is a GIF, whose still picture is the figure.  `python` is the line of Python that draws it, empty where no
-    public function does.
-    """
-
-    stem: str
-    title: str
-    caption: str
-    alt: str
-    figure: Figure
-    data: tuple[Column, ...] = ()
-    python: str = ""
-    film: bytes = b""
-
-
-def picture(
-    kind: str, figure: Figure, *, data: Table | Iterable[Column] = (), stem: str = "", **values: Any
-) -> Picture:
-    """A picture with title, caption, alternative text and line of Python of its kind; `stem` names its files."""
-    title, caption, alt, *python = _parts(kind, values)
-    return Picture(stem or kind.replace("_", "-"), title, caption, alt, figure, _columns(data), "".join(python))
-
-
-def sheet(kind: str, columns: Table | Iterable[Column], /, *, stem: str = "", **values: Any) -> Table:
-    """A table with the title and the caption of its kind; `stem` names its files."""
-    title, caption = _parts(kind, values)
-    return Table(columns=_columns(columns), stem=stem or kind.replace("_", "-"), title=title, caption=caption)
-
-
-def _columns(of: Table | Iterable[Column]) -> tuple[Column, ...]:
-    return of.columns if isinstance(of, Table) else tuple(of)
-
-
-def columns_of(keys: Sequence[str], rows: Iterable[Sequence[Any]]) -> list[Column]:
-    """The columns of these rows, as the data of a picture have them."""
-    return [Column(key, of=of) for key, of in zip(keys, zip(*rows, strict=True), strict=True)]
-
-
-class SavedBlock(NamedTuple):
-    """A picture or table as the page shows it, its files saved; `image` is the picture without words."""
-
-    stem: str
-    title: str
-    html: Markup
-    image: Markup | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PageSection:
-    """A part of a page.  `answer` is its result in a sentence or two, `card` the loops of a controller of its own.
-
-    `words` are paragraphs, `items` a list; `blocks` pictures and tables, of which one without columns is not shown.
-    `failure` is the reason why the section could not be made, which its words have too; empty otherwise.
-    """
-
-    anchor: str = ""
-    title: str = ""
-    answer: str = ""
-    words: Sequence[str] = ()
-    items: Sequence[str] = ()
-    facts: Sequence[Fact] = ()
-    card: Sequence[Mapping[str, Any]] = ()
-    blocks: Sequence[Any] = ()
-    failure: str = ""
-
-
-def save_section(section: PageSection, folder: Path, is_paper: bool = False) -> PageSection:
-    """The section with its blocks saved: what remains to be written are words."""
-    for name in (PICTURES, DATA):
-        (folder / name).mkdir(exist_ok=True)
-    return replace(
-        section,
-        blocks=[save_block(block, folder, is_paper) for block in section.blocks if getattr(block, "columns", True)],
-    )
-
-
-def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> SavedBlock:
-    """A picture as pictures/*.svg, for a paper *.pdf too, its data as data/*.csv; a table as data/*.csv and .json.
-
-    Of a picture there is a narrow one for phones, *-narrow.svg; a film is small enough.
-    """
-    shape: Any = templates().get_template("blocks.html").module
-    if isinstance(block, Table):
-        files = [f"{DATA}/{name}" for name in save_table(block, folder / DATA)]
-        return SavedBlock(block.stem, block.title, shape.table(block, files))
-    files = [f"{PICTURES}/{block.stem}.svg"]
-    save_figure(block.figure, folder / files[0])
-    again = block.figure.again  # type: ignore[attr-defined]
-    narrow = None
-    if not block.film:
-        with drawn_for("phone"):
-            narrow = again()
-            save_figure(narrow, folder / PICTURES / f"{block.stem}-narrow.svg")
-    if is_paper:
-        files.append(f"{PICTURES}/{block.stem}.pdf")
-        with drawn_for("column"):
-            save_figure(again(), folder / files[-1])
-    if block.film:
-        files.append(f"{PICTURES}/{block.stem}.gif")
-        (folder / files[-1]).write_bytes(block.film)
-    if block.data:
-        columns = tuple(
-            replace(each, of=[kept_digits((x,), DRAWN_DIGITS)[0] if isinstance(x, float) else x for x in each.of])
-            for each in block.data
-        )
-        saved = save_table(Table(columns=columns, stem=f"{block.stem}-data"), folder / DATA, ("csv",))
-        files += [f"{DATA}/{name}" for name in saved]
-    return SavedBlock(block.stem, block.title, shape.picture(block, files, narrow), shape.image(block, narrow))
-
-
-def explained(text: str, words: str = "") -> Markup:
-    """A sentence as a page shows it, commands in `...`; a promise leads to its meaning on the page `words`, if any."""
-    shown = re.sub("`(.+?)`", r"<code>\1</code>", str(with_symbols(text)))
-    for word in PROMISES if words else ():
-        linked = rf'<a class="term" href="{words}#{anchor("word", word)}">\g<0></a>'
-        shown = re.sub(rf"\b{word}\b", linked, shown, count=1, flags=re.IGNORECASE)
-    return Markup(shown)
-
-
-def anchor(kind: str, name: str) -> str:
-    """A name for links: the equation "(A.1)" becomes "eq-a-1"."""
-    return f"{kind}-{re.sub(r'[^a-z0-9]+', '-', name.lower()).strip('-')}"
-
-
-def write_text(file: Path, text: str) -> None:
-    """A file of text, the same bytes on every system."""
-    file.write_text(text, encoding="utf-8", newline="")
-
-
-# ------------------------------------------------------------ what an index reads in the folders of arms
-
-
-def keep(folder: Path, kind: str, content: Mapping[str, Any]) -> None:
-    """kind.json, with a mark of what it is."""
-    text = to_json({f"tfarm_{kind}": 1, **content}, ensure_ascii=False, indent=1)
-    write_text(folder / f"{kind}.json", f"{text}\n")
-
-
-def kept_in(folder: Path, kind: str, record: type[T]) -> T | None:
-    """The record in a folder's kind.json; None where there is none, or none of ours."""
-    try:
-        return TypeAdapter(record).validate_json((folder / f"{kind}.json").read_bytes())
-    except (OSError, ValueError):
-        return None
-
-
-def kept(out: Path, kind: str, record: type[T]) -> dict[Path, T]:
-    """The records of that kind in the folders of arms, by folder; what is none of ours is passed over."""
-    folders = sorted((f for f in out.iterdir() if f.is_dir() and not f.name.startswith(".")), key=lambda f: f.name)
-    found = {folder: each for folder in folders if (each := kept_in(folder, kind, record)) is not None}
-    return {folder: each for folder, each in found.items() if getattr(each, "name", "") == folder.name}
-
-
-# ------------------------------------------------------------ the report
+# ------------------------------------------------------------ a controller
 
 
 @frozen
@@ -318,31 +83,50 @@ class GivenLaw:
     file: str = ""
     measured: MeasuredRun | None = None
 
-    @property
-    def name(self) -> str:
-        """Its own name, or its gains with their values."""
-        law = as_law(self.law)
-        return one_line(law.name, 60) if law.gains is None else gains_words(law)
-
 
 @frozen
-class Controller:
-    """A law on an arm: `arm` has the input that `law` drives, `given` is its source.
+class PageCase:
+    """A case of a page with its records.
 
     `name` is for reading, `key` for the columns and names of files, "law" or of several "law_1", "law_2" ...
+    `given` is the source of the controller.
     """
 
-    arm: Arm
-    law: Law
-    given: GivenLaw
+    case: Case
     name: str
     key: str
+    given: GivenLaw
+
+    @property
+    def arm(self) -> Arm:
+        """The arm with the input of the controller."""
+        return self.case.arm
+
+    @property
+    def law(self) -> Law:
+        """The controller."""
+        return self.case.law
+
+    @property
+    def chain(self) -> Chain:
+        """The sampling."""
+        return self.case.chain
+
+    @property
+    def measured(self) -> MeasuredRun | None:
+        """The run that was measured on the rig."""
+        return self.given.measured
+
+    @property
+    def own_name(self) -> str:
+        """The name of the controller itself, or its gains with their values."""
+        return one_line(self.law.name, 60) if self.case.gains is None else gains_words(self.law)
 
     @property
     def gains(self) -> str:
         """Its gains with their values, or the signals that it reads."""
         law = self.law
-        return f"order {law.order}, of {', '.join(law.signals)}" if law.gains is None else gains_words(law)
+        return f"order {law.order}, of {', '.join(law.signals)}" if self.case.gains is None else gains_words(law)
 
     @property
     def title(self) -> str:
@@ -352,6 +136,126 @@ class Controller:
     def stem(self, suffix: str) -> str:
         """The name of a file of it."""
         return f"{self.key.replace('_', '-')}-{suffix}"
+
+    # the continuous-time loop, and both
+
+    @property
+    def margins(self) -> Margins:
+        """Verdict, stability intervals and margins of the continuous-time loop."""
+        return margins_of(self.arm, self.law)
+
+    @property
+    def loop_function(self) -> LoopCurve:
+        """Loop functions of both loops; of the continuous-time one alone where the other is not determined."""
+        try:
+            return loop_curve(self.arm, self.law, self.chain)
+        except ConvergenceError:
+            return self.margins.curve
+
+    @property
+    def nyquist(self) -> Nyquist:
+        """The loop function on Nyquist's contour, with its encirclements."""
+        return nyquist_of(self.margins.stability)
+
+    @property
+    def spillover(self) -> Spill:
+        """Verdicts by models of up to twelve modes."""
+        return spill(self.arm, self.law, 12)
+
+    @property
+    def poles(self) -> Poles:
+        """The closed-loop poles."""
+        return closed_loop_poles(self.arm, self.law)
+
+    @property
+    def card(self) -> ResultCard:
+        """The result card of both loops."""
+        return result_card(self.arm, self.law, self.chain)
+
+    # the sampled loop, and time
+
+    @property
+    def sampled(self) -> Analysis:
+        """Verdict, stability intervals and modes of the sampled loop."""
+        return sampled_of(self.arm, self.law, self.chain)
+
+    @property
+    def brief(self) -> SampledBrief:
+        """The verdict on the sampled loop in short."""
+        return sampled_brief(self.case)
+
+    @property
+    def delays(self) -> Iterator[tuple[float, Verdict]]:
+        """Further delays [ms] of none, half a sample and one, with the verdict on the sampled loop."""
+        yield 0.0, self.sampled.verdict
+        sampling = self.chain.sampling
+        for more in (0.5, 1.0):
+            delay = sampling.delay_samples + more
+            if delay + self.law.delay / sampling.period <= MOST_DELAY:
+                late = replace(self.chain, sampling=replace(sampling, delay_samples=delay))
+                yield 1e3 * sampling.period * more, sampled_verdict(self.case.through(late))
+
+    @property
+    def slew(self) -> Simulation:
+        """The slew of the sampled loop, with the records that a picture needs."""
+        duration = traces.RECORD_LENGTH * self.chain.slew.rise_time
+        return results.drawn(self.case, "slew", duration)
+
+    def film(self, run: Simulation) -> traces.Motion:
+        """Return the motion of a slew, and of what follows for half as long."""
+        return traces.motion_of(self.arm, run, 1.5 * self.chain.slew.rise_time, FILM_FRAMES)
+
+    @property
+    def time_responses(self) -> Step:
+        """The slew of both loops with its figures."""
+        return step(self.arm, self.law, self.chain, "slew")
+
+    @property
+    def run(self) -> RunComparison | None:
+        """The measured run with that of the sampled loop, if one was measured."""
+        return None if self.measured is None else compare_run(self.case, self.measured)
+
+    @property
+    def growth(self) -> float:
+        """Time constant [s] of the growth of an unstable sampled loop."""
+        return self.chain.sampling.period / self.sampled.verdict.log_radius
+
+    @property
+    def departures(self) -> list[float]:
+        """Times [s] after the measured run at which the growth of the hub angle shows."""
+        if self.measured is None:
+            return []
+        # as much longer as an unstable loop may seem settled
+        longer = 20 * self.growth
+        count = self.sampled.verdict.modes_used
+        return departures(self.case, self.measured, count, longer)
+
+    @property
+    def live(self) -> LiveNumbers:
+        """The numbers of the live page that begins with this controller."""
+        return live_data(self.case)
+
+    def check(self) -> None:
+        """Raise ParameterError for a law that does not suit the arm or the sampling period of the chain."""
+        Signals(self.arm, self.law.signals)
+        if not self.law.is_discrete:
+            ContinuousLoop(self.case)
+        acting_law(self.case)
+
+
+# ------------------------------------------------------------ the arm
+
+
+class PossibleArms(NamedTuple):
+    """Arms that the data of a fit leave possible, the margins of each under the default gains, and their responses.
+
+    `band` is None of a fit without responses, `share` of arms without a loop.
+    """
+
+    arms: tuple[Arm, ...]
+    margins: list[Margins]
+    band: ResponseBand | None
+    share: ShareOfArms | None
 
 
 class ArmReport(NamedTuple):
@@ -369,55 +273,167 @@ class ArmReport(NamedTuple):
     is_paper: bool = False
 
     @property
-    def controllers(self) -> tuple[Controller, ...]:
-        """The laws, each under a name that no other has; else the default gains."""
+    def gains(self) -> HubFeedback:
+        """The default gains of the arm."""
+        return default_gains(self.arm)
+
+    def case_of(self, given: GivenLaw, name: str, key: str) -> PageCase:
+        """Return the case of a controller on the arm, under a name of its own."""
+        return PageCase(Case(self.arm, given.law, self.chain), name, key, given)
+
+    @property
+    def default(self) -> PageCase:
+        """The case of the default gains."""
+        return self.case_of(GivenLaw(self.gains), "default gains", "default")
+
+    @property
+    def cases(self) -> tuple[PageCase, ...]:
+        """A case for each law under a name that no other has; else that of the default gains."""
         if not self.laws:
-            return (on_hub(self.arm, default_gains(self.arm), "default gains", "default"),)
-        found: list[Controller] = []
+            return (self.default,)
+        found: list[PageCase] = []
         for number, given in enumerate(self.laws, 1):
-            law = as_law(given.law)
-            name = given.name if law.gains is None else "the gains given"
-            name += f" ({number})" * (name in {each.name for each in found})
             key = f"law_{number}" if len(self.laws) > 1 else "law"
-            found.append(Controller(arm_and_law(self.arm, law)[0], law, given, name, key))
+            each = self.case_of(given, "the gains given", key)
+            name = each.own_name if each.case.gains is None else each.name
+            name += f" ({number})" * (name in {other.name for other in found})
+            found.append(replace(each, name=name))
         return tuple(found)
 
     @property
-    def in_s(self) -> tuple[Controller, ...]:
-        """The continuous-time controllers: those given, else the default gains and the best ones."""
-        found = None if self.laws else best(self.arm, self.chain)
-        more = () if found is None else (on_hub(self.arm, found.law, "best damping", "best"),)
-        return tuple(each for each in (*self.controllers, *more) if not each.law.is_discrete)
+    def in_s(self) -> tuple[PageCase, ...]:
+        """The cases of continuous-time controllers: those given, else the default gains and the best ones."""
+        found = None if self.laws else self.best
+        more = () if found is None else (self.case_of(GivenLaw(found.law), "best damping", "best"),)
+        return tuple(each for each in (*self.cases, *more) if not each.law.is_discrete)
+
+    @property
+    def bare(self) -> PageCase:
+        """The default gains without that of the root moment."""
+        return self.case_of(GivenLaw(self.gains.having(MOMENT_GAIN, 0.0)), f"{MOMENT_GAIN} = 0", "without")
 
     @property
     def has_loop(self) -> bool:
         """Whether the page has sections on loops: of laws wherever the hub can turn, of gains where both are felt."""
         return not self.arm.is_locked if self.laws else has_loop(self.arm)
 
+    @property
+    def best(self) -> Design | None:
+        """The gains of best damping; None where there are none."""
+        return best(self.arm, self.chain)
 
-def on_hub(arm: Arm, gains: HubFeedback, name: str, key: str) -> Controller:
-    """Gains at the hub under a name of their own."""
-    return Controller(arm, as_law(gains), GivenLaw(gains), name, key)
+    @property
+    def map(self) -> StabilityMap:
+        """The map of both gains."""
+        return stability_map(self.arm, self.chain)
+
+    @property
+    def band(self) -> float:
+        """The frequency range [rad/s] in which damping is designed for."""
+        return band_of(self.arm, DESIGNED_MODES)
+
+    @property
+    def rate_unit(self) -> float:
+        """The unit of the rate gain, J w1."""
+        return rate_unit(self.arm)
+
+    @property
+    def regions(self) -> StableRegions:
+        """The stability regions around the gains of the page, continuous and sampled."""
+        return stable_regions(self.cases[0].case)
+
+    def locus(self, name: str) -> Loci:
+        """Return the root locus along one of the default gains, exact and of a reduced model."""
+        # what balances a torque, both sides of 0 and beyond 1
+        torque = self.arm.input_per_torque
+        ends = {RATE_GAIN: (0.0, 2.0 * self.rate_unit), MOMENT_GAIN: (-1.0 * torque, 1.6 * torque)}
+        return loci(self.default.case, name, *ends[name])
+
+    @property
+    def sampled_loci(self) -> SampledLoci:
+        """The root loci of the sampled loop along both gains."""
+        loop = self.cases[0].sampled.loop
+        arm = loop.plant.arm
+        # past the rate gain at which sampling alone makes the hub unstable; K2 over the stable interval of most arms
+        turning = arm.hub_side_inertia * arm.input_per_torque
+        top = max(1.25 * 2 * turning / self.chain.sampling.period, STRONGER * loop.gains[RATE_GAIN])
+        return sampled_loci(loop, top, (-0.5, 1.5))
+
+    def modes(self, count: int, theory: Theory | None = None) -> Modes:
+        """Return the first modes of the arm, by another theory where one is named."""
+        return modes(self.arm, count, theory=theory)
+
+    def mode_list(self, count: int) -> ModeList:
+        """Return a row for each of the first modes, damped too."""
+        return listed_modes(self.modes(count))
+
+    def proven_modes(self, count: int) -> Certificate:
+        """Return the certified brackets of the first modes.  Raises CertificationError where there are none."""
+        return proven_modes(self.arm, count)
+
+    def proven_damped_modes(self, count: int) -> DampedModes:
+        """Return the certified damped modes.  Raises CertificationError or ConvergenceError where there are none."""
+        return proven_damped_modes(self.arm, count)
+
+    def bode(self, output: str) -> Bode:
+        """Return the response of an output to the input."""
+        return bode(self.arm, output)
+
+    @property
+    def proof(self) -> ArmProof:
+        """The counts and certified digits of the arm."""
+        return prove(self.arm, self.chain)
+
+    @property
+    def overlays(self) -> list[Overlay]:
+        """Each measured response over that of the arm."""
+        return [overlay(self.arm, one) for one in self.measured]
+
+    @property
+    def candidates(self) -> Mapping[str, Candidates]:
+        """The arm with other sections and with other hubs, as far as the paper leaves them open."""
+        found = {}
+        if self.arm.is_uniform:
+            found["assumptions_section"] = section_study(self.arm)
+        if self.has_candidate_hubs:
+            found["assumptions_hub"] = hub_study(self.arm)
+        return found
+
+    @property
+    def has_candidate_hubs(self) -> bool:
+        """Whether other hubs are candidates."""
+        return self.arm.is_uniform and has_hub_inertia(self.arm)
+
+    @property
+    def tuner(self) -> TunerNumbers:
+        """The gain tuner against baselines."""
+        return tuner_numbers(self.arm, self.chain)
+
+    def tuned_regions(self, found: TunerNumbers) -> StableRegions:
+        """Return the stability regions around the gains of the tuner."""
+        return stable_regions(Case(found.arm, found.tuning.constant, found.tuning.trial.loop.chain))
+
+    def possible_arms(self, count: int = ARMS) -> PossibleArms:
+        """Return arms that the data of the fit leave possible.  Raises ConvergenceError where there are none."""
+        fit = self.fit
+        assert fit is not None
+        arms = arms_drawn(fit, count)
+        found = [margins(each, default_gains(fit.arm)) for each in arms if has_loop(fit.arm)]
+        band = response_band(fit, arms, "root_moment") if fit.responses else None
+        return PossibleArms(arms, found, band, stable_share(arms, ranges_of(fit.arm)) if found else None)
 
 
-def check_laws(report: ArmReport) -> None:
-    """Raise ParameterError for a law that does not suit this arm or the sampling period of its chain."""
-    for each in report.controllers if report.laws and not report.arm.is_locked else ():
-        case = Case(each.arm, each.law, report.chain)
-        Signals(case.arm, case.law.signals)
-        if not case.law.is_discrete:
-            ContinuousLoop(case)
-        discretise.acting_law(case)
+def gather() -> tuple[Sequence[AuditRow], Sequence[PublishedRow]]:
+    """Return the evidence for the whole package: the audit of the paper, kept or new, and the tables of others.
+
+    Raises CertificationError where one of them fails.
+    """
+    return kept_audit(), validate()
 
 
 def has_loop(arm: Arm) -> bool:
     """Whether both gains can be closed: the hub can turn, and has inertia."""
     return not (arm.is_locked or arm.has_massless_hub)
-
-
-def sign_words(arm: Arm) -> str:
-    """The law, and the sign of its moment gain."""
-    return prose("signs", law=sign_of(arm))
 
 
 @lru_cache(maxsize=16)
@@ -430,7 +446,12 @@ def best(arm: Arm, chain: Chain) -> Design | None:
     return None if found is None or found.at_limit else found  # where the hub does not move there is no law to draw
 
 
-brief_on = lru_cache(maxsize=64)(verdict.sampled_brief)  # each computed once for all sections of a page
+def sign_words(arm: Arm) -> str:
+    """The law, and the sign of its moment gain."""
+    return prose("signs", law=sign_of(arm))
+
+
+# ------------------------------------------------------------ the file and the command of a page
 
 
 def is_preset(arm: Arm, chain: Chain) -> bool:
@@ -438,36 +459,19 @@ def is_preset(arm: Arm, chain: Chain) -> bool:
     return arm.name in presets() and (load(arm.name), load_chain(arm.name)) == (arm, chain)
 
 
-def arm_python(arm: Arm) -> str:
-    """Python that loads an arm: by its name where it comes with tfarm, else from the file in the folder of its page."""
-    name = arm.name if arm.name in presets() and load(arm.name) == arm else "arm.toml"
-    return f"tfarm.load({json.dumps(name)})"
-
-
-def gains_python(law: AnyLaw) -> str:
-    """Python that makes gains at the hub."""
-    gains = as_law(law).gains
-    assert gains is not None
-    values = {gain.name: float(gains[gain.name]) for gain in LISTED}
-    return f"tfarm.HubFeedback({', '.join(f'{name}={value!r}' for name, value in values.items() if value)})"
-
-
-def argument(name: str, preset: bool) -> str:
-    """The name of an arm in a command."""
-    return shlex.quote(name if preset else f"{name}.toml")
-
-
 def file_of(report: ArmReport) -> str:
     """The arm's file with its chain, and with the law that the page is about where TOML can say that alone."""
     law = own_law(report)
-    return file_text(report.arm, report.chain) + ("" if law is None else f"\n{law}")
+    if law is None:
+        return file_text(report.arm, report.chain)
+    return f"{file_text(report.cases[0].arm, report.chain)}\n{law}"
 
 
 def own_law(report: ArmReport) -> str | None:
     """The table [law] of the one law of a page; None of none or several, or of one with files of its own."""
     with suppress(ParameterError):
         if len(report.laws) == 1 and report.laws[0].measured is None:
-            return law_toml(as_law(report.laws[0].law))
+            return law_toml(report.cases[0].law)
     return None
 
 

@@ -1,31 +1,30 @@
-"""The arm without a controller: modes, shapes, theories, sensitivities; frequency responses, computed and measured."""
+"""The arm without a controller: its numbers and assumptions, modes, shapes, theories, sensitivities, responses."""
 
 import math
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal, localcontext
 from functools import partial
-from typing import Any
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
-import tfarm
-from tfarm.arm import Arm, Theory
-from tfarm.audit.arm_proofs import BRACKET_DIGITS, proven_damped_modes, proven_modes
-from tfarm.digits import fixed, kept_digits, lined, listed, plain
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, Theory, implausible, input_words, unit_of
+from tfarm.arm.chain import file_text
+from tfarm.arm.schema import file_key
+from tfarm.audit.arm_proofs import BRACKET_DIGITS
+from tfarm.digits import fixed, kept_digits, lined, listed, plain, significant, unit
 from tfarm.errors import CertificationError, ConvergenceError
-from tfarm.fitting.fit import ARMS, arms_drawn, response_band, stable_share
-from tfarm.fitting.overlay import overlay
-from tfarm.loop.margins import margins
-from tfarm.loop.plane import ranges_of
+from tfarm.fitting.fit import ARMS
 from tfarm.plots import frequency, motion
 from tfarm.plots.style import gains_words
-from tfarm.report.page import ArmReport, PageSection, Picture, has_loop, picture, prose, sheet, upper
-from tfarm.response.frequency import AXIS_SHARE, Bode, bode
-from tfarm.schema import Column, Table, curve_table, table
+from tfarm.report.blocks import Fact, PageSection, Picture, picture, prose, sheet, upper
+from tfarm.report.page import ArmReport
+from tfarm.response.frequency import AXIS_SHARE, Bode
+from tfarm.schema import Column, Quantity, Table, curve_table, table
 from tfarm.spectrum import Modes
-from tfarm.spectrum.gains import default_gains
-from tfarm.spectrum.listing import SHAPE_DIGITS, beyond_the_box, listed_modes
+from tfarm.spectrum.listing import SHAPE_DIGITS, beyond_the_box
 
 # as `tfarm modes` lists them; shapes in three rows of two
 TABLED_MODES = 10
@@ -33,21 +32,152 @@ DRAWN_MODES = 6
 THEORIES: tuple[Theory, ...] = ("timoshenko", "shear", "rayleigh", "euler-bernoulli")
 
 
+def arm_section(report: ArmReport) -> PageSection:
+    """The first part of every page: headline numbers, slips of units, the theory, and the parameters."""
+    arm = report.arm
+    input = input_words(arm)
+    words = (
+        prose("units", odd="; ".join(implausible(arm))),
+        prose("rig", arm=arm, input=input),
+        "" if arm.assumptions else "This arm states no assumptions.",
+    )
+    return PageSection(
+        title="The arm",
+        facts=headline_numbers(report.modes(3)),
+        words=list(filter(None, words)),
+        items=arm.assumptions,
+        blocks=(
+            picture("arm", motion.sketch.figure(arm), arm=arm, input=input),
+            sheet(
+                "parameters",
+                table([*parameters(arm, tomllib.loads(file_text(arm, report.chain)))]),
+                is_rig=not arm.is_uniform,
+            ),
+            derived_table(arm),
+        ),
+    )
+
+
+def headline_numbers(modes: Modes) -> tuple[Fact, ...]:
+    """Return first natural frequencies (at C = 0), total inertia, slenderness, shear cut-off, damping."""
+    arm = modes.arm
+    numbered = zip(modes.index.tolist(), modes.natural_frequency.tolist(), strict=True)
+    # the rigid body's 0 is not shown
+    frequencies = [(f"natural frequency {number}", omega) for number, omega in numbered if number > 0]
+    if arm.has_cutoff:
+        frequencies.append(("shear cut-off √(κGA/ρI)", arm.shear_cutoff))
+    slenderness = arm.link.slenderness if arm.is_uniform else arm.length / arm.link.section.radius_of_gyration
+    return (
+        *(
+            Fact(label, significant(omega, 8), "rad/s", f"{significant(omega / (2 * math.pi), 8)} Hz")
+            for label, omega in frequencies
+        ),
+        Fact(
+            "total inertia J about the hub",
+            significant(arm.total_inertia, 8),
+            "kg m²",
+            "the arm cannot turn as a rigid body" * (not arm.has_rigid_mode),
+        ),
+        Fact("slenderness L/√(I/A)", significant(slenderness, 5)),
+        Fact("damping C", plain(arm.damping), "s", prose("damping_note", arm=arm)),
+    )
+
+
+class Parameter(NamedTuple):
+    """A number of the arm's file."""
+
+    label: Annotated[str, Quantity("parameter", help="what the number is in the model")]
+    value: Annotated[float | str, Quantity("value", digits=10, help="as the file has it")]
+    unit: Annotated[str, Quantity("unit", help="SI unit of the value")]
+    key: Annotated[str, Quantity("key of the file", help="table and key of the TOML file")]
+
+
+def parameters(arm: Arm, table: Mapping[str, Any], under: str = "") -> Iterator[Parameter]:
+    """The numbers of a table of an arm's file by their keys, those of tables in it too."""
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from parameters(arm, value, f"{under}{key}.")
+        elif isinstance(value, list) and all(isinstance(each, dict) for each in value):
+            yield from parameters(arm, {str(number): each for number, each in enumerate(value, 1)}, f"{under}{key}.")
+        elif key not in ("name", "assumptions"):  # which are in other places of the page
+            of = file_key(f"{under}{key}", arm)
+            yield Parameter(of.label, value, unit(of.unit), f"{under}{key}")
+
+
+class Derived(NamedTuple):
+    """A number that follows from the parameters; False where an arm has none."""
+
+    quantity: Annotated[str, Quantity("quantity", help="number that the parameters determine")]
+    symbol: Annotated[str, Quantity("symbol", help="letter or formula of the quantity")]
+    value: Annotated[float | Literal[False], Quantity("value", digits=8, help="from the parameters alone")]
+    unit: Annotated[str, Quantity("unit", help="SI unit of the value")]
+
+
+def derived_table(arm: Arm) -> Table:
+    """The numbers that follow from the parameters alone."""
+    turns = arm.has_rigid_mode and not arm.is_locked
+    rows = [
+        Derived(f"segment {i}: " * bool(arm.outer) + quantity, symbol, value, unit)
+        for i, link in enumerate(arm.links, 1)
+        for quantity, symbol, value, unit in (
+            ("area of the section", "A", link.section.area, "m²"),
+            ("second moment of area", "I", link.section.second_moment, "m⁴"),
+            (
+                f"shear factor, {'Cowper (1966)' if link.section.shear_factor is None else 'given'}",
+                "κ",
+                link.shear_factor,
+                "",
+            ),
+            ("mass", "ρAL", link.rhoA * link.length, "kg"),
+            ("bending stiffness", "EI", link.EI, "N m²"),
+            ("shear stiffness", "κGA", link.kGA, "N"),
+            (
+                "Poisson's ratio of an isotropic material",
+                "E/2G − 1",
+                -1 < link.poissons_ratio <= 0.5 and link.poissons_ratio,
+                "",
+            ),
+            ("radius of gyration", "√(I/A)", link.section.radius_of_gyration, "m"),
+            ("slenderness", "L/√(I/A)", link.slenderness, ""),
+        )
+    ] + [
+        Derived("rotor inertia at the hub", "N² J_m", arm.motor is not None and arm.motor.reflected_inertia, "kg m²"),
+        Derived(
+            "root moment per torque at rest",
+            "−(J − I_h)/J" * arm.is_uniform,
+            turns and -arm.gauged_inertia / arm.total_inertia,
+            "N m/(N m)",
+        ),
+        Derived(
+            "input for a torque of 1 N m",
+            "",
+            arm.input_per_torque != 1.0 and arm.input_per_torque,
+            unit_of(MOMENT_GAIN, arm),
+        ),
+        Derived(
+            f"losses at the hub, in {RATE_GAIN}", "", arm.rate_loss != 0.0 and arm.rate_loss, unit_of(RATE_GAIN, arm)
+        ),
+    ]
+    return sheet("derived", table([row for row in rows if row.value is not False]), arm=arm)
+
+
+# ------------------------------------------------------------ modes
+
+
 def modes_section(report: ArmReport) -> PageSection:
     """Everything about free vibration: at C = 0, and the eigenvalues at the arm's own C."""
     arm = report.arm
-    found = tfarm.modes(arm, count=TABLED_MODES)
     words = [prose("complete_modes")]
-    blocks: list[Picture | Table] = [modal_table(found)]
+    blocks: list[Picture | Table] = [modal_table(report)]
     if not arm.is_uniform:
-        blocks.append(locked_table(found))
+        blocks.append(locked_table(report))
         words += [prose("which_is_measured")] * (not arm.is_locked)
     if not arm.is_undamped:
         try:
-            blocks += damped_tables(found)
+            blocks += damped_tables(report)
         except (ConvergenceError, CertificationError) as error:
             words.append(prose("no_damped_table", why=error))
-    drawn = tfarm.modes(arm, count=DRAWN_MODES)
+    drawn = report.modes(DRAWN_MODES)
     shapes = motion.scaled(drawn, DRAWN_MODES)
     columns = (
         Column("x_m", of=np.linspace(0.0, arm.length, motion.SHAPE_POINTS)),
@@ -56,8 +186,8 @@ def modes_section(report: ArmReport) -> PageSection:
     nodes = [own for number, own in zip(drawn.index, drawn.nodes, strict=True) if number in shapes]
     blocks += [
         picture("mode_shapes", motion.modes.figure(drawn), data=columns, arm=arm, nodes=nodes),
-        theories(arm),
-        sensitivity_table(found),
+        theories({theory: report.modes(TABLED_MODES, theory) for theory in THEORIES}),
+        sensitivity_table(report.modes(TABLED_MODES)),
     ]
     return PageSection(title="Modes", words=words, blocks=blocks)
 
@@ -65,33 +195,34 @@ def modes_section(report: ArmReport) -> PageSection:
 # ------------------------------------------------------------ natural frequencies, and their proof
 
 
-def modal_table(modes: Modes) -> Table:
+def modal_table(report: ArmReport) -> Table:
     """Frequencies, hub participation, modal moment and nodes."""
-    decimals = SHAPE_DIGITS - 1 - math.floor(math.log10(modes.arm.length))
+    decimals = SHAPE_DIGITS - 1 - math.floor(math.log10(report.arm.length))
     rows = []
-    for row in listed_modes(modes).modes:  # what depends on a shape to the digits that hold on every processor
+    # what depends on a shape to the digits that hold on every processor
+    for row in report.mode_list(TABLED_MODES).modes:
         participation, moment = kept_digits((row.hub_participation, row.modal_moment + 0.0), SHAPE_DIGITS)
         nodes = np.round(row.nodes, decimals).tolist()
         rows.append(replace(row, hub_participation=participation, modal_moment=moment, nodes=nodes))
     names = ("index", "natural_frequency", "natural_frequency_hz", "hub_participation", "modal_moment", "nodes")
     columns = table(rows, names).columns
-    proof = how_proven(modes, columns[1].cells, columns[2].cells)
-    return sheet("modal_table", columns, arm=modes.arm, proof=proof)
+    proof = how_proven(report, columns[1].cells, columns[2].cells)
+    return sheet("modal_table", columns, arm=report.arm, proof=proof)
 
 
-def how_proven(modes: Modes, cells: Sequence[str], cells_hz: Sequence[str]) -> str:
+def how_proven(report: ArmReport, cells: Sequence[str], cells_hz: Sequence[str]) -> str:
     """Whether every digit of these cells [rad/s] and [Hz] is certified: a sentence or two."""
     try:
-        proof = proven_modes(modes.arm, int(modes.index[-1]))
+        proof = report.proven_modes(TABLED_MODES)
     except CertificationError as error:
         return f"The digits are those of double precision, not proven: {error}."
-    rows = np.flatnonzero(modes.index > 0).tolist()
+    rows = np.flatnonzero(report.modes(TABLED_MODES).index > 0).tolist()
     two_pi = Decimal("6.2831853071795864769252867665590057683943387987502")
     is_proven = all(
         rounds_to(cells[row], bracket) and rounds_to(cells_hz[row], bracket, two_pi)
         for row, bracket in zip(rows, proof.brackets, strict=True)
     )
-    return prose("proven_digits", is_proven=is_proven, digits=BRACKET_DIGITS, proof=proof, arm=modes.arm)
+    return prose("proven_digits", is_proven=is_proven, digits=BRACKET_DIGITS, proof=proof, arm=report.arm)
 
 
 def rounds_to(cell: str, bracket: tuple[str, str], divisor: Decimal = Decimal(1)) -> bool:
@@ -103,11 +234,11 @@ def rounds_to(cell: str, bracket: tuple[str, str], divisor: Decimal = Decimal(1)
 # ------------------------------------------------------------ damped modes, and those of a locked hub
 
 
-def damped_tables(undamped: Modes) -> list[Table]:
+def damped_tables(report: ArmReport, count: int = TABLED_MODES) -> list[Table]:
     """The arm's damped modes, each number certified to 12 digits and printed to fewer; then those of no mode."""
-    arm = undamped.arm
-    damped = proven_damped_modes(arm, int(undamped.index[-1]))
-    found = listed_modes(undamped)
+    arm = report.arm
+    damped = report.proven_damped_modes(count)
+    found = report.mode_list(count)
     every = np.concatenate([damped.eigenvalues, damped.unassigned_pairs])
     inside = np.all(damped.box.holds(every) | np.isnan(every), axis=1)
     number = len(damped.index)
@@ -128,18 +259,17 @@ def damped_tables(undamped: Modes) -> list[Table]:
     ]
 
 
-def locked_table(found: Modes) -> Table:
+def locked_table(report: ArmReport, count: int = TABLED_MODES) -> Table:
     """A row a mode: natural frequency with the hub free, and with the hub locked."""
-    rows = [row for row in listed_modes(found).modes if row.index > 0]
+    rows = [row for row in report.mode_list(count).modes if row.index > 0]
     return sheet("hub_locked", table(rows, ("index", "natural_frequency", "hub_locked")))
 
 
 # ------------------------------------------------------------ shapes, theories, sensitivities
 
 
-def theories(arm: Arm) -> Table:
+def theories(found: Mapping[Theory, Modes]) -> Table:
     """Natural frequencies by the four beam theories, and differences from the first in per cent."""
-    found = {theory: tfarm.modes(arm, TABLED_MODES, theory=theory) for theory in THEORIES}
     omega = {theory: each.natural_frequency[each.index > 0] for theory, each in found.items()}
     differences = {theory: 100 * (omega[theory] / omega["timoshenko"] - 1) for theory in THEORIES[1:]}
     columns = (
@@ -203,7 +333,7 @@ def tint(x: float) -> str:
 
 def bode_section(report: ArmReport, output: str) -> PageSection:
     """One output: picture, its meaning, poles and zeros."""
-    data = bode(report.arm, output)
+    data = report.bode(output)
     stem = f"bode-{output.replace('_', '-')}"
     what = f"{data.input_label} to {data.label}"
     if data.is_zero:
@@ -250,22 +380,20 @@ def fit_section(report: ArmReport, count: int = ARMS) -> PageSection:
         sheet("fit_resonances", table(fit.resonances)),
     ]
     try:
-        arms = arms_drawn(fit, count)
+        possible = report.possible_arms(count)
     except ConvergenceError as error:
         words.append(f"The loops of the arms that agree with the data are not drawn: {error}.")
     else:
-        every = [margins(each, default_gains(fit.arm)) for each in arms if has_loop(fit.arm)]
-        gains = gains_words(default_gains(fit.arm))
-        stable = [each.in_band for each in every if each.in_band is not None]
-        if fit.responses:
-            output = "root_moment"
-            figure = frequency.draw_band.figure(fit, response_band(fit, arms, output), output, len(arms))
-            blocks.append(picture("fit_band", figure, arms=arms))
-        if every:
-            words.append(prose("fit_share", gains=gains, every=every))
+        if possible.band is not None:
+            figure = frequency.draw_band.figure(fit, possible.band, "root_moment", len(possible.arms))
+            blocks.append(picture("fit_band", figure, arms=possible.arms))
+        if possible.share is not None:
+            gains = gains_words(report.default.law)
+            words.append(prose("fit_share", gains=gains, every=possible.margins))
+            stable = [each.in_band for each in possible.margins if each.in_band is not None]
             columns = table(stable, ("phase_margin", "delay_margin", "disk_margin"))
             blocks += [
-                picture("fit_map", frequency.draw_share.figure(fit, stable_share(arms, ranges_of(fit.arm)))),
+                picture("fit_map", frequency.draw_share.figure(fit, possible.share)),
                 sheet("fit_margins", columns, gains=gains),
             ]
     answer = prose("fit", verdict=fit.verdict, found=fit.in_words)
@@ -279,8 +407,7 @@ def measured_section(report: ArmReport) -> PageSection:
     """Each response over the exact one, with the differences."""
     blocks: list[Picture | Table] = []
     words: list[str] = []
-    for number, one in enumerate(report.measured, start=1):
-        found = overlay(report.arm, one)
+    for number, found in enumerate(report.overlays, start=1):
         label = f"-{number}" if len(report.measured) > 1 else ""
         name = found.measured.label
         words.append(prose("measured_response", name=name, found=found, peaks=found.unmatched / (2 * math.pi)))
@@ -292,3 +419,14 @@ def measured_section(report: ArmReport) -> PageSection:
             sheet("measured_required", table(found.required_changes), stem=f"measured-required{label}"),
         ]
     return PageSection(title="Measured over exact", words=words, blocks=blocks)
+
+
+# ------------------------------------------------------------ assumptions
+
+
+def assumptions_section(report: ArmReport) -> PageSection:
+    """Frequencies over the sections and the hub inertias that could be chosen, with sensitivities."""
+    arm = report.arm
+    blocks = [sheet(kind, table(study.candidates), study=study) for kind, study in report.candidates.items()]
+    words = (prose("assumptions", arm=arm, has_hub=report.has_candidate_hubs),)
+    return PageSection(title="Effect of the assumptions", words=words, blocks=blocks)

@@ -1,73 +1,51 @@
-"""The sampled loops of a report: verdict, margins, stability intervals, modes, and motion in time.
+"""The sampled loops of a report: verdict, margins, stability intervals, modes, motion in time, and the gain tuner.
 
-In time: slews, and steps that were measured with the exact sampled loop over them.
+In time: slews, and steps that were measured with the exact sampled loop over them.  Of the tuner: costs against
+baselines, what it learns, and where it is proven.
 """
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, as_law, shown_unit
-from tfarm.arm.chain import MOST_DELAY
-from tfarm.assessment.card import margins_of, sampled_of
-from tfarm.assessment.stability_map import StableRegions, stable_regions
-from tfarm.assessment.step import Step, step
-from tfarm.case import Case
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, shown_unit
+from tfarm.assessment.stability_map import StableRegions
+from tfarm.assessment.step import Step
 from tfarm.digits import plain, significant
-from tfarm.dsp import Chain, Simulation, results, traces
-from tfarm.dsp.traces import motion_of
-from tfarm.errors import ParameterError
-from tfarm.fitting.recording import RunComparison, compare_run, departures, overshoot
-from tfarm.loop import sampled_modes as modes
-from tfarm.loop import sampled_verdict as verdict
-from tfarm.loop.sampled_verdict import Analysis, sampled_verdict
+from tfarm.dsp import Chain, Simulation, scenarios, traces
+from tfarm.errors import CertificationError, ParameterError
+from tfarm.fitting.recording import RunComparison, overshoot
+from tfarm.loop.sampled_verdict import Analysis
 from tfarm.plots import animation, motion, regions, roots, style
-from tfarm.report.page import (
-    ArmReport,
-    Controller,
-    Fact,
-    PageSection,
-    Picture,
-    columns_of,
-    on_hub,
-    picture,
-    prose,
-    sheet,
-)
+from tfarm.report.blocks import Fact, PageSection, Picture, columns_of, picture, prose, sheet
+from tfarm.report.page import ArmReport, PageCase, has_loop
 from tfarm.schema import Column, Quantity, Table, across, table, text
-from tfarm.spectrum.gains import default_gains
-
-FILM_FRAMES = 80  # at most: a second of computing
+from tfarm.studies.candidates import WITHOUT, TunerNumbers
 
 
 def sampled_section(report: ArmReport) -> PageSection:
     """Return the sampled loop of each controller; in time runs measured under the laws, else the slew."""
     chain = report.chain
-    found = [(each, sampled_of(each.arm, each.law, chain)) for each in report.controllers]
+    found = [(each, each.sampled) for each in report.cases]
     numbers = across({each.title: it for each, it in found}, keys=[each.key for each, _ in found])
     blocks: list[Picture | Table] = [sheet("sampled", numbers)]
     for each, it in found:
         intervals = table(it.stability_intervals)
         blocks.append(sheet("sampled_numbers", intervals, stem=_stem("numbers", each), each=each, found=it))
-    blocks.append(delays_table(found, chain))
+    blocks.append(delays_table(report))
     pictures, words, facts = slews(report)
     if not report.laws:
         # the gains of the arm itself
         (_, own), *_ = found
-        blocks = [
-            overlay_picture(stable_regions(Case(report.arm, own.loop.law, chain)), own),
-            *blocks,
-            loci_picture(own),
-        ]
+        blocks = [overlay_picture(report, own), *blocks, loci_picture(report, own)]
         facts = [*interval_facts(own), *facts]
     of_whole_law = ("index", "natural_frequency", "band", "aliased", "first_order", "by_damping", "log_radius")
     for each, it in found:
         modes = table(it.modes, () if it.loop.is_of_gains else of_whole_law)
         blocks.append(sheet("sampled_modes", modes, stem=_stem("modes", each), each=each, found=it))
-    growths = [growth_words(each, it.verdict, chain) for each, it in found if it.verdict.log_radius > 0]
+    growths = [growth_words(each, it) for each, it in found if it.verdict.log_radius > 0]
     return PageSection(
         title=f"The sampled loop, {plain(1e3 * chain.sampling.period)} ms",
         facts=facts,
@@ -95,22 +73,14 @@ def chain_words(arm: Arm, chain: Chain) -> str:
     return prose("chain", chain=chain, unit=arm.input_unit, is_default=chain == Chain())
 
 
-def _stem(name: str, each: Controller) -> str:
+def _stem(name: str, each: PageCase) -> str:
     """The name of a controller's table; the first has no more than the name."""
     return f"sampled-{name}" if each.key in ("default", "law") else f"sampled-{name}-{each.key.replace('_', '-')}"
 
 
-def delays_table(found: Sequence[tuple[Controller, Analysis]], chain: Chain) -> Table:
+def delays_table(report: ArmReport) -> Table:
     """Return the verdict on each controller as it is, and with half a sample and a whole one of further delay."""
-    sampling = chain.sampling
-    rows = []
-    for each, it in found:
-        rows.append((each.name, 0.0, it.verdict))
-        for more in (0.5, 1.0):
-            delay = sampling.delay_samples + more
-            if delay + each.law.delay / sampling.period <= MOST_DELAY:
-                late = replace(chain, sampling=replace(sampling, delay_samples=delay))
-                rows.append((each.name, 1e3 * sampling.period * more, sampled_verdict(Case(each.arm, each.law, late))))
+    rows = [(each.name, *row) for each in report.cases for row in each.delays]
     names, delays, verdicts = zip(*rows, strict=True)
     columns = (
         Column("law", "controller", of=names),
@@ -123,32 +93,26 @@ def delays_table(found: Sequence[tuple[Controller, Analysis]], chain: Chain) -> 
 # ------------------------------------------------------------ pictures of gains
 
 
-def overlay_picture(both: StableRegions, found: Analysis) -> Picture:
+def overlay_picture(report: ArmReport, found: Analysis) -> Picture:
     """Return the regions of the continuous and of the sampled loop in one plane, with the intervals of K2 below it."""
-    arm = both.continuous.arm
-    gains = found.loop.gains
-    rows = [row for row in margins_of(arm, as_law(gains)).stability_intervals if row.name == MOMENT_GAIN]
+    both = report.regions
+    rows = [row for row in report.cases[0].margins.stability_intervals if row.name == MOMENT_GAIN]
     return picture(
         "sampled_overlay",
         regions.overlay.figure(*both),
         data=both.columns,
-        arm=arm,
+        arm=report.arm,
         low=float(both.continuous.x[0]),
         nested=len(both.sampled) > 1,
         continuous=text([each for row in rows for each in row.intervals], 4) or "no value",
         sampled=text(list(found.shown[MOMENT_GAIN]), 4) or "no value",
-        at=gains.gain_text(RATE_GAIN, plain, arm),
+        at=report.gains.gain_text(RATE_GAIN, plain, report.arm),
     )
 
 
-def loci_picture(found: Analysis) -> Picture:
+def loci_picture(report: ArmReport, found: Analysis) -> Picture:
     """Return root loci of the sampled loop in the z-plane, along each gain; its data are the poles with Im z >= 0."""
-    loop = found.loop
-    arm = loop.plant.arm
-    # past the rate gain at which sampling alone makes the hub unstable; K2 over the stable interval of most arms
-    turning = arm.hub_side_inertia * arm.input_per_torque
-    top = max(1.25 * 2 * turning / loop.chain.sampling.period, modes.STRONGER * loop.gains[RATE_GAIN])
-    loci = modes.sampled_loci(loop, top, (-0.5, 1.5))
+    loci = report.sampled_loci
     rows = []
     for name, locus in loci.by.items():
         for value, poles in zip(locus.values.tolist(), locus.z, strict=True):
@@ -176,16 +140,14 @@ def slews(report: ArmReport) -> tuple[list[Picture | Table], list[str], list[Fac
     chain = report.chain
     if not report.arm.has_rigid_mode:
         return [], [f"{prose('what_holds', arm=report.arm)}: no slew is simulated."], []
-    if all(each.given.measured is not None for each in report.controllers):
+    if all(each.measured is not None for each in report.cases):
         return [], [], []
     runs: dict[str, Simulation] = {}
-    simulated: list[Controller] = []
+    simulated: list[PageCase] = []
     words: list[str] = []
-    bare = on_hub(report.arm, default_gains(report.arm).having(MOMENT_GAIN, 0.0), f"{MOMENT_GAIN} = 0", "without")
-    for each in (*([] if report.laws else [bare]), *report.controllers):
+    for each in report.cases if report.laws else (report.bare, *report.cases):
         try:
-            duration = traces.RECORD_LENGTH * chain.slew.rise_time
-            runs[each.name] = results.drawn(Case(each.arm, each.law, chain), "slew", duration)
+            runs[each.name] = each.slew
             simulated.append(each)
         except ParameterError as error:
             words.append(f"No slew of {each.name} is simulated: {error}.")
@@ -202,7 +164,7 @@ def slews(report: ArmReport) -> tuple[list[Picture | Table], list[str], list[Fac
         *table(list(runs.values()), ("residual_moment", "settling_time")).columns,
         Column("finding", "finding", of=[run.finding for run in runs.values()]),
     )
-    own = [each for each in simulated if each is not bare]
+    own = [each for each in simulated if each.key != "without"]
     moving = next((each for each in own if runs[each.name].stopped is None), None)
     blocks: list[Picture | Table] = [
         picture("sampled_slew", figure, data=columns, runs=runs, piece=piece_of_bands(runs), task=title),
@@ -210,8 +172,8 @@ def slews(report: ArmReport) -> tuple[list[Picture | Table], list[str], list[Fac
     ]
     facts = [settling_fact(each, runs[each.name], len(report.laws) > 1) for each in own]
     if moving is not None:
-        found = step(moving.arm, moving.law, chain, "slew")
-        blocks.insert(1, film_picture(moving, runs[moving.name], chain.slew.rise_time))
+        found = moving.time_responses
+        blocks.insert(1, film_picture(moving, runs[moving.name]))
         blocks.append(sheet("time_responses", found.table, each=moving, found=found))
         facts += tip_facts(found)
     return blocks, words, facts
@@ -228,14 +190,14 @@ def tip_facts(found: Step) -> Iterator[Fact]:
             yield Fact(label, text(loop.tip.settling_time, 4), "s", residual)
 
 
-def film_picture(each: Controller, run: Simulation, rise: float) -> Picture:
+def film_picture(each: PageCase, run: Simulation) -> Picture:
     """Return the film of a slew, and of what follows for half as long."""
-    found = motion_of(each.arm, run, 1.5 * rise, FILM_FRAMES)
+    found = each.film(run)
     still = picture("slew_film", animation.draw_motion.figure(found), name=each.name, found=found)
     return still._replace(film=animation.film(found).gif)
 
 
-def settling_fact(each: Controller, run: Simulation, is_named: bool) -> Fact:
+def settling_fact(each: PageCase, run: Simulation, is_named: bool) -> Fact:
     """The settling time of a slew, or the time within which it is not reached."""
     label = f"settling time of the root moment{f', {each.name}' if is_named else ''}"
     if run.stopped is not None:
@@ -302,26 +264,26 @@ def step_rows(name: str, found: RunComparison) -> Iterator[StepRow]:
 
 def measured_blocks(report: ArmReport) -> Iterator[Picture | Table]:
     """Each measured run with the exact loop over it, and both in numbers; nothing where none was measured."""
-    runs = [(each, each.given.measured) for each in report.controllers if each.given.measured is not None]
-    found = {each.name: compare_run(Case(each.arm, each.law, report.chain), run) for each, run in runs}
-    if not found:
+    runs = {each: run for each in report.cases if (run := each.run) is not None}
+    if not runs:
         return
-    figure = motion.draw_measured_runs.figure(found)
-    columns = compared_data({each.key: found[each.name] for each, _ in runs})
-    yield picture("sampled_measured", figure, data=columns, found=found)
+    found = {each.name: run for each, run in runs.items()}
+    columns = compared_data({each.key: run for each, run in runs.items()})
+    yield picture("sampled_measured", motion.draw_measured_runs.figure(found), data=columns, found=found)
     rows = [row for name, it in found.items() if it.measured.hub_angle.size for row in step_rows(name, it)]
     yield sheet("sampled_overshoot", table(rows))
 
 
-def growth_words(each: Controller, found: verdict.Verdict, chain: Chain) -> str:
+def growth_words(each: PageCase, found: Analysis) -> str:
     """State the growth of an unstable loop; after a measured run also when the hub angle shows it."""
-    growth = chain.sampling.period / found.log_radius
-    measured = each.given.measured
-    shown: list[float] = []
-    if measured is not None:
-        # as much longer as an unstable loop may seem settled
-        shown = departures(Case(each.arm, each.law, chain), measured, found.modes_used, 20 * growth)
-    return prose("growth", name=each.name, found=found, growth=growth, measured=measured, shown=shown)
+    return prose(
+        "growth",
+        name=each.name,
+        found=found.verdict,
+        growth=each.growth,
+        measured=each.measured,
+        shown=each.departures,
+    )
 
 
 def compared_data(found: Mapping[str, RunComparison]) -> Iterator[Column]:
@@ -340,3 +302,102 @@ def compared_data(found: Mapping[str, RunComparison]) -> Iterator[Column]:
         ):
             if values.size:
                 yield Column(name, of=np.interp(t, at, values))
+
+
+# ------------------------------------------------------------ the gain tuner
+
+
+SAME_COST = 1e-4  # relative difference of two costs below which they are called the same
+
+
+def tuner_section(report: ArmReport) -> PageSection:
+    """Return the tuner with the paper's figures on a damped arm and its own chain; one sentence for any other."""
+    title = "The gain tuner against baselines"
+    answer = why_not(report.arm, report.chain)
+    if not answer:
+        try:
+            data = report.tuner
+            if math.isfinite(data.tuning.without.cost):
+                return PageSection(
+                    title=title,
+                    answer=tuner_in_short(data),
+                    facts=tuner_facts(data),
+                    words=[prose("tuner", guard=data.tuning.training.guard.sentence)],
+                    blocks=list(tuner_blocks(data, report.tuned_regions(data))),
+                )
+            answer = prose("tuner_unstable")
+        except CertificationError as error:
+            answer = prose("tuner_unproven", error=error)
+    return PageSection(title=title, answer=answer)
+
+
+def why_not(arm: Arm, chain: Chain, longest: int = 70_000) -> str:
+    """Return the sentence for an arm or a chain on which no tuner is trained; empty of any other.
+
+    No trial on a page is of more samples than the `longest`.
+    """
+    period = chain.sampling.period
+    samples = 1 + round(scenarios.TRIAL_SLEWS * chain.slew.rise_time / period)
+    return prose("no_tuner", arm=arm, has_loop=has_loop(arm), samples=samples, most=longest, period=period)
+
+
+def saved_cost(data: TunerNumbers) -> float:
+    """Return by how much the median cost of the tuner is below that of the best constant gain [%]."""
+    return 100 * (1 - data.curves.final_quartiles[1] / data.tuning.best_constant.cost)
+
+
+def tuner_in_short(data: TunerNumbers) -> str:
+    """Compare the median cost of the tuner over its seeds with the best constant gain."""
+    curves = data.curves
+    return prose(
+        "tuner_in_short",
+        gain=saved_cost(data),
+        same=100 * SAME_COST,
+        median=curves.final_quartiles[1],
+        best=data.tuning.best_constant.cost,
+        final=curves.final,
+    )
+
+
+def tuner_facts(data: TunerNumbers) -> tuple[Fact, ...]:
+    """Return the costs, from no moment feedback to the bound, and where the tuner leaves the tip."""
+    tuning = data.tuning
+    best = tuning.best_constant
+    saved = saved_cost(data)
+    low, median, high = (significant(cost, 4) for cost in data.curves.final_quartiles)
+    left = float(traces.away(data.arm, data.slews["with the tuner"])[-1])
+    less = f"{significant(saved, 2)} % less cost" if saved > 100 * SAME_COST else "no improvement"
+    return (
+        Fact("tuner against the best constant gain", less, note=f"median of {data.curves.seeds} seeds"),
+        Fact("cost without moment feedback", significant(tuning.without.cost, 4)),
+        Fact("best constant gain", significant(best.cost, 4), note=f"{MOMENT_GAIN} = {significant(best.gain, 3)}"),
+        Fact("tuner", median, note=f"half between {low} and {high}"),
+        Fact("bound", significant(tuning.bound.cost, 4), note="linear-quadratic optimum"),
+        Fact("tip error at the end", significant(1e3 * abs(left), 2), "mm"),
+    )
+
+
+def tuner_blocks(data: TunerNumbers, both: StableRegions) -> Iterator[Picture | Table]:
+    """Yield the gain, slews without and with the tuner, the costs, and the learning curves.
+
+    The slews are through ideal converters, then with those and the delay of the arm's own chain.
+    """
+    tuning = data.tuning
+    result = tuning.training.result
+    columns = Column("t_s", of=result.t), Column("K", of=result.K), Column("x_N_m", of=result.x)
+    gain = tuning.constant.gain_text(RATE_GAIN, plain)
+    yield picture("tune_gain", motion.draw_gain.figure(tuning, *both), data=columns, tuning=tuning, gain=gain)
+    chain = chain_words(data.arm, data.coarse[WITHOUT].chain)
+    for kind, runs, how in (
+        ("tune_slew", data.slews, "ideal converters"),
+        ("tune_dsp", data.coarse, "with converters and delay"),
+    ):
+        figure = motion.slew.figure(data.arm, runs, f"the slew, {how}")
+        slews = response_columns(data.arm, dict(zip(("without", "tuner"), runs.values(), strict=True)))
+        yield picture(kind, figure, data=slews, runs=runs, piece=piece_of_bands(runs), how=how, chain=chain)
+    yield sheet("tune_comparison", table(data.rows), data=data)
+    curves = data.curves
+    learned = [Column("trial", of=range(1, curves.costs.shape[1] + 1))]
+    learned += [Column(name, of=costs) for name, costs in curves.quartile_curves.items()]
+    learned += [Column(f"seed_{seed}", of=costs) for seed, costs in enumerate(curves.costs)]
+    yield picture("tune_curves", motion.draw_curves.figure(curves, tuning), data=learned, curves=curves)

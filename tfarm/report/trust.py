@@ -15,8 +15,6 @@ from latex2mathml.converter import convert
 from markupsafe import Markup, escape
 
 import tfarm
-from tfarm import audit
-from tfarm.arm import Arm
 from tfarm.audit import AuditRow, published
 from tfarm.audit.arm_proofs import (
     BRACKET_DIGITS,
@@ -25,12 +23,10 @@ from tfarm.audit.arm_proofs import (
     PROVEN_OUTPUTS,
     UNPROVEN,
     ArmProof,
-    prove,
 )
 from tfarm.audit.rows import is_zero
 from tfarm.digits import powers, scientific, significant, unit
-from tfarm.dsp import Chain
-from tfarm.report.page import (
+from tfarm.report.blocks import (
     DATA,
     PROMISES,
     PageSection,
@@ -43,15 +39,16 @@ from tfarm.report.page import (
     sheet,
     write_text,
 )
+from tfarm.report.page import ArmReport
 from tfarm.response.frequency import BAND_POINTS
 from tfarm.schema import Column, Table, save_table, table
 from tfarm.schema.glossary import GLOSSARY_TERMS
 from tfarm.schema.html import GREEK, LETTER
 
 
-def save_proof(arm: Arm, folder: Path, chain: Chain | None = None) -> None:
+def save_proof(report: ArmReport, folder: Path) -> None:
     """proof.json."""
-    keep(folder, "proof", asdict(prove(arm, chain)))
+    keep(folder, "proof", asdict(report.proof))
 
 
 def written_proofs(out: Path) -> Sequence[ArmProof]:
@@ -155,14 +152,6 @@ def _correct(leaf: ElementTree.Element, before: ElementTree.Element) -> None:
     elif leaf.text == "|":
         is_right = before.tag == "mtable"
         leaf.attrib = {"form": "postfix" if is_right else "prefix", "stretchy": "true", "symmetric": "true"}
-
-
-def gather() -> tuple[Sequence[AuditRow], Sequence[published.PublishedRow]]:
-    """What the whole package shows for itself: the audit of the paper, kept or new, and the tables of others.
-
-    Raises CertificationError where one of them fails.
-    """
-    return audit.kept_audit(), published.validate()
 
 
 def write_trust(

@@ -1,6 +1,6 @@
-"""From arms to a folder of pages: everything is made in a temporary folder, and moved into place when complete.
+"""From records to a folder of pages: everything is made in a temporary folder, and moved into place when complete.
 
-The sections of an arm's page in their order, its page by templates, the index, and the page of a comparison.
+The sections of an arm's page in their order, its page by templates, the index, the pages of a comparison and a study.
 """
 
 import hashlib
@@ -9,41 +9,32 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain, product
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 from tfarm.arm import Arm
 from tfarm.assessment import Comparison
+from tfarm.digits import how_many
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import driven
-from tfarm.errors import TfarmError, must_be_known, require
+from tfarm.errors import TfarmError, must_be_known, one_line, require
+from tfarm.exact.outputs import signal_words
 from tfarm.files import move_into, place_in, temporary_folder
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
+from tfarm.plots import studies
 from tfarm.plots.regions import comparison
 from tfarm.plots.style import drawn_for
 from tfarm.processes import shared
-from tfarm.report.arm_section import arm_section, assumptions_section
-from tfarm.report.live import ASSETS, LIVE_PAGE, is_live, save_live, write_assets
-from tfarm.report.loop_section import (
-    law_section,
-    locus_section,
-    map_section,
-    margins_section,
-    nyquist_section,
-    recommended_section,
-)
-from tfarm.report.overview import SHORT, Card, blocks, save_card, summary
-from tfarm.report.page import (
-    ArmReport,
-    GivenLaw,
+from tfarm.report import loop_section, response_sections
+from tfarm.report.blocks import (
+    Fact,
     PageSection,
-    check_laws,
-    command_of,
+    Picture,
+    anchor,
     explained,
-    file_of,
-    has_loop,
     keep,
     kept,
     kept_in,
@@ -55,27 +46,26 @@ from tfarm.report.page import (
     upper,
     write_text,
 )
-from tfarm.report.response_sections import bode_section, fit_section, measured_section, modes_section
-from tfarm.report.sampled_section import sampled_section
-from tfarm.report.trust import TRUST_FOLDER, gather, save_proof, write_trust, written_proofs
-from tfarm.report.tuner_section import tuner_section
-from tfarm.schema import quantities, table
+from tfarm.report.live import ASSETS, LIVE_PAGE, is_live, save_live, write_assets
+from tfarm.report.overview import SHORT, Card, blocks, save_card, summary
+from tfarm.report.page import ArmReport, GivenLaw, command_of, file_of, gather, has_loop
+from tfarm.report.response_sections import bode_section
+from tfarm.report.sampled_section import sampled_section, tuner_section
+from tfarm.report.trust import TRUST_FOLDER, save_proof, write_trust, written_proofs
+from tfarm.schema import Column, Table, quantities, table, text
+from tfarm.studies.study import Study
 
 ReportProgress = Callable[[int, int, str], object]
 Calls = Mapping[str, Sequence[Callable[[], Any]]]  # by task: what one process does in turn
 MOST_WORKERS = 2  # processes that share the pieces of a report: as many cores as a small machine has
-WORTH_A_PROCESS = 8  # pieces for which a second process, which takes a second or two to start, is worth it
 EVIDENCE = "method and proofs"  # a task of no arm
 MAP = "margins-map"  # anchor of the section that the overview begins with
-# each of sections that share a design or damped modes
-LOOP_TASK = "continuous loop"
-SAMPLED_TASK = "sampled loop"
-LONGEST = (SAMPLED_TASK, LOOP_TASK, EVIDENCE)  # tasks of five seconds and more, which are begun first
-EXPORTS = "export"  # folder in that of an arm, to whose files its pages lead
-EXPORTED = [f"{of}{end}" for of in ("controller", "tuner", "plant", "loop") for end in (".h", ".fmu", ".mat", ".py")]
+LOOP_TASK = "continuous loop"  # of sections that share a design
+SAMPLED_TASK = "sampled loop"  # of sections that share damped modes
 TRUST_PAGE = f"{TRUST_FOLDER}/index.html"
 COMPARISON_PAGE = "compare.html"
-RESERVED_NAMES = {  # of folders that no arm may have
+# names of folders that no arm may have
+RESERVED_NAMES = {
     "index.html",
     "readme.md",
     "pictures",
@@ -116,7 +106,7 @@ class Piece:
 
 def _in_s(report: ArmReport) -> bool:
     """Whether a controller of the report acts in continuous time."""
-    return not report.arm.is_locked and any(not each.law.is_discrete for each in report.controllers)
+    return not report.arm.is_locked and any(not each.law.is_discrete for each in report.cases)
 
 
 def _of_laws(report: ArmReport) -> bool:
@@ -130,10 +120,10 @@ def _of_gains(report: ArmReport) -> bool:
 
 
 PIECES = (
-    Piece("stability region of both gains", MAP, map_section, _of_gains, task=LOOP_TASK),
-    Piece("recommended gains", "margins-recommended", recommended_section, _of_gains, task=LOOP_TASK),
-    Piece("stability margins", "margins", margins_section, _in_s, "Gains and margins", task=LOOP_TASK),
-    Piece("Nyquist plot", "margins-nyquist", nyquist_section, _in_s, task=LOOP_TASK),
+    Piece("stability region of both gains", MAP, loop_section.map_section, _of_gains, task=LOOP_TASK),
+    Piece("recommended gains", "margins-recommended", loop_section.recommended_section, _of_gains, task=LOOP_TASK),
+    Piece("stability margins", "margins", loop_section.margins_section, _in_s, "Gains and margins", task=LOOP_TASK),
+    Piece("Nyquist plot", "margins-nyquist", loop_section.nyquist_section, _in_s, task=LOOP_TASK),
     Piece(
         "response of the root moment",
         "bode-root-moment",
@@ -141,15 +131,15 @@ PIECES = (
         title="Bode plots",
     ),
     Piece("response of the tip", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),
-    Piece("measured responses", "bode-measured", measured_section, attrgetter("measured")),
-    Piece("the arm", "arm", arm_section, on="modes"),
-    Piece("modes", "modes", modes_section, title="Arm and modes"),
-    Piece("root loci", "locus", locus_section, _in_s, "Root loci", task=LOOP_TASK),
+    Piece("measured responses", "bode-measured", response_sections.measured_section, attrgetter("measured")),
+    Piece("the arm", "arm", response_sections.arm_section, on="modes"),
+    Piece("modes", "modes", response_sections.modes_section, title="Arm and modes"),
+    Piece("root loci", "locus", loop_section.locus_section, _in_s, "Root loci", task=LOOP_TASK),
     Piece("sampled loop", "sampled", sampled_section, attrgetter("has_loop"), "The sampled loop", task=SAMPLED_TASK),
-    Piece("controllers", "law", law_section, _of_laws, "The controller"),
+    Piece("controllers", "law", loop_section.law_section, _of_laws, "The controller"),
     Piece("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", task=SAMPLED_TASK),
-    Piece("fit to measurements", "fit", fit_section, attrgetter("fit"), "Fitted numbers"),
-    Piece("assumptions", "assumptions", assumptions_section, title="Assumptions"),
+    Piece("fit to measurements", "fit", response_sections.fit_section, attrgetter("fit"), "Fitted numbers"),
+    Piece("assumptions", "assumptions", response_sections.assumptions_section, title="Assumptions"),
 )
 QUESTIONS = {piece.page: piece.title for piece in PIECES if piece.title}  # pages that may be asked for alone
 PAGES = {"index": "Overview", "live": "Live loop", **QUESTIONS}
@@ -215,7 +205,8 @@ def write(
     each = zip(arms, chains or [Chain()] * n, laws or [()] * n, fits or [None] * n, strict=True)
     reports = [ArmReport(*driven(arm, chain), tuple(own), fit, tuple(measured), paper) for arm, chain, own, fit in each]
     for report in reports:
-        check_laws(report)
+        for case in report.cases if report.laws and not report.arm.is_locked else ():
+            case.check()
     with place_in(out, "out", names + [TRUST_FOLDER, ASSETS] * (not only)) as place:
         sections = _written(reports, out, place, only, progress, announce)
     for name, section in sections:
@@ -282,7 +273,7 @@ def tasks_of(
     if only:
         tasks[LOOP_TASK if LOOP_TASK in tasks else "card"].append(partial(save_card, report, folder))
     if not (only and report.laws):
-        tasks["modes"].append(partial(save_proof, report.arm, folder, report.chain))
+        tasks["modes"].append(partial(save_proof, report, folder))
     return {f"{report.arm.name}: {task}": calls for task, calls in tasks.items()}
 
 
@@ -309,25 +300,27 @@ def first_pages(
     return made[0] if made else None
 
 
+def _results(calls: Sequence[Callable[[], Any]]) -> list[Any]:
+    return [call() for call in calls]
+
+
 def make_all(tasks: Calls, progress: ReportProgress | None) -> dict[str, Sequence[Any]]:
     """The results of all calls, by task."""
-    longest = sorted(tasks, key=lambda task: not task.endswith(LONGEST))
+    # those of five seconds and more are begun first
+    longest = sorted(tasks, key=lambda task: not task.endswith((SAMPLED_TASK, LOOP_TASK, EVIDENCE)))
     done: dict[str, Sequence[Any]] = {}
 
     def begun(running: Sequence[str]) -> None:
         if progress is not None:
             progress(len(done), len(tasks), ", ".join(running))
 
-    count = MOST_WORKERS if len(tasks) >= WORTH_A_PROCESS else 1
-    calls = ((task, partial(_in_turn, tasks[task])) for task in longest)
+    # a second process takes a second or two to start
+    count = MOST_WORKERS if len(tasks) >= 8 else 1
+    calls = ((task, partial(_results, tasks[task])) for task in longest)
     for task, results in shared(calls, count, begun, joins=True):
         done[task] = results  # noqa: PERF403  `begun` counts them meanwhile
     begun(["pages"])
     return done
-
-
-def _in_turn(calls: Sequence[Callable[[], Any]]) -> list[Any]:
-    return [call() for call in calls]
 
 
 # ------------------------------------------------------------ an arm's page
@@ -349,15 +342,14 @@ def _write_pages(
             own[piece.page].append(by_anchor[piece.anchor])
     written = only or ("index", *own)
     pages = navigation(report.arm, pages_in(earlier, folder, written=written), trust, earlier)
+    facts = [by_anchor[name].facts for name in ("margins-map", "sampled") if name in by_anchor]
     shared = {
         "card": kept_in(folder, "card", Card) or Card(report.arm.name, summary(report), "", (), (), ()),
         "short": SHORT,
         "pages": pages,
         "titles": dict(pages),
         "blocks": [*blocks(by_anchor)],
-        "short_facts": [
-            fact for name in ("margins-map", "sampled") if name in by_anchor for fact in by_anchor[name].facts
-        ],
+        "short_facts": [*chain.from_iterable(facts)],
         "recommended": by_anchor.get("margins-recommended"),
         "open_pictures": 2,  # of a section: those that answer its question; the rest is a click away
         "has_proof": (folder / "proof.json").is_file(),
@@ -375,7 +367,10 @@ def navigation(arm: Arm, own: Sequence[tuple[str, str]], trust: str, folder: Pat
     """(file, title) of all that a page of an arm leads to."""
     compared = kept_comparison(folder.parent)
     more = [(f"../{COMPARISON_PAGE}", compared["title"])] if arm.name in compared["arms"] else []
-    files = [f"{EXPORTS}/{name}" for name in EXPORTED if (folder / EXPORTS / name).is_file()]
+    # folder in that of an arm
+    place = "export"
+    exported = product(("controller", "tuner", "plant", "loop"), (".h", ".fmu", ".mat", ".py"))
+    files = [f"{place}/{of}{end}" for of, end in exported if (folder / place / f"{of}{end}").is_file()]
     more += [(file, f"Exported: {Path(file).name}") for file in files]
     return [("../index.html", "All arms"), *own, *more, *([(f"../{trust}", "Method and proofs")] if trust else [])]
 
@@ -389,21 +384,17 @@ def pages_in(*folders: Path, written: Sequence[str] = ()) -> list[tuple[str, str
 # ------------------------------------------------------------ the index
 
 
-def index_page(out: Path) -> str:
-    """Return the page that leads to all others in a folder of reports."""
-    cards = [(card, pages) for folder, card in kept(out, "card", Card).items() if (pages := pages_in(folder))]
-    compared = kept_comparison(out)["title"]
-    return render("index.html", title="tfarm reports", cards=cards, trust=trust_in(out), compared=compared, short=SHORT)
-
-
 def trust_in(out: Path) -> str:
     """Return the page on method and proofs in a folder of reports, if there is one."""
     return TRUST_PAGE if (out / TRUST_PAGE).is_file() else ""
 
 
 def write_index(out: Path, stage: Path) -> None:
-    """Write the index of a folder of reports, through a folder next to it."""
-    write_text(stage / "index.html", index_page(out))
+    """Write the page that leads to all others in a folder of reports, through a folder next to it."""
+    cards = [(card, pages) for folder, card in kept(out, "card", Card).items() if (pages := pages_in(folder))]
+    compared = kept_comparison(out)["title"]
+    page = render("index.html", title="tfarm reports", cards=cards, trust=trust_in(out), compared=compared, short=SHORT)
+    write_text(stage / "index.html", page)
     move_into(stage, out)
 
 
@@ -430,9 +421,8 @@ def write_comparison(found: Comparison, out: Path) -> Path:
     )
     first, *tables = (sheet("compared", table(each), stem=f"compare-{of.key}", of=of) for of, each in rows)
     with place_in(out, "--out") as made:
-        saved = save_section(
-            PageSection(words=[prose("comparison", found=found)], blocks=[first, drawn, *tables]), made
-        )
+        section = PageSection(words=[prose("comparison", found=found)], blocks=[first, drawn, *tables])
+        saved = save_section(section, made)
         others = {"index.html": "all arms"} | {f"{name}/index.html": name for name in arms}
         pages = [(file, name) for file, name in others.items() if (out / file).is_file()]
         write_text(made / COMPARISON_PAGE, render(COMPARISON_PAGE, title=title, saved=saved, pages=pages))
@@ -441,3 +431,70 @@ def write_comparison(found: Comparison, out: Path) -> Path:
         if (out / "index.html").is_file():
             write_index(out, made)
     return out / COMPARISON_PAGE
+
+
+# ------------------------------------------------------------ a study
+
+
+def write_study(found: Study) -> Path:
+    """Write index.html with its pictures and tables to the folder of a study: the page.
+
+    Raises ParameterError where it cannot be written.
+    """
+    folder = found.parts.folder
+    with place_in(folder, "--out") as made:
+        with drawn_for("page"):
+            saved = [save_section(each, made) for each in study_sections(found)]
+        sections = [each for each in saved if each.words or each.blocks]
+        title = f"{found.arm}: study of {how_many(found.rows, 'arm')}"
+        page = render("study.html", title=title, sections=sections, explained=explained, found=found)
+        write_text(made / "index.html", page)
+        move_into(made, folder)
+    return folder / "index.html"
+
+
+def study_sections(found: Study) -> list[PageSection]:
+    """Return findings, distributions, drivers, responses, worst arm and failures of a study, as far as it has them."""
+    facts = [
+        *(Fact(each.loop, f"{each.stable:,}", f"of {found.done:,} arms stable", each.finding) for each in found.shares),
+        Fact("arms computed", f"{found.done:,}", note=f"of {found.rows:,}"),
+    ]
+    distributions: list[Picture | Table] = []
+    drivers: list[Picture | Table] = [sheet("study_sobol", table(found.sobol))]
+    if found.spreads:
+        distributions.append(picture("study_distributions", studies.study.figure(found), found=found))
+        drivers.insert(0, picture("study_scatter", studies.study_scatter.figure(found), found=found))
+    responses: list[Picture] = []
+    missing: list[str] = []
+    for output in ("root_moment", "tip_displacement"):
+        try:
+            figure = studies.study_band.figure(found, output)
+            name = signal_words(output)[0]
+            responses.append(picture("study_band", figure, stem=f"study-{output.replace('_', '-')}", name=name))
+        except TfarmError as error:
+            missing.append(f"{output}: {error}.")
+    numbers = [sheet("study_ranges", table(found.spreads)), sheet("study_numbers", varied_numbers(found), found=found)]
+    worst = [] if found.worst is None else [prose("study_worst", worst=found.worst)]
+    sections = (
+        PageSection(title="Findings", facts=facts, words=[prose("study", found=found)], blocks=numbers),
+        PageSection(title="Distributions", blocks=distributions),
+        PageSection(title="Drivers", blocks=drivers),
+        PageSection(title="Responses", words=missing, blocks=responses),
+        PageSection(title="Worst arm", words=worst),
+        PageSection(title="Arms without a result", blocks=[sheet("study_failures", table(found.failures))]),
+    )
+    return [replace(each, anchor=anchor("study", each.title)) for each in sections]
+
+
+def varied_numbers(found: Study) -> list[Column]:
+    """Return a row a varied number: its distribution or grid, and its value of the worst arm where that was found."""
+    space = found.parts.plan.space
+    kinds = {key: one_line(f"{each.kind} {', '.join(map(text, each.numbers))}", 60) for key, each in space.over.items()}
+    columns = [
+        Column("key", "number", of=space.keys),
+        Column("distribution", "distribution", of=[kinds.get(key, "list or posterior") for key in space.keys]),
+    ]
+    if found.worst is not None:
+        worst = list(found.worst.numbers.values())
+        columns.append(Column("worst", "worst arm", of=worst, shown=list(map(text, worst))))
+    return columns
