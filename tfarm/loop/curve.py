@@ -9,7 +9,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -114,7 +114,9 @@ class LoopVerdict(ABC):
     """
 
     consumer: ClassVar[Consumer]
-    word: str
+    if TYPE_CHECKING:
+        # a field here would come before those of each record in its tables
+        word: str
 
     @property
     @abstractmethod
