@@ -20,6 +20,7 @@ from tests.exact.accuracy import (
     near,
     run,
 )
+from tests.rigs import some_rig
 from tests.shared import sized
 from tests.strategies import some_arm
 from tfarm.exact import balls
@@ -63,6 +64,16 @@ def test_next_to_the_essential_singularity():
     while len(points) < 40:
         arm = some_arm(rng, damping=10 ** rng.uniform(-6, -2))
         points += measure(arm, complex(near(rng, -1 / arm.link.damping, 1e-6, 1e-3)), 0.5, AT_ENDS)
+    assert_accurate(points)
+
+
+def test_where_a_spring_holds_the_root_back_its_motion_keeps_digits():
+    """Far up Psi of a sprung root is a small share of theta, and W there of r theta: of rigs with both, x = 0."""
+    rng, points = np.random.default_rng(1), []
+    while len(points) < 400:
+        arm = some_rig(rng)
+        if arm.hub.radius and not (arm.clamp.is_rigid and arm.joint.is_rigid):
+            points += measure(arm, 1j * 10 ** rng.uniform(1, 7), 0.0)
     assert_accurate(points)
 
 

@@ -22,9 +22,11 @@ from tests.strategies import arm_of, some_arm
 from tfarm import Arm, Hub
 from tfarm.arm import Motor
 from tfarm.cli.running import run
+from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
 from tfarm.exact.system import system_of
 from tfarm.loop.locus import open_poles
+from tfarm.report.page import ArmReport
 from tfarm.report.response_sections import damped_tables, locked_table
 from tfarm.spectrum.damped import NOT_ASSIGNED, DampedModes, damped_modes, origins_of
 from tfarm.spectrum.naming import function_of
@@ -301,7 +303,7 @@ def test_tables_of_them_hold_every_eigenvalue_and_no_nan(number: int) -> None:
     arm, count = RIGS[number]
     undamped = tfarm.modes(arm, count)
     damped = tfarm.damped_modes(undamped)
-    first, *others = damped_tables(undamped)
+    first, *others = damped_tables(ArmReport(arm, Chain()), count)
     assert [row["index"] for row in first] == damped.index.tolist()
     assert [row["origin"] for each in others for row in each] == [each.origin for each in damped.unassigned]
     assert all("nan" not in cell for table in (first, *others) for column in table.columns for cell in column.cells)
@@ -312,7 +314,7 @@ def test_tables_of_them_hold_every_eigenvalue_and_no_nan(number: int) -> None:
     assert np.isnan(damped.damping_ratio).sum() == (~damped.is_assigned).sum()
     assert ("Damped modes: no eigenvalue" in first.caption) == (not damped.is_assigned.all())
     assert ("Damped modes: " in first.caption) == (damped.left_out > 0 or not damped.is_assigned.all())
-    locked_table(undamped)
+    locked_table(ArmReport(arm, Chain()), count)
 
 
 @pytest.mark.parametrize("proof", sized((), ("--certify",)))

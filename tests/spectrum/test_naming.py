@@ -8,7 +8,6 @@ import pytest
 import tfarm
 from tests.rigs import some_rig
 from tfarm.errors import ConvergenceError
-from tfarm.reduced.modal import NAMING_STEPS
 from tfarm.spectrum.damped import damped_modes
 from tfarm.spectrum.following import follow
 from tfarm.spectrum.naming import LOST, in_pairs
@@ -101,7 +100,7 @@ def test_zeros_that_ring_are_a_pair(single, pairs, expected_single, expected):
 def test_names_are_given_up_and_the_box_is_complete_all_the_same():
     """128 modes of a rig that took 24,000 steps to name, 32 s: those that are lost are listed without a name."""
     arm = tfarm.load("tests/data/reproductions/laws_24.toml")
-    damped = damped_modes(tfarm.modes(arm, 128), steps=NAMING_STEPS)
+    damped = damped_modes(tfarm.modes(arm, 128), steps=1_000)
     inside = np.r_[damped.eigenvalues.ravel(), damped.single, damped.unassigned_pairs.ravel()]
     assert not damped.is_assigned.all()
     assert damped.box.holds(inside).sum() == damped.count
