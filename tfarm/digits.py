@@ -8,7 +8,9 @@ from typing import Any
 
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 DOUBLE_DIGITS = 15  # of a decimal number that a double preserves
-LEAST_PLAIN, MOST_PLAIN = 1e-3, 1e7  # outside, numbers have powers of ten
+# outside, numbers have powers of ten
+LEAST_PLAIN = 1e-3
+MOST_PLAIN = 1e7
 CellsOf = Callable[[Sequence[Any]], Sequence[str]]  # from the values of a column to its cells
 
 

@@ -33,7 +33,8 @@ class Rational:
     den: tuple[float, ...] = (1.0,)
 
     def __post_init__(self) -> None:
-        num, den = _polynomial("num", self.num), _polynomial("den", self.den)
+        num = _polynomial("num", self.num)
+        den = _polynomial("den", self.den)
         require(any(den), "den", list(den), "a denominator that is not 0 everywhere")
         object.__setattr__(self, "num", num)
         object.__setattr__(self, "den", den)
@@ -177,7 +178,9 @@ class StateSpace:
 
         None where it is 0 at one of them.
         """
-        near, nearer = 1e-6 + 0j, 1e-9 + 0j  # 1/s: there the numerator grows as its lowest power of s
+        # 1/s: there the numerator grows as its lowest power of s
+        near = 1e-6 + 0j
+        nearer = 1e-9 + 0j
         first, second = abs(self.numerators(np.array([near, nearer]))[signal])
         if not (first and second):
             return None

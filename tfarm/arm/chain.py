@@ -20,7 +20,9 @@ from tfarm.errors import ParameterError, must_be_known, naming, require, unknown
 from tfarm.schema import Quantity
 
 Reading = Literal["vibration", "total"]
-LEAST_BITS, MOST_BITS = 2, 32  # of a converter: of one bit there are no steps, of more than 32 no part
+# of a converter: of one bit there are no steps, of more than 32 no part
+LEAST_BITS = 2
+MOST_BITS = 32
 MOST_DELAY = 100.0  # samples: each whole one is a state more
 DELAYS = "a computational delay is zero or positive, in samples, at most 100"
 TIME_ROUNDING = 1e-12  # of a time: by so little before a sample it is at it, as its quotient with the period is rounded

@@ -39,7 +39,9 @@ LISTED = tuple(sorted(GAINS, key=lambda gain: gain.name))  # in the order in whi
 NAMES = ("K1", "K2", "Kp")
 ON = {gain.output: gain.name for gain in GAINS}  # the name of the gain on each output
 OUTPUT_OF = {gain.name: gain.output for gain in GAINS}
-ANGLE_GAIN, RATE_GAIN, MOMENT_GAIN = "Kp", "K1", "K2"
+ANGLE_GAIN = "Kp"
+RATE_GAIN = "K1"
+MOMENT_GAIN = "K2"
 PLANE = (RATE_GAIN, MOMENT_GAIN)  # the gains of the paper's law: axes of the stability region
 TWO_GAINS = "K1-K2"  # the name of that structure, as PD or lead
 TAKEN_OFF = "Kp theta - K1 theta_t - K2 M"  # the law, subtracted from the input

@@ -52,7 +52,8 @@ def load_tables(name_or_path: AnyFile) -> ArmFile:
     is_text = isinstance(name, str) and bool(name.strip()) and "\0" not in name
     require(is_text, "arm", name, f"give a preset ({', '.join(presets())}) or a path")
     if is_named and name in presets():
-        data, name = PRESETS.joinpath(f"{name}.toml").read_bytes(), f"{name}.toml"
+        data = PRESETS.joinpath(f"{name}.toml").read_bytes()
+        name = f"{name}.toml"
     elif is_named and not ({"/", "\\", os.sep} & set(name) or name.endswith(".toml") or os.path.lexists(name)):
         remedy = f"no such preset: {did_you_mean(name, presets())}; or give the path of a .toml file"
         raise ParameterError(key="arm", value=name, remedy=remedy)
@@ -151,7 +152,10 @@ def _segment(key: str, link: Link, length: float) -> Iterator[str]:
 
 def _parts(arm: Arm) -> Iterator[str]:
     """Yield the warnings of hub, payload, clamp, motor and attachments: values by a ratio to those of the link."""
-    hub, payload, length, mass = arm.hub, arm.payload, arm.length, arm.own_mass
+    hub = arm.hub
+    payload = arm.payload
+    length = arm.length
+    mass = arm.own_mass
     beam = mass * length**2 / 3  # kg m^2, spread evenly from the axis
     bending = 3 * arm.bending_scale  # N m
     radius = math.sqrt(payload.inertia / payload.mass) if 0.0 < payload.mass < math.inf else 0.0
@@ -186,7 +190,8 @@ def _parts(arm: Arm) -> Iterator[str]:
     ]
     if arm.motor is not None:
         rotor = "through the gear {:.1g} times the link's; its unit is kg m^2, before the gear"
-        own, reflected = arm.motor.rotor_inertia, arm.motor.reflected_inertia
+        own = arm.motor.rotor_inertia
+        reflected = arm.motor.reflected_inertia
         limits.append(("motor.rotor_inertia", own, reflected / beam, HEAVIEST, rotor))
     for i, each in enumerate(arm.attachments, 1):
         limits.append((f"attachment.{i}.mass", each.mass, each.mass / mass, HEAVIEST, heavy))

@@ -145,7 +145,8 @@ class Arm:
     @property
     def is_uniform(self) -> bool:
         """Whether it is an arm as in the paper: one segment on a hub, a payload centred on the tip, no other part."""
-        hub, spare = self.hub, (self.outer, self.motor, self.attachments, self.payload.offset, self.gauge.x)
+        hub = self.hub
+        spare = (self.outer, self.motor, self.attachments, self.payload.offset, self.gauge.x)
         plain = not any((hub.friction, hub.radius, hub.stiffness, *spare))
         return plain and self.clamp.is_rigid and self.joint.is_rigid
 
@@ -229,7 +230,9 @@ class Arm:
         A mass at x has (r + x)(x - place): rhoA (L^3/3 + a L (a + L) + c L (a + L/2)) of a segment from a to a + L
         beyond the place, which is at c from the axis.
         """
-        c, start, beam = self.hub.radius + place, 0.0, []
+        c = self.hub.radius + place
+        start = 0.0
+        beam = []
         for link in self.links:
             a = max(start, place) - place
             start += link.length
@@ -344,7 +347,8 @@ class Arm:
     @property
     def lossless(self) -> Arm:
         """The arm without dissipation."""
-        clamp, joint = replace(self.clamp, damping=0.0), replace(self.joint, damping=0.0)
+        clamp = replace(self.clamp, damping=0.0)
+        joint = replace(self.joint, damping=0.0)
         return replace(self.elastic.lossless_hub, clamp=clamp, joint=joint)
 
     @property

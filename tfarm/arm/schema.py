@@ -64,7 +64,9 @@ def validated(model: type[_Strict], table: Any, place: str) -> _Strict:
     except ValidationError as error:
         problem = min(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
     key = ".".join(filter(None, (place, *map(str, problem["loc"]))))
-    word, value, known = str(problem["loc"][0]), problem["input"], model.model_fields
+    word = str(problem["loc"][0])
+    value = problem["input"]
+    known = model.model_fields
     if word not in known:
         is_of_top = place and word in AT_THE_TOP
         remedy = f"unknown key; {word} belongs at the top of the file" if is_of_top else unknown_key(word, known)
@@ -129,7 +131,8 @@ class LinkTable(TomlTable):
     section: dict[str, Any]
 
     def build(self) -> Link:
-        nu, shape = self.poissons_ratio, self.section.get("shape", MISSING)
+        nu = self.poissons_ratio
+        shape = self.section.get("shape", MISSING)
         require(shape in SHAPE_TABLES, "link.section.shape", shape, f"give one of {', '.join(SHAPE_TABLES)}")
         section = validated(SHAPE_TABLES[shape], self.section, "link.section").build()
         is_isotropic = self.material is None or materials()[self.material].is_isotropic

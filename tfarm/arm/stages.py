@@ -12,7 +12,10 @@ from typing import Any, NamedTuple
 
 from tfarm.errors import require
 
-ACTS, NAMED, PARTLY, NONE = "acts", "named", "partly", "none"
+ACTS = "acts"
+NAMED = "named"
+PARTLY = "partly"
+NONE = "none"
 
 
 class Stage(NamedTuple):

@@ -32,7 +32,8 @@ def to_toml(arm: Arm) -> str:
 
 def arm_table(arm: Arm) -> dict[str, Any]:
     """Return the tables of the arm's file, as `arm_of_table` reads them."""
-    links, motor = [_link_table(link) for link in arm.links], arm.motor
+    links = [_link_table(link) for link in arm.links]
+    motor = arm.motor
     tables: dict[str, Any] = {
         "name": arm.name,
         "assumptions": list(arm.assumptions),

@@ -46,7 +46,10 @@ GRADED = {  # names of the graded margins in the grade of the loop
     "delay_margin": "delay margin",
     "peak_sensitivity": "Ms",
 }
-GAIN_LIMITS, PHASE_LIMITS, PERIOD_LIMITS, PEAK_LIMITS = (6.0, 3.0), (45.0, 30.0), (1.0, 0.5), (2.0, 3.0)
+GAIN_LIMITS = (6.0, 3.0)
+PHASE_LIMITS = (45.0, 30.0)
+PERIOD_LIMITS = (1.0, 0.5)
+PEAK_LIMITS = (2.0, 3.0)
 REFERENCE_RATIO = 1e-3  # damping ratio of mode 1 with which an undamped arm is graded; less is small damping
 UNDAMPED = (
     "undamped model: margins and grades are those with C = {:.4g} s, 0.1 % of critical damping in mode 1; "
@@ -83,7 +86,9 @@ class LeastDamped(NamedTuple):
 
 
 NOT_DEFINED = Graded(None, None, UNDEFINED)
-margins_of, sampled_of = lru_cache(maxsize=64)(margins), lru_cache(maxsize=16)(sampled)  # card and curve of a page
+# card and curve of a page
+margins_of = lru_cache(maxsize=64)(margins)
+sampled_of = lru_cache(maxsize=16)(sampled)
 
 
 def loop_names(period: float) -> tuple[str, str]:
@@ -289,7 +294,8 @@ def _margins(band: LoopMargins | None, delay: float | None, period: float) -> di
         undefined = {"grade": UNDEFINED, "limited_by": (), "delay_margin_periods": None, "disk_margin": None}
         return dict.fromkeys(GRADED, NOT_DEFINED) | undefined
     down, up = (gain_margin(band, factor) for factor in band.gain)
-    phase, peak = band.phase_margin, band.sensitivity_peak
+    phase = band.phase_margin
+    peak = band.sensitivity_peak
     periods = None if delay is None else type(delay)(delay / period)
     graded = (
         Graded(*up, grade_of(up[0], GAIN_LIMITS)),

@@ -32,7 +32,9 @@ from tfarm.spectrum.gains import default_gains
 
 MOST_COMPARED = 30  # flexible modes of a table that a person reads
 LONGEST_SIDE_NAME = 60  # characters of a name: of two in one legend
-MOST_FACTOR, FACTORS = 4.0, 40  # of a continuous-time controller: where that plane ends, and values that are counted
+# of a continuous-time controller: where that plane ends, and values that are counted
+MOST_FACTOR = 4.0
+FACTORS = 40
 
 
 class ArmMode(NamedTuple):
@@ -391,7 +393,8 @@ def _modes_of_arm(arm: Arm, count: int, most: int) -> tuple[list[ArmMode], dict[
 
     Damping ratios that could not be found, or not for one mode, are None; the poles are then the undamped ones.
     """
-    found, more = modes_of(arm, count), modes_of(arm, most)
+    found = modes_of(arm, count)
+    more = modes_of(arm, most)
     poles = dict(zip(more.index.tolist(), (1j * more.natural_frequency).tolist(), strict=True))
     ratio: dict[int, float] = dict.fromkeys(poles, 0.0) if arm.is_undamped else {}
     with suppress(ConvergenceError):
@@ -410,7 +413,9 @@ def _sampled_poles(found: Analysis, most: int) -> tuple[Complex, dict[int, compl
 
     And those of the rig by itself, by flexible mode, 0 for none.
     """
-    T, pulse, z = found.loop.chain.sampling.period, found.loop.pulse, found.loop.poles.z
+    T = found.loop.chain.sampling.period
+    pulse = found.loop.pulse
+    z = found.loop.poles.z
     z = np.where(abs(z.imag) <= 1e-12, z.real, z)  # but for rounding
     s = np.log(z[(abs(z) > 1e-3) & (z.imag >= 0)]) / T  # of others a thousandth is left after a sample
     upper = pulse.poles.imag > 0

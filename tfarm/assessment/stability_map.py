@@ -77,7 +77,8 @@ def stable_regions(case: Case) -> StableRegions:
     ends = ends[np.diff(ends, prepend=0.0) > 1e-3 * ends]
     span, cut = (arm.input_per_torque * np.array(ends) for ends in (K2_RANGE, CUT_RANGE))
     # beyond all that is stable
-    low, top = gains.K1 / 15.0, 1.7 * max([gains.K1, *ends])
+    low = gains.K1 / 15.0
+    top = 1.7 * max([gains.K1, *ends])
     across = with_both_sides(np.geomspace(low, top, OVERLAY_COLUMNS), ends)
     # about the width of the picture over its height
     wide = 1.8 / np.log(top / low)
@@ -112,7 +113,9 @@ def outlined(loop: Sampled, across: Real, up: Real, drawn: Callable[[Real, Real]
 
 
 DESIGNED_MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
-GRID_COLUMNS, GRID_ROWS = 240, 200  # of the coloured grid
+# of the coloured grid
+GRID_COLUMNS = 240
+GRID_ROWS = 200
 
 
 @frozen

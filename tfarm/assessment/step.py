@@ -70,7 +70,8 @@ CONSUMER = Consumer(
     none=("volts",),
 )  # fmt: skip
 SAMPLED_NAMES = {"reference": "reference", "slew": "slew", "pulse": "pulse", "deflection": "decay"}  # by scenario
-MOMENT, UNSTABLE = AT_HUB[-1], "unstable"
+MOMENT = AT_HUB[-1]
+UNSTABLE = "unstable"
 Curve = tuple[Real, Real, Real, Peak | None]  # times [s], values, bounds of their errors, and the peak where known
 PARTS = ("hub", "tip", "root_moment", "torque")
 TIME_CONSTANTS = 8.0  # of the dominant pole: length of a record after its input, to 3e-4 of the final value
@@ -165,7 +166,8 @@ class _Record:
             (error <= CONVERGED * abs(peak.value)).all() and peak.bound <= CONVERGED * abs(peak.value)
             for _, _, error, peak in curves.values()
         )
-        word, count = verdict_on(response.poles.loop).word, f"{response.poles.count} poles{omitted}"
+        word = verdict_on(response.poles.loop).word
+        count = f"{response.poles.count} poles{omitted}"
         return self._loop(word, is_converged, count, curves)
 
     def _of_sampled(self, case: Case, task: Scenario, names: Sequence[str]) -> LoopResponse:
@@ -191,9 +193,11 @@ class _Record:
         """Figures of one signal at times `t` with a bound on its error; its peak is the largest there unless given."""
         n = int(abs(y).argmax())
         peak = peak or Peak(float(t[n]), float(y[n]), 0.0, abs(float(y[n])))
-        size, step = max(abs(peak.value), LEAST_SIZE), float(self.t[1])
+        size = max(abs(peak.value), LEAST_SIZE)
+        step = float(self.t[1])
         known = self._values(name, t, y, 0 * bound)
-        below, above = self._values(name, t, y, -bound), self._values(name, t, y, bound)
+        below = self._values(name, t, y, -bound)
+        above = self._values(name, t, y, bound)
         least = {"overshoot": 0.01, "settling_time": step / OPEN, "rise_time": step / OPEN}
         spread = {
             key: _spread(value, (below[key], above[key]), least.get(key, RESOLVED * size))
@@ -365,7 +369,8 @@ def step(
     if is_step:
         hub, own = followed(case.law)
         case = case.under(own)
-    arm, chain = case.arm, case.chain
+    arm = case.arm
+    chain = case.chain
     poles = None if case.law.is_discrete else usual_poles(ContinuousLoop(case))
     length = usual_duration(poles, chain) if duration is None else duration
     if is_step:
@@ -458,14 +463,16 @@ def _released(loop: ContinuousLoop, offset: float, names: Sequence[str]) -> Exci
     signals = tuple(dict.fromkeys(("tip_displacement", *loop.law.signals, *names)))
     plant = sensed_plant(loop.arm, Chain(), signals, 1).unfiltered
     first, amplitude = first_mode(plant, offset, "deflection")
-    p, pairs = complex(plant.poles[first]), zip(signals, plant.residues[:, first] * amplitude, strict=True)
+    p = complex(plant.poles[first])
+    pairs = zip(signals, plant.residues[:, first] * amplitude, strict=True)
     free = {name: lambda s, r=r: r / (s - p) + r.conjugate() / (s - p.conjugate()) for name, r in pairs}
     return Excitation({}, poles=(p,), free=free)
 
 
 def _times(response: TimeResponse | None, task: Scenario) -> Real:
     """Times [s] of a record: the samples and times between them, which resolve the fastest mode that shows."""
-    T, n = task.period, task.t.size
+    T = task.period
+    n = task.t.size
     finest = (n - 1) * T / 2000
     if response is not None:
         z, amplitudes = (np.hstack([part.late[n] for part in response.parts]) for n in (0, 1))

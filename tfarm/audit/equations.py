@@ -53,7 +53,9 @@ def equation(number: int) -> Expression:
 
 def along_arm(field: str, text: str) -> str:
     """(1), (2): against the Euler-Lagrange equation of y or phi along the arm."""
-    l, rate, slope = parsed(DENSITY), jet(field, t=1), jet(field, x=1)
+    l = parsed(DENSITY)
+    rate = jet(field, t=1)
+    slope = jet(field, x=1)
     euler = d_dt(sp.diff(l, rate)) + d_dx(sp.diff(l, slope)) - sp.diff(l, jet(field))
     return remainder(euler - difference(text))
 
@@ -75,14 +77,16 @@ def at_hub(text: str) -> str:
 
 def at_clamp(field: str, text: str) -> str:
     """(6), (7): what the clamp would do by its force (or moment) on what the condition leaves free."""
-    free, reaction = jet(field, t=1, at=AT_ROOT), -sp.diff(parsed(DENSITY), jet(field, x=1))
+    free = jet(field, t=1, at=AT_ROOT)
+    reaction = -sp.diff(parsed(DENSITY), jet(field, x=1))
     solved = sp.solve(d_dt(difference(text)), free)
     return remainder(reaction * (solved[0] if solved else free))
 
 
 def is_transform(number: int, text: str) -> str:
     """(8)-(14): against the Laplace transform of (1)-(7), which are linear, from rest."""
-    f, names = equation(number - 7), {"y": "Y", "phi": "Phi", "theta": "Theta"}
+    f = equation(number - 7)
+    names = {"y": "Y", "phi": "Phi", "theta": "Theta"}
     images = {s: symbol("s") ** j * jet(names[field], i, 0, at.replace(",t)", ",s)")) for s, field, i, j, at in jets(f)}
     return remainder(f.subs(images | {symbol("u"): symbol("U")}, simultaneous=True) - difference(text))
 
@@ -137,7 +141,8 @@ def relation() -> Expression:
 
 def solves(text: str, stiffness: str = STIFFNESS) -> str:
     """The residuals of (8) and (9) with the waves of a text, for lambda as in the corrected (A.2)."""
-    left, ks = [], symbols("k1 k2 k3 k4")
+    left = []
+    ks = symbols("k1 k2 k3 k4")
     for number in (8, 9):
         residual = sp.expand(inserted(number, waves_of(text), stiffness))
         left.append(residual.subs(dict.fromkeys(ks, 0)))
@@ -162,7 +167,9 @@ def are_entries(text: str) -> str:
 
     Theta is Psi(0) by (14).
     """
-    given, waves, left = sides(text), waves_of(WAVES), []
+    given = sides(text)
+    waves = waves_of(WAVES)
+    left = []
     theta = sp.solve(inserted(14, waves), symbol("Theta"))[0]
     for i, number in enumerate((11, 12, 13, 10), start=1):
         row = sp.expand(inserted(number, waves).subs(symbol("Theta"), theta))
@@ -198,10 +205,12 @@ def disagreement(text: str) -> str:
 def by_transition(v: dict[str, Any]) -> list[Any]:
     """theta, w(L), psi(L), M(0) for a unit torque, from exp(A(s) L) of the state (w, psi, Q, M)."""
     rho, A, length, E, I, kappa, G, C, m, I_c, I_h, s = (v[name] for name in BEAM_NAMES)
-    s2, EI = s**2, E * (1 + C * s) * I
+    s2 = s**2
+    EI = E * (1 + C * s) * I
     rows = [[0, 1, 1 / (kappa * G * A), 0], [0, 0, 0, 1 / EI], [rho * A * s2, 0, 0, 0], [0, rho * I * s2, -1, 0]]
     T = mpmath.expm(mpmath.matrix(rows) * length)
-    free, torque = mpmath.matrix([[0, 0], [1, 0], [0, 1], [I_h * s2, 0]]), mpmath.matrix([0, 0, 0, -1])
+    free = mpmath.matrix([[0, 0], [1, 0], [0, 1], [I_h * s2, 0]])
+    torque = mpmath.matrix([0, 0, 0, -1])
     tip = mpmath.matrix([[m * s2, 0, 1, 0], [0, I_c * s2, 0, 1]]) * T
     found = mpmath.lu_solve(tip * free, -tip * torque)  # theta and Q(0)
     w, psi, _, _ = T * (free * found + torque)

@@ -58,7 +58,8 @@ def jets(f: Expression) -> list[tuple[Expression, str, int, int, str]]:
     ]
 
 
-x, L = symbol("x"), symbol("L")
+x = symbol("x")
+L = symbol("L")
 
 
 @cache

@@ -44,7 +44,8 @@ def kept_audit(folder: Path = FOLDER) -> tuple[AuditRow, ...]:
 
 def source_hash() -> str:
     """Return the hash of all that an audit depends on: sources and tables of tfarm, and versions of what they use."""
-    root, versions = Path(__file__).parents[1], [platform.python_version(), *map(version, PACKAGES)]
+    root = Path(__file__).parents[1]
+    versions = [platform.python_version(), *map(version, PACKAGES)]
     digest = hashlib.sha256(" ".join(versions).encode())
     for source in sorted(each for kind in ("py", "toml") for each in root.rglob(f"*.{kind}")):
         digest.update(source.relative_to(root).as_posix().encode() + source.read_bytes())

@@ -138,7 +138,8 @@ def is_power(text: str) -> str:
 
 def proven_gains(law: Expression) -> dict[str, Expression]:
     """The intervals of K1 and K2 for which some a1, a2 > 0 make the true dV/dt (a3 = a1) a negative square."""
-    M, slope = symbol("M(0)"), parsed("phi_x(0,t)")
+    M = symbol("M(0)")
+    slope = parsed("phi_x(0,t)")
     power = sp.expand(claimed(formula_of("(18)"))[0].subs(u, law)).subs(slope, M / parsed("E*I"))
     weight = sp.solve(power.coeff(M), a1)[0] / a2  # a1/a2, which must be positive
     damping = -sp.expand(power.subs(M, 0)) / (a2 * theta_t**2)
@@ -148,7 +149,8 @@ def proven_gains(law: Expression) -> dict[str, Expression]:
 
 def are_proven_gains(text: str) -> str:
     """(19): the gains that the text allows against those for which dV/dt <= 0 can be proven with its law."""
-    proven, wrong = proven_gains(sides(text)[u]), []
+    proven = proven_gains(sides(text)[u])
+    wrong = []
     for clause in clauses(text)[1:]:
         low, name, high = clause.split(" < ")
         allowed = sp.Interval.open(parsed(low), parsed(high))
@@ -230,7 +232,8 @@ def is_section(text: str) -> str:
     given = is_given("I", text)
     if given != "0":
         return given
-    (_, value, _), sides = quantity(clauses(text)[0]), clauses(text)[1].removeprefix("rectangle ").split(" x ")
+    (_, value, _) = quantity(clauses(text)[0])
+    sides = clauses(text)[1].removeprefix("rectangle ").split(" x ")
     width, depth = (quantity(f"side = {side}")[1] for side in sides)
     # the printed area is 6.0e-4 m^2
     off = max(abs(width * depth / 6.0e-4 - 1), abs(width * depth**3 / 12 / value - 1))

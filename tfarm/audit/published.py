@@ -146,7 +146,8 @@ def case_rows(key: str, case: PrintedColumn) -> list[PublishedRow]:
 
 def computed(case: PrintedColumn) -> NDArray[np.float64]:
     """The exact solution's numbers for a column, in its quantity."""
-    link, count = case.arm.link, len(case.printed)
+    link = case.arm.link
+    count = len(case.printed)
     table = modes(case.arm, count, theory=case.theory)
     reduced = table.flexible * link.length**2 * np.sqrt(link.rhoA / link.EI)
     return {

@@ -119,7 +119,9 @@ def check_figure(path: Path | None) -> Path | None:
     return path
 
 
-CONTROLLER, SAMPLING = "Controller", "Sampling"  # groups of options
+# groups of options
+CONTROLLER = "Controller"
+SAMPLING = "Sampling"
 ArmName = Annotated[  # in a command the tables of that file, read and parsed once
     Any,
     typer.Argument(

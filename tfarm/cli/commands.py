@@ -331,7 +331,9 @@ def fit(
     from tfarm.fitting.data import data_of
     from tfarm.fitting.fit import save_fit
 
-    subject, measured, page = load_arm(arm, theory), [data_of(text) for text in data or []], None
+    subject = load_arm(arm, theory)
+    measured = [data_of(text) for text in data or []]
+    page = None
     for each in measured:
         overlay.check_unit(subject, each)
     found = tfarm.fit(
@@ -376,7 +378,8 @@ def frf(
     """
     from tfarm.fitting import recording
 
-    names, columns = [], []
+    names = []
+    columns = []
     for text in (output, input):
         name, sign, column = text.partition("=")
         require(column or not sign, "signal", text, "write NAME=COLUMN, such as tip_acceleration=acc1")

@@ -286,7 +286,8 @@ def simulate(
     else:
         from tfarm.tuner import load_tuner, tuning
 
-        subject, tuner = load_arm(arm, loop.keywords["theory"]), load_tuner(controller)
+        subject = load_arm(arm, loop.keywords["theory"])
+        tuner = load_tuner(controller)
         found = tuning.controlled_run(subject, tuner, chain(arm), scenario, duration, **how)
     if mat is not None:
         write_file(mat, mat_content(matlab_signals(found), "column"), key="--mat")

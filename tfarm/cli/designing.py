@@ -223,7 +223,8 @@ def tune(
     from tfarm.studies.candidates import learning_curves
     from tfarm.tuner import trial, tuning
 
-    subject, sampling = load_arm(arm, theory), chain(arm)
+    subject = load_arm(arm, theory)
+    sampling = chain(arm)
     typed = {MOMENT_GAIN: 0.0} if k1 is None else {RATE_GAIN: k1, MOMENT_GAIN: 0.0}
     law, defaults = load_law(arm, subject, typed)
     rate = cast("tfarm.HubFeedback", law)[RATE_GAIN]

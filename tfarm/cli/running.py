@@ -24,21 +24,25 @@ PATHS = (*WRITTEN, "--out", "--tuned", "--dsp", "--law", "--controller", "--list
 def run(arguments: list[str]) -> int:
     """Return the exit code of a command: 0, 2 for bad input, 3 for what could not be solved or proven."""
     open_streams()
-    message, code = "", 0
+    message = ""
+    code = 0
     try:
         with progress():
             code = call(arguments or ["--help"])
         sys.stdout.flush()
     except (ConvergenceError, CertificationError, MemoryError) as error:
-        message, code = str(error) or "not enough memory for this; ask for less at a time", 3
+        message = str(error) or "not enough memory for this; ask for less at a time"
+        code = 3
     except (TfarmError, TyperException) as error:
-        message, code = usage(error), 2
+        message = usage(error)
+        code = 2
     except (BrokenPipeError, SystemExit):  # the reader, head for instance, has left; rich leaves with it
         discard(sys.stdout)
     except OSError as error:  # of standard output, or of a folder that compiled code is kept in
         discard(sys.stdout)
         remedy = "free some space, or write elsewhere (NUMBA_CACHE_DIR is the folder of compiled code)"
-        message, code = f"{error.filename or 'standard output'}: {error.strerror or error}; {remedy}", 2
+        message = f"{error.filename or 'standard output'}: {error.strerror or error}; {remedy}"
+        code = 2
     if message:
         print_line(message)
         try:  # what was printed before the error

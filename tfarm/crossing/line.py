@@ -173,8 +173,10 @@ def crossings(curve: Curve, lines: Sequence[Line], *, with_dips: bool = False) -
 
     `with_dips`, on a `Grid`: those too of which two lie between neighbours, where |h| dips through 0.
     """
-    others, alone = np.array([line.others for line in lines]), np.array([line.alone for line in lines])
-    A, B = others @ curve.terms, alone @ curve.terms
+    others = np.array([line.others for line in lines])
+    alone = np.array([line.alone for line in lines])
+    A = others @ curve.terms
+    B = alone @ curve.terms
     (line, step), change = brackets((A * B.conj()).imag)
     low, high, terms, origin = curve.steps(step)
 
@@ -184,8 +186,10 @@ def crossings(curve: Curve, lines: Sequence[Line], *, with_dips: bool = False) -
 
     if with_dips:
         dip_line, first, middle, last, sign = _dips(parts, curve, _share(A, B))
-        line, change = np.r_[line, dip_line, dip_line], np.r_[change, 2 * sign, -2 * sign]
-        low, high = np.r_[low, first, middle], np.r_[high, middle, last]
+        line = np.r_[line, dip_line, dip_line]
+        change = np.r_[change, 2 * sign, -2 * sign]
+        low = np.r_[low, first, middle]
+        high = np.r_[high, middle, last]
 
     def h(at: Real, which: Whole) -> Real:
         A, B = parts(at, which, line[which])
@@ -209,7 +213,8 @@ def _dips(
     Two crossings lie there, as near to each other as a resonance is narrow, and h has one sign at the points of the
     grid.  The least of all dips are found together, by SciPy's Chandrupatla (1998).
     """
-    inner, signs = share[:, 1:-1], np.sign(share[:, 1:-1])
+    inner = share[:, 1:-1]
+    signs = np.sign(share[:, 1:-1])
     lower = np.minimum(signs * share[:, :-2], signs * share[:, 2:])  # of the neighbours: below 0 where one is across
     line, before = np.nonzero((abs(inner) <= lower) & (abs(inner) > ROUNDED))
     sign = signs[line, before].astype(np.int64)

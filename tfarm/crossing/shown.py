@@ -50,7 +50,8 @@ class PlaneOfCounts(ABC):
     def must_agree(self, count: Callable[[float, float], int | None], remedy: str) -> None:
         """Raise ConvergenceError where a count at a corner is another one.  None: a pole is on the stability limit."""
         for i, j in itertools.product((0, -1), repeat=2):
-            at, here = (float(self.x[i]), float(self.y[j])), int(self.counts[j][i])
+            at = (float(self.x[i]), float(self.y[j]))
+            here = int(self.counts[j][i])
             there = count(*at)
             if there not in (here, None):
                 where = ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.vary, at, strict=True))
@@ -81,8 +82,10 @@ class PlaneOfCounts(ABC):
     @property
     def drawing(self) -> str:
         """A coarse picture for a terminal: a dot where the loop is stable."""
-        most_lines, most_characters = 24, 60
-        up, across = max(1, self.y.size // most_lines), max(1, self.x.size // most_characters)
+        most_lines = 24
+        most_characters = 60
+        up = max(1, self.y.size // most_lines)
+        across = max(1, self.x.size // most_characters)
         rows = list(zip(self.y, self.counts, strict=True))[::-up]
         lines = [f"{value:9.3g} " + "".join("#" if count else "." for count in row[::across]) for value, row in rows]
         name, other = self.vary

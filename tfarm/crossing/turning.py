@@ -31,7 +31,8 @@ def loose(curves: Complex, width: Real | float, height: Real | float) -> NDArray
     `width` and `height` are numbers, or columns (b, 1).  None is needed where a curve is NaN or real.
     """
     piece = np.diff(curves.real / width + 1j * (curves.imag / height), axis=1)
-    size, is_real = abs(piece), curves.imag == 0
+    size = abs(piece)
+    is_real = curves.imag == 0
     with np.errstate(all="ignore"):
         turn = abs(np.angle(piece[:, 1:] / piece[:, :-1]))
     parts = is_real[:, 1:] != is_real[:, :-1]
@@ -54,8 +55,10 @@ def loose_columns(across: Real, parts: Sequence[RegionPiece], drawn: Callable[[R
         gain = np.r_[gain, gain[::-1]]
         outline = drawn(gain, np.r_[low, high[::-1]])
         kept = abs(outline - np.roll(outline, 1)) > 0
-        gain, outline = gain[kept], outline[kept]
-        before, after = outline - np.roll(outline, 1), np.roll(outline, -1) - outline
+        gain = gain[kept]
+        outline = outline[kept]
+        before = outline - np.roll(outline, 1)
+        after = np.roll(outline, -1) - outline
         is_seen = (outline.real > 0) & (outline.imag > 0) & (outline.imag < 1)
         is_corner = is_seen & (abs(np.angle(after / before)) > STRETCH * MOST_TURN)
         for way, side in ((1, before), (-1, after)):
@@ -91,12 +94,14 @@ def pieces(across: Real, intervals: Sequence[Sequence[Window]]) -> list[RegionPi
     found: list[RegionPiece] = []
     going: list[RegionPiece] = []
     for gain, column in zip(across.tolist(), intervals, strict=True):
-        here, last = [(gain, *ends) for ends in column], [piece.points[-1] for piece in going]
+        here = [(gain, *ends) for ends in column]
+        last = [piece.points[-1] for piece in going]
         pairs = itertools.product(range(len(last)), range(len(here)))
         links = [(i, j) for i, j in pairs if last[i][1] < here[j][2] and here[j][1] < last[i][2]]
         following = [RegionPiece([each], begins=True) for each in here]
         for i, j in links:
-            children, parents = [b for a, b in links if a == i], [a for a, b in links if b == j]
+            children = [b for a, b in links if a == i]
+            parents = [a for a, b in links if b == j]
             piece = going[i]
             if len(children) > 1:  # a part of an interval begins
                 piece.ends = False

@@ -23,13 +23,32 @@ CONSUMER = Consumer(
     ),
 )  # fmt: skip
 
-ANGLE, RATE, MOMENT = 0, 1, 2  # of the outputs, which begin with what is fed back (`tfarm.arm.FED_BACK`)
-ENCODER, AMPLIFIER, DAC = 0, 1, 2  # rows of the quantisers, and places in `saturated`
-DOUBLY, ONCE = 0, 1  # integrals of the torque in `rigid`, and their weights in an output in `rates`
-DURATION, IS_NEW, IS_RECORD = 0, 1, 2  # of a piece of a sample: its length [s], whether the new torque acts, a record
-DONE, MOVED = 0, 1  # of `work` [J]: done on the hub, and the sum of its absolute values
-STEP, LOWEST, HIGHEST = 0, 1, 2  # of a row of the quantisers
-ANGLE_BEFORE, RATE_BEFORE, BEGUN = 0, 1, 2  # memory of the estimate of the hub rate
+# of the outputs, which begin with what is fed back (`tfarm.arm.FED_BACK`)
+ANGLE = 0
+RATE = 1
+MOMENT = 2
+# rows of the quantisers, and places in `saturated`
+ENCODER = 0
+AMPLIFIER = 1
+DAC = 2
+# integrals of the torque in `rigid`, and their weights in an output in `rates`
+DOUBLY = 0
+ONCE = 1
+# of a piece of a sample: its length [s], whether the new torque acts, a record
+DURATION = 0
+IS_NEW = 1
+IS_RECORD = 2
+# of `work` [J]: done on the hub, and the sum of its absolute values
+DONE = 0
+MOVED = 1
+# of a row of the quantisers
+STEP = 0
+LOWEST = 1
+HIGHEST = 2
+# memory of the estimate of the hub rate
+ANGLE_BEFORE = 0
+RATE_BEFORE = 1
+BEGUN = 2
 YES = 0.5  # a number above it is true among floats
 
 
@@ -212,7 +231,10 @@ def after(k: int, u: float, model: Any, state: Any, forcing: Any, of: Any) -> No
     advance(k, model, state, old, state.held[(k - of.delay) % ring], forcing.disturbance[k])
 
 
-_before, _converted, _after = inlined(before), inlined(converted), inlined(after)  # those of Python loops are plain
+# those of Python loops are plain
+_before = inlined(before)
+_converted = inlined(converted)
+_after = inlined(after)
 
 
 @inlined

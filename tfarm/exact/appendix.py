@@ -38,7 +38,8 @@ class Appendix:
     """
 
     def __init__(self, arm: Arm, s: Number) -> None:
-        link, payload = arm.link, arm.payload
+        link = arm.link
+        payload = arm.payload
         self.L, self.A, self.rho = mpf(link.length), mpf(link.section.area), mpf(link.density)
         self.kappa_G = mpf(link.shear_factor) * mpf(link.shear_modulus)
         self.EI = mpf(link.youngs_modulus) * mpf(link.section.second_moment)
@@ -52,7 +53,11 @@ class Appendix:
 
     def wave_numbers(self, Ed: Number) -> tuple[Number, Number]:
         """Return lambda_1 and lambda_2 of (A.2), with its inner square root; Ed = E (1 + C s)."""
-        rho, A, s, kG, EI = self.rho, self.A, self.s, self.kappa_G, self.EI * self.damper
+        rho = self.rho
+        A = self.A
+        s = self.s
+        kG = self.kappa_G
+        EI = self.EI * self.damper
         outer = (1 / Ed + 1 / kG) * rho * s**2
         inner = mpmath.sqrt((1 / Ed - 1 / kG) ** 2 * rho**2 * s**4 - 4 * rho * A * s**2 / EI)
         return mpmath.sqrt((outer + inner) / 2), mpmath.sqrt((outer - inner) / 2)
@@ -60,7 +65,8 @@ class Appendix:
     @cached_property
     def a(self) -> list[list[Number]]:
         """a_ij: the tip's shear force, the tip's moment, W(0) = 0, the hub."""
-        rhoA_s2, EI = self.rho * self.A * self.s**2, self.EI * self.damper
+        rhoA_s2 = self.rho * self.A * self.s**2
+        EI = self.EI * self.damper
         (m_s2, force), (Ic_s2, moment), (Ih_s2, torque) = self.ends
         waves = [(l, gamma, mpmath.exp(l * self.L)) for l, gamma in self.waves]
         return [
@@ -198,14 +204,17 @@ def natural_frequency(arm: Arm, near: float, digits: int) -> Number:
 def _agreed(evaluate: Callable[[], list[Number]], digits: int, what: str) -> list[Number]:
     """Return evaluate() at a working precision doubled until two results agree, each number to its digits."""
     digits = max(digits, FEWEST_DIGITS)
-    work, last, misses = digits + FEWEST_DIGITS, [mpf(0)], [mpf(0)]
+    work = digits + FEWEST_DIGITS
+    last = [mpf(0)]
+    misses = [mpf(0)]
     while work < MOST_DIGITS + 4 * digits:
         with mpmath.workdps(work):
             values = evaluate()
             misses = [abs(value - before) for value, before in zip(values, last, strict=False)]
             if all(miss < abs(value) / 10**digits / 4 for miss, value in zip(misses, values, strict=False)):
                 return values
-        work, last = 2 * work, values
+        work = 2 * work
+        last = values
     raise ConvergenceError(f"no {digits} digits of {what}: a pole, a zero, or no limit there", last, misses)
 
 

@@ -24,7 +24,8 @@ _end_plane, _met, _across_rows, _row_across = map(
     python_of, (waves.end_plane, waves.met, waves.across_rows, waves.row_across)
 )
 _transition_rows, across_waves, in_chain = map(python_of, (waves.transition_rows, waves.across_waves, waves.in_chain))
-_inside_element, _beyond_element = python_of(sweep.inside), python_of(sweep.beyond)
+_inside_element = python_of(sweep.inside)
+_beyond_element = python_of(sweep.beyond)
 Ball = Any  # flint.acb or flint.arb, which come without types
 _Found = TypeVar("_Found")
 
@@ -67,12 +68,15 @@ def transition(z_sum: Ball, z_product: Ball) -> tuple[Ball, ...]:
     That is of F'''' = (z1 + z2) F'' - z1 z2 F as a first-order system, with F'''(0) = 1.
     """
     spread = root(z_sum * z_sum / 4 - z_product)
-    z1, z2 = z_sum / 2 + spread, z_sum / 2 - spread
+    z1 = z_sum / 2 + spread
+    z2 = z_sum / 2 - spread
     if (z1 - z2).contains(0) or z1.contains(0) or z2.contains(0):
         companion = flint.acb_mat([[0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], [-z_product, 0, z_sum, 0]])
         return tuple(row[3] for row in companion.exp().tolist())
-    t1, t2 = root(z1), root(z2)
-    (h1, c1), (h2, c2) = t1.sinh_cosh(), t2.sinh_cosh()
+    t1 = root(z1)
+    t2 = root(z2)
+    (h1, c1) = t1.sinh_cosh()
+    (h2, c2) = t2.sinh_cosh()
     over = 1 / (z1 - z2)
     return (h1 / t1 - h2 / t2) * over, (c1 - c2) * over, (t1 * h1 - t2 * h2) * over, (z1 * c1 - z2 * c2) * over
 
@@ -90,7 +94,9 @@ def exact_middle(ball: Ball) -> Any:
 
 def summed(z_sum: Any, z_product: Any, count: int) -> list[Any]:
     """Return F0..F3 at a segment's end by `count` terms of their series in z1 + z2 and z1 z2, series of flint."""
-    h, before, sums = 0 * z_sum + 1, 0 * z_sum, [0 * z_sum] * 4
+    h = 0 * z_sum + 1
+    before = 0 * z_sum
+    sums = [0 * z_sum] * 4
     for n in range(count):
         terms = (Fraction(1, math.factorial(2 * n + shift)) for shift in (3, 2, 1, 0))
         sums = [total + h * rational(term) for total, term in zip(sums, terms, strict=True)]
@@ -128,7 +134,8 @@ class Sweep:
     @property
     def of_angle(self) -> Any:
         """The sum of A_n s^n (see `system`)."""
-        s, A = self.s, self.A
+        s = self.s
+        A = self.A
         return ((s * A[3] + A[2]) * s + A[1]) * s + A[0]
 
     @property
@@ -139,7 +146,8 @@ class Sweep:
     @cached_property
     def states(self) -> dict[Place, Row]:
         """W, Psi, M and Q at each mark."""
-        one, none = self.exact(1) + 0 * self.s, 0 * self.s
+        one = self.exact(1) + 0 * self.s
+        none = 0 * self.s
         conditions = self.carried_out((one, none, none, none))
         return {place: _met(f, self.planes[place]) for place, f in conditions.items()}
 
@@ -191,7 +199,8 @@ class Sweep:
 
     def _transition(self, segment: Any) -> tuple[Row, ...]:
         if id(segment) not in self._rows:
-            l, (over_d, z_sum, z_product) = segment.length, self._sums(segment)
+            l = segment.length
+            (over_d, z_sum, z_product) = self._sums(segment)
             F0, F1, F2, F3 = self._functions(z_sum, z_product)
             functions = F0 * (l * l * l), F1 * (l * l), F2 * l, F3
             rows = _transition_rows(functions, self.S, over_d / segment.stiffness, segment.of_chain)
@@ -201,7 +210,8 @@ class Sweep:
     def _sums(self, segment: Any) -> tuple[Any, Any, Any]:
         """Return 1/d, z_1 + z_2 and z_1 z_2 of a segment."""
         a, b, g = segment[:3]
-        S, over_d = self.S, 1 / (self.s * segment.damping + 1)
+        S = self.S
+        over_d = 1 / (self.s * segment.damping + 1)
         return over_d, S * (over_d * a + b), S * (S * (a * b) + g) * over_d
 
     def _functions(self, z_sum: Any, z_product: Any) -> tuple[Any, ...]:

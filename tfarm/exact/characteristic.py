@@ -136,10 +136,13 @@ class WideSweep(Sweep):
         # 6.0: |z1| + |z2| below which power series are used
         if abs(z_sum[0]).mid() + 2 * abs(z_product[0]).mid().sqrt() < 6.0:
             return super()._inside(element, p)
-        S, d = self.S, self.s * element.damping + 1
+        S = self.S
+        d = self.s * element.damping + 1
         pair = _waves(*element[:3], S, d, self._shortest)
         one, two = (in_chain(wave[:5], element.length) for wave in pair)
-        d, gS, gap = d * element.stiffness, S * element.of_chain[2], one[2] - two[2]
+        d = d * element.stiffness
+        gS = S * element.of_chain[2]
+        gap = one[2] - two[2]
         unit = _nonzero(gap * gap * d * gS)
         self.phase = self.phase + pair[0][5] + pair[1][5]
         return tuple(part / unit for part in across_waves(one, two, gS, d, p))
@@ -151,7 +154,8 @@ class WideSweep(Sweep):
     @cached_property
     def states(self) -> dict[Place, Row]:
         """W, Psi, M and Q at each mark, in the scale of the plane at the axis."""
-        shrunk, full = (-self.phase).exp(), super().states
+        shrunk = (-self.phase).exp()
+        full = super().states
         return {place: tuple(each * shrunk for each in state) for place, state in full.items()}
 
     def _functions(self, z_sum: Series, z_product: Series) -> tuple[Series, ...]:
@@ -194,7 +198,8 @@ def characteristic_ball(k: System, s: Ball, law: Feedback | None = None) -> Ball
 def characteristic_over(k: System, s: Ball, law: Feedback | None = None) -> Ball:
     """Return D enclosed over the wide ball s, up to a positive factor that depends on its middle alone."""
     # the power of the last Taylor term, the one over the wide ball
-    middle, last = s.mid(), 0 if s.real.is_exact() and s.imag.is_exact() else 3
+    middle = s.mid()
+    last = 0 if s.real.is_exact() and s.imag.is_exact() else 3
     try:
         here, scale = _by_waves(k, middle, law, None, LONG_WAVE, max(last, 1))
         value = _by_waves(k, s, law, scale, LONG_WAVE, last + 1)[0][last] if last else here[0]
@@ -293,7 +298,8 @@ def _wave(z: Series, S: Series, d: Series, a: Ball, b: Ball, g: Ball, shortest: 
         raise InseparableError
     t = _nonzero(_root(z))
     e = (-t).exp()
-    v, inverse = z - S * b, d * z - S * a
+    v = z - S * b
+    inverse = d * z - S * a
     if not inverse[0].contains(0):
         other = -(S * g) / inverse  # the same by the dispersion relation; the narrower of the two
         v = other if other[0].rel_accuracy_bits() > v[0].rel_accuracy_bits() else v

@@ -63,7 +63,8 @@ def chain_count(omega: float, rows: Any, ends: Any) -> int:
     """Return the number of natural frequencies below omega [rad/s], with the rigid body."""
     S = -omega * omega
     p = end_plane(*tip_conditions(ends, S))
-    number, free = 0, int(ends[FREE_MOTIONS])
+    number = 0
+    free = int(ends[FREE_MOTIONS])
     for i in range(len(rows)):
         row = rows[i]
         if row.kind == SEGMENT:
@@ -88,14 +89,21 @@ def _joined(outside: int, omega: float, row: Any, plane: Plane, free: int) -> tu
     clamped = (0.0, 0.0, 0.0, 0.0, 1.0)  # W = Psi = 0
     (s, _, _), (z1, v1, t1, dt1), (z2, v2, t2, dt2) = dispersion(complex(0.0, omega), row)
     number = half_waves(z1, t1, dt1) + half_waves(z2, t2, dt2) + (z1.real < 0.0 and z2.real < 0.0)
-    S, z1, z2, l, EI = s.real, z1.real, z2.real, row.length, row.stiffness
+    S = s.real
+    z1 = z1.real
+    z2 = z2.real
+    l = row.length
+    EI = row.stiffness
     if max(abs(z1), abs(z2)) < SERIES_RADIUS:
         F0, F1, F2, F3, _, _ = transition_series(z1 + z2, z1 * z2)
         rows = transition_rows((F0 * (l * l * l), F1 * (l * l), F2 * l, F3), S, 1.0 / EI, row.of_chain)
-        q, r = across_rows(*rows, plane), across_rows(*rows, clamped)
+        q = across_rows(*rows, plane)
+        r = across_rows(*rows, clamped)
     else:
-        one, two = in_chain(real_wave(z1, v1.real, t1, dt1), l), in_chain(real_wave(z2, v2.real, t2, dt2), l)
-        gS, gap = row.of_chain[2] * S, one[2] - two[2]
+        one = in_chain(real_wave(z1, v1.real, t1, dt1), l)
+        two = in_chain(real_wave(z2, v2.real, t2, dt2), l)
+        gS = row.of_chain[2] * S
+        gap = one[2] - two[2]
         unit = 1.0 / (gS * EI * gap * gap)
         q = scaled(across_waves(one, two, gS, EI, plane), unit)
         r = scaled(across_waves(one, two, gS, EI, clamped), unit)
@@ -124,11 +132,15 @@ def list_steps(first: Any, last: int, rows: Any, starts: Any, ends: Any, estimat
     all of them, `DOUBLINGS` times at most, and each is bisected from there to neighbouring floats.
     """
     for j in range(len(ends)):
-        own, above, doubled = rows[starts[j] : starts[j + 1]], estimate[j], 0
+        own = rows[starts[j] : starts[j + 1]]
+        above = estimate[j]
+        doubled = 0
         while doubled < DOUBLINGS and chain_count(above, own, ends[j]) < last:
-            above, doubled = 2.0 * above, doubled + 1
+            above = 2.0 * above
+            doubled = doubled + 1
         for number in range(first[j], last + 1 if doubled < DOUBLINGS else 0):
-            low, high = 0.0, above
+            low = 0.0
+            high = above
             while True:
                 middle = 0.5 * (low + high)
                 if not (low < middle and middle < high):
@@ -155,6 +167,8 @@ def real_wave(z: float, v: float, t: complex, dt: complex) -> Wave:
     if z > 0.0:
         e = math.exp(-t.real) * (1.0 - dt.real)
         return 0.5 * (1.0 + e * e), 0.5 * (1.0 - e * e) / (t.real + dt.real), z, v, e
-    k, dk = t.imag, dt.imag
-    cosine, sine = math.cos(k), math.sin(k)
+    k = t.imag
+    dk = dt.imag
+    cosine = math.cos(k)
+    sine = math.sin(k)
     return cosine - sine * dk, (sine + cosine * dk) / (k + dk), z, v, 1.0

@@ -38,7 +38,9 @@ KINDS: Mapping[type, int] = {Segment: SEGMENT, Offset: OFFSET, Spring: SPRING, B
 OF_ELEMENT = "kind a b g a_low b_low g_low sigma damping length stiffness compliance mass inertia rotational_stiffness"
 ROW = np.dtype([*((name, float) for name in OF_ELEMENT.split()), ("of_chain", float, 4)])
 AT_JOINT = 2.0**-50  # of the length: rounding of a place at a joint, a quotient of float64 numbers
-OF_ANGLE, OF_MOMENT = 6, 10  # in the vector of ends: after six numbers of the payload A_0..A_3, then B_0 and B_1
+# in the vector of ends: after six numbers of the payload A_0..A_3, then B_0 and B_1
+OF_ANGLE = 6
+OF_MOMENT = 10
 
 W, PSI, M, Q = range(4)  # the fields of a state
 FIELDS = {"W": W, "Y": W, "centre": W, "Psi": PSI, "Phi": PSI, "M": M, "strain": M, "Q": Q}  # of each quantity
@@ -95,7 +97,8 @@ class Layout:
     @property
     def _conditions(self) -> tuple[tuple[Fraction, ...], ...]:
         """Both tip conditions, A_0..A_3, and B_0 and B_1."""
-        chain, drive = self.chain, self.chain.drive
+        chain = self.chain
+        drive = self.chain.drive
         return end_condition(chain.tip_mass), end_condition(chain.tip_inertia), drive.of_angle, drive.of_moment
 
     @cached_property
@@ -152,7 +155,9 @@ def unit_scale(wanted: Output, k: System) -> Fraction:
 
 def reading_of(chain: System, wanted: Output, x: float) -> Reading:
     """Return an output as a reading; x is the share of the length for one along the link."""
-    share, drive, unit = Fraction(wanted.share(x)), chain.drive, unit_scale(wanted, chain)
+    share = Fraction(wanted.share(x))
+    drive = chain.drive
+    unit = unit_scale(wanted, chain)
     if wanted.quantity == "current":  # the torque, which is the input less back-EMF, through the lag
         is_driven = drive.per_ampere and drive.turns
         require(is_driven, "output", "motor_current", "needs a [motor] and another input than hub_angle")

@@ -67,7 +67,8 @@ def load_of(text: str, length: float) -> Load:
 
 def loaded_value(chain: System, load: Load, wanted: Output, s: complex, x: float) -> Ball:
     """Return the output for unit load at s, SI, to `PROVEN_BITS`.  Raises CertificationError at a pole or zero."""
-    one, (_, jump, signs) = reading_of(chain, wanted, x), LOAD_KINDS[load.kind]
+    one = reading_of(chain, wanted, x)
+    (_, jump, signs) = LOAD_KINDS[load.kind]
     require(not one.input, "output", wanted.name, "needs an input at the hub instead of a load")
     unit = (chain.length / chain.EI) * (chain.length if jump == Q else 1)  # of the dimensionless load
     loads = [Place(Fraction(share)) for share in load.shares]
@@ -96,17 +97,21 @@ class _Loaded(Sweep):
 
     def quantity(self, one: Reading, load: Place, jump: int) -> Ball:
         """Return theta and field of a reading for a unit jump of an entry of the state at the load."""
-        none, whole = 0 * self.s, 1 + 0 * self.s
+        none = 0 * self.s
+        whole = 1 + 0 * self.s
         f, g = (
             self.carried_out(at) for at in ((whole, none, none, none), (none, self.of_angle, -self.of_moment, none))
         )
         F, G = ({at: _met(row, self.planes[at]) for at, row in rows.items()} for rows in (f, g))
         balance = {at: sum(a * b for a, b in zip(g[at], F[at], strict=True)) for at in f}  # 0 at an eigenvalue
-        by_F, by_G = F[load][Q - jump] / balance[load], G[load][Q - jump] / balance[load]  # w(F, e) and w(G, e)
+        # w(F, e) and w(G, e)
+        by_F = F[load][Q - jump] / balance[load]
+        by_G = G[load][Q - jump] / balance[load]
         value = by_F * self.of_moment * rational(one.theta)
         if one.place is None:
             return value
-        at, n = one.place, one.field
+        at = one.place
+        n = one.field
         if self.layout.marks[at] > self.layout.marks[load]:
             dual = by_G * f[at][Q - n] - by_F * g[at][Q - n]
             return value + (dual if n < M else -dual)

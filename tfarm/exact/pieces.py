@@ -103,7 +103,11 @@ def cross(points: Any, row: Any, j: int, work: Work, lost: Any) -> None:
 
     Scales are added to `work.scale`, lost digits are marked.
     """
-    outer, inner, waves, low, slow = work.planes[j], work.planes[j + 1], work.waves[j], work.low[j], 0
+    outer = work.planes[j]
+    inner = work.planes[j + 1]
+    waves = work.waves[j]
+    low = work.low[j]
+    slow = 0
     for i in range(BLOCK):
         low[i] = is_low(points[i], row)
         slow += low[i]
@@ -114,7 +118,8 @@ def cross(points: Any, row: Any, j: int, work: Work, lost: Any) -> None:
             gap = one[2] - two[2]
             put(inner, i, scaled(across_waves(one, two, gS, d, plane_at(outer, i)), reciprocal(gS * d * gap * gap)))
         for i in range(BLOCK):
-            z1, z2 = waves[ONE + i], waves[TWO + i]
+            z1 = waves[ONE + i]
+            z2 = waves[TWO + i]
             work.scale[i] += 0.0 if low[i] else waves[ONE + PHASE + i] + waves[TWO + PHASE + i]
             lost[i] |= (not low[i]) & (magnitude(z1 - z2) < PARALLEL * (magnitude(z1) + magnitude(z2)))
     if slow:
@@ -132,7 +137,8 @@ def fill_waves(points: Any, row: Any, waves: Any) -> None:
         put(waves, ONE + i, one)
         put(waves, TWO + i, two)
     for i in range(BLOCK):
-        (z1, _, t1, dt1), (z2, _, t2, dt2) = row_at(waves, ONE + i), row_at(waves, TWO + i)
+        (z1, _, t1, dt1) = row_at(waves, ONE + i)
+        (z2, _, t2, dt2) = row_at(waves, TWO + i)
         put(waves, ONE + FUNCTIONS + i, wave_functions(z1, t1, dt1))
         put(waves, TWO + FUNCTIONS + i, wave_functions(z2, t2, dt2))
 
@@ -140,10 +146,15 @@ def fill_waves(points: Any, row: Any, waves: Any) -> None:
 @inlined
 def waves_at(row: Any, waves: Any, i: int) -> tuple[Wave, Wave, complex, complex]:
     """Return both waves of a point, g S and d, in the chain's units."""
-    (z1, v1, _, _), (c1, s1, e1, _) = row_at(waves, ONE + i), row_at(waves, ONE + FUNCTIONS + i)
-    (z2, v2, _, _), (c2, s2, e2, _) = row_at(waves, TWO + i), row_at(waves, TWO + FUNCTIONS + i)
-    (_, d, gS, _), l, EI = row_at(waves, S_SQUARED + i), row.length, row.stiffness
-    one, two = in_chain((c1, s1, z1, v1, e1), l), in_chain((c2, s2, z2, v2, e2), l)
+    (z1, v1, _, _) = row_at(waves, ONE + i)
+    (c1, s1, e1, _) = row_at(waves, ONE + FUNCTIONS + i)
+    (z2, v2, _, _) = row_at(waves, TWO + i)
+    (c2, s2, e2, _) = row_at(waves, TWO + FUNCTIONS + i)
+    (_, d, gS, _) = row_at(waves, S_SQUARED + i)
+    l = row.length
+    EI = row.stiffness
+    one = in_chain((c1, s1, z1, v1, e1), l)
+    two = in_chain((c2, s2, z2, v2, e2), l)
     return one, two, times(gS, EI / (l * l * l * l)), times(d, EI)
 
 
@@ -171,7 +182,10 @@ def cross_back(points: Any, row: Any, j: int, work: Work, scale: Any) -> None:
 
     The scales less those of the plane are added to `scale`.
     """
-    back, waves, low, slow = work.back, work.waves[j], work.low[j], 0
+    back = work.back
+    waves = work.waves[j]
+    low = work.low[j]
+    slow = 0
     for i in range(BLOCK):
         slow += low[i]
     if slow < BLOCK:
@@ -190,15 +204,18 @@ def cross_back(points: Any, row: Any, j: int, work: Work, scale: Any) -> None:
 def _fade(waves: Any, low: Any, scale: Any) -> None:
     """Bring c and s of the slower wave to the scale of the faster one, also where both e^{-t} underflow."""
     for i in range(BLOCK):
-        one, two = ONE + FUNCTIONS + i, TWO + FUNCTIONS + i
+        one = ONE + FUNCTIONS + i
+        two = TWO + FUNCTIONS + i
         is_first = waves[ONE + PHASE + i].real >= waves[TWO + PHASE + i].real
         fast, slow = (one, two) if is_first else (two, one)
-        (_, _, e, t), (c, s, e_slow, t_slow) = row_at(waves, fast), row_at(waves, slow)
+        (_, _, e, t) = row_at(waves, fast)
+        (c, s, e_slow, t_slow) = row_at(waves, slow)
         # below that a reciprocal would overflow
         if magnitude(e_slow) > 1e-140:
             ratio = e * reciprocal(e_slow)
         else:
-            decay, turn = math.exp(t_slow.real - t.real), t_slow.imag - t.imag
+            decay = math.exp(t_slow.real - t.real)
+            turn = t_slow.imag - t.imag
             ratio = complex(decay * math.cos(turn), decay * math.sin(turn))
         waves[slow], waves[slow + BLOCK] = c * ratio, s * ratio
         if not low[i]:
@@ -209,7 +226,8 @@ def _fade(waves: Any, low: Any, scale: Any) -> None:
 def finish(points: Any, source: Any, power: int, unit: float, C: float, value: Any) -> None:
     """Compute the values of an output, those of its source times  unit s^power/(1 + C s),  power at most 4."""
     for i in range(value.size):
-        s, found = points[i], source[i]
+        s = points[i]
+        found = source[i]
         found = found * s if power % 2 == 1 else found
         found = found * (s * s) if power > 1 else found
         found = found * (s * s) if power > 3 else found

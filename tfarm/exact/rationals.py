@@ -42,7 +42,9 @@ def falls(P: Matrix, A: Real) -> bool:
 
 
 AT_MINUS_ONE = -2.0  # delta of z = -1, the image of s = infinity under Tustin's rule
-BITS_A_STATE, SPARE_STATES = 64, 8  # of the first precision of a held block, which is doubled
+# of the first precision of a held block, which is doubled
+BITS_A_STATE = 64
+SPARE_STATES = 8
 ENOUGH_BITS = 80  # of a coefficient of a held block: more than a double
 MOST_DOUBLINGS = 5  # of the precision: a coefficient without digits by then is 0
 
@@ -80,7 +82,8 @@ def polynomials(block: LawBlock) -> tuple[list[Any], Any]:
         num, den = (flint.fmpq_poly([fraction(each) for each in reversed(of)]) for of in (block.num, block.den))
         return [num], den
     A, _, C, D = map(exact_matrix, block.matrices())
-    columns, den = [exact_matrix(column[:, None]) for column in block.matrices()[1].T], A.charpoly()
+    columns = [exact_matrix(column[:, None]) for column in block.matrices()[1].T]
+    den = A.charpoly()
     return [(A - each * C).charpoly() + (D[0, j] - 1) * den for j, each in enumerate(columns)], den
 
 
@@ -111,8 +114,11 @@ def _of_tustin(num: Any, den: Any, c: float, most: int) -> Gained:
 
     A zero at s = c, which is at z = infinity, is the factor -2 c/(delta + 2).
     """
-    zeros, poles = _roots(num), _roots(den)
-    sizes, of_poles = np.where(zeros == c, -2.0, (c - zeros) / c), (c - poles) / c  # exact differences next to c
+    zeros = _roots(num)
+    poles = _roots(den)
+    # exact differences next to c
+    sizes = np.where(zeros == c, -2.0, (c - zeros) / c)
+    of_poles = (c - poles) / c
     gain = _leading(num, den) * np.prod(sizes) / np.prod(of_poles) * c ** (zeros.size - poles.size)
     at_end = np.full(most - zeros.size, AT_MINUS_ONE) if num else np.empty(0)
     zeros = zeros[zeros != c]
@@ -121,7 +127,8 @@ def _of_tustin(num: Any, den: Any, c: float, most: int) -> Gained:
 
 def _of_matched(num: Any, den: Any, T: float) -> Gained:
     """Return gain and zeros with e^{rT} for every root r; at rest both agree, as powers of s and delta/T."""
-    zeros, poles = _roots(num), _roots(den)
+    zeros = _roots(num)
+    poles = _roots(den)
 
     def growth(roots: Complex) -> complex:
         """Return prod((e^{rT} - 1)/(r T)) of the roots other than 0."""
@@ -156,12 +163,15 @@ def _held_numerator(num: Any, den: Any, T: Any) -> Any:
 
 def _held_coefficients(num: Any, den: Any, T: Any) -> list[Any]:
     """Return those of delta^0 to delta^(n - 1), n the order, as balls, from num/den in controllable form."""
-    n, first = den.degree(), den.leading_coefficient()
-    D, down = num[n] / first, range(n - 1, -1, -1)
+    n = den.degree()
+    first = den.leading_coefficient()
+    D = num[n] / first
+    down = range(n - 1, -1, -1)
     C = [(num[k] - D * den[k]) / first for k in down]
     chain = [[T if k == i else 0 for k in range(n + 1)] for i in range(n - 1)]
     both = flint.arb_mat([[*(-den[k] * T / first for k in down), T], *chain, [0] * (n + 1)]).exp().tolist()
     less = flint.arb_mat([[both[i][k] - int(i == k) for k in range(n)] for i in range(n)])
     fed = flint.arb_mat([[both[i][n] * c for c in C] for i in range(n)])
-    p, q = (less - fed).charpoly(), less.charpoly()
+    p = (less - fed).charpoly()
+    q = less.charpoly()
     return [p[k] + (flint.arb(D) - 1) * q[k] for k in range(n)]

@@ -30,7 +30,8 @@ def rigid_response(arm: Arm, wanted: Output, s: Complex, x: float = 0.0) -> Comp
     if wanted.quantity == "strain":
         return np.zeros(s.size, complex)
     layout = readings(system_of(arm), (wanted,), x)
-    sweep, one = RigidSweep(layout), layout.each[0]
+    sweep = RigidSweep(layout)
+    one = layout.each[0]
     above, below = (each + 0 * sweep.s for each in (sweep.numerator(one), sweep.input))
     if not below:
         return np.zeros(s.size, complex)
@@ -68,6 +69,8 @@ def _rigid(element: Any) -> tuple[Any, ...]:
     """Return a segment as a rigid body between two halves of its length; any other element itself."""
     if not isinstance(element, Segment):
         return (element,)
-    l, (a, _, g, _) = element.length, element.of_chain
-    half, none = Offset(l / 2), 0 * l
+    l = element.length
+    (a, _, g, _) = element.of_chain
+    half = Offset(l / 2)
+    none = 0 * l
     return half, Body(g * l, (g * l * l / 12 + a) * l, none, none), half

@@ -54,7 +54,8 @@ def constant_of(chain: System, wanted: Output, x: float) -> int | None:
     (one,) = layout.each
     with precision(SERIES_BITS):
         sweep = _swept(chain, layout.places)
-        unit, found = rational(one.unit), sweep.numerator(one)
+        unit = rational(one.unit)
+        found = sweep.numerator(one)
         size = max(abs((sweep.input * unit)[n]) for n in range(SERIES_ORDER))
         for value in (0, 1, -1):
             rest = found - sweep.input * (unit * value)

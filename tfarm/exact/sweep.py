@@ -72,7 +72,8 @@ AXIS = read_only(np.array([[1.0], [0.0], [0.0], [0.0]]))  # the condition W = 0 
 @inlined
 def _work(rows: int) -> Work:
     """Return the scratch arrays of a chain of that number of rows."""
-    number, by_row = np.complex128, (rows, BLOCK)
+    number = np.complex128
+    by_row = (rows, BLOCK)
     return Work(
         np.empty((rows + 1, PLANE_SIZE), number),
         np.empty((rows, WAVES_SIZE), number),
@@ -93,7 +94,9 @@ def _sweep(points: Any, rows: Any, ends: Any, work: Work, lost: Any) -> None:
         put(work.planes[0], i, end_plane(*tip_conditions(ends, points[i] * points[i])))
         work.scale[i], lost[i] = 0.0, False
     for j in range(len(rows)):
-        row, outer, inner = rows[j], work.planes[j], work.planes[j + 1]
+        row = rows[j]
+        outer = work.planes[j]
+        inner = work.planes[j + 1]
         for i in range(BLOCK):
             work.powers[j, i] = 0
         if row.kind == SEGMENT:
@@ -158,8 +161,12 @@ def _brought_back(buffer: Any, parts: int, powers: Any) -> None:
 @inlined
 def _go_back(points: Any, rows: Any, outermost: int, work: Work, differs: bool, lost: Any) -> None:
     """Compute the state at each mark, in place of its plane, from the condition of the axis carried outwards."""
-    axis, back, reach, is_root = work.planes[len(rows)], work.back, 0.0, True
-    scale, shift = np.zeros(BLOCK, np.complex128), np.zeros(BLOCK, np.int64)
+    axis = work.planes[len(rows)]
+    back = work.back
+    reach = 0.0
+    is_root = True
+    scale = np.zeros(BLOCK, np.complex128)
+    shift = np.zeros(BLOCK, np.int64)
     for i in range(BLOCK):
         work.theta[i] = met(row_at(back, i), plane_at(axis, i))[1]
         back[LIFT + i] = back[TURN + i] = 0.0  # W = 0 on the axis, of a mode also where another condition determines it
@@ -174,7 +181,8 @@ def _go_back(points: Any, rows: Any, outermost: int, work: Work, differs: bool, 
             if differs:
                 _beyond_segment(points, row, j, work, reach, shift)
             cross_back(points, row, j, work, scale)
-            reach, is_root = reach + row.length, False
+            reach = reach + row.length
+            is_root = False
         else:
             _beyond(points, row, work.planes[j + 1], back, shift)
             reach += row.length if row.kind == OFFSET else 0.0
@@ -206,7 +214,8 @@ def _beyond(points: Any, row: Any, inner: Any, back: Any, shift: Any) -> None:
     """Compute condition, W - r theta and Psi - theta beyond an offset, a spring or a body, in place."""
     kind = row.kind
     for i in range(BLOCK):
-        s, f = points[i], row_at(back, i)
+        s = points[i]
+        f = row_at(back, i)
         if kind == OFFSET:
             back[LIFT + i] += row.length * back[TURN + i]
         elif kind == SPRING:
@@ -221,14 +230,21 @@ def _beyond_segment(points: Any, row: Any, j: int, work: Work, reach: float, shi
 
     It is `waves.transition_rows` from the other end, with the other sign of Psi and Q, minus the identity.
     """
-    inner, waves, back = work.planes[j + 1], work.waves[j], work.back
+    inner = work.planes[j + 1]
+    waves = work.waves[j]
+    back = work.back
     for i in range(BLOCK):
         if not work.low[j, i]:
             back[LIFT + i] = complex(np.nan, 0.0)
             continue
-        unit, (_, _, M, Q) = math.ldexp(1.0, shift[i]), met(row_at(back, i), plane_at(inner, i))
-        M, Q, lift, turn = times(M, unit), times(Q, unit), back[LIFT + i], back[TURN + i]
-        W, Psi = times(work.theta[i], reach) + lift, work.theta[i] + turn
+        unit = math.ldexp(1.0, shift[i])
+        (_, _, M, Q) = met(row_at(back, i), plane_at(inner, i))
+        M = times(M, unit)
+        Q = times(Q, unit)
+        lift = back[LIFT + i]
+        turn = back[TURN + i]
+        W = times(work.theta[i], reach) + lift
+        Psi = work.theta[i] + turn
         of_W, of_Psi, _, _ = rows_at(points[i], row, waves, i)
         S = points[i] * points[i]
         even = waves[F3_LESS_1 + i] - row.of_chain[0] * S * of_W[2]
@@ -244,11 +260,13 @@ def drive_at(s: complex, segment: Any, ends: Any, theta: complex, M: complex) ->
 
     The scale is that of its two terms, and of each with the motion of the other.
     """
-    A0, B0 = OF_ANGLE, OF_MOMENT
+    A0 = OF_ANGLE
+    B0 = OF_MOMENT
     of_angle = ends[A0] + s * (ends[A0 + 1] + s * (ends[A0 + 2] + s * ends[A0 + 3]))
     of_moment = ends[B0] + s * ends[B0 + 1]
     waves = impedance(magnitude(s * s), segment) * segment.stiffness / segment.length
-    turned, bent = magnitude(theta) + magnitude(M) / max(waves, 1.0), magnitude(M) + magnitude(theta) * waves
+    turned = magnitude(theta) + magnitude(M) / max(waves, 1.0)
+    bent = magnitude(M) + magnitude(theta) * waves
     return of_angle * theta - of_moment * M, magnitude(of_angle) * turned + magnitude(of_moment) * bent
 
 
@@ -262,13 +280,18 @@ def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, l
     s theta and of the drive.  Digits are lost where two waves of a segment are nearly one, where an output is a small
     difference of fast waves, and where the drive is one, near a pole.
     """
-    differs, outermost = False, 0
+    differs = False
+    outermost = 0
     for o in range(len(table)):
         differs = differs or (table[o, 0] >= 0.0 and table[o, 2] != 0.0)
     while outermost < len(rows) and rows[outermost].kind != MARK:
         outermost += 1
-    work, segment, values = _work(len(rows)), innermost(rows), np.empty((1 + len(table), BLOCK), np.complex128)
-    points, over, lost_here = np.empty(BLOCK, np.complex128), np.ones(BLOCK, np.complex128), np.empty(BLOCK, np.bool_)
+    work = _work(len(rows))
+    segment = innermost(rows)
+    values = np.empty((1 + len(table), BLOCK), np.complex128)
+    points = np.empty(BLOCK, np.complex128)
+    over = np.ones(BLOCK, np.complex128)
+    lost_here = np.empty(BLOCK, np.bool_)
     small = 1.0 / max(1.0, ends[OF_ANGLE + 1], ends[OF_ANGLE + 2])  # against overflow of squares of a heavy hub's drive
     for first in range(0, s.size, BLOCK):
         n = min(BLOCK, s.size - first)
@@ -317,19 +340,26 @@ def _output(points: Any, want: Any, work: Work, drive: Any, over: Any, value: An
 
     Until its power of s it is times 2^100: at the tip W would underflow where s^2 W does not.
     """
-    j, field, lift = int(want[0]), BLOCK * int(want[1]), 2.0**100
-    of_theta, of_rate, of_drive = lift * want[2], lift * want[6], lift * want[7]
+    j = int(want[0])
+    field = BLOCK * int(want[1])
+    lift = 2.0**100
+    of_theta = lift * want[2]
+    of_rate = lift * want[6]
+    of_drive = lift * want[7]
     for i in range(BLOCK):
         value[i] = times(work.theta[i], of_theta)
     if of_drive != 0.0:
         for i in range(BLOCK):
             value[i] += times(drive[i], of_drive) + points[i] * times(work.theta[i], of_rate)
     if j >= 0:
-        states, scale, shift = work.planes[j + 1], work.scales[j], work.shifts[j]
+        states = work.planes[j + 1]
+        scale = work.scales[j]
+        shift = work.shifts[j]
         for i in range(BLOCK):
             at = states[field + i]
             if scale[i] != 0.0 or shift[i]:
-                root, turn = math.exp(0.5 * scale[i].real), scale[i].imag
+                root = math.exp(0.5 * scale[i].real)
+                turn = scale[i].imag
                 decay = math.ldexp(lift * root, shift[i]) * root
                 at *= complex(decay * math.cos(turn), decay * math.sin(turn))
             else:

@@ -32,7 +32,8 @@ from tfarm.records import frozen
 
 from .outputs import Side
 
-ZERO, ONE = Fraction(0), Fraction(1)
+ZERO = Fraction(0)
+ONE = Fraction(1)
 Inertia = Fraction | float  # a fraction, or math.inf
 
 
@@ -66,7 +67,8 @@ class Segment(NamedTuple):
     @property
     def of_chain(self) -> tuple[Fraction, Fraction, Fraction, Fraction]:
         """The numbers a, b, g and sigma in the chain's units."""
-        l, EI = self.length, self.stiffness
+        l = self.length
+        EI = self.stiffness
         if l == EI == 1:
             return self.a, self.b, self.g, self.sigma
         return self.a * EI / (l * l), self.b / (l * l), self.g * EI / (l * l * l * l), self.sigma * (l * l) / EI
@@ -136,7 +138,10 @@ class Drive(NamedTuple):
         """A_0..A_3."""
         if not self.turns:
             return ONE, ZERO, ZERO, ZERO
-        k, b, J, lag = self.stiffness, self.friction, self.inertia, self.lag
+        k = self.stiffness
+        b = self.friction
+        J = self.inertia
+        lag = self.lag
         if not lag:
             return k, b + self.back_emf, J, ZERO
         return k, b + lag * k + self.back_emf, J + lag * b, lag * J
@@ -169,7 +174,8 @@ Placed = tuple[Fraction, int, Element]  # distance from the clamp (of a segment'
 
 def placed(elements: Iterable[Element]) -> Iterator[Placed]:
     """Yield the elements of a chain, from the payload inwards, with their places."""
-    position, is_beyond = ONE, True
+    position = ONE
+    is_beyond = True
     for each in elements:
         is_beyond = is_beyond and isinstance(each, Offset)
         yield position, PAYLOAD if is_beyond else BODY if isinstance(each, Body) else NEXT, each
@@ -196,10 +202,12 @@ def ratio(above: Iterable[float], below: Iterable[float] = ()) -> Fraction:
     p = q = 1
     for each in above:
         n, d = each.as_integer_ratio()
-        p, q = p * n, q * d
+        p = p * n
+        q = q * d
     for each in below:
         n, d = each.as_integer_ratio()
-        p, q = p * d, q * n
+        p = p * d
+        q = q * n
     return Fraction(p, q)
 
 
@@ -324,12 +332,17 @@ def system_of(arm: Arm, theory: Theory | None = None) -> System:
     theory = theory or arm.theory
     must_be_known("theory", theory, THEORIES)
     CONSUMER.refuse_others(arm_table(arm))
-    unit_length, EI = sum((Fraction(link.length) for link in arm.links), ZERO), stiffness_of(arm.link)
+    unit_length = sum((Fraction(link.length) for link in arm.links), ZERO)
+    EI = stiffness_of(arm.link)
     rotation = unit_length / EI
     translation = rotation * unit_length * unit_length
 
     def segment(link: Link) -> Segment:
-        L, rho, A, E, I = link.length, link.density, link.section.area, link.youngs_modulus, link.section.second_moment
+        L = link.length
+        rho = link.density
+        A = link.section.area
+        E = link.youngs_modulus
+        I = link.section.second_moment
         shear = link.shear_factor, link.shear_modulus
         return Segment(
             a=ratio((rho, L, L), (E,)) if theory in WITH_ROTARY_INERTIA else ZERO,
@@ -372,14 +385,16 @@ def system_of(arm: Arm, theory: Theory | None = None) -> System:
 
 def hub_drive(arm: Arm, rotation: Fraction) -> Drive:
     """Return the drive of an arm's input; `rotation` is L/EI."""
-    hub, motor = arm.hub, arm.motor
+    hub = arm.hub
+    motor = arm.motor
     if arm.is_locked:
         return Drive(turns=False)
     inertia, friction, stiffness = (Fraction(each) * rotation for each in (hub.inertia, hub.friction, hub.stiffness))
     drive = Drive(True, inertia, friction, stiffness, unit=1 / rotation)
     if motor is None:
         return drive
-    N, resistance = Fraction(motor.gear_ratio), Fraction(motor.resistance)
+    N = Fraction(motor.gear_ratio)
+    resistance = Fraction(motor.resistance)
     drive = drive._replace(
         inertia=inertia + N**2 * Fraction(motor.rotor_inertia) * rotation,
         friction=friction + N**2 * Fraction(motor.rotor_friction) * rotation,

@@ -69,7 +69,8 @@ def _filled(
     layout: Layout, s: Complex, axis: Real = AXIS, *, per_input: bool = False
 ) -> tuple[Complex, NDArray[np.bool_]]:
     """Return drive, scale and outputs (rows), for a unit input if `per_input`, and where digits are lost."""
-    found, lost = np.empty((2 + len(layout.each), s.size), complex), np.empty(s.size, bool)
+    found = np.empty((2 + len(layout.each), s.size), complex)
+    lost = np.empty(s.size, bool)
     s = np.ascontiguousarray(s, dtype=complex)
     fill_free(s, layout.rows, layout.ends, axis, layout.table, found, lost, per_input)
     return found, lost
@@ -85,8 +86,10 @@ def free_slopes(chain: System, wanted: Sequence[Output], s: Complex, x: float) -
     circle = free_of(layout, (s[:, None] + radius[:, None] * SLOPE_CIRCLE).ravel())
     scales = circle.scale.reshape(-1, SLOPE_CIRCLE.size)
     here = here._replace(scale=np.where(np.isfinite(here.scale), here.scale, scales[:, 0]))
-    values, slope = np.exp(scales - here.scale[:, None]), 1.0 / SLOPE_CIRCLE / radius[:, None]
-    drive, outputs = circle.drive.reshape(scales.shape) * values, circle.outputs.reshape(-1, *scales.shape) * values
+    values = np.exp(scales - here.scale[:, None])
+    slope = 1.0 / SLOPE_CIRCLE / radius[:, None]
+    drive = circle.drive.reshape(scales.shape) * values
+    outputs = circle.outputs.reshape(-1, *scales.shape) * values
     if here.lost.any():  # there the values are means over the circle, as where two waves are one
         here = here._replace(
             drive=np.where(here.lost, _mean(drive), here.drive),
@@ -191,7 +194,8 @@ def _refuse_pole(k: System, wanted: Output, s: complex, x: float) -> None:
 
 def output_ball(k: System, wanted: Output, s: Ball, x: float) -> Ball | None:
     """Return an output for a unit input at s, in SI units; None where the input of the free response may be zero."""
-    layout, constant = readings(k, (wanted,), x), constant_of(k, wanted, x)
+    layout = readings(k, (wanted,), x)
+    constant = constant_of(k, wanted, x)
     (one,) = layout.each
     if constant is not None:
         return s**one.power * constant * rational(one.unit) / (1 + rational(one.C) * s)
@@ -242,7 +246,8 @@ def digits_of(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0
         value = output_ball(k, wanted, point(s), x)
         if value is None:
             return None
-        zero, bits = flint.arb(0), math.ceil(3.33 * digits) + 8
+        zero = flint.arb(0)
+        bits = math.ceil(3.33 * digits) + 8
         re, im = (zero if is_zero else part for is_zero, part in zip(vanish, (value.real, value.imag), strict=True))
         if known(re, bits) is None or known(im, bits) is None:
             return None
@@ -319,7 +324,8 @@ class ByMethod:
 
     def rows(self, at: Sequence[Any]) -> list[MethodRow]:
         """Return a row for each place: the value of the closed form, and the differences of the others."""
-        values, apart = self.values["closed-form"].tolist(), {k: v.tolist() for k, v in self.differences.items()}
+        values = self.values["closed-form"].tolist()
+        apart = {k: v.tolist() for k, v in self.differences.items()}
         balls, appendix = (apart.get(name, [None] * len(values)) for name in ("balls", "appendix"))
         return list(map(MethodRow, at, values, balls, appendix))
 
@@ -360,7 +366,8 @@ def slow_values(method: Method, arm: Arm, k: System, wanted: Sequence[Output], s
     from . import appendix  # here: mpmath takes a while to load
 
     must_be_of_appendix(arm, arm.theory, wanted)
-    place, digits = x * arm.link.length, APPENDIX_DIGITS
+    place = x * arm.link.length
+    digits = APPENDIX_DIGITS
     return np.array(
         [[complex(appendix.response(arm, each, complex(at), digits, place)) for at in s] for each in wanted]
     )

@@ -71,7 +71,10 @@ def _two_sum(a: complex, b: complex) -> Double:
 @inlined
 def _two_product(a: complex, b: complex) -> Double:
     """Return product and error of a b, the error to about 2^-100 of |a b|."""
-    rr, ii, ri, ir = a.real * b.real, a.imag * b.imag, a.real * b.imag, a.imag * b.real
+    rr = a.real * b.real
+    ii = a.imag * b.imag
+    ri = a.real * b.imag
+    ir = a.imag * b.real
     product, rest = _two_sum(complex(rr, ri), complex(-ii, ir))
     split = complex(
         fma(a.real, b.real, -rr) - fma(a.imag, b.imag, -ii),
@@ -128,10 +131,14 @@ def dispersion(s: complex, k: Any) -> tuple[tuple[complex, complex, complex], Ro
     Cs, Cs_low = _times_real(k.damping, s)
     d, d_low = _two_sum(complex(1.0, 0.0), Cs)
     d_low = d_low + Cs_low
-    aS, bS, gS = _scaled(k.a, k.a_low, S), _scaled(k.b, k.b_low, S), _scaled(k.g, k.g_low, S)
+    aS = _scaled(k.a, k.a_low, S)
+    bS = _scaled(k.b, k.b_low, S)
+    gS = _scaled(k.g, k.g_low, S)
 
     over_d = reciprocal(d)
-    bend, couple, shear = aS[0] * over_d, gS[0] * over_d, bS[0]
+    bend = aS[0] * over_d
+    couple = gS[0] * over_d
+    shear = bS[0]
     mean = 0.5 * (bend + shear)
     spread = _square_root(0.25 * (bend - shear) * (bend - shear) - couple)
     spread = spread * (1.0 if mean.real * spread.real + mean.imag * spread.imag >= 0.0 else -1.0)
@@ -143,7 +150,8 @@ def dispersion(s: complex, k: Any) -> tuple[tuple[complex, complex, complex], Ro
 @inlined
 def _corrected(z: complex, damper: Double, aS: Double, bS: Double, gS: Double) -> Row:
     """Return z, v, t, dt after a Newton step on (d z - a S)(z - b S) + g S, a double-double residual."""
-    (d, d_low), (gS_high, gS_low) = damper, gS
+    (d, d_low) = damper
+    (gS_high, gS_low) = gS
     dz, dz_low = _two_product(d, z)
     dz_low = dz_low + d_low * z
     u, u_low = _two_sum(dz, -aS[0])
@@ -177,7 +185,8 @@ def wave_functions(z: complex, t: complex, dt: complex) -> Row:
     if abs(z.real) + abs(z.imag) < 1.0:
         c, s = even_functions(z)
         return e * c, e * s, e, t
-    e, phase = e - e * dt, t + dt
+    e = e - e * dt
+    phase = t + dt
     half_square = 0.5 * (e * e)
     return 0.5 + half_square, (0.5 - half_square) * reciprocal(phase), e, phase
 
@@ -185,7 +194,8 @@ def wave_functions(z: complex, t: complex, dt: complex) -> Row:
 @inlined
 def wave_sums(s: complex, k: Any) -> tuple[complex, complex, complex, complex]:
     """Return S = s^2, 1/d, z_1 + z_2 and z_1 z_2 of a segment."""
-    S, over_d = s * s, reciprocal(1.0 + k.damping * s)
+    S = s * s
+    over_d = reciprocal(1.0 + k.damping * s)
     return S, over_d, S * (k.b + k.a * over_d), S * (k.a * k.b * S + k.g) * over_d
 
 
@@ -193,7 +203,8 @@ def wave_sums(s: complex, k: Any) -> tuple[complex, complex, complex, complex]:
 def is_low(s: complex, k: Any) -> bool:
     """Whether both |z| are certainly below SERIES_RADIUS."""
     _, _, z_sum, z_product = wave_sums(s, k)
-    half_sum, product = 0.5 * magnitude(z_sum), magnitude(z_product)
+    half_sum = 0.5 * magnitude(z_sum)
+    product = magnitude(z_product)
     return 1.4 * (half_sum + math.sqrt(half_sum * half_sum + 2.0 * product)) < SERIES_RADIUS
 
 
@@ -313,12 +324,17 @@ def across_waves(one: Wave, two: Wave, gS: Number, d: Number, p: Plane) -> Plane
 
     v_j = z_j - b S and v1 v2 = g S/d.
     """
-    (c1, s1, z1, v1, e1), (c2, s2, z2, v2, e2) = one, two
+    (c1, s1, z1, v1, e1) = one
+    (c2, s2, z2, v2, e2) = two
     WPsi, WM, WQ, PsiQ, MQ = p
     gap = z1 - z2
     turned = d * gS * WPsi
-    A, D = -gS * gap * WM, d * gap * PsiQ  # alpha_1 ^ alpha_2 and beta_1 ^ beta_2
-    B, C = v1 * MQ - 2.0 * gS * WQ + v2 * turned, 2.0 * gS * WQ - v1 * turned - v2 * MQ  # a1 ^ b2, b1 ^ a2
+    # alpha_1 ^ alpha_2 and beta_1 ^ beta_2
+    A = -gS * gap * WM
+    D = d * gap * PsiQ
+    # a1 ^ b2, b1 ^ a2
+    B = v1 * MQ - 2.0 * gS * WQ + v2 * turned
+    C = 2.0 * gS * WQ - v1 * turned - v2 * MQ
     v_sum = v1 + v2
     kept = (d * WQ * v_sum - MQ - turned) * (e1 * e2)  # v1 alpha_1 ^ beta_1 d/(g S)
     A, C, B, D = c1 * A - z1 * s1 * C, c1 * C - s1 * A, c1 * B - z1 * s1 * D, c1 * D - s1 * B
@@ -338,10 +354,15 @@ def transition_rows(F: Row, S: Number, over_d: Number, k: Any) -> tuple[Row, Row
 
     `k` are a, b, g and sigma.
     """
-    (F0, F1, F2, F3), sigma = F, k[3]
-    aS, bS, gS = k[0] * S, k[1] * S, k[2] * S
-    even, odd = F3 - aS * over_d * F1, F3 - bS * F1
-    bend, lift = F2 - bS * F0, F2 - aS * over_d * F0
+    (F0, F1, F2, F3) = F
+    sigma = k[3]
+    aS = k[0] * S
+    bS = k[1] * S
+    gS = k[2] * S
+    even = F3 - aS * over_d * F1
+    odd = F3 - bS * F1
+    bend = F2 - bS * F0
+    lift = F2 - aS * over_d * F0
     return (
         (even, -F2, over_d * F1, over_d * F0 - sigma * lift),
         (gS * over_d * F0, odd, -over_d * bend, -over_d * F1),
@@ -353,7 +374,9 @@ def transition_rows(F: Row, S: Number, over_d: Number, k: Any) -> tuple[Row, Row
 @inlined
 def _minor(i: Row, j: Row, p: Plane) -> Number:
     """Return q_ij of the carried plane: the minors of rows i and j times p."""
-    (i0, i1, i2, i3), (j0, j1, j2, j3), (WPsi, WM, WQ, PsiQ, MQ) = i, j, p
+    (i0, i1, i2, i3) = i
+    (j0, j1, j2, j3) = j
+    (WPsi, WM, WQ, PsiQ, MQ) = p
     return (
         (i0 * j1 - i1 * j0) * WPsi
         + (i0 * j2 - i2 * j0) * WM
@@ -406,10 +429,13 @@ def row_across_waves(one: Wave, two: Wave, gS: Number, d: Number, f: Row) -> Row
 
     c, s of both waves are scaled by the same factor.
     """
-    (c1, s1, z1, v1, _), (c2, s2, z2, v2, _) = one, two
+    (c1, s1, z1, v1, _) = one
+    (c2, s2, z2, v2, _) = two
     W, Psi, M, Q = f
-    even1, odd1 = W + d * v1 * M, v1 * Psi + gS * Q
-    even2, odd2 = W + d * v2 * M, v2 * Psi + gS * Q
+    even1 = W + d * v1 * M
+    odd1 = v1 * Psi + gS * Q
+    even2 = W + d * v2 * M
+    odd2 = v2 * Psi + gS * Q
     even1, odd1 = c1 * even1 - s1 * odd1, c1 * odd1 - z1 * s1 * even1
     even2, odd2 = c2 * even2 - s2 * odd2, c2 * odd2 - z2 * s2 * even2
     return (

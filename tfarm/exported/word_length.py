@@ -44,13 +44,21 @@ from tfarm.schema import Quantity
 MOST_DOUBLINGS = 40  # of the samples that a sum has: 1e12 of them
 SUMMED = 1e-9  # of a sum of squares: its last terms
 LEAST_SHARE = 1e-12  # of the largest singular value: below it a state is not controllable or not observable
-GIVEN, SECTIONS, BALANCED = "law as given", "second-order sections", "balanced state space"
-MOST_SUMMED, BLOCK = 20_000, 32  # samples of a sum without a bound on all others, and of one step
+GIVEN = "law as given"
+SECTIONS = "second-order sections"
+BALANCED = "balanced state space"
+# samples of a sum without a bound on all others, and of one step
+MOST_SUMMED = 20_000
+BLOCK = 32
 FRACTION_BITS = 31  # of a number in fixed point
 HALF_STEP = 2.0 ** -(FRACTION_BITS + 1)  # of the range of a number: its largest rounding
 LEAST_SCALE = 2.0**-100  # of the range of a state
-FIXED, OUTPUT, FEEDFORWARD = "q31", "output", "feedforward"  # fixed point; names of u and of r among ranges
-RATE, ANGLE = "hub_rate", "hub_angle"
+# fixed point; names of u and of r among ranges
+FIXED = "q31"
+OUTPUT = "output"
+FEEDFORWARD = "feedforward"
+RATE = "hub_rate"
+ANGLE = "hub_angle"
 FLOATS: dict[str, tuple[Any, float]] = {"double": (np.float64, 2.0**-53), "float": (np.float32, 2.0**-24)}  # roundoff
 
 

@@ -51,7 +51,9 @@ SOMEWHERE = 0.31 + 0.71j  # of w1: where a signal is tested for being fed back a
 NEAREST_TO_ORIGIN = 1e-12  # of w1: where a function, its zeros at 0 divided out, is taken for its value at 0
 ROUNDING_AT_REST = 1e-13  # of the terms of D: less is left by their rounding where they cancel at s = 0
 ORDER_READ_AT = (2e-5, 1e-5)  # of w1: where the order of a zero at s = 0 is read off
-NEAREST_TO_STEEP, FARTHEST_FROM_STEEP = 1e-10, 0.06  # distances from a steep place, as shares of its frequency
+# distances from a steep place, as shares of its frequency
+NEAREST_TO_STEEP = 1e-10
+FARTHEST_FROM_STEEP = 0.06
 POINTS_NEAR_STEEP = 14  # of a grid on either side of a steep place, one and a half a decade
 POINTS_BETWEEN_STEEP = 24  # and between two of them
 STEEP_BEYOND = 1.05  # of the end of a grid: the points of steep places up to there reach below it
@@ -213,7 +215,8 @@ def by_differences(
 
 def _must_not_be_algebraic(loop: ContinuousLoop) -> None:
     """Raise ParameterError for a law whose loop function does not fall far right: the loop would be algebraic."""
-    arm, law = loop.arm, loop.law
+    arm = loop.arm
+    law = loop.law
     moment = [part for part in law.parts if "root_moment" in part.signals and part.block.excess == 0]
     if arm.has_massless_hub and any(p.block.matrices()[3][0, p.signals.index("root_moment")] for p in moment):
         key, value = ("law.root_moment", law.name) if loop.gains is None else ("K2", loop.gains.K2)

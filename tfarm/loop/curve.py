@@ -172,7 +172,8 @@ class LoopVerdict(ABC):
     @cached_property
     def curve(self) -> LoopCurve:
         """The loop function on a grid that resolves it."""
-        loop, omega = self.full, self.frequencies
+        loop = self.full
+        omega = self.frequencies
         omega, L = refined(loop.loop_function, omega[omega >= lowest_drawn(loop.arm, self.in_band)])
         return LoopCurve(
             arm=loop.arm,
@@ -221,7 +222,8 @@ def refined(L: Callable[[Complex], Complex], omega: Real, rounds: int = 6) -> tu
     for number in range(rounds):
         values = np.asarray(L(1j * omega), dtype=np.complex128)
         known = np.isfinite(values) & ((values != 0) | (not values.any()))
-        omega, values = omega[known], values[known]
+        omega = omega[known]
+        values = values[known]
         sizes = np.array([values, 1 + values])
         steps = abs(np.diff(np.log(np.where(sizes == 0, 1.0, sizes))))
         (coarse,) = np.nonzero((steps[0] > 0.15) | (steps[1] > 0.4))

@@ -36,7 +36,9 @@ LONGEST_DELAY_SAMPLES = 20.0  # samples: end of the search of a delay margin
 MOST_STEPS = 2000  # of a scan of the delay
 MOST_LOOP_MODES = 128  # of a whole loop: half a second of work
 MOST_EDGE_MODES = 64  # of loops in which edges are searched
-GAIN_DIGITS, OTHER_DIGITS = 6, 4  # that are printed where all are certified
+# that are printed where all are certified
+GAIN_DIGITS = 6
+OTHER_DIGITS = 4
 
 Proof = tuple[bool | None, float]  # whether a loop is stable (None: not shown), and the band [rad/s] of that proof
 Test = Callable[[float], Proof]
@@ -63,7 +65,8 @@ def delay_margin(loop: Sampled) -> DelayMargin:
 
     if log_radius(0.0) >= 0:
         return DelayMargin(0.0, False)
-    plant, T = loop.plant, loop.chain.sampling.period
+    plant = loop.plant
+    T = loop.chain.sampling.period
     # 4 times the first-order shift of a pole by the feedback: a mode with more damping stays stable
     reach = 4 * loop.push * abs(held_amplitude(plant.poles, T))
     risky = (reach > -plant.poles.real * T) & (plant.poles.imag > 0)  # the feedback may exceed their own damping
@@ -132,7 +135,8 @@ def outliving(arm: Arm, chain: Chain) -> int:
 
     Overdamped modes have their slow poles next to -1/C, where those of the remainder are too.
     """
-    C, remaining = arm.least_damping, chain.sampling.period * (1 - chain.sampling.fraction)
+    C = arm.least_damping
+    remaining = chain.sampling.period * (1 - chain.sampling.fraction)
     return modes_below(arm, min(math.sqrt(2 * FORGOTTEN / (C * remaining)), OVERDAMPED / C))
 
 
@@ -265,7 +269,8 @@ def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[Interval]
         return _proof(band, loop.having(name, value))
 
     def found(loop: Sampled) -> list[tuple[Limit, Limit]]:
-        other, modes = _with_others(loop), loop.plant.count
+        other = _with_others(loop)
+        modes = loop.plant.count
 
         def confirmed(value: float) -> Proof:
             return other().having(name, value).is_stable, math.inf
@@ -288,7 +293,8 @@ def _most_certain(
 ) -> Found:
     """What is found with at most MOST_EDGE_MODES modes; in a certified band with twice as many until it `is_sharp`."""
     loop = resized(loop, min(loop.plant.count, MOST_EDGE_MODES))
-    result, count = found(loop), loop.plant.count
+    result = found(loop)
+    count = loop.plant.count
     most = min(most, _most(loop)) if band is not None else 0
     while count < most and not is_sharp(result):
         count = min(2 * count, most)
@@ -331,7 +337,9 @@ def delay_limit(loop: Sampled, band: Band | None) -> Figure | Limit:
         return _proof(complete_band(later), later)
 
     def found(loop: Sampled) -> Figure | Limit:
-        margin, modes, other = delay_margin(loop), loop.plant.count, _with_others(loop)
+        margin = delay_margin(loop)
+        modes = loop.plant.count
+        other = _with_others(loop)
 
         def holds(more: float) -> Proof:
             return None if more < 0 else other().with_delay(now + more).is_stable, math.inf

@@ -17,7 +17,9 @@ from tfarm.arrays import MACHINE_EPS, Complex, Real
 from tfarm.records import frozen
 
 POINTS = 2**15  # of the sum
-PERIODS, ALIASED = 4.0, 36.0  # P is four times the times that are wanted; e^-36 of what follows is added
+# P is four times the times that are wanted; e^-36 of what follows is added
+PERIODS = 4.0
+ALIASED = 36.0
 FINER = 4  # times the points of the sum: even times, 4 in a period of its last frequency, 8 of the largest not faded
 NEAR = 32  # of these times to either side, whose largest error is taken: the difference of two sums has zeros
 
@@ -56,7 +58,8 @@ def inverted(transform: Callable[[Complex], Complex], end: float, growth: float 
         faded = values * np.sin(np.pi / 2 * fade) ** 2
         return np.asarray(rising * (np.fft.ifft(faded, k.size, axis=1) * k.size).real)
 
-    y, shorter = summed(POINTS), summed(POINTS // 2)
+    y = summed(POINTS)
+    shorter = summed(POINTS // 2)
     error = np.maximum(abs(y - shorter), abs(np.roll(y[:, ::-1], 1, axis=1)))
     error = maximum_filter1d(error, 2 * NEAR + 1, axis=1, mode="wrap")
     error += MACHINE_EPS * rising * abs(values).sum(axis=1, keepdims=True)

@@ -78,7 +78,8 @@ class LawTerms:
         rows = [rig.drive * whole, *(shares * late).sum(axis=1)]
         D = np.tensordot(self.weights, rows, 1)
         for _, _, part, block in self.others.values():
-            ((signal,), own) = law.parts[part].signals, law.parts[part].block
+            (signal,) = law.parts[part].signals
+            own = law.parts[part].block
             fed_back = -law.sign * late[law.signals.index(signal)] * whole * block.numerators(s)[0]
             rows.append(((D - rows[1 + part]) * block.denominator(s) + fed_back) / own.denominator(s))
         return np.array(rows)
@@ -92,14 +93,16 @@ class LawTerms:
         s = 1j * omega
         drive, numerators, scale = (self.signals.kept if s.size >= LONG_PATH else self.signals.parts)(s)
         if self.signals.system.is_real_on_axis:
-            turn, odd = np.exp(1j * scale.imag), [[each.power % 2] for each in self.signals.outputs]
+            turn = np.exp(1j * scale.imag)
+            odd = [[each.power % 2] for each in self.signals.outputs]
             numerators = np.where(odd, 1j * (numerators * turn).imag, (numerators * turn).real)
             drive = (drive * turn).real + 0j
         return self.of(s, LoopParts(drive, numerators, scale))
 
     def line(self, name: str, low: float = -math.inf, high: float = math.inf) -> Line:
         """The line of a number of the law."""
-        weights, part = np.r_[self.weights, np.zeros(len(self.others))], self.part(name)
+        weights = np.r_[self.weights, np.zeros(len(self.others))]
+        part = self.part(name)
         if name == "gain":  # a factor on the law
             return Line.of(weights, np.r_[0.0, weights[1:]], 1.0, low, high)
         if part is not None:
@@ -110,7 +113,8 @@ class LawTerms:
 
     def having(self, name: str, value: float) -> LawTerms:
         """The same with another value of the gain of a part."""
-        other, part = copy(self), self.part(name)
+        other = copy(self)
+        part = self.part(name)
         assert part is not None
         other.weights = self.weights.copy()
         other.weights[1 + part] = value
@@ -154,7 +158,8 @@ def _with_real_poles(along: Along, found: list[Crossing], N: Complex, P: Complex
     low, high = limits = along.line[2:]
     rest = through_origin(N[:2], P[:2], limits)
     if rest is not None and low <= rest.t <= high:
-        (zero, half), (whole, part) = abs((N + rest.t * P)[2:4]), abs(P[2:4])
+        (zero, half) = abs((N + rest.t * P)[2:4])
+        (whole, part) = abs(P[2:4])
         # ratio of values at the first and the second: 2 of a simple zero, 4 of a double one
         is_single = zero * part < 3.0 * half * whole
         found.append(rest if is_single else rest._replace(change=_change_at(along, rest.t, found, band)))
@@ -183,7 +188,8 @@ def _change_at(along: Along, at: float, others: list[Crossing], band: float) -> 
 
     Raises ConvergenceError where nothing is damped and modes cross at that value too, but for rounding.
     """
-    loop, name = along.member(), along.name
+    loop = along.member()
+    name = along.name
     away = [abs(each.t - at) for each in others if each.t != at and math.isfinite(each.t)]
     # 1e-3 of the range: how far from such a place its counts are taken
     step = min([1e-3 * (along.line.high - along.line.low), *(each / 2 for each in away)])
@@ -226,10 +232,12 @@ def unstable_below(loop: ContinuousLoop, band: float) -> int:
     """
     if loop.resting_zeros:
         raise ConvergenceError("a pole is at s = 0, neither stable nor unstable: take other values", loop, 0.0)
-    right, nearest = box_of(loop, band).re_max, MARGIN_OF_ZERO if loop.arm.least_damping else NEAREST_TO_ZERO
+    right = box_of(loop, band).re_max
+    nearest = MARGIN_OF_ZERO if loop.arm.least_damping else NEAREST_TO_ZERO
     for factor in TRIED_HEIGHTS:
         top = factor * band
-        side, above = right + 1j * np.linspace(0.0, top, FIRST_POINTS), np.linspace(right, 0.0, FIRST_POINTS) + 1j * top
+        side = right + 1j * np.linspace(0.0, top, FIRST_POINTS)
+        above = np.linspace(right, 0.0, FIRST_POINTS) + 1j * top
         path = np.r_[side, above[1:-1], 1j * np.asarray(grid(loop.arm, top))[::-1], 0.0]
         try:
             return round(turned(loop.function, path, abs(right + 1j * top), nearest) / math.pi)
@@ -249,5 +257,6 @@ def static_edge(loop: ContinuousLoop, name: str, limits: Window) -> Crossing | N
     """The value of a number at which a real pole passes through s = 0, if there is one."""
     near = SLOWEST * first_frequency(loop.arm) * np.array(NEAR_ORIGIN) + 0j
     terms = LawTerms(loop.signals, loop.law, [name])
-    line, rows = terms.line(name), terms.at(near)
+    line = terms.line(name)
+    rows = terms.at(near)
     return through_origin(line.others @ rows, line.alone @ rows, limits)

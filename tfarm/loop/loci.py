@@ -28,7 +28,9 @@ from tfarm.spectrum.following import between
 if TYPE_CHECKING:
     import control
 
-LOCUS_POINTS, LOCUS_BRANCHES = 300, 7  # values of the gain, and branches
+# values of the gain, and branches
+LOCUS_POINTS = 300
+LOCUS_BRANCHES = 7
 POLE_DIGITS = 10  # digits of |s| that are drawn and written: poles differ from processor to processor by 1e-14 at most
 GAP_NOTE = (
     "largest distance of a branch from the reduced one, over |s| or the arm's first flexible frequency, the larger"
@@ -69,7 +71,8 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
 
     Raises ConvergenceError if the model is beyond python-control.
     """
-    arm, rigid = exact.arm, exact.arm.has_rigid_mode
+    arm = exact.arm
+    rigid = exact.arm.has_rigid_mode
     # by default ten modes at least, and two modes above the last branch
     order = order or max(20, 2 * (int(exact.mode.max()) + rigid + 2))
     count = order // 2 - rigid
@@ -149,17 +152,21 @@ def most_damped(found: Locus) -> MostDamped | None:
     rows = rows[~np.isnan(rows).any(axis=1)]
     if found.vary not in NAMES or not rows.size:
         return None
-    way, ratios = int(np.sign(found.gain[-1] - found.gain[0])), damping_ratios(rows[0])
+    way = int(np.sign(found.gain[-1] - found.gain[0]))
+    ratios = damping_ratios(rows[0])
     at = int(np.argmax(ratios))
-    best, near = (float(found.gain[at]), float(ratios[at])), slice(at - 1, at + 2)
-    gain, branch = found.gain[near][::way], rows[0][near][::way]
+    best = (float(found.gain[at]), float(ratios[at]))
+    near = slice(at - 1, at + 2)
+    gain = found.gain[near][::way]
+    branch = rows[0][near][::way]
     if 0 < at < ratios.size - 1 and (branch.imag > 0).all():
 
         def ratio(value: float) -> float:
             return -float(damping_ratios(between(found.varied, gain, branch[:, None], np.array([value])))[0, 0])
 
         # 1e-7 of the gain: a damping ratio, flat there, is known to 1e-14 of its curvature
-        ends, known = (float(gain[0]), float(gain[2])), float(1e-7 * abs(gain[1]))
+        ends = (float(gain[0]), float(gain[2]))
+        known = float(1e-7 * abs(gain[1]))
         least = minimize_scalar(ratio, bounds=ends, method="bounded", options={"xatol": known})
         best = float(least.x), -float(least.fun)
     return MostDamped(*best, bool((rows[0][at:].imag > 0).all()), found.varied.title)
@@ -193,8 +200,11 @@ class Loci:
     @property
     def rows(self) -> Annotated[list[Branch], Quantity("branches", key="branch_list", help=BRANCHES_NOTE)]:
         """One row for each branch."""
-        exact, ends, (_, unit) = self.exact, dict(self.exact.ends), self.exact.varied.title
-        branches, modes = exact.branches.tolist(), exact.mode.tolist()
+        exact = self.exact
+        ends = dict(self.exact.ends)
+        (_, unit) = self.exact.varied.title
+        branches = exact.branches.tolist()
+        modes = exact.mode.tolist()
         gaps = [None] * len(branches) if self.reduced is None else self.reduced.gap.tolist()
         values = zip(("first", "last"), exact.gain[[0, -1]].tolist(), strict=True)
         titles = {

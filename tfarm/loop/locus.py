@@ -43,7 +43,10 @@ from tfarm.spectrum.following import assigned, between, follow
 MOST_LOCUS_POINTS = 100_000  # values, those between that make it round among them
 MOST_BRANCHES = 200  # and flexible modes below the top of the box
 CROSSINGS_SHOWN = 3  # of a locus, in its finding
-RIGID, CONTROLLER, OTHER = 0, -1, -2  # origin of a branch of no flexible mode
+# origin of a branch of no flexible mode
+RIGID = 0
+CONTROLLER = -1
+OTHER = -2
 ORIGINS = {RIGID: "rigid body", CONTROLLER: "controller", OTHER: "other"}
 
 CROSSINGS = Quantity("crossings of the imaginary axis", help="solved for, not interpolated; in the order of the range")
@@ -93,7 +96,8 @@ class Locus:
         """The first `CROSSINGS_SHOWN` crossings of the imaginary axis."""
         if not self.crossings:
             return "no branch crosses the imaginary axis"
-        shown, more = self.crossings[:CROSSINGS_SHOWN], len(self.crossings) - CROSSINGS_SHOWN
+        shown = self.crossings[:CROSSINGS_SHOWN]
+        more = len(self.crossings) - CROSSINGS_SHOWN
         first = ", ".join(f"{each.direction} at {self.vary} = {each.gain:.6g}" for each in shown)
         return f"a pole becomes {first}{f' and {more} more' if more > 0 else ''}"
 
@@ -204,7 +208,8 @@ def followed(family: Varied, gain: Real, modes: int) -> tuple[Complex, Whole]:
     # 2 flexible modes are followed beyond the box, whose poles may come into it
     row, origin = named(family, modes + 2)
     row = np.r_[row, missing(family, family.start, row)]
-    rows, low = row[:, None], 0
+    rows = row[:, None]
+    low = 0
     # 3 values after the first at which the poles of the box are counted
     nodes = np.unique(np.linspace(0, gain.size - 1, 3 + 1).round().astype(int)).tolist()[1:]
     while nodes:
@@ -221,7 +226,8 @@ def followed(family: Varied, gain: Real, modes: int) -> tuple[Complex, Whole]:
             back = follow(family, gain[low : high + 1][::-1], np.r_[part[-1], new])
             part = np.hstack([part, back[::-1, part.shape[1] :]])
             rows = np.vstack([rows, np.full((new.size, rows.shape[1]), np.nan)])
-        rows, low = np.hstack([rows, part[1:].T]), nodes.pop(0)
+        rows = np.hstack([rows, part[1:].T])
+        low = nodes.pop(0)
     return rows, np.r_[origin, np.full(len(rows) - origin.size, OTHER)]
 
 
@@ -251,7 +257,8 @@ def named(family: Varied, number: int) -> tuple[Complex, Whole]:
     loop = family.first
     grown = Varied(loop.case, "gain", 0.0, 1.0, family.box)
     row, origin = open_poles(loop.arm, number)
-    own, resting = loop.law.poles[loop.law.poles != 0], at_origin(grown.at(0.0))
+    own = loop.law.poles[loop.law.poles != 0]
+    resting = at_origin(grown.at(0.0))
     row = np.r_[np.zeros(resting.size - grown.pinned, complex), row, own]
     origin = np.r_[resting[grown.pinned :], origin, np.full(own.size, CONTROLLER)]
     if loop.feeds_back:
@@ -260,7 +267,8 @@ def named(family: Varied, number: int) -> tuple[Complex, Whole]:
         except ConvergenceError:  # of poles that come in from afar, as under a delay
             row = assigned(grown, 1.0, row)
     of_first = resting[family.pinned : grown.pinned]  # at 0 at the first value alone
-    row, origin = np.r_[np.zeros(of_first.size, complex), row], np.r_[of_first, origin]
+    row = np.r_[np.zeros(of_first.size, complex), row]
+    origin = np.r_[of_first, origin]
     return row[~np.isnan(row)], origin[~np.isnan(row)]
 
 
@@ -272,7 +280,8 @@ def at_origin(loop: ContinuousLoop) -> Whole:
 def open_poles(arm: Arm, number: int) -> tuple[Complex, Whole]:
     """Poles of the rig without feedback, both of each pair, and their origins: of at least `number` flexible modes."""
     found = damped_modes(modes(arm, number))
-    rigid, pairs = found.eigenvalues[found.index == 0].ravel(), found.eigenvalues[found.index > 0].ravel()
+    rigid = found.eigenvalues[found.index == 0].ravel()
+    pairs = found.eigenvalues[found.index > 0].ravel()
     others = [*found.others, *found.unassigned_pairs.ravel()]
     row = np.array([*rigid, *others, *pairs], complex)
     origin = np.repeat([RIGID, OTHER], [len(rigid), len(others)])
@@ -286,8 +295,13 @@ def rounded(found: Locus) -> Locus:
 
     Each is drawn in a picture of its own and in one of all, down to pieces of a pixel.
     """
-    family, gain, rows, branches = found.varied, found.gain, found.followed, found.branches
-    way, pinned, box = int(np.sign(gain[-1] - gain[0])), len(branches) - found.listed.size, found.box
+    family = found.varied
+    gain = found.gain
+    rows = found.followed
+    branches = found.branches
+    way = int(np.sign(gain[-1] - gain[0]))
+    pinned = len(branches) - found.listed.size
+    box = found.box
     # rounds of halving at most: where two branches meet their distance goes with the root of that of the gain
     for _ in range(24):
         pictures = np.array([*map(frame, branches)]), frame(branches), view(branches, found.origin)
@@ -298,7 +312,8 @@ def rounded(found: Locus) -> Locus:
             break
         order = np.argsort(way * np.r_[gain, more], kind="stable")
         added = between(family, gain[::way], rows[:, ::way].T, more).T
-        gain, rows = np.r_[gain, more][order], np.hstack([rows, added])[:, order]
+        gain = np.r_[gain, more][order]
+        rows = np.hstack([rows, added])[:, order]
         branches = shown(rows, found.listed, pinned, box if found.in_box else None)
     return replace(found, gain=gain, branches=branches, followed=rows)
 
@@ -308,8 +323,10 @@ def frame(branches: Complex) -> tuple[float, float, float, float]:
     points = branches[~np.isnan(branches)]
     if not points.size:
         return 0.0, 1.0, 0.0, 1.0
-    left, right = float(points.real.min(initial=0.0)), float(points.real.max(initial=0.0))
-    low, high = float(points.imag.min()), float(points.imag.max())
+    left = float(points.real.min(initial=0.0))
+    right = float(points.real.max(initial=0.0))
+    low = float(points.imag.min())
+    high = float(points.imag.max())
     # less than 1e-12 of the size of its poles is rounding of a constant pole
     wide = max(right - left, 1e-12 * float(abs(points).max())) or 1.0  # where no pole moves from 0
     tall = max(high - low, 1e-9 * high) or wide  # where none of them oscillates
@@ -361,11 +378,14 @@ def branch_crossings(
     Of a damped rig along a number of its law those of poles on no branch too, up to `top` [rad/s].  Where D is linear
     in the number they are those of D-decomposition.
     """
-    way, (low, high) = float(np.sign(gain[-1] - gain[0])), sorted(gain[[0, -1]].tolist())
-    changes, is_damped = _changes(branches), not family.is_reactive
+    way = float(np.sign(gain[-1] - gain[0]))
+    (low, high) = sorted(gain[[0, -1]].tolist())
+    changes = _changes(branches)
+    is_damped = not family.is_reactive
     known: list[Crossing] = []
     if (changes or is_damped) and not (family.is_of_arm or family.vary == "delay"):
-        loop, name = family.first.under(family.full), "gain" if family.vary == "all" else family.vary
+        loop = family.first.under(family.full)
+        name = "gain" if family.vary == "all" else family.vary
         # between two values a branch may be higher
         band = max(top, 1.01 * float(np.nanmax(branches.imag, initial=0.0)))
         try:
@@ -385,7 +405,8 @@ def branch_crossings(
         at, omega = _crossed(family, gain[step], points, known, top)
         found.append(crossing(at, omega, points[1].real - points[0].real, number))
     # 1e-9 of the range: a crossing so near to an end is at the end, and not between
-    seen, at_end = {(own.gain, own.omega) for own in found}, 1e-9 * (high - low)
+    seen = {(own.gain, own.omega) for own in found}
+    at_end = 1e-9 * (high - low)
     for each in known if is_damped else ():
         is_between = low + at_end < each.t < high - at_end
         if is_between and not top < each.at < math.inf and (each.t, each.at) not in seen:
@@ -417,7 +438,8 @@ def _changes(branches: Complex) -> list[tuple[int, int, int]]:
 
 def _crossed(family: Varied, ends: Real, points: Complex, known: Sequence[Crossing], top: float) -> tuple[float, float]:
     """The value between two (ascending) at which a branch is on the axis, and the frequency there."""
-    (low, high), (slow, fast) = ends.tolist(), sorted(abs(points.imag).tolist())
+    (low, high) = ends.tolist()
+    (slow, fast) = sorted(abs(points.imag).tolist())
     # 1e-3 of the highest frequency: largest distance of a crossing from where the points of its branch are
     wide = 1e-3 * top + fast - slow
     near = [each for each in known if low <= each.t <= high and slow - wide <= each.at <= fast + wide]

@@ -131,7 +131,8 @@ def margins_along(
     minus = -loop.loop_function(1j * crossed)
     angle = held(np.degrees(np.angle(minus)), np.degrees(apart), CROSSOVER_DIGITS)  # 0 where L = -1
     delay = held(np.radians(np.mod(angle, 360)) / crossed, apart / crossed)
-    lag, lead = angle > 0, angle < 0
+    lag = angle > 0
+    lead = angle < 0
     least = {
         "phase": _least(angle, crossed),
         "phase_lag": _least(angle[lag], crossed[lag]),
@@ -204,7 +205,8 @@ def phase_crossovers(loop: Loop, omega: Real) -> tuple[PhaseCrossover, ...]:
     nearest = decided.argmax(axis=0)[None]
     turns = np.take_along_axis(opposite, nearest, 0)[0] | ~decided.any(axis=0)
     crosses = (factor > AT_POLE) & (factor < 1 / AT_POLE) & ~turns
-    place, factor = place[crosses], factor[crosses]
+    place = place[crosses]
+    factor = factor[crosses]
     factor = held(factor, _spread(lambda w: _factor(loop, w), place), CROSSOVER_DIGITS)
     found = list(map(PhaseCrossover, place.tolist(), factor.tolist()))
     low, lower = _factor(loop, omega[0] * np.array([1.0, 0.5]))
@@ -244,7 +246,8 @@ def lowest(
     best = int(np.argmin(values))
     dips = np.nonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:]))[0] + 1
     dips = np.r_[best, dips[np.argsort(values[dips])][:most]]
-    low, high = omega[np.maximum(dips - 1, 0)], omega[np.minimum(dips + 1, omega.size - 1)]
+    low = omega[np.maximum(dips - 1, 0)]
+    high = omega[np.minimum(dips + 1, omega.size - 1)]
     for _ in range(rounds):
         inside = np.linspace(low, high, points)
         depth = f(inside.ravel()).reshape(inside.shape)

@@ -82,10 +82,13 @@ class Margins(LoopAnalysis):
     @cached_property
     def _exact(self) -> tuple[float | None, float | None, float | None]:
         """Delay margin, disk margin and peak sensitivity of the whole loop; None: not determined."""
-        found, loop = self.in_band, self.stability.loop
+        found = self.in_band
+        loop = self.stability.loop
         if found is None:
             return None, None, None
-        arm, gains, of_disk = loop.arm, loop.gains, (found.disk, found.peak_sensitivity)
+        arm = loop.arm
+        gains = loop.gains
+        of_disk = (found.disk, found.peak_sensitivity)
         if not arm.is_undamped and is_quiet(loop, self.stability.band):
             return found.delay, *of_disk
         if gains is None:
@@ -158,7 +161,8 @@ class Margins(LoopAnalysis):
 
         A theorem on the sign of a law, and small gain, hold for that law, not for one with another number.
         """
-        loop, words = self.stability.loop, reach_words(self.windows.values())
+        loop = self.stability.loop
+        words = reach_words(self.windows.values())
         if loop.is_of_gains:
             return None if self.stability.is_known_beyond else words or None
         if not self.windows and loop.arm.has_elastic_link:

@@ -87,13 +87,16 @@ def nyquist(arm: Arm, law: AnyLaw) -> Nyquist:
 
 def nyquist_of(verdict: LoopVerdict) -> Nyquist:
     """Return the same for a verdict on either curve: both counts have one region."""
-    loop, contour = verdict.full, verdict.contour
+    loop = verdict.full
+    contour = verdict.contour
     s, is_arc = smooth(loop, *upper_contour(loop, contour, verdict.margins_end))
     path = np.r_[s, contour.closing]
     angle = turned(lambda at: _difference(loop, at), path, float(abs(path).max()))
-    encirclements, open_poles = round(angle / math.pi), contour.unstable_open
+    encirclements = round(angle / math.pi)
+    open_poles = contour.unstable_open
     plot = Nyquist(s, loop.loop_function(s), is_arc, contour.on_curve, encirclements, verdict, open_poles)
-    counted, least = plot.unstable_by_nyquist, min(contour.clear, contour.unstable)
+    counted = plot.unstable_by_nyquist
+    least = min(contour.clear, contour.unstable)
     if not least <= counted <= least + contour.near_axis:
         text = f"{counted} unstable poles by the encirclements of -1, {contour.unstable} by finding all in a box"
         raise ConvergenceError(text, plot, counted - contour.unstable)
@@ -111,9 +114,12 @@ def upper_contour(loop: Loop, contour: LoopContour, band: float) -> tuple[Comple
     Each arc around a pole of L is smaller than its distance to the nearest closed-loop pole.  The radius is that where
     |L| is about 20, and at most a thousandth of the pole's frequency (at 0: of the first).
     """
-    poles, omega = contour.on_curve, contour.grid
-    scale, pole = np.where(poles == 0, band_of(loop.arm, 1), poles), poles[:, None]
-    step, away = RESIDUE_AT * scale, abs(contour.closed - 1j * pole)
+    poles = contour.on_curve
+    omega = contour.grid
+    scale = np.where(poles == 0, band_of(loop.arm, 1), poles)
+    pole = poles[:, None]
+    step = RESIDUE_AT * scale
+    away = abs(contour.closed - 1j * pole)
     of_residue = INDENT_RADIUS * step * abs(loop.loop_function(np.where(poles == 0, step, 1j * (poles + step))))
     nearest = np.where(away > AXIS_SHARE * pole, away, math.inf).min(axis=1, initial=math.inf)
     radius = np.minimum(np.minimum(of_residue, WIDEST_INDENT * scale), NEARER * nearest)[:, None]
@@ -123,7 +129,8 @@ def upper_contour(loop: Loop, contour: LoopContour, band: float) -> tuple[Comple
     axis = axis[(axis > 0) & (axis <= band) & (abs(axis - pole) > radius).all(axis=0)]
     arcs = (1j * pole + radius * np.exp(1j * ARC)).ravel()
     arcs = arcs[arcs.imag >= 0]
-    s, is_arc = np.r_[1j * axis, arcs], np.arange(axis.size + arcs.size) >= axis.size
+    s = np.r_[1j * axis, arcs]
+    is_arc = np.arange(axis.size + arcs.size) >= axis.size
     order = np.argsort(s.imag, kind="stable")
     return s[order], is_arc[order]
 

@@ -72,7 +72,8 @@ def loop_panels(arm: Arm, band: float, loop: ContinuousLoop | None = None) -> Pa
     rows: Callable[[Complex], Complex] = partial(_hub_rows, arm, order)
     if loop is not None:
         at_rest = loop.k.at_rest + int((loop.law.poles == 0).sum())
-        order, rows = at_rest - loop.zeros_at_origin, partial(_law_rows, loop, at_rest)
+        order = at_rest - loop.zeros_at_origin
+        rows = partial(_law_rows, loop, at_rest)
     places = np.asarray(steep_places(arm, band))[STEEP_A_PANEL - 1 :: STEEP_A_PANEL]
     edges = np.r_[0.0, places[places < band], band]
     waiting = [(-edges[1], edges[1]), *itertools.pairwise(edges[1:])]
@@ -101,17 +102,20 @@ def _hub_rows(arm: Arm, order: int, s: Complex) -> Complex:
 
 def _law_rows(loop: ContinuousLoop, at_rest: int, s: Complex) -> Complex:
     """The drive times the law's denominator over s^at_rest, and what each part feeds back over the s^n of D."""
-    rig, (shares, whole) = loop.signals.parts(s), loop.law.shares(s)
+    rig = loop.signals.parts(s)
+    (shares, whole) = loop.law.shares(s)
     fed_back = np.exp(-s * loop.law.delay) * (shares * rig.numerators).sum(axis=1) / s**loop.zeros_at_origin
     return np.vstack([rig.drive * whole / s**at_rest, fed_back]) * np.exp(rig.scale - rig.scale.real.max())
 
 
 def _panel(rows: Callable[[Complex], Complex], low: float, high: float) -> tuple[Complex, float]:
     """Samples of all parts on one panel, the largest 1, and the largest miss between them."""
-    middle, half = (low + high) / 2, (high - low) / 2
+    middle = (low + high) / 2
+    half = (high - low) / 2
     both = rows(1j * (middle + half * np.r_[CHEBYSHEV, BETWEEN_SAMPLES]))
     size = abs(both).max()
-    values, between = both[:, :PANEL_SAMPLES] / size, both[:, PANEL_SAMPLES:] / size
+    values = both[:, :PANEL_SAMPLES] / size
+    between = both[:, PANEL_SAMPLES:] / size
     weights = BARYCENTRIC / (BETWEEN_SAMPLES[:, None] - CHEBYSHEV)
     missed = abs(values @ weights.T / weights.sum(axis=1) - between)
     return values, float((missed.max(axis=1) / abs(values).max(axis=1)).max())
@@ -159,7 +163,8 @@ def positions(arm: Arm, sensor: Sensor, x: Real, count: int) -> Positions:
     """
     must_turn(arm)
     found = modes(arm, count)
-    field, band = _fields(found, sensor, x), band_of(arm, count)
+    field = _fields(found, sensor, x)
+    band = band_of(arm, count)
     zeros = []
     for place in x.tolist():
         every = transfer(arm, sensor, x=place).zeros(up_to=band).values

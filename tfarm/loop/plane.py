@@ -213,8 +213,10 @@ def plane(loop: ContinuousLoop, vary: tuple[str, str], x: Real, y: Real) -> Plan
         loop = loop.under(with_numbers(loop.law, dict.fromkeys(PLANE, 0.0)))
     # most values of a map, along one number of a law, and along one gain
     most = 2000 if loop.is_of_gains else 400
-    x, y = ascending(vary[0], x, 2, most), ascending(vary[1], y, 2, most)
-    across, up = (float(x[0]), float(x[-1])), (float(y[0]), float(y[-1]))
+    x = ascending(vary[0], x, 2, most)
+    y = ascending(vary[1], y, 2, most)
+    across = (float(x[0]), float(x[-1]))
+    up = (float(y[0]), float(y[-1]))
     for name, (low, high) in zip(vary, (across, up), strict=True):
         remedy = "a leading coefficient keeps its sign in a map, as without it the order is another: a range without 0"
         require(not name.endswith(LEADING) or low * high > 0, name, [low, high], remedy)
@@ -320,7 +322,8 @@ def ranges_of(arm: Arm) -> tuple[tuple[float, float], tuple[float, float]]:
     K1 = 1.0 if arm.is_uniform else default_gains(arm).K1 / PAPER_GAINS.K1
     K2 = arm.input_per_torque
     # the stable region of the paper's arm, and around
-    (low, high), (lower, upper) = (-1.0, 3.0), (-2.0, 2.0)
+    (low, high) = (-1.0, 3.0)
+    (lower, upper) = (-2.0, 2.0)
     return (low * K1, high * K1), (lower * K2, upper * K2)
 
 
@@ -367,7 +370,8 @@ class Axis:
     @classmethod
     def of(cls, values: Real) -> Axis:
         """The axis on which a grid (n,), ascending, is nearly even: linear, or logarithmic beyond its smallest size."""
-        low, high = float(values[0]), float(values[-1])
+        low = float(values[0])
+        high = float(values[-1])
         # 1e-9 of its range: by less may the steps of an even grid differ
         if np.ptp(np.diff(values)) <= 1e-9 * (high - low):
             return cls(low, high)
@@ -387,7 +391,8 @@ def rate_columns(arm: Arm, x: Axis, number: int) -> Real:
 
     A free hub is unstable where its gain exceeds the friction: 1 + L is below 0 next to s = 0, and above it far right.
     """
-    across, least = x.grid(number), -arm.rate_loss
+    across = x.grid(number)
+    least = -arm.rate_loss
     return across[across > least] if arm.has_rigid_mode else across[across != least]
 
 
@@ -410,11 +415,13 @@ def moment_axis(arm: Arm, x: Axis) -> Axis:
 
 def edge(found: Plane, x: Axis, y: Axis) -> Real:
     """The boundary in the picture, refined where it is coarse, with a row of nan after each of its parts."""
-    points, loop = found.boundary, found.loop
+    points = found.boundary
+    loop = found.loop
     # rounds of cutting at most: 2^-30 of a step between frequencies is less than a pixel
     for _ in range(30):
         length, is_seen = _segments(points, x, y)
-        low, high = points[:-1, 2], points[1:, 2]
+        low = points[:-1, 2]
+        high = points[1:, 2]
         middle = np.sqrt(low * high)
         is_coarse = (length > SHORT_SEGMENT) & is_seen & (low < middle) & (middle < high)
         if not is_coarse.any():
@@ -453,6 +460,7 @@ def boundary_lines(found: Plane, x: Axis, y: Axis) -> BoundaryLines:
 def static_edges(found: Plane) -> tuple[float | None, float | None]:
     """The gains at which a real pole passes through 0: an upright line of the boundary, and a level one."""
     upright = found.upright if found.arm.has_rigid_mode and found.Kp == 0 else None
-    loop, up = found.loop, float(abs(found.y).max())
+    loop = found.loop
+    up = float(abs(found.y).max())
     level = static_edge(loop.having(RATE_GAIN, 1.0), MOMENT_GAIN, (-up, up))
     return upright, None if level is None else level.t

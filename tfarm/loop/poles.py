@@ -39,7 +39,9 @@ MOST_BOX_MODES = 4000  # flexible, below the highest box that is searched for as
 SLOW_SHARE = 1e-6  # of a box's height: poles nearer to 0 are known beforehand
 LEAST_REAL_PART = -0.5  # of L, so that 1 + L has no zero
 RIGHT_OF_EDGE = (2.0, 5.0, 20.0)  # times the right edge of a box, where L is evaluated again
-FAR_RIGHT, BEYOND_CORNER = 1e5, 10.0  # times that edge, and a law's fastest corner: the end of a search of real poles
+# times that edge, and a law's fastest corner: the end of a search of real poles
+FAR_RIGHT = 1e5
+BEYOND_CORNER = 10.0
 FAR_POINTS = 41  # of the real axis up to there, on which 1 + L is smooth
 RIGHT_GROWS = 1.7  # times, from one right edge that is tried to the next: of effect on the time alone
 RIGHT_POINTS = 60  # of half a right edge, where Re L is evaluated: far from any pole of L, it is smooth
@@ -123,7 +125,8 @@ class Poles:
 
         Raises CertificationError where something cannot be proven.
         """
-        k, law = self.loop.k, self.loop.exact
+        k = self.loop.k
+        law = self.loop.exact
         discs = tuple(enclosed(k, complex(pole), digits, law) for pole in self.moving)
         if not disjoint(discs):
             raise CertificationError("the discs of two poles touch: ask for more digits")
@@ -170,7 +173,8 @@ def poles_below(
     Left it reaches to about -1.5 heights, -0.8/C or -late/delay.  Where a zero lies on the edge of the box the next of
     the `factors` on the height is tried.
     """
-    starts, known = starting_points(loop, STARTS_REACH * height), slow_poles(loop, SLOW_SHARE * height)
+    starts = starting_points(loop, STARTS_REACH * height)
+    known = slow_poles(loop, SLOW_SHARE * height)
     found, box = complete(loop.function, lambda top: box_of(loop, top, late), height, starts, known, factors)
     # without losses a simple zero is its own mirror image, and its real part is rounding
     is_even = loop.is_lossless or (loop.arm.is_undamped and loop.theorem.energy == CONSERVES)
@@ -183,7 +187,8 @@ def poles_below(
 
 def box_of(loop: ContinuousLoop, height: float, late: float = LATE) -> Box:
     """A box of that height, right of the law's poles and until |L| is small; left short of -1/C and -late/delay."""
-    own, C = loop.law.poles, loop.arm.damping
+    own = loop.law.poles
+    C = loop.arm.damping
     farthest = 1e8 * first_frequency(loop.arm)  # the phase of waves turns too often along a wider box
     if own.real.max(initial=0.0) > farthest:
         fastest = complex(own[own.real.argmax()])
@@ -215,7 +220,8 @@ def quiet_edge(loop: ContinuousLoop, right: float, height: float) -> float:
     far = np.geomspace(right, max(FAR_RIGHT * right, BEYOND_CORNER * corner), FAR_POINTS)
     with np.errstate(all="ignore"):  # powers of s may overflow so far right: these points are left out
         real_part = loop.loop_function(far.astype(complex)).real
-    far, is_above = far[np.isfinite(real_part)], real_part[np.isfinite(real_part)] > -1
+    far = far[np.isfinite(real_part)]
+    is_above = real_part[np.isfinite(real_part)] > -1
     (turns,) = np.nonzero(is_above[1:] != is_above[:-1])
     return float(far[turns[-1] + 1] if turns.size else right)
 
@@ -265,7 +271,8 @@ def poles_by_mode(poles: Complex, open_loop: Mapping[int, complex]) -> dict[int,
     moves a mode here: such a pole belongs to none.
     """
     farthest = 1.0
-    modes, own = list(open_loop), np.array(list(open_loop.values()))
+    modes = list(open_loop)
+    own = np.array(list(open_loop.values()))
     apart = np.minimum(abs(np.log(poles)[:, None] - np.log(own)), farthest)
     rows, columns = linear_sum_assignment(apart)
     near = apart[rows, columns] < farthest
@@ -288,7 +295,8 @@ def first_poles(poles: Poles, count: int | None) -> Poles:
 
     Raises ParameterError where a count separates real poles.
     """
-    values, real = poles.values, int((poles.values.imag == 0).sum())
+    values = poles.values
+    real = int((poles.values.imag == 0).sum())
     count = max(USUAL_POLES, real) if count is None else count
     kept = values[:count]
     parts_real = count < values.size and values[count].imag == kept[-1].imag == 0

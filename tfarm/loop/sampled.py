@@ -250,7 +250,8 @@ class Sampled(Loop):
 
     def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
         """Return denominator and numerator of L at z = e^{sT}, s = i w up to pi/T, or off the axis."""
-        grid, at = self.rig.grid, np.ravel(s) * self.period
+        grid = self.rig.grid
+        at = np.ravel(s) * self.period
         is_on = at.real == 0
         q = at.imag[is_on]
         base = grid.base[np.minimum(np.searchsorted(grid.q, q), grid.q.size - 1)]

@@ -31,7 +31,9 @@ FOLLOWING_STEPS = 24  # of the continuation from zero gain
 SAMPLED_LOCUS_VALUES = 61  # of a gain along its locus, to begin with
 RIM = 1.12  # radius up to which the z-plane is shown
 DRAWN_RADIUS = 1.2 * RIM  # and up to which a branch is drawn, so that its line runs out of the picture
-RATE_DECADES, STRONGER = 3, 10.0  # of the rate gain: below the end of its locus, and above its own value
+# of the rate gain: below the end of its locus, and above its own value
+RATE_DECADES = 3
+STRONGER = 10.0
 
 
 @frozen

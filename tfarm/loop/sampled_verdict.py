@@ -52,7 +52,9 @@ RADIUS_AGREES = 1e-4  # of ln of the spectral radius: its largest error with few
 RADIUS_NOISE = 1e-12  # and its rounding error
 ON_CIRCLE = 1e-12  # of ln|z|: an open-loop pole so near to the circle is on it
 MOST_COUNT = 400  # modes that may be asked for
-DEFAULT_PERIOD, LAWS_PERIOD = "tfarm's default period", "the controller's period"  # origins of a sampling period
+# origins of a sampling period
+DEFAULT_PERIOD = "tfarm's default period"
+LAWS_PERIOD = "the controller's period"
 
 
 @frozen
@@ -178,7 +180,8 @@ class Verdict(OfLoop, LoopVerdict):
     @cached_property
     def contour(self) -> LoopContour:
         """Around the upper half of the circle, as s = ln(z)/T, and outside the poles on it."""
-        loop, poles = self.full, self.full.poles
+        loop = self.full
+        poles = self.full.poles
         s = np.log(1 + loop.rig.open_loop[loop.rig.open_loop != -1])
         is_near = abs(s.real) <= ON_CIRCLE
         closed = np.asarray(poles.log_radius + 1j * abs(np.angle(poles.z)), dtype=np.complex128)

@@ -141,7 +141,8 @@ class Stability(LoopVerdict):
     @property
     def ringing(self) -> list[tuple[int, complex]]:
         """The oscillating poles by mode."""
-        moving, table = self.poles.moving, modes(self.loop.arm, up_to=self.band)
+        moving = self.poles.moving
+        table = modes(self.loop.arm, up_to=self.band)
         own = dict(zip(table.index.tolist(), (1j * table.natural_frequency).tolist(), strict=True))
         oscillating = moving[moving.imag > 0]
         by_mode = poles_by_mode(oscillating, {n: s for n, s in own.items() if n})
@@ -159,7 +160,8 @@ class Stability(LoopVerdict):
 
         |1 + L| dips there, and not where the arm's own functions are steep; the less damping, the narrower the dip.
         """
-        omega, poles = np.asarray(grid(self.loop.arm, self.band)), np.r_[self.poles.values, self.loop.law.poles]
+        omega = np.asarray(grid(self.loop.arm, self.band))
+        poles = np.r_[self.poles.values, self.loop.law.poles]
         near = np.geomspace(0.05, 20.0, 12)
         close = poles.imag[:, None] + abs(poles.real[:, None]) * np.r_[-near, 0.0, near]
         # |L| may cross 1 down to a twentieth of the slowest pole
@@ -170,8 +172,11 @@ class Stability(LoopVerdict):
     @cached_property
     def contour(self) -> LoopContour:
         """Up the axis to the band, and around the right part of the box in which the poles were counted."""
-        loop, band, moving = self.loop, self.band, self.poles.moving
-        own, omega = loop.law.poles, np.asarray(grid(loop.arm, band))
+        loop = self.loop
+        band = self.band
+        moving = self.poles.moving
+        own = loop.law.poles
+        omega = np.asarray(grid(loop.arm, band))
         ringing = own[own.imag > 0]
         # points around a pole of the law, in its distances from the axis
         near = (ringing.imag[:, None] + abs(ringing.real)[:, None] * np.linspace(-4.0, 4.0, 41)).ravel()
@@ -196,7 +201,8 @@ class Stability(LoopVerdict):
         """
         if not self.loop.is_moved_at_hub_alone or self.loop.theorem.energy is None:
             return next_limits(t for _, t in by_phase)
-        arm, numbers = self.loop.arm, self.loop.numbers
+        arm = self.loop.arm
+        numbers = self.loop.numbers
         ends = (arm.input_per_torque, numbers[MOMENT_GAIN]), (-arm.rate_loss, numbers[RATE_GAIN])
         return next_limits([*(t for w, t in by_phase if w == 0), *(end / gain for end, gain in ends if end and gain)])
 
@@ -229,7 +235,8 @@ def verdict_on(loop: ContinuousLoop, band: float | None = None) -> Stability:
     delayed = DELAYED if loop.arm.is_undamped and loop.law.delay and loop.feeds_back else ""
     tail = theorem.reason if theorem.energy is not None else SMALL_GAIN if quiet else delayed
     is_infinite = theorem.energy == GIVES or tail == DELAYED
-    verdict, words = _verdict(poles, is_infinite), tail or UNKNOWN_ABOVE.format(band=height)
+    verdict = _verdict(poles, is_infinite)
+    words = tail or UNKNOWN_ABOVE.format(band=height)
     return Stability(loop, verdict, poles.unstable, is_infinite, poles.box.im_max, words, poles, bool(tail))
 
 
@@ -238,7 +245,8 @@ def _verdict(poles: Poles, is_infinite: bool) -> str:
 
     Raises ConvergenceError where one of a damped loop may be on the axis, and none is right of it.
     """
-    moving, arm = poles.moving, poles.loop.arm
+    moving = poles.moving
+    arm = poles.loop.arm
     share = moving.real / abs(moving)
     if is_infinite or (share > MARGIN_OF_ZERO).any():
         return "unstable"
@@ -268,18 +276,24 @@ def hub_shares(arm: Arm, up_to: float) -> Real:
     Of sqrt(1/m) k and sqrt(1/m) E I k^2, those of a slender beam of mass m with waves of the same frequency: high modes
     tend to sqrt 2 and 0 on a free pin, to 0 and 2 where the hub is heavy.
     """
-    table, EI = modes(arm, up_to=up_to), arm.bending_scale * arm.length
+    table = modes(arm, up_to=up_to)
+    EI = arm.bending_scale * arm.length
     flexible = table.index > 0
-    omega, b = table.natural_frequency[flexible], abs(table.hub_participation[flexible])
-    k, scale = np.sqrt(omega) * (arm.own_mass / arm.length / EI) ** 0.25, np.sqrt(arm.own_mass)
+    omega = table.natural_frequency[flexible]
+    b = abs(table.hub_participation[flexible])
+    k = np.sqrt(omega) * (arm.own_mass / arm.length / EI) ** 0.25
+    scale = np.sqrt(arm.own_mass)
     return np.array([b * scale / k, b * arm.hub_side_inertia * omega**2 * scale / (EI * k**2)])
 
 
 def band_of_loop(loop: ContinuousLoop) -> tuple[float, bool]:
     """The band [rad/s] in which poles are computed, and whether small gain holds beyond it (never without damping)."""
-    theorem, arm, own = loop.theorem, loop.arm, loop.law.poles
+    theorem = loop.theorem
+    arm = loop.arm
+    own = loop.law.poles
     ringing = own[own.real > -DULL * abs(own)]
-    fastest, highest = BEYOND_LAW_POLES * float(abs(ringing).max(initial=0.0)), band_of(arm, MOST_BAND_MODES)
+    fastest = BEYOND_LAW_POLES * float(abs(ringing).max(initial=0.0))
+    highest = band_of(arm, MOST_BAND_MODES)
     least = max(band_of(arm, LEAST_BAND_MODES), min(fastest, highest))
     is_decided = theorem.energy is not None and (arm.has_elastic_link or not loop.law.is_static)
     if arm.loses_at_hub_alone or is_decided or fastest > highest:
@@ -313,7 +327,8 @@ def has_fallen(loop: ContinuousLoop, band: float) -> bool:
     L is evaluated on two decades of the axis, where |L| falls, with the natural frequencies between, and on the upper
     edge of the box; farther right |L| is smaller still.
     """
-    omega, half = np.asarray(quiet_places(loop.arm, band, QUIET_POINTS)), math.sqrt(QUIET_REACH) * band
+    omega = np.asarray(quiet_places(loop.arm, band, QUIET_POINTS))
+    half = math.sqrt(QUIET_REACH) * band
     size = abs(loop.loop_function(1j * omega))
     if not (size.max() < QUIET and size[omega > half].max() <= size[omega <= half].max()):
         return False
@@ -426,7 +441,10 @@ def spill(arm: Arm, law: AnyLaw, most: int = USUAL_SPILL_MODES) -> Spill:
     most = whole("modes", most, 1, MOST_SPILL_MODES, f"a whole number of modes, 1 to {MOST_SPILL_MODES}")
     require(not case.law.is_improper, "law", case.law.name, "differentiates, and has no states; add a fast pole to den")
     verdict = stability(case)
-    loop, numbers, unstable, rightmost = verdict.loop, np.arange(1, most + 1), [], []
+    loop = verdict.loop
+    numbers = np.arange(1, most + 1)
+    unstable = []
+    rightmost = []
     slowest = REST_SHARE * float(modes(loop.arm, 1).natural_frequency[-1])
     for model in _bare_models(loop, most):
         poles = poles_of_model(loop, model)
@@ -442,11 +460,14 @@ def _bare_models(loop: ContinuousLoop, most: int) -> list[Matrices]:
     They are cut from the largest.  A search of more modes of a strongly damped arm may leave poles without a mode,
     which no smaller model has: then each has a search of its own.
     """
-    arm, signals, numbers = loop.arm, loop.law.signals, range(1, most + 1)
+    arm = loop.arm
+    signals = loop.law.signals
+    numbers = range(1, most + 1)
     first, last = (modal_model(arm, "hub_angle", number) for number in (1, most))
     if last.index.tolist() == [*numbers] and last.single.size == first.single.size:
         A, B, C, D = sensed_model(arm, signals, most)
-        states, beyond = np.arange(len(A)), [last.rigid_states + 2 * number for number in numbers]
+        states = np.arange(len(A))
+        beyond = [last.rigid_states + 2 * number for number in numbers]
         kept = [(states < end) | (states >= beyond[-1]) for end in beyond]
         return [(A[np.ix_(each, each)], B[each], C[:, each], 0 * D) for each in kept]
     models = [sensed_model(arm, signals, number) for number in numbers]

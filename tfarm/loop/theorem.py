@@ -55,7 +55,10 @@ if TYPE_CHECKING:
 
 MOST_EXACT_DEGREE = 40  # degree: exact arithmetic with such polynomials takes a moment
 KIND = Quantity("kind", help="from the hub's angle or rate to its torque; none where no sign is shown")
-TAKES, CONSERVES, GIVES = 1, 0, -1  # energy that a law takes from every mode with motion of the hub: its sign
+# energy that a law takes from every mode with motion of the hub: its sign
+TAKES = 1
+CONSERVES = 0
+GIVES = -1
 
 
 @frozen
@@ -92,8 +95,10 @@ def absorbed(loop: Loop) -> tuple[float, Law] | None:
     None for laws on other signals than the hub's angle and rate and, statically, the moment that acts on the hub.  With
     damping in the links that moment is not the gauge's.
     """
-    arm, law = loop.arm, loop.law
-    share, rest = 0.0, []
+    arm = loop.arm
+    law = loop.law
+    share = 0.0
+    rest = []
     for part in law.parts:
         if part.signals != ("root_moment",):
             rest.append(part)
@@ -110,7 +115,8 @@ def absorbed(loop: Loop) -> tuple[float, Law] | None:
 
 def theorem_of(loop: Loop) -> Theorem:
     """Return the theorem that decides the stability of every mode of a loop."""
-    arm, parts = loop.arm, absorbed(loop)
+    arm = loop.arm
+    parts = absorbed(loop)
     if parts is None or (arm.input_lags and loop.feeds_back):
         return NO_THEOREM
     share, rest = parts
@@ -152,13 +158,17 @@ def signs_of(law: Law, friction: float = 0.0) -> Signs:
     if law.is_static:  # gains on hub angle and hub rate, by their signs alone
         values = dict(zip(law.signals, law.values(np.ones(1, complex))[:, 0].real.tolist(), strict=True))
         return _of_signs(values.get("hub_rate", 0.0) + friction, values.get("hub_angle", 0.0))
-    num, den = polynomial([0.0]), polynomial([1.0])  # of the whole law as one fraction on the angle
+    # of the whole law as one fraction on the angle
+    num = polynomial([0.0])
+    den = polynomial([1.0])
     for part in law.parts:
         assert isinstance(part.block, Rational)  # seen above
-        p, q = polynomial(part.block.num) * -law.sign, polynomial(part.block.den)
+        p = polynomial(part.block.num) * -law.sign
+        q = polynomial(part.block.den)
         if part.signals == ("hub_rate",):
             p = p * polynomial([1.0, 0.0])
-        num, den = num * q + p * den, den * q
+        num = num * q + p * den
+        den = den * q
     passive = _positive_real(num + polynomial([friction, 0.0]) * den, den)
     if passive is not None and passive.kind:
         return passive
@@ -222,9 +232,12 @@ def lyapunov(loop: Loop) -> Lyapunov:
 
     V_t = -a2 K1 theta_t^2 - a1 C integral(E I phi_xt^2) with a1/a2 = 1 - K2, where that has a sign.
     """
-    arm, law = loop.arm, loop.law.gains
+    arm = loop.arm
+    law = loop.law.gains
     assert law is not None
-    C, weight, K1 = arm.damping, 1.0 - law.K2 / arm.input_per_torque, law.K1 + arm.rate_loss
+    C = arm.damping
+    weight = 1.0 - law.K2 / arm.input_per_torque
+    K1 = law.K1 + arm.rate_loss
     least = 0.0  # of Kp: below 0 where the tip is held, and gives the hub a static stiffness
     if law.Kp < 0 and not arm.has_rigid_mode:
         least = -weight / float(transfer(arm, "hub_angle").static)
@@ -263,7 +276,8 @@ def polynomial(coefficients: Sequence[float]) -> Poly:
 
 def on_axis(num: Poly, den: Poly) -> tuple[Poly, Poly]:
     """Real part, and imaginary part over w, of num(i w) conj den(i w): polynomials in v = w^2."""
-    (a, b), (c, d) = _split(num), _split(den)
+    (a, b) = _split(num)
+    (c, d) = _split(den)
     v = polynomial([1.0, 0.0])
     return a * c + v * b * d, b * c - a * d
 
@@ -290,7 +304,8 @@ def definite(poly: Poly) -> Literal["above", "not below", "zero", ""]:
 
 def is_hurwitz(poly: Poly) -> bool:
     """Whether all roots lie left of the axis, by Routh's table."""
-    row, other = poly.all_coeffs()[0::2], poly.all_coeffs()[1::2]
+    row = poly.all_coeffs()[0::2]
+    other = poly.all_coeffs()[1::2]
     if not row[0]:
         return False
     while other:
@@ -298,5 +313,6 @@ def is_hurwitz(poly: Poly) -> bool:
             return False
         padded = [*other, 0]
         rest = [row[n + 1] - row[0] / other[0] * padded[n + 1] for n in range(len(row) - 1)]
-        row, other = other, rest
+        row = other
+        other = rest
     return True

@@ -42,16 +42,27 @@ from .continuous import FAR_RIGHT, ContinuousLoop, band_of
 from .inversion import POINTS, Inversion, inverted
 from .poles import Poles, poles_below
 
-ACTUATOR, TORQUE = "actuator", "torque"  # the input of the arm as a place of excitation, and as a signal
+# the input of the arm as a place of excitation, and as a signal
+ACTUATOR = "actuator"
+TORQUE = "torque"
 USUAL_COUNT = 80  # flexible modes below the top of the box
-CLOSE, MOST_CLOSE = 3.0, 0.1  # poles closer than 3/T are one circle, but no farther apart than 0.1 of the first mode
+# poles closer than 3/T are one circle, but no farther apart than 0.1 of the first mode
+CLOSE = 3.0
+MOST_CLOSE = 0.1
 SLOW_RADIUS = 2.0  # over T, of a circle around s = 0, on which e^{s T} is moderate; or times the extent of its poles
 POLE_RADIUS = 0.25  # of the way to the next pole: radius of the circle of one pole
-POLE_NODES, FEWEST_NODES, MOST_NODES, NODE_LOG = 32, 128, 512, 40.0  # of circles; e^-40 is below the rounding
+# of circles; e^-40 is below the rounding
+POLE_NODES = 32
+FEWEST_NODES = 128
+MOST_NODES = 512
+NODE_LOG = 40.0
 ON_AXIS = 1e-9  # of the least distance of two circles: by so little a centre is off the real axis
 BLOCK = 20_000  # times that are evaluated together: with 200 terms 64 MB
 MOST_GROWTH = 500.0  # exponent of the fastest growing pole at the end of a record
-CUTS, SEEN, SAME_TIME = 8, 1e-13, 1e-10  # of intervals; of a peak: less is rounding; of a record: the same time
+# of intervals; of a peak: less is rounding; of a record: the same time
+CUTS = 8
+SEEN = 1e-13
+SAME_TIME = 1e-10
 
 Transform = Callable[[Complex], Complex]
 
@@ -171,13 +182,18 @@ class TimeResponse:
         t = np.union1d(t[abs(t[:, None] - jumps).min(axis=1, initial=math.inf) > SAME_TIME * t[-1]], jumps)
         t = t[np.diff(t, append=math.inf) > SAME_TIME * t[-1]]
         after = self.at(t)
-        before, at_jump = after.copy(), np.isin(t, jumps)
+        before = after.copy()
+        at_jump = np.isin(t, jumps)
         before[:, at_jump] = self.at(t[at_jump], before=True)
-        ends, y = np.array([t[:-1], t[1:]]), np.array([after[:, :-1], before[:, 1:]])
+        ends = np.array([t[:-1], t[1:]])
+        y = np.array([after[:, :-1], before[:, 1:]])
         bends = np.where(np.isin(t[1:-1], jumps), 0, abs(np.diff((y[1] - y[0]) / np.diff(t))) * 2 / (t[2:] - t[:-2]))
-        more, errors = _of_both(bends) * np.diff(t) ** 2 / 4, self.remainder(t)
-        errors, most = np.maximum(errors[:, :-1], errors[:, 1:]), np.zeros(len(self.names))
-        times, values = [ends.ravel()], [np.hstack([*y])]
+        more = _of_both(bends) * np.diff(t) ** 2 / 4
+        errors = self.remainder(t)
+        errors = np.maximum(errors[:, :-1], errors[:, 1:])
+        most = np.zeros(len(self.names))
+        times = [ends.ravel()]
+        values = [np.hstack([*y])]
         for most_open in (*[3000] * 8, 0):
             largest = abs(np.hstack(values)).max(axis=1, keepdims=True) + LEAST_SIZE
             could = abs(y).max(axis=0) + np.where(more > SEEN * largest, more, 0.0)
@@ -186,12 +202,15 @@ class TimeResponse:
             most = np.maximum(most, np.delete(could + errors, is_open, axis=1).max(axis=1, initial=0.0))
             every = np.linspace(ends[0, is_open], ends[1, is_open], CUTS + 1)
             inner = self.at(every[1:-1].ravel())
-            times, values = [*times, every[1:-1].ravel()], [*values, inner]
+            times = [*times, every[1:-1].ravel()]
+            values = [*values, inner]
             whole = np.stack([y[0][:, is_open], *np.split(inner, CUTS - 1, axis=1), y[1][:, is_open]], axis=1)
             more = np.hstack([*_of_both(abs(np.diff(whole, 2, axis=1))).swapaxes(0, 1)]) / 4
             y = np.array([np.hstack([*part.swapaxes(0, 1)]) for part in (whole[:, :-1], whole[:, 1:])])
-            ends, errors = np.array([every[:-1].ravel(), every[1:].ravel()]), np.tile(errors[:, is_open], CUTS)
-        t, y = np.concatenate(times), np.hstack(values)
+            ends = np.array([every[:-1].ravel(), every[1:].ravel()])
+            errors = np.tile(errors[:, is_open], CUTS)
+        t = np.concatenate(times)
+        y = np.hstack(values)
         largest = (1 - 1e-14) * abs(y).max(axis=1, keepdims=True)
         places = np.where(abs(y) >= largest, t, math.inf).argmin(axis=1)  # the first time of a constant
         found = np.array([t[places], y[:, places].diagonal(), self.remainder(t[places]).diagonal(), most])
@@ -273,7 +292,9 @@ class Transforms:
 
     def parts(self, s: Complex) -> tuple[Complex, Complex, Complex]:
         """Return H, its direct part, and the rest."""
-        law, excitation, (drive, row) = self.loop.law, self.excitation, self._rig(s)
+        law = self.loop.law
+        excitation = self.excitation
+        (drive, row) = self._rig(s)
         columns = (*law.signals, *law.wanted)
         parts, den = law.shares(s, columns)
         entries = dict(zip(columns, parts.sum(axis=0), strict=True))
@@ -286,8 +307,10 @@ class Transforms:
         for name in free.keys() & {*law.signals} if self.refers else ():
             driven = driven - entries[name] * free[name]
         added = np.array([free.get(name, 0 * s) * self.acts for name in (*self.names, TORQUE)])
-        rig, D = np.array([*(row[name] for name in self.names), drive]), drive * den + fed_back
-        whole, direct = rig * driven / D + added, self.shares * driven / den + added
+        rig = np.array([*(row[name] for name in self.names), drive])
+        D = drive * den + fed_back
+        whole = rig * driven / D + added
+        direct = self.shares * driven / den + added
         rest = whole - direct
         rest[-1] = -driven * fed_back / (D * den)  # the same without cancellation
         return whole, direct, rest
@@ -303,7 +326,8 @@ def _part(poles: Poles, of: Transforms, start: float, duration: float) -> Part:
     slowest = float(late[0].real[late[0].imag > top / 2].max(initial=left))
 
     # 20 time constants of the poles outside the box; above it as well, or until frequencies up to four times its top
-    decayed, resolved = 20.0, 2 * np.pi * POINTS / (4 * 4 * top)
+    decayed = 20.0
+    resolved = 2 * np.pi * POINTS / (4 * 4 * top)
     end = max(decayed / -left, min(decayed / max(-slowest, LEAST_SIZE), resolved))
     growth = float(known.real.max(initial=0.0))
     end = min(end, 10 / max(growth, LEAST_SIZE))  # where an unstable pole has grown by e^10
@@ -344,7 +368,8 @@ def _terms(
     _, label = connected_components(abs(every[:, None] - every) <= np.maximum(reach, alike))
     found = []
     for n in range(label.max() + 1):
-        own, order = every[label == n], int(count[label == n].sum())
+        own = every[label == n]
+        order = int(count[label == n].sum())
         c = complex(own.mean())
         beyond = 2 * (abs(every).max() + 1 / duration)
         nearest = [complex(edge.real or c.real, edge.imag or c.imag) for edge in map(complex, edges)]
@@ -360,7 +385,9 @@ def _circle(
     own: Complex, order: int, c: complex, room: float, transform: Transform, duration: float
 ) -> tuple[Complex, Complex]:
     """The nodes of a circle around poles, to a distance of `room` from others; of a simple pole its residue."""
-    is_simple, extent, radius = order == 1 and c != 0, float(abs(own - c).max()), POLE_RADIUS * room
+    is_simple = order == 1 and c != 0
+    extent = float(abs(own - c).max())
+    radius = POLE_RADIUS * room
     if not is_simple:
         moderate = max(SLOW_RADIUS * max(extent, 1 / duration), -c.real / 2)  # where e^{s t} does not grow
         radius = min(max(math.sqrt(extent * room), radius), moderate)

@@ -65,7 +65,8 @@ class Varied:
         for key, value in (("from", self.start), ("to", self.stop)):
             require(math.isfinite(value), key, value, "a finite number")
             loop = self.at(value)
-            arm, K1 = loop.arm, loop.gains[RATE_GAIN] if loop.gains else 0.0
+            arm = loop.arm
+            K1 = loop.gains[RATE_GAIN] if loop.gains else 0.0
             passes = arm.rate_loss and arm.lossless_hub.has_massless_hub and -arm.rate_loss >= K1
             remedy = f"with hub.inertia = 0 a pole passes through infinity at {RATE_GAIN} = {-arm.rate_loss:.6g}"
             require(not passes, key, value, f"{remedy}: stay above it, or give the hub an inertia")
@@ -155,7 +156,8 @@ class Varied:
                 here = values == value
                 found[:, :, here] = self.at(float(value)).characteristic(s[:, here])
             return found[0], found[1]
-        (terms, line), rig = self.terms, self.first.signals.parts(s)
+        (terms, line) = self.terms
+        rig = self.first.signals.parts(s)
         rows = terms.of(s, rig)
         others, alone = (np.tensordot(each, rows, 1) for each in (line.others, line.alone))
         share = np.exp(-s * (values - self.full.delay)) if self.vary == "delay" else values
@@ -189,7 +191,9 @@ class Varied:
 
     def near(self, values: Real, guess: Complex) -> Complex:
         """The poles (m, b) next to the guesses at m values, by Newton's method; NaN where it does not settle."""
-        found, resting, rests = guess.copy(), self.resting(values), np.zeros(guess.shape, bool)
+        found = guess.copy()
+        resting = self.resting(values)
+        rests = np.zeros(guess.shape, bool)
         for n in np.flatnonzero(resting):
             nearest = np.argsort(abs(np.where(np.isnan(guess[n]), np.inf, guess[n])))
             both = np.where(guess[n, nearest].imag > 0, 2, 1).cumsum()  # of a pair that rests

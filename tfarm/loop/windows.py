@@ -27,7 +27,9 @@ End = Literal["edge", "search bound", "no limit"]
 SEARCH_RANGE = Quantity("search range", digits=5, key="search_range", help="values between which limits were searched")
 ENDS = "an end with < or > is that of the search range: no limit was found up to there"
 
-WINDOW_REACH, FARTHER_REACH = 20.0, {MOMENT_GAIN: 50.0}  # of the search range, times `gain_unit`
+# of the search range, times `gain_unit`
+WINDOW_REACH = 20.0
+FARTHER_REACH = {MOMENT_GAIN: 50.0}
 BEYOND_LAW = 10.0  # times the number of the law: least search range too
 
 
@@ -96,7 +98,8 @@ def windows_of(verdict: Stability, names: Iterable[str] | None = None) -> dict[s
     elastic links are.  A number has none along which poles meet at s = 0 and cannot be counted.  All are of poles up to
     one band: high enough for both ends of each range, or that of a verdict beyond which nothing is known.
     """
-    loop, numbers = verdict.loop, verdict.loop.numbers
+    loop = verdict.loop
+    numbers = verdict.loop.numbers
     if not loop.is_of_gains and (verdict.word == "marginal" or loop.arm.has_elastic_link):
         return {}
     ranges = {name: looked_at(loop, name) for name in names or numbers}
@@ -104,10 +107,13 @@ def windows_of(verdict: Stability, names: Iterable[str] | None = None) -> dict[s
     lines, band = _lines(verdict, solved)
     done: dict[str, Windows] = {}
     for name, limits in ranges.items():
-        value, unit, reach = numbers[name], shown_unit(name, loop.arm) if loop.is_of_gains else "", math.inf
+        value = numbers[name]
+        unit = shown_unit(name, loop.arm) if loop.is_of_gains else ""
+        reach = math.inf
         if name in lines:
             try:
-                found, reach = lines[name](), band
+                found = lines[name]()
+                reach = band
                 stable = _stable(verdict, name, limits, found, band)
             except ConvergenceError:
                 continue  # poles cannot be counted: `Margins.intervals_note` names the number
@@ -127,7 +133,8 @@ def looked_at(loop: ContinuousLoop, name: str) -> Window:
 
     Of a leading coefficient without which high modes are unstable: from a tenth of its value on, with its sign.
     """
-    arm, value = loop.arm, loop.numbers[name]
+    arm = loop.arm
+    value = loop.numbers[name]
     if not loop.is_of_gains:
         if name.endswith(LEADING) and value and not is_known_without(loop, name):
             low, high = sorted((value / BEYOND_LAW, value * BEYOND_LAW))
@@ -146,7 +153,8 @@ def looked_at(loop: ContinuousLoop, name: str) -> Window:
 
 def _lines(verdict: Stability, ranges: dict[str, Window]) -> tuple[dict[str, Callable[[], Crossings]], float]:
     """What makes the crossings along each number in its range, all solved for at once, and their band [rad/s]."""
-    loop, band = verdict.loop, verdict.band
+    loop = verdict.loop
+    band = verdict.band
     if not ranges:
         return {}, band
     if verdict.is_known_beyond or loop.is_of_gains:
@@ -163,9 +171,12 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
     Where nothing is known beyond the band, a pair of poles may pass through its top: then each interval is counted if
     the count at an end differs.
     """
-    loop, value = verdict.loop, verdict.loop.numbers[name]
+    loop = verdict.loop
+    value = verdict.loop.numbers[name]
     found = without_losses(loop, name, found)
-    pairs, count, at = found.spans(*limits), verdict.unstable_roots, value
+    pairs = found.spans(*limits)
+    count = verdict.unstable_roots
+    at = value
     resting = [each.change for each in found if each.t == value and each.at == 0]
     is_known = verdict.word != "marginal"
     if is_known and resting in ([1], [-1]):  # the verdict leaves that pole out
@@ -198,11 +209,13 @@ def without_losses(loop: ContinuousLoop, name: str, found: Crossings) -> Crossin
     if not loop.is_moved_at_hub_alone:
         return found
     arm = loop.arm
-    at, reach = 0.0 - arm.rate_loss, 1.0
+    at = 0.0 - arm.rate_loss
+    reach = 1.0
     if name != RATE_GAIN and at == loop.numbers[RATE_GAIN]:
         return Crossings.of([])
     if name == MOMENT_GAIN and is_decided_along(loop, name):
-        at, reach = arm.input_per_torque, 1e-9
+        at = arm.input_per_torque
+        reach = 1e-9
     elif name != RATE_GAIN:
         return found
     near = reach * gain_unit(arm, name)

@@ -234,7 +234,8 @@ def slew(arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "", 
 
 def _draw_curve(curve: traces.TimeCurve, ax: Axes, colour: str, *, scale: float = 1.0, **looks: Any) -> None:
     """Draw the line, or the band."""
-    low, high = scale * curve.low, scale * curve.high
+    low = scale * curve.low
+    high = scale * curve.high
     if not curve.is_band:
         ax.plot(curve.t, low, color=colour, lw=1.3, **looks)
         return
@@ -292,7 +293,8 @@ def step(found: Step, *, ax: Sequence[Axes]) -> None:
             _draw_signal(one, t[: y.size], y, OF_STABILITY[each.stability], samples, label=label)
         stable = [each.signals[name] for each in loops if each.hub]
         if stable and len(stable) < len(loops):
-            low, high = stable[0].min(), stable[0].max()
+            low = stable[0].min()
+            high = stable[0].max()
             # beyond a stable response, of its height
             room = 0.3 * (high - low)
             one.set_ylim(low - room, high + room)

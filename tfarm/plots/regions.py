@@ -134,7 +134,8 @@ def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
 
     Open lines shorter than a twelfth of the picture are stubs at the edge of the grid, and left out.
     """
-    least, largest = np.nanmin(damping, initial=np.inf), np.nanmax(damping, initial=0.0)
+    least = np.nanmin(damping, initial=np.inf)
+    largest = np.nanmax(damping, initial=0.0)
     levels = [each for each in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(least, largest) if least < each < largest]
     if not levels:
         return

@@ -118,7 +118,8 @@ def _mark_values(exact: Locus, way: int, which: list[int], ax: Axes) -> None:
     branches = held_branches(exact.branches[which])
     at = np.array([np.interp(way * values, way * exact.gain, s) for s in branches])
     looks: dict[str, Any] = {"ls": "none", "color": INK, "mew": 1.3, "zorder": 4}
-    start, later = at[:, 0], at[:, 1:].ravel()
+    start = at[:, 0]
+    later = at[:, 1:].ravel()
     label = f"{exact.vary} = {names[0]}"
     ax.plot(start.real, start.imag, marker="o" if begins else "x", ms=6, mfc="white", label=label, **looks)
     label = f"{exact.vary} = {', '.join(names[1:])}"
@@ -129,7 +130,8 @@ def _draw_branches(shown: Complex, ax: Axes) -> None:
     """Draw branches, their parts left and right of the axis in the colours of stability, and those on it."""
     left, right = ax.get_xlim()
     ax.axvline(0, color=INK, lw=0.9, zorder=1)
-    stable, unstable = ax.axvspan(left, 0.0, fc="none"), ax.axvspan(0.0, right, fc=REGIONS[1], zorder=0.1)
+    stable = ax.axvspan(left, 0.0, fc="none")
+    unstable = ax.axvspan(0.0, right, fc=REGIONS[1], zorder=0.1)
     for lw, colour, part, name in (2.6, STABLE, stable, "stable"), (2.61, UNSTABLE, unstable, "unstable"):
         for s in shown:
             ax.plot(s.real, s.imag, lw=lw, color=colour, zorder=2)[0].set_clip_path(part)
@@ -192,7 +194,8 @@ def s_grid(ax: Axes, *, is_named: bool = True) -> None:
     ratios = [m * 10.0**k for k in range(-6, 0) for m in (1, 2, 5)]
     for ratio in [*ratios, 0.8] if left < 0 < high else ():
         slope = ratio / np.sqrt(1 - ratio**2)
-        x, y = max(left, -high * slope), min(high, -left / slope)
+        x = max(left, -high * slope)
+        y = min(high, -left / slope)
         looks = VALUE | {"xytext": (3, -3), "va": "top" if x > left else "center"}
         is_apart = (high - y) / (high - bottom) - x / (right - left) > apart and y > bottom + 0.1 * (high - bottom)
         if is_apart and note(f"ζ {plain(ratio)}", (x, y), ax, (apart, apart), **looks):

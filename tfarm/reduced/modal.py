@@ -133,7 +133,8 @@ def modal_model(
     """
     G = transfer(arm, outputs, x=x)
     count = whole("count", count, 0, MOST_MODELLED, f"a whole number of flexible modes, 0 to {MOST_MODELLED}")
-    k, share = G.system, G.share
+    k = G.system
+    share = G.share
     wanted = list(G.rows)
     for each in wanted:
         remedy = "a power of s times the input, which no state space has; choose another output"
@@ -146,7 +147,9 @@ def modal_model(
     index, p, single = _eigenvalues(arm, table, reach)
     r, alone = _residues(table, k, [*wanted, collocated], share, p, single)
     if count == 0:
-        index, p, r = index[:0], p[:0], r[:, :0]
+        index = index[:0]
+        p = p[:0]
+        r = r[:, :0]
     expansion, kept = _at_rest(G, single, table)
     return ModalModel(
         arm=arm,

@@ -89,7 +89,8 @@ class PartialFractions:
     @property
     def numerators(self) -> tuple[Real, Real]:
         """n1, n0 (outputs, n) of each mode's share (n1 s + n0)/((s - p1)(s - p2))."""
-        r1, r2 = self.residues[..., 0], self.residues[..., 1]
+        r1 = self.residues[..., 0]
+        r2 = self.residues[..., 1]
         p1, p2 = self.eigenvalues.T
         return (r1 + r2).real, -(r1 * p2 + r2 * p1).real
 
@@ -112,7 +113,8 @@ class PartialFractions:
         is_pole = (product == 0).any(axis=0) | ((self.rigid_states > 0) & (s == 0))
         for pole in s[is_pole][:1].tolist():
             require(False, "s", pole, "a pole of the reduced model; move s")
-        (n1, n0), share = map(part, self.numerators), part(1 / product)
+        (n1, n0) = map(part, self.numerators)
+        share = part(1 / product)
         total = part(s) * (n1 @ share) + n0 @ share + part(self.static)[:, None]
         if self.rigid_states:
             total = total + part(self.rigid[:, :1] / (s * s)) + part(self.rigid[:, 1:] / s)

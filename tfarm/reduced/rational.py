@@ -78,7 +78,8 @@ def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float 
         # 5e-14: errors below this are equal
         rank = max(error, 5e-14), -exact - poles.size
         if rank < best:
-            best, model = rank, _assembled(inside, rest, poles, shares)
+            best = rank
+            model = _assembled(inside, rest, poles, shares)
         if exact + poles.size == pairs:
             break
         exact = pairs - poles.size
@@ -118,12 +119,15 @@ def _best_poles(rest: _Remainders, most: int) -> tuple[Real, Real, float]:
     Their degree is that with the smallest error, or the first with an error of rounding alone.
     """
     best = np.empty(0), np.empty((len(rest.F), 0))
-    least, idle = float((abs(rest.F) * rest.weight).max()), 0
+    least = float((abs(rest.F) * rest.weight).max())
+    idle = 0
     for square in aaa_poles(rest.S, rest.F, rest.weight, most):
         square, shares, error = _checked(rest, square[square > rest.beyond**2])
         idle += 1
         if error < least:
-            best, least, idle = (np.sqrt(square), shares), error, 0
+            best = (np.sqrt(square), shares)
+            least = error
+            idle = 0
         # 1e-14: a weighted error below this is rounding; more poles would fit noise, as after three without progress
         if least < 1e-14 or idle == 3:
             break

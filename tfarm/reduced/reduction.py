@@ -213,7 +213,8 @@ class _Bench:
 
     def of_order(self, order: int) -> ReducedModel:
         """Return the better model of that many states."""
-        pairs, of = self._pairs(order), (self.arm, self.rows)
+        pairs = self._pairs(order)
+        of = (self.arm, self.rows)
         if (order - self.fixed) % 2 and self.arm.damping:
             return self._measured(relaxed_model(*of, pairs, self.x), "modal")
         found: list[ReducedModel] = []
@@ -231,7 +232,8 @@ class _Bench:
 
     def within(self, error: float) -> ReducedModel:
         """Return the smallest model whose error is within that one."""
-        found, most = [*self._few_poles(error)], self.most
+        found = [*self._few_poles(error)]
+        most = self.most
         if self.arm.damping:
             found += self._few_modes(error, relaxed_model, most)
             most = found[-1].model.index.size if found else most
@@ -264,7 +266,8 @@ class _Bench:
         def rough(count: int) -> float:
             return self.ruler.rough(make(self.arm, self.rows, count, self.x))
 
-        good, bad = 0, -1
+        good = 0
+        bad = -1
         sizes: list[float] = []  # of the errors with more and more modes beyond those of the range
         try:
             while (size := rough(good)) > error:

@@ -313,13 +313,15 @@ def bode(
     Raises ParameterError for an unknown output, a wrong place, a load on the link, and an illegal range.
     """
     G = transfer(arm, output, x=x, input=input)
-    arm, (row,) = G.arm, G.rows
+    arm = G.arm
+    (row,) = G.rows
     band = resonant_band(arm) if band is None else known_band(band, 1e30)
     G.must_be_of_the_hub("a Bode plot, with its zeros,")
     if not np.any(G(1j * np.geomspace(*band, 3))):
         return _no_motion(arm, row, G.x, band)
     beyond = 1.3 * band[1]  # roots just above the range shape its edge
-    all_poles, all_zeros = G.poles(up_to=beyond), G.zeros(up_to=beyond)
+    all_poles = G.poles(up_to=beyond)
+    all_zeros = G.zeros(up_to=beyond)
     poles, zeros = without_cancelled(_upper(all_poles.values), _upper(all_zeros.values))
     if all_zeros.proof == "constant":  # by an end condition: it has no pole of the arm
         poles = poles[:0]
@@ -391,7 +393,8 @@ def _no_motion(arm: Arm, row: Output, x: float | None, band: tuple[float, float]
 
 def without_cancelled(poles: Complex, zeros: Complex) -> tuple[Complex, Complex]:
     """Return poles and zeros without the pairs that cancel."""
-    kept_poles, kept_zeros = list(poles), list(zeros)
+    kept_poles = list(poles)
+    kept_zeros = list(zeros)
     for pole in poles:
         # 1e-9: relative distance below which a pole and a zero cancel
         for zero in [zero for zero in kept_zeros if abs(zero - pole) <= 1e-9 * abs(pole)][:1]:

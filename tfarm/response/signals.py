@@ -60,7 +60,8 @@ class Signals:
 
     def kept(self, s: Complex) -> LoopParts:
         """Return `parts`, cached for the last sets of points."""
-        key, kept = (s.shape, s.tobytes()), self._kept
+        key = (s.shape, s.tobytes())
+        kept = self._kept
         found = kept.pop(key, None) or read_only(self.parts(s))
         kept[key] = found  # the last one is the latest
         # 24: sets of points whose values are cached
@@ -74,7 +75,8 @@ class Signals:
 
     def parts(self, s: NDArray[Any]) -> LoopParts:
         """Return drive (n,), numerators (signals, n) in SI per unit of the input, and scale, at s of any shape."""
-        k, s = self.system, np.asarray(s, dtype=complex)
+        k = self.system
+        s = np.asarray(s, dtype=complex)
         numerators = np.empty((len(self.names), s.size), complex)
         first: LoopParts | None = None
         for share in dict.fromkeys(self.places):
@@ -155,7 +157,8 @@ def sign_convention(law: Law, arm: Arm) -> str:
     """Return the control law in words; for gains at the hub with the moment of a static torque."""
     if law.gains is not None:
         return sign_of(arm)
-    sign, variable = "-" if law.sign < 0 else "+", "z" if law.is_discrete else "s"
+    sign = "-" if law.sign < 0 else "+"
+    variable = "z" if law.is_discrete else "s"
     late = f", delay {law.delay:g} s" if law.delay else ""
     return f"v = {sign}sum of C_i({variable}) y_i{late}; v is {input_words(arm)}, y = ({', '.join(law.signals)})"
 

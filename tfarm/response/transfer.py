@@ -306,7 +306,8 @@ class TransferFunction:
         At C = 0 they are +-i times the natural frequencies, complete by their count, and 0 twice for the rigid-body
         mode.  At C > 0 they are complete by the winding number of the characteristic function.
         """
-        k, up_to = self.system, positive("up_to", up_to, A_FREQUENCY)
+        k = self.system
+        up_to = positive("up_to", up_to, A_FREQUENCY)
         if self.arm.is_undamped:
             return _on_axis(flexible_frequencies(self.arm, up_to), k.at_rest, up_to)
         starts = _near_poles(self.arm, up_to)

@@ -11,7 +11,9 @@ from tfarm.digits import powers, unit
 from .tables import Table
 
 COMPLEX = re.compile(r"(?<=[\d)])([+-])(\d[\d.]*(?:e[+-]?\d+)?)i\b")  # the imaginary part of a number
-SIGN, INFINITE = re.compile(r"(?<![\w.)])-(?=[\d.]|inf\b)"), re.compile(r"\binf\b")  # of a number in a cell
+# of a number in a cell
+SIGN = re.compile(r"(?<![\w.)])-(?=[\d.]|inf\b)")
+INFINITE = re.compile(r"\binf\b")
 TYPESET = {
     "theta_t^2": "(dθ/dt)²", "theta_t": "dθ/dt", "phi_xt(0)": "∂φ′(0)/∂t", " theta": " θ", "phi'(0)": "φ′(0)",
     "L(iw)": "L(iω)", "J w1": "J ω₁", "+-": "±",

@@ -244,7 +244,8 @@ class Difference(NamedTuple):
     @property
     def difference(self) -> Annotated[float | None, Quantity("difference", digits=4, help="second less first")]:
         """Second less first, in the unit; what rounding may leave is 0, and what is no number has none."""
-        one, other = self.one, self.other
+        one = self.one
+        other = self.other
         if any(isinstance(each, bool) or not isinstance(each, int | float) for each in (one, other)):
             return None
         gap = 0.0 if one == other else float(other - one)

@@ -260,7 +260,8 @@ def as_csv(table: Table, *, units: bool = False) -> str:
 
     With `units` these stand in brackets behind the keys.
     """
-    stream, columns = io.StringIO(), table.columns
+    stream = io.StringIO()
+    columns = table.columns
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow([f"{column.key} [{column.unit}]" if units and column.unit else column.key for column in columns])
     writer.writerows(zip(*map(_csv_cells, columns), strict=True))

@@ -21,7 +21,9 @@ from .tables import Column, Section, Table, sections
 
 COLUMN_GAP = 2  # spaces between two columns
 LEAST_FOLDED = 20  # characters to which a text may be folded
-PIPE_WIDTH, LEAST_IN_PIPE = 120, 48  # columns of a pipe, and characters to which a text may be folded there
+# columns of a pipe, and characters to which a text may be folded there
+PIPE_WIDTH = 120
+LEAST_IN_PIPE = 48
 
 
 def show(record: Any, rows: Table | None = None, last: str = "") -> None:
@@ -57,7 +59,8 @@ def first_and_last(table: Table, most: int = 40) -> tuple[Table, str]:
 
     With labels, titles and the row of dots between, 40 rows fill a screen of 50 lines; in a pipe the text is the same.
     """
-    number, half = len(table.columns[0].of), most // 2
+    number = len(table.columns[0].of)
+    half = most // 2
     left_out = number - 2 * half
     if left_out <= 1:  # a row of dots takes the place of one
         return table, ""
@@ -88,7 +91,8 @@ def terminal_width() -> int | None:
 def table_lines(table: Table, width: int | None = None) -> list[str]:
     """Return the lines of a table, each within `width` as far as its widest column allows; without one, for a pipe."""
     columns = table.columns
-    is_pipe, width = width is None, width or PIPE_WIDTH
+    is_pipe = width is None
+    width = width or PIPE_WIDTH
     shortest = LEAST_IN_PIPE if is_pipe else LEAST_FOLDED
     widths = [widest([each.heading, *each.cells]) for each in columns]
     if sum(widths) + COLUMN_GAP * (len(widths) - 1) <= width:  # rich would take a second for two thousand rows
@@ -109,7 +113,8 @@ def table_lines(table: Table, width: int | None = None) -> list[str]:
     for block in blocks:
         grid = RichTable(box=None, pad_edge=False, padding=(0, COLUMN_GAP, 0, 0), header_style="")
         for column in block:
-            size, side = least(column, shortest), "left" if column.is_text else "right"
+            size = least(column, shortest)
+            side = "left" if column.is_text else "right"
             fixed = None if column.folds else size
             grid.add_column(Text(column.heading), justify=cast("Any", side), width=fixed, min_width=size)
         for row in zip(*(column.cells for column in block), strict=True):

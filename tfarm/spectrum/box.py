@@ -87,9 +87,11 @@ def winding_number(function: Function, box: Box, points: int = FIRST_POINTS) -> 
 
     Raises ConvergenceError where a zero is on the contour, within the resolution of float64.
     """
-    corners, turn = np.append(box.corners, box.corners[0]), 2 * math.pi
+    corners = np.append(box.corners, box.corners[0])
+    turn = 2 * math.pi
     if box.is_symmetric:
-        corners, turn = np.array([box.re_max, *box.corners[2:], box.re_min]), math.pi
+        corners = np.array([box.re_max, *box.corners[2:], box.re_min])
+        turn = math.pi
     path = [np.linspace(a, b, points, endpoint=False) for a, b in pairwise(corners)]
     return round(turned(function, np.append(path, corners[-1]), box.across) / turn)
 
@@ -101,14 +103,20 @@ def turned(function: Function, path: Complex, across: float, nearest: float = NE
     of |s|, with |s| between 1e-8 and 1 times `across`, and for more than 200,000 points.
     """
     phase, rate = _phase(function, path)
-    start, end = np.array([path[:-1], phase[:-1], rate[:-1]]), np.array([path[1:], phase[1:], rate[1:]])
-    angle, seen = 0.0, path.size
+    start = np.array([path[:-1], phase[:-1], rate[:-1]])
+    end = np.array([path[1:], phase[1:], rate[1:]])
+    angle = 0.0
+    seen = path.size
     while True:
-        length, step = end[0] - start[0], np.angle(np.exp(1j * (end[1] - start[1]).real))
+        length = end[0] - start[0]
+        step = np.angle(np.exp(1j * (end[1] - start[1]).real))
         foreseen = abs(length) * np.maximum(abs(start[2]), abs(end[2]))
         smooth = (abs(step) <= 0.6) & (foreseen <= FORESEEN)  # nan is not smooth
         angle += float(step[smooth].sum())
-        start, end, length, step = start[:, ~smooth], end[:, ~smooth], length[~smooth], step[~smooth]
+        start = start[:, ~smooth]
+        end = end[:, ~smooth]
+        length = length[~smooth]
+        step = step[~smooth]
         if not length.size:
             return angle
         smallest = nearest * np.clip(abs(start[0]), 1e-8 * across, across)
@@ -116,7 +124,9 @@ def turned(function: Function, path: Complex, across: float, nearest: float = NE
             raise ConvergenceError(f"a zero lies on the contour near {start[0, 0]:.6g}", start[0, 0], step[0])
         halfway = (start[0] + end[0]) / 2
         middle = np.array([halfway, *_phase(function, halfway)])
-        start, end, seen = np.hstack([start, middle]), np.hstack([middle, end]), seen + halfway.size
+        start = np.hstack([start, middle])
+        end = np.hstack([middle, end])
+        seen = seen + halfway.size
 
 
 def _phase(function: Function, points: Complex) -> tuple[NDArray[np.float64], Complex]:
@@ -138,7 +148,9 @@ def newton(
     steps.
     """
     s = np.array(starts, dtype=complex)
-    settled, moving, last = np.zeros(s.size, bool), np.arange(s.size), np.full(s.size, np.inf)
+    settled = np.zeros(s.size, bool)
+    moving = np.arange(s.size)
+    last = np.full(s.size, np.inf)
     many = longest = since = 0
     for step in range(60):
         at = function(s[moving])
@@ -149,12 +161,14 @@ def newton(
         moving = moving[known]
         move = _at_most(0.3 * abs(s[moving]), move[known])
         s[moving] -= move
-        away, size = abs(move), abs(s[moving])
+        away = abs(move)
+        size = abs(s[moving])
         settled[moving] = away < 1e-11 * size
         ended = (away <= 1e-15 * size) | (settled[moving] & (away > 0.9 * last[moving]))
         last[moving], moving = away, moving[~ended]
         if listed is not None and settled.sum() > many:
-            many, length = settled.sum(), listed(s[settled]).size
+            many = settled.sum()
+            length = listed(s[settled]).size
             longest, since = (length, step) if length > longest else (longest, since)
         if listed is not None and (longest >= expected or step - since > 6):
             moving = moving[settled[moving]]
@@ -184,8 +198,11 @@ def repelled(function: Function, starts: Complex, zeros: Complex, box: Box, miss
         n = np.argmin(away)
         chosen.append(complex(points[n] - step[n]))
         is_far = abs(points - points[n]) > away[n]
-        points, step, away = points[is_far], step[is_far], away[is_far]
-    points, is_next = np.array(chosen, complex), np.zeros(len(chosen), bool)
+        points = points[is_far]
+        step = step[is_far]
+        away = away[is_far]
+    points = np.array(chosen, complex)
+    is_next = np.zeros(len(chosen), bool)
     for _ in range(15):
         points, step, away = _apart(function, points, zeros, points, farthest)
         points = points - step
@@ -209,16 +226,20 @@ def _apart(
         step = 1 / (alone - np.where(between == 0, 0, 1 / between).sum(axis=1))
         away = abs(1 / alone)
     known = np.isfinite(step)
-    s, step, away = s[known], step[known], away[known]
+    s = s[known]
+    step = step[known]
+    away = away[known]
     return s, _at_most(farthest, step), away
 
 
 def distinct(points: Complex) -> Complex:
     """Return the points without those within 1e-9 of an earlier one; each is compared with those of nearly its size."""
     order = np.argsort(abs(points))
-    ranked, again = points[order], np.zeros(points.size, bool)
+    ranked = points[order]
+    again = np.zeros(points.size, bool)
     for n in range(1, points.size):
-        larger, smaller = ranked[n:], ranked[:-n]
+        larger = ranked[n:]
+        smaller = ranked[:-n]
         near = 1e-9 * abs(larger)
         if not (abs(larger) - abs(smaller) <= near).any():
             break
@@ -270,7 +291,8 @@ def complete(
 
 def _search(function: Function, box: Box, starts: Complex, known: Complex, found: Complex, depth: int) -> Complex:
     """Return all zeros in the box, by halves where some are missing; `found` are zeros of a larger box."""
-    expected, mirrored = winding_number(function, box), box.is_symmetric
+    expected = winding_number(function, box)
+    mirrored = box.is_symmetric
     if not expected:
         return NOTHING_KNOWN
     width = max(box.re_max - box.re_min, box.im_max - box.im_min)

@@ -36,7 +36,9 @@ from .table import Modes, first_frequency, modes
 
 COMPANY = 6  # modes named beyond the list: a box may end below them
 MOST_MODES = 300  # of a damped table
-SLOWEST, REAL_POINTS = 1e-6, 300  # of the lowest frequency, and number: points of the negative real axis
+# of the lowest frequency, and number: points of the negative real axis
+SLOWEST = 1e-6
+REAL_POINTS = 300
 DRIVE_PARTS = {
     "friction": "hub friction",
     "back_emf": "back-EMF",
@@ -108,7 +110,8 @@ class DampedModes:
 
         Raises CertificationError where that fails.
         """
-        k, discs = self.undamped.system, []
+        k = self.undamped.system
+        discs = []
         for pair in self._listed:
             wanted = pair[:1] if pair[0].imag > 0 else pair[np.isfinite(pair)]
             discs.append(tuple(enclosed(k, complex(zero), digits) for zero in wanted))
@@ -212,11 +215,15 @@ def _searched_once(arm: Arm, theory: Theory, count: int, steps: float, reach: fl
 
 def _searched(undamped: Modes, steps: float, reach: float) -> DampedModes:
     """Return all eigenvalues in a box, assigned to their modes where that is certain."""
-    k, arm, theory = undamped.system, undamped.arm, undamped.theory
+    k = undamped.system
+    arm = undamped.arm
+    theory = undamped.theory
     count = int(undamped.index.max())
     omega = modes(arm, count + COMPANY, theory=theory).flexible
     single, every = named(undamped, count + int((k.damping * omega[count:] < reach).sum()), steps)
-    pairs, company, omega = every[:count], every[count:], omega[: count + 1]
+    pairs = every[:count]
+    company = every[count:]
+    omega = omega[: count + 1]
     lost = np.flatnonzero(np.isnan(pairs[:, 0]))
     box, found = _boxed(undamped, omega, _with_single(single, pairs), company)
     for zeros in (single, pairs):
@@ -255,7 +262,8 @@ def _boxed(undamped: Modes, omega: Real, listed: Complex, company: Complex) -> t
     `company` are pairs that are not listed, `omega` the undamped frequencies of the list and the next one.
     """
     k = undamped.system
-    f, is_whole = function_of(k), bool(np.isfinite(listed[:, 0]).all())
+    f = function_of(k)
+    is_whole = bool(np.isfinite(listed[:, 0]).all())
     box = complete_box(f, listed, company, k.damping) if is_whole else None
     if box is not None:
         return box, listed[box.holds(listed)]
@@ -313,7 +321,8 @@ def entered(damped: DampedModes) -> Real:
     from scipy.optimize import brentq  # half a second to import, and not needed for an undamped arm
 
     k = damped.undamped.system
-    lowest, last = first_frequency(damped.undamped.arm), float(damped.natural_frequency.max())
+    lowest = first_frequency(damped.undamped.arm)
+    last = float(damped.natural_frequency.max())
     reach = TOWARD_SINGULAR / k.damping if k.damping else last
     at = -np.geomspace(min(SLOWEST * lowest, reach / 2), reach, REAL_POINTS)
 
@@ -324,6 +333,7 @@ def entered(damped: DampedModes) -> Real:
     alone = damped.unassigned_pairs[:, 0]
     overdamped = damped.eigenvalues[damped.is_overdamped].real.ravel()
     known = np.sort(-np.r_[overdamped, damped.single, alone[alone.imag == 0].real])
-    sides, passed = np.sign(signed(at)), np.searchsorted(known, -at)
+    sides = np.sign(signed(at))
+    passed = np.searchsorted(known, -at)
     new = np.flatnonzero((sides[1:] * sides[:-1] < 0) & (np.diff(passed) == 0))
     return np.array([brentq(lambda s: float(signed(np.array([s]))[0]), at[n + 1], at[n], xtol=1e-300) for n in new])

@@ -32,7 +32,8 @@ def settled(function: Callable[..., Analytic], guess: Complex, *values: Real) ->
 
     The function is of s and, where these are given, of `values` (n,).
     """
-    s, still = guess.copy(), ~np.isnan(guess)
+    s = guess.copy()
+    still = ~np.isnan(guess)
     with np.errstate(all="ignore"):
         for _ in range(NEWTON_STEPS):
             if not still.any():
@@ -144,12 +145,15 @@ def between(family: Family, values: Real, rows: Complex, wanted: Real) -> Comple
 
     By interpolation, or where that is uncertain by following them from the known value below.
     """
-    values, rows = values.copy(), rows.copy()  # as in `follow`
+    # as in `follow`
+    values = values.copy()
+    rows = rows.copy()
     found = np.empty((wanted.size, rows.shape[1]), complex)
     right = np.clip(np.searchsorted(values, wanted), 1, values.size - 1)
     for n in np.unique(right):
         low = int(np.clip(n - PAST // 2, 0, max(0, values.size - PAST)))
-        here, near = np.flatnonzero(right == n), slice(low, low + PAST)
+        here = np.flatnonzero(right == n)
+        near = slice(low, low + PAST)
         guess = predicted(values[near], rows[near], wanted[here], rows[n - 1])
         found[here] = corrected(family, wanted[here], guess, rows[n - 1])
         singular = family.singular(wanted[here])
@@ -181,7 +185,8 @@ def assigned(family: Family, value: float, guess: Complex) -> Complex:
 @compiled
 def nearest(row: Any) -> Any:
     """Return the index of the nearest other root of each of the roots (b,), and its distance, inf for none."""
-    index, away = np.zeros(row.size, np.int64), np.full(row.size, np.inf)
+    index = np.zeros(row.size, np.int64)
+    away = np.full(row.size, np.inf)
     for i in range(row.size):
         for j in range(row.size):
             distance = abs(row[i] - row[j])
@@ -209,7 +214,8 @@ def predicted(at: Any, rows: Any, wanted: Any, base: Any) -> Any:
 
     Roots from before two of them met are left out.
     """
-    partner, guess = couples(base), np.full((wanted.size, base.size), LOST)
+    partner = couples(base)
+    guess = np.full((wanted.size, base.size), LOST)
     for m in range(wanted.size):
         for low in range(at.size):
             weights = np.ones(at.size)
@@ -241,7 +247,8 @@ def _of_one(weights: Any, first: Any, second: Any, base: Any) -> Any:
 @inlined
 def _of_couple(weights: Any, first: Any, second: Any, base: Any, other: Any) -> Any:
     """Return both of a couple by polynomials of their mean and of the square of half their distance."""
-    square, apart = 0j, (base - other) / 2.0
+    square = 0j
+    apart = (base - other) / 2.0
     for k in range(weights.size):
         half = (first[k] - second[k]) / 2.0
         square += weights[k] * (half * half)
@@ -276,13 +283,15 @@ def which_plain(guess: Any, found: Any, base: Any, singular: Any, blur: float) -
     for m in range(len(found)):
         index, away = nearest(found[m])
         for i in range(base.size):
-            here, is_couple = found[m, i], index[index[i]] == i
+            here = found[m, i]
+            is_couple = index[index[i]] == i
             others = np.append(np.abs(np.append(found[m], singular[m]) - here), np.inf)
             others[i] = np.inf
             # of a couple the roots meet or separate
             if is_couple:
                 others[index[i]] = np.inf
-            room, moved = np.nanmin(others), abs(here - guess[m, i])
+            room = np.nanmin(others)
+            moved = abs(here - guess[m, i])
             if base[i].imag != 0.0 and np.all(base != base[i].conjugate()):
                 room = min(room, 2.0 * min(abs(here.imag), abs(base[i].imag)))
             same_side = np.sign(here.imag) == np.sign(guess[m, i].imag)

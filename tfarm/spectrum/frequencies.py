@@ -41,7 +41,8 @@ MOST_AXIS_BITS = 40_000  # of working precision: a root that needs more is doubl
 
 def real_waves(a: Ball, b: Ball, g: Ball, S: Ball) -> tuple[tuple[Ball, ...], tuple[Ball, ...]]:
     """Return c, sinh t / t, z, v and the scale of both waves at S = -omega^2, which are real."""
-    half, product = S * (a + b) / 2, S * (a * b * S + g)
+    half = S * (a + b) / 2
+    product = S * (a * b * S + g)
     spread = (half * half - product).sqrt()
     return _wave(half + spread, b * S), _wave(half - spread, b * S)
 
@@ -60,13 +61,15 @@ def _wave(z: Ball, bS: Ball) -> tuple[Ball, ...]:
 
 def pinned_count(squares: Iterable[Ball]) -> int | None:
     """Return the count for both ends pinned: half waves inside the length, one above the cut-off; None if uncertain."""
-    number, travelling = 0, 0
+    number = 0
+    travelling = 0
     for z in squares:
         if z < 0:
             whole = ((-z).sqrt() / flint.arb.pi()).floor().unique_fmpz()
             if whole is None:
                 return None
-            number, travelling = number + int(whole), travelling + 1
+            number = number + int(whole)
+            travelling = travelling + 1
         elif not z > 0:
             return None
     return number + (travelling == 2)
@@ -99,7 +102,9 @@ class AxisSweep(Sweep):
 
     def _joined(self, element: Any, p: Plane) -> Plane:
         a, b, g, *_ = element
-        own, l, EI = real_waves(a, b, g, self.S), element.length, element.stiffness
+        own = real_waves(a, b, g, self.S)
+        l = element.length
+        EI = element.stiffness
         one, two = (in_chain(wave, l) for wave in own)
         gS = self.S * g * EI / l**4
         gap = one[2] - two[2]
@@ -114,7 +119,8 @@ class AxisSweep(Sweep):
         return inside
 
     def _count_segment(self, z: Sequence[Ball], p: Plane, q: Plane, r: Sequence[Ball]) -> None:
-        outside, pinned = self.number, pinned_count(z)
+        outside = self.number
+        pinned = pinned_count(z)
         if pinned is None:
             raise UncertainError
         self.number = pinned
@@ -162,17 +168,21 @@ class RealAxis:
 def secant(axis: RealAxis, omega: float, digits: int) -> Ball | None:
     """Return the root next to omega by the secant method on midpoints; None if it does not converge there."""
     # 50: equal bits of the two first points of a secant
-    before, now = flint.arb(omega), flint.arb(omega) * (1 + flint.arb(2) ** -50)
+    before = flint.arb(omega)
+    now = flint.arb(omega) * (1 + flint.arb(2) ** -50)
     value_before = axis.drive(before).mid()
     # 36: equal bits of a root and its start: a simple root in float64 has more
-    small, near = now * flint.arb(10) ** -(digits + 2), now * flint.arb(2) ** -36
+    small = now * flint.arb(10) ** -(digits + 2)
+    near = now * flint.arb(2) ** -36
     # 40 of the secant, at most: each has 1.6 times the digits
     for _ in range(40):
         value = axis.drive(now).mid()
         if value == value_before:
             return now
         step = (value * (now - before) / (value - value_before)).mid()
-        before, value_before, now = now, value, (now - step).mid()
+        before = now
+        value_before = value
+        now = (now - step).mid()
         if not abs(now - omega) < near:
             return None
         if abs(step) < small:
@@ -225,7 +235,8 @@ def list_frequencies(systems: Sequence[System], first: int, last: int) -> None:
     stacked = read_only(np.concatenate(rows)), starts, read_only(np.array(ends))
     list_steps(lowest, last + 1, *stacked, estimate, found)
     # 1e-3 of the mean spacing: above it rounding moves neither root by more than a few last units
-    close, near = np.diff(found) * number[1:] < 1e-3 * found[:, 1:], np.zeros(found.shape, bool)
+    close = np.diff(found) * number[1:] < 1e-3 * found[:, 1:]
+    near = np.zeros(found.shape, bool)
     near[:, 1:] = close
     near[:, :-1] |= close
     for j, i in np.argwhere(near):
@@ -237,7 +248,8 @@ def list_frequencies(systems: Sequence[System], first: int, last: int) -> None:
 
 def _separated(k: System, omega: float, number: int) -> float:
     """Return the frequency of that number next to omega, close to another, by the count in balls."""
-    low, high = omega * (1 - PAIR_REACH), omega * (1 + PAIR_REACH)
+    low = omega * (1 - PAIR_REACH)
+    high = omega * (1 + PAIR_REACH)
     # 256 of working precision, for a double frequency to its last float64 digit
     with precision(256):
         axis = RealAxis(k)
@@ -265,7 +277,8 @@ def refine(k: System, omega: float, digits: int) -> str:
     The sign of D(i w) changes within a tenth of the last digit, certified.
     Raises ConvergenceError where it does not: at a double frequency, or a pair that float64 does not separate.
     """
-    axis, text = RealAxis(k), f"no {digits} digits of the frequency near {omega:.10g} rad/s: no sign change"
+    axis = RealAxis(k)
+    text = f"no {digits} digits of the frequency near {omega:.10g} rad/s: no sign change"
 
     def attempt() -> str | None:
         root = secant(axis, omega, digits)

@@ -62,7 +62,8 @@ def most_gain(arm: Arm, name: str) -> float:
 def check_gains(arm: Arm, law: HubFeedback, least: float = LEAST_UNITS) -> None:
     """Raise ParameterError for a gain that is too large for the arm, or too small: 0 to `least` of its unit."""
     for name, unit in {"Kp": "J w1^2", "K1": "J w1", "K2": "1"}.items():
-        value, own = law[name], gain_unit(arm, name)
+        value = law[name]
+        own = gain_unit(arm, name)
         remedy = f"for this arm at most {MOST_UNITS:g} times {unit} in size, {MOST_UNITS * own:.3g}"
         require(abs(value) <= MOST_UNITS * own, name, value, remedy)
         remedy = f"for this arm 0, or at least {least:g} times {unit} in size, {least * own:.3g}"
@@ -85,7 +86,8 @@ def default_gains(arm: Arm) -> HubFeedback:
 
 def default_words(arm: Arm, names: Iterable[str] = ("K1", "K2")) -> str:
     """Return the default gains of these names and their reason, in one clause."""
-    law, is_paper = default_gains(arm), _is_of_the_paper(arm)
+    law = default_gains(arm)
+    is_paper = _is_of_the_paper(arm)
     why = "as in the paper" if is_paper else f"{RATE_SHARE:g} J w1 of this arm"
     units = {name: written_unit(name, arm) for name in ("K1", "K2")}
     words = {"K1": f"K1 = {law.K1:g}{units['K1']} ({why})", "K2": f"K2 = {law.K2:g}{units['K2']}"}

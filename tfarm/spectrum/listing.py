@@ -131,7 +131,8 @@ class ModeList:
         """The flexible modes without an eigenvalue and the reason, in one line; None where each has one."""
         if self.damped is None:
             return None
-        last, notes = int(self.damped.index[-1]), []
+        last = int(self.damped.index[-1])
+        notes = []
         without = self.damped.index[~self.damped.is_assigned].tolist()
         if without:
             notes.append(f"no eigenvalue is assigned for certain to mode {', '.join(map(str, without))}")
@@ -161,13 +162,16 @@ def listed_modes(
     """
     wanted = None if not certify else DOUBLE_DIGITS if digits is None else digits
     proof = None if wanted is None else found.certify(wanted)
-    damped, discs, failure = None, None, None
+    damped = None
+    discs = None
+    failure = None
     if not found.arm.is_undamped:
         try:
             damped = damped_modes(found)
             discs = None if wanted is None else damped.certify(wanted)
         except (ConvergenceError, CertificationError) as error:
-            damped, failure = None, f"damped modes: {error}"
+            damped = None
+            failure = f"damped modes: {error}"
     rows = list(_rows(found, digits, method, damped, proof, discs))
     free = () if damped is None else damped.unassigned
     enclosed = [None] * len(free) if discs is None else [tuple(each) for each in discs[len(discs) - len(free) :]]
@@ -188,15 +192,18 @@ def _rows(
     discs: Sequence[Sequence[Disc]] | None,
 ) -> Iterator[ListedMode]:
     """Yield a row for each mode."""
-    locked, rigid = hub_locked(found), len(found) - found.flexible.size
+    locked = hub_locked(found)
+    rigid = len(found) - found.flexible.size
     frequencies = found.frequencies(method)
     omega: list[Any] = frequencies.tolist()
     hertz = (frequencies / (2 * math.pi)).tolist()
     still: list[Any] = locked.flexible.tolist()
     if digits is not None and digits > DOUBLE_DIGITS:
-        omega, still = found.digits(digits), locked.digits(digits)[-locked.flexible.size :]
+        omega = found.digits(digits)
+        still = locked.digits(digits)[-locked.flexible.size :]
     brackets = [(None, None)] * len(found) if proof is None else [*[(None, None)] * rigid, *proof.brackets]
-    theories, sensitivity = compare_theories(found), found.sensitivity
+    theories = compare_theories(found)
+    sensitivity = found.sensitivity
     enclosures = _discs_by_mode(damped, discs)
     for row in range(len(found)):
         first, second, ratio = (None, None, None) if damped is None else _damped(damped, row)

@@ -40,18 +40,22 @@ def _newton(s: Any, rows: Any, ends: Any, at_rest: int, singular: Any) -> None:
     """Replace guesses s (n,) by the zeros of D/s^at_rest next to them, or NaN, as `following.settled` does."""
     moving = np.flatnonzero(~np.isnan(s))
     for _ in range(NEWTON_STEPS):
-        here, many = s[moving], moving.size
+        here = s[moving]
+        many = moving.size
         if many == 0:
             break
-        near, left = np.ones(many), np.empty(many)
+        near = np.ones(many)
+        left = np.empty(many)
         for each in singular:
             near = np.minimum(near, np.abs(1.0 - here / each))
         h = DIFFERENCE_STEP * np.maximum(np.abs(here) * near, 1e-300)
         at = np.concatenate((here, here + h, here - h))
-        found, lost = np.empty((2, at.size), np.complex128), np.empty(at.size, np.bool_)
+        found = np.empty((2, at.size), np.complex128)
+        lost = np.empty(at.size, np.bool_)
         fill_free(at, rows, ends, AXIS, NO_OUTPUT, found, lost, False)
         for i in range(many):
-            up, down = i + many, i + 2 * many
+            up = i + many
+            down = i + 2 * many
             move = LOST
             # complex division by zero is an error in compiled code
             if here[i] != 0.0:
@@ -97,7 +101,9 @@ class Damping:
             # after the steps that there are in all roots that are stray are soon lost
             self.most_halvings = min(self.most_halvings, 8)
         units = (values * self.level)[:, None]
-        found, (rows, of_rows), (ends, of_ends) = guess / units, self.rows, self.ends
+        found = guess / units
+        (rows, of_rows) = self.rows
+        (ends, of_ends) = self.ends
         rows = read_only((rows + values[:, None, None] * of_rows).view(ROW)[..., 0])  # as those of a layout are
         ends = read_only(ends + values[:, None] * of_ends)
         for n, here in enumerate(found):
@@ -106,13 +112,15 @@ class Damping:
 
     def complete(self, value: float, guess: Complex) -> Complex:
         """Return the roots next to the guesses, with mirror images for guesses below the real axis."""
-        unit, wanted = value * self.level, guess[~np.isnan(guess)]
+        unit = value * self.level
+        wanted = guess[~np.isnan(guess)]
         starts = np.outer(wanted[wanted.imag >= 0] / unit, AROUND).ravel()
         with np.errstate(all="ignore"):
             found = newton(function_of(self.k.with_damping(value)), starts) * unit
         # the imaginary part of a double zero is rounding
         found = np.where(abs(found.imag) < 1e-7 * abs(found), found.real, found)
-        upper, lower = found[found.imag > 0], wanted[wanted.imag < 0].conj()
+        upper = found[found.imag > 0]
+        lower = wanted[wanted.imag < 0].conj()
         away = abs(upper[:, None] - lower).min(axis=1, initial=np.inf)
         return np.r_[found[found.imag >= 0], upper[away < abs(AROUND[-1] - 1) * abs(upper)].conj()]
 
@@ -157,7 +165,8 @@ def named(undamped: Modes, count: int, steps: float) -> tuple[Complex, Complex]:
                 share = ends.pop(0)
             break
         except ConvergenceError as lost:
-            (share, start), stray = lost.best, lost.residual
+            (share, start) = lost.best
+            stray = lost.residual
             start = np.where(stray, LOST, start)
     found = np.full(start.size, LOST) if ends else settled(function_of(k), start / family.level)
     with np.errstate(invalid="ignore"):  # of lost ones
@@ -172,11 +181,13 @@ def in_pairs(single: Complex, pairs: Complex) -> tuple[Complex, Complex]:
 
     Of two modes the higher one has the pair, and the lower one the other two zeros; a single zero is left to none.
     """
-    single, pairs = single.copy(), pairs.copy()
+    single = single.copy()
+    pairs = pairs.copy()
     for n in (*range(len(pairs)), *range(len(pairs))):  # twice, as one of two may have half of another pair
         rings = np.flatnonzero(np.isfinite(pairs[n]) & (pairs[n].imag != 0))
         if rings.size == 1:
-            one, rest = pairs[n, rings[0]], pairs[n, 1 - rings[0]]
+            one = pairs[n, rings[0]]
+            rest = pairs[n, 1 - rings[0]]
             alone, other = (abs(each - one.conj()) <= REAL_SHARE * abs(one) for each in (single, pairs))
             pairs[n] = one, one.conj()
             if other.any():

@@ -82,14 +82,16 @@ def certify(k: System, omega: NDArray[np.float64], above: float, digits: int, ri
 def _bracket(k: System, omega: float, digits: int) -> tuple[Fraction, Fraction]:
     """Return neighbouring decimals of that many digits with a certified sign change of D between them."""
     exponent = math.floor(math.log10(omega)) - digits + 1
-    axis, unit = RealAxis(k), Fraction(10) ** exponent
+    axis = RealAxis(k)
+    unit = Fraction(10) ** exponent
 
     def attempt() -> tuple[Fraction, Fraction] | None:
         root = secant(axis, omega, digits)
         number = None if root is None else (root / rational(unit)).floor().unique_fmpz()
         if number is None:
             return None
-        lower, upper = int(number) * unit, (int(number) + 1) * unit
+        lower = int(number) * unit
+        upper = (int(number) + 1) * unit
         return (lower, upper) if axis.drive(rational(lower)) * axis.drive(rational(upper)) < 0 else None
 
     text = f"no certified sign change in {digits} digits near {omega:.15g} rad/s: a double or a very close pair"
@@ -140,7 +142,9 @@ def proven_count(k: System, box: Box, law: Feedback | None = None) -> int:
     """
     if k.damping and box.re_min <= -1.0 / k.damping:
         raise CertificationError(f"a box from {box.re_min:g} 1/s on contains the accumulation point -1/C")
-    right, left, top = box.re_max, box.re_min, box.im_max
+    right = box.re_max
+    left = box.re_min
+    top = box.im_max
     corners = [complex(right, 0), complex(right, top), complex(left, top), complex(left, 0)]
     # 96 of working precision along a contour
     with precision(96):
@@ -156,8 +160,12 @@ def proven_count(k: System, box: Box, law: Feedback | None = None) -> int:
 def _turning(k: System, law: Feedback | None, a: Ball, b: Ball) -> Ball:
     """Return the change of arg D along the side from a to b."""
     # 1 / 32 of a side of the contour, before adaptation: time alone
-    total, start, step, pieces = flint.arb(0), 0.0, 1 / 32, 0
-    here, value = a, characteristic_over(k, a, law)
+    total = flint.arb(0)
+    start = 0.0
+    step = 1 / 32
+    pieces = 0
+    here = a
+    value = characteristic_over(k, a, law)
     while start < 1:
         end = min(start + step, 1.0)
         there = (a + (b - a) * end).mid()
@@ -176,7 +184,10 @@ def _turning(k: System, law: Feedback | None, a: Ball, b: Ball) -> Ball:
         end_value = characteristic_over(k, there, law)
         total += (end_value / value).log().imag
         # 1.125 of a step after a good one; tuned: with 2 every second step was too long
-        start, here, value, step = end, there, end_value, 1.125 * step
+        start = end
+        here = there
+        value = end_value
+        step = 1.125 * step
     return total
 
 

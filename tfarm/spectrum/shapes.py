@@ -49,13 +49,15 @@ from tfarm.exact.values import free_fields
 from tfarm.exact.waves import SERIES_RADIUS, fill_wave_numbers, transition_rows, transition_series
 from tfarm.records import read_only
 
-_rows, _series = python_of(transition_rows), python_of(transition_series)
+_rows = python_of(transition_rows)
+_series = python_of(transition_series)
 
 DOUBLE = 1e-15  # relative gap under which two frequencies are one, with two modes
 CLOSE_MODES = 1e-5  # relative gap under which rounding would leave two modes not quite orthogonal
 PANELS_AT_ONCE = 2**13  # times modes, each of 4 kB: memory alone
 NO_MOTION = 1e-9  # of another motion of the tip or hub: a smaller one is rounding
-AT_HUB, AT_TIP = Place(Fraction(0), "inner"), Place(Fraction(1))
+AT_HUB = Place(Fraction(0), "inner")
+AT_TIP = Place(Fraction(1))
 
 
 class Shapes:
@@ -75,7 +77,8 @@ class Shapes:
         # Each mode is a sum of four responses, two of its own and two of a close neighbour below, for orthogonality:
         # frequency, condition on the axis (`_conditions`), scale and factor of each, the modes last.
         gap = np.r_[np.inf, np.diff(omega) / omega[1:], np.inf]
-        is_first, is_second = gap[1:] < DOUBLE, gap[:-1] < DOUBLE
+        is_first = gap[1:] < DOUBLE
+        is_second = gap[:-1] < DOUBLE
         close = np.minimum(gap[1:], gap[:-1]) < CLOSE_MODES
         conditions = self._conditions()
         left = np.array([self._at_axis(axis) for axis in conditions[:2]])
@@ -150,7 +153,8 @@ class Shapes:
 
     def states(self, places: tuple[Place, ...]) -> tuple[Real, Real]:
         """Return W, Psi, M, Q (fields, modes, places) and the hub angle (modes,)."""
-        fields, theta = np.zeros((4, self.omega.size, len(places))), np.zeros(self.omega.size)
+        fields = np.zeros((4, self.omega.size, len(places)))
+        theta = np.zeros(self.omega.size)
         for modes, _, more, turned in self._responses(places):
             fields[:, modes] += more
             theta[modes] += turned
@@ -191,7 +195,8 @@ class Shapes:
 
     def _conditions(self) -> Real:
         """Return conditions (4, 4, modes) on the axis: W = 0, the balance A Psi = M, and two for close modes."""
-        A, none = float(self.system.drive.stiffness) - float(self.system.drive.inertia) * self.omega**2, 0 * self.omega
+        A = float(self.system.drive.stiffness) - float(self.system.drive.inertia) * self.omega**2
+        none = 0 * self.omega
         units = np.eye(4)[:, :, None] + none
         size = np.maximum(abs(A), 1.0)
         balance = [none, A / size, -1.0 / size, none]
@@ -216,7 +221,8 @@ class Shapes:
 
     def _moving(self) -> list[tuple[Real, Real]]:
         """Return inertias (n,) and their motions (n, modes): along the segments, of bodies, payload and hub."""
-        system, parts = self.system, []
+        system = self.system
+        parts = []
         for piece, weights, (W, Psi, _, _) in self.panels():
             parts.append((float(piece.g * piece.stiffness / piece.length**4) * weights, W.T))
             parts.append((float(piece.a * piece.stiffness / piece.length**2) * weights, Psi.T))
@@ -254,7 +260,8 @@ class Shapes:
             overlap = self.part(slice(lower, lower + 2)).mass_matrix()[0, 1]
             self._factors[2:, lower + 1] = -overlap * self._factors[:2, lower]
             self._factors[:, lower + 1] /= math.sqrt(self.part(slice(lower + 1, lower + 2)).masses()[0])
-        tip, theta = self.tip(), self.theta()
+        tip = self.tip()
+        theta = self.theta()
         turned = np.where(abs(tip[1]) > NO_MOTION * abs(theta), tip[1], theta)
         motion = np.where(abs(tip[0]) > NO_MOTION * abs(tip[1]), tip[0], turned)
         self._factors = self._factors * np.where(motion < 0, -1.0, 1.0)
@@ -262,11 +269,13 @@ class Shapes:
 
 def _of_segment(segment: Segment, omega: Real, ends: Real, x: Real) -> Real:
     """Return W, Psi, M, Q (4, modes, n) at the shares x (modes, n) from the states (4, modes, 2) at both ends."""
-    numbers, result = np.empty((2, 3, omega.size), complex), np.empty((4, *x.shape))
+    numbers = np.empty((2, 3, omega.size), complex)
+    result = np.empty((4, *x.shape))
     fill_wave_numbers(1j * omega, read_only(kernel_row(segment)), numbers)
     units = [float(each) for each in segment.units]
     own = np.array([units[0], 1.0, *units[1:]])[:, None]
-    inner, outer = ends[..., 0] * own, ends[..., 1] * own
+    inner = ends[..., 0] * own
+    outer = ends[..., 1] * own
     low = abs(numbers[:, 0]).max(axis=0) < SERIES_RADIUS
     if low.any():
         result[:, low] = _by_series(segment, omega[low], inner[:, low], x[low])
@@ -282,7 +291,8 @@ def _of_segment(segment: Segment, omega: Real, ends: Real, x: Real) -> Real:
 def _by_series(segment: Segment, omega: Real, inner: Real, x: Real) -> Real:
     """Return W, Psi, M, Q in a slow segment's own units, carried outwards, with the other sign of Psi and Q."""
     a, b, g, _ = k = [float(each) for each in segment[:4]]
-    S, outwards = -(omega[:, None] ** 2), np.array([1.0, -1.0, 1.0, -1.0])[:, None]
+    S = -(omega[:, None] ** 2)
+    outwards = np.array([1.0, -1.0, 1.0, -1.0])[:, None]
     F0, F1, F2, F3, _, _ = _series(S * (a + b) * x**2, S * (a * b * S + g) * x**4)
     rows = _rows((x**3 * F0, x**2 * F1, x * F2, F3), S, 1.0, k)
     state = (inner * outwards)[..., None]
@@ -293,7 +303,9 @@ def _by_series(segment: Segment, omega: Real, inner: Real, x: Real) -> Real:
 def _by_waves(segment: Segment, omega: Real, numbers: Complex, inner: Real, outer: Real, x: Real) -> Real:
     """Return W, Psi, M, Q in a fast segment's own units, of both waves: without damping their z and v are real."""
     gS = -float(segment.g) * omega**2
-    z, v, k = numbers[:, 0].real, numbers[:, 1].real, abs(numbers[:, 2])
+    z = numbers[:, 0].real
+    v = numbers[:, 1].real
+    k = abs(numbers[:, 2])
     fields = np.zeros((4, *x.shape))
     for n, other in ((0, 1), (1, 0)):
         gap = z[n] - z[other]
@@ -305,12 +317,14 @@ def _by_waves(segment: Segment, omega: Real, numbers: Complex, inner: Real, oute
 
 def _wave(z: Real, k: Real, ends: list[tuple[Real, Real]], x: Real) -> tuple[Real, Real]:
     """Return W_j and s_j (modes, n) of a wave with real z = -k^2 or k^2, from those (modes,) at both ends."""
-    z, k = z[:, None], np.maximum(k, LEAST_SIZE)[:, None]
+    z = z[:, None]
+    k = np.maximum(k, LEAST_SIZE)[:, None]
     (W0, s0), (W1, s1) = ((each[:, None] for each in end) for end in ends)
     wave, slope = np.empty((2, *x.shape))
     for kind, even, odd in ((z < 0, np.cos, np.sin), ((z >= 0) & (z < 1), np.cosh, np.sinh)):
         rows = kind[:, 0]
-        c, s = even(k[rows] * x[rows]), odd(k[rows] * x[rows]) / k[rows]
+        c = even(k[rows] * x[rows])
+        s = odd(k[rows] * x[rows]) / k[rows]
         wave[rows], slope[rows] = W0[rows] * c + (z * s0)[rows] * s, s0[rows] * c + W0[rows] * s
     rows = z[:, 0] >= 1
     from_inner = ((W0 - k * s0)[rows] / 2) * np.exp(-k[rows] * x[rows])
@@ -325,14 +339,19 @@ def mode_field(k: System, s: complex, quantity: str, x: NDArray[np.float64]) -> 
     At an eigenvalue  D'(s) theta = a  (locked hub: D'(s) M = a),  a the mode's  2 s (mass) + (damping)  in the shape's
     own scale (reciprocity, differentiated); the shape is scaled to  a = 2 s, its tip moving up (turning, if pinned).
     """
-    at, places = np.array([s]), [Place(Fraction(float(share))) for share in (*x, 1.0)]
+    at = np.array([s])
+    places = [Place(Fraction(float(share))) for share in (*x, 1.0)]
     fields, angle, scale = free_fields(k, at, [*places, AT_HUB])
     drive = characteristic(k, at)
-    slope, back = drive.slope[0], np.exp(scale - drive.scale)  # a cut system has another scale
-    fields, theta = fields * back, complex((angle * back)[0])
+    # a cut system has another scale
+    slope = drive.slope[0]
+    back = np.exp(scale - drive.scale)
+    fields = fields * back
+    theta = complex((angle * back)[0])
     _, _, M, Q = fields[:, 0, -1]
     M = M + float(k.radius) * Q
-    A, B = k.drive.at(at)[0][0], k.drive.at(at)[1][0]
+    A = k.drive.at(at)[0][0]
+    B = k.drive.at(at)[1][0]
     if abs(A) > abs(B) > 0:  # the balance of a heavy hub, for the digits of M
         theta = M * B / A
     product = complex(slope * (theta / B if k.drive.turns else M))
@@ -365,7 +384,8 @@ def sensitivities(arm: Arm, shapes: Shapes) -> dict[str, Real]:
 
 def _of_modes(arm: Arm, shapes: Shapes) -> Doubled:
     ends = list(accumulate(Fraction(link.length) / shapes.system.length for link in arm.links))  # from the hub outwards
-    totals, start = [np.zeros((5, shapes.omega.size)) for _ in arm.links], Fraction(0)
+    totals = [np.zeros((5, shapes.omega.size)) for _ in arm.links]
+    start = Fraction(0)
     for piece, weight, fields in shapes.panels():
         terms = _densities(piece, shapes.omega[:, None], *fields)
         totals[bisect(ends, start)] += np.array([term @ weight for term in terms])
@@ -395,9 +415,13 @@ def _of_link(bend: Real, shear: Real, slide: Real, move: Real, turn: Real) -> Do
 
 def _densities(piece: Segment, omega: Any, W: Any, Psi: Any, M: Any, Q: Any) -> tuple[Any, ...]:
     """Return energies of a piece, as in `_of_link`, per length."""
-    length, stiffness, square = float(piece.length), float(piece.stiffness), omega**2
+    length = float(piece.length)
+    stiffness = float(piece.stiffness)
+    square = omega**2
     slip = float(piece.sigma) * length**2 / stiffness  # W' = Psi + slip Q
-    bend, shear, slide = M**2 / stiffness / square, slip * Q**2 / square, Q * (Psi + slip * Q) / square
+    bend = M**2 / stiffness / square
+    shear = slip * Q**2 / square
+    slide = Q * (Psi + slip * Q) / square
     return (
         bend,
         shear,
@@ -409,7 +433,9 @@ def _densities(piece: Segment, omega: Any, W: Any, Psi: Any, M: Any, Q: Any) -> 
 
 def _hub(arm: Arm, shapes: Shapes) -> Doubled:
     """Return those of hub, rotor, clamp and joint; behind the clamp the rotation is Psi - M/k, at the joint theta."""
-    chain, hub, square = shapes.system, arm.hub, shapes.omega**2
+    chain = shapes.system
+    hub = arm.hub
+    square = shapes.omega**2
     per_rotation = float(chain.length / chain.EI)
     turning = per_rotation * shapes.theta() ** 2
     _, Psi, M, Q = shapes.states((AT_HUB,))[0][..., 0]
@@ -433,7 +459,8 @@ def _hub(arm: Arm, shapes: Shapes) -> Doubled:
 
 def _payload(arm: Arm, shapes: Shapes) -> Doubled:
     """Return those of the payload, with the displacement W + e Psi."""
-    chain, square = shapes.system, shapes.omega**2
+    chain = shapes.system
+    square = shapes.omega**2
     W, Psi, _, Q = shapes.tip()
     motions = (("mass", chain.tip_mass, W + float(chain.offset) * Psi), ("inertia", chain.tip_inertia, Psi))
     found = {
@@ -446,11 +473,14 @@ def _payload(arm: Arm, shapes: Shapes) -> Doubled:
 
 def _attachment(arm: Arm, shapes: Shapes, number: int) -> Iterator[tuple[str, Real]]:
     """Yield those of an attachment; also of its place, where the link is uniform around it and has no other there."""
-    each, chain, square = arm.attachments[number], shapes.system, shapes.omega**2
+    each = arm.attachments[number]
+    chain = shapes.system
+    square = shapes.omega**2
     share = min(Fraction(each.x) / chain.length, Fraction(1))
     sides = Place(share, "inner"), Place(share, "outer")
     inner, outer = shapes.states(sides)[0].transpose(2, 0, 1)
-    per_motion, per_rotation = float(chain.length**3 / chain.EI), float(chain.length / chain.EI)
+    per_motion = float(chain.length**3 / chain.EI)
+    per_rotation = float(chain.length / chain.EI)
     joints = list(accumulate((Fraction(link.length) for link in arm.links), initial=Fraction(0)))
     if Fraction(each.x) not in joints and sum(other.x == each.x for other in arm.attachments) == 1:
         pieces = [segment_at(chain, side) for side in sides]
@@ -459,7 +489,8 @@ def _attachment(arm: Arm, shapes: Shapes, number: int) -> Iterator[tuple[str, Re
             for piece, state in zip(pieces[::-1], (outer, inner), strict=True)
         )
         yield "x", (within - beyond) * float(share)
-    translation, rotation = per_motion * outer[0] ** 2, per_rotation * outer[1] ** 2
+    translation = per_motion * outer[0] ** 2
+    rotation = per_rotation * outer[1] ** 2
     energies = {  # kinetic ones negative
         "mass": -translation,
         "inertia": -rotation,

@@ -170,7 +170,8 @@ class Modes(Tabled):
 
         For a hub lighter than the link it is computed so, as the field at the root cancels: 0 for a free pin.
         """
-        link, inertia = self.arm.link, self.arm.hub_side_inertia
+        link = self.arm.link
+        inertia = self.arm.hub_side_inertia
         if self.arm.reads_hub_moment and not self.arm.is_locked and inertia < link.rhoA * link.length**3 / 3:
             return (self.arm.hub.stiffness - inertia * self.natural_frequency**2) * self.hub_participation + 0.0
         return self.moment(0.0)
@@ -178,7 +179,8 @@ class Modes(Tabled):
     @cached_property
     def nodes(self) -> tuple[Real, ...]:
         """Points x [m] strictly inside the arm where the displacement of each mode vanishes."""
-        found, first = [np.empty(0)] * self._rigid, 0
+        found = [np.empty(0)] * self._rigid
+        first = 0
         for block in self._shapes.blocks():
             first += block.omega.size
             mode, x = self._nodes(block, first)
@@ -236,14 +238,17 @@ class Modes(Tabled):
         # a cut-off mode has W = 0 throughout, to rounding
         W[abs(W) < 1e-13 * abs(np.hstack([W, Psi])).max(axis=1, keepdims=True)] = 0.0
         mode, start = np.nonzero(W[:, :-1] * W[:, 1:] < 0)
-        low, high = grid[start], grid[start + 1]
-        before, x = low, low + (high - low) * W[mode, start] / (W[mode, start] - W[mode, start + 1])
+        low = grid[start]
+        high = grid[start + 1]
+        before = low
+        x = low + (high - low) * W[mode, start] / (W[mode, start] - W[mode, start + 1])
         # from two digits to more than 64 bits
         for _ in range(6):
             if (abs(x - before) <= np.spacing(1.0)).all():
                 break
             at, slope, _, Q = shapes.at(mode, x)
-            before, x = x, np.clip(x - at / (slope + shear_flexibility(self._k, x) * Q), low, high)
+            before = x
+            x = np.clip(x - at / (slope + shear_flexibility(self._k, x) * Q), low, high)
         return mode, x
 
 

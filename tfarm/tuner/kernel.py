@@ -296,7 +296,9 @@ def sample_gradient(
 
 
 MOST_HIDDEN = 1000  # neurons; the paper has 6
-PAPER_INPUTS, PAPER_HIDDEN = 6, 6  # of the paper's network; one input more, the gain before, is optional
+# of the paper's network; one input more, the gain before, is optional
+PAPER_INPUTS = 6
+PAPER_HIDDEN = 6
 HALF_WIDTH = 0.5  # of the uniform distribution of the initial weights
 
 

@@ -43,7 +43,9 @@ from tfarm.tuner.kernel import (
 )
 from tfarm.tuner.trial import Record, Trial
 
-NEVER, ENOUGH = -1, -2  # instead of the sample where a trial was stopped: none was, or x was small enough
+# instead of the sample where a trial was stopped: none was, or x was small enough
+NEVER = -1
+ENOUGH = -2
 X, U, E, K = range(4)  # rows of the derivatives that `derive` carries, of the signals now
 BEFORE = 4  # rows further are those of the sample before, and as many further again those of the one before that
 INPUT_ROWS = (U, U + BEFORE, E + BEFORE, E + 2 * BEFORE, X, X + BEFORE, K + BEFORE)  # of each input of the network
