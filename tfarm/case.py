@@ -47,7 +47,10 @@ class Case:
             # the record refuses an input that the arm has no motor for
             object.__setattr__(self, "arm", replace(self.arm, input=law.input))  # type: ignore[arg-type]
         gains = law.gains if _follows_all(law) else None
-        object.__setattr__(self, "law", law if gains is None else replace(Law.of_gains(gains), name=law.name))
+        if gains is not None:
+            usual = Law.of_gains(gains)
+            law = usual if law.name == Law.name else replace(usual, name=law.name)
+        object.__setattr__(self, "law", law)
         object.__setattr__(self, "chain", chain_or_usual(self.chain))
 
     @cached_property

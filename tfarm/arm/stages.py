@@ -8,7 +8,6 @@ state is refused by the name of that stage, so that none is ever left out in sil
 """
 
 from collections.abc import Iterator, Mapping
-from functools import cache
 from typing import Any, NamedTuple
 
 from tfarm.errors import ParameterError
@@ -144,10 +143,10 @@ class Consumer(NamedTuple):
 
     def refuse_others(self, *tables: Mapping[str, Any]) -> None:
         """Raise ParameterError for a key of tables of a file whose stage it does not state, or that no stage has."""
-        stated = _stated_keys(self)
+        stated = {*self.acts, *self.named, *self.partly, *self.none}
         for key, value in flat_keys(*tables):
-            if key not in stated:
-                stage = STAGE_OF.get(key)
+            stage = STAGE_OF.get(key)
+            if stage is None or stage.name not in stated:
                 what = f"the stage {stage.name}" if stage else "this key"
                 raise ParameterError(key=key, value=value, remedy=f"{self.name} does not have {what}: leave it out")
 
@@ -157,12 +156,6 @@ class Consumer(NamedTuple):
         without = [each for each in found if self.word(each[1].name) in (NAMED, PARTLY)]
         names = [stage.remainder or key.partition(".")[2] for key, stage in without]
         return f"; not covered: {', '.join(names)}" if names else ""
-
-
-@cache
-def _stated_keys(consumer: Consumer) -> frozenset[str]:
-    """Return the keys of files whose stage a consumer states."""
-    return frozenset(key for key, stage in STAGE_OF.items() if consumer.word(stage.name) is not None)
 
 
 def are_linear(*tables: Mapping[str, Any]) -> bool:

@@ -204,7 +204,7 @@ def _meet(state: Any, work: Work, is_root: bool, reach: float, shift: Any) -> No
             rigid = times(work.theta[i], reach)
             lifted = rigid + back[LIFT + i]
             # far up a spring at the root leaves of both next to nothing: the state itself has those digits
-            if magnitude(lifted) > 0.1 * magnitude(rigid):
+            if magnitude(lifted) >= 0.1 * magnitude(rigid):
                 state[i] = times(lifted, math.ldexp(1.0, -shift[i])) if shift[i] else lifted
         state[LIFT + i], state[TURN + i] = back[LIFT + i], back[TURN + i]
 
