@@ -79,10 +79,7 @@ def sketch(arm: Arm, *, ax: Axes) -> None:
     _draw_attachments(arm, ax)
     _draw_payload(arm, ax)
     _draw_springs(arm, ax)
-    x = arm.hub.radius + arm.gauge.x
-    depth = _depth_at(arm, scale, arm.gauge.x)
-    place = f", {_value('x', arm.gauge.x, 'm')}" if arm.gauge.x else " at the root"
-    _mark(ax, "gauge", x, f"strain gauge{place}", y=depth / 2, marker="s", ms=6.0, mfc=GREEN, mec="white", mew=0.6)
+    _draw_gauge(arm, scale, ax)
     _draw_signs(arm, scale, ax)
 
 
@@ -145,11 +142,14 @@ def _draw_link(arm: Arm, scale: _Scale, ax: Axes) -> None:
         ax.plot([x, x], [-half, half], color=BLUE, lw=1.6, gid=f"segment.joint.{number}", label=label, zorder=2.5)
 
 
-def _depth_at(arm: Arm, scale: _Scale, x: float) -> float:
-    """Return the drawn depth [m] of the segment at a place [m] from the clamp."""
+def _draw_gauge(arm: Arm, scale: _Scale, ax: Axes) -> None:
+    """Strain gauge, on the surface of the segment on its side of a joint."""
+    gauge = arm.gauge
     ends = np.cumsum([link.length for link in arm.links])
-    segment = min(int(np.searchsorted(ends, x, side="right")), len(ends) - 1)
-    return float(scale.depths[segment])
+    segment = int(np.searchsorted(ends, gauge.x, side="left" if gauge.side == "inner" else "right"))
+    y = scale.depths[min(segment, len(ends) - 1)] / 2
+    words = "strain gauge" + (f", {_value('x', gauge.x, 'm')}" if gauge.x else " at the root")
+    _mark(ax, "gauge", arm.hub.radius + gauge.x, words, y=y, marker="s", ms=6.0, mfc=GREEN, mec="white", mew=0.6)
 
 
 def _draw_attachments(arm: Arm, ax: Axes) -> None:
