@@ -8,6 +8,7 @@ from tfarm.assessment.stability_map import stable_regions
 from tfarm.case import Case
 from tfarm.digits import plain
 from tfarm.dsp import load_chain
+from tfarm.plots.arm_sketch import sketch
 from tfarm.plots.frequency import bode as bode_plot
 from tfarm.plots.motion import modes
 from tfarm.plots.regions import overlay
@@ -20,7 +21,7 @@ DOTS = 100  # an inch: pictures of a README are shown at their own size
 
 
 def write_pictures(out: Path) -> None:
-    """Write bode-root-moment.png, gains.png and mode-shapes.png to a folder."""
+    """Write arm.svg, bode-root-moment.png, gains.png and mode-shapes.png to a folder."""
     lab, undamped = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
     band, labels = resonant_band(lab, 6), ("exact, no damping", f"exact, damping C = {plain(lab.damping)} s")
     both = {label: bode(arm, "root_moment", band) for label, arm in zip(labels, (undamped, lab), strict=True)}
@@ -31,6 +32,7 @@ def write_pictures(out: Path) -> None:
     }
     for stem, figure in figures.items():
         save_figure(figure, out / f"{stem}.png", DOTS)
+    save_figure(sketch.figure(tfarm.load("quanser-2dsfl")), out / "arm.svg")  # of lines: as sharp at any width
 
 
 if __name__ == "__main__":

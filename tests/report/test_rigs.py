@@ -1,4 +1,4 @@
-"""Pages of rigs: every part is in a table and in the sketch, hub-locked frequencies are listed with the free ones."""
+"""Pages of rigs: every part is in a table, hub-locked frequencies are listed with the free ones."""
 
 import math
 from dataclasses import replace
@@ -6,15 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
 
 import tfarm
-from tests.plots.labels import complaints
 from tfarm import plots
 from tfarm.arm import Gauge, written_unit
 from tfarm.dsp import Chain
 from tfarm.loop.circle_crossings import sampled_map
-from tfarm.plots.motion import sketch
 from tfarm.report.overview import summary
 from tfarm.report.page import ArmReport, has_loop, sign_words
 from tfarm.report.response_sections import arm_section, assumptions_section, locked_table
@@ -51,16 +48,6 @@ def test_the_page_has_the_gauge_s_place_and_the_shear_cut_off():
         labels = [fact.label for fact in section.facts]
         assert any("shear cut-off" in each for each in labels) == (arm.theory == "timoshenko")
         assert ("no shear cut-off" in derived.caption) == (arm.theory == "rayleigh")
-
-
-def test_the_sketch_has_each_segment_where_it_is_and_the_payload_at_its_centre():
-    arm = RIGS["bench-rig"]
-    ax = sketch(arm)
-    boxes = [each for each in ax.patches if isinstance(each, Rectangle)]
-    np.testing.assert_allclose([each.get_x() for each in boxes[:2]], [arm.hub.radius, arm.hub.radius + arm.link.length])
-    assert boxes[2].get_x() + boxes[2].get_width() / 2 == pytest.approx(arm.centre_distance)
-    assert ax.get_xlim()[1] > arm.centre_distance
-    assert complaints(ax.get_figure()) == []
 
 
 def test_free_and_locked_frequencies_are_those_of_the_commands():

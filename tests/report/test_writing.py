@@ -161,7 +161,7 @@ def test_the_foot_has_the_command_to_write_the_page_again(pages):
 # ------------------------------------------------------------ what a reader sees at once
 
 
-BLOCKS = ("result", "modes", "margins-map", "margins", "sampled", "locus")  # of a first page, in their order
+BLOCKS = ("result", "modes", "margins-map", "margins", "sampled", "locus", "arm")  # of a first page, in their order
 
 
 def test_the_first_page_has_the_card_and_the_pictures_in_their_order(pages):
@@ -169,12 +169,13 @@ def test_the_first_page_has_the_card_and_the_pictures_in_their_order(pages):
     text, links = page.read_text(encoding="utf-8"), links_of(page)
     assert [each for each in links.ids if each in BLOCKS] == list(BLOCKS)
     pictures = [target for target in links.targets if target.endswith(".svg") and not target.endswith("-narrow.svg")]
-    assert pictures == [f"pictures/{name}.svg" for name in ("map", "default-bode", "sampled-slew", "locus-K2")]
+    assert pictures == [f"pictures/{name}.svg" for name in ("map", "default-bode", "sampled-slew", "locus-K2", "arm")]
     assert len(links.alts) == len(pictures)
     assert not links.tags & {"details", "figcaption"}
     for anchor in BLOCKS[1:]:
         heading = text.partition(f'id="{anchor}"')[2].partition("</h2>")[0]
-        assert f'href="{anchor.partition("-")[0]}.html"' in heading
+        page = "modes" if anchor == "arm" else anchor.partition("-")[0]
+        assert f'href="{page}.html"' in heading
     shown = tfarm.modes(ARM, 5).natural_frequency[1:]
     assert [row[1] for row in Read(text).rows if row[0].isdigit()] == [f"{omega:.6g}" for omega in shown]
     assert ('href="margins.html#margins-recommended"' in text) == (best(ARM, Chain()) is not None)

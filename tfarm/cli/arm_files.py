@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from tfarm.arm.parts import SHAPES
-from tfarm.cli.app import SAMPLING, TheoryName, add_command, advance, emit_record, preset_names, refuse
+from tfarm.cli.app import SAMPLING, Png, TheoryName, add_command, advance, emit_record, preset_names, refuse
 from tfarm.errors import MISSING, must_be_known, require
 from tfarm.files import write_file
 
@@ -117,14 +117,21 @@ def new(
     print(f"written: {file}; next: tfarm check {file}")
 
 
-@add_command("Arm", epilog="check my-arm.toml")
+@add_command("Arm", epilog="check my-arm.toml --figure my-arm.png")
 def check(
     *,
     arm: Annotated[str, typer.Argument(metavar="ARM", help="preset or TOML file", autocompletion=preset_names)],
     theory: TheoryName = None,
+    png: Png = None,
     show: Any = emit_record,
 ) -> None:
-    """Arm file as it is read: mass, inertia, first frequency, warnings, missing tables and their defaults."""
+    """Arm file as it is read: mass, inertia, first frequency, warnings, missing tables; its picture is a sketch."""
     from tfarm.assessment.arm_check import check_arm
 
-    show(check_arm(arm, theory))
+    found = check_arm(arm, theory)
+    if png is not None:
+        from tfarm import plots
+        from tfarm.arm import load
+
+        plots.style.save_picture(plots.sketch.figure, load(arm), png)
+    show(found, also=(png,))

@@ -9,9 +9,10 @@ In the look of the report's pages, whose pictures these are.  This is the only r
 """
 
 from tfarm.plots.animation import animate
+from tfarm.plots.arm_sketch import sketch
 from tfarm.plots.frequency import bode, measured
 from tfarm.plots.loop_function import disc, loop, nichols, nyquist, sensitivity
-from tfarm.plots.motion import modes, sketch, slew, step, tuned_gain
+from tfarm.plots.motion import modes, slew, step, tuned_gain
 from tfarm.plots.regions import comparison, gain_map, overlay
 from tfarm.plots.roots import locus
 from tfarm.plots.studies import study, study_band, study_scatter

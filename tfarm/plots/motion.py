@@ -1,4 +1,4 @@
-"""The arm itself, to scale; its mode shapes; the arm over time.
+"""Mode shapes of the arm, and the arm over time.
 
 Root moment, tip and motor are lines or, where these ring too fast for a page, bands.  Measured runs on a rig are drawn
 under the exact sampled loop with the same reference.  Of the tuner its gain and its guard on the map and over time, and
@@ -6,17 +6,17 @@ its learning curves.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import cycle
 from typing import Any
 
 import numpy as np
-from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
+from matplotlib.patches import Rectangle
 
 from tfarm.arm import MOMENT_GAIN, Arm
 from tfarm.arrays import Real
 from tfarm.assessment.step import Step
-from tfarm.digits import how_many, plain, significant, unit
+from tfarm.digits import how_many, plain, significant
 from tfarm.dsp import Simulation, traces
 from tfarm.dsp.results import Run
 from tfarm.exact.outputs import OUTPUTS
@@ -110,77 +110,6 @@ def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
         one.set_title(f"Mode {number}:  {omega} rad/s  ({hertz} Hz)\nnodes [m]: {places}", fontsize=9.5)
         if not one.figure.get_supylabel():
             one.set(xlabel=ALONG, ylabel=DISPLACEMENT)
-
-
-# ------------------------------------------------------------ the arm
-
-
-def _depths(arm: Arm) -> list[float]:
-    """The depth [m] of each segment: that of its shape, or sqrt(12) times the radius of gyration, as of a rectangle."""
-    return [
-        math.sqrt(12) * of.radius_of_gyration if of.half_depth is None else 2 * of.half_depth
-        for of in (link.section for link in arm.links)
-    ]
-
-
-def _frame(arm: Arm) -> tuple[float, float, float]:
-    """Left end, right end and half the height [m] of the picture."""
-    tip = arm.length + arm.hub.radius + max(0.0, arm.payload.offset)
-    return -0.2 * arm.length, tip + 0.2 * arm.length, max(0.12 * arm.length, 0.6 * max(_depths(arm)))
-
-
-def _sketch_size(arm: Arm) -> tuple[float, float]:
-    left, right, half = _frame(arm)
-    return 9.0, 1.15 + 8.6 * 2 * half / (right - left)  # with three lines above, and the axis below
-
-
-@picture((Arm, "tfarm.load returns"), size=_sketch_size, title=lambda _: "")
-def sketch(arm: Arm, *, ax: Axes) -> None:
-    """Hub, link and payload from the side, to scale [m], in the axes given or in new ones; the axes."""
-    left, right, half = _frame(arm)
-    root = arm.hub.radius
-    bore = 0.055 * arm.length
-    ax.set(aspect="equal", xlim=(left, right), ylim=(-half, half), yticks=[], xlabel="distance from the hub's axis [m]")
-    ax.spines[["left", "right", "top"]].set_visible(False)
-    ax.axhline(0, color=FAINT, lw=0.8, ls=(0, (6, 3, 1, 3)), zorder=0)
-    starts = root + np.cumsum([0.0, *(link.length for link in arm.links)])
-    for start, link, deep, colour in zip(starts, arm.links, _depths(arm), cycle(("#cfe0ee", "#e3ecd5")), strict=False):
-        ax.add_patch(Rectangle((start, -deep / 2), link.length, deep, fc=colour, ec=BLUE, lw=1.0, zorder=2))
-    ax.plot([0, root], [0, 0], color=INK, lw=4.0, solid_capstyle="butt", zorder=1.5)
-    if not arm.clamp.is_rigid:
-        ax.plot(root, 0, "o", ms=7.0, mfc="white", mec=ORANGE, mew=1.4, zorder=5)
-    for each in arm.attachments:
-        ax.plot(root + each.x, 0, "o", ms=5.0, color=INK, zorder=5)
-    if arm.payload.mass or arm.payload.inertia:
-        at = root + arm.length + arm.payload.offset
-        side = max(0.03 * arm.length, min(bore, 0.75 * max(_depths(arm))))
-        ax.plot([root + arm.length, at], [0, 0], color=INK, lw=2.0, zorder=2.5)
-        ax.add_patch(Rectangle((at - side, -side), 2 * side, 2 * side, fc="#8c8c8c", ec=INK, lw=1.0, zorder=3))
-    ax.add_patch(Circle((0, 0), bore, fc="#e9e9e9" if arm.hub.inertia else "white", ec=INK, lw=1.2, zorder=3))
-    ax.plot(0, 0, "o", ms=3.5, color=INK, zorder=4)
-    ends = np.array([[1.5, -1.0], [-1.0, 1.5]]) * bore
-    ax.add_patch(
-        FancyArrowPatch(
-            *ends, zorder=4, connectionstyle="arc3,rad=0.75", arrowstyle="-|>", mutation_scale=11, color=ORANGE, lw=1.3
-        )
-    )
-    ax.text(ends[1, 0], ends[1, 1], "θ" if arm.is_locked else "u", color=ORANGE, ha="right", va="bottom", fontsize=11)
-    ax.set_title("\n".join(_numbers(arm)), fontsize=9.0, color=INK)
-
-
-def _numbers(arm: Arm) -> Iterator[str]:
-    """Hub, link and payload in numbers, a line each."""
-    payload = arm.payload
-    inertia = unit("kg m^2")
-    free = f"hub  $I_h$ = {plain(arm.hub.inertia, 6)} {inertia}" if arm.hub.inertia else "free pin, no hub inertia"
-    hub = "hub locked: driven by its angle" if arm.is_locked else free
-    yield hub + (f",  r = {plain(arm.hub.radius, 6)} m" if arm.hub.radius else "")
-    depths = f"{len(arm.links)} segments, at most" if arm.outer else "depth"
-    yield f"link  L = {plain(arm.length, 6)} m,  {depths} {plain(max(_depths(arm)), 4)} m{' deep' if arm.outer else ''}"
-    masses = "tip pinned" if math.isinf(payload.mass) else f"m = {plain(payload.mass, 6)} kg"
-    turns = "tip cannot rotate" if math.isinf(payload.inertia) else f"$I_c$ = {plain(payload.inertia, 6)} {inertia}"
-    offset = f",  e = {plain(payload.offset, 6)} m" if payload.offset else ""
-    yield f"payload  {masses},  {turns}{offset}" if payload.mass or payload.inertia else "free tip, no payload"
 
 
 # ------------------------------------------------------------ over time

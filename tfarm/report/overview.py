@@ -24,6 +24,7 @@ SHOWN = (  # sections of the first page in their order: anchor, name of a pictur
     ("bode-root-moment", "bode-root-moment", 0),  # where there is no loop function
     ("modes", "", 0),
     ("locus", "locus-.+", -1),
+    ("arm", "arm", 0),
     ("fit", "fit-overlay", 0),
 )
 

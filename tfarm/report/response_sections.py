@@ -17,7 +17,7 @@ from tfarm.audit.arm_proofs import BRACKET_DIGITS
 from tfarm.digits import fixed, kept_digits, lined, listed, plain, significant, unit
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.fitting.fit import ARMS
-from tfarm.plots import frequency, motion
+from tfarm.plots import arm_sketch, frequency, motion
 from tfarm.plots.style import gains_words
 from tfarm.report.blocks import Fact, PageSection, Picture, picture, prose, sheet, upper
 from tfarm.report.page import ArmReport
@@ -47,7 +47,7 @@ def arm_section(report: ArmReport) -> PageSection:
         words=list(filter(None, words)),
         items=arm.assumptions,
         blocks=(
-            picture("arm", motion.sketch.figure(arm), arm=arm, input=input),
+            picture("arm", arm_sketch.sketch.figure(arm), arm=arm, input=input),
             sheet(
                 "parameters",
                 table([*parameters(arm, tomllib.loads(file_text(arm, report.chain)))]),
