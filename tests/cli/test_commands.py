@@ -84,6 +84,8 @@ BAD = [
     (["c2d", "sasaki2012"], 'Did you mean "sampled"?'),
     (["margin", "sasaki2012"], 'Did you mean "margins"?'),
     (["proof", "audt"], "Did you mean 'audit'?"),
+    (["prests"], 'Did you mean "new --list"?'),
+    (["proof", "glossry"], "Did you mean 'glossary'?"),
     (["new"], "FILE is missing: give a name that ends with .toml, or --list"),
     (["new", "--list", "my-arm.toml"], "--list writes no file"),
     (["new", "my-arm.toml", "--json"], "a file is written: give --list"),

@@ -200,7 +200,9 @@ def add_command(
 def help_of(function: Callable[..., Any]) -> tuple[str, dict[str, str]]:
     """Return the docstring of a function without its options, and the help of each option."""
     words, _, lines = (getdoc(function) or "").partition("\n\nOptions:\n")
-    return words, dict(line.split(": ", 1) for line in re.split(r"\n(?=\w)", lines) if lines)
+    # a paragraph is one line: where it is broken, the width of the terminal decides
+    paragraphs = [" ".join(each.split()) for each in words.split("\n\n")]
+    return "\n\n".join(paragraphs), dict(line.split(": ", 1) for line in re.split(r"\n(?=\w)", lines) if lines)
 
 
 def keyword_only(function: Callable[..., Any]) -> Iterator[Parameter]:

@@ -243,7 +243,7 @@ def step(
 ) -> None:
     """Time response: rise, overshoot, settling, residual vibration.
 
-    Peaks too, of the continuous-time and of the sampled loop.
+    The loops are the continuous-time and the sampled one; peaks are printed too.
 
     Options:
     scenario: reference (unit step of the hub angle, or of the hub rate without its feedback), slew, pulse (of torque)

@@ -215,9 +215,9 @@ def tune(
     chain: Any = load_chain,
     show: Any = emit_record,
 ) -> None:
-    """Neural tuner of the moment gain in a slew, and baselines.
+    """Neural tuner of the moment gain, compared with baselines.
 
-    The baselines are simpler controllers.
+    The motion is a slew, and the baselines are simpler controllers.
 
     Options:
     k1: hub rate gain [N m s/rad]; by default 0.00642 J w1, 0.71 damping with Kp
@@ -358,7 +358,7 @@ def study(
 ) -> None:
     """Many uncertain arms: stable share, distributions, worst arm.
 
-    The share has its confidence interval, and each distribution its drivers.
+    The stable share has a confidence interval, and each quantity its drivers.
     ARM is an arm, or the TOML file of a study.  A study that was interrupted goes on when it is run again.
 
     Options:

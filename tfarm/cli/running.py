@@ -4,6 +4,7 @@ import os
 import re
 import sys
 import tomllib
+from difflib import get_close_matches
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -174,7 +175,8 @@ def usage(error: Any) -> str:
         return str(ParameterError(key=of.opts[0], value=problem["input"], remedy=remedy))
     if text.startswith("No such command"):
         word = text.split("'")[1].lower()
-        ours = hints()["commands"].get(word)
-        if ours is not None:
-            return f"No such command '{word}'. Did you mean \"{ours}\"?"
+        ours = hints()["commands"] | hints()["renamed"]
+        near = get_close_matches(word, ours, 1, cutoff=0.8)
+        if near == [word] or (near and "Did you mean" not in text):
+            return f"No such command '{word}'. Did you mean \"{ours[near[0]]}\"?"
     return text.removeprefix("Invalid value for ").replace("'", "", 2) if "param" in vars(error) else text
