@@ -80,7 +80,7 @@ def test_help_is_whole_and_has_an_example_that_is_understood(capsys, monkeypatch
     assert " ".join(command.help.replace("\\[", "[").split()) in words
     assert command.epilog in words
     example = command.epilog.removeprefix("Example: tfarm ")
-    assert example.startswith(name)
+    assert f"{example} ".startswith(f"{name} ")
     monkeypatch.chdir(tmp_path)
     for file in ("record.csv", "my-arm.toml", "rig.toml"):
         (tmp_path / file).touch()
