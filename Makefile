@@ -77,7 +77,7 @@ tune: $(INSTALLED) ## write one arm's gain tuner beside what it has to beat (ARM
 	@$(BIN)/tfarm report '$(ARM)' --only tune --out reports
 
 audit: $(INSTALLED) ## check the paper equation by equation
-	@$(BIN)/tfarm audit
+	@$(BIN)/tfarm proof audit
 
 docs: $(DOCS_INSTALLED) ## write the documentation to docs/_build/html/index.html
 	@$(BIN)/python -m sphinx -q -W --keep-going docs docs/_build/html && echo docs/_build/html/index.html

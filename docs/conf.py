@@ -16,14 +16,13 @@ from pydantic_core import PydanticUndefined
 from typer.cli import get_docs_for_click
 
 import tfarm
-import tfarm.cli.running  # loads every command
 from tfarm.arm.chain import CHAIN_TABLES
 from tfarm.arm.law_tables import LawTable, SignalTable
 from tfarm.arm.materials import materials
 from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES, StrictTable, file_keys
 from tfarm.arm.stages import ARM_KEYS, STAGES
 from tfarm.assessment import step
-from tfarm.cli.app import whole_command
+from tfarm.cli.running import whole_command
 from tfarm.dsp import kernel
 from tfarm.exported import controller, fmu, live_loop, systems, tuner_code
 from tfarm.fitting.recording import RunTable
@@ -96,11 +95,14 @@ def commands_page() -> str:
     """Return every command with its arguments, options and example, as Typer writes them."""
     whole = whole_command()
     context, commands = typer.Context(whole), whole.commands.values()
-    rows = ([each.rich_help_panel, f"[`{each.name}`](#tfarm-{each.name})", each.help.splitlines()[0]]
-            for each in commands)  # fmt: skip
+    rows = (
+        [each.rich_help_panel, f"[`{each.name}`](#tfarm-{each.name})", each.help.splitlines()[0]]
+        for each in commands
+        if not each.hidden
+    )
     pages = [get_docs_for_click(obj=each, ctx=context, indent=1, call_prefix="tfarm") for each in commands]
     text = re.sub(r"(?m)^Example: (.*)$", "**Example**:\n\n```console\n$ \\1\n```", "\n".join(pages))
-    return "\n".join(["# Commands", "", *markdown_table(("group", "command", "purpose"), rows), "", text])
+    return "\n".join(["# Commands", "", *markdown_table(("chapter", "command", "purpose"), rows), "", text])
 
 
 def arm_file_page() -> str:

@@ -61,7 +61,7 @@ def lossless():
 def audit_file(tmp_path_factory):
     """The pickled rows of the audit of the paper: some ten seconds of SymPy, once a session.
 
-    What `tfarm audit --json` prints of them is audit.json in the same folder.
+    What `tfarm proof audit --json` prints of them is audit.json in the same folder.
     """
     return once(tmp_path_factory, "audit", save_audit)
 
@@ -75,7 +75,7 @@ def save_audit(file):
     with pytest.MonkeyPatch.context() as patch, open(file.with_suffix(".json"), "w", encoding="utf-8") as printed:
         patch.setattr(paper, "audit", lambda: rows)
         patch.setattr(sys, "stdout", printed)
-        assert run(["audit", "--json"]) == 0
+        assert run(["proof", "audit", "--json"]) == 0
 
 
 @pytest.fixture(scope="session")

@@ -90,13 +90,13 @@ def test_a_wrong_digit_reason_or_arm_is_named(message: str) -> None:
 
 
 def test_the_verb_prints_the_table_or_one_object(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = run(capsys, "validate")
+    code, out, err = run(capsys, "proof", "validate")
     assert (code, err) == (0, "")
     assert re.search(r"^agree to the last printed digit +136\ndiffer for the reason given +21$", out, re.MULTILINE)
     assert "printed with the sign of the tip inertia" in out  # the rest is folded in a line of 120 characters
     printed = set(out.split())
     assert all(printed.issuperset(source.citation.split()) for source in SOURCES)
-    code, out, err = run(capsys, "validate", "--json")
+    code, out, err = run(capsys, "proof", "validate", "--json")
     assert (code, err) == (0, "")
     assert json.loads(out)["explained"] == 21
 
@@ -106,7 +106,7 @@ def test_the_command_exits_3_and_names_the_row(
 ) -> None:
     wrong = changed("nafems-fv5", why={})
     monkeypatch.setattr(published, "validate", partial(validate, (wrong,)))
-    code, out, err = run(capsys, "validate")
+    code, out, err = run(capsys, "proof", "validate")
     assert (code, out) == (3, "")
     assert "nafems-fv5, pinned-pinned, mode 1: printed 42.650, exact 42.64490922, and no reason is given" in err
     assert err.count("\n") == 1

@@ -21,14 +21,14 @@ import tfarm
 from tests import survey
 from tests.shell import heard
 from tests.survey import Finding
-from tfarm.cli.running import run, whole_command
+from tfarm.cli.running import commands_of, run, whole_command
 
 CPU_SECONDS = 20
 OPTIONS_PER_FILE = 17  # 5,000 files go with 300 sets of options
 PRESETS = Path(tfarm.__file__).parent / "arm" / "presets"
 VERBS = (
     "modes", "response --output root_moment --points 20", "poles --count 4", "margins", "map --points 12",
-    "sampled", "simulate --duration 0.2", "assumptions --count 2", "reduce --order 6",
+    "sampled", "simulate --duration 0.2", "proof assumptions --count 2", "reduce --order 6",
     "locus --vary K2 --from 0 --to 0.5 --points 5 --branches 3", "design --modes 1",
 )  # fmt: skip
 NUMBERS = (
@@ -84,8 +84,8 @@ def _changed(rng, lines):
 def odd_options(rng, options):
     """A verb of the command line with one to four of its options, each with an odd word."""
     verb = str(rng.choice(sorted(options)))
-    arguments = [verb]
-    if verb not in ("presets", "audit", "validate"):
+    arguments = verb.split()
+    if verb not in ("proof audit", "proof validate"):
         arguments += [str(rng.choice(tfarm.presets()))]
     known = options[verb]
     for _ in range(int(rng.integers(1, 5)) if known else 0):  # a verb may have none
@@ -100,7 +100,7 @@ def options_of_the_verbs():
         name: [
             (param.opts[0], bool(getattr(param, "is_flag", False))) for param in verb.params if param.opts[0][:1] == "-"
         ]
-        for name, verb in whole_command().commands.items()
+        for name, verb in commands_of(whole_command()).items()
         if name not in ("report", "tune")
     }
 
@@ -112,8 +112,10 @@ def cases(number, seed, folder):
     for i in range(number):
         file = folder / f"arm{i}.toml"
         file.write_bytes(odd_file(rng))
-        verb, *rest = str(rng.choice(VERBS)).split()
-        drawn.append((verb, str(file), *rest, *(["--json"] if rng.random() < 0.5 else [])))
+        verb, dashes, rest = str(rng.choice(VERBS)).partition(" --")
+        drawn.append(
+            (*verb.split(), str(file), *f"{dashes}{rest}".split(), *(["--json"] if rng.random() < 0.5 else []))
+        )
     options = options_of_the_verbs()
     return drawn + [odd_options(rng, options) for _ in range(-(-number // OPTIONS_PER_FILE))]
 

@@ -24,5 +24,5 @@ OF_AN_ARM = {
     "study": "--over payload.mass=uniform:0,0.1 --ask modes --draws 2 --workers 1 --out OUT",
     "fit": "--mode 1=11hz --free link.youngs_modulus --covariance",
     "report": "--only modes --out OUT",
-    "assumptions": "",
+    "proof assumptions": "",
 }

@@ -63,10 +63,10 @@ def test_files_have_all_rows_of_which_a_person_reads_the_first_and_the_last(caps
 
 
 def test_presets_are_listed_with_their_assumptions(capsys):
-    listed = answer(capsys, "presets")["presets"]
+    listed = answer(capsys, "new", "--list")["presets"]
     assert {arm["name"] for arm in listed} == set(tfarm.presets())
     assert all(arm["assumptions"] for arm in listed)
-    _, out, _ = run(capsys, "presets")
+    _, out, _ = run(capsys, "new", "--list")
     assert "2766.7" in out
 
 
@@ -80,6 +80,16 @@ BAD = [
     (["margins", "sasaki2012", "--period", "0.01"], "tfarm sampled ARM --period 0.01"),
     (["rlocus", "sasaki2012"], 'Did you mean "locus"?'),
     (["lqr", "sasaki2012"], 'Did you mean "design"?'),
+    (["damp", "sasaki2012"], 'Did you mean "poles"?'),
+    (["c2d", "sasaki2012"], 'Did you mean "sampled"?'),
+    (["margin", "sasaki2012"], 'Did you mean "margins"?'),
+    (["proof", "audt"], "Did you mean 'audit'?"),
+    (["prests"], 'Did you mean "new --list"?'),
+    (["proof", "glossry"], "Did you mean 'glossary'?"),
+    (["new"], "FILE is missing: give a name that ends with .toml, or --list"),
+    (["new", "--list", "my-arm.toml"], "--list writes no file"),
+    (["new", "my-arm.toml", "--json"], "a file is written: give --list"),
+    (["new", "--presets"], "Did you mean --list?"),
     (["response", "sasaki2012", "--output", "tip"], 'did you mean "tip_displacement"'),
     (["modes", "sasaki2012", "--cuont", "3"], "Possible options: --count"),
     (["modes", "sasaki2012", "--theory", "timo"], "'timoshenko', 'shear', 'rayleigh', 'euler-bernoulli'"),
@@ -111,8 +121,8 @@ BAD = [
     (["simulate", "sasaki2012", "--dsp", "./nothing.toml"], "No such file"),
     (["design", "sasaki2012", "--objective", "beauty"], "'beauty'"),
     (["design", "sasaki2012", "--K1", "0,1e300"], "K1"),
-    (["assumptions", "sasaki2012", "--count", "many"], "--count = 'many': should be "),
-    (["assumptions", BENCH], "one Timoshenko beam on a hub"),
+    (["proof", "assumptions", "sasaki2012", "--count", "many"], "--count = 'many': should be "),
+    (["proof", "assumptions", BENCH], "one Timoshenko beam on a hub"),
     (["response", "sasaki2012-lab", "--s", "1j", "--theory", "shear", "--method", "appendix"], "Timoshenko"),
     (["completion", "fsh"], "'fish'"),
     (["step", "sasaki2012-lab", "--figure", "t.pdf", "--csv", "t.pdf"], "two results in one file"),

@@ -86,7 +86,7 @@ def test_a_list_of_poles_names_the_shear_cut_off_where_it_ends(capsys, tmp_path)
 
 
 def test_the_table_marks_the_arm_and_gives_the_limits(capsys, tmp_path):
-    code, out, err = run(capsys, "assumptions", "sasaki2012")
+    code, out, err = run(capsys, "proof", "assumptions", "sasaki2012")
     assert (code, err) == (0, "")
     own = [line.split() for line in out.splitlines() if line.lstrip().startswith("yes")]
     assert own[0][1:5] == ["0.006", "0.1", "1.8e-09", "71.5057,"]
@@ -96,7 +96,7 @@ def test_the_table_marks_the_arm_and_gives_the_limits(capsys, tmp_path):
     assert "area, shear factor and all else held" in out
     arm = replace(tfarm.load("stocky-steel"), hub=tfarm.Hub(inertia=math.inf), name="held")
     (tmp_path / "held.toml").write_text(to_toml(arm), encoding="utf-8")
-    code, out, _ = run(capsys, "assumptions", str(tmp_path / "held.toml"))
+    code, out, _ = run(capsys, "proof", "assumptions", str(tmp_path / "held.toml"))
     assert (code, "hub inertias" in out) == (0, False)
 
 

@@ -28,9 +28,9 @@ def shell(command, **environment):
     ("command", "code", "why"),
     thinned(
         [
-            ("tfarm presets > /dev/full", 2, "No space left on device"),
+            ("tfarm new --list > /dev/full", 2, "No space left on device"),
             ("tfarm modes sasaki2021 > /dev/full", 2, "sasaki2021"),
-            ("tfarm presets >&-", 2, "Bad file descriptor"),
+            ("tfarm new --list >&-", 2, "Bad file descriptor"),
             ("tfarm no-such-verb >&-", 2, "no-such-verb"),
         ],
         2,
@@ -119,7 +119,7 @@ def test_an_interrupt_while_things_are_imported_is_one_line(tmp_path):
     """A module of the name of the first that the commands need, interrupted as it is read."""
     (tmp_path / "typer.py").write_text("raise KeyboardInterrupt\n")
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
-    assert shell("tfarm presets", PYTHONPATH=path) == (130, b"", "tfarm: stopped\n")
+    assert shell("tfarm new --list", PYTHONPATH=path) == (130, b"", "tfarm: stopped\n")
 
 
 @pytest.mark.parametrize(

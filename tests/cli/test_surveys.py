@@ -14,7 +14,7 @@ def test_nothing_is_wrong():
         [sys.executable, "-m", "tests.cli.fuzz", "2", "4"], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0
-    assert done.stdout.startswith("commands: {'exit 2': 1, 'exit 0': 2}, 0 wrong")
+    assert done.stdout.startswith("commands: {'exit 2': 2, 'exit 0': 1}, 0 wrong")
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from tests.cli.shortest import OF_AN_ARM
 from tests.shared import thinned
 from tests.shell import answer
 from tfarm.arm.reading import PRESETS
-from tfarm.cli.running import whole_command
+from tfarm.cli.running import commands_of, whole_command
 from tfarm.exact.outputs import on_side
 
 # others take long, or a file: the option is one for all
@@ -16,7 +16,7 @@ ARM, BENCH = "sasaki2012-lab", "tests/rigs/bench-rig.toml"
 
 
 def test_every_command_that_takes_an_arm_has_the_option():
-    commands = whole_command().commands
+    commands = commands_of(whole_command())
     takes_arm = {name for name, each in commands.items() if any(p.name in ("arm", "arms") for p in each.params)}
     has_option = {name for name, each in commands.items() if any("--theory" in p.opts for p in each.params)}
     assert takes_arm == has_option

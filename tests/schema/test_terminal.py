@@ -113,7 +113,7 @@ with open(sys.argv.pop(), "rb") as file:
     rows = pickle.load(file)
 paper.audit = lambda: rows
 from tfarm.cli.running import run
-for words in (["modes", "sasaki2012-lab", "--count", "3"], ["audit"]):
+for words in (["modes", "sasaki2012-lab", "--count", "3"], ["proof", "audit"]):
     assert run(words) == 0
     print("----")
 """

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from copy import copy
 from dataclasses import replace
-from functools import cache, partial, wraps
+from functools import partial, wraps
 from inspect import Parameter, Signature, getdoc, isfunction, signature
 from pathlib import Path
 from threading import Event, Thread
@@ -28,23 +28,7 @@ if TYPE_CHECKING:
     from tfarm.arm.chain import Chain
 
 app = typer.Typer(name="tfarm", rich_markup_mode="rich", pretty_exceptions_enable=False)
-GROUPS = ("Arm", "Loop", "Sampled loop", "Design", "Measurement", "Report")  # of commands in the help, in its order
 PROGRESS_AFTER = 2.0  # seconds to the first line of progress
-
-
-@cache  # some 35 ms, which a process with several commands need not spend on each
-def whole_command() -> Any:
-    """Return the command with all its subcommands; called once every module of commands is loaded.
-
-    An epilog is the example of its command, and a [unit] in a help text no markup of rich.
-    """
-    command: Any = typer.main.get_command(app)
-    command.commands = dict(sorted(command.commands.items(), key=lambda each: GROUPS.index(each[1].rich_help_panel)))
-    for each in command.commands.values():
-        each.epilog = f"Example: tfarm {each.epilog}"
-        for text in (each, *each.params):
-            text.help = (text.help or "").replace("[", r"\[")
-    return command
 
 
 def print_version(wanted: bool) -> None:
@@ -54,7 +38,7 @@ def print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
+@app.callback(options_metavar="[--version] [--help]")
 def tfarm_options(
     version: Annotated[
         bool, typer.Option("--version", is_eager=True, callback=print_version, help="print the version, and exit")
@@ -190,8 +174,10 @@ def without_none(values: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def add_command(group: str, **how: Any) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Return the decorator that adds a command to a group of the help; `how` are its name and its example.
+def add_command(
+    chapter: str | None, group: typer.Typer = app, **how: Any
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return the decorator that adds a command to a chapter of the help; `how` are its name and its example.
 
     Its keyword-only parameters are its arguments and options.  "name: text" below "Options:" in its docstring is the
     help of one.  A parameter whose default is a function has an option for each keyword-only parameter of that, and is
@@ -205,7 +191,7 @@ def add_command(group: str, **how: Any) -> Callable[[Callable[..., None]], Calla
 
         called.__signature__ = Signature(options_of(command))  # type: ignore[attr-defined]
         called.__doc__ = help_of(command)[0]
-        app.command(rich_help_panel=group, **how)(called)
+        group.command(rich_help_panel=chapter, **how)(called)
         return command
 
     return add
@@ -214,7 +200,9 @@ def add_command(group: str, **how: Any) -> Callable[[Callable[..., None]], Calla
 def help_of(function: Callable[..., Any]) -> tuple[str, dict[str, str]]:
     """Return the docstring of a function without its options, and the help of each option."""
     words, _, lines = (getdoc(function) or "").partition("\n\nOptions:\n")
-    return words, dict(line.split(": ", 1) for line in re.split(r"\n(?=\w)", lines) if lines)
+    # a paragraph is one line: where it is broken, the width of the terminal decides
+    paragraphs = [" ".join(each.split()) for each in words.split("\n\n")]
+    return "\n\n".join(paragraphs), dict(line.split(": ", 1) for line in re.split(r"\n(?=\w)", lines) if lines)
 
 
 def keyword_only(function: Callable[..., Any]) -> Iterator[Parameter]:

@@ -3,15 +3,18 @@
 import os
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+import tfarm
 from tfarm.arm.parts import SHAPES
 from tfarm.cli.app import SAMPLING, Png, TheoryName, add_command, advance, emit_record, preset_names, refuse
-from tfarm.errors import MISSING, must_be_known, require
+from tfarm.errors import MISSING, ParameterError, must_be_known, require
 from tfarm.files import write_file
+from tfarm.schema import Quantity
 
 SECTIONS = "rectangle (--width, --depth), round (--diameter) or tube (--outer-diameter, --inner-diameter)"
 Size = Annotated[float | None, typer.Option(rich_help_panel="Section")]
@@ -73,12 +76,54 @@ def section_table(
     }
 
 
+@dataclass(frozen=True)
+class Preset:
+    """An arm that comes with tfarm."""
+
+    name: Annotated[str, Quantity("name", help="argument ARM of every command")]
+    length: Annotated[float, Quantity("length", "m", help="of all elastic links together", key="length")]
+    damping: Annotated[
+        float,
+        Quantity(
+            "damping C",
+            "s",
+            help="Kelvin-Voigt, the largest of all links: stress E (strain + C strain rate)",
+            key="damping",
+        ),
+    ]
+    hub_inertia: Annotated[float, Quantity("hub inertia", "kg m^2", help="about the axis of rotation, without a motor")]
+    payload_mass: Annotated[float, Quantity("payload mass", "kg", help="at the tip")]
+    payload_inertia: Annotated[float, Quantity("payload inertia", "kg m^2", help="about the tip")]
+    assumptions: Annotated[
+        tuple[str, ...],
+        Quantity("assumptions", help="numbers that the source of the arm does not give, and their origin"),
+    ]
+
+
+@dataclass(frozen=True)
+class Presets:
+    """All of them."""
+
+    presets: Annotated[list[Preset], Quantity("arms", help="arms that come with tfarm")]
+
+
+def list_presets() -> Presets:
+    """Return the arms that come with tfarm."""
+    names = [each.name for each in fields(Preset)]
+    return Presets([Preset(*(getattr(arm, name) for name in names)) for arm in map(tfarm.load, tfarm.presets())])
+
+
 @add_command(
     "Arm", epilog="new my-arm.toml --material steel --length 0.8 --width 0.06 --depth 0.004 --hub-inertia 0.05"
 )
 def new(
     *,
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="the file to write, .toml", show_default=False)],
+    file: Annotated[
+        Path | None, typer.Argument(metavar="FILE", help="the file to write, .toml", show_default=False)
+    ] = None,
+    presets: Annotated[
+        bool, typer.Option("--list", help="list the arms that come with tfarm, with their assumptions")
+    ] = False,
     link: Callable[..., Any] = link_table,
     section: Callable[..., Any] = section_table,
     hub_inertia: float | None = None,
@@ -88,8 +133,11 @@ def new(
     damping_ratio: float | None = None,
     period: Annotated[float | None, typer.Option(rich_help_panel=SAMPLING)] = None,
     force: bool = False,
+    show: Any = emit_record,
 ) -> None:
-    """Arm file with comments, from options; on a terminal tfarm asks for what is missing.
+    """Arm file from options, with comments; --list shows the presets.
+
+    On a terminal tfarm asks for a missing number.  A preset is an ARM of every command.
 
     Options:
     hub_inertia: inertia of the hub about the axis [kg m^2]; inf locks it, 0 is a free pin
@@ -103,6 +151,13 @@ def new(
     from tfarm.arm.starting import first_file
     from tfarm.assessment.arm_check import with_damping
 
+    if presets:
+        refuse({"FILE": file and str(file)}, "--list writes no file: leave this out")
+        show(list_presets())
+        return
+    refuse({"--json": show.keywords["json"]}, "a file is written: give --list for the arms that come with tfarm")
+    if file is None:
+        raise ParameterError(key="FILE", value=MISSING, remedy="give a name that ends with .toml, or --list")
     require(file.suffix == ".toml", "FILE", str(file), "give a name that ends with .toml")
     require(force or not os.path.lexists(file), "FILE", str(file), "exists already; --force replaces it")
     refuse({"--damping-ratio": None if damping is None else damping_ratio}, "give it or --damping, not both")
@@ -125,7 +180,10 @@ def check(
     png: Png = None,
     show: Any = emit_record,
 ) -> None:
-    """Arm file as it is read: mass, inertia, first frequency, warnings, missing tables; its picture is a sketch."""
+    """Arm file as read: mass, inertia, first frequency, warnings.
+
+    Tables that are missing are listed with their defaults; its picture is a sketch to scale.
+    """
     from tfarm.assessment.arm_check import check_arm
 
     found = check_arm(arm, theory)

@@ -1,7 +1,6 @@
 """The commands on an arm and on measured data.  Packages are imported inside them: `tfarm --help` needs none."""
 
 import math
-from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, cast
@@ -32,10 +31,9 @@ from tfarm.cli.app import (
     refuse,
 )
 from tfarm.errors import require
-from tfarm.schema import Quantity
 
 command = partial(add_command, "Arm")
-measuring_command = partial(add_command, "Measurement")
+measuring_command = partial(add_command, "Measure")
 RecordName = Annotated[
     Path, typer.Argument(metavar="RECORD", exists=True, help="CSV or .mat file: t [s] and signals", show_default=False)
 ]
@@ -65,45 +63,6 @@ def check_method(
     return method, compare, digits
 
 
-@dataclass(frozen=True)
-class Preset:
-    """An arm that comes with tfarm."""
-
-    name: Annotated[str, Quantity("name", help="argument ARM of every command")]
-    length: Annotated[float, Quantity("length", "m", help="of all elastic links together", key="length")]
-    damping: Annotated[
-        float,
-        Quantity(
-            "damping C",
-            "s",
-            help="Kelvin-Voigt, the largest of all links: stress E (strain + C strain rate)",
-            key="damping",
-        ),
-    ]
-    hub_inertia: Annotated[float, Quantity("hub inertia", "kg m^2", help="about the axis of rotation, without a motor")]
-    payload_mass: Annotated[float, Quantity("payload mass", "kg", help="at the tip")]
-    payload_inertia: Annotated[float, Quantity("payload inertia", "kg m^2", help="about the tip")]
-    assumptions: Annotated[
-        tuple[str, ...],
-        Quantity("assumptions", help="numbers that the source of the arm does not give, and their origin"),
-    ]
-
-
-@dataclass(frozen=True)
-class Presets:
-    """All of them."""
-
-    presets: Annotated[list[Preset], Quantity("arms", help="arms that come with tfarm")]
-
-
-@command(epilog="presets")
-def presets(*, show: Any = emit_record) -> None:
-    """List the arms that come with tfarm, with their assumptions."""
-    names = [each.name for each in fields(Preset)]
-    rows = [Preset(*(getattr(arm, name) for name in names)) for arm in map(tfarm.load, tfarm.presets())]
-    show(Presets(rows))
-
-
 @command(epilog="modes sasaki2012-lab --count 5")
 def modes(
     *,
@@ -114,7 +73,7 @@ def modes(
     how: Any = check_method,
     show: Any = emit_record,
 ) -> None:
-    """Natural frequencies, damping ratios and modes, complete by construction.
+    """Natural frequencies, damping ratios and modes, none missing.
 
     Options:
     count: flexible modes
@@ -159,7 +118,7 @@ def response(
     how: Any = check_method,
     show: Any = emit,
 ) -> None:
-    """Exact frequency response to the arm's input, or its values at points s.
+    """Exact frequency response of an output, or values at points s.
 
     The input is the hub torque unless the arm's file names another, and the hub angle of a locked hub.
     With --measured tip_acceleration/hub_angle=sweep.csv it is compared with that response.
@@ -227,8 +186,9 @@ def bode(
     chain: Any = load_chain,
     show: Any = emit,
 ) -> None:
-    """Bode plot of the exact response to the arm's input, with the poles and zeros of that output.
+    """Bode plot of the exact response, or of the loop function.
 
+    The response is that to the arm's input, with the poles and zeros of the output.
     With --loop of the loop function at the actuator, with its gain, phase and delay margin; with --period,
     --delay-samples or --dsp of the sampled loop too.
 
@@ -272,7 +232,9 @@ def reduce(
     along: Any = outputs_on,
     show: Any = emit_record,
 ) -> None:
-    """Reduced state-space model, with its largest error against the exact arm over a frequency range.
+    """Reduced state-space model, and its error over a range.
+
+    The error is the largest one against the exact arm over the frequency range.
 
     Options:
     outputs: names separated by commas
@@ -313,7 +275,9 @@ def fit(
     theory: TheoryName = None,
     show: Any = emit_record,
 ) -> None:
-    """Fit of an arm's numbers to measured responses and ring-downs, with confidence intervals.
+    """Fit of an arm's numbers to measured responses and ring-downs.
+
+    Each number has its confidence interval.
 
     Options:
     data: measured response; may be repeated
@@ -365,7 +329,9 @@ def frf(
     csv: Annotated[Path | None, typer.Option("--save", "--csv", metavar="FILE")] = None,
     show: Any = emit_record,
 ) -> None:
-    """Frequency response of a record over time, by averaged cross-spectra, with coherence.
+    """Frequency response and coherence of a record over time.
+
+    The estimate is that of averaged cross-spectra.
 
     Options:
     input: such as hub_torque; or hub_torque=COLUMN of the record
@@ -409,7 +375,9 @@ def ring(
     modes: Annotated[int, typer.Option(min=1)] = 1,
     show: Any = emit_record,
 ) -> None:
-    """Frequencies and damping ratios of a decay, with confidence intervals.
+    """Frequencies and damping ratios of a decay.
+
+    Each has its confidence interval.
 
     Options:
     signal: column of the record that decays

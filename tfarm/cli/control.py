@@ -35,7 +35,6 @@ from tfarm.errors import require
 from tfarm.files import mat_content, write_file
 
 command = partial(add_command, "Loop")
-sampled_command = partial(add_command, "Sampled loop")
 ModeCount = Annotated[
     int | None, typer.Option("--modes", min=1, max=400, help="flexible modes; by default as many as the result takes")
 ]
@@ -63,7 +62,10 @@ def poles(
 
 @command(epilog="margins sasaki2012-lab --K1 0.3 --K2 0.3")
 def margins(*, arm: ArmName, loop: Any = load_driven_loop, show: Any = emit_record) -> None:
-    """Result card, stability, the stability interval of each gain, and the margins of the exact loop function."""
+    """Stability, stability interval of each gain, and margins.
+
+    The result card is first.  The margins are those of the exact loop function.
+    """
     case, defaults = loop(arm)
     found = case.margins()
     show(found, defaults, summary=case.card(continuous=found))
@@ -71,7 +73,9 @@ def margins(*, arm: ArmName, loop: Any = load_driven_loop, show: Any = emit_reco
 
 @command(epilog="nyquist sasaki2012-lab --K1 0.3 --K2 0.3 --png nyquist.png")
 def nyquist(*, arm: ArmName, disc: bool = False, loop: Any = load_driven_loop, show: Any = emit) -> None:
-    """Nyquist plot of the exact loop: encirclements of -1, and the unstable poles found in a box.
+    """Nyquist plot of the exact loop, with encirclements of -1.
+
+    Their number is compared with the unstable poles found in a box.
 
     Options:
     disc: picture of the whole contour in a disc whose rim is infinity, in place of the linear plot with a zoom at -1
@@ -82,18 +86,18 @@ def nyquist(*, arm: ArmName, disc: bool = False, loop: Any = load_driven_loop, s
 
 @command(epilog="nichols sasaki2012-lab --K1 0.3 --K2 0.3 --png nichols.png")
 def nichols(*, arm: ArmName, loop: Any = load_loop, chain: Any = load_chain, show: Any = emit) -> None:
-    """Nichols chart of the loop function, with its margins and contours of the closed loop.
+    """Nichols chart of the loop function, with its margins.
 
-    With --period, --delay-samples or --dsp of the sampled loop too.
+    Contours are those of the closed loop.  With --period, --delay-samples or --dsp of the sampled loop too.
     """
     emit_loop("nichols", arm, loop, chain, show)
 
 
 @command(epilog="sensitivity sasaki2012-lab --K1 0.3 --K2 0.3 --png sensitivity.png")
 def sensitivity(*, arm: ArmName, loop: Any = load_loop, chain: Any = load_chain, show: Any = emit) -> None:
-    """Sensitivity S = 1/(1 + L) and complementary sensitivity T = L/(1 + L), with their peaks Ms and Mt.
+    """Sensitivity S, complementary sensitivity T, peaks Ms and Mt.
 
-    With --period, --delay-samples or --dsp of the sampled loop too.
+    S = 1/(1 + L) and T = L/(1 + L).  With --period, --delay-samples or --dsp of the sampled loop too.
     """
     emit_loop("sensitivity", arm, loop, chain, show)
 
@@ -106,7 +110,9 @@ def spill(
     loop: Any = load_driven_loop,
     show: Any = emit_record,
 ) -> None:
-    """Spillover into modes that a design model leaves out: the exact loop and models of 1, 2, 3 ... modes.
+    """Spillover into the modes that a design model leaves out.
+
+    The exact loop is compared with models of 1, 2, 3 ... modes.
 
     Options:
     modes: modes of the largest model
@@ -127,7 +133,9 @@ def locus(
     loop: Any = load_driven_loop,
     show: Any = emit,
 ) -> None:
-    """Root locus of the exact arm along a gain or a parameter, with its crossings of the imaginary axis.
+    """Root locus along a gain or a parameter, with its crossings.
+
+    Poles are those of the exact arm, crossings those of the imaginary axis.
 
     Options:
     vary: K1, K2, Kp, all (a factor on these), payload_mass, payload_inertia, hub_inertia, length or damping; or gain (a
@@ -186,8 +194,9 @@ def map_plane(
 def gain_map(
     *, arm: ArmName, plane: Any = map_plane, theory: TheoryName = None, chain: Any = load_chain, show: Any = emit
 ) -> None:
-    """Number of unstable poles over the plane of two gains, or of two numbers of a law, with the exact boundary.
+    """Stability region in the plane of two gains, with its boundary.
 
+    The number of unstable poles over two gains, or two numbers of a law; the boundary is exact.
     With --period, --delay-samples or --dsp of the sampled loop.
     """
     from tfarm.dsp.plant import driven
@@ -206,11 +215,11 @@ def gain_map(
     show(found)
 
 
-@sampled_command(epilog="sampled sasaki2012-lab --K1 0.3 --K2 0.3 --period 0.01")
+@command(epilog="sampled sasaki2012-lab --K1 0.3 --K2 0.3 --period 0.01")
 def sampled(
     *, arm: ArmName, modes: ModeCount = None, loop: Any = load_loop, chain: Any = load_chain, show: Any = emit_record
 ) -> None:
-    """Stability of the sampled loop: verdict, intervals, modes, margins.
+    """Stability, intervals, modes and margins of the sampled loop.
 
     A law of a file acts with its own period, which has to be that of the chain; one in s is made discrete by its rule.
     """
@@ -232,7 +241,9 @@ def step(
     chain: Any = load_chain,
     show: Any = emit,
 ) -> None:
-    """Time response of the continuous-time and the sampled loop: rise, overshoot, settling, peaks, residual vibration.
+    """Time response: rise, overshoot, settling, residual vibration.
+
+    The loops are the continuous-time and the sampled one; peaks are printed too.
 
     Options:
     scenario: reference (unit step of the hub angle, or of the hub rate without its feedback), slew, pulse (of torque)
@@ -246,7 +257,7 @@ def step(
     show(case.step(scenario, duration, outputs=output or (), settling_band=settling_band), defaults)
 
 
-@sampled_command(epilog="simulate sasaki2012-lab --scenario slew --output tip_rotation --csv slew.csv")
+@command(epilog="simulate sasaki2012-lab --scenario slew --output tip_rotation --csv slew.csv")
 def simulate(
     *,
     arm: ArmName,
@@ -262,7 +273,9 @@ def simulate(
     chain: Any = load_chain,
     show: Any = emit,
 ) -> None:
-    """Time response of the sampled loop: hub angle, tip, root moment and torque, exact between the samples.
+    """Time response of the sampled loop, exact between the samples.
+
+    Its signals are hub angle, tip, root moment and torque.
 
     Options:
     scenario: slew, step, decay, impulse or pulse

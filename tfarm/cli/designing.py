@@ -41,6 +41,7 @@ from tfarm.cli.app import (
 from tfarm.errors import require
 
 command = partial(add_command, "Design")
+study_command = partial(add_command, "Study")
 
 
 @command(epilog="design sasaki2012-lab --structure PD+notch --save notch.toml")
@@ -67,7 +68,9 @@ def design(
     chain: Any = load_chain,
     show: Any = emit_record,
 ) -> None:
-    """Law of a structure with the best objective in the sampled loop, at the file's period or else 10 ms.
+    """Law of a structure with the best objective in the sampled loop.
+
+    The sampling period is that of the file, or else 10 ms.
 
     Options:
     objective: damping, margin, sensitivity, delay, residual or cost (of the tuner)
@@ -114,8 +117,9 @@ def export(
     chain: Any = load_chain,
     show: Any = emit_record,
 ) -> None:
-    """Files for another program: C code, a functional mock-up unit, MATLAB, python-control.
+    """C code, FMU, MATLAB or Python files of controller, plant, loop.
 
+    An FMU is a functional mock-up unit; the Python file is one for python-control.
     The loop is judged with the numbers as they are rounded in the files.
 
     Options:
@@ -211,7 +215,9 @@ def tune(
     chain: Any = load_chain,
     show: Any = emit_record,
 ) -> None:
-    """Neural tuner of the moment gain during a slew, compared with simpler baselines.
+    """Neural tuner of the moment gain, compared with baselines.
+
+    The motion is a slew, and the baselines are simpler controllers.
 
     Options:
     k1: hub rate gain [N m s/rad]; by default 0.00642 J w1, 0.71 damping with Kp
@@ -245,7 +251,7 @@ def tune(
     show(found, defaults, also=(save,))
 
 
-@command(epilog="compare sasaki2012 sasaki2012-lab --png both.png")
+@study_command(epilog="compare sasaki2012 sasaki2012-lab --png both.png")
 def compare(
     *,
     arms: Annotated[
@@ -269,9 +275,9 @@ def compare(
     chain: Any = load_chain,
     show: Any = emit_record,
 ) -> None:
-    """Comparison of two arms, or of two laws on one arm: modes, poles, verdicts, margins.
+    """Two arms, or two laws on one arm: modes, poles, margins.
 
-    Of one arm give --law twice; of two arms once for both, or once for each.
+    Verdicts are compared too.  Of one arm give --law twice; of two arms once for both, or once for each.
 
     Options:
     output: output of the Bode plot of two arms
@@ -329,7 +335,7 @@ def study_arguments(
     return {"arm": case.arm, "law": case.law, "chain": chain(file), **known}, defaults
 
 
-@command(epilog="study sasaki2012-lab --over payload.mass=uniform:0,0.2 --ask card --draws 100 --out study")
+@study_command(epilog="study sasaki2012-lab --over payload.mass=uniform:0,0.2 --ask card --draws 100 --out study")
 def study(
     *,
     arm: ArmName,
@@ -350,8 +356,9 @@ def study(
     chain: Any = load_chain,
     show: Any = emit,
 ) -> None:
-    """Many uncertain arms: stable share with its confidence, distributions, drivers, worst arm.
+    """Many uncertain arms: stable share, distributions, worst arm.
 
+    The stable share has a confidence interval, and each quantity its drivers.
     ARM is an arm, or the TOML file of a study.  A study that was interrupted goes on when it is run again.
 
     Options:

@@ -14,6 +14,7 @@ from tfarm.cli.app import (
     TheoryName,
     add_command,
     advance,
+    app,
     emit_record,
     given_gains,
     load_arm,
@@ -26,6 +27,16 @@ from tfarm.cli.app import (
 from tfarm.errors import must_be_known
 
 command = partial(add_command, "Report")
+proof = typer.Typer(help="Audit of the paper, published tables, assumptions, glossary.")
+app.add_typer(proof, name="proof", rich_help_panel="Report")
+proof_command = partial(add_command, None, proof)
+
+
+@proof.callback(invoke_without_command=True)
+def print_proofs(context: typer.Context) -> None:
+    """Print the commands, where none of them is given."""
+    if context.invoked_subcommand is None:
+        print(context.get_help())
 
 
 @command(epilog="report sasaki2012-lab --out pages")
@@ -44,8 +55,9 @@ def report(
     gains: Any = given_gains,
     chain: Any = load_chain,
 ) -> None:
-    """Pages with pictures, tables and data: open index.html in a browser.
+    """Pages with pictures, tables and data, to read in a browser.
 
+    Open index.html in a browser.
     The pages are about the gains or the laws that are given, or the [law] of an arm's file, or the default gains.
 
     Options:
@@ -89,15 +101,18 @@ def report(
     print(index)
 
 
-@command(epilog="audit")
+@proof_command(epilog="proof audit")
 def audit(*, show: Any = emit_record) -> None:
-    """Every equation of the paper, as printed and as corrected, with the check of each."""
+    """Every equation of the paper, as printed and as corrected.
+
+    Each has its check.
+    """
     from tfarm import audit as paper
 
     show(paper.Audit(paper.PAPER, paper.audit()))
 
 
-@command(epilog="assumptions sasaki2012")
+@proof_command(epilog="proof assumptions sasaki2012")
 def assumptions(
     *,
     arm: ArmName,
@@ -105,7 +120,9 @@ def assumptions(
     theory: TheoryName = None,
     show: Any = emit_record,
 ) -> None:
-    """Effect of the assumed section and hub inertia: frequencies over the candidates, with exact sensitivities.
+    """Frequencies over candidates of the assumed section and hub.
+
+    Sections and hub inertias are varied; the sensitivities are exact.
 
     Options:
     count: flexible modes
@@ -115,27 +132,33 @@ def assumptions(
     show(find(load_arm(arm, theory), count))
 
 
-@command(epilog="validate")
+@proof_command(epilog="proof validate")
 def validate(*, show: Any = emit_record) -> None:
-    """Natural frequencies of published tables compared with the exact ones, with the reason of each difference."""
+    """Published natural frequencies compared with the exact ones.
+
+    Each difference has its reason.
+    """
     from tfarm.audit import published
 
     show(published.Validation(published.validate()))
 
 
-@command(epilog="glossary margin")
+@proof_command(epilog="proof glossary margin")
 def glossary(
     *,
     words: Annotated[str | None, typer.Argument(metavar="[TERM]", help="part of a term; by default all")] = None,
     show: Any = emit_record,
 ) -> None:
-    """Words of certainty, terms, and the quantities of all results with their units."""
+    """Words of certainty, terms, and quantities with their units.
+
+    The quantities are those of all results.
+    """
     from tfarm.schema.glossary import glossary as find
 
     show(find(words))
 
 
-@command(epilog="completion bash")
+@command(epilog="completion bash", hidden=True)
 def completion(
     *,
     shell: Annotated[
@@ -143,5 +166,8 @@ def completion(
         typer.Argument(metavar="SHELL", help="the shell"),
     ],
 ) -> None:
-    """Script that completes commands, options and presets in a shell: eval "$(tfarm completion bash)"."""
+    """Script that completes commands, options and presets in a shell.
+
+    A shell takes it by eval "$(tfarm completion bash)".
+    """
     print(get_completion_script(prog_name="tfarm", complete_var="_TFARM_COMPLETE", shell=shell))

@@ -4,6 +4,8 @@ import os
 import re
 import sys
 import tomllib
+from difflib import get_close_matches
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -12,13 +14,47 @@ import typer
 from typer.exceptions import TyperException
 
 from tfarm.cli import arm_files, commands, control, designing, pages  # noqa: F401  each adds its commands
-from tfarm.cli.app import discard, print_line, progress, whole_command
+from tfarm.cli.app import app, discard, print_line, progress
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError, require
 from tfarm.files import STANDARD_OUTPUT
 
 STREAMED = ("--csv", "--figure", "--png", "--mat", "--save")  # files that may be "-", standard output
 WRITTEN = (*STREAMED, "--animate")
 PATHS = (*WRITTEN, "--out", "--tuned", "--dsp", "--law", "--controller", "--list", "--posterior")  # such as 1_0
+CHAPTERS = ("Arm", "Loop", "Design", "Measure", "Study", "Report")  # of the help, in its order
+
+
+@cache  # some 35 ms, which a process with several commands need not spend on each
+def whole_command() -> Any:
+    """Return the command with all its subcommands; called once every module of commands is loaded.
+
+    An epilog is the example of its command, and a [unit] in a help text no markup of rich.  The help of the whole has
+    its options in the line of usage, and a group of commands last in its chapter.
+    """
+    command: Any = typer.main.get_command(app)
+
+    def place_of(named: tuple[str, Any]) -> tuple[int, bool]:
+        return CHAPTERS.index(named[1].rich_help_panel), hasattr(named[1], "commands")
+
+    command.commands = dict(sorted(command.commands.items(), key=place_of))
+    for option in command.get_params(typer.Context(command)):
+        option.hidden = True
+    for each in commands_of(command).values():
+        each.epilog = f"Example: tfarm {each.epilog}"
+        for text in (each, *each.params):
+            text.help = (text.help or "").replace("[", r"\[")
+    return command
+
+
+def commands_of(group: Any) -> dict[str, Any]:
+    """Return the commands of a group by their words: modes, and proof audit of a group in it."""
+    found: dict[str, Any] = {}
+    for name, each in group.commands.items():
+        if hasattr(each, "commands"):
+            found |= {f"{name} {word}": inner for word, inner in commands_of(each).items()}
+        else:
+            found[name] = each
+    return found
 
 
 def run(arguments: list[str]) -> int:
@@ -55,6 +91,8 @@ def run(arguments: list[str]) -> int:
 def call(arguments: list[str]) -> int:
     """Run a command, or complete one for a shell; return its exit code."""
     command = whole_command()
+    if arguments[0] not in command.commands:
+        arguments = replace_old_name(arguments)
     check_words(arguments)
     try:  # not command.main, which takes a closed pipe for an error
         command._main_shell_completion({}, "tfarm")
@@ -65,6 +103,21 @@ def call(arguments: list[str]) -> int:
     except typer.Abort:  # of a question, by the end of the input or an interrupt
         raise KeyboardInterrupt from None
     return 0
+
+
+def replace_old_name(arguments: list[str]) -> list[str]:
+    """Return the arguments with the new name of a command of an old name, which is named on standard error."""
+    old, *others = arguments
+    new = hints()["renamed"].get(old)
+    if new is None:
+        return arguments
+    print_line(f'"tfarm {old}" has moved: write "tfarm {new}"')
+    return [*new.split(), *others]
+
+
+def hints() -> dict[str, dict[str, Any]]:
+    """Return the words of other tools and the old names, and the word of tfarm for each."""
+    return tomllib.loads((Path(__file__).parent / "hints.toml").read_text(encoding="utf-8"))
 
 
 def open_streams() -> None:
@@ -108,14 +161,13 @@ def usage(error: Any) -> str:
     if not hasattr(error, "format_message"):
         return str(error)
     text = error.format_message()
-    hints = tomllib.loads((Path(__file__).parent / "hints.toml").read_text(encoding="utf-8"))
     if text.startswith("No such option"):
         name = error.option_name
         known = [option for each in error.ctx.command.params for option in each.opts]
-        meant = [option for option, others in hints["options"].items() if name in others and option in known]
+        meant = [option for option, others in hints()["options"].items() if name in others and option in known]
         if meant:
             return f"No such option: {name}. Did you mean {' or '.join(meant)}?"
-        return text + hints["other_commands"].get(name, "")
+        return text + hints()["other_commands"].get(name, "")
     for problem in getattr(error.__cause__, "errors", list)():  # of pydantic, which converts for Typer
         of = error.param
         within = "" if None in (of.min, of.max) else f", from {of.min} to {of.max}"
@@ -123,6 +175,8 @@ def usage(error: Any) -> str:
         return str(ParameterError(key=of.opts[0], value=problem["input"], remedy=remedy))
     if text.startswith("No such command"):
         word = text.split("'")[1].lower()
-        if word in hints["commands"]:
-            return f"No such command '{word}'. Did you mean \"{hints['commands'][word]}\"?"
+        ours = hints()["commands"] | hints()["renamed"]
+        near = get_close_matches(word, ours, 1, cutoff=0.8)
+        if near == [word] or (near and "Did you mean" not in text):
+            return f"No such command '{word}'. Did you mean \"{ours[near[0]]}\"?"
     return text.removeprefix("Invalid value for ").replace("'", "", 2) if "param" in vars(error) else text

@@ -1,4 +1,4 @@
-"""The five words of certainty and the terms of the results, for `tfarm glossary`, the pages and the documentation.
+"""The five words of certainty and the terms of the results, for `tfarm proof glossary`, pages and documentation.
 
 The quantities of all results, with label, unit and meaning, are read where each record declares them.
 """
