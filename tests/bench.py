@@ -41,7 +41,7 @@ from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.schema import to_dict
 from tfarm.spectrum.proofs import enclosed
 from tfarm.studies.quantities import column_names, values_of
-from tfarm.studies.running import Plan, chunk
+from tfarm.studies.running import StudyPlan, chunk
 from tfarm.studies.space import space_of
 from tfarm.tuner import Guard, Learning, initial_network, slew_trial, train
 
@@ -228,7 +228,7 @@ def study(ask, n, values):
     """The first rows of a study, by `values` of its plan; prepared is the plan."""
 
     def prepared(subject):
-        plan = Plan(Case(*subject), space_of(over(subject), draws=n, seed=0, posterior=None), column_names([ask]))
+        plan = StudyPlan(Case(*subject), space_of(over(subject), draws=n, seed=0, posterior=None), column_names([ask]))
         return lambda: values(plan, n)
 
     return prepared

@@ -19,7 +19,7 @@ from tfarm.arm.writing import to_toml
 from tfarm.errors import ParameterError, must_be_known, naming, require, unknown_key
 from tfarm.schema import Quantity
 
-Reading = Literal["vibration", "total"]
+MomentReading = Literal["vibration", "total"]
 # of a converter: of one bit there are no steps, of more than 32 no part
 LEAST_BITS = 2
 MOST_BITS = 32
@@ -150,7 +150,7 @@ class Slew:
 
     travel: float | None = None
     rise_time: Annotated[float, positive, "a rise time is a positive, finite number of seconds"] = 1.0
-    reading: Reading = "vibration"
+    reading: MomentReading = "vibration"
 
     def __post_init__(self) -> None:
         if self.travel is not None:

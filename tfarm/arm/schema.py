@@ -23,7 +23,7 @@ from tfarm.files import read_file
 from tfarm.schema import Quantity
 
 _Strict = TypeVar("_Strict", bound="StrictTable")
-_Table = TypeVar("_Table", bound="TomlTable")
+_AnyTable = TypeVar("_AnyTable", bound="TomlTable")
 LOOP_TABLES = ("sampling", "converters", "actuator", "slew", "law")  # of the loop: read by other rooms
 OF_INPUT = "N m, V or A"  # unit of a limit of the input
 EXPECTED: dict[Any, str] = {
@@ -93,19 +93,19 @@ def validated_file(model: type[_Strict], path: str | os.PathLike[str], most: int
     raise ParameterError(key=place, value=value, remedy=f"{problem['msg']}; give {what}", file=os.fspath(path))
 
 
-def of(makes: Callable[..., Any]) -> Callable[[type[_Table]], type[_Table]]:
+def of(makes: Callable[..., Any]) -> Callable[[type[_AnyTable]], type[_AnyTable]]:
     """Decorate a table whose keys are the parameters of a constructor, with their names, types and defaults.
 
     Keys of the class itself are kept.
     """
 
-    def with_keys(table: type[_Table]) -> type[_Table]:
+    def with_keys(table: type[_AnyTable]) -> type[_AnyTable]:
         hints = get_type_hints(makes)
         own: dict[str, Any] = {}
         for name, each in signature(makes).parameters.items():
             if name not in table.model_fields and name != "stated_ratio":  # which is poissons_ratio in a file
                 own[name] = hints[name], ... if each.default is Parameter.empty else each.default
-        made: type[_Table] = create_model(table.__name__, __base__=table, __doc__=table.__doc__, **own)
+        made: type[_AnyTable] = create_model(table.__name__, __base__=table, __doc__=table.__doc__, **own)
         made.makes = makes
         return made
 

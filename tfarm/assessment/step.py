@@ -54,7 +54,7 @@ from tfarm.loop.time_response import (
     usual_poles,
 )
 from tfarm.records import frozen
-from tfarm.response.signals import Controller, controller, placed
+from tfarm.response.signals import ControllerSignals, controller, placed
 from tfarm.schema import Column, Percent, Quantity, Table, across
 from tfarm.schema.html import as_html
 from tfarm.spectrum.table import first_frequency
@@ -72,7 +72,9 @@ CONSUMER = Consumer(
 SAMPLED_NAMES = {"reference": "reference", "slew": "slew", "pulse": "pulse", "deflection": "decay"}  # by scenario
 MOMENT = AT_HUB[-1]
 UNSTABLE = "unstable"
-Curve = tuple[Real, Real, Real, Peak | None]  # times [s], values, bounds of their errors, and the peak where known
+SignalCurve = tuple[
+    Real, Real, Real, Peak | None
+]  # times [s], values, bounds of their errors, and the peak where known
 PARTS = ("hub", "tip", "root_moment", "torque")
 TIME_CONSTANTS = 8.0  # of the dominant pole: length of a record after its input, to 3e-4 of the final value
 CONVERGED = 1e-6  # of the peak of each signal: bound on its error, everywhere in the record, of a converged response
@@ -140,7 +142,7 @@ class LoopResponse:
 
 
 @dataclass(frozen=True)
-class _Record:
+class _LoopRecord:
     """Times [s] of the signals of a loop, the names of those of hub and tip, root moment and torque, and references.
 
     `busy_until` [s] is the end of the input, `band` the share of the travel within which a signal settles.
@@ -181,7 +183,7 @@ class _Record:
         curves = {name: (self.t[: y.size], y, 0 * y, None) for name, y in signals.items()}
         return self._loop(word, is_converged, f"{used.modes} modes", curves)
 
-    def _loop(self, stability: str, is_converged: bool, count: str, curves: Mapping[str, Curve]) -> LoopResponse:
+    def _loop(self, stability: str, is_converged: bool, count: str, curves: Mapping[str, SignalCurve]) -> LoopResponse:
         """The figures of a loop; of an unstable one those of its signals are left out."""
         names = zip(PARTS, self.names, strict=True) if stability != UNSTABLE else ()
         of = {part: self._figures(name, *curves[name]) for part, name in names}
@@ -266,7 +268,7 @@ class _Record:
 
 
 @frozen(kw_only=True)
-class Step(_Record):
+class Step(_LoopRecord):
     """Time responses of an arm under a controller, continuous-time and sampled, at the times `t` [s].
 
     A law in z has no continuous-time loop; the signals of a sampled loop end where it was stopped.  `names` are the
@@ -274,7 +276,7 @@ class Step(_Record):
     response at any time, `busy_until` [s] the end of the input.
     """
 
-    controller: Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]
+    controller: Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]
     scenario: Annotated[str, Quantity(help="reference, slew, pulse or deflection")]
     scenario_in_words: Annotated[str, Quantity("scenario", help="input with its size")]
     duration: Annotated[float, Quantity("duration", "s", 4, help="length of the record")]
@@ -389,7 +391,7 @@ def step(
     t = _times(response, task)
     angle = traces.reference_angle(task, t) if of_angle else np.ones(t.size)
     reference = {hub: angle, tip: arm.reach * angle} if is_step or scenario_name == "slew" else {}
-    found = _Record(arm, (*names[:3], TORQUE), task.busy_until, t, reference, band)
+    found = _LoopRecord(arm, (*names[:3], TORQUE), task.busy_until, t, reference, band)
     return Step(
         **vars(found), controller=controller(case.law, arm), scenario=scenario_name, period=task.period,
         duration=min(length, float(t[-1])), scenario_in_words=described(task, arm, chain), response=response,

@@ -95,7 +95,7 @@ class PublishedRow:
     why: Annotated[str, Quantity(help="reason of a difference beyond the printed digits; empty where there is none")]
 
 
-class Difference(NamedTuple):
+class PublishedDifference(NamedTuple):
     """Printed numbers of a case that ours do not round to, and why."""
 
     source: Annotated[str, Quantity("source", help="short name of the publication")]
@@ -177,13 +177,14 @@ class Validation:
     def differences(
         self,
     ) -> Annotated[
-        list[Difference], Quantity("differences", help="numbers whose printed digits are not reached, a row a reason")
+        list[PublishedDifference],
+        Quantity("differences", help="numbers whose printed digits are not reached, a row a reason"),
     ]:
         """A row a reason."""
         rows = (row for row in self.rows if not row.agrees)
         groups = ((key, list(of)) for key, of in groupby(rows, attrgetter("source", "case", "why")))
         return [
-            Difference(
+            PublishedDifference(
                 source, case, ", ".join(str(row.mode) for row in of), max((r.difference for r in of), key=abs), why
             )
             for (source, case, why), of in groups

@@ -36,7 +36,7 @@ from tfarm.files import mat_content, write_file
 
 command = partial(add_command, "Loop")
 sampled_command = partial(add_command, "Sampled loop")
-ModeCount = Annotated[
+ModelOrder = Annotated[
     int | None, typer.Option("--modes", min=1, max=400, help="flexible modes; by default as many as the result takes")
 ]
 
@@ -208,7 +208,7 @@ def gain_map(
 
 @sampled_command(epilog="sampled sasaki2012-lab --K1 0.3 --K2 0.3 --period 0.01")
 def sampled(
-    *, arm: ArmName, modes: ModeCount = None, loop: Any = load_loop, chain: Any = load_chain, show: Any = emit_record
+    *, arm: ArmName, modes: ModelOrder = None, loop: Any = load_loop, chain: Any = load_chain, show: Any = emit_record
 ) -> None:
     """Stability of the sampled loop: verdict, intervals, modes, margins.
 
@@ -252,7 +252,7 @@ def simulate(
     arm: ArmName,
     scenario: str = "slew",
     duration: float = 3.0,
-    modes: ModeCount = None,
+    modes: ModelOrder = None,
     output: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
     between: Annotated[int, typer.Option(min=0, max=1000)] = 0,
     mat: File = None,

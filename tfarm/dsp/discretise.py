@@ -201,7 +201,7 @@ def _differenced(part: Part, a: float, T: float) -> Part:
 # ------------------------------------------------------------ factors
 
 
-Column = tuple[int, int, float, Complex]  # part, row of the signal, and g and zeros of g prod(delta - zeros)
+PartColumn = tuple[int, int, float, Complex]  # part, row of the signal, and g and zeros of g prod(delta - zeros)
 
 
 @frozen
@@ -215,7 +215,7 @@ class LawInZ:
 
     signals: tuple[str, ...]
     part_poles: tuple[Complex, ...]
-    columns: tuple[Column, ...]
+    columns: tuple[PartColumn, ...]
     matrices: Matrices
 
     @cached_property
@@ -224,7 +224,7 @@ class LawInZ:
         return np.concatenate(self.part_poles)
 
     @cached_property
-    def terms(self) -> list[Column]:
+    def terms(self) -> list[PartColumn]:
         """The columns as p_i: the poles of other parts are zeros too."""
         poles = [np.empty(0, complex), *self.part_poles]
         others = [np.concatenate(poles[: n + 1] + poles[n + 2 :]) for n in range(len(self.part_poles))]

@@ -1,7 +1,7 @@
 """The compiled heart of the simulation: exact steps of the modal amplitudes between the samples, and the linear law.
 
 All compiled functions are in this one file, for numba's cache does not notice an edited callee elsewhere.  They share
-named tuples: a `Model` of the arm, its `State`, the `Forcing` of a scenario and the `Electronics` of a chain.
+named tuples: a `SampleModel` of the arm, its `State`, the `Forcing` of a scenario and the `Electronics` of a chain.
 """
 
 from typing import Any, NamedTuple
@@ -52,7 +52,7 @@ BEGUN = 2
 YES = 0.5  # a number above it is true among floats
 
 
-class Model(NamedTuple):
+class SampleModel(NamedTuple):
     """The arm between the samples: outputs = Re(weights amplitude) + rates rigid + static torque.
 
     Under a held torque an amplitude circles its rest position, -`rest` torque, `rest` (m,) being 1/p.
@@ -72,7 +72,7 @@ class Model(NamedTuple):
     hub: int
 
 
-def model_of(plant: Plant, kept: Whole, sampling: Sampling, between: int, hub: int) -> Model:
+def model_of(plant: Plant, kept: Whole, sampling: Sampling, between: int, hub: int) -> SampleModel:
     """The model of a plant's poles `kept`, with `between` records in each sample; `hub` is the row of the hub angle."""
     p = plant.poles[kept]
     T = sampling.period
@@ -80,7 +80,7 @@ def model_of(plant: Plant, kept: Whole, sampling: Sampling, between: int, hub: i
     records = T * (np.arange(between) + 1) / (between + 1)
     ends = np.unique(np.r_[records, [f * T] if f else [], T])
     starts = np.r_[0.0, ends[:-1]]
-    return Model(
+    return SampleModel(
         rest=1 / p,
         turn=np.exp(p * (ends - starts)[:, None]),
         push=np.array([held_amplitude(p, float(each)) for each in ends - starts]),

@@ -25,7 +25,7 @@ from tfarm.dsp.simulate import Simulation, Simulator, Trace
 from tfarm.dsp.traces import resolved
 from tfarm.errors import ConvergenceError
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.response.signals import Controller, controller
+from tfarm.response.signals import ControllerSignals, controller
 from tfarm.schema import Column, Quantity, Table
 
 MODE_COUNTS = (10, 20, 40)  # flexible modes; 80 would take a heavily damped arm 8 s of CPU time
@@ -106,7 +106,7 @@ class Run:
     tuner: Annotated[dict[str, Any] | None, Quantity("tuner", key="controller", help="that set the moment gain")] = None
 
     @property
-    def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
+    def controller(self) -> Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller."""
         return controller(self.case.feedback, self.arm)
 

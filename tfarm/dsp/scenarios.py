@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import AT_HUB, Arm, must_turn
-from tfarm.arm.chain import PERIOD, TIME_ROUNDING, Chain, Reading
+from tfarm.arm.chain import PERIOD, TIME_ROUNDING, Chain, MomentReading
 from tfarm.arm.checks import positive
 from tfarm.arrays import Real
 from tfarm.dsp.plant import driven
@@ -44,7 +44,7 @@ class Scenario:
     impulse: float = 0.0
     tip_offset: float = 0.0
     busy_until: float = 0.0
-    reading: Reading = "vibration"
+    reading: MomentReading = "vibration"
 
     @property
     def t(self) -> Real:

@@ -103,7 +103,7 @@ class Measurement(NamedTuple):
         return law[ANGLE_GAIN] * angle_off + law[RATE_GAIN] * rate_off
 
 
-Controller = Callable[[Measurement], float]
+ControlFunction = Callable[[Measurement], float]
 
 
 @frozen
@@ -300,7 +300,7 @@ class Simulator:
         done = kernel.run(self.model, state, self._forcing, self.electronics, table, sources, references)
         return self._result(state, int(done), None if gains is None else np.full(state.torque.size, gains.K2))
 
-    def controller(self, controller: Controller) -> Simulation:
+    def controller(self, controller: ControlFunction) -> Simulation:
         """Simulate a callable from a `Measurement` to a torque [N m]; its numbers are float32 if the arithmetic is."""
         return self._stepped(lambda m: (float(controller(m)), 0.0), None)
 
@@ -324,7 +324,7 @@ class Simulator:
     # ------------------------------------------------------------ inside
 
     @cached_property
-    def model(self) -> kernel.Model:
+    def model(self) -> kernel.SampleModel:
         """The plant for the compiled loop, with the records between two samples."""
         row = self.plant.outputs.index("hub_angle", len(self.measured))
         return kernel.model_of(self.plant, self.kept, self.chain.sampling, self.between, row)

@@ -23,8 +23,7 @@ from tfarm.errors import ConvergenceError, ParameterError
 from .outputs import Output, output
 from .series import constant_of
 from .system import system_of
-
-Number = Any  # mpmath.mpf or mpmath.mpc, which come without types
+from .waves import Number
 
 FEWEST_DIGITS = 15  # of agreement, beyond coincidence
 MOST_DIGITS = 10_000  # of working precision

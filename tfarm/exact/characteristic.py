@@ -40,7 +40,7 @@ from .outputs import Output
 from .rationals import polynomials
 from .system import Place, Segment, System
 from .values import free_of, free_slopes
-from .waves import Plane, Row
+from .waves import SolutionPlane, SolutionRow
 
 NEXT_TO_REST = 1e-60  # 1/s, for s = 0: there D over a power of s is at its limit, and no power is 0
 DIFFERENCE_STEP = 1e-6  # of |s|, or of the way to -1/C, for differences
@@ -129,7 +129,7 @@ class WideSweep(Sweep):
         self._shortest, self.phase = shortest, 0 * s
         super().__init__(layout, s)
 
-    def _inside(self, element: Any, p: Plane) -> Plane:
+    def _inside(self, element: Any, p: SolutionPlane) -> SolutionPlane:
         if not isinstance(element, Segment):
             return super()._inside(element, p)
         _, z_sum, z_product = self._sums(element)
@@ -147,12 +147,12 @@ class WideSweep(Sweep):
         self.phase = self.phase + pair[0][5] + pair[1][5]
         return tuple(part / unit for part in across_waves(one, two, gS, d, p))
 
-    def _at_mark(self, p: Plane) -> Plane:
+    def _at_mark(self, p: SolutionPlane) -> SolutionPlane:
         grown = self.phase.exp()
         return tuple(each * grown for each in p)
 
     @cached_property
-    def states(self) -> dict[Place, Row]:
+    def states(self) -> dict[Place, SolutionRow]:
         """W, Psi, M and Q at each mark, in the scale of the plane at the axis."""
         shrunk = (-self.phase).exp()
         full = super().states

@@ -29,7 +29,7 @@ from .layout import (
 from .sweep import inside
 from .waves import (
     SERIES_RADIUS,
-    Plane,
+    SolutionPlane,
     Wave,
     across_rows,
     across_waves,
@@ -81,7 +81,7 @@ def chain_count(omega: float, rows: Any, ends: Any) -> int:
 
 
 @inlined
-def _joined(outside: int, omega: float, row: Any, plane: Plane, free: int) -> tuple[int, Plane]:
+def _joined(outside: int, omega: float, row: Any, plane: SolutionPlane, free: int) -> tuple[int, SolutionPlane]:
     """Return the count with one more segment, clamped at its inner end, and the plane carried across it.
 
     `outside` is the count of the outer part clamped at the joint, `free` the number of free motions there.

@@ -17,8 +17,8 @@ from tfarm.arrays import Complex
 from .compiled import inlined
 from .waves import (
     PARALLEL,
-    Plane,
-    Row,
+    SolutionPlane,
+    SolutionRow,
     Wave,
     across_rows,
     across_waves,
@@ -45,7 +45,7 @@ FUNCTIONS, PHASE = (BLOCK * j for j in (4, 7))  # of a wave
 F1, F2_LESS_1, F3_LESS_1 = (SERIES + BLOCK * j for j in (1, 4, 5))
 
 
-class Work(NamedTuple):
+class BlockBuffers(NamedTuple):
     """Scratch arrays of a block, many by the row j of an element.
 
     `planes` j + 1 is inside of the element, 0 at the tip's end; that of a mark becomes its state on the way back.  It
@@ -86,19 +86,19 @@ def put_where(chosen: bool, buffer: Any, i: int, numbers: tuple[complex, ...]) -
 
 
 @inlined
-def row_at(buffer: Any, i: int) -> Row:
+def row_at(buffer: Any, i: int) -> SolutionRow:
     """Return four numbers of a point."""
     return buffer[i], buffer[BLOCK + i], buffer[2 * BLOCK + i], buffer[3 * BLOCK + i]
 
 
 @inlined
-def plane_at(buffer: Any, i: int) -> Plane:
+def plane_at(buffer: Any, i: int) -> SolutionPlane:
     """Return the plane of a point."""
     return buffer[i], buffer[BLOCK + i], buffer[2 * BLOCK + i], buffer[3 * BLOCK + i], buffer[4 * BLOCK + i]
 
 
 @inlined
-def cross(points: Any, row: Any, j: int, work: Work, lost: Any) -> None:
+def cross(points: Any, row: Any, j: int, work: BlockBuffers, lost: Any) -> None:
     """Compute the plane at the inner end of a segment, row j, from that at its outer one, at the points of a block.
 
     Scales are added to `work.scale`, lost digits are marked.
@@ -159,7 +159,7 @@ def waves_at(row: Any, waves: Any, i: int) -> tuple[Wave, Wave, complex, complex
 
 
 @inlined
-def rows_at(s: complex, row: Any, waves: Any, i: int) -> tuple[Row, Row, Row, Row]:
+def rows_at(s: complex, row: Any, waves: Any, i: int) -> tuple[SolutionRow, SolutionRow, SolutionRow, SolutionRow]:
     """Return the transition matrix of a slow segment at a point from F0..F3 in the chain's units."""
     over_d = times(reciprocal(1.0 + row.damping * s), 1.0 / row.stiffness)
     return transition_rows(row_at(waves, SERIES + i), s * s, over_d, row.of_chain)
@@ -177,7 +177,7 @@ def _fill_series(points: Any, row: Any, waves: Any) -> None:
 
 
 @inlined
-def cross_back(points: Any, row: Any, j: int, work: Work, scale: Any) -> None:
+def cross_back(points: Any, row: Any, j: int, work: BlockBuffers, scale: Any) -> None:
     """Compute the condition at the outer end of a segment, row j, from that at its inner one, in place; see `cross`.
 
     The scales less those of the plane are added to `scale`.

@@ -25,14 +25,14 @@ from tfarm.records import frozen, read_only
 from tfarm.schema import Quantity
 
 from .balls import Ball, Sweep, first_success, nearest_float, point, rational
-from .layout import Layout, Reading, readings
+from .layout import Layout, OutputFormula, readings
 from .outputs import Output
 from .series import constant_of, expansion_at_zero
 from .sweep import AXIS, fill_free
 from .system import ONE, ZERO, Place, System
 
 AT_A_POLE = 4 * float(np.finfo(float).eps)  # of |s|: the distance of a pole within which no digit is right
-_Found = TypeVar("_Found")
+_Value = TypeVar("_Value")
 
 PROVEN_BITS = 60  # more than a float64 has
 MOST_ENCLOSURE_BITS = 1 << 18  # of working precision: at a pole no number of them is enough
@@ -114,8 +114,8 @@ def free_fields(
     """
 
     def with_states() -> Layout:
-        each = [Reading(place, field, ZERO, 0, ONE) for place in places for field in range(4)]
-        return Layout(chain, tuple(dict.fromkeys(places)), (*each, Reading(None, -1, ONE, 0, ONE)))
+        each = [OutputFormula(place, field, ZERO, 0, ONE) for place in places for field in range(4)]
+        return Layout(chain, tuple(dict.fromkeys(places)), (*each, OutputFormula(None, -1, ONE, 0, ONE)))
 
     layout = chain.keep(tuple(places), with_states)
     found, _ = _filled(layout, s, np.asarray(read_only(np.ascontiguousarray(axis))))
@@ -259,7 +259,7 @@ def digits_of(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0
     return certified(4 * digits, attempt, f"{digits} digits", s)
 
 
-def certified(bits: int, attempt: Callable[[], _Found | None], number: str, s: complex) -> _Found:
+def certified(bits: int, attempt: Callable[[], _Value | None], number: str, s: complex) -> _Value:
     """Return the first result other than None at working precisions for that many right bits, each twice the last.
 
     Raises CertificationError, naming the number and s, where none has one.

@@ -61,7 +61,7 @@ U, E, X, K, E_BEFORE, TORQUE = range(6)  # places of the state: the last sample,
 ZERO, ONE = np.array([0.0, 1.0], np.float32)  # exact, and of either precision with another number
 
 
-class Numbers(NamedTuple):
+class TunerConstants(NamedTuple):
     """Numbers of a tuner in one precision.
 
     e^x is 0 up to `lowest`; adding and subtracting `shift` rounds to a whole number; `inverse` is 1/ln 2, ln 2 = `high`
@@ -86,7 +86,7 @@ class Numbers(NamedTuple):
     is_total: bool
 
 
-def numbers_of(saved: SavedTuner, real: Any) -> Numbers:
+def numbers_of(saved: SavedTuner, real: Any) -> TunerConstants:
     """The numbers of a tuner in np.float64 or np.float32, the guard rounded inwards.
 
     Raises ParameterError for a number beyond the range of the precision, and for a tuner without a guard.
@@ -110,7 +110,7 @@ def numbers_of(saved: SavedTuner, real: Any) -> Numbers:
     share = float(scales.min()) / (2 * scales.size * max(1.0, float(abs(W1).max())))
     largest = real(min(1.0, share) * float(np.finfo(real).max))
     own = taylor, W1, w2, scales, real(K1), real(Kp), lo, hi, largest, saved.signals == "total"
-    return Numbers._make([*(real(float(each)) for each in scalars), *own])
+    return TunerConstants._make([*(real(float(each)) for each in scalars), *own])
 
 
 @inlined
@@ -123,7 +123,7 @@ def polynomial(x: float, coefficients: Real) -> float:
 
 
 @compiled
-def exponential(x: float, of: Numbers) -> float:
+def exponential(x: float, of: TunerConstants) -> float:
     """e^x for x <= 0; 0 of NaN, which u, e or x then is too: the step is refused."""
     if not x > of.lowest:
         return ZERO
@@ -140,14 +140,14 @@ def exponential(x: float, of: Numbers) -> float:
 
 
 @compiled
-def sigmoid(z: float, of: Numbers) -> float:
+def sigmoid(z: float, of: TunerConstants) -> float:
     """1/(1 + e^-z)."""
     small = exponential(-z if z > ZERO else z, of)
     return (ONE if z > ZERO else small) / (ONE + small)
 
 
 @inlined
-def network_gain(of: Numbers, row: Real) -> float:
+def network_gain(of: TunerConstants, row: Real) -> float:
     """K of a row of inputs."""
     z = ZERO
     for j in range(of.w2.size):
@@ -160,7 +160,7 @@ def network_gain(of: Numbers, row: Real) -> float:
 
 
 @inlined
-def step(of: Numbers, state: Real, inputs: Real) -> int:
+def step(of: TunerConstants, state: Real, inputs: Real) -> int:
     """Advance by one sample; return 0, or the kind of an error."""
     for value in inputs:
         if not -of.largest <= value <= of.largest:
@@ -185,7 +185,7 @@ def step(of: Numbers, state: Real, inputs: Real) -> int:
 
 
 @compiled
-def run(of: Numbers, state: Real, inputs: Real, torque: Real, status: Whole) -> None:
+def run(of: TunerConstants, state: Real, inputs: Real, torque: Real, status: Whole) -> None:
     """Step over rows of inputs."""
     for k in range(status.size):
         status[k] = step(of, state, inputs[k])
@@ -271,7 +271,7 @@ def c_tuner(task: ExportTask) -> Export:
 
 
 def written(task: ExportTask, tuner: ExportedTuner, name: str, facts: dict[str, str]) -> dict[str, bytes]:
-    """The files by name; constants have the names of `Numbers`."""
+    """The files by name; constants have the names of `TunerConstants`."""
     of = tuner.numbers
     real, suffix, _ = REAL[task.precision]
     kept: dict[str, Any] = of._asdict()

@@ -70,7 +70,7 @@ class NoiseGain(NamedTuple):
             help="variance of the output by roundings, for states of unit variance, in the closed loop")]  # fmt: skip
 
 
-class Bounds(NamedTuple):
+class WordLengthBounds(NamedTuple):
     """Bounds on the states as exported, on the error of the returned u, and on u of the law, for inputs within ranges.
 
     `is_whole` where they are over all samples.
@@ -82,7 +82,7 @@ class Bounds(NamedTuple):
     output: float
 
 
-class Around(NamedTuple):
+class StateSpaceLoop(NamedTuple):
     """The closed loop around a law of one state space: matrix, input of each signal and of each rounding, output u.
 
     `of_signals` (n, signals), `of_rounding` (n, states + 1) (the last is a rounding of u), `output` (n,), `reads`
@@ -112,14 +112,14 @@ def closed(A: Real, B: Real, C: Real, a: Real, b: Real, c: Real, d: Real) -> tup
     return block_diag(A, a) + np.r_[B @ u, b @ y], y, u
 
 
-def around(law: Law, loop: Sampled) -> Around:
+def around(law: Law, loop: Sampled) -> StateSpaceLoop:
     """The closed loop of `Sampled.matrix`, around a law of one state space."""
     A, B, C = loop.pulse.matrices()
     own, Bk, Ck, Dk = with_estimate(law, loop.chain).matrices(loop.in_z.signals)
     matrix, reads, output = closed(A, B[:, None], C, own, Bk, -Ck, -Dk)
     states = slice(len(A), len(A) + law.order)
     push = np.r_[B, np.zeros(len(own))]
-    return Around(
+    return StateSpaceLoop(
         matrix=matrix,
         of_signals=np.r_[np.outer(B, -Dk[0]), Bk],
         of_rounding=np.c_[np.eye(len(matrix))[:, states], push],
@@ -141,7 +141,7 @@ def sum_of_squares(M: Real, Q: Real, rows: slice) -> Real | None:
     return None
 
 
-def gramians(of: Around) -> tuple[Real, Real] | None:
+def gramians(of: StateSpaceLoop) -> tuple[Real, Real] | None:
     """K over the variance of u, and W, of the states of the law; None where their sums do not converge."""
     rows = of.states
     K = sum_of_squares(of.matrix, of.of_signals @ of.of_signals.T, rows)
@@ -266,7 +266,7 @@ class Word:
         return terms * unit / (1 - terms * unit), tiny + of_dac
 
     @cached_property
-    def bounds(self) -> Bounds:
+    def bounds(self) -> WordLengthBounds:
         """Bounds on what the code returns, against the law in exact arithmetic.
 
         The error d of the states obeys d' = A d + w, w = |dS| [X; E] + roundings; X includes d.  In fixed point a state
@@ -287,7 +287,7 @@ class Word:
         if np.isfinite(sums[:n, :n]).all():
             lost = n * unit * max(abs(np.linalg.eigvals(abs(A) @ sums[:n, :n])), default=0.0)
         if lost > 1e-3:
-            return Bounds(np.full(n, np.inf), False, math.inf, math.inf)
+            return WordLengthBounds(np.full(n, np.inf), False, math.inf, math.inf)
         S, X = np.hsplit(sums * (1 + lost), [n])
         largest = X @ self.sizes
         output = float(largest[n] + abs(exact[n, n:]) @ self.sizes + self.feedforward)
@@ -296,9 +296,9 @@ class Word:
         states = least_solution(S[:n] @ V[:n, :n], largest[:n] + S[:n] @ rest[:n])
         states = np.minimum(states, 1.0 if self.precision == FIXED else np.inf)
         if not np.isfinite(states).all():
-            return Bounds(states, is_whole, math.inf, output)
+            return WordLengthBounds(states, is_whole, math.inf, output)
         w = V[:, :n] @ states + rest
-        return Bounds(states, is_whole, float(S[n] @ w[:n] + w[n] + relative * self.feedforward), output)
+        return WordLengthBounds(states, is_whole, float(S[n] @ w[:n] + w[n] + relative * self.feedforward), output)
 
     def limit_cycle(self, loop: Sampled) -> float | None:
         """Bound on u in a limit cycle that roundings sustain in a loop at rest; None where none was found.

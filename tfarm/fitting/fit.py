@@ -30,17 +30,17 @@ from tfarm.loop.plane import gain_map
 from tfarm.records import frozen
 from tfarm.response import transfer
 from tfarm.schema import Quantity
+from tfarm.stopping import Progress
 
 from .data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of, rms
 from .misses import Miss, Remedy, misses_of, remedies_of
-from .model import SENSOR_DELAY, SENSOR_GAIN, Problem, Response, RingMode, parameters
+from .model import SENSOR_DELAY, SENSOR_GAIN, FitResponse, Problem, RingMode, parameters
 from .overlay import ResonanceShift, ratio_of, resonance_shifts
 from .posterior import SUFFIX, Posterior, Repeats, posterior_of, repeats
 from .solve import (
     FIT_SEED,
     BetterError,
     Fitted,
-    Progress,
     Solution,
     best_solution,
     confidence_intervals,
@@ -351,7 +351,7 @@ def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: An
     family, numbers = parameters(arm, keys, start=start or {}, bounds=bounds or {}, priors=priors or {})
     for each in data:
         ratio_of(arm, each)
-    responses = tuple(Response(each, noise_of(each)) for each in data)
+    responses = tuple(FitResponse(each, noise_of(each)) for each in data)
     subject = Problem(family, numbers, responses, tuple(rings)).with_sensors(free)
     count = len(subject.parameters)
     require(count, "free", "nothing", "name what is free, such as link.youngs_modulus")

@@ -19,7 +19,7 @@ from tfarm.response.frequency import HERTZ
 from tfarm.schema import Quantity
 
 from .data import rms
-from .model import SENSOR_DELAY, SENSOR_GAIN, Problem, Response, parameters
+from .model import SENSOR_DELAY, SENSOR_GAIN, FitResponse, Problem, parameters
 from .solve import EXCLUDED, Solution, best_solution, is_explained
 
 
@@ -64,7 +64,7 @@ def misses_of(found: Solution) -> tuple[Miss, ...]:
     return tuple(miss for one, H in pairs if (miss := _miss(one, H)) is not None)
 
 
-def _miss(one: Response, computed: Complex) -> Miss | None:
+def _miss(one: FitResponse, computed: Complex) -> Miss | None:
     """Return how one response is missed, None where it is not."""
     data = one.data
     kept = np.isfinite(one.noise.sigma) & (data.values != 0)

@@ -33,7 +33,7 @@ from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum import modes_below
 
 from .data import Measured, Noise, check_signal, must_be_measured, noise_of, rms
-from .model import Response
+from .model import FitResponse
 from .resonances import (
     PARTNERS_BEYOND,
     Resonance,
@@ -432,7 +432,7 @@ class ResonanceShift(NamedTuple):
     measured: Annotated[float, Quantity("measured", "Hz", help="peak of the measured response")]
 
 
-def resonance_shifts(before: Arm, after: Arm, responses: Sequence[Response]) -> list[ResonanceShift]:
+def resonance_shifts(before: Arm, after: Arm, responses: Sequence[FitResponse]) -> list[ResonanceShift]:
     """Each measured peak of all responses, with those of the arm before and after a fit.
 
     A peak is a pole of its response: a natural frequency, with the hub held where the response is over the hub's angle.

@@ -32,6 +32,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.records import frozen
 from tfarm.schema import Quantity
+from tfarm.stopping import Progress
 
 from .data import CONFIDENCE, in_parts
 from .model import Problem, walled
@@ -312,8 +313,6 @@ def _rescaled(found: Solution) -> Solution:
         found = nearest_minimum(replace(found.problem, responses=tuple(responses)), found.point)
     return found
 
-
-Progress = Callable[[int, int, str], object]
 
 TAKES_PART = 0.1  # of a unit vector: a smaller component has no part in it
 

@@ -38,7 +38,7 @@ from tfarm.exact.system import System
 from tfarm.loop.loop import Loop
 from tfarm.loop.theorem import Theorem, theorem_of
 from tfarm.records import frozen
-from tfarm.response.signals import Controller, Signals, controller
+from tfarm.response.signals import ControllerSignals, Signals, controller
 from tfarm.schema import Quantity
 from tfarm.spectrum import flexible_frequencies, modes, modes_below
 from tfarm.spectrum.frequencies import ARMS_KEPT
@@ -99,7 +99,7 @@ class ContinuousLoop(Loop):
         return self.case.feedback
 
     @property
-    def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
+    def controller(self) -> Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller, without gains of 0."""
         return controller(self.case.law, self.arm)
 

@@ -42,7 +42,7 @@ OTHER_DIGITS = 4
 
 Proof = tuple[bool | None, float]  # whether a loop is stable (None: not shown), and the band [rad/s] of that proof
 Test = Callable[[float], Proof]
-Found = TypeVar("Found")
+Edge = TypeVar("Edge")
 
 
 @frozen
@@ -205,7 +205,7 @@ class LowerBound(float):
         return f"≥ {general(self, digits)}"
 
 
-Interval = tuple[Figure, Figure]  # both edges of a stable interval
+FigurePair = tuple[Figure, Figure]  # both edges of a stable interval
 
 
 @dataclass(frozen=True)
@@ -262,7 +262,7 @@ class Limit:
         return min(band, narrower) if still is False else 0.0
 
 
-def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[Interval]:
+def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[FigurePair]:
     """Return the stability intervals of a number, with more and more modes until all digits are certified."""
 
     def proof(value: float) -> Proof:
@@ -289,8 +289,12 @@ def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[Interval]
 
 
 def _most_certain(
-    loop: Sampled, band: Band | None, most: int, found: Callable[[Sampled], Found], is_sharp: Callable[[Found], bool]
-) -> Found:
+    loop: Sampled,
+    band: Band | None,
+    most: int,
+    found: Callable[[Sampled], Edge],
+    is_sharp: Callable[[Edge], bool],
+) -> Edge:
     """What is found with at most MOST_EDGE_MODES modes; in a certified band with twice as many until it `is_sharp`."""
     loop = resized(loop, min(loop.plant.count, MOST_EDGE_MODES))
     result = found(loop)

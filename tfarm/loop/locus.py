@@ -34,7 +34,7 @@ from tfarm.loop.varied import ARM_PARAMETERS, OF_THE_LAW, Title, Varied
 from tfarm.loop.windows import without_losses
 from tfarm.records import frozen
 from tfarm.response.frequency import AXIS_SHARE
-from tfarm.response.signals import Controller, controller
+from tfarm.response.signals import ControllerSignals, controller
 from tfarm.schema import Quantity
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.box import Box
@@ -102,7 +102,7 @@ class Locus:
         return f"a pole becomes {first}{f' and {more} more' if more > 0 else ''}"
 
     @property
-    def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
+    def controller(self) -> Annotated[ControllerSignals, Quantity(flat=True)]:
         """Names of the arm and the controller."""
         return controller(self.law, self.arm)
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback, Law, cancelled
 from tfarm.arrays import Complex
-from tfarm.response.signals import Controller, controller
+from tfarm.response.signals import ControllerSignals, controller
 from tfarm.schema import Quantity
 
 
@@ -41,7 +41,7 @@ class Loop(ABC):
         return None
 
     @property
-    def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
+    def controller(self) -> Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller."""
         return controller(self.law, self.arm)
 

@@ -46,7 +46,7 @@ from tfarm.loop.lines import (
 from tfarm.loop.stability import band_of_family, verdict_on
 from tfarm.loop.windows import theorem_edges, theorem_windows
 from tfarm.records import frozen
-from tfarm.response.signals import Controller, controller
+from tfarm.response.signals import ControllerSignals, controller
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.gains import PAPER_GAINS, default_gains, rate_unit
@@ -112,7 +112,7 @@ class Plane(PlaneOfCounts):
         return self.loop.law
 
     @property
-    def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
+    def controller(self) -> Annotated[ControllerSignals, Quantity(flat=True)]:
         """Names of the arm and the controller."""
         return controller(self.law, self.arm)
 

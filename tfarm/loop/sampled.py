@@ -55,7 +55,7 @@ from tfarm.errors import ParameterError, did_you_mean
 from tfarm.loop.loop import Loop
 from tfarm.loop.sampled_rig import SampledRig
 from tfarm.records import frozen
-from tfarm.response.signals import Controller
+from tfarm.response.signals import ControllerSignals
 from tfarm.schema import Quantity
 
 MOST_STEPS = 200  # of all roots together: a cluster of nine takes 24
@@ -360,7 +360,7 @@ class OfLoop:
     loop: Sampled
 
     @property
-    def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
+    def controller(self) -> Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller."""
         return self.loop.controller
 

@@ -24,7 +24,7 @@ from tfarm.loop.curve import LoopAnalysis, LoopContour, LoopVerdict, next_limits
 from tfarm.loop.edges import (
     DelayMargin,
     Figure,
-    Interval,
+    FigurePair,
     Limit,
     LowerBound,
     damping_limit,
@@ -264,7 +264,7 @@ class SampledNumber(NamedTuple):
 
     number: Annotated[str, Quantity("gain or coefficient", help="name of a number of the controller")]
     value: Annotated[float, Quantity("value", help="present value of the number")]
-    windows: Annotated[Sequence[Window | Interval], Quantity("stability intervals", key="intervals",
+    windows: Annotated[Sequence[Window | FigurePair], Quantity("stability intervals", key="intervals",
             help="all intervals of the number in which the loop is stable, the others constant")]  # fmt: skip
     interval: Annotated[Window | None, Quantity(help="the interval that contains the present value")]
 
@@ -332,7 +332,7 @@ class Analysis(LoopAnalysis):
         return self.verdict.loop
 
     @cached_property
-    def shown(self) -> Mapping[str, list[Interval]]:
+    def shown(self) -> Mapping[str, list[FigurePair]]:
         """The stability intervals of each gain at the hub, the others constant, by name."""
         without_loop = (MOMENT_GAIN,) if self.loop.plant.arm.has_massless_hub else ()
         return {

@@ -83,7 +83,7 @@ def headline_numbers(modes: Modes) -> tuple[Fact, ...]:
     )
 
 
-class Parameter(NamedTuple):
+class FileParameter(NamedTuple):
     """A number of the arm's file."""
 
     label: Annotated[str, Quantity("parameter", help="what the number is in the model")]
@@ -92,7 +92,7 @@ class Parameter(NamedTuple):
     key: Annotated[str, Quantity("key of the file", help="table and key of the TOML file")]
 
 
-def parameters(arm: Arm, table: Mapping[str, Any], under: str = "") -> Iterator[Parameter]:
+def parameters(arm: Arm, table: Mapping[str, Any], under: str = "") -> Iterator[FileParameter]:
     """The numbers of a table of an arm's file by their keys, those of tables in it too."""
     for key, value in table.items():
         if isinstance(value, dict):
@@ -101,7 +101,7 @@ def parameters(arm: Arm, table: Mapping[str, Any], under: str = "") -> Iterator[
             yield from parameters(arm, {str(number): each for number, each in enumerate(value, 1)}, f"{under}{key}.")
         elif key not in ("name", "assumptions"):  # which are in other places of the page
             of = file_key(f"{under}{key}", arm)
-            yield Parameter(of.label, value, unit(of.unit), f"{under}{key}")
+            yield FileParameter(of.label, value, unit(of.unit), f"{under}{key}")
 
 
 class Derived(NamedTuple):

@@ -53,9 +53,9 @@ from tfarm.report.response_sections import bode_section
 from tfarm.report.sampled_section import sampled_section, tuner_section
 from tfarm.report.trust import TRUST_FOLDER, save_proof, write_trust, written_proofs
 from tfarm.schema import Column, Table, quantities, table, text
+from tfarm.stopping import Progress
 from tfarm.studies.study import Study
 
-ReportProgress = Callable[[int, int, str], object]
 Calls = Mapping[str, Sequence[Callable[[], Any]]]  # by task: what one process does in turn
 MOST_WORKERS = 2  # processes that share the pieces of a report: as many cores as a small machine has
 EVIDENCE = "method and proofs"  # a task of no arm
@@ -82,7 +82,7 @@ RESERVED_NAMES = {
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class SectionSpec:
     """A section of an arm's pages: a name for the progress bar, the section's anchor, and how to make it of a report.
 
     A report that it does not suit has no such section.  The page that has it is called by the first word of its anchor,
@@ -120,37 +120,43 @@ def _of_gains(report: ArmReport) -> bool:
 
 
 PIECES = (
-    Piece("stability region of both gains", MAP, loop_section.map_section, _of_gains, task=LOOP_TASK),
-    Piece("recommended gains", "margins-recommended", loop_section.recommended_section, _of_gains, task=LOOP_TASK),
-    Piece("stability margins", "margins", loop_section.margins_section, _in_s, "Gains and margins", task=LOOP_TASK),
-    Piece("Nyquist plot", "margins-nyquist", loop_section.nyquist_section, _in_s, task=LOOP_TASK),
-    Piece(
+    SectionSpec("stability region of both gains", MAP, loop_section.map_section, _of_gains, task=LOOP_TASK),
+    SectionSpec(
+        "recommended gains", "margins-recommended", loop_section.recommended_section, _of_gains, task=LOOP_TASK
+    ),
+    SectionSpec(
+        "stability margins", "margins", loop_section.margins_section, _in_s, "Gains and margins", task=LOOP_TASK
+    ),
+    SectionSpec("Nyquist plot", "margins-nyquist", loop_section.nyquist_section, _in_s, task=LOOP_TASK),
+    SectionSpec(
         "response of the root moment",
         "bode-root-moment",
         partial(bode_section, output="root_moment"),
         title="Bode plots",
     ),
-    Piece("response of the tip", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),
-    Piece("measured responses", "bode-measured", response_sections.measured_section, attrgetter("measured")),
-    Piece("the arm", "arm", response_sections.arm_section, on="modes"),
-    Piece("modes", "modes", response_sections.modes_section, title="Arm and modes"),
-    Piece("root loci", "locus", loop_section.locus_section, _in_s, "Root loci", task=LOOP_TASK),
-    Piece("sampled loop", "sampled", sampled_section, attrgetter("has_loop"), "The sampled loop", task=SAMPLED_TASK),
-    Piece("controllers", "law", loop_section.law_section, _of_laws, "The controller"),
-    Piece("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", task=SAMPLED_TASK),
-    Piece("fit to measurements", "fit", response_sections.fit_section, attrgetter("fit"), "Fitted numbers"),
-    Piece("assumptions", "assumptions", response_sections.assumptions_section, title="Assumptions"),
+    SectionSpec("response of the tip", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),
+    SectionSpec("measured responses", "bode-measured", response_sections.measured_section, attrgetter("measured")),
+    SectionSpec("the arm", "arm", response_sections.arm_section, on="modes"),
+    SectionSpec("modes", "modes", response_sections.modes_section, title="Arm and modes"),
+    SectionSpec("root loci", "locus", loop_section.locus_section, _in_s, "Root loci", task=LOOP_TASK),
+    SectionSpec(
+        "sampled loop", "sampled", sampled_section, attrgetter("has_loop"), "The sampled loop", task=SAMPLED_TASK
+    ),
+    SectionSpec("controllers", "law", loop_section.law_section, _of_laws, "The controller"),
+    SectionSpec("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", task=SAMPLED_TASK),
+    SectionSpec("fit to measurements", "fit", response_sections.fit_section, attrgetter("fit"), "Fitted numbers"),
+    SectionSpec("assumptions", "assumptions", response_sections.assumptions_section, title="Assumptions"),
 )
 QUESTIONS = {piece.page: piece.title for piece in PIECES if piece.title}  # pages that may be asked for alone
 PAGES = {"index": "Overview", "live": "Live loop", **QUESTIONS}
 
 
-def pieces_of(report: ArmReport) -> list[Piece]:
+def pieces_of(report: ArmReport) -> list[SectionSpec]:
     """The sections of a report, in their order."""
     return [piece for piece in PIECES if piece.suits(report)]
 
 
-def make_section(piece: Piece, report: ArmReport, folder: Path) -> PageSection:
+def make_section(piece: SectionSpec, report: ArmReport, folder: Path) -> PageSection:
     """Return a section saved in the arm's folder, or the reason why tfarm could not make it; a bug of ours is loud."""
     try:
         with drawn_for("page"):
@@ -178,7 +184,7 @@ def write(
     measured: Sequence[Measured] = (),
     only: tuple[str, ...] | None = None,
     paper: bool = False,
-    progress: ReportProgress | None = None,
+    progress: Progress | None = None,
     notice: Callable[[str], object] | None = None,
     announce: Callable[[str], object] | None = None,
 ) -> Path:
@@ -231,7 +237,7 @@ def _written(
     out: Path,
     place: Path,
     only: tuple[str, ...],
-    progress: ReportProgress | None,
+    progress: Progress | None,
     announce: Callable[[str], object] | None,
 ) -> list[tuple[str, PageSection]]:
     """Make all pages in `place` and move them to `out`, the index last; every section with the name of its arm."""
@@ -304,7 +310,7 @@ def _results(calls: Sequence[Callable[[], Any]]) -> list[Any]:
     return [call() for call in calls]
 
 
-def make_all(tasks: Calls, progress: ReportProgress | None) -> dict[str, Sequence[Any]]:
+def make_all(tasks: Calls, progress: Progress | None) -> dict[str, Sequence[Any]]:
     """The results of all calls, by task."""
     # those of five seconds and more are begun first
     longest = sorted(tasks, key=lambda task: not task.endswith((SAMPLED_TASK, LOOP_TASK, EVIDENCE)))

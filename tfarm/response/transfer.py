@@ -1,7 +1,7 @@
 """The exact transfer function, with the names of python-control.
 
-Its poles and zeros are complete: by a count for real spectra, else by a winding number.  `Points` are values of one
-response at points s, `ByMethods` those by each method.
+Its poles and zeros are complete: by a count for real spectra, else by a winding number.  `TransferPoints` are values of
+one response at points s, `ByMethods` those by each method.
 """
 
 from __future__ import annotations
@@ -350,7 +350,7 @@ def _finite(s: ArrayLike) -> Complex:
 
 
 @frozen
-class Points:
+class TransferPoints:
     """G(s) of one output at `s`; `value` are pairs of texts for more than 15 digits."""
 
     s: Annotated[Complex, Quantity("s", "1/s", help="Laplace variable", curve=True)]
@@ -400,11 +400,11 @@ class Points:
         return Table(columns=(*names, *values))
 
 
-def values_at(G: TransferFunction, s: Complex, digits: int | None = None) -> Points:
+def values_at(G: TransferFunction, s: Complex, digits: int | None = None) -> TransferPoints:
     """Return the response at s, with certified digits for more than 15 of them."""
     right = digits or 0
     value = np.asarray(G(s)) if right <= DOUBLE_DIGITS else [list(G.digits(complex(each), right)) for each in s]
-    return Points(s, value, G.arm.name, G.input, G.input_unit, G.outputs[0], G.units[0], G.x, G.method)
+    return TransferPoints(s, value, G.arm.name, G.input, G.input_unit, G.outputs[0], G.units[0], G.x, G.method)
 
 
 @dataclass(frozen=True)

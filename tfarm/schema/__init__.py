@@ -9,6 +9,8 @@ meaning from here.  `to_dict` and `sections` read a record, `table` records of o
 `schema.terminal` and `schema.html` render tables, `schema.glossary` has every declared quantity.
 """
 
+from tfarm.moved import moved
+
 from .printed import Tabled
 from .quantities import (
     At,
@@ -24,7 +26,7 @@ from .quantities import (
 )
 from .tables import (
     Column,
-    Section,
+    RecordSection,
     Table,
     across,
     as_csv,
@@ -44,7 +46,7 @@ __all__ = [
     "Difference",
     "Percent",
     "Quantity",
-    "Section",
+    "RecordSection",
     "Table",
     "Tabled",
     "across",
@@ -64,3 +66,6 @@ __all__ = [
     "to_json",
     "with_unit",
 ]
+
+# its name up to version 1.0
+__getattr__ = moved(__name__, {"Section": "tfarm.schema:RecordSection"})

@@ -187,7 +187,7 @@ def curve_table(record: Any) -> Table:
 
 
 @dataclass(frozen=True, slots=True)
-class Section:
+class RecordSection:
     """What is read of a record one below the other: pairs of label and text, or a table, under a title."""
 
     title: str = ""
@@ -196,28 +196,28 @@ class Section:
     drawing: str = ""
 
 
-def sections(record: Any, title: str = "") -> list[Section]:
+def sections(record: Any, title: str = "") -> list[RecordSection]:
     """A record as a person reads it: tables declared `first`, single values, other tables, the records inside it."""
-    own = Section(title)
-    first: list[Section] = []
-    later: list[Section] = []
+    own = RecordSection(title)
+    first: list[RecordSection] = []
+    later: list[RecordSection] = []
     for value, of, owner in with_flat(record):
         if not of.label:
             continue
         if value is None or of.curve:
             own.pairs.extend([(of.label, NO_VALUE)] * of.is_number)
         elif is_table(value) or is_list_of_records(value):
-            (first if of.first else later).append(Section(of.label, table=table(value, parent=owner)))
+            (first if of.first else later).append(RecordSection(of.label, table=table(value, parent=owner)))
         elif is_declared(value) and not isinstance(value, At) and not hasattr(value, "as_text"):
             later += sections(value, of.label)
         elif isinstance(value, np.ndarray) and np.iscomplexobj(value) and value.size:
-            later.append(Section(of.help or of.label, table=roots_table(value, of)))
+            later.append(RecordSection(of.help or of.label, table=roots_table(value, of)))
         elif shown := with_unit(value, of):
             own.pairs.append((of.label, shown))
     if isinstance(whole := getattr(record, "table", None), Table):
-        later.append(Section(whole.title, table=whole))
+        later.append(RecordSection(whole.title, table=whole))
     if hasattr(record, "drawing"):
-        later.append(Section(drawing=record.drawing))
+        later.append(RecordSection(drawing=record.drawing))
     return [*first, own, *later]
 
 

@@ -17,7 +17,7 @@ from rich.console import Console, RenderableType
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from .tables import Column, Section, Table, sections
+from .tables import Column, RecordSection, Table, sections
 
 COLUMN_GAP = 2  # spaces between two columns
 LEAST_FOLDED = 20  # characters to which a text may be folded
@@ -29,7 +29,7 @@ LEAST_IN_PIPE = 48
 def show(record: Any, rows: Table | None = None, last: str = "") -> None:
     """Print a record as a person reads it, then a table of points and a last line of text, if there are any."""
     shown, left_out = (None, "") if rows is None else first_and_last(rows)
-    for number, each in enumerate([*sections(record), Section(table=shown)]):
+    for number, each in enumerate([*sections(record), RecordSection(table=shown)]):
         if each.pairs or each.table or each.drawing:
             print(end="\n" * bool(number))
             show_text(each.title)

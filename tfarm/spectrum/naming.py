@@ -15,7 +15,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import DIFFERENCE_STEP, has_slope, quick_characteristics
 from tfarm.exact.compiled import compiled
-from tfarm.exact.layout import OF_ELEMENT, ROW, Reading, readings
+from tfarm.exact.layout import OF_ELEMENT, ROW, OutputFormula, readings
 from tfarm.exact.sweep import AXIS, fill_free
 from tfarm.exact.system import Segment, System
 from tfarm.records import read_only
@@ -26,7 +26,7 @@ from .table import Modes, modes
 
 HALVINGS = (250, *[80] * 8)  # of steps, after which stray branches are lost and the others followed
 AROUND = np.array([1, 1.02, 0.98, 1 + 0.02j, 1 - 0.02j, 1.2, 0.8, 1 + 0.2j, 1 - 0.2j])  # starts next to a guess, of it
-NO_OUTPUT = np.empty((0, len(Reading._fields)))  # the table of a layout
+NO_OUTPUT = np.empty((0, len(OutputFormula._fields)))  # the table of a layout
 
 
 def function_of(k: System) -> Function:

@@ -24,12 +24,12 @@ from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.gains import default_gains
+from tfarm.stopping import Progress
 from tfarm.tuner import LearningCurves, Tuning, compare_controllers, tried_loops, tune
 from tfarm.tuner.baselines import Outcomes, quantised_chain
 from tfarm.tuner.tuning import tuned, usual_plan
 
 from .quantities import FREQUENCY, INTERVAL, STABILITY, intervals_of, prepare
-from .running import Progress
 from .space import Subjects
 
 STUDIED_MODES = 4  # flexible modes, by default

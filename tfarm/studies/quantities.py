@@ -62,7 +62,7 @@ CONFIDENCE = 0.95
 QUANTILES = {"least": 0.0, "low": 0.05, "median": 0.5, "high": 0.95, "largest": 1.0}
 STABLE = "stable"
 Values = Callable[[Subject, Set[str]], Mapping[str, Any]]  # of an arm, in these columns
-Asked = tuple[Mapping[str, Quantity], Values]  # columns, and their values
+ColumnSource = tuple[Mapping[str, Quantity], Values]  # columns, and their values
 
 
 def first_of(name: str) -> str:
@@ -121,7 +121,7 @@ def _kinds(kind: Any) -> dict[str, tuple[Any, ...]]:
     }
 
 
-def _card_of(loop: str) -> Asked:
+def _card_of(loop: str) -> ColumnSource:
     """Return the entries of the card of a loop, of which stability and its certainty need the verdict alone."""
 
     def values(one: Subject, names: Set[str]) -> dict[str, Any]:
@@ -214,7 +214,7 @@ def _tuner_of(one: Subject, _: Set[str]) -> dict[str, Any]:
     }
 
 
-ASKED: tuple[Asked, ...] = (
+ASKED: tuple[ColumnSource, ...] = (
     *map(_card_of, LOOPS),
     (_columns(FREQUENCY, "natural frequency, mode", "rad/s", "of the undamped arm"), _modes_of),
     ({name: column for parameter in PARAMETERS for name, column in _columns(

@@ -41,6 +41,7 @@ from tfarm.processes import shared
 from tfarm.records import frozen
 from tfarm.schema import Column, Quantity, Table
 from tfarm.spectrum.gains import default_gains
+from tfarm.stopping import Progress
 
 from .quantities import (
     CARD,
@@ -63,10 +64,9 @@ from .running import (
     ROW,
     STUDY_FILE,
     Engine,
-    Parts,
-    Plan,
-    Progress,
     Row,
+    StudyFolder,
+    StudyPlan,
     complete,
     on_cluster,
     rows_of,
@@ -127,7 +127,7 @@ class StudyTable(dict[str, Any]):
 class Study:
     """Results of a study, as far as it has been run, with its findings."""
 
-    parts: Parts
+    parts: StudyFolder
     arm: Annotated[str, Quantity("arm", help="arm whose numbers are varied")]
     rows: Annotated[int, Quantity("arms", help="rows of the whole study")]
     rows_a_part: Annotated[int, Quantity(help="rows of one file of the results")]
@@ -268,7 +268,7 @@ def study(
         over or {}, draws=draws, seed=seed, posterior=known, listing=None if rows is None else listing_of(Path(rows))
     )
     order = order_of(worst) if worst else ()
-    plan = Plan(case, space, column_names([*ask, *order]))
+    plan = StudyPlan(case, space, column_names([*ask, *order]))
     require(sobol >= 0 and sobol & (sobol - 1) == 0, "sobol", sobol, "a power of 2, such as 256; 0 for no indices")
     is_possible = not sobol or (space.is_independent and posterior is None and len(space.keys) > 1)
     require(is_possible, "sobol", sobol, "needs two or more independent distributions")
@@ -389,7 +389,7 @@ def worst_arm(study: Study, order: Sequence[str], deadline: float) -> WorstArm |
     )  # fmt: skip
 
 
-def search_worst(parts: Parts, order: Sequence[str], first: int, deadline: float) -> list[Row] | None:
+def search_worst(parts: StudyFolder, order: Sequence[str], first: int, deadline: float) -> list[Row] | None:
     """Return the rows of a search of the worst arm, by Nelder and Mead's simplex from row `first`.
 
     It stays within the range of a bounded distribution of n draws, else within its quantiles 1/(2 n) and 1 - 1/(2 n).
@@ -416,7 +416,7 @@ def search_worst(parts: Parts, order: Sequence[str], first: int, deadline: float
     return searched(parts.others(f"_worst-{order[0]}-", most, 1, order), search, deadline)
 
 
-def write_case(parts: Parts, numbers: Mapping[str, float]) -> Path:
+def write_case(parts: StudyFolder, numbers: Mapping[str, float]) -> Path:
     """Write the arm with these numbers, its chain and its controller, and return the file."""
     plan = parts.plan
     file = parts.folder / "worst.toml"
@@ -432,7 +432,7 @@ def write_case(parts: Parts, numbers: Mapping[str, float]) -> Path:
 
 
 def sobol_indices(
-    study: Parts, size: int, workers: int, engine: Engine, deadline: float, progress: Progress
+    study: StudyFolder, size: int, workers: int, engine: Engine, deadline: float, progress: Progress
 ) -> tuple[SobolIndex, ...]:
     """Return Sobol' indices of every quantity, of a sample of its own of N (numbers + 2) arms, written as parts.
 

@@ -29,9 +29,9 @@ from tfarm.schema import Quantity
 from tfarm.tuner.guard import Guard
 from tfarm.tuner.kernel import (
     Network,
-    Run,
+    SampleBuffers,
     Setting,
-    Work,
+    TrialSignals,
     act,
     backward,
     copied,
@@ -51,7 +51,7 @@ BEFORE = 4  # rows further are those of the sample before, and as many further a
 INPUT_ROWS = (U, U + BEFORE, E + BEFORE, E + 2 * BEFORE, X, X + BEFORE, K + BEFORE)  # of each input of the network
 
 
-class Steps(NamedTuple):
+class DescentSettings(NamedTuple):
     """Constants of (21) and (22): learning rate, momentum, largest norm of a gradient (inf: any).
 
     `enough` is the root mean square of x [N m] over a trial that is small enough to stop.
@@ -73,7 +73,7 @@ def _rms(x: Real) -> float:
 
 
 @inlined
-def _step(weights: Real, change: Real, gradient: Real, steps: Steps, share: float) -> None:
+def _step(weights: Real, change: Real, gradient: Real, steps: DescentSettings, share: float) -> None:
     """Take a step of (21) and (22): dw = -eta g + alpha dw, w = w + dw; eta times `share`, g clipped to `longest`."""
     norm = 0.0
     for i in range(gradient.size):
@@ -87,7 +87,13 @@ def _step(weights: Real, change: Real, gradient: Real, steps: Steps, share: floa
 
 @compiled
 def learn_by_trials(
-    setting: Setting, steps: Steps, weights: Real, costs: Real, run: Run, work: Work, takes_back: bool
+    setting: Setting,
+    steps: DescentSettings,
+    weights: Real,
+    costs: Real,
+    run: TrialSignals,
+    work: SampleBuffers,
+    takes_back: bool,
 ) -> tuple[int, int]:
     """Learn after each trial: fill `costs`, change `weights`.
 
@@ -132,7 +138,9 @@ def learn_by_trials(
 
 
 @inlined
-def derive(k: int, setting: Setting, weights: Real, run: Run, work: Work, S: Real, spare: Real, D: Real) -> None:
+def derive(
+    k: int, setting: Setting, weights: Real, run: TrialSignals, work: SampleBuffers, S: Real, spare: Real, D: Real
+) -> None:
     """Set derivatives at sample k by every weight, forward: rows of D are those of x, u, e, K now and 1, 2 samples ago.
 
     S (n, weights) is that of the state, and advances by one sample.
@@ -168,7 +176,13 @@ def derive(k: int, setting: Setting, weights: Real, run: Run, work: Work, S: Rea
 
 @compiled
 def learn_by_samples(
-    setting: Setting, steps: Steps, weights: Real, costs: Real, run: Run, work: Work, is_whole: bool
+    setting: Setting,
+    steps: DescentSettings,
+    weights: Real,
+    costs: Real,
+    run: TrialSignals,
+    work: SampleBuffers,
+    is_whole: bool,
 ) -> tuple[int, int]:
     """Learn at every sample, from x by the weights of its torque; return as `learn_by_trials`.
 
@@ -328,7 +342,7 @@ def train(trial: Trial, network: Network, guard: Guard, learning: Learning, tria
     weights = network.weights
     costs = np.zeros(trials)
     longest = math.inf if learning.rule == "plain" else learning.clip
-    steps = Steps(learning.eta, learning.alpha, longest, learning.enough)
+    steps = DescentSettings(learning.eta, learning.alpha, longest, learning.enough)
     common = (trial.setting(network, guard.limits), steps, weights, costs, *trial.room(network))
     if learning.mode == "trial":
         made, sample = learn_by_trials(*common, learning.rule == "dynamic")

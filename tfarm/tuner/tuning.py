@@ -10,7 +10,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, must_be_arm
-from tfarm.arm.chain import Reading
+from tfarm.arm.chain import MomentReading
 from tfarm.arm.checks import check_annotated, positive
 from tfarm.arrays import Real
 from tfarm.case import Case
@@ -56,7 +56,7 @@ class Plan:
 
     cost: Cost = field(default_factory=Cost)
     learning: Learning = field(default_factory=Learning)
-    signals: Reading = "vibration"
+    signals: MomentReading = "vibration"
     guard: GuardKind = "time-varying"
     trials: int = 100
     seed: int = 0
