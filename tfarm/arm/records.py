@@ -20,7 +20,7 @@ from tfarm.arm.checks import (
     plain_texts,
 )
 from tfarm.arm.parts import Attachment, Gauge, Hub, Link, Motor, Payload, RotarySpring, brief_repr
-from tfarm.errors import ParameterError, must_be_known, require, shown
+from tfarm.errors import ParameterError, must_be_known, require, short_text
 
 MOST_PARTS = 64  # segments, and attachments: a check of the chain has 64 equal pieces
 IDEAL_MOTOR = Motor(resistance=1.0, torque_constant=1.0, back_emf_constant=0.0)  # without inertia, friction and gear
@@ -371,7 +371,7 @@ def must_be_arm(arm: object) -> None:
     """Raise ParameterError for anything but an Arm."""
     if not isinstance(arm, Arm):
         name = str(arm) if isinstance(arm, str | os.PathLike) else "sasaki2012"
-        raise ParameterError(key="arm", value=arm, remedy=f"is no Arm; give tfarm.load({shown(name)})")
+        raise ParameterError(key="arm", value=arm, remedy=f"is no Arm; give tfarm.load({short_text(name)})")
 
 
 def must_have_free_hub(arm: Arm) -> None:

@@ -34,8 +34,8 @@ from tfarm.case import Case
 from tfarm.digits import general
 from tfarm.dsp import Chain, traces
 from tfarm.dsp.plant import sensed_plant
-from tfarm.dsp.results import ENOUGH_CHANGE, simulated
-from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, described, resting, scenario
+from tfarm.dsp.results import ENOUGH_CHANGE, simulate_modes
+from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, describe_scenario, rest_scenario, scenario
 from tfarm.dsp.simulate import MOST_BETWEEN, SETTLING_BAND, final_value, first_mode, settling_time
 from tfarm.dsp.stages import admit_case, not_covered
 from tfarm.errors import must_be_known, require
@@ -54,7 +54,7 @@ from tfarm.loop.time_response import (
     usual_poles,
 )
 from tfarm.records import frozen
-from tfarm.response.signals import ControllerSignals, controller, placed
+from tfarm.response.signals import ControllerSignals, controller, locate_output
 from tfarm.schema import Column, Percent, Quantity, Table, across
 from tfarm.schema.html import as_html
 from tfarm.spectrum.table import first_frequency
@@ -175,7 +175,7 @@ class _LoopRecord:
     def _of_sampled(self, case: Case, task: Scenario, names: Sequence[str]) -> LoopResponse:
         """The sampled loop, with the signals of these names."""
         between = round(task.period / self.t[1]) - 1
-        run, used = simulated(case, task, between=between, outputs=names)
+        run, used = simulate_modes(case, task, between=between, outputs=names)
         signals = {name: traces.continuous(run, name)[1][: self.t.size] for name in names}
         signals[TORQUE] = traces.held_at(run, run.torque, self.t[: signals[MOMENT].size])
         is_converged = used.change is not None and used.change <= ENOUGH_CHANGE
@@ -221,7 +221,7 @@ class _LoopRecord:
         settled = known["settling_time"]
         return SignalFigures(
             signal=name,
-            unit=unit_of(self.arm, name),
+            unit=signal_unit(self.arm, name),
             **known,
             note="; ".join(words) or None,
             at_rest_after=None if settled is None else self.busy_until + settled,
@@ -312,7 +312,7 @@ class Step(_LoopRecord):
     def csv_table(self) -> Table:
         """The signals of both loops at the same times, empty where a run was stopped."""
         signals = (
-            Column(prefix + name, unit=unit_of(self.arm, name), of=[*y.tolist(), *[""] * (self.t.size - y.size)])
+            Column(prefix + name, unit=signal_unit(self.arm, name), of=[*y.tolist(), *[""] * (self.t.size - y.size)])
             for prefix, loop in (("", self.continuous), ("sampled_", self.sampled))
             for name, y in (loop.signals.items() if loop else ())
         )
@@ -322,9 +322,9 @@ class Step(_LoopRecord):
         return as_html(self.table)
 
 
-def unit_of(arm: Arm, name: str) -> str:
+def signal_unit(arm: Arm, name: str) -> str:
     """SI unit of a signal, or of the input as "torque"."""
-    return arm.input_unit if name == TORQUE else placed(name, arm.length)[0].unit
+    return arm.input_unit if name == TORQUE else locate_output(name, arm.length)[0].unit
 
 
 def step(
@@ -369,14 +369,14 @@ def step(
     is_step = scenario_name == "reference"
     hub = AT_HUB[0]
     if is_step:
-        hub, own = followed(case.law)
+        hub, own = step_reference(case.law)
         case = case.under(own)
     arm = case.arm
     chain = case.chain
     poles = None if case.law.is_discrete else usual_poles(ContinuousLoop(case))
     length = usual_duration(poles, chain) if duration is None else duration
     if is_step:
-        task = resting("reference", arm, chain, length, hub)
+        task = rest_scenario("reference", arm, chain, length, hub)
     else:
         task = scenario(SAMPLED_NAMES[scenario_name], arm, chain, length)
     require(task.t.size > 1, "duration", length, f"at least one sampling period, {task.period:g} s")
@@ -394,13 +394,13 @@ def step(
     found = _LoopRecord(arm, (*names[:3], TORQUE), task.busy_until, t, reference, band)
     return Step(
         **vars(found), controller=controller(case.law, arm), scenario=scenario_name, period=task.period,
-        duration=min(length, float(t[-1])), scenario_in_words=described(task, arm, chain), response=response,
+        duration=min(length, float(t[-1])), scenario_in_words=describe_scenario(task, arm, chain), response=response,
         sampled=found._of_sampled(case, task, names),
         continuous=None if response is None else found._of_continuous(response, not_covered(CONTINUOUS, chain)),
     )  # fmt: skip
 
 
-def followed(law: Law) -> tuple[str, Law]:
+def step_reference(law: Law) -> tuple[str, Law]:
     """Return the signal of the hub whose reference steps, and the law with that reference.
 
     Raises ParameterError for a law that feeds back neither hub angle nor hub rate.

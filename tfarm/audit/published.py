@@ -29,8 +29,8 @@ DATA = tomllib.loads((files("tfarm.audit") / "literature.toml").read_text("utf-8
 class PrintedColumn:
     """One column of a table: the arm, the theory it was printed for, and what was printed of modes 1, 2, ...
 
-    `quantity` is one of those of `computed`, w in rad/s; `why` has a reason for each mode whose printed digits are not
-    reached.
+    `quantity` is one of those of `exact_numbers`, w in rad/s; `why` has a reason for each mode whose printed digits are
+    not reached.
     """
 
     name: str
@@ -140,11 +140,11 @@ def case_rows(key: str, case: PrintedColumn) -> list[PublishedRow]:
             agrees=agrees(ours, printed),
             why=case.why.get(mode, ""),
         )
-        for mode, (printed, ours) in enumerate(zip(case.printed, computed(case).tolist(), strict=True), start=1)
+        for mode, (printed, ours) in enumerate(zip(case.printed, exact_numbers(case).tolist(), strict=True), start=1)
     ]
 
 
-def computed(case: PrintedColumn) -> NDArray[np.float64]:
+def exact_numbers(case: PrintedColumn) -> NDArray[np.float64]:
     """The exact solution's numbers for a column, in its quantity."""
     link = case.arm.link
     count = len(case.printed)

@@ -164,7 +164,7 @@ def map_plane(
     vary: twice: two numbers of a law and their ranges; gain (a factor on the law), delay, SIGNAL, SIGNAL.num.N or
         SIGNAL.den.N
     """
-    from tfarm.loop.plane import between, ranges_of
+    from tfarm.loop.plane import cell_middles, ranges_of
 
     controller: AnyLaw
     typed = {RATE_GAIN: k1, MOMENT_GAIN: k2}
@@ -179,7 +179,7 @@ def map_plane(
         ranges = {name: typed[name] or usual for name, usual in zip(PLANE, ranges_of(arm), strict=True)}
         controller = tfarm.default_gains(arm).having(ANGLE_GAIN, kp)
     number = points or (60 if vary or law else 101)
-    return controller, {name: between(low, high, number) for name, (low, high) in ranges.items()}
+    return controller, {name: cell_middles(low, high, number) for name, (low, high) in ranges.items()}
 
 
 @command(epilog="map sasaki2012-lab --K1 -1,3 --K2 -2,2 --png map.png", name="map")
@@ -190,7 +190,7 @@ def gain_map(
 
     With --period, --delay-samples or --dsp of the sampled loop.
     """
-    from tfarm.dsp.plant import driven
+    from tfarm.dsp.plant import arm_under_chain
     from tfarm.loop.circle_crossings import sampled_map
     from tfarm.loop.sampled_verdict import sampled_verdict
 
@@ -202,7 +202,7 @@ def gain_map(
         loop = sampled_verdict(tfarm.Case(subject, controller, chain(arm))).full
         found: Any = sampled_map(loop, x, y, vary=names)
     else:
-        found = tfarm.map(driven(subject, chain(arm))[0], x, y, law=controller, vary=names)
+        found = tfarm.map(arm_under_chain(subject, chain(arm))[0], x, y, law=controller, vary=names)
     show(found)
 
 

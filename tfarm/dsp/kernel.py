@@ -138,7 +138,7 @@ class Electronics(NamedTuple):
 
 
 @inlined
-def reading(o: int, model: Any, state: Any) -> float:
+def dynamic_output(o: int, model: Any, state: Any) -> float:
     """Output o without its static remainder."""
     value = model.rates[o, DOUBLY] * state.rigid[DOUBLY] + model.rates[o, ONCE] * state.rigid[ONCE]
     for i in range(state.amplitude.size):
@@ -152,7 +152,7 @@ def reading(o: int, model: Any, state: Any) -> float:
 def read_outputs(model: Any, state: Any, torque: float, out: Any) -> None:
     """The outputs under the torque that acts now."""
     for o in range(out.size):
-        out[o] = reading(o, model, state) + model.static[o] * torque
+        out[o] = dynamic_output(o, model, state) + model.static[o] * torque
 
 
 @compiled
@@ -162,7 +162,7 @@ def advance(k: int, model: Any, state: Any, old: float, new: float, push_on: flo
     Fills a row of `fine` at each record, and adds to the work.
     """
     row = 0
-    before = reading(model.hub, model, state)
+    before = dynamic_output(model.hub, model, state)
     for s in range(model.piece.shape[0]):
         torque = (new if model.piece[s, IS_NEW] > YES else old) + push_on
         dt = model.piece[s, DURATION]
@@ -172,7 +172,7 @@ def advance(k: int, model: Any, state: Any, old: float, new: float, push_on: flo
             state.amplitude[i] = model.turn[s, i] * state.amplitude[i] + model.push[s, i] * torque
         state.rigid[DOUBLY] += dt * state.rigid[ONCE] + 0.5 * dt * dt * torque
         state.rigid[ONCE] += dt * torque
-        after = reading(model.hub, model, state)
+        after = dynamic_output(model.hub, model, state)
         done = torque * (after - before)
         state.work[DONE] += done
         state.work[MOVED] += abs(done)
@@ -205,7 +205,7 @@ def estimate(angle: float, rate: float, memory: Any, is_differenced: bool, pole:
     return memory[RATE_BEFORE]
 
 
-def converted(record: Any, saturated: Any, memory: Any, of: Any) -> Any:
+def convert_outputs(record: Any, saturated: Any, memory: Any, of: Any) -> Any:
     """Hub angle, hub rate and root moment of one sample's outputs, through the converters of `Electronics`."""
     angle = quantise(record[ANGLE], of.quantisers[ENCODER], saturated, ENCODER)
     moment = quantise(record[MOMENT], of.quantisers[AMPLIFIER], saturated, AMPLIFIER)
@@ -233,22 +233,22 @@ def after(k: int, u: float, model: Any, state: Any, forcing: Any, of: Any) -> No
 
 # those of Python loops are plain
 _before = inlined(before)
-_converted = inlined(converted)
+_converted = inlined(convert_outputs)
 _after = inlined(after)
 
 
 @inlined
-def rounded(value: float, single: bool) -> float:
+def to_precision(value: float, single: bool) -> float:
     """A number in the precision of the controller: float32 or float64."""
     return float(np.float32(value)) if single else value
 
 
 @inlined
-def product(row: Any, values: Any, start: float, single: bool) -> float:
+def add_row_product(row: Any, values: Any, start: float, single: bool) -> float:
     """start + row . values, every product and sum in the precision of the controller."""
     total = start
     for j in range(values.size):
-        total = rounded(total + rounded(row[j] * values[j], single), single)
+        total = to_precision(total + to_precision(row[j] * values[j], single), single)
     return total
 
 
@@ -256,11 +256,13 @@ def product(row: Any, values: Any, start: float, single: bool) -> float:
 def law_step(table: Any, z: Any, feedforward: float, single: bool, out: Any) -> None:
     """out = table z of z = [x; e]: the next states, and the output, which begins with the feedforward."""
     for i in range(out.size):
-        out[i] = product(table[i], z, feedforward if i == out.size - 1 else 0.0, single)
+        out[i] = add_row_product(table[i], z, feedforward if i == out.size - 1 else 0.0, single)
 
 
 @compiled
-def run(model: Any, state: Any, forcing: Any, electronics: Any, table: Any, sources: Any, references: Any) -> int:
+def run_samples(
+    model: Any, state: Any, forcing: Any, electronics: Any, table: Any, sources: Any, references: Any
+) -> int:
     """Run a law over all samples; return their number before the root moment passes its bound.
 
     [x_{k+1}; u - r] = table [x; e] of the errors e = reference - signal, `references` (n, columns).  `sources`
@@ -281,8 +283,8 @@ def run(model: Any, state: Any, forcing: Any, electronics: Any, table: Any, sour
         for j in range(sources.size):
             source = sources[j]
             value = 0.0 if source < 0 else known[source] if source < known.size else record[source]
-            z[order + j] = rounded(rounded(references[k, j], single) - rounded(value, single), single)
-        law_step(table, z, rounded(forcing.feedforward[k], single), single, following)
+            z[order + j] = to_precision(to_precision(references[k, j], single) - to_precision(value, single), single)
+        law_step(table, z, to_precision(forcing.feedforward[k], single), single, following)
         for i in range(order):
             z[i] = following[i]
         _after(k, following[order], model, state, forcing, electronics)

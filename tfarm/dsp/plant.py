@@ -120,7 +120,7 @@ class Plant:
         return int(self.mode.max(initial=0))
 
 
-def driven(arm: Arm, chain: Chain) -> tuple[Arm, Chain]:
+def arm_under_chain(arm: Arm, chain: Chain) -> tuple[Arm, Chain]:
     """The arm that a chain drives, with the actuator's analog damping as friction of its hub, and the chain without it.
 
     So it is in every loop of that arm once: in the sampled and in the continuous-time one.
@@ -240,7 +240,7 @@ class SensedPlant:
 
 def sensed_plant(arm: Arm, chain: Chain, names: Sequence[str], count: int) -> SensedPlant:
     """Return the signals of these names with `count` flexible modes, of an arm whose hub a chain may damp."""
-    read = Signals(driven(arm, chain)[0], tuple(names))
+    read = Signals(arm_under_chain(arm, chain)[0], tuple(names))
     plants = []
     for share in dict.fromkeys(read.places):
         here = zip(read.outputs, read.places, strict=True)

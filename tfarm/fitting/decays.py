@@ -119,7 +119,7 @@ class RingdownFit:
         return self.white >= NOT_WHITE
 
 
-def ring(
+def fit_ringdown(
     recording: Recording, name: str, *, start: float | None = None, stop: float | None = None, modes: int = 1
 ) -> RingdownFit:
     """Frequency and damping of the decay of one signal between two times [s] of the record.

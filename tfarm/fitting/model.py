@@ -83,7 +83,7 @@ class Parameter:
         return found if self.start > 0 or self.size else found[::-1]
 
 
-def parameters(
+def free_parameters(
     arm: Arm,
     keys: Sequence[str],
     *,
@@ -370,7 +370,7 @@ class Problem:
         return np.array(rows)
 
 
-def walled(residuals: Callable[[Real], Real], first: Real) -> Callable[[Real], Real]:
+def penalize(residuals: Callable[[Real], Real], first: Real) -> Callable[[Real], Real]:
     """The residuals, and where there is no arm (a mass beyond the tip) a wall, so high that no search goes on there."""
     near = residuals(first)
     wall = np.full(near.size, 10.0 * max(abs(near).max(initial=0.0), 1.0))

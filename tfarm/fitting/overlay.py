@@ -26,7 +26,7 @@ from tfarm.exact.outputs import unit_over
 from tfarm.records import frozen
 from tfarm.response import TransferFunction, transfer
 from tfarm.response.frequency import HERTZ, refined_grid, without_cancelled
-from tfarm.response.signals import Signals, placed
+from tfarm.response.signals import Signals, locate_output
 from tfarm.response.transfer import Roots
 from tfarm.schema import Column, Quantity, Table
 from tfarm.spectrum import modes as modes_of
@@ -155,7 +155,7 @@ class Ratio:
 
 def _transfer(arm: Arm, name: str) -> TransferFunction:
     """To a signal with its place after an @."""
-    wanted, x = placed(name, arm.length)
+    wanted, x = locate_output(name, arm.length)
     return transfer(arm, wanted, x=x if wanted.place == "x" else None)
 
 

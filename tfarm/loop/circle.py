@@ -49,7 +49,7 @@ from numpy.typing import NDArray
 from tfarm.arrays import MACHINE_EPS, Complex, Real
 from tfarm.dsp.plant import SLOW, phi
 from tfarm.errors import ConvergenceError
-from tfarm.loop.sampled import Sampled, resized
+from tfarm.loop.sampled import Sampled, with_more_modes
 from tfarm.records import frozen
 from tfarm.spectrum import modes
 from tfarm.spectrum.box import TOWARD_SINGULAR, Box, winding_number
@@ -181,7 +181,7 @@ class Circle:
         signals = [self._output(row, arcs, sums[row] + sums[n + row] * arcs.turned(1), sums[-1]) for row in range(n)]
         found = [arcs.x]
         for _, row, _, roots in self.terms:
-            term = product(arcs.x, roots[roots != 0]) * arcs.turned(order - roots.size)
+            term = root_ratio(arcs.x, roots[roots != 0]) * arcs.turned(order - roots.size)
             found.append(term if row < 0 else term * signals[row])
         return Discs(np.array([each.middle for each in found]), np.array([each.radius for each in found]))
 
@@ -282,7 +282,7 @@ def power(x: Discs, n: int) -> Discs:
     return reduce(Discs.__mul__, [x] * n, one)
 
 
-def product(x: Discs, roots: Complex) -> Discs:
+def root_ratio(x: Discs, roots: Complex) -> Discs:
     """prod((z - r)/z) for x = 1 - 1/z in discs, each root r given as r - 1."""
     factors = x.middle[:, None] * (1 + roots) - roots
     sizes = abs(factors)
@@ -317,7 +317,7 @@ class Band:
     @cached_property
     def full(self) -> Sampled:
         """The loop with all modes of the band, and at least one."""
-        return resized(self.loop, max(1, self.modes))
+        return with_more_modes(self.loop, max(1, self.modes))
 
     @cached_property
     def circle(self) -> Circle:

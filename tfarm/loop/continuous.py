@@ -271,7 +271,7 @@ def grid(arm: Arm, up_to: float) -> Any:
 
 
 @lru_cache(maxsize=ARMS_KEPT)
-def band_of(arm: Arm, number: int) -> float:
+def frequency_above_mode(arm: Arm, number: int) -> float:
     """A frequency [rad/s] half-way between two natural ones, with `number` flexible modes below."""
     omega = modes(arm, number + 1).natural_frequency
     return float((omega[-1] + omega[-2]) / 2)

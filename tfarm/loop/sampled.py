@@ -442,7 +442,7 @@ def sampled_loop(case: Case, *, count: int = USUAL_MODES) -> Sampled:
     """Return the loop of a case with `count` flexible modes.
 
     Raises ParameterError for a locked hub, an unknown signal, a law in z of another period, a massless hub whose moment
-    is fed back (an algebraic loop), and as `discretised` does.
+    is fed back (an algebraic loop), and as `discretise_law` does.
     """
     law = case.feedback
     acting, chain = acting_law(case, law)
@@ -455,7 +455,7 @@ def sampled_loop(case: Case, *, count: int = USUAL_MODES) -> Sampled:
     return Sampled(SampledRig(sensed_plant(case.arm, chain, in_z.signals, count), chain, in_z), law, tuple(weights))
 
 
-def resized(loop: Sampled, count: int) -> Sampled:
+def with_more_modes(loop: Sampled, count: int) -> Sampled:
     """The loop with another number of flexible modes, or up to two more or less where two damped modes are one."""
     if count == loop.plant.count:
         return loop

@@ -38,8 +38,8 @@ from tfarm.records import frozen
 from tfarm.response.signals import Signals
 from tfarm.spectrum.table import first_frequency
 
-from .continuous import FAR_RIGHT, ContinuousLoop, band_of
-from .inversion import POINTS, Inversion, inverted
+from .continuous import FAR_RIGHT, ContinuousLoop, frequency_above_mode
+from .inversion import POINTS, Inversion, invert_transform
 from .poles import Poles, poles_below
 
 # the input of the arm as a place of excitation, and as a signal
@@ -241,7 +241,7 @@ def usual_poles(loop: ContinuousLoop, count: int = USUAL_COUNT) -> Poles:
     Raises ConvergenceError where they are not complete.
     """
     seen = loop.under(of_common_blocks(loop.law))
-    return replace(poles_below(seen, band_of(loop.arm, count)), loop=loop)
+    return replace(poles_below(seen, frequency_above_mode(loop.arm, count)), loop=loop)
 
 
 def time_response(poles: Poles, names: tuple[str, ...], excitation: Excitation, duration: float) -> TimeResponse:
@@ -337,7 +337,7 @@ def _part(poles: Poles, of: Transforms, start: float, duration: float) -> Delaye
     growth = float(known.real.max(initial=0.0))
     end = min(end, 10 / max(growth, LEAST_SIZE))  # where an unstable pole has grown by e^10
     # a first inversion ends 64 times sooner, for what begins as the root of time
-    rests = tuple(inverted(lambda s: of.parts(s)[2], each, growth) for each in (end / 64, end))
+    rests = tuple(invert_transform(lambda s: of.parts(s)[2], each, growth) for each in (end / 64, end))
     direct = _terms(np.r_[own, of.loop.law.poles], [], math.inf, lambda s: of.parts(s)[1], end)
     part = DelayedResponse(start, late, direct, rests, np.zeros(0), slowest, np.zeros(0))
 

@@ -18,7 +18,7 @@ from tfarm.arm import Arm
 from tfarm.assessment import Comparison
 from tfarm.digits import how_many
 from tfarm.dsp import Chain
-from tfarm.dsp.plant import driven
+from tfarm.dsp.plant import arm_under_chain
 from tfarm.errors import TfarmError, must_be_known, one_line, require
 from tfarm.exact.outputs import signal_words
 from tfarm.files import move_into, place_in, temporary_folder
@@ -27,19 +27,19 @@ from tfarm.fitting.fit import Fit
 from tfarm.plots import studies
 from tfarm.plots.regions import comparison
 from tfarm.plots.style import drawn_for
-from tfarm.processes import shared
+from tfarm.processes import share_tasks
 from tfarm.report import loop_section, response_sections
 from tfarm.report.blocks import (
     Fact,
     PageSection,
     Picture,
     anchor,
-    explained,
+    explain_commands,
     keep,
-    kept,
     kept_in,
     picture,
     prose,
+    read_records,
     render,
     save_section,
     sheet,
@@ -209,7 +209,10 @@ def write(
     only = only or ()
     _check(names, only)
     each = zip(arms, chains or [Chain()] * n, laws or [()] * n, fits or [None] * n, strict=True)
-    reports = [ArmReport(*driven(arm, chain), tuple(own), fit, tuple(measured), paper) for arm, chain, own, fit in each]
+    reports = [
+        ArmReport(*arm_under_chain(arm, chain), tuple(own), fit, tuple(measured), paper)
+        for arm, chain, own, fit in each
+    ]
     for report in reports:
         for case in report.cases if report.laws and not report.arm.is_locked else ():
             case.check()
@@ -323,7 +326,7 @@ def make_all(tasks: Calls, progress: Progress | None) -> dict[str, Sequence[Any]
     # a second process takes a second or two to start
     count = MOST_WORKERS if len(tasks) >= 8 else 1
     calls = ((task, partial(_results, tasks[task])) for task in longest)
-    for task, results in shared(calls, count, begun, joins=True):
+    for task, results in share_tasks(calls, count, begun, joins=True):
         done[task] = results  # noqa: PERF403  `begun` counts them meanwhile
     begun(["pages"])
     return done
@@ -360,7 +363,7 @@ def _write_pages(
         "open_pictures": 2,  # of a section: those that answer its question; the rest is a click away
         "has_proof": (folder / "proof.json").is_file(),
         "sha256": hashlib.sha256(file.encode()).hexdigest(),
-        "explained": partial(explained, words=f"../{trust}" if trust else ""),
+        "explained": partial(explain_commands, words=f"../{trust}" if trust else ""),
     }
     for name in written:
         title = f"{report.arm.name}: {QUESTIONS[name]}" if name in QUESTIONS else report.arm.name
@@ -397,7 +400,7 @@ def trust_in(out: Path) -> str:
 
 def write_index(out: Path, stage: Path) -> None:
     """Write the page that leads to all others in a folder of reports, through a folder next to it."""
-    cards = [(card, pages) for folder, card in kept(out, "card", Card).items() if (pages := pages_in(folder))]
+    cards = [(card, pages) for folder, card in read_records(out, "card", Card).items() if (pages := pages_in(folder))]
     compared = kept_comparison(out)["title"]
     page = render("index.html", title="tfarm reports", cards=cards, trust=trust_in(out), compared=compared, short=SHORT)
     write_text(stage / "index.html", page)
@@ -453,7 +456,7 @@ def write_study(found: Study) -> Path:
             saved = [save_section(each, made) for each in study_sections(found)]
         sections = [each for each in saved if each.words or each.blocks]
         title = f"{found.arm}: study of {how_many(found.rows, 'arm')}"
-        page = render("study.html", title=title, sections=sections, explained=explained, found=found)
+        page = render("study.html", title=title, sections=sections, explained=explain_commands, found=found)
         write_text(made / "index.html", page)
         move_into(made, folder)
     return folder / "index.html"

@@ -103,10 +103,10 @@ class Signals:
     @cached_property
     def _placed(self) -> tuple[tuple[Output, float], ...]:
         """The output of each name and its place [m]."""
-        return tuple(placed(name, self.arm.length) for name in self.names)
+        return tuple(locate_output(name, self.arm.length) for name in self.names)
 
 
-def placed(name: str, length: float) -> tuple[Output, float]:
+def locate_output(name: str, length: float) -> tuple[Output, float]:
     """Return the output of a name and its place [m] on an arm of this length.  Raises ParameterError for others."""
     plain, at, text = name.partition("@")
     wanted = known_output(plain)

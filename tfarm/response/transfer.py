@@ -43,7 +43,7 @@ from tfarm.exact.values import (
 from tfarm.records import frozen
 from tfarm.schema import Column, Quantity, Table, roots_table
 from tfarm.spectrum import flexible_frequencies
-from tfarm.spectrum.box import REAL_SHARE, TOWARD_SINGULAR, Box, Function, complete
+from tfarm.spectrum.box import REAL_SHARE, TOWARD_SINGULAR, Box, Function, complete_zeros
 from tfarm.spectrum.starts import damped_starts
 
 
@@ -127,7 +127,7 @@ def _in_box(k: System, function: Function, at_zero: int, up_to: float, starts: C
     def box_of(height: float) -> Box:
         return Box(-min(TOWARD_SINGULAR / k.damping, height) if k.damping else -height, height, -height, height)
 
-    found, box = complete(function, box_of, up_to, starts)
+    found, box = complete_zeros(function, box_of, up_to, starts)
     if k.is_undamped:  # zeros come in +- pairs too
         found = np.where(abs(found.real) < REAL_SHARE * abs(found), 1j * found.imag, found)
     found = found[np.lexsort((-found.imag, found.real.round(9), abs(found.imag).round(9)))]

@@ -5,7 +5,7 @@
         delay: Annotated[float, Quantity("delay margin", "s", 4, "smallest further delay that destabilises the loop")]
 
 JSON, CSV, terminals, pages, axes, the documentation and the comparison of two records have its name, unit, digits and
-meaning from here.  `to_dict` and `sections` read a record, `table` records of one class, `compare` two of them;
+meaning from here.  `to_dict` and `sections` read a record, `table` records of one class, `compare_records` two of them;
 `schema.terminal` and `schema.html` render tables, `schema.glossary` has every declared quantity.
 """
 
@@ -17,7 +17,7 @@ from .quantities import (
     Difference,
     Percent,
     Quantity,
-    compare,
+    compare_records,
     entries,
     quantities,
     text,
@@ -52,7 +52,7 @@ __all__ = [
     "across",
     "as_csv",
     "as_json",
-    "compare",
+    "compare_records",
     "curve_table",
     "entries",
     "json_value",
@@ -67,5 +67,5 @@ __all__ = [
     "with_unit",
 ]
 
-# its name up to version 1.0
-__getattr__ = moved(__name__, {"Section": "tfarm.schema:RecordSection"})
+# names up to version 1.0
+__getattr__ = moved(__name__, {"Section": "tfarm.schema:RecordSection", "compare": "tfarm.schema:compare_records"})

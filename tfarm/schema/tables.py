@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from tfarm.digits import TEXTS, CellsOf, within
+from tfarm.digits import TEXTS, CellsOf, round_to_error
 
 from .quantities import (
     COMPLEX_ERROR,
@@ -26,8 +26,8 @@ from .quantities import (
     is_declared,
     is_list_of_records,
     is_table,
-    parts,
     quantities_of,
+    round_parts,
     text,
     to_json_value,
     with_flat,
@@ -152,14 +152,14 @@ def across(records: Mapping[str, Any], *, keys: Sequence[str] = (), title: str =
 def roots_table(values: Any, of: Quantity) -> Table:
     """A row a complex number: its real and imaginary part, and of a pole or zero in 1/s its damping ratio."""
     roots = [complex(value) for value in values]
-    shown = [parts(root, of.digits) for root in roots]
+    shown = [round_parts(root, of.digits) for root in roots]
     columns = [
         Column("re", f"Re {of.label}", of.unit, of=[s.real for s in roots], shown=[re for re, _ in shown]),
         Column("im", f"Im {of.label}", of.unit.replace("1/s", "rad/s"), of=[s.imag for s in roots],
                shown=[im for _, im in shown]),
     ]  # fmt: skip
     if of.unit == "1/s":
-        ratios = [within(-s.real / abs(s), COMPLEX_ERROR, RATIO_DIGITS) if s.imag else NO_VALUE for s in roots]
+        ratios = [round_to_error(-s.real / abs(s), COMPLEX_ERROR, RATIO_DIGITS) if s.imag else NO_VALUE for s in roots]
         columns.append(Column("damping_ratio", "damping ratio", of=ratios))
     return Table(columns=tuple(columns))
 

@@ -38,7 +38,7 @@ from tfarm.schema import Percent, Quantity, quantities
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.frequencies import list_frequencies
 from tfarm.spectrum.shapes import PARAMETERS
-from tfarm.tuner.tuning import tuned
+from tfarm.tuner.tuning import tune_by_default
 
 from .space import Subject, Subjects
 
@@ -202,7 +202,7 @@ def _columns(name: str, label: str, unit: str, meaning: str) -> dict[str, Quanti
 
 
 def _tuner_of(one: Subject, _: Set[str]) -> dict[str, Any]:
-    tuning = tuned(one.case.arm, one.case.chain, None, **one.tuner)
+    tuning = tune_by_default(one.case.arm, one.case.chain, None, **one.tuner)
     training = tuning.training
     return {
         **_numbered(TRIAL_COST, training.costs),
@@ -427,7 +427,9 @@ class StudyBand(NamedTuple):
     unit: str
 
 
-def band_of(subjects: Subjects, rows: Sequence[Sequence[float]], output: str, points: int = 1200) -> StudyBand:
+def response_quantiles(
+    subjects: Subjects, rows: Sequence[Sequence[float]], output: str, points: int = 1200
+) -> StudyBand:
     """Return the exact responses of the arms of some rows, and their quantiles at each frequency.
 
     Raises ParameterError for an unknown output, and where no arm has that response.

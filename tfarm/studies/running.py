@@ -223,7 +223,7 @@ class StudyRecord(StrictTable):
     rows_a_part: int
 
 
-def opened(
+def open_study(
     folder: Path, plan: StudyPlan, files: Mapping[str, bytes], workers: int, size: int | None, rows: Real
 ) -> StudyFolder:
     """Return the parts of a study in a folder, a new one or that of an interrupted run, with the files that declare it.
@@ -290,18 +290,18 @@ def run(
     listing = plan.space.listing
     rows = plan.space.rows(0, count, None if listing is None else next(listing.blocks([(0, count)])))
     check_rows(plan, rows)
-    parts = opened(folder, plan, files, workers, size, rows)
+    parts = open_study(folder, plan, files, workers, size, rows)
 
     def calls(ends: Sequence[tuple[int, int]]) -> Iterator[Callable[[], Chunk]]:
         blocks = [None] * len(ends) if listing is None else listing.blocks(ends)
         for (first, last), listed in zip(ends, blocks, strict=True):
             yield partial(chunk, plan, first, last, listed)
 
-    complete(parts, calls, engine, deadline, progress, "parts of the study")
+    write_missing_parts(parts, calls, engine, deadline, progress, "parts of the study")
     return parts
 
 
-def complete(
+def write_missing_parts(
     parts: StudyFolder,
     calls: Callable[[Sequence[tuple[int, int]]], Iterable[Callable[[], Chunk]]],
     engine: Engine,
@@ -322,7 +322,7 @@ def complete(
         progress(len(done) + ready, parts.count, f"{text}, {left:.0f} s left")
 
 
-def searched(
+def search_rows(
     parts: StudyFolder, search: Callable[[Callable[[Real], Row]], object], deadline: float
 ) -> list[Row] | None:
     """Return the rows of a search, which asks for the results of one row of values (1, keys) after another.

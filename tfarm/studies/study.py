@@ -30,14 +30,14 @@ from tfarm.arm.chain import Chain, file_text, load_chain
 from tfarm.arm.checks import whole
 from tfarm.arm.law_tables import load_law
 from tfarm.arm.reading import AnyFile, load, load_tables, presets
-from tfarm.arm.schema import StrictTable, validated
+from tfarm.arm.schema import StrictTable, validate_table
 from tfarm.arm.writing import law_head, law_toml, toml_tables, toml_text
 from tfarm.arrays import Real
 from tfarm.case import Case
-from tfarm.errors import ParameterError, naming, require
+from tfarm.errors import ParameterError, name_file, require
 from tfarm.files import locked_folder, mat_content, write_file
 from tfarm.fitting.posterior import load_posterior
-from tfarm.processes import shared
+from tfarm.processes import share_tasks
 from tfarm.records import frozen
 from tfarm.schema import Column, Quantity, Table
 from tfarm.spectrum.gains import default_gains
@@ -51,11 +51,11 @@ from .quantities import (
     Spread,
     StableShare,
     StudyBand,
-    band_of,
     column_names,
     failures_of,
     order_of,
     quantity_of,
+    response_quantiles,
     shares_of,
     spreads_of,
 )
@@ -67,13 +67,13 @@ from .running import (
     Row,
     StudyFolder,
     StudyPlan,
-    complete,
     on_cluster,
     rows_of,
     run,
-    searched,
+    search_rows,
     seconds_an_arm,
     table_of,
+    write_missing_parts,
 )
 from .space import ENDS, MOST_SEED, listing_of, space_of
 
@@ -175,7 +175,7 @@ class Study:
         """
         plan = self.parts.plan
         rows = np.column_stack([self._table[key] for key in plan.space.keys])
-        return band_of(plan.subjects, rows[:: max(1, -(-self.done // most))].tolist(), output)
+        return response_quantiles(plan.subjects, rows[:: max(1, -(-self.done // most))].tolist(), output)
 
     @property
     def shear(self) -> Annotated[str, Quantity("shear modulus", help="with a varied Young's modulus; else empty")]:
@@ -274,7 +274,7 @@ def study(
     require(is_possible, "sobol", sobol, "needs two or more independent distributions")
     files = files_of(case, {"over": over or {}, "ask": ask, "draws": draws, "seed": seed, "rows": rows,
                                        "posterior": posterior, "worst": worst, "sobol": sobol})  # fmt: skip
-    engine = partial(shared, count=workers) if client is None else partial(on_cluster, client=client)
+    engine = partial(share_tasks, count=workers) if client is None else partial(on_cluster, client=client)
     deadline = time.monotonic() + (math.inf if stop_after is None else stop_after)
     with locked_folder(Path(out), key=OUT):
         parts = run(Path(out), plan, files, engine, workers, deadline, part, progress)
@@ -317,8 +317,8 @@ def load_study(name_or_path: AnyFile) -> dict[str, Any]:
     """
     tables, file = load_tables(name_or_path)
     folder = Path(file).parent
-    with naming(file):
-        declared = validated(StudyFile, tables, "").model_dump(exclude_unset=True)
+    with name_file(file):
+        declared = validate_table(StudyFile, tables, "").model_dump(exclude_unset=True)
     arm = load_tables(declared["arm"] if declared["arm"] in presets() else str(folder / declared["arm"]))
     law = load_law(folder / declared["law"] if "law" in declared else arm)
     own = {key: folder / value if key in PATHS else value for key, value in declared.items()}
@@ -413,7 +413,7 @@ def search_worst(parts: StudyFolder, order: Sequence[str], first: int, deadline:
             options={"maxfev": most, "initial_simplex": [start, *(start + steps)]},
         )  # fmt: skip
 
-    return searched(parts.others(f"_worst-{order[0]}-", most, 1, order), search, deadline)
+    return search_rows(parts.others(f"_worst-{order[0]}-", most, 1, order), search, deadline)
 
 
 def write_case(parts: StudyFolder, numbers: Mapping[str, float]) -> Path:
@@ -450,7 +450,7 @@ def sobol_indices(
         seconds = seconds_an_arm(plan, rows) * len(rows) / workers
         progress(0, 0, f"Sobol' indices of {len(rows):,} further arms, about {seconds:.0f} s")
     calls = partial(map, lambda ends: partial(table_of, plan, ends[0], rows[slice(*ends)]))
-    complete(parts, calls, engine, deadline, progress, "parts of Sobol' indices")
+    write_missing_parts(parts, calls, engine, deadline, progress, "parts of Sobol' indices")
     table = parts.column(*names) if parts.is_complete else {}
     return tuple(index for name, values in table.items() for index in _indices(name, keys, values))
 

@@ -28,8 +28,8 @@ from tfarm.arm.blocks import Rational
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.case import Case
 from tfarm.dsp import Chain
-from tfarm.dsp.plant import driven
-from tfarm.dsp.results import simulated
+from tfarm.dsp.plant import arm_under_chain
+from tfarm.dsp.results import simulate_modes
 from tfarm.errors import ConvergenceError
 from tfarm.loop.edges import LowerBound, most_modes
 from tfarm.loop.loop_margins import lowest
@@ -223,7 +223,7 @@ class Judge:
         if not self.is_sampled:
             return self.score(law)
         case = self.case(law)
-        run, _ = simulated(case, slew_and_after(case.arm, self.known, case.chain))
+        run, _ = simulate_modes(case, slew_and_after(case.arm, self.known, case.chain))
         return np.inf if run.residual_moment is None else run.residual_moment
 
     def holds(self, law: AnyLaw) -> bool:
@@ -289,8 +289,8 @@ def judge_of(
     """The judge of laws on these signals, with `count` flexible modes; more of the continuous-time loop."""
     aim = OBJECTIVES[objective]
     signals = tuple(dict.fromkeys((*signals, *("root_moment",) * aim.of_slew)))
-    known, _ = driven(known, chain)
-    arm, chain = driven(arm, chain)
+    known, _ = arm_under_chain(known, chain)
+    arm, chain = arm_under_chain(arm, chain)
     own = continuous_model(arm, signals, modes, (2 if continuous else 1) * count, 2 / chain.sampling.period)
     if continuous:
         return Judge(arm, known, chain, aim, modes, own, ())

@@ -26,7 +26,7 @@ from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain, Scenario, scenario
 from tfarm.dsp.plant import PulseTransfer, sensed_plant
 from tfarm.dsp.scenarios import TRIAL_SLEWS, trial_weights
-from tfarm.loop.continuous import band_of, grid
+from tfarm.loop.continuous import frequency_above_mode, grid
 from tfarm.records import frozen
 from tfarm.reduced.modal import ALGEBRAIC, sensed_model
 from tfarm.response.signals import Signals
@@ -165,7 +165,7 @@ def continuous_model(arm: Arm, signals: tuple[str, ...], modes: int, count: int,
         B = B[1:]
         C = C[:, 1:]
     read = Signals(arm, signals)
-    top = band_of(arm, modes)
+    top = frequency_above_mode(arm, modes)
     moment = C[signals.index("root_moment")] if "root_moment" in signals else np.zeros(len(A))
     return DesignModel(
         (A, B, C, D), signals, speed, None, lambda: grid(arm, top), lambda w: read.values(1j * w), top, (), 0, moment
@@ -195,7 +195,7 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
         a = np.exp(-chain.converters.rate_filter * T)
         n = read.index("hub_angle")
         row = signals.index("hub_rate")
-        A, B, C = differenced(A, B, C, n, row, a, T, first + damped if turns else None)
+        A, B, C = difference_rate(A, B, C, n, row, a, T, first + damped if turns else None)
         own = np.append(own, 0.0)
 
         def response(z: Complex) -> Complex:
@@ -215,7 +215,7 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
     )  # fmt: skip
 
 
-def differenced(
+def difference_rate(
     A: Real, B: Real, C: Real, angle: int, rate: int, a: float, T: float, state: int | None
 ) -> tuple[Real, Real, Real]:
     """The plant with the rate as the filtered difference of the angle, (1 - a)/T (z - 1)/(z - a).

@@ -40,7 +40,7 @@ class NamedArm(NamedTuple):
     numbers: dict[str, float]
 
 
-def varied(arm: Arm, key: str, value: float) -> Arm:
+def vary_arm(arm: Arm, key: str, value: float) -> Arm:
     """The arm with another value of one number, named as in its file ("payload.mass", "hub.friction") or in a locus.
 
     Raises ParameterError for an unknown key, and for a value as its parts do.
@@ -86,7 +86,7 @@ class ArmBox:
             far = low > 0 and high > 10.0 * low
             inside = low * (high / low) ** share if far else low + share * (high - low)
             numbers[key] = low if share == 0 else high if share == 1 else float(inside)
-            arm = varied(arm, key, numbers[key])
+            arm = vary_arm(arm, key, numbers[key])
         values = ", ".join(f"{key} = {value:.6g}" for key, value in numbers.items())
         return NamedArm(f"{self.arm.name}, {values}", arm, numbers)
 

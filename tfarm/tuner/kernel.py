@@ -123,7 +123,7 @@ def logistic(z: float) -> float:
 
 
 @compiled
-def guarded(z: float, limits: Limits) -> tuple[float, float]:
+def guard_gain(z: float, limits: Limits) -> tuple[float, float]:
     """The gain and its derivative for the output neuron's sum z.
 
     kappa = ln(1 + e^z) without a guard; lo + (hi - lo)(1 - e^-kappa) with one.
@@ -147,7 +147,7 @@ def network_gain(weights: Real, inputs: Real, hidden: Real, limits: Limits) -> t
             net += weights[j * m + i] * inputs[i]
         hidden[j] = logistic(net)
         z += weights[h * m + j] * hidden[j]
-    return guarded(z, limits)
+    return guard_gain(z, limits)
 
 
 @compiled
@@ -165,7 +165,7 @@ def gain_gradient(weights: Real, inputs: Real, hidden: Real, by_sum: float, out:
 
 
 @inlined
-def copied(source: Real, target: Real) -> None:
+def copy_into(source: Real, target: Real) -> None:
     """target = source, element by element: an assignment of arrays takes numba seconds to compile, and a loop none."""
     for i in range(target.size):
         target[i] = source[i]
@@ -337,7 +337,7 @@ class Network:
         return Network(weights[:first].reshape(self.W1.shape), weights[first:], self.scales)
 
     def gain(self, signals: Real, guard: Limits) -> float:
-        """K for one row of inputs [N m], not scaled; `guard` as in `guarded`."""
+        """K for one row of inputs [N m], not scaled; `guard` as in `guard_gain`."""
         return float(network_gain(self.weights, signals / self.scales, np.zeros(self.w2.size), guard)[0])
 
 

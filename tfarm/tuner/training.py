@@ -34,7 +34,7 @@ from tfarm.tuner.kernel import (
     TrialSignals,
     act,
     backward,
-    copied,
+    copy_into,
     forward,
     gain_gradient,
     sample_gradient,
@@ -115,25 +115,25 @@ def learn_by_trials(
         costs[trial] = cost
         if takes_back and not cost <= best and best < np.inf:
             share *= 0.5
-            copied(kept, weights)
+            copy_into(kept, weights)
             change.fill(0.0)
             _step(weights, change, slope, steps, share)
             continue
         if not isfinite(cost):
-            copied(kept, weights)
+            copy_into(kept, weights)
             return trial + 1, done
         if _rms(run.x) < steps.enough:
             return trial + 1, ENOUGH
         backward(setting, weights, run, work, gradient)
-        copied(weights, kept)
+        copy_into(weights, kept)
         if takes_back:
-            copied(gradient, slope)
+            copy_into(gradient, slope)
             # the step is whole again after four good trials
             share = min(1.0, 1.2 * share)
             best = cost
         _step(weights, change, gradient, steps, share)
     if takes_back:
-        copied(kept, weights)
+        copy_into(kept, weights)
     return costs.size, NEVER
 
 
@@ -149,7 +149,7 @@ def derive(
     model = setting.model
     by_input = work.by_input
     for row in range(D.shape[0] - 1, BEFORE - 1, -1):
-        copied(D[row - BEFORE], D[row])
+        copy_into(D[row - BEFORE], D[row])
     for row in range(BEFORE):
         D[row].fill(0.0)
     for i in range(states):
@@ -171,7 +171,7 @@ def derive(
         for p in range(size):
             spare[i, p] += model.B[i] * D[E, p]
     for i in range(states):
-        copied(spare[i], S[i])
+        copy_into(spare[i], S[i])
 
 
 @compiled
@@ -202,14 +202,14 @@ def learn_by_samples(
     room = np.zeros((states, size))
     D = np.zeros((3 * BEFORE, size))
     for trial in range(costs.size):
-        copied(weights, kept)
+        copy_into(weights, kept)
         work.state.fill(0.0)
         S.fill(0.0)
         D.fill(0.0)
         for k in range(n):
             if not sense(k, setting, run, work):
                 costs[trial] = np.inf
-                copied(kept, weights)
+                copy_into(kept, weights)
                 return trial + 1, k
             if is_whole:
                 act(k, setting, weights, run, work)
@@ -222,7 +222,7 @@ def learn_by_samples(
             if k >= numbers.lag:
                 sample_gradient(k - numbers.lag, numbers, run.x[k], run, made, gradient, work.by_input)
                 _step(weights, change, gradient, steps, 1.0)
-            copied(weights, made)
+            copy_into(weights, made)
             act(k, setting, weights, run, work)
         costs[trial] = trial_cost(n, numbers, run)
         if _rms(run.x) < steps.enough:

@@ -39,7 +39,7 @@ from tfarm.dsp import Chain, Measurement, Scenario, Simulation, Simulator, scena
 from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
 from tfarm.dsp.simulate import FOLDED_UP
 from tfarm.dsp.stages import admit
-from tfarm.errors import must_be_known, naming, require
+from tfarm.errors import must_be_known, name_file, require
 from tfarm.files import write_file
 from tfarm.loop.sampled import Sampled, sampled_loop
 from tfarm.records import frozen
@@ -271,7 +271,7 @@ class TunedGain:
         return K
 
 
-def judged(simulation: Simulation, cost: Cost, signals: MomentReading) -> Record:
+def record_of_simulation(simulation: Simulation, cost: Cost, signals: MomentReading) -> Record:
     """Return a simulation as a record of a trial: x before the converters, e from the torque after them.
 
     So x has passed the anti-alias filter where there is one, but no quantisation.
@@ -348,7 +348,7 @@ def load_tuner(path: str | os.PathLike[str], key: str = "controller") -> SavedTu
     # more bytes than a network of the most neurons takes
     most = 4_000_000
     found = validated_file(SavedTuner, path, most, key=key, what="a tuner's file of tfarm tune ARM --save FILE.json")
-    with naming(path):
+    with name_file(path):
         found.gain()  # refuses parts that do not match
         Cost(a=found.a, b=found.b)
     return found
