@@ -156,7 +156,7 @@ def read_outputs(model: Any, state: Any, torque: float, out: Any) -> None:
 
 
 @compiled
-def advance(k: int, model: Any, state: Any, old: float, new: float, push_on: float) -> None:
+def advance_state(k: int, model: Any, state: Any, old: float, new: float, push_on: float) -> None:
     """Advance by sample k: `old` torque up to the switch, `new` after it, `push_on` (a disturbance) throughout.
 
     Fills a row of `fine` at each record, and adds to the work.
@@ -228,7 +228,7 @@ def after(k: int, u: float, model: Any, state: Any, forcing: Any, of: Any) -> No
         for i in range(state.amplitude.size):
             state.amplitude[i] += forcing.impulse
         state.rigid[ONCE] += forcing.impulse
-    advance(k, model, state, old, state.held[(k - of.delay) % ring], forcing.disturbance[k])
+    advance_state(k, model, state, old, state.held[(k - of.delay) % ring], forcing.disturbance[k])
 
 
 # those of Python loops are plain

@@ -76,7 +76,7 @@ class Scenario:
         return float(np.sqrt(np.mean(left**2))) if left.size else None
 
 
-def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
+def slew_scenario(arm: Arm, chain: Chain, duration: float) -> Scenario:
     """Return the bang-bang slew: hub acceleration +-4 travel/((r + L) rise^2), means over a sample, fed forward with J.
 
     On a rig also friction, back-EMF and analog damping at the mean rate, all in the unit of its input.
@@ -161,7 +161,7 @@ def describe_scenario(task: Scenario, arm: Arm, chain: Chain) -> str:
 def scenario(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:
     """Return the scenario of that name with its usual size.  Raises ParameterError for an unknown one."""
     must_be_known("scenario", name, SCENARIOS)
-    return slew(arm, chain, duration) if name == "slew" else rest_scenario(name, arm, chain, duration)
+    return slew_scenario(arm, chain, duration) if name == "slew" else rest_scenario(name, arm, chain, duration)
 
 
 def _samples(duration: float, period: float) -> int:

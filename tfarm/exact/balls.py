@@ -25,7 +25,7 @@ _end_plane, _met, _across_rows, _row_across = map(
 )
 _transition_rows, across_waves, in_chain = map(python_of, (waves.transition_rows, waves.across_waves, waves.in_chain))
 _inside_element = python_of(sweep.inside)
-_beyond_element = python_of(sweep.beyond)
+_beyond_element = python_of(sweep.carry_beyond)
 Ball = Any  # flint.acb or flint.arb, which come without types
 _Enclosure = TypeVar("_Enclosure")
 
@@ -92,7 +92,7 @@ def exact_middle(ball: Ball) -> Any:
     return flint.fmpq(whole) * flint.fmpq(2) ** int(power)
 
 
-def summed(z_sum: Any, z_product: Any, count: int) -> list[Any]:
+def sum_series(z_sum: Any, z_product: Any, count: int) -> list[Any]:
     """Return F0..F3 at a segment's end by `count` terms of their series in z1 + z2 and z1 z2, series of flint."""
     h = 0 * z_sum + 1
     before = 0 * z_sum

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from tfarm.arm import Law
 from tfarm.arrays import Complex, Real
 
-from .balls import Ball, Sweep, across_waves, in_chain, point, rational, summed
+from .balls import Ball, Sweep, across_waves, in_chain, point, rational, sum_series
 from .layout import Layout, laid_out, readings
 from .outputs import Output
 from .rationals import polynomials
@@ -66,7 +66,7 @@ def characteristic(k: System, s: Complex, at_zero: int = 0) -> Analytic:
     """Return D(s)/s^at_zero of a system without a law and its derivative at s (1-D, complex), in float64."""
     s = off_rest(s) if at_zero else s
     here, slopes = free_slopes(k, [], s, 0.0)
-    return deflated(here.drive, slopes.drive, here.scale, s, at_zero)
+    return deflate(here.drive, slopes.drive, here.scale, s, at_zero)
 
 
 def off_rest(s: Complex) -> Complex:
@@ -74,7 +74,7 @@ def off_rest(s: Complex) -> Complex:
     return np.where(s == 0, NEXT_TO_REST, s)
 
 
-def deflated(value: Complex, slope: Complex, scale: Complex, s: Complex, at_zero: int) -> Analytic:
+def deflate(value: Complex, slope: Complex, scale: Complex, s: Complex, at_zero: int) -> Analytic:
     """Return D/s^at_zero from D and its slope at s, which is not 0."""
     if at_zero:
         value = value / s**at_zero
@@ -173,7 +173,7 @@ class WideSweep(Sweep):
         ball = flint.acb(flint.arb(0, tail.upper()), flint.arb(0, tail.upper()))
         terms_kept = z_sum.prec
         rest = flint.acb_series([ball] * terms_kept, prec=terms_kept)
-        return tuple(total + rest for total in summed(z_sum, z_product, count))
+        return tuple(total + rest for total in sum_series(z_sum, z_product, count))
 
 
 def _size(series: Series) -> Ball:

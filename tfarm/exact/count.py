@@ -37,7 +37,7 @@ from .waves import (
     end_plane,
     even_functions,
     in_chain,
-    scaled,
+    scale_plane,
     tip_conditions,
     transition_rows,
     transition_series,
@@ -105,8 +105,8 @@ def _joined(outside: int, omega: float, row: Any, plane: SolutionPlane, free: in
         gS = row.of_chain[2] * S
         gap = one[2] - two[2]
         unit = 1.0 / (gS * EI * gap * gap)
-        q = scaled(across_waves(one, two, gS, EI, plane), unit)
-        r = scaled(across_waves(one, two, gS, EI, clamped), unit)
+        q = scale_plane(across_waves(one, two, gS, EI, plane), unit)
+        r = scale_plane(across_waves(one, two, gS, EI, clamped), unit)
     number = _clamped(number, r[1], -1)  # r at the outer end is, up to signs, the plane carried inwards (symmetry)
     number = _clamped(number, -r[0], -1) + outside
     if free == 2:

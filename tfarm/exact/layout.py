@@ -27,9 +27,9 @@ from .system import (
     Segment,
     Spring,
     System,
-    cut,
+    cut_segments,
+    elements_with_places,
     end_condition,
-    placed,
 )
 
 SEGMENT, OFFSET, SPRING, BODY, MARK = range(5)
@@ -70,7 +70,7 @@ class Layout:
 
     def __init__(self, chain: System, places: tuple[Place, ...] = (), each: tuple[OutputFormula, ...] = ()) -> None:
         self.chain, self.places, self.each = chain, places, each
-        elements = list(placed(chain.elements))
+        elements = list(elements_with_places(chain.elements))
         joints = [position for position, _, each in elements if isinstance(each, Segment)] + [ZERO]
         order = {"payload": PAYLOAD, "outer": OUTER, "inner": INNER}
         marks = []
@@ -78,7 +78,7 @@ class Layout:
             away = [abs(joint - place.share) for joint in joints]
             share = joints[away.index(min(away))] if min(away) <= AT_JOINT else place.share
             marks.append((share, order[place.side], Mark(place)))
-        self.elements = cut([*marks, *elements])
+        self.elements = cut_segments([*marks, *elements])
         self._numbers: dict[Any, list[Any]] = {}
 
     def numbers(self, key: Any, exact: Callable[[Any], Any]) -> list[Any]:

@@ -22,7 +22,7 @@ from .compiled import python_of
 from .layout import Layout, M, OutputFormula, Q, reading_of
 from .outputs import Output
 from .system import Place, Spring, System
-from .values import PROVEN_BITS, certified, known
+from .values import PROVEN_BITS, accurate_ball, certify_by_precision
 from .waves import SolutionRow, met
 
 _met = python_of(met)
@@ -79,9 +79,9 @@ def loaded_value(chain: System, load: Load, wanted: Output, s: complex, x: float
         value = sum(sign * _Loaded(layout, point(s)).quantity(one, at, jump) for sign, layout, at in parts)
         value = value * point(s) ** one.power / (1 + rational(one.C) * point(s))
         value = value * rational(one.unit * chain.drive.unit * unit)
-        return known(value, PROVEN_BITS) if value.is_finite() else None
+        return accurate_ball(value, PROVEN_BITS) if value.is_finite() else None
 
-    return certified(PROVEN_BITS, attempt, f"{PROVEN_BITS} bits", s)
+    return certify_by_precision(PROVEN_BITS, attempt, f"{PROVEN_BITS} bits", s)
 
 
 class _Loaded(Sweep):

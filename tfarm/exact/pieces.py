@@ -29,7 +29,7 @@ from .waves import (
     reciprocal,
     row_across,
     row_across_waves,
-    scaled,
+    scale_plane,
     transition_rows,
     transition_series,
     wave_functions,
@@ -72,7 +72,7 @@ def times(z: complex, factor: float) -> complex:
 
 
 @inlined
-def put(buffer: Any, i: int, numbers: tuple[complex, ...]) -> None:
+def write_point(buffer: Any, i: int, numbers: tuple[complex, ...]) -> None:
     """Write the numbers of a point."""
     for j in range(len(numbers)):
         buffer[BLOCK * j + i] = numbers[j]
@@ -116,7 +116,9 @@ def cross(points: Any, row: Any, j: int, work: BlockBuffers, lost: Any) -> None:
         for i in range(BLOCK):
             one, two, gS, d = waves_at(row, waves, i)
             gap = one[2] - two[2]
-            put(inner, i, scaled(across_waves(one, two, gS, d, plane_at(outer, i)), reciprocal(gS * d * gap * gap)))
+            write_point(
+                inner, i, scale_plane(across_waves(one, two, gS, d, plane_at(outer, i)), reciprocal(gS * d * gap * gap))
+            )
         for i in range(BLOCK):
             z1 = waves[ONE + i]
             z2 = waves[TWO + i]
@@ -133,14 +135,14 @@ def fill_waves(points: Any, row: Any, waves: Any) -> None:
     """Compute numbers and functions of both waves at every point of a block: the latter alone calls a library."""
     for i in range(BLOCK):
         own, one, two = dispersion(points[i], row)
-        put(waves, S_SQUARED + i, own)
-        put(waves, ONE + i, one)
-        put(waves, TWO + i, two)
+        write_point(waves, S_SQUARED + i, own)
+        write_point(waves, ONE + i, one)
+        write_point(waves, TWO + i, two)
     for i in range(BLOCK):
         (z1, _, t1, dt1) = row_at(waves, ONE + i)
         (z2, _, t2, dt2) = row_at(waves, TWO + i)
-        put(waves, ONE + FUNCTIONS + i, wave_functions(z1, t1, dt1))
-        put(waves, TWO + FUNCTIONS + i, wave_functions(z2, t2, dt2))
+        write_point(waves, ONE + FUNCTIONS + i, wave_functions(z1, t1, dt1))
+        write_point(waves, TWO + FUNCTIONS + i, wave_functions(z2, t2, dt2))
 
 
 @inlined
@@ -173,7 +175,7 @@ def _fill_series(points: Any, row: Any, waves: Any) -> None:
         _, _, z_sum, z_product = wave_sums(points[i], row)
         F0, F1, F2, F3, F2_less_1, F3_less_1 = transition_series(z_sum, z_product)
         own = times(F0, l * l * l), times(F1, l * l), times(F2, l), F3, times(F2_less_1, l), F3_less_1
-        put(waves, SERIES + i, own)
+        write_point(waves, SERIES + i, own)
 
 
 @inlined
@@ -223,7 +225,7 @@ def _fade(waves: Any, low: Any, scale: Any) -> None:
 
 
 @inlined
-def finish(points: Any, source: Any, power: int, unit: float, C: float, value: Any) -> None:
+def finish_output(points: Any, source: Any, power: int, unit: float, C: float, value: Any) -> None:
     """Compute the values of an output, those of its source times  unit s^power/(1 + C s),  power at most 4."""
     for i in range(value.size):
         s = points[i]

@@ -37,12 +37,12 @@ from .pieces import (
     BlockBuffers,
     cross,
     cross_back,
-    finish,
+    finish_output,
     plane_at,
-    put,
     row_at,
     rows_at,
     times,
+    write_point,
 )
 from .waves import (
     Number,
@@ -91,7 +91,7 @@ def _work(rows: int) -> BlockBuffers:
 def _sweep(points: Any, rows: Any, ends: Any, work: BlockBuffers, lost: Any) -> None:
     """Compute the plane inside of each element, and the scale of that at the axis; mark lost digits."""
     for i in range(BLOCK):
-        put(work.planes[0], i, end_plane(*tip_conditions(ends, points[i] * points[i])))
+        write_point(work.planes[0], i, end_plane(*tip_conditions(ends, points[i] * points[i])))
         work.scale[i], lost[i] = 0.0, False
     for j in range(len(rows)):
         row = rows[j]
@@ -103,11 +103,11 @@ def _sweep(points: Any, rows: Any, ends: Any, work: BlockBuffers, lost: Any) -> 
             cross(points, row, j, work, lost)
         elif row.kind == MARK:
             for i in range(BLOCK):
-                put(inner, i, plane_at(outer, i))
+                write_point(inner, i, plane_at(outer, i))
             continue
         else:
             for i in range(BLOCK):
-                put(inner, i, inside(row.kind, row, points[i], points[i] * points[i], plane_at(outer, i)))
+                write_point(inner, i, inside(row.kind, row, points[i], points[i] * points[i], plane_at(outer, i)))
         _brought_back(inner, 5, work.powers[j])
         for i in range(BLOCK):
             work.scale[i] += work.powers[j, i] * LN_2
@@ -126,7 +126,7 @@ def inside(kind: int, row: Any, s: Number, S: Number, p: SolutionPlane) -> Solut
 
 
 @inlined
-def beyond(kind: int, row: Any, s: Number, S: Number, f: SolutionRow) -> SolutionRow:
+def carry_beyond(kind: int, row: Any, s: Number, S: Number, f: SolutionRow) -> SolutionRow:
     """Return the condition beyond an offset, a spring or a body."""
     if kind == OFFSET:
         return beyond_offset(row.length, f)
@@ -199,7 +199,7 @@ def _meet(state: Any, work: BlockBuffers, is_root: bool, reach: float, shift: An
     """
     back = work.back
     for i in range(BLOCK):
-        put(state, i, met(row_at(back, i), plane_at(state, i)))
+        write_point(state, i, met(row_at(back, i), plane_at(state, i)))
         if is_root:
             rigid = times(work.theta[i], reach)
             lifted = rigid + back[LIFT + i]
@@ -221,7 +221,7 @@ def _beyond(points: Any, row: Any, inner: Any, back: Any, shift: Any) -> None:
         elif kind == SPRING:
             moment = times(met(f, plane_at(inner, i))[2], math.ldexp(1.0, shift[i]))
             back[TURN + i] += row.compliance * reciprocal(s * row.damping + row.stiffness) * moment
-        put(back, i, beyond(kind, row, s, s * s, f))
+        write_point(back, i, carry_beyond(kind, row, s, s * s, f))
 
 
 @inlined
@@ -373,4 +373,4 @@ def _output(points: Any, want: Any, work: BlockBuffers, drive: Any, over: Any, v
                     lost[i] = lost[i] or magnitude(value[i]) < SMALL_DIFFERENCE * size
     for i in range(BLOCK):
         value[i] *= over[i]
-    finish(points, value, int(want[3]), want[4] / lift, want[5], value)
+    finish_output(points, value, int(want[3]), want[4] / lift, want[5], value)

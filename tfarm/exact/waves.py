@@ -277,7 +277,7 @@ def in_chain(wave: Wave, length: Number) -> Wave:
 
 
 @inlined
-def scaled(p: SolutionPlane, unit: Number) -> SolutionPlane:
+def scale_plane(p: SolutionPlane, unit: Number) -> SolutionPlane:
     """Return the plane times a number."""
     return p[0] * unit, p[1] * unit, p[2] * unit, p[3] * unit, p[4] * unit
 

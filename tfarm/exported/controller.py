@@ -31,7 +31,7 @@ from tfarm.errors import must_be_known, require
 from tfarm.exact.compiled import compiled, inlined
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.exported.result import Export, ExportTask, Name, names_of
-from tfarm.exported.texts import facts_of, identifiers, literal, name_in_c, render
+from tfarm.exported.texts import facts_of, identifiers, literal, name_in_c, render_source
 from tfarm.exported.word_length import (
     ANGLE,
     FEEDFORWARD,
@@ -220,7 +220,7 @@ def source_files(
     values = template_values(task, controller, ports_of(task, controller, signals, references))
     (own,) = name.values()
     values |= {"name": own, "facts": facts, "bounds": bounds}
-    return {file: render(file, **values) for file in FILES}, names_of(name, signals, references)
+    return {file: render_source(file, **values) for file in FILES}, names_of(name, signals, references)
 
 
 def in_z(case: Case) -> Law:

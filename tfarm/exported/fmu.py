@@ -33,7 +33,7 @@ from tfarm.errors import ParameterError, one_line, require
 from tfarm.exact.outputs import signal_words
 from tfarm.exported.controller import controller_of, in_z, source_files
 from tfarm.exported.result import ANYWAY, Export, ExportTask, What, is_certified, names_of
-from tfarm.exported.texts import identifiers, literal, render
+from tfarm.exported.texts import identifiers, literal, render_source
 from tfarm.exported.word_length import FEEDFORWARD, FIXED
 from tfarm.files import temporary_folder
 from tfarm.records import frozen
@@ -142,8 +142,8 @@ def fmu(task: ExportTask) -> Export:
     head: dict[str, Any] = {"variables": variables, "has_plant": has_plant, "period": period, "about": about}
     head["guid"] = guid[:32]
     plant = plant_code(prepared)
-    source = render("fmu.c", law=law, functions=FUNCTIONS, errors=ERRORS, sha256=task.sha256, **head, **plant)
-    sources = {"fmi2.h": render("fmi2.h"), "fmu.c": source, **(law.files if law else {})}
+    source = render_source("fmu.c", law=law, functions=FUNCTIONS, errors=ERRORS, sha256=task.sha256, **head, **plant)
+    sources = {"fmi2.h": render_source("fmi2.h"), "fmu.c": source, **(law.files if law else {})}
     binary, compiler = binary_of(sources, own[name])
     files = {f"sources/{name}": content for name, content in sources.items()} | binary
     files["modelDescription.xml"] = model_description(sources, own[name], **head)

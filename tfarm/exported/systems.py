@@ -33,7 +33,7 @@ from tfarm.dsp.plant import USUAL_MODES, PulseTransfer, arm_under_chain, sensed_
 from tfarm.dsp.stages import not_covered
 from tfarm.errors import require
 from tfarm.exported.result import Export, ExportTask, names_of
-from tfarm.exported.texts import comment, matlab_text, render
+from tfarm.exported.texts import comment, matlab_text, render_source
 from tfarm.exported.word_length import close_state_space
 from tfarm.files import is_standard_output, mat_content, write_file
 from tfarm.records import frozen
@@ -230,7 +230,7 @@ def mat_files(name: str, of: Linear) -> dict[str, bytes]:
     script = f"load_{re.sub(r'[^A-Za-z0-9_]', '_', Path(name).stem)}.m"
     first, *others = ((name, system_variables(system)) for name, system in of.systems.items())
     content = mat_content({**first[1], **dict(others), **of.response}, "row")
-    return {name: content, script: render("load.m", file=matlab_text(name), of=of)}
+    return {name: content, script: render_source("load.m", file=matlab_text(name), of=of)}
 
 
 def system_variables(system: NamedSystem) -> dict[str, Any]:
@@ -283,7 +283,7 @@ def py(task: ExportTask) -> Export:
     found = linear(task)
     every = [name for each in found.systems.values() for name in (*each.inputs, *each.outputs)]
     changed = {name: new for name, new in zip(every, without_dots(every), strict=True) if new != name}
-    contents = {f"{task.what}.py": render("systems.txt", of=found, listed=list_literal)}
+    contents = {f"{task.what}.py": render_source("systems.txt", of=found, listed=list_literal)}
     return task.exported(contents, names_of(changed), found.verdict)
 
 

@@ -39,7 +39,7 @@ from tfarm.errors import MISSING, ParameterError, must_be_known, require
 from tfarm.exact.compiled import compiled, inlined
 from tfarm.exported.controller import INPUT_ERROR, OVERFLOW, REAL, Port, self_test_values
 from tfarm.exported.result import ANYWAY, Export, ExportTask, names_of
-from tfarm.exported.texts import literal, name_in_c, render
+from tfarm.exported.texts import literal, name_in_c, render_source
 from tfarm.exported.word_length import FEEDFORWARD, FLOATS
 from tfarm.loop.sampled import sampled_loop
 from tfarm.tuner.guard import sector_guard
@@ -147,7 +147,7 @@ def sigmoid(z: float, of: TunerConstants) -> float:
 
 
 @inlined
-def network_gain(of: TunerConstants, row: Real) -> float:
+def network_output(of: TunerConstants, row: Real) -> float:
     """K of a row of inputs."""
     z = ZERO
     for j in range(of.w2.size):
@@ -169,7 +169,7 @@ def advance_sample(of: TunerConstants, state: Real, inputs: Real) -> int:
     servo = of.Kp * (inputs[WANTED_ANGLE] - inputs[ANGLE]) + of.K1 * (inputs[WANTED_RATE] - inputs[RATE])
     u = servo + inputs[FORWARD] if of.is_total else servo
     row = np.array([u, state[U], state[E], state[E_BEFORE], x, state[X], state[K]])
-    gain = network_gain(of, row)
+    gain = network_output(of, row)
     e = u - gain * x
     torque = (inputs[FORWARD] + servo) - gain * x
     for value in (u, e, x, gain, torque):
@@ -290,4 +290,4 @@ def tuner_files(task: ExportTask, tuner: ExportedTuner, name: str, facts: dict[s
         },
         **self_test_values(tuner.run, ports, task.precision),
     }  # fmt: skip
-    return {file: render(file, **values) for file in ("tuner.h", "tuner.c", "self_test.c")}
+    return {file: render_source(file, **values) for file in ("tuner.h", "tuner.c", "self_test.c")}

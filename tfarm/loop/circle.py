@@ -201,7 +201,9 @@ class Circle:
         if order == 2:  # then there is no 1/s: an arm that turns freely has no friction at the hub
             total = total + ((push * late).times(T) + x * arcs.polynomial(*pulse.ramps)).times(twice) * late
         elif order == 1:
-            total = total + (push * late if self.braked is None else pair * self._braked_pair(arcs)).times(once)
+            total = total + (push * late if self.slow_hub_pole is None else pair * self._slow_hub_pair(arcs)).times(
+                once
+            )
         return total * arcs.turned(pulse.sampling.whole_delay)
 
     # ------------------------------------------------------------ arcs
@@ -232,23 +234,23 @@ class Circle:
         p = plant.poles
         T = sampling.period
         late = sampling.late
-        is_braked = np.arange(p.size) == (-1 if self.braked is None else self.braked)
-        share = (plant.residues + np.outer(plant.rigid[:, 1], is_braked)) / p  # the rest is in `_braked_pair`
+        is_braked = np.arange(p.size) == (-1 if self.slow_hub_pole is None else self.slow_hub_pole)
+        share = (plant.residues + np.outer(plant.rigid[:, 1], is_braked)) / p  # the rest is in `_slow_hub_pair`
         now = np.expm1(p * (T - late))
         before = np.exp(p * (T - late)) * np.expm1(p * late)
         return np.vstack([*np.where(self.kept, [share * now, share * before], 0.0), np.where(is_braked, -p, 0.0)])
 
     @cached_property
-    def braked(self) -> int | None:
+    def slow_hub_pole(self) -> int | None:
         """The pole of a hub that friction brings to rest, if it is slow and kept; else None."""
-        found = self.loop.plant.braked(SLOW / self.loop.chain.sampling.period)
+        found = self.loop.plant.slow_hub_pole(SLOW / self.loop.chain.sampling.period)
         return found if found is not None and self.kept[found] else None
 
-    def _braked_pair(self, arcs: Arcs) -> Discs:
+    def _slow_hub_pair(self, arcs: Arcs) -> Discs:
         """(c0 + c1/z + c2/z^2): x times the pulse transfer function of 1/s - 1/(s - p), without -p/(z - e^{pT})."""
         T = self.loop.chain.sampling.period
         late = self.loop.chain.sampling.late
-        p = float(self.loop.plant.poles[self.braked].real)
+        p = float(self.loop.plant.poles[self.slow_hub_pole].real)
         first = (T - late) ** 2 * phi(p * (T - late))
         last = late**2 * np.exp(p * T) * phi(-p * late)
         middle = T * np.expm1(p * T) / p - first - last

@@ -33,7 +33,7 @@ from tfarm.arm import (
 from tfarm.arrays import Complex
 from tfarm.case import Case
 from tfarm.errors import require
-from tfarm.exact.characteristic import Analytic, Feedback, LoopParts, deflated, difference_steps, feedback
+from tfarm.exact.characteristic import Analytic, Feedback, LoopParts, deflate, difference_steps, feedback
 from tfarm.exact.system import System
 from tfarm.loop.loop import Loop
 from tfarm.loop.theorem import Theorem, theorem_of
@@ -210,7 +210,7 @@ def by_differences(
     with np.errstate(over="ignore", invalid="ignore"):  # far from where it is large: no number, and no start
         D, scale = characteristic(np.array([s, s + h, s - h]))
         up, down = D[1:] * np.exp(scale[1:] - scale[0])
-        return deflated(D[0], (up - down) / (2 * h), scale[0], s, at_zero)
+        return deflate(D[0], (up - down) / (2 * h), scale[0], s, at_zero)
 
 
 def _must_not_be_algebraic(loop: ContinuousLoop) -> None:

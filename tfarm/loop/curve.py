@@ -140,7 +140,7 @@ class LoopVerdict(ABC):
 
     @property
     @abstractmethod
-    def ringing(self) -> list[tuple[int, complex]]:
+    def oscillating_poles(self) -> list[tuple[int, complex]]:
         """The oscillating poles s [1/s], Im s > 0, each with its mode, 0 without one."""
 
     @property

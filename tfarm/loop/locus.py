@@ -180,7 +180,7 @@ def locus(
     points = whole("points", points, 2, MOST_LOCUS_POINTS, f"a whole number from 2 to {MOST_LOCUS_POINTS}")
     branches = whole("branches", branches, 1, MOST_BRANCHES, f"a whole number from 1 to {MOST_BRANCHES}")
     number = branches if in_box else max(1, branches - 2 * case.arm.has_rigid_mode)
-    family = Varied(case, vary, start, stop).boxed(number)
+    family = Varied(case, vary, start, stop).with_box(number)
     gain = np.linspace(start, stop, points)
     rows, origin = follow_poles(family, gain, number)
     is_shown = family.box.holds(rows) if in_box else ~np.isnan(rows)

@@ -163,7 +163,7 @@ class Verdict(OfLoop, LoopVerdict):
         return -self.loop.chain.sampling.period / self.log_radius if self.log_radius else None
 
     @property
-    def ringing(self) -> list[tuple[int, complex]]:
+    def oscillating_poles(self) -> list[tuple[int, complex]]:
         """The oscillating poles s = ln(z)/T by mode, each at the frequency that is nearest to that of its mode."""
         return [*unaliased_poles(self.full).items()]
 

@@ -139,7 +139,7 @@ class Stability(LoopVerdict):
         return -1 / self.spectral_abscissa if self.spectral_abscissa else None
 
     @property
-    def ringing(self) -> list[tuple[int, complex]]:
+    def oscillating_poles(self) -> list[tuple[int, complex]]:
         """The oscillating poles by mode."""
         moving = self.poles.moving
         table = modes(self.loop.arm, up_to=self.band)

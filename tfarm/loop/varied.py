@@ -232,7 +232,7 @@ class Varied:
 
     # ------------------------------------------------------------ complete in a box
 
-    def boxed(self, modes: int) -> Varied:
+    def with_box(self, modes: int) -> Varied:
         """The same with a box for all values, as high as `modes` modes, no pole on its edge at the first value."""
         loops = [self.at(value) for value in self.few]
         # heights of the box, until no pole is on its edge at the first value

@@ -21,7 +21,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import MISSING, require
 from tfarm.exact.balls import nearest_float
-from tfarm.exact.characteristic import Analytic, characteristic, deflated, off_rest
+from tfarm.exact.characteristic import Analytic, characteristic, deflate, off_rest
 from tfarm.exact.loads import is_load, load_of, loaded_value
 from tfarm.exact.outputs import Output, output
 from tfarm.exact.series import constant_of, expansion_at_zero, order_at_zero
@@ -116,7 +116,7 @@ def _numerator(k: System, base: Output, order: int, x: float) -> Function:
     def function(s: Complex) -> Analytic:
         s = off_rest(s)
         here, slopes = free_slopes(k, [base], s, x)
-        return deflated(here.outputs[0], slopes.outputs[0], here.scale, s, order)
+        return deflate(here.outputs[0], slopes.outputs[0], here.scale, s, order)
 
     return function
 

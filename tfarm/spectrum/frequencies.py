@@ -140,7 +140,7 @@ class AxisSweep(Sweep):
             raise UncertainError
         self.number += step * ((self.number % 2 == 1) != bool(value < 0))
 
-    def released(self) -> int:
+    def count_released(self) -> int:
         """Return the count with the hub released, where it is not locked."""
         if self.layout.chain.drive.turns:
             self._step(self.drive, 1)
@@ -160,7 +160,7 @@ class RealAxis:
     def count(self, omega: Ball) -> int | None:
         """Return N(omega), with the rigid-body mode; None if a sign or a half wave is uncertain."""
         try:
-            return AxisSweep(self._system, omega, counting=True).released()
+            return AxisSweep(self._system, omega, counting=True).count_released()
         except UncertainError:
             return None
 

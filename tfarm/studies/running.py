@@ -275,7 +275,7 @@ def versions() -> dict[str, str]:
 # ------------------------------------------------------------------------------------------------------------ runs
 
 
-def run(
+def run_parts(
     folder: Path,
     plan: StudyPlan,
     files: Mapping[str, bytes],

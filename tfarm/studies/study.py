@@ -69,7 +69,7 @@ from .running import (
     StudyPlan,
     on_cluster,
     rows_of,
-    run,
+    run_parts,
     search_rows,
     seconds_an_arm,
     table_of,
@@ -277,7 +277,7 @@ def study(
     engine = partial(share_tasks, count=workers) if client is None else partial(on_cluster, client=client)
     deadline = time.monotonic() + (math.inf if stop_after is None else stop_after)
     with locked_folder(Path(out), key=OUT):
-        parts = run(Path(out), plan, files, engine, workers, deadline, part, progress)
+        parts = run_parts(Path(out), plan, files, engine, workers, deadline, part, progress)
         found = Study(parts=parts, arm=arm.name, rows=space.count, rows_a_part=parts.rows)
         if found.is_complete:
             indices = sobol_indices(parts, sobol, workers, engine, deadline, progress) if sobol else ()
