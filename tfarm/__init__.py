@@ -14,7 +14,7 @@ import ast
 from importlib import import_module
 from pathlib import Path
 
-__version__ = "1.0.0"
+__version__ = "1.1.0"
 
 
 def _public_names() -> dict[str, tuple[str, str]]:

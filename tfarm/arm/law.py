@@ -11,7 +11,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
-from functools import cached_property
+from functools import cached_property, reduce
+from operator import mul
 from typing import Annotated, Any
 
 import numpy as np
@@ -228,11 +229,11 @@ class Law:
         row = {name: n for n, name in enumerate(self.signals if columns is None else columns)}
         numerators = np.zeros((len(self.parts), len(row), *s.shape), complex)
         for n, part in enumerate(self.parts):
-            others = np.prod([den for m, den in enumerate(dens) if m != n], axis=0) * -self.sign
+            others = reduce(mul, dens[:n] + dens[n + 1 :], -self.sign)
             for name, value in zip(part.signals, part.block.numerators(s), strict=True):
                 if name in row:
                     numerators[n, row[name]] += value * others
-        return numerators, np.asarray(np.prod(dens, axis=0))
+        return numerators, np.asarray(reduce(mul, dens))
 
     def values(self, s: Complex) -> Complex:
         """Return C_i (signals, n) at s, or z, without the delay; infinite or nan at its poles."""

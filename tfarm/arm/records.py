@@ -188,7 +188,8 @@ class Arm:
         No inertia is infinite, no spring ties it to the ground, and the hub's angle is not prescribed.
         """
         is_held = self.is_locked or any(value for _, value in self._springs_to_ground())
-        return math.isfinite(self.total_inertia) and not is_held
+        is_tip_free = math.isfinite(self.payload.mass) and math.isfinite(self.payload.inertia)
+        return is_tip_free and not is_held
 
     def _springs_to_ground(self) -> Iterator[tuple[str, float]]:
         """Yield the key and the stiffness of each spring to ground."""

@@ -8,9 +8,10 @@ state is refused by the name of that stage, so that none is ever left out in sil
 """
 
 from collections.abc import Iterator, Mapping
+from functools import cache
 from typing import Any, NamedTuple
 
-from tfarm.errors import require
+from tfarm.errors import ParameterError
 
 ACTS = "acts"
 NAMED = "named"
@@ -143,11 +144,12 @@ class Consumer(NamedTuple):
 
     def refuse_others(self, *tables: Mapping[str, Any]) -> None:
         """Raise ParameterError for a key of tables of a file whose stage it does not state, or that no stage has."""
+        stated = _stated_keys(self)
         for key, value in flat_keys(*tables):
-            stage = STAGE_OF.get(key)
-            remedy = f"the stage {stage.name}" if stage else "this key"
-            is_stated = stage is not None and self.word(stage.name) is not None
-            require(is_stated, key, value, f"{self.name} does not have {remedy}: leave it out")
+            if key not in stated:
+                stage = STAGE_OF.get(key)
+                what = f"the stage {stage.name}" if stage else "this key"
+                raise ParameterError(key=key, value=value, remedy=f"{self.name} does not have {what}: leave it out")
 
     def not_covered(self, *tables: Mapping[str, Any]) -> str:
         """Return the end of its line of certainty: the keys of these tables that it is without."""
@@ -155,6 +157,12 @@ class Consumer(NamedTuple):
         without = [each for each in found if self.word(each[1].name) in (NAMED, PARTLY)]
         names = [stage.remainder or key.partition(".")[2] for key, stage in without]
         return f"; not covered: {', '.join(names)}" if names else ""
+
+
+@cache
+def _stated_keys(consumer: Consumer) -> frozenset[str]:
+    """Return the keys of files whose stage a consumer states."""
+    return frozenset(key for key, stage in STAGE_OF.items() if consumer.word(stage.name) is not None)
 
 
 def are_linear(*tables: Mapping[str, Any]) -> bool:

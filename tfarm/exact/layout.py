@@ -104,7 +104,7 @@ class Layout:
     @cached_property
     def rows(self) -> NDArray[np.void]:
         """The elements for the kernel (elements,) of `ROW`."""
-        return np.asarray(read_only(np.concatenate([kernel_row(each) for each in self.elements])))
+        return np.asarray(read_only(np.array([kernel_row(each) for each in self.elements], ROW)))
 
     @cached_property
     def ends(self) -> Real:
@@ -123,18 +123,18 @@ class Layout:
         return np.asarray(read_only(np.array(rows, dtype=float).reshape(-1, len(OutputFormula._fields))))
 
 
-def kernel_row(element: Element) -> NDArray[np.void]:
-    """Return an element as a row of the kernel (1,) of `ROW`."""
-    row = np.zeros(1, ROW)
-    row["kind"] = KINDS[type(element)]
-    for name in set(element._fields) & set(ROW.fields or ()):
-        row[name] = float(getattr(element, name))
+def kernel_row(element: Element) -> tuple[Any, ...]:
+    """Return the numbers of an element in the order of `ROW`."""
+    numbers: dict[str, Any] = dict.fromkeys(ROW.names or (), 0.0)
+    numbers["kind"] = KINDS[type(element)]
+    numbers["of_chain"] = (0.0,) * 4
+    numbers |= {name: float(getattr(element, name)) for name in element._fields if name in numbers}
     if isinstance(element, Segment):
         for name in "abg":
             value = getattr(element, name)
-            row[f"{name}_low"] = float(value - Fraction(float(value)))
-        row["of_chain"] = [float(each) for each in element.of_chain]
-    return row
+            numbers[f"{name}_low"] = float(value - Fraction(numbers[name]))
+        numbers["of_chain"] = tuple(map(float, element.of_chain))
+    return tuple(numbers.values())
 
 
 def segment_at(chain: System, place: Place) -> Segment:

@@ -43,7 +43,7 @@ from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import characteristic
 from tfarm.exact.compiled import python_of
-from tfarm.exact.layout import kernel_row, segment_at
+from tfarm.exact.layout import ROW, kernel_row, segment_at
 from tfarm.exact.system import Body, Place, Segment, System
 from tfarm.exact.values import free_fields
 from tfarm.exact.waves import SERIES_RADIUS, fill_wave_numbers, transition_rows, transition_series
@@ -271,7 +271,7 @@ def _of_segment(segment: Segment, omega: Real, ends: Real, x: Real) -> Real:
     """Return W, Psi, M, Q (4, modes, n) at the shares x (modes, n) from the states (4, modes, 2) at both ends."""
     numbers = np.empty((2, 3, omega.size), complex)
     result = np.empty((4, *x.shape))
-    fill_wave_numbers(1j * omega, read_only(kernel_row(segment)), numbers)
+    fill_wave_numbers(1j * omega, read_only(np.array([kernel_row(segment)], ROW)), numbers)
     units = [float(each) for each in segment.units]
     own = np.array([units[0], 1.0, *units[1:]])[:, None]
     inner = ends[..., 0] * own
