@@ -24,7 +24,7 @@ from tfarm.assessment.card import GAIN_LIMITS, PEAK_LIMITS, PERIOD_LIMITS, PHASE
 from tfarm.audit.published import Validation, validate
 from tfarm.case import Case
 from tfarm.digits import general
-from tfarm.fitting.decays import ring
+from tfarm.fitting.decays import fit_ringdown
 from tfarm.fitting.recording import compare_run, load_run, overshoot, read_recording
 from tfarm.spectrum.table import hub_locked
 from tfarm.synthesis.structures import STRUCTURES
@@ -169,7 +169,7 @@ def rig_ring() -> list[str]:
     locked = hub_locked(tfarm.modes(tfarm.load("quanser-2dsfl"), 1)).natural_frequency_hz[-1]
     rows = []
     for name in ("ring-20deg", "ring-neg-10deg"):
-        found = ring(read_recording(RIG / f"{name}.csv"), "tip_angle_against_hub", start=2.0)
+        found = fit_ringdown(read_recording(RIG / f"{name}.csv"), "tip_angle_against_hub", start=2.0)
         (mode,) = found.modes
         rows.append([name, f"{mode.frequency:.4g}", f"{mode.frequency_low:.4g} to {mode.frequency_high:.4g}",
                      f"{locked:.4g}"])  # fmt: skip

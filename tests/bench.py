@@ -39,9 +39,9 @@ from tfarm.loop.locus import locus
 from tfarm.loop.plane import gain_map
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.schema import to_dict
-from tfarm.spectrum.proofs import enclosed
+from tfarm.spectrum.proofs import enclose_zero
 from tfarm.studies.quantities import column_names, values_of
-from tfarm.studies.running import Plan, chunk
+from tfarm.studies.running import StudyPlan, chunk
 from tfarm.studies.space import space_of
 from tfarm.tuner import Guard, Learning, initial_network, slew_trial, train
 
@@ -228,7 +228,7 @@ def study(ask, n, values):
     """The first rows of a study, by `values` of its plan; prepared is the plan."""
 
     def prepared(subject):
-        plan = Plan(Case(*subject), space_of(over(subject), draws=n, seed=0, posterior=None), column_names([ask]))
+        plan = StudyPlan(Case(*subject), space_of(over(subject), draws=n, seed=0, posterior=None), column_names([ask]))
         return lambda: values(plan, n)
 
     return prepared
@@ -324,7 +324,7 @@ def loci(order=20):
             loop = ContinuousLoop(Case(BARE.arm, HubFeedback(K1=float(gains[at]))))
             for near, value in zip(found.branches[:, at], values[:, at], strict=True):
                 if near:
-                    disc = enclosed(loop.k, complex(near), 50, loop.exact)
+                    disc = enclose_zero(loop.k, complex(near), 50, loop.exact)
                     worst = max(worst, abs(value / complex(float(disc.re), float(disc.im)) - 1))
         return worst
 

@@ -3,7 +3,15 @@ import re
 
 import pytest
 
-from tfarm.errors import MISSING, CertificationError, ConvergenceError, ParameterError, TfarmError, did_you_mean, naming
+from tfarm.errors import (
+    MISSING,
+    CertificationError,
+    ConvergenceError,
+    ParameterError,
+    TfarmError,
+    did_you_mean,
+    name_file,
+)
 
 
 def error(key="link.length", value=-1.0, remedy="a length is positive", file=None):
@@ -21,11 +29,11 @@ def test_a_parameter_error_names_file_key_value_and_remedy():
 
 @pytest.mark.parametrize(("own", "start"), [(None, "arm.toml: link"), ("c.mat", "c.mat: link")])
 def test_an_error_in_a_file_names_that_file_or_its_own(own, start):
-    with pytest.raises(ParameterError) as refused, naming("arm.toml"):
+    with pytest.raises(ParameterError) as refused, name_file("arm.toml"):
         raise error(file=own)
     assert str(refused.value).startswith(start)
     assert refused.value.__suppress_context__
-    with pytest.raises(ConvergenceError), naming("arm.toml"):
+    with pytest.raises(ConvergenceError), name_file("arm.toml"):
         raise ConvergenceError("stopped", 1.0, 0.0)
 
 

@@ -1,5 +1,6 @@
 """Public names of version 1.0, of `__all__` of the package and its rooms and of the documentation, are found."""
 
+import re
 import warnings
 from importlib import import_module
 from pathlib import Path
@@ -26,9 +27,10 @@ def test_a_name_of_version_1_is_found_and_a_moved_one_names_its_place(name):
     value, words = found(name)
     if words:
         (text,) = words
-        head, _, place = text.partition(" has moved: import it from ")
+        head, _, news = text.partition(" ")
+        renamed = re.fullmatch(r"(?:has moved: import it|is (\w+) now: import that) from ([\w.]+)", news)
         assert head == name
-        assert getattr(import_module(place), name.rpartition(".")[2]) is value
+        assert getattr(import_module(renamed[2]), renamed[1] or name.rpartition(".")[2]) is value
 
 
 def test_moved_names_warn_and_unknown_ones_are_none():

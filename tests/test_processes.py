@@ -10,7 +10,7 @@ import pytest
 
 import tfarm
 from tests.shared import refusal
-from tfarm.processes import BLAS, shared
+from tfarm.processes import BLAS, share_tasks
 
 
 def test_each_task_has_its_result_and_the_running_ones_are_named(monkeypatch):
@@ -18,7 +18,7 @@ def test_each_task_has_its_result_and_the_running_ones_are_named(monkeypatch):
     monkeypatch.delenv(BLAS, raising=False)
     tasks = {name: partial(str.upper, name) for name in "abcd"} | {"threads": partial(os.getenv, BLAS)}
     seen = []
-    found = dict(shared(tasks.items(), 2, begun=seen.append))
+    found = dict(share_tasks(tasks.items(), 2, begun=seen.append))
     assert found == {"a": "A", "b": "B", "c": "C", "d": "D", "threads": "1"}
     assert seen[0] == ["a", "b"]
     assert {name for names in seen for name in names} == set(tasks)
@@ -40,7 +40,7 @@ def test_a_process_that_joins_is_one_of_them_and_the_other_need_not_wait_for_it(
     file, seen = tmp_path / "third", []
     tasks = {"first": os.getpid, "second": partial(appears, file), "third": file.touch}
     tasks |= dict.fromkeys(range(5), os.getpid)
-    found = dict(shared(tasks.items(), 2, begun=seen.append, joins=True))
+    found = dict(share_tasks(tasks.items(), 2, begun=seen.append, joins=True))
     assert found["second"]
     assert found.keys() == tasks.keys()
     assert len({found[n] for n in ("first", *range(5))} - {os.getpid()}) == 1
@@ -50,9 +50,9 @@ def test_a_process_that_joins_is_one_of_them_and_the_other_need_not_wait_for_it(
 
 SCRIPT = """
 import os
-from tfarm.processes import shared
+from tfarm.processes import share_tasks
 print("begun")
-found = {process for _, process in shared([(n, os.getpid) for n in range(9)], 2)}
+found = {process for _, process in share_tasks([(n, os.getpid) for n in range(9)], 2)}
 print(os.getpid() in found, __name__, flush=True)
 """
 
@@ -73,10 +73,10 @@ def test_an_error_of_a_task_is_raised_by_whichever_process_has_it_and_the_rest_i
     tasks.insert(0, ("slow", partial(time.sleep, 0.3)))
     tasks.insert(position, ("fails", partial(os.listdir, tmp_path / "none")))
     with pytest.raises(FileNotFoundError):
-        list(shared(tasks, 2, joins=joins))
+        list(share_tasks(tasks, 2, joins=joins))
     assert len(os.listdir(tmp_path)) < 9
 
 
 def test_a_killed_process_is_an_error_of_one_line():
-    found = shared({"dies": partial(os._exit, 9), "other": time.time}.items(), 2)
+    found = share_tasks({"dies": partial(os._exit, 9), "other": time.time}.items(), 2)
     assert "worker process ended before its work was done" in str(refusal(list, found, kind=tfarm.ConvergenceError))

@@ -18,7 +18,7 @@ from tests.hostile import Read
 from tfarm import HubFeedback
 from tfarm.case import Case
 from tfarm.dsp import Chain
-from tfarm.dsp.scenarios import slew
+from tfarm.dsp.scenarios import slew_scenario
 from tfarm.dsp.simulate import Simulator
 from tfarm.loop.circle_crossings import sampled_map
 from tfarm.loop.locus import locus
@@ -53,7 +53,7 @@ MAKERS = {  # of a record: how it is made, and how its repr begins: with the fin
     "model": (lambda: modal_model(LAB, ["root_moment"], 4), "PartialFractions(arm='sasaki2012-lab', "),
     "sampled": (lambda: tfarm.sampled(LAB, LAW, count=4), "Analysis(verdict='stable', "),
     "sampled map": (small_map, "GainMap(finding='stable at 4 of 4 points', "),
-    "slew": (lambda: Simulator(Case(LAB, HubFeedback(), Chain()), slew(LAB, Chain(), 0.5), count=3).linear(LAW),
+    "slew": (lambda: Simulator(Case(LAB, HubFeedback()), slew_scenario(LAB, Chain(), 0.5), count=3).linear(LAW),
              "Simulation(finding='ran to 0.5 s, root moment up to 4.653 N m', "),
     "bode": (lambda: tfarm.bode(LAB, "root_moment", (1.0, 300.0)), "Bode(finding='2 poles and 1 zeros up to 300"),
 }  # fmt: skip

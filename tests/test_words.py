@@ -2,6 +2,7 @@
 
 import ast
 import re
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
@@ -39,3 +40,18 @@ def test_templates_avoid_words_that_need_decoding(path: Path) -> None:
     lines = path.read_text(encoding="utf-8").splitlines()
     found = [f"{number}: {line.strip()}" for number, line in enumerate(lines, 1) if UNUSED.search(line)]
     assert not found, "\n".join(found)
+
+
+def test_a_type_name_has_one_meaning() -> None:
+    places = defaultdict(set)
+    for path in MODULES:
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            match node:
+                case ast.ClassDef(name=name) | ast.AnnAssign(target=ast.Name(id=name)):
+                    places[name.lstrip("_")].add(path)
+                case ast.Assign(targets=targets):
+                    for target in targets:
+                        places[getattr(target, "id", "").lstrip("_")].add(path)
+    types = {name: where for name, where in places.items() if re.fullmatch(r"[A-Z][a-z]\w*", name)}
+    assert len(types) > 300
+    assert {name: where for name, where in types.items() if len(where) > 1} == {}

@@ -19,9 +19,9 @@ def singly(how: Callable[..., str], *digits: int) -> CellsOf:
     return lambda values: [value if isinstance(value, str) else how(value, *digits) for value in values]
 
 
-def lined(digits: int, least: int) -> CellsOf:
-    """Return a format of a column by `aligned`."""
-    return partial(aligned, digits=digits, least=least)
+def column_format(digits: int, least: int) -> CellsOf:
+    """Return a format of a column by `align_decimals`."""
+    return partial(align_decimals, digits=digits, least=least)
 
 
 TEXTS = singly(str)  # words and whole numbers as they are
@@ -50,7 +50,7 @@ def scientific(x: float, digits: int) -> str:
     return _typeset(f"{x:.{digits - 1}e}") if x else "0"
 
 
-def aligned(values: Iterable[float], digits: int, *, least: int = 6) -> tuple[str, ...]:
+def align_decimals(values: Iterable[float], digits: int, *, least: int = 6) -> tuple[str, ...]:
     """Return a column with a common number of decimals: the largest with `digits` digits, the smallest with `least`.
 
     Where that needs too many decimals, each number has `digits` digits of its own (`significant`).
@@ -65,7 +65,7 @@ def aligned(values: Iterable[float], digits: int, *, least: int = 6) -> tuple[st
     return tuple(_typeset(f"{x:.{decimals}f}") if x else "0" for x in column)
 
 
-def fixed(values: Iterable[float], decimals: int) -> tuple[str, ...]:
+def fix_decimals(values: Iterable[float], decimals: int) -> tuple[str, ...]:
     """Return a column with that many decimals; zero has no sign."""
     return tuple(_typeset(f"{x:.{decimals}f}") for x in values)
 
@@ -75,7 +75,7 @@ def kept_digits(values: Iterable[float], digits: int) -> list[float]:
     return [float(f"{value:.{digits - 1}e}") for value in values]
 
 
-def within(value: float, error: float, most: int) -> str:
+def round_to_error(value: float, error: float, most: int) -> str:
     """Return a number with the digits above an absolute error, at most `most`; without any, 0 and the error."""
     if value == 0:
         return "0"
@@ -88,7 +88,7 @@ def how_many(count: float, what: str) -> str:
     return f"{plain(count) if count else 'no'} {what}{'s' * (count != 1)}"
 
 
-def listed(words: Sequence[str]) -> str:
+def join_words(words: Sequence[str]) -> str:
     """Return words with commas and an "and" before the last."""
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 

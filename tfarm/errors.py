@@ -28,7 +28,7 @@ class ParameterError(TfarmError, ValueError):
     def __str__(self) -> str:
         where = "" if self.file is None else f"{one_line(self.file, 240)}: "
         key = one_line(self.key, 80)
-        what = f"{key} is missing" if self.value is MISSING else f"{key} = {shown(self.value)}"
+        what = f"{key} is missing" if self.value is MISSING else f"{key} = {short_text(self.value)}"
         return f"{where}{what}: {one_line(self.remedy, 480)}"
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -47,7 +47,7 @@ def require(is_met: object, key: str, value: object, remedy: str, file: str | No
 
 
 @contextmanager
-def naming(file: str | os.PathLike[str]) -> Iterator[None]:
+def name_file(file: str | os.PathLike[str]) -> Iterator[None]:
     """Add the name of a file to a ParameterError raised inside, unless it has one."""
     try:
         yield
@@ -75,10 +75,10 @@ def did_you_mean(word: str, choices: Iterable[str]) -> str:
     known = list(choices)
     near = close_to(word, known)
     hint = "did you mean " + " or ".join(f'"{choice}"' for choice in near) + "? " if near else ""
-    return f"{hint}known are: {listed(known, 400 - len(hint))}"
+    return f"{hint}known are: {list_within(known, 400 - len(hint))}"
 
 
-def listed(words: Iterable[str], longest: int) -> str:
+def list_within(words: Iterable[str], longest: int) -> str:
     """Return words with commas: the first that fit into `longest` characters, each whole, and the number of others."""
     known = list(words)
     ends = accumulate(len(word) + 2 for word in known)
@@ -129,12 +129,12 @@ def one_line(text: str, longest: int) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
-def shown(value: object) -> str:
+def short_text(value: object) -> str:
     """Return the text of a value, in at most 60 characters."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, list | tuple) and all(isinstance(each, str) for each in value):
-        return f"[{listed((one_line(repr(each), 50) for each in value), 58)}]"
+        return f"[{list_within((one_line(repr(each), 50) for each in value), 58)}]"
     try:
         return one_line(repr(value), 60)
     except (ValueError, RecursionError):  # an integer of more than 4300 digits, a very deep table

@@ -66,7 +66,7 @@ def of_mat(path: str) -> Iterator[memoryview]:
     from scipy.io import loadmat
 
     found = loadmat(path, appendmat=False, squeeze_me=False, struct_as_record=True)
-    return packed(dict(each for item in found.items() if item[0][:2] != "__" for each in _numbers(*item)))
+    return pack_arrays(dict(each for item in found.items() if item[0][:2] != "__" for each in _numbers(*item)))
 
 
 def _numbers(name: str, value: Any) -> Iterator[tuple[str, Any]]:
@@ -89,10 +89,10 @@ def of_uff(path: str) -> Iterator[memoryview]:
         # 18: the kind of an abscissa that is a frequency
         if each.get("func_type") == 4 and each.get("abscissa_spec_data_type", 18) == 18:
             found |= {f"x{len(found) // 2}": each["x"], f"data{len(found) // 2}": each["data"]}
-    return packed(found)
+    return pack_arrays(found)
 
 
-def packed(found: dict[str, Any]) -> Iterator[memoryview]:
+def pack_arrays(found: dict[str, Any]) -> Iterator[memoryview]:
     """Yield the names of arrays, then each of them."""
     for each in (np.array([*found], dtype=str), *found.values()):
         np.save(stream := io.BytesIO(), each, allow_pickle=False)

@@ -8,13 +8,15 @@ from types import ModuleType
 
 
 def moved(module: str, places: Mapping[str, str]) -> Callable[[str], object]:
-    """Return the `__getattr__` of a module, by the modules that its former names are in."""
+    """Return the `__getattr__` of a module, by the module of each former name, or "module:name" of a new one."""
 
     def find(name: str) -> object:
         if name not in places:
             raise AttributeError(f"module {module!r} has no attribute {name!r}")
-        warnings.warn(f"{module}.{name} has moved: import it from {places[name]}", DeprecationWarning, stacklevel=2)
-        return getattr(import_module(places[name]), name)
+        place, _, new = places[name].partition(":")
+        news = f"is {new} now: import that" if new else "has moved: import it"
+        warnings.warn(f"{module}.{name} {news} from {place}", DeprecationWarning, stacklevel=2)
+        return getattr(import_module(place), new or name)
 
     return find
 

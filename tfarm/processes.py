@@ -23,7 +23,7 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 
-def shared(
+def share_tasks(
     tasks: Iterable[tuple[Task, Callable[[], Result]]],
     count: int,
     begun: Callable[[Sequence[Task]], object] = lambda _: None,

@@ -14,7 +14,7 @@ from typing import Any, TypeVar, dataclass_transform, overload
 import numpy as np
 
 _Class = TypeVar("_Class", bound=type[Any])
-_Record = TypeVar("_Record")
+_AnyRecord = TypeVar("_AnyRecord")
 
 SHOWN_FIRST = ("verdict", "word", "text", "finding", "unstable", "worst_error")  # the finding
 LONGEST_REPR = 200  # characters of a repr: a line or two of a terminal
@@ -53,11 +53,11 @@ def record(cls: _Class) -> _Class:
 
 
 @overload
-def frozen(cls: type[_Record], /) -> type[_Record]: ...
+def frozen(cls: type[_AnyRecord], /) -> type[_AnyRecord]: ...
 
 
 @overload
-def frozen(*, kw_only: bool = False, slots: bool = False) -> Callable[[type[_Record]], type[_Record]]: ...
+def frozen(*, kw_only: bool = False, slots: bool = False) -> Callable[[type[_AnyRecord]], type[_AnyRecord]]: ...
 
 
 @dataclass_transform(frozen_default=True)

@@ -14,6 +14,8 @@ from contextlib import contextmanager, suppress
 from threading import Lock, Thread
 from types import FrameType
 
+# what a long computation calls between its steps, with the number done, that of all, and what runs next
+Progress = Callable[[int, int, str], object]
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 PATIENCE = 0.5  # seconds that the main thread has before the second thread ends the process
 

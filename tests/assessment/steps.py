@@ -271,7 +271,7 @@ def identities(found, truth):
 def answered(case):
     """The answer of `step`, its sampled loop left out."""
     nothing = LoopResponse(stability="", certainty="", signals={})
-    with mock.patch.object(step._Record, "_of_sampled", return_value=nothing):
+    with mock.patch.object(step._LoopRecord, "_of_sampled", return_value=nothing):
         return step.step(case.arm, case.law, case.chain, case.scenario, case.duration)
 
 

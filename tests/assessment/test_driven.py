@@ -10,7 +10,7 @@ from tests.shell import answer
 from tfarm.arm.chain import file_text
 from tfarm.assessment.comparison import compare
 from tfarm.dsp import Actuator, Chain, Sampling, scenario
-from tfarm.dsp.plant import driven
+from tfarm.dsp.plant import arm_under_chain
 from tfarm.report.live import explore
 from tfarm.schema import to_dict
 from tfarm.synthesis.judge import judge_of
@@ -61,9 +61,9 @@ def test_analog_damping_is_friction_of_the_hub(name, monkeypatch):
 
 def test_it_is_in_each_loop_once():
     """Of the driven arm and the chain that is left the answers are the same again."""
-    arm, chain = driven(ARM, ANALOG)
+    arm, chain = arm_under_chain(ARM, ANALOG)
     assert (arm, chain) == (BRAKED, IDEAL)
-    assert driven(arm, chain) == (arm, chain)
+    assert arm_under_chain(arm, chain) == (arm, chain)
     assert str(tfarm.result_card(ARM, GAINS, ANALOG)) == str(tfarm.result_card(arm, GAINS, chain))
     (damped, plain) = (tfarm.result_card(each, GAINS, IDEAL).continuous for each in (BRAKED, ARM))
     assert damped.time_constant < 0.5 * plain.time_constant  # (J + ...)/(K1 + b): the damping acts

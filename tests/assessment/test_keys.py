@@ -13,7 +13,7 @@ import pytest
 import tfarm
 from tests.exported.tuners import some_tuner
 from tests.shared import docs_module, remembered
-from tfarm.arm.chain import CHAIN_TABLES, stated
+from tfarm.arm.chain import CHAIN_TABLES, stated_keys
 from tfarm.arm.schema import file_keys
 from tfarm.arm.stages import ARM_KEYS, STAGE_OF, STAGES, Consumer, Stage
 from tfarm.assessment import step
@@ -180,7 +180,7 @@ def test_every_key_has_a_stage_and_every_consumer_states_stages_that_there_are()
 @pytest.mark.parametrize("key", CHANGES)
 def test_a_chain_is_linear_where_its_stages_are(key):
     before, after = changed(key)
-    keys = [key, *(f"{table}.{name}" for table, own in stated(before).items() for name in own)]
+    keys = [key, *(f"{table}.{name}" for table, own in stated_keys(before).items() for name in own)]
     assert after.is_linear == all(STAGE_OF[each].is_linear for each in keys)
     assert Chain().is_linear
     assert STAGE_OF[key].is_linear == (STAGE_OF[key].name not in QUANTISERS)

@@ -11,7 +11,7 @@ import tfarm
 from tests.shell import answer, run
 from tfarm.arm import Attachment
 from tfarm.arm.chain import Sampling
-from tfarm.assessment.step import PARTS, SAMPLED_NAMES, _Record
+from tfarm.assessment.step import PARTS, SAMPLED_NAMES, _LoopRecord
 from tfarm.dsp import Chain
 from tfarm.loop.time_response import Peak
 
@@ -30,7 +30,9 @@ def test_figures_of_a_second_order_system_are_those_of_the_textbook():
         return 2 * (1 - np.exp(-z * w * t) * (np.cos(wd * t) + z * w / wd * np.sin(wd * t)))
 
     t = np.linspace(0.0, 10.0, 200_001)
-    record = _Record(LAB, ("hub_angle", "tip_displacement", "root_moment"), 0.0, t, {"hub_angle": 2.1 + 0 * t}, 0.02)
+    record = _LoopRecord(
+        LAB, ("hub_angle", "tip_displacement", "root_moment"), 0.0, t, {"hub_angle": 2.1 + 0 * t}, 0.02
+    )
     found = record._figures("hub_angle", t, y(t), 0 * t)
     assert found.overshoot == pytest.approx(math.exp(-math.pi * z / math.sqrt(1 - z * z)), rel=1e-6)
     assert found.peak_time == pytest.approx(math.pi / wd, rel=1e-4)
@@ -60,7 +62,7 @@ def test_the_settling_time_of_the_root_moment_is_that_of_simulate():
     found, run_ = tfarm.step(LAB, LAW, scenario_name="slew", duration=3.0), tfarm.simulate(LAB, LAW, duration=3.0)
     every = round(found.period / found.t[1])
     t, moment = found.t[::every], found.sampled.signals["root_moment"][::every]
-    coarse = _Record(LAB, found.names, found.busy_until, t, {}, 0.02)._figures("root_moment", t, moment, 0 * t)
+    coarse = _LoopRecord(LAB, found.names, found.busy_until, t, {}, 0.02)._figures("root_moment", t, moment, 0 * t)
     assert coarse.settling_time == pytest.approx(run_.settling_time, rel=1e-12)
     assert found.sampled.root_moment.settling_time == pytest.approx(run_.settling_time, abs=0.01)
     assert found.sampled.root_moment.residual_rms == pytest.approx(run_.residual_raw, rel=0.05)
@@ -85,7 +87,7 @@ def test_a_figure_is_not_determined_where_its_bound_leaves_a_hundredth_open(shar
     """A decaying cosine with an error of that share: each figure is within 1 %, or it has a reason in words."""
     t = np.linspace(0.0, 10.0, 5001)
     y = 2.0 * np.exp(-t) * np.cos(7 * t)
-    record = _Record(LAB, ("hub_rate", "velocity@1.0", "root_moment", "torque"), 0.0, t, {}, 0.02)
+    record = _LoopRecord(LAB, ("hub_rate", "velocity@1.0", "root_moment", "torque"), 0.0, t, {}, 0.02)
     found = record._figures("hub_rate", t, y, share * 2 + 0 * t, Peak(0.0, 2.0, 2 * share, 2.0 + 2 * share))
     if words is None:
         assert found.peak == 2.0
@@ -125,7 +127,7 @@ def test_the_peak_of_the_torque_of_a_delayed_filter_is_the_laws_own():
 def test_settling_counts_from_the_end_of_the_motion_within_the_band():
     """Of the sampled signals by hand: the last time outside the band of the travel, less the slew; none is negative."""
     found = tfarm.step(LAB, SERVO, scenario_name="slew", duration=3.0, settling_band=0.0005)
-    usual = _Record(LAB, found.names, found.busy_until, found.t, found.reference, 0.02)
+    usual = _LoopRecord(LAB, found.names, found.busy_until, found.t, found.reference, 0.02)
     for name, of, scale in (("hub_angle", found.sampled.hub, 1.15), ("root_moment", found.sampled.root_moment, None)):
         y = found.sampled.signals[name]
         away = abs(y - y[found.t >= 2.7 - 1e-9].mean())

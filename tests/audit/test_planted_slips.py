@@ -30,7 +30,13 @@ FORMULAS = {
     for name, claim in CLAIMS.items()
     if not name.startswith("Table") and name not in NOT_FORMULAS and "order of" not in name
 }
-CACHES = (formulas.parsed, equations.accelerations, paper.energy_of, equations.wave_determinant, equations.relation)
+CACHES = (
+    formulas.parse_expression,
+    equations.accelerations,
+    paper.energy_of,
+    equations.wave_determinant,
+    equations.relation,
+)
 
 
 def flips(text):
@@ -44,7 +50,7 @@ SIGNED = [name for name, text in FORMULAS.items() if any(flips(text))]
 
 
 class Watched:
-    """The pattern by which `formulas.parsed` finds derivatives in a text, and the texts in which it has."""
+    """The pattern by which `formulas.parse_expression` finds derivatives in a text, and the texts in which it has."""
 
     def __init__(self, pattern):
         self.pattern, self.texts = pattern, set()

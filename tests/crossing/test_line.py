@@ -10,12 +10,12 @@ from tfarm.crossing import (
     Grid,
     Line,
     brackets,
-    confirmed,
+    confirm_intervals,
     counts_over,
-    crossed,
     crossings,
     intervals,
-    joined,
+    join_neighbours,
+    locate_crossings,
     zeros_between,
 )
 
@@ -36,7 +36,7 @@ def drawn(rng, curve):
 def crossings_of(curve, A, B):
     """Those of pairs between the ends of the grid, and those of single roots at the real points of the curve."""
     at, grid, _ = CURVES[curve]
-    gain, place, change = crossed(grid, lambda x: (A(at(x)), B(at(x))))
+    gain, place, change = locate_crossings(grid, lambda x: (A(at(x)), B(at(x))))
     single = [0.0] if curve == "axis" else [1.0, -1.0]
     return place, Crossings.of(zip(gain, place, change, strict=True)), [-A(point) / B(point) for point in single]
 
@@ -79,7 +79,7 @@ def test_intervals_are_where_nothing_is_beyond():
     assert intervals(found, -3.0, 5.0, 0.0, 0) == [(-1.0, 1.0), (2.0, 5.0)]
     assert intervals(found, -3.0, 5.0, -2.0, 1) == []
     assert intervals(Crossings.of([(np.inf, 1.0, 2)]), -1.0, 1.0, 0.0, 0) == [(-1.0, 1.0)]
-    assert joined([(0.0, 1.0), (1.0, 2.0), (3.0, 4.0)]) == [(0.0, 2.0), (3.0, 4.0)]
+    assert join_neighbours([(0.0, 1.0), (1.0, 2.0), (3.0, 4.0)]) == [(0.0, 2.0), (3.0, 4.0)]
     far = Crossings.of([(10.0, 1.0, -2), (11.0, 1.0, 2)])
     assert intervals(far, 0.0, 12.0, 0.0, 2) == [(10.0, 11.0)]
 
@@ -111,7 +111,7 @@ def test_windows_are_those_of_routh_and_hurwitz(A, B, ends, crossings, windows, 
         return bool((np.roots(np.polyadd(A, gain / unit * np.array(B))).real < 0).all())
 
     wanted = [pytest.approx((unit * low, unit * high), rel=1e-15, abs=0) for low, high in windows]
-    assert confirmed(found, unit * ends[0], unit * ends[1], is_stable) == wanted
+    assert confirm_intervals(found, unit * ends[0], unit * ends[1], is_stable) == wanted
 
 
 def test_zeros_are_found_to_the_last_bit_each_in_its_own_bracket():
@@ -157,9 +157,9 @@ def test_a_window_is_found_where_the_counts_are_wrong():
     places = {-1.0: (1e-13, 2), 0.5: (1e-14, 2)} | dict.fromkeys((20.0, 30.0, 40.0, 50.0), (1e-13, -2))
     false = [(gain, *each) for gain, each in places.items()]
     for more in ([], false):
-        found = confirmed(Crossings.of(true + more), -math.inf, math.inf, lambda gain: -2 < gain < 3)
+        found = confirm_intervals(Crossings.of(true + more), -math.inf, math.inf, lambda gain: -2 < gain < 3)
         assert found == [(-2.0, 3.0)]
-    assert confirmed(Crossings.of(true + false), -math.inf, math.inf, lambda gain: False) == []
+    assert confirm_intervals(Crossings.of(true + false), -math.inf, math.inf, lambda gain: False) == []
 
 
 def of(h):
@@ -185,7 +185,7 @@ def found(grid, parts, with_dips=True):
 def test_two_zeros_in_one_dip_are_both_found(half, middle, sign):
     """A parabola with zeros at middle -+ half on a grid of whole numbers, which sees one sign alone."""
     grid, parts = np.arange(8.0), of(lambda x: sign * ((x - middle) ** 2 - half**2) / 20)
-    assert crossed(grid, parts)[0].size == 0
+    assert locate_crossings(grid, parts)[0].size == 0
     gain, at, change = found(grid, parts)
     np.testing.assert_allclose(at, [middle - half, middle + half], rtol=1e-13)
     np.testing.assert_allclose(gain, -1.0, rtol=1e-13)

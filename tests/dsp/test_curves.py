@@ -12,7 +12,7 @@ from tests.odd_arms import odd_arms
 from tfarm.arm import HubFeedback
 from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling, Simulator, Slew, scenario
-from tfarm.dsp.results import drawn
+from tfarm.dsp.results import simulate_for_picture
 from tfarm.dsp.traces import (
     LEAST_BETWEEN,
     MOST_LINE,
@@ -45,7 +45,7 @@ def test_a_fast_ringing_is_drawn_as_a_band_that_holds_the_curve():
 
 
 def test_the_slew_of_a_stiff_arm_is_not_aliased_and_its_file_has_the_curve():
-    run = drawn(Case(STEEL, default_gains(STEEL).having("K2", 0.0), Chain()), "slew", 3.0)
+    run = simulate_for_picture(Case(STEEL, default_gains(STEEL).having("K2", 0.0), Chain()), "slew", 3.0)
     records = run.between.t.size / run.t.size
     first = tfarm.modes(STEEL, 1).natural_frequency[-1] / (2 * np.pi)
     assert (records + 1) * 100 >= POINTS_A_PERIOD * first > 400  # 400 a second is what three records gave
@@ -61,7 +61,7 @@ def test_the_slew_of_a_stiff_arm_is_not_aliased_and_its_file_has_the_curve():
 def test_a_slew_under_any_law_is_resolved_too():
     """On the page of a law: 20 records in each period of the first mode, which rings at 368 Hz, or a band around it."""
     law = tfarm.Law({"hub_rate": ([40.0, 0.0], [1.0, 300.0]), "hub_angle": 100.0})
-    run = drawn(Case(STEEL, law, Chain()), "impulse", 0.1)
+    run = simulate_for_picture(Case(STEEL, law, Chain()), "impulse", 0.1)
     first = tfarm.modes(STEEL, 1).natural_frequency[-1] / (2 * np.pi)
     assert (run.between.t.size / run.t.size + 1) * 100 >= POINTS_A_PERIOD * first
     found, needed = points_a_period(STEEL, run)
@@ -74,7 +74,7 @@ def test_a_slew_under_any_law_is_resolved_too():
 
 def test_a_slow_arm_is_a_line_of_the_simulators_own_records():
     lab = tfarm.load("sasaki2012-lab")
-    run = drawn(Case(lab, default_gains(lab), Chain()), "slew", 3.0)
+    run = simulate_for_picture(Case(lab, default_gains(lab), Chain()), "slew", 3.0)
     curve = curve_of(run, "root_moment")
     assert not curve.is_band
     assert curve.t.size == run.t.size + run.between.t.size >= (LEAST_BETWEEN + 1) * 301

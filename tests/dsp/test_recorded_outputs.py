@@ -16,7 +16,7 @@ from tfarm.arm.chain import Slew
 from tfarm.case import Case
 from tfarm.dsp import Actuator, Chain, Sampling, Simulator, scenario
 from tfarm.dsp.plant import RECORDED
-from tfarm.dsp.scenarios import slew
+from tfarm.dsp.scenarios import slew_scenario
 from tfarm.dsp.traces import away
 from tfarm.errors import ParameterError
 from tfarm.exact.outputs import OUTPUTS
@@ -138,7 +138,7 @@ SLOW = 1e-3  # 1/s: the rig turns as one piece, and s^2 of its next term is beyo
 def test_the_feedforward_of_a_slew_turns_the_rig_against_its_friction(name):
     """Input over angle of the slowly turning exact rig is loss s + J s^2 + ..., and its gauge reads -J_g s^2."""
     arm = tfarm.load(name)
-    task = slew(arm, Chain(), 1.5)
+    task = slew_scenario(arm, Chain(), 1.5)
     forth, back = (1 / tfarm.transfer(arm, "hub_angle")(s) for s in (SLOW, -SLOW))
     loss, inertia = (forth - back) / (2 * SLOW), (forth + back) / (2 * SLOW**2)
     mean = np.r_[np.diff(task.hub_angle), 0.0] / task.period

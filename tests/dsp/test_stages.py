@@ -200,7 +200,7 @@ def test_the_page_in_javascript(stages):
     truth = vector(chain, data["modes"])
     task = truth.scenario
     ideal = [task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference, task.rigid_moment]
-    given = {"slew": data | {"ideal": live_loop.packed(np.stack(ideal, axis=1))}, "law": asdict(LAW)}
+    given = {"slew": data | {"ideal": live_loop.pack_doubles(np.stack(ideal, axis=1))}, "law": asdict(LAW)}
     scripts = [TEMPLATES / name for name in ("live_loop.js", "live_sampled.js")]
     found = json.loads(run(needed("node"), "-e", NODE, *scripts, input=json.dumps(given).encode()))
     seen = truth.at_samples

@@ -35,7 +35,7 @@ def test_forty_digits_are_those_of_the_balls(case):
     x = float(rng.uniform(0.05, 0.95)) * arm.link.length
     k, compared = system_of(arm), 0
     for name, output in OF_ONE_LINK.items():
-        value = appendix.response(arm, name, s, 40, x=x)
+        value = appendix.output_value(arm, name, s, 40, x=x)
         if value == 0:
             assert output.place == "tip"
             continue
@@ -65,7 +65,7 @@ def test_as_many_digits_as_requested(digits):
     arm = tfarm.load("sasaki2012-lab")
     for name in ("hub_angle", "tip_deflection", "root_moment"):
         for s in (0.3 + 57.1j, 1e-6j, 1e6j, 1e-3 + 1e5j):
-            value, better = (appendix.response(arm, name, s, n) for n in (digits, 2 * digits + 20))
+            value, better = (appendix.output_value(arm, name, s, n) for n in (digits, 2 * digits + 20))
             with mpmath.workdps(2 * digits + 20):
                 for part, right in ((value.real, better.real), (value.imag, better.imag)):
                     assert abs(part - right) <= abs(right) * mpmath.mpf(10) ** -digits
@@ -73,9 +73,9 @@ def test_as_many_digits_as_requested(digits):
 
 def test_a_part_that_vanishes_by_symmetry_is_zero():
     arm = tfarm.load("sasaki2012")
-    assert appendix.response(arm, "hub_angle", 40j, 20).imag == 0
-    assert appendix.response(arm, "hub_rate", 40j, 20).real == 0
-    assert appendix.response(arm, "hub_rate", 40 + 0j, 20).imag == 0
+    assert appendix.output_value(arm, "hub_angle", 40j, 20).imag == 0
+    assert appendix.output_value(arm, "hub_rate", 40j, 20).real == 0
+    assert appendix.output_value(arm, "hub_rate", 40 + 0j, 20).imag == 0
 
 
 def powers_of_two(*, damping=0.0, hub=0.25, mass=0.5, inertia=0.125):
@@ -97,7 +97,7 @@ def test_where_two_waves_coincide_to_the_last_bit(name, s):
     wanted = (ALONG[name], mpmath.mpf(x)) if output.place == "x" else name
     expected = response(arm, s, [wanted], 30)[wanted]
     with mpmath.workdps(30):
-        assert abs(appendix.response(arm, name, s, 25, x=x) / expected - 1) < mpmath.mpf(10) ** -25
+        assert abs(appendix.output_value(arm, name, s, 25, x=x) / expected - 1) < mpmath.mpf(10) ** -25
     G = tfarm.transfer(arm, name, x=x if output.place == "x" else None)
     slope = abs(s * G.derivative(s) / complex(expected))
     assert abs(G(s) / complex(expected) - 1) <= 90 * EPS * (1 + slope)
@@ -132,10 +132,10 @@ def test_at_s_0_the_limit_or_an_error(name):
     arm = powers_of_two()
     if name == "root_moment":
         limit = -(arm.total_inertia - arm.hub.inertia) / arm.total_inertia
-        assert float(appendix.response(arm, name, 0j, 15).real) == pytest.approx(limit, rel=2 * EPS, abs=0)
+        assert float(appendix.output_value(arm, name, 0j, 15).real) == pytest.approx(limit, rel=2 * EPS, abs=0)
     else:
         with pytest.raises(ConvergenceError, match=r"no 15 digits of .* a pole"):
-            appendix.response(arm, name, 0j, 15)
+            appendix.output_value(arm, name, 0j, 15)
 
 
 def test_what_has_no_value_is_refused():
@@ -143,12 +143,18 @@ def test_what_has_no_value_is_refused():
         appendix.determinant(powers_of_two(), 3 * 2.0**16 * 1j, 15)
     for x in (None, -0.1, 1.1, math.nan):
         with pytest.raises(ParameterError, match=r"x = .*: a point of the arm lies between 0 and 1.0 m"):
-            appendix.response(powers_of_two(), "moment", 5j, 15, x=x)
+            appendix.output_value(powers_of_two(), "moment", 5j, 15, x=x)
 
 
 def test_what_the_ends_hold_is_zero():
     arm = powers_of_two(mass=0.0, inertia=0.0)
     held = powers_of_two(mass=math.inf)
-    assert appendix.response(arm, "moment", 5j, 15, x=1.0) == appendix.response(arm, "shear", 5j, 15, x=1.0) == 0
-    assert appendix.response(held, "tip_displacement", 5j, 15) == 0
-    assert appendix.response(arm, "deflection", 5j, 15, x=0.0) == appendix.response(arm, "rotation", 5j, 15, x=0.0) == 0
+    assert (
+        appendix.output_value(arm, "moment", 5j, 15, x=1.0) == appendix.output_value(arm, "shear", 5j, 15, x=1.0) == 0
+    )
+    assert appendix.output_value(held, "tip_displacement", 5j, 15) == 0
+    assert (
+        appendix.output_value(arm, "deflection", 5j, 15, x=0.0)
+        == appendix.output_value(arm, "rotation", 5j, 15, x=0.0)
+        == 0
+    )

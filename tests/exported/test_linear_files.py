@@ -26,7 +26,7 @@ from tfarm.arm.law_tables import law_of_table
 from tfarm.case import Case
 from tfarm.dsp import Actuator, Chain
 from tfarm.exported.result import ExportTask
-from tfarm.exported.systems import linear, plain, save_mat
+from tfarm.exported.systems import linear, save_mat, without_dots
 from tfarm.reduced import reduce
 from tfarm.response.signals import Signals
 
@@ -130,7 +130,11 @@ def test_a_script_builds_the_systems_of_its_task(folder):
         own = systems_of(what)
         assert found.keys() == own.keys()
         for name, (inputs, outputs, period, *matrices) in found.items():
-            assert (inputs, outputs, period) == (plain(own[name].inputs), plain(own[name].outputs), own[name].period)
+            assert (inputs, outputs, period) == (
+                without_dots(own[name].inputs),
+                without_dots(own[name].outputs),
+                own[name].period,
+            )
             assert [each.tolist() for each in own[name].matrices] == matrices
     (stated,) = re.findall(r"worst .* (\S+) from 0.1 to 1000 rad/s", (folder / "loop.py").read_text())
     assert stated == f"{own['reduced'].facts['worst_error']:.3g}"

@@ -12,7 +12,7 @@ from tests.hostile import C_TEXTS, NAME
 from tests.shared import thinned
 from tfarm.exported.controller import c_controller
 from tfarm.exported.result import write_into
-from tfarm.exported.systems import listed, plain
+from tfarm.exported.systems import list_literal, without_dots
 from tfarm.exported.texts import LONGEST_IDENTIFIER, comment, identifiers, matlab_text
 
 KEYWORDS = ("int", "restrict", "class", "end", "lambda", "function", "_Bool", "None", "while")
@@ -40,7 +40,7 @@ def test_a_comment_is_one_line_that_ends_nothing(words):
 
 @pytest.mark.parametrize("words", C_TEXTS)
 def test_literals_are_read_back(words):
-    assert ast.literal_eval(listed([words])) == plain([words])
+    assert ast.literal_eval(list_literal([words])) == without_dots([words])
     quoted = matlab_text(words)
     assert quoted[0] == quoted[-1] == "'"
     assert "\n" not in quoted

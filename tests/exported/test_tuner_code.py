@@ -49,7 +49,7 @@ def tuner_of(seed, **changed):
 
 def numbers_of(real):
     """Constants of exp and log in a precision."""
-    return functions.numbers_of(tuner_of(0), real)
+    return functions.constants_of_tuner(tuner_of(0), real)
 
 
 # ------------------------------------------------------------ exp

@@ -19,10 +19,10 @@ from tfarm.exported.word_length import (
     BALANCED,
     SECTIONS,
     absolute_sum,
-    around,
     candidates,
+    close_around_law,
     gramians,
-    observed,
+    observable_part,
     similar,
     with_system_matrix,
 )
@@ -60,7 +60,7 @@ def test_noise_gains_are_those_of_lyapunov_equations():
     given, loop = exact_loop(SERVO)
     for gain, S in candidates(given, loop):
         law = with_system_matrix(given, S)
-        of = around(law, loop)
+        of = close_around_law(law, loop)
         K = solve_discrete_lyapunov(of.matrix, of.of_signals @ of.of_signals.T)
         W = solve_discrete_lyapunov(of.matrix.T, np.outer(of.output, of.output))
         k, w, variance = np.diag(K)[of.states], np.diag(W)[of.states], of.output @ K @ of.output
@@ -133,11 +133,11 @@ def test_a_limit_cycle_in_fixed_point_stays_within_its_bound(law, bits):
 
 def test_a_pole_that_no_output_shows_is_left_out():
     M, left = np.array([[1.0, 0.3], [0.0, 0.5]]), np.array([[0.0, 1.0]])
-    kept = observed(M, left)
+    kept = observable_part(M, left)
     assert max(abs(np.linalg.eigvals(kept))) == pytest.approx(0.5)
     for k in range(6):
         assert left @ np.linalg.matrix_power(kept, k + 1) == pytest.approx(left @ np.linalg.matrix_power(M, k + 1))
-    assert (observed(M, np.eye(2)) == M).all()
+    assert (observable_part(M, np.eye(2)) == M).all()
 
 
 def test_an_integral_can_overflow_and_a_servo_cannot():

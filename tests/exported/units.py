@@ -74,7 +74,7 @@ int main(void) {
 @contextmanager
 def modes_of_units(count):
     """Units of a number of flexible modes, in place of those that the simulation of a slew takes seconds to choose."""
-    with mock.patch.object(fmu, "simulated", return_value=(None, SimpleNamespace(modes=count))):
+    with mock.patch.object(fmu, "simulate_modes", return_value=(None, SimpleNamespace(modes=count))):
         yield
 
 

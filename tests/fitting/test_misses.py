@@ -16,7 +16,7 @@ from tfarm.errors import ConvergenceError
 from tfarm.fitting.data import Measured, noise_of
 from tfarm.fitting.fit import arms_drawn, fit
 from tfarm.fitting.misses import misses_of
-from tfarm.fitting.model import Problem, Response
+from tfarm.fitting.model import FitResponse, Problem
 from tfarm.fitting.solve import Solution
 from tfarm.report.page import ArmReport
 from tfarm.report.response_sections import fit_section
@@ -35,7 +35,7 @@ class Given(Problem):
 def missed(ratio):
     """The misses of a curve with these ratios computed/measured at `LINES`, of a response with unknown noise."""
     data = Measured(output="hub_rate", input="hub_torque", omega=LINES, values=1.0 / (1 + 1j * LINES / 50))
-    problem = Given(None, (), (Response(data, noise_of(data)),))
+    problem = Given(None, (), (FitResponse(data, noise_of(data)),))
     nothing = np.zeros(0)
     return misses_of(Solution(problem, data.values * ratio, nothing, nothing, True, 1))
 

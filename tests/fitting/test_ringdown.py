@@ -18,7 +18,7 @@ import tfarm
 from tests.shared import refusal
 from tests.shell import answer, run
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.fitting.decays import ring, whiteness
+from tfarm.fitting.decays import fit_ringdown, whiteness
 from tfarm.fitting.model import mode_of
 from tfarm.fitting.recording import Recording, read_recording
 
@@ -37,7 +37,7 @@ def decay(t, w, zeta, amplitude=1.0, phase=0.0):
 def test_two_modes_and_an_offset_without_noise_come_back_to_rounding():
     """At the condition of two modes an octave apart, some 1e3, times epsilon; that of most energy is first."""
     y = 3.0 + decay(t, 20.0, 0.02, 0.3, 1.0) + decay(t, 41.0, 0.05, 1.0, -0.5)
-    found = ring(recorded(y), "y", modes=2)
+    found = fit_ringdown(recorded(y), "y", modes=2)
     rows = [(2 * np.pi * row.natural_frequency, row.damping_ratio, row.amplitude) for row in found.modes]
     assert rows[0] == pytest.approx((41.0, 0.05, 1.0), rel=1e-9)
     assert rows[1] == pytest.approx((20.0, 0.02, 0.3), rel=1e-9)
@@ -46,7 +46,7 @@ def test_two_modes_and_an_offset_without_noise_come_back_to_rounding():
 
 @pytest.mark.parametrize(("scale", "w"), [(1e-3, 20.0), (1e3, 20.0), (1.0, 3.0)])  # the last: 0.7 of a turn
 def test_neither_the_unit_of_a_signal_nor_a_short_record_changes_the_pole(scale, w):
-    (row,) = ring(recorded(scale * decay(t, w, 0.02)), "y").modes
+    (row,) = fit_ringdown(recorded(scale * decay(t, w, 0.02)), "y").modes
     assert (2 * np.pi * row.natural_frequency, row.damping_ratio) == pytest.approx((w, 0.02), rel=1e-7)
     assert row.amplitude == pytest.approx(scale, rel=1e-7)
 
@@ -55,7 +55,9 @@ def test_a_decay_is_found_in_part_of_a_record_and_far_oversampled():
     """Of 300 samples a turn, where neighbours are all but the same, and without its first half second."""
     fast = 1e-3 * np.arange(4000)
     y = np.where(fast < 0.5, 7.0, decay(fast, 20.0, 0.01)) + 1e-3 * np.random.default_rng(1).standard_normal(4000)
-    found = ring(Recording(signals={"y": y}, start=0.0, period=1e-3, jitter=0.0, source="", digest=""), "y", start=0.5)
+    found = fit_ringdown(
+        Recording(signals={"y": y}, start=0.0, period=1e-3, jitter=0.0, source="", digest=""), "y", start=0.5
+    )
     assert (found.start, found.samples) == (0.5, 3500)
     assert 2 * np.pi * found.modes[0].natural_frequency == pytest.approx(20.0, rel=1e-4)
 
@@ -73,7 +75,7 @@ def cases(count, seed, colour=0.0):
             e = lfilter([1.0], [1.0, -2 * colour * np.cos(w * T), colour**2], rng.standard_normal(5 * t.size))
             e = e[-t.size :] / e[-t.size :].std()
         y = 0.3 + decay(t, w, zeta, 1.0, rng.uniform(0, 2 * np.pi)) + rng.uniform(0.01, 0.1) * e
-        yield w, zeta, ring(recorded(y), "y")
+        yield w, zeta, fit_ringdown(recorded(y), "y")
 
 
 def covered(found):
@@ -107,17 +109,17 @@ def test_noise_that_rings_with_the_decay_is_noted_and_widens_the_intervals():
 
 def test_a_mode_left_out_and_a_frequency_that_drifts_are_noted():
     noise = 1e-3 * np.random.default_rng(3).standard_normal(t.size)
-    two = ring(recorded(decay(t, 20.0, 0.02) + decay(t, 61.0, 0.02, 0.1) + noise), "y")
+    two = fit_ringdown(recorded(decay(t, 20.0, 0.02) + decay(t, 61.0, 0.02, 0.1) + noise), "y")
     assert not two.is_white
     chirp = np.exp(-0.4 * t) * np.cos(20.0 * t + 0.5 * t**2) + noise
-    notes = ring(recorded(chirp), "y").notes
+    notes = fit_ringdown(recorded(chirp), "y").notes
     assert any("mode 1 rings at" in note and "friction" in note for note in notes)
 
 
 def test_a_half_that_does_not_determine_a_frequency_has_none():
     """By the middle of the record a decay of 8 1/s is below the noise; one of 0.4 1/s is seen in both halves."""
     noise = 0.01 * np.random.default_rng(7).standard_normal(t.size)
-    brief, long = (ring(recorded(decay(t, 40.0, zeta) + noise), "y").modes[0] for zeta in (0.2, 0.01))
+    brief, long = (fit_ringdown(recorded(decay(t, 40.0, zeta) + noise), "y").modes[0] for zeta in (0.2, 0.01))
     assert (brief.first_half, brief.second_half) == (None, None)
     assert (long.first_half, long.second_half) == pytest.approx((long.frequency,) * 2, rel=2e-3)
 
@@ -140,7 +142,7 @@ def test_white_noise_is_white_with_the_probability_computed():
     ],
 )
 def test_a_signal_without_decay_is_refused(y, options, error, message):
-    assert message in str(refusal(ring, recorded(y), kind=error, **{"name": "y"} | options))
+    assert message in str(refusal(fit_ringdown, recorded(y), kind=error, **{"name": "y"} | options))
 
 
 DATA = Path(__file__).parent.parent / "data" / "quanser-2dsfl"

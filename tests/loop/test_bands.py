@@ -13,7 +13,7 @@ from tfarm.arm import FED_BACK, HubFeedback, Law
 from tfarm.case import Case
 from tfarm.dsp import Chain, Converters, Sampling
 from tfarm.loop import circle as circle_module
-from tfarm.loop.circle import Arcs, Circle, Discs, complete_band, product
+from tfarm.loop.circle import Arcs, Circle, Discs, complete_band, root_ratio
 from tfarm.loop.circle_crossings import FACTOR
 from tfarm.loop.edges import delay_limit, whole_loop
 from tfarm.loop.sampled import sampled_loop
@@ -85,7 +85,7 @@ def test_a_disc_holds_every_value_on_its_arc_and_is_no_larger_than_its_terms(nam
     roots = np.array(ROOTS[name], dtype=complex)
     angles = np.array([0.0, 1e-4, 0.7, 2.0, math.pi])
     radius = np.full(angles.size, 2 * math.sin(half / 2))
-    found = product(Discs(-np.expm1(-1j * angles), radius), roots)
+    found = root_ratio(Discs(-np.expm1(-1j * angles), radius), roots)
     away = np.zeros(angles.size)
     with mpmath.workdps(40):
         for n, angle in enumerate(angles.tolist()):

@@ -20,12 +20,12 @@ from tfarm import ConvergenceError, HubFeedback, Law, ParameterError
 from tfarm.case import Case
 from tfarm.loop.lines import through_infinity, with_numbers
 from tfarm.loop.nyquist import nyquist_of
-from tfarm.loop.plane import between, plane
+from tfarm.loop.plane import cell_middles, plane
 from tfarm.loop.poles import poles_below
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import Spill
-from tfarm.loop.theorem import absorbed, definite, is_hurwitz, on_axis, polynomial, signs_of
-from tfarm.reduced.modal import closed, sensed_model
+from tfarm.loop.theorem import cancel_hub_moment, definite, exact_polynomial, is_hurwitz, on_axis, signs_of
+from tfarm.reduced.modal import closed_loop_matrix, sensed_model
 from tfarm.response.signals import Signals
 
 LAB, BARE, RIG = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "quanser-2dsfl"))
@@ -136,7 +136,7 @@ def test_signs_of_polynomials_are_those_of_their_roots():
     rng = np.random.default_rng(7)
     for _ in range(60):
         roots = rng.integers(-5, 6, size=rng.integers(1, 6)).tolist()
-        poly = polynomial(np.poly(roots).round().tolist())
+        poly = exact_polynomial(np.poly(roots).round().tolist())
         odd = any(roots.count(r) % 2 for r in roots if r > 0)
         assert definite(poly) == ("" if odd else "not below" if max(roots) > 0 else "above"), roots
         assert is_hurwitz(poly) == (max(roots) < 0)
@@ -144,7 +144,7 @@ def test_signs_of_polynomials_are_those_of_their_roots():
         c = rng.integers(-9, 10, size=rng.integers(2, 8)).tolist()
         roots = np.roots(c)
         if c[0] and abs(roots.real).min(initial=1.0) > 1e-6:
-            assert is_hurwitz(polynomial(c)) == bool((roots.real < 0).all()), c
+            assert is_hurwitz(exact_polynomial(c)) == bool((roots.real < 0).all()), c
 
 
 @pytest.mark.parametrize(
@@ -216,7 +216,7 @@ def test_models_of_a_strongly_damped_arm_have_no_poles_of_higher_modes(C, most):
     found = tfarm.spill(arm, law, most)
     for number in (1, 2, 4, 7):
         A, B, C, D = sensed_model(arm, law.signals, number)
-        poles = np.linalg.eigvals(closed((A, B, C, 0 * D), law.matrices()))
+        poles = np.linalg.eigvals(closed_loop_matrix((A, B, C, 0 * D), law.matrices()))
         poles = poles[abs(poles) > 1e-6]
         assert found.unstable[number - 1] == (poles.real > 0).sum()
         assert found.rightmost[number - 1].real == pytest.approx(poles.real.max(), rel=1e-8)
@@ -295,7 +295,7 @@ def test_parts_on_the_axis_are_those_of_the_quotient_there():
     rng = np.random.default_rng(12)
     for _ in range(6):
         num, den = rng.uniform(-2, 2, rng.integers(1, 5)), rng.uniform(-2, 2, rng.integers(2, 6))
-        real, imaginary = on_axis(polynomial(num), polynomial(den))
+        real, imaginary = on_axis(exact_polynomial(num), exact_polynomial(den))
         for w in (0.3, 1.7):
             whole = np.polyval(num, 1j * w) * np.conj(np.polyval(den, 1j * w))
             assert float(real.eval(w * w)) == pytest.approx(whole.real, rel=1e-12, abs=1e-13)
@@ -330,7 +330,7 @@ LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], 
 )
 @pytest.mark.parametrize("points", sized(2, 4))
 def test_counts_are_those_of_full_searches(vary, x, y, points):
-    found = plane(loop_of(LAB, LAW), vary, between(*x, 8), between(*y, 10))
+    found = plane(loop_of(LAB, LAW), vary, cell_middles(*x, 8), cell_middles(*y, 10))
     assert len(np.unique(found.unstable)) > 2
     for i, j in np.random.default_rng(1).integers((8, 10), size=(points, 2)):
         law = with_numbers(LAW, dict(zip(vary, (found.x[i], found.y[j]), strict=True)))
@@ -435,7 +435,7 @@ def test_a_wrong_argument_is_refused_with_the_form_to_give(call, words):
 
 def test_the_moment_that_a_static_law_cancels_is_its_gain_over_its_denominator():
     """A half over two is a quarter, and the rest of the law stays."""
-    share, rest = absorbed(loop_of(BARE, Law({"hub_rate": 0.3, "root_moment": ([0.5], [2.0])})))
+    share, rest = cancel_hub_moment(loop_of(BARE, Law({"hub_rate": 0.3, "root_moment": ([0.5], [2.0])})))
     assert share == pytest.approx(0.25, rel=1e-15)
     assert "root_moment" not in rest.signals
     assert rest.gains.K1 == 0.3

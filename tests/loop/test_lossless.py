@@ -17,7 +17,7 @@ from tests.rigs import some_rig
 from tests.shared import refusal, thinned
 from tfarm import Hub, HubFeedback, Payload
 from tfarm.arm import Gauge, Motor
-from tfarm.loop.continuous import band_of
+from tfarm.loop.continuous import frequency_above_mode
 from tfarm.loop.lines import line_crossings
 from tfarm.loop.margins import margins
 from tfarm.loop.nyquist import nyquist_of
@@ -50,7 +50,7 @@ RIGS |= {f"seed {seed}": lossless_rig(seed) for seed in (4, 6)}
 def edges_of(arm):
     """Gains and frequencies of the edges along K2 in the band of twelve modes, by frequency."""
     loop = loop_of(arm, HubFeedback(K1=default_gains(arm).K1))
-    found = line_crossings(loop, "K2", -50.0, 50.0, band_of(arm, 12))
+    found = line_crossings(loop, "K2", -50.0, 50.0, frequency_above_mode(arm, 12))
     kept = (found.at > 0) & (abs(found.gain) < 1e6)
     order = np.argsort(found.at[kept])
     return found.gain[kept][order], found.at[kept][order]

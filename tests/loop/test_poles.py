@@ -15,9 +15,9 @@ from tests.shared import refusal, thinned
 from tests.spectrum.independent import newton_step
 from tfarm import Hub, HubFeedback, Law
 from tfarm.errors import ConvergenceError
-from tfarm.loop.continuous import band_of
+from tfarm.loop.continuous import frequency_above_mode
 from tfarm.loop.locus import BranchCrossing, Locus
-from tfarm.loop.nyquist import compressed
+from tfarm.loop.nyquist import compress_radius
 from tfarm.loop.panels import CHEBYSHEV, Positions, loop_panels, positions, sensed_places
 from tfarm.loop.plane import Axis, moment_axis, rate_axis, stable_edge
 from tfarm.loop.poles import Poles, closed_loop_poles, count_with_mirrors, first_poles, poles_below, starting_points
@@ -254,7 +254,7 @@ WIDE = some_rig(np.random.default_rng(53))  # polynomials miss the second panel,
 @pytest.mark.parametrize(("arm", "modes"), [(LAB, 5), (BARE, 5), (WIDE, 12)], ids=["lab", "paper", "halved twice"])
 def test_between_its_samples_a_panel_is_the_loop_function_too(arm, modes, monkeypatch):
     """By SciPy's interpolation through them; from 0 to the band without a gap, the first panel on both sides of 0."""
-    band, law = band_of(arm, modes), HubFeedback(K1=0.3, K2=-0.7, Kp=2.0)
+    band, law = frequency_above_mode(arm, modes), HubFeedback(K1=0.3, K2=-0.7, Kp=2.0)
     found = loop_panels(arm, band)
     assert (found.low[0], found.high[-1]) == (-found.high[0], band)
     np.testing.assert_array_equal(found.low[1:], found.high[:-1])
@@ -304,10 +304,10 @@ def test_resonators_in_one_fraction_are_passed_as_they_are_in_several():
 def test_the_plane_is_drawn_in_a_disc():
     """r at r/(1 + r), its direction kept: back again r/(1 - r); what is infinite at 1."""
     L = np.array([0.0, 0.3 - 0.4j, -1.0, 7j, -1e8 + 1e8j])
-    drawn = compressed(L)
+    drawn = compress_radius(L)
     assert (abs(drawn) < 1).all()
     np.testing.assert_allclose(drawn / (1 - abs(drawn)), L, rtol=1e-7)
-    assert compressed(np.array([complex(np.inf, 3.0)])).tolist() == [1.0]
+    assert compress_radius(np.array([complex(np.inf, 3.0)])).tolist() == [1.0]
 
 
 @pytest.mark.parametrize("C", [2e-4, 0.01, 0.1, pytest.param(1e-4, marks=pytest.mark.survey)])

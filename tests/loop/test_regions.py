@@ -13,7 +13,7 @@ from tests.loop.ritz_loop import RitzLoop
 from tests.loop.test_lossless import RIGS
 from tests.shared import refusal, thinned
 from tfarm import HubFeedback
-from tfarm.loop.plane import INFINITE, LINEAR_SCALE, Axis, between, edge, gain_map, ranges_of, static_edges
+from tfarm.loop.plane import INFINITE, LINEAR_SCALE, Axis, cell_middles, edge, gain_map, ranges_of, static_edges
 from tfarm.loop.poles import poles_below
 from tfarm.schema import to_dict
 from tfarm.spectrum.gains import default_gains
@@ -33,7 +33,7 @@ def of_model(arm, terms):
 
 @pytest.mark.parametrize("Kp", thinned([0.0, 3.0, -0.5], 2))
 def test_counts_of_the_lab_arm_are_those_of_an_independent_model(Kp) -> None:
-    K1, K2 = between(-1, 3, 5), between(-2, 2.5, 6)
+    K1, K2 = cell_middles(-1, 3, 5), cell_middles(-2, 2.5, 6)
     found = gain_map(LAB, K1, K2, Kp)
     low = counts_by(lambda law: poles_below(loop_of(LAB, law), found.band).unstable, K1, K2, Kp)
     np.testing.assert_array_equal(found.unstable, low)
@@ -43,7 +43,7 @@ def test_counts_of_the_lab_arm_are_those_of_an_independent_model(Kp) -> None:
 @pytest.mark.parametrize(("Kp", "K2"), [(0.0, (-2, 3)), (-30.0, (-2, 3)), (0.0, (1.2, 1.4)), (-30.0, (1.2, 1.4))])
 def test_counts_of_a_held_arm_step_where_its_stiffness_vanishes(Kp, K2) -> None:
     """At K1 < 0 the real pole goes the other way there than at K1 > 0; the range may begin beyond that step."""
-    K1, K2 = between(-6, 6, 5), between(*K2, 9)
+    K1, K2 = cell_middles(-6, 6, 5), cell_middles(*K2, 9)
     counts = counts_by(of_model(held(1e-3), 10), K1, K2, Kp)
     np.testing.assert_array_equal(gain_map(held(1e-3), K1, K2, Kp).unstable, counts)
 
@@ -66,7 +66,7 @@ NO_DAMPING = [(BARE, -2.0), (held(0.0), -30.0), (BARE, 0.0), (held(0.0), 5.0), (
 @pytest.mark.parametrize(("arm", "Kp"), thinned(NO_DAMPING, 3))
 def test_at_no_damping_finite_counts_are_those_of_a_verdict_at_each_point(arm, Kp) -> None:
     """On the lines K1 = 0 and K2 = 1 too, where every pole may lie on the axis and none be unstable."""
-    K1, K2 = np.sort(np.r_[between(-5, 5, 4), 0.0]), np.sort(np.r_[between(-2, 5, 5), 1.0])
+    K1, K2 = np.sort(np.r_[cell_middles(-5, 5, 4), 0.0]), np.sort(np.r_[cell_middles(-2, 5, 5), 1.0])
     found = gain_map(arm, K1, K2, Kp)
     for (j, i), count in np.ndenumerate(found.unstable):
         there = verdict_of(arm, HubFeedback(K1=float(K1[i]), K2=float(K2[j]), Kp=Kp))
@@ -80,10 +80,10 @@ def test_at_no_damping_finite_counts_are_those_of_a_verdict_at_each_point(arm, K
 def test_the_middle_of_a_range_around_0_is_0_and_not_next_to_it() -> None:
     """There at C = 0 nothing is stable, a rounding above it everything is."""
     for low, high, number in ((-1.0, 3.0, 6), (-0.7, 2.1, 6), (-0.1, 0.7, 12), (-6.3, 6.3, 5)):
-        gains = between(low, high, number)
+        gains = cell_middles(low, high, number)
         assert np.diff(gains) == pytest.approx((high - low) / number, rel=1e-12)
         assert abs(gains[gains != 0]).min() > 0.01 * (high - low) / number
-    columns = between(-2.1, 0.7, 6)
+    columns = cell_middles(-2.1, 0.7, 6)
     assert columns[4] == 0
     assert gain_map(BARE, columns, np.array([0.0, 0.5])).stable.tolist() == 2 * [[False] * 5 + [True]]
 

@@ -16,7 +16,7 @@ from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling
-from tfarm.loop.continuous import band_of
+from tfarm.loop.continuous import frequency_above_mode
 from tfarm.loop.plane import INFINITE, gain_map
 from tfarm.loop.poles import closed_loop_poles, poles_below
 from tfarm.loop.sampled_verdict import sampled_verdict
@@ -122,7 +122,7 @@ def test_more_than_the_whole_moment_drives_every_mode_behind_friction(K2):
     driven = K2 > 1
     assert verdict.unstable_roots_infinite == driven
     assert verdict.is_known_beyond
-    heights = [band_of(arm, number) for number in (4, 8)]
+    heights = [frequency_above_mode(arm, number) for number in (4, 8)]
     low, high = (poles_below(loop_of(arm, law), height).unstable for height in heights)
     assert high - low == 8 * driven
     plane = gain_map(

@@ -15,7 +15,7 @@ from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling
-from tfarm.dsp.discretise import discretised
+from tfarm.dsp.discretise import discretise_law
 from tfarm.loop.circle import complete_band
 from tfarm.loop.circle_crossings import FACTOR, stable_windows
 from tfarm.loop.edges import damping_limit, whole_loop
@@ -36,7 +36,7 @@ LAWS = {
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_poles_are_those_of_a_model_stepped_by_matrix_exponentials(law):
     loop = sampled_loop(Case(BARE, law, Chain(sampling=Sampling(delay_samples=1.25))), count=12)
-    M = stepped(BARE, discretised(law, T), loop.chain, 12)
+    M = stepped(BARE, discretise_law(law, T), loop.chain, 12)
     mine, theirs = np.sort_complex(loop.poles.z), np.sort_complex(np.linalg.eigvals(M))
     mine, theirs = (z[abs(z) > 0.3] for z in (mine, theirs))
     assert mine.size == theirs.size - loop.has_free_angle
@@ -164,7 +164,7 @@ BLOCKS = {
 @pytest.mark.parametrize(("rule", "warp"), [("tustin", 0.0), ("tustin", 25.0), ("zoh", 0.0), ("matched", 0.0)])
 def test_the_rules_are_those_of_python_control(name, rule, warp):
     law, continuous = Law({"hub_rate": BLOCKS[name]}, rule=rule, prewarp=warp), control.tf(*BLOCKS[name])
-    values = discretised(law, T).values
+    values = discretise_law(law, T).values
     if rule == "matched" and name in ("integrator", "washout"):  # python-control matches 0 or inf at rest
         assert values(np.exp([1e-6j]))[0, 0] == pytest.approx(complex(continuous(1e-6j / T)), rel=1e-5)
         return
@@ -181,7 +181,7 @@ def test_the_rules_are_those_of_python_control(name, rule, warp):
 def test_tustins_rule_keeps_a_zero_at_two_over_the_period(num, zero):
     """Which is at z = infinity; next to it the coefficients are no difference of rounded numbers."""
     law = Law({"hub_rate": (np.polymul(num, [1.0, -zero]).tolist(), [1.0, 200.0])})
-    block, z = discretised(law, T).parts[0].block, np.exp(1j * np.array([0.1, 1.0, 3.0]))
+    block, z = discretise_law(law, T).parts[0].block, np.exp(1j * np.array([0.1, 1.0, 3.0]))
     s = 2 / T * (z - 1) / (z + 1)
     A, B, C, D = block.matrices()
     found = [(C @ np.linalg.solve(each * np.eye(len(A)) - A, B) + D)[0, 0] for each in z]
@@ -195,11 +195,11 @@ def test_tustins_rule_keeps_a_zero_at_two_over_the_period(num, zero):
 def test_a_pole_where_tustins_rule_has_none_is_refused():
     for num in ([1.0], [1.0, 2.0, 3.0]):
         with pytest.raises(ParameterError, match="a pole at 200 1/s"):
-            discretised(Law({"hub_rate": (num, [1.0, -200.0])}), T)
+            discretise_law(Law({"hub_rate": (num, [1.0, -200.0])}), T)
 
 
 def test_tustins_derivative_is_the_trapezoidal_rule_backwards():
-    law = discretised(Law({"hub_angle": ([1.0, 0.0], [1.0])}), T)
+    law = discretise_law(Law({"hub_angle": ([1.0, 0.0], [1.0])}), T)
     z = np.exp(1j * np.array([0.3, 2.0]))
     np.testing.assert_allclose(law.values(z)[0], 2 / T * (z - 1) / (z + 1), rtol=1e-13)
 

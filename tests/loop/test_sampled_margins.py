@@ -20,7 +20,7 @@ from tfarm.arm import as_law
 from tfarm.case import Case
 from tfarm.dsp import Chain, Converters, Sampling
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.loop.circle_crossings import ENDS_AT, around, ends_of_K1, sampled_map, stable_windows
+from tfarm.loop.circle_crossings import ENDS_AT, ends_of_K1, interval_around, sampled_map, stable_windows
 from tfarm.loop.edges import DelayMargin, Figure, delay_margin, required_damping
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_verdict import Analysis, Verdict, sampled_verdict
@@ -41,7 +41,7 @@ def test_a_static_crossing_torn_by_rounding_hides_no_window(period):
     """A pinned tip, where a pole meets z = 1 at K2 = 1: the window below it is there, by the poles on its two sides."""
     arm = odd_arms()["pinned"]
     loop = sampled_loop(Case(arm, HubFeedback(K1=0.0374, K2=0.3), Chain(sampling=Sampling(period=period))), count=8)
-    low, high = around(stable_windows(loop, "K2"), 0.3)
+    low, high = interval_around(stable_windows(loop, "K2"), 0.3)
     assert high == pytest.approx(1.0, rel=1e-9)
     assert stable_at(loop, "K2", (low - 1e-6, low + 1e-6, 0.999, 1.001)) == [False, True, True, False]
 

@@ -23,7 +23,7 @@ from tfarm.exact.characteristic import Analytic
 from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.loop.stability import band_of_loop, hub_shares, is_controllable, is_quiet
 from tfarm.loop.theorem import lyapunov
-from tfarm.spectrum.box import turned
+from tfarm.spectrum.box import argument_change
 
 LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
 
@@ -157,8 +157,8 @@ def test_a_turn_that_is_no_number_is_refused() -> None:
 
     path = 1j * np.linspace(0.0, 4.0, 50)
     with pytest.raises(ConvergenceError, match="a zero lies on the contour"):
-        turned(unknown, path, 4.0)
-    assert abs(turned(unknown, path[path.imag < 1.4], 4.0)) < 1.0
+        argument_change(unknown, path, 4.0)
+    assert abs(argument_change(unknown, path[path.imag < 1.4], 4.0)) < 1.0
 
 
 SPRING = 3.0  # N m/rad

@@ -10,7 +10,7 @@ import pytest
 import tfarm
 from tests.loop.arms import loop_of
 from tests.shared import thinned
-from tfarm.exact.appendix import response as appendix_response
+from tfarm.exact.appendix import output_value as appendix_response
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.loop.time_response import ACTUATOR, Excitation, time_response, usual_poles
 from tfarm.reduced.modal import modal_model, sensed_model

@@ -24,7 +24,7 @@ from tfarm.dsp import Chain
 from tfarm.fitting.data import Measured
 from tfarm.loop.circle_crossings import sampled_map
 from tfarm.loop.loci import reduced_locus
-from tfarm.loop.nyquist import compressed
+from tfarm.loop.nyquist import compress_radius
 from tfarm.plots.regions import colours, contours
 from tfarm.plots.style import number_label
 from tfarm.spectrum.gains import default_gains
@@ -193,7 +193,7 @@ def test_nyquist_draws_the_loop_function_with_its_verdict(name, records):
     (data,) = records(name)
     ax = getattr(tfarm.plots, name)(data, ax=axes_for(0), name="mine")
     drawn = {complex(x, y) for line in ax.lines for x, y in zip(*line.get_data(), strict=True)}
-    upper = (data.L if name == "nyquist" else compressed(data.L))[~data.is_arc]
+    upper = (data.L if name == "nyquist" else compress_radius(data.L))[~data.is_arc]
     assert set(upper.tolist()) | set(upper.conj().tolist()) <= drawn
     assert ax.get_title("left" if name == "nyquist" else "center").split("\n") == [
         f"mine: {data.verdict.word.upper()}",

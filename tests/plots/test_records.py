@@ -28,13 +28,13 @@ READERS = {
     "tfarm.loop.curve.gain_margin",
     "tfarm.loop.loci.held_branches",
     *(f"tfarm.loop.locus.{name}" for name in ("frame", "origin_name", "view")),
-    "tfarm.loop.nyquist.compressed",
+    "tfarm.loop.nyquist.compress_radius",
     "tfarm.response.signals.sign_convention",
     "tfarm.spectrum.listing.beyond_the_box",
     *(f"tfarm.studies.quantities.{name}" for name in ("column_names", "loop_of", "quantity_of", "stability_of")),
 }
 # at the door: what is asked of an arm and a chain together, and the film of a run that a person has
-DOORS = {"tfarm.dsp.plant.driven", "tfarm.dsp.stages.admit", "tfarm.dsp.traces.motion_of"}
+DOORS = {"tfarm.dsp.plant.arm_under_chain", "tfarm.dsp.stages.admit", "tfarm.dsp.traces.motion_of"}
 FILES = sorted({*ROOT.glob("plots/*.py"), *ROOT.glob("report/*.py")} - {ROOT / "report" / "page.py"})
 
 

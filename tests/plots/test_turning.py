@@ -9,7 +9,7 @@ from tfarm.case import Case
 from tfarm.crossing import pieces
 from tfarm.dsp import load_chain
 from tfarm.loop.continuous import ContinuousLoop
-from tfarm.loop.locus import locus, rounded
+from tfarm.loop.locus import locus, refine_branches
 from tfarm.loop.plane import moment_axis, rate_axis
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_modes import sampled_loci
@@ -114,7 +114,7 @@ def _near_a_corner(line, n):
 def test_a_locus_under_any_law_keeps_its_poles():
     """The poles of the record stay, those between are zeros of 1 + L."""
     found = locus(LAB, LEAD, "gain", 1.0, 8.0, points=8, branches=1)
-    fine = rounded(found)
+    fine = refine_branches(found)
     more = np.nonzero(~np.isin(fine.gain, found.gain))[0]
     assert more.size
     for value, poles in zip(found.gain, found.branches.T, strict=True):

@@ -15,7 +15,7 @@ import pytest
 import tfarm
 from tfarm import Hub, Payload
 from tfarm.arm import RotarySpring
-from tfarm.audit.published import ALL, agrees, arm_of_case, computed
+from tfarm.audit.published import ALL, agrees, arm_of_case, exact_numbers
 
 inf = math.inf
 SOURCES = {source.key: source.cases for source in ALL}
@@ -119,17 +119,17 @@ def test_wang_2017_has_the_sign_of_the_tip_inertia_reversed(case):
         for text in case.printed:
             assert agrees(float(root(case.arm, math.sqrt(float(text)), sign=-1) ** 2), text)
     bare, sliding = (beam(mass=case.arm.payload.mass, inertia=inertia) for inertia in (0.0, inf))
-    without, held = (computed(replace(case, arm=arm)) for arm in (bare, sliding))
-    assert (computed(case) < without).all()
+    without, held = (exact_numbers(replace(case, arm=arm)) for arm in (bare, sliding))
+    assert (exact_numbers(case) < without).all()
     assert (without < printed).all()
-    assert (computed(case)[1:] > held[:-1]).all()  # one more constraint: they interlace
+    assert (exact_numbers(case)[1:] > held[:-1]).all()  # one more constraint: they interlace
 
 
 def test_bir_2010_rounded_its_length_and_the_second_frequency_twice():
     """With 1000^(1/2) m the unit EI/(rhoA L^4) is 1 s^-2, so the third agrees, the second rounded twice."""
     bare = SOURCES["bir-2010"][0]
     link = replace(bare.arm.link, length=math.sqrt(1000.0))
-    meant = computed(replace(bare, arm=replace(bare.arm, link=link))).tolist()
+    meant = exact_numbers(replace(bare, arm=replace(bare.arm, link=link))).tolist()
     assert agrees(meant[2], bare.printed[2])
     assert not agrees(meant[1], bare.printed[1])
     assert f"{meant[1]:.4f}" == "22.0345"
@@ -139,7 +139,7 @@ def test_bir_2010_rounded_its_length_and_the_second_frequency_twice():
 def test_vpcs_sdll15_has_rayleighs_estimate_for_its_first():
     """sqrt(3 EI / (L^3 (m + 0.24 M))) / 2 pi lies below; the static deflection gives 33/140 of M, the beam's mass."""
     (case,) = SOURCES["vpcs-sdll15"]
-    link, first = case.arm.link, computed(case)[0]
+    link, first = case.arm.link, exact_numbers(case)[0]
 
     def estimate(share):
         carried = case.arm.payload.mass + share * link.rhoA * link.length
@@ -180,5 +180,5 @@ def test_an_end_slides_in_the_limit_of_one_over_the_distance(part):
     found = []
     for far in (1e4, 1e5):
         parts = {"hub": Hub(inertia=0.0, radius=far)} if part == "root" else {"payload": Payload(mass=inf, offset=far)}
-        found.append(computed(replace(case, arm=replace(case.arm, **parts))) - computed(case))
+        found.append(exact_numbers(replace(case, arm=replace(case.arm, **parts))) - exact_numbers(case))
     assert found[0] == pytest.approx(10 * found[1], rel=1e-3)

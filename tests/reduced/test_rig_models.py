@@ -15,7 +15,7 @@ from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling, pulse_transfer
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.reduced.modal import modal_model
-from tfarm.spectrum.damped import entered
+from tfarm.spectrum.damped import missing_real_eigenvalues
 from tfarm.spectrum.gains import default_gains
 
 MEASURED = ("hub_angle", "hub_rate", "root_moment")
@@ -93,7 +93,7 @@ def rubbing(inertia, friction, *, theory="timoshenko", C=1e-4):
 @pytest.mark.parametrize("inertia", [0.0, 1e-6])
 def test_the_pole_is_one_of_the_exact_arm(theory, inertia):
     arm = rubbing(inertia, 5.0, theory=theory)
-    (pole,) = entered(damped_modes(modes(arm, 6)))
+    (pole,) = missing_real_eigenvalues(damped_modes(modes(arm, 6)))
     either_side = [determinant(arm, mpmath.mpf(pole * (1 + side)), digits=30).real for side in (-1e-9, 1e-9)]
     assert either_side[0] * either_side[1] < 0
     assert -140 < pole < -130
@@ -118,10 +118,10 @@ def test_the_sampled_loop_of_few_modes_is_that_of_many():
 
 @pytest.mark.parametrize("inertia", [1e-3, 0.1])
 def test_a_hub_that_weighs_something_has_none(inertia):
-    assert not entered(damped_modes(modes(rubbing(inertia, 5.0), 6))).size
+    assert not missing_real_eigenvalues(damped_modes(modes(rubbing(inertia, 5.0), 6))).size
 
 
 def test_a_segment_next_to_massless_is_no_warning():
     """On the negative axis its waves hardly swing: what D grows by from one s to the next is beyond any number."""
     first = replace(LAB.link, length=0.3, density=1e-9, damping=0.0)
-    assert not entered(damped_modes(modes(replace(LAB, link=first, outer=(LAB.link,)), 6))).size
+    assert not missing_real_eigenvalues(damped_modes(modes(replace(LAB, link=first, outer=(LAB.link,)), 6))).size

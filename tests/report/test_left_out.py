@@ -26,7 +26,7 @@ from tfarm.report import write, writing
 from tfarm.report.blocks import render
 from tfarm.report.page import ArmReport
 from tfarm.report.response_sections import fit_section
-from tfarm.report.writing import Piece, make_section, pieces_of
+from tfarm.report.writing import SectionSpec, make_section, pieces_of
 
 OMEGA = np.geomspace(8.0, 300.0, 30)
 NOT_OF_IT = Measured(output="root_moment", input="hub_torque", omega=OMEGA, values=OMEGA + 0j)  # of a hub that turns
@@ -62,10 +62,12 @@ def test_a_section_that_cannot_be_made_has_its_reason_in_its_place_and_on_standa
     [SHORT, tfarm.CertificationError("stopped short"), tfarm.ParameterError(key="K2", value=2.0, remedy="short")],
 )
 def test_a_section_fails_by_an_error_of_tfarm_alone(tmp_path, error):
-    saved = make_section(Piece("of it", "locus", Unmakeable(error)), ArmReport(HELD, Chain()), tmp_path)
+    saved = make_section(SectionSpec("of it", "locus", Unmakeable(error)), ArmReport(HELD, Chain()), tmp_path)
     assert (saved.title, saved.failure) == ("Of it", str(error))
     with pytest.raises(ValueError, match="infeasible"):
-        make_section(Piece("of it", "locus", Unmakeable(ValueError("infeasible"))), ArmReport(HELD, Chain()), tmp_path)
+        make_section(
+            SectionSpec("of it", "locus", Unmakeable(ValueError("infeasible"))), ArmReport(HELD, Chain()), tmp_path
+        )
 
 
 def test_an_index_without_the_picture_of_an_arm_names_it(tmp_path, monkeypatch):
@@ -78,7 +80,7 @@ def test_an_index_without_the_picture_of_an_arm_names_it(tmp_path, monkeypatch):
 
 def with_a_bug(monkeypatch):
     """Put a section of a bug in the place of the page of the arm: what is written first is made before it."""
-    broken = Piece("the arm", "arm", Unmakeable(ValueError("a bug")), on="modes")
+    broken = SectionSpec("the arm", "arm", Unmakeable(ValueError("a bug")), on="modes")
     monkeypatch.setattr(writing, "PIECES", (broken,))
 
 
@@ -232,7 +234,7 @@ def test_of_a_fit(tmp_path):
     seen = Measured(output="root_moment", input="hub_torque", omega=OMEGA, values=H, sigma=abs(H), source=TEXT)
     found = fit(LAB, [seen], free=["hub.inertia"], profile=False)
     report = ArmReport(found.arm, Chain(), (), found)
-    saved = make_section(Piece("fit", "fit", partial(fit_section, count=2)), report, tmp_path)
+    saved = make_section(SectionSpec("fit", "fit", partial(fit_section, count=2)), report, tmp_path)
     for drawing in tmp_path.rglob("*.svg"):
         check_drawing(drawing.read_text(encoding="utf-8"))
     assert list(tmp_path.rglob("*.json"))
@@ -246,7 +248,9 @@ def test_of_a_fit(tmp_path):
 def test_of_a_section_and_a_live_page_that_cannot_be_made(tmp_path):
     check_page(render("live_failed.html", title=NAME, why=TEXT), NAME, TEXT)
     report = ArmReport(LAB, Chain())
-    region = Piece("stability region of both gains", "margins-map", Unmakeable(tfarm.ConvergenceError(TEXT, 0.0, 1.0)))
+    region = SectionSpec(
+        "stability region of both gains", "margins-map", Unmakeable(tfarm.ConvergenceError(TEXT, 0.0, 1.0))
+    )
     saved = make_section(region, report, tmp_path)
     assert saved.failure
     writing._write_pages(report, tmp_path, [saved], None, "", tmp_path)

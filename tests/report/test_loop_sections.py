@@ -17,7 +17,7 @@ from tfarm.assessment.card import margins_of
 from tfarm.case import Case
 from tfarm.dsp import Chain, load_chain
 from tfarm.loop import plane as edges
-from tfarm.loop.continuous import band_of
+from tfarm.loop.continuous import frequency_above_mode
 from tfarm.loop.loci import loci
 from tfarm.loop.nyquist import nyquist
 from tfarm.loop.poles import closed_loop_poles
@@ -103,7 +103,7 @@ def test_the_contours_are_the_damping_of_the_poles(lab):
     for row, column in ((5, 20), (25, 40), (30, 55)):
         law = HubFeedback(K1=float(lab.coarse.axes[0][column]), K2=float(lab.coarse.axes[1][row]))
         poles = closed_loop_poles(LAB, law, 6).values
-        poles = poles[(poles.imag > 0) & (poles.imag < band_of(LAB, stability_map.DESIGNED_MODES))]
+        poles = poles[(poles.imag > 0) & (poles.imag < frequency_above_mode(LAB, stability_map.DESIGNED_MODES))]
         expected = (-poles.real / abs(poles)).min()
         assert lab.damping[row, column] == pytest.approx(expected, rel=1e-3, abs=0)  # of a model of eight modes
 

@@ -22,7 +22,7 @@ from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.poles import poles_below
 from tfarm.report.blocks import prose
 from tfarm.report.loop_section import (
-    interval_facts,
+    continuous_interval_facts,
     locus_section,
     margin_table,
     margins_section,
@@ -148,7 +148,7 @@ def is_stable(arm, law, up_to):
 def test_the_interval_of_K2_is_that_of_the_poles(name):
     """On either side of an edge; at the end of a search nothing happens, and no edge is claimed."""
     arm, law = ARMS[name], default_gains(ARMS[name])
-    _, fact = interval_facts(ArmReport(arm, Chain()))
+    _, fact = continuous_interval_facts(ArmReport(arm, Chain()))
     down, up = (number(end.strip("<> ()")) for end in re.search(r"\(.+?\)", fact.value)[0].split(", "))
     band = 3 * tfarm.modes(arm, 3).natural_frequency[-1]
     assert is_stable(arm, replace(law, K2=0.999 * up), band)

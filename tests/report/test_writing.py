@@ -36,12 +36,12 @@ from tfarm.loop.edges import LowerBound
 from tfarm.plots.style import GOOD, LOW, MARGINAL, POOR, UNSTABLE
 from tfarm.report import page as report_page
 from tfarm.report import write, writing
-from tfarm.report.blocks import TEMPLATES, explained, prose, sheet, templates
+from tfarm.report.blocks import TEMPLATES, explain_commands, prose, sheet, templates
 from tfarm.report.overview import Card, results, save_card
 from tfarm.report.page import ArmReport, GivenLaw, best
 from tfarm.report.response_sections import arm_section
 from tfarm.report.trust import write_trust, written_proofs
-from tfarm.report.writing import PIECES, QUESTIONS, kept, make_section, navigation, pieces_of, write_index
+from tfarm.report.writing import PIECES, QUESTIONS, make_section, navigation, pieces_of, read_records, write_index
 from tfarm.schema import Column, quantities, to_dict
 from tfarm.spectrum.gains import default_gains
 
@@ -252,8 +252,8 @@ def test_no_paragraph_is_on_two_pages_and_words_are_explained_in_one_place(pages
 
 
 def test_without_the_page_of_words_none_is_linked():
-    assert explained("Proven: `tfarm design`.") == "Proven: <code>tfarm design</code>."
-    assert 'href="x.html#word-proven">Proven</a>' in explained("Proven.", "x.html")
+    assert explain_commands("Proven: `tfarm design`.") == "Proven: <code>tfarm design</code>."
+    assert 'href="x.html#word-proven">Proven</a>' in explain_commands("Proven.", "x.html")
 
 
 def test_a_page_has_a_narrow_picture_for_a_phone(tmp_path):
@@ -425,7 +425,7 @@ def rows_of(tmp_path, laws, chain):
     folder.mkdir()
     save_card(ArmReport(LAB, chain, tuple(laws)), folder)
     (folder / "index.html").write_text("a page")
-    (card,) = kept(tmp_path, "card", Card).values()
+    (card,) = read_records(tmp_path, "card", Card).values()
     return card.loops, index_of(tmp_path)
 
 
@@ -474,5 +474,5 @@ def test_a_card_that_is_not_determined_has_its_reason(tmp_path, monkeypatch):
     monkeypatch.setattr(report_page, "result_card", Unmakeable(tfarm.ConvergenceError("stopped short", None, None)))
     loops, page = rows_of(tmp_path, [], Chain())
     assert (loops, "no loop" in page) == ((), True)
-    (card,) = kept(tmp_path, "card", Card).values()
+    (card,) = read_records(tmp_path, "card", Card).values()
     assert "default gains: not determined, stopped short" in card.notes[0]

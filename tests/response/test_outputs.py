@@ -36,7 +36,7 @@ OWN = [TURN, MOMENT, FORCE, JERK, SNAP, replace(TURN, power=1, unit="rad/s", lab
 def test_call_digits_and_frequency_response_agree_with_the_paper(arm, wanted) -> None:
     G = tfarm.transfer(arm, wanted)
     for s in POINTS:
-        expected = complex(appendix.response(arm, wanted, s, 20))
+        expected = complex(appendix.output_value(arm, wanted, s, 20))
         slope = abs(s * G.derivative(s))
         assert abs(G(s) - expected) <= 90 * EPS * (abs(expected) + slope)
         assert abs(complex(*map(float, G.digits(s, 17))) - expected) <= 4 * EPS * abs(expected)

@@ -17,7 +17,7 @@ from tfarm.schema import (
     Quantity,
     across,
     as_csv,
-    compare,
+    compare_records,
     curve_table,
     entries,
     quantities,
@@ -118,7 +118,7 @@ def test_curves_are_columns_of_csv_complex_ones_two():
 
 def test_differences_are_in_the_unit_and_rows_are_paired_by_their_first_quantity():
     other = replace(RECORD, margin=At(40.87, 70.0), rows=[Row(2, 205.3), Row(3, 1.0)], inner=Inner("marginal", 0.25))
-    found = {each.quantity: each for each in compare(RECORD, other)}
+    found = {each.quantity: each for each in compare_records(RECORD, other)}
     assert found["margin"].difference == pytest.approx(-1.0)
     assert found["margin"].unit == "deg"
     assert found["limit"].difference == pytest.approx(-0.25)

@@ -12,7 +12,7 @@ from markupsafe import escape
 
 import tfarm
 from tests.hostile import Read
-from tfarm.digits import lined, significant, singly
+from tfarm.digits import column_format, significant, singly
 from tfarm.loop.margins import LoopMargins
 from tfarm.schema import Column, Table, across, as_csv, as_json, quantities, save_table, to_json
 from tfarm.schema.html import as_html, with_symbols
@@ -31,7 +31,7 @@ FOUND = Found()
 COLUMNS = (
     Column("index", "mode", of=FOUND.index),
     Column("omega_rad_s", "frequency", "rad/s", of=FOUND.omega, digits=singly(significant, 5)),
-    Column("frequency_hz", "", "Hz", of=FOUND.omega / (2 * math.pi), digits=lined(5, 3)),
+    Column("frequency_hz", "", "Hz", of=FOUND.omega / (2 * math.pi), digits=column_format(5, 3)),
     Column("words", "what & why", of=FOUND.words, tint=("", "#fff", "")),
     Column("nodes_m", "nodes", "m", of=[(0.1, 0.25), (), (1e-300,)], shown=["0.1, 0.25", "none", "1e-300"]),
 )

@@ -11,12 +11,12 @@ from tfarm.exact.characteristic import Analytic
 from tfarm.spectrum import box as room
 from tfarm.spectrum.box import (
     Box,
-    complete,
     complete_box,
+    complete_zeros,
     distinct,
     filled_box,
+    find_other_zeros,
     newton,
-    repelled,
     winding_number,
     zeros_in_box,
 )
@@ -88,19 +88,21 @@ def test_a_search_ends(monkeypatch):
 
 def test_a_box_grows_where_a_zero_lies_on_its_edge():
     zeros = np.array([2.0 + 10.0j, 2.0 - 10.0j, -1.0, -40.0])
-    found, box = complete(
+    found, box = complete_zeros(
         polynomial(*zeros), lambda height: Box(-50.0, 10.0, -height, height), 10.0, np.array([0.1 + 0j])
     )
     assert 10.0 < box.im_max < 10.1
     assert np.sort_complex(found) == pytest.approx(np.sort_complex(zeros), rel=1e-12)
     assert (found.imag == 0).sum() == 2
-    _, last = complete(  # on the edge of the first two, so that the last of three is taken
+    _, last = complete_zeros(  # on the edge of the first two, so that the last of three is taken
         polynomial(*zeros, 2.0 + 11.0j, 2.0 - 11.0j),
         lambda height: Box(-50.0, 10.0, -height, height), 10.0, np.array([0.1 + 0j]), factors=(1.0, 1.1, 1.2),
     )  # fmt: skip
     assert last.im_max == 12.0
     with pytest.raises(ConvergenceError, match="lies on the contour"):
-        complete(polynomial(*zeros), lambda height: Box(-50.0, 10.0, -height, height), 10.0, zeros, factors=(1.0,))
+        complete_zeros(
+            polynomial(*zeros), lambda height: Box(-50.0, 10.0, -height, height), 10.0, zeros, factors=(1.0,)
+        )
 
 
 EPS = 2.0**-52
@@ -131,7 +133,7 @@ def test_all_zeros_of_a_box_are_found_in_any_unit_of_time(unit):
     """One of them a millionth of the box off 0; what is taken for rounding, and so for real, is a share of a size."""
     zeros = np.array([2.0 + 3.0j, 2.0 - 3.0j, -1.0, 1e-5])
     function = in_units(polynomial(*zeros), unit)
-    found, box = complete(function, lambda height: Box(-5 * unit, 5 * unit, -height, height), 4 * unit, zeros[:0])
+    found, box = complete_zeros(function, lambda height: Box(-5 * unit, 5 * unit, -height, height), 4 * unit, zeros[:0])
     assert np.sort_complex(found / unit) == pytest.approx(np.sort_complex(zeros), rel=1e-10)
     assert (found.imag == 0).sum() == 2
     assert box.im_max == 4 * unit
@@ -191,10 +193,10 @@ def test_a_missed_zero_is_found_with_the_known_ones_divided_out():
     zeros = np.array([1.0 + 2.0j, 1.0 - 2.0j, -1.5, 0.8 + 0.1j, *np.linspace(3.0, 4.0, 60)])
     box, starts = Box(-2.0, 2.0, -3.0, 3.0), np.array([-0.9 + 0j, 0.5 + 1.5j, -1.0 - 2.0j])
     function = with_zeros(zeros)
-    near = repelled(function, starts, np.delete(zeros, 3), box, 1)
+    near = find_other_zeros(function, starts, np.delete(zeros, 3), box, 1)
     assert near.size
     np.testing.assert_allclose(near, zeros[3], rtol=1e-5)
-    assert repelled(function, starts, zeros, box, 1).size == 0
+    assert find_other_zeros(function, starts, zeros, box, 1).size == 0
 
 
 def test_of_a_function_real_on_the_real_axis_half_a_box_is_searched():

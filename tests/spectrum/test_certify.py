@@ -24,7 +24,7 @@ from tfarm.exact.system import system_of
 from tfarm.spectrum import frequencies, proofs
 from tfarm.spectrum.box import Box
 from tfarm.spectrum.frequencies import RealAxis, count_below, natural_frequencies, pinned_count
-from tfarm.spectrum.proofs import Disc, _holds_one, certify, disjoint, enclosed, proven_count
+from tfarm.spectrum.proofs import Disc, _holds_one, certify, disjoint, enclose_zero, proven_count
 
 
 def last_unit(text: str, digits: int) -> Decimal:
@@ -137,7 +137,7 @@ def test_discs_hold_the_papers_roots(digits: int) -> None:
     arm = damped_arm(2e-5, hub=0.3, mass=0.4, inertia=0.5, slenderness=12.0)
     k = system_of(arm)
     for zero in pairs(listed(arm, 3))[[0, 2], 0]:
-        disc = enclosed(k, complex(zero), digits)
+        disc = enclose_zero(k, complex(zero), digits)
         root = newton_root(arm, zero, digits)
         with mpmath.workdps(2 * digits + 20):
             miss = abs(mpmath.mpc(disc.re, disc.im) - root)
@@ -151,7 +151,7 @@ def test_discs_of_real_zeros_are_real() -> None:
     damped = listed(arm, 6)
     for pair in damped.eigenvalues[damped.is_overdamped]:
         for zero in pair:
-            disc = enclosed(damped.undamped.system, complex(zero), 30)
+            disc = enclose_zero(damped.undamped.system, complex(zero), 30)
             assert disc.is_real
             root = newton_root(arm, zero, 30)
             with mpmath.workdps(60):
@@ -165,7 +165,7 @@ def test_a_double_eigenvalue_has_no_disc(monkeypatch: pytest.MonkeyPatch) -> Non
     arm = replace(rigid, link=replace(rigid.link, damping=2 / float(omega[1])))
     k = system_of(arm, "euler-bernoulli")
     monkeypatch.setattr(frequencies, "MOST_AXIS_BITS", 1000)
-    assert "double" in str(refusal(enclosed, k, complex(-omega[1]) * (1 + 1e-4), 5, kind=CertificationError))
+    assert "double" in str(refusal(enclose_zero, k, complex(-omega[1]) * (1 + 1e-4), 5, kind=CertificationError))
 
 
 def test_touching_discs_are_seen() -> None:

@@ -31,7 +31,7 @@ from tfarm.studies.quantities import (
     spreads_of,
     values_of,
 )
-from tfarm.studies.running import Plan, chunk
+from tfarm.studies.running import StudyPlan, chunk
 from tfarm.studies.space import Subject, Subjects, space_of
 from tfarm.studies.study import badness
 from tfarm.tuner import tune
@@ -388,7 +388,7 @@ def test_the_tuner_of_a_row_is_that_of_the_command(capsys):
     """Seed, trials and cost; the same again, and another for another seed."""
     names = ("tuner.cost", "tuner.cost_best_constant", "tuner.trials", "tuner.is_zero", "tuner.trial_cost.4")
     space = space_of({"tuner.seed": {"values": (3, 4, 3)}}, draws=1, seed=0)
-    table = chunk(Plan(Case(LAB, GAINS), space, names), 0, 3)
+    table = chunk(StudyPlan(Case(LAB, GAINS), space, names), 0, 3)
     one = answer(capsys, "tune", "sasaki2012-lab", "--seed", "3")
     assert [table[name][0] for name in names] == [one["cost_tuned"], one["cost_best_constant"], 100, 0, one["cost"][3]]
     assert [table[name][2] for name in names] == [table[name][0] for name in names]

@@ -120,7 +120,7 @@ def test_a_section_has_the_reason_of_a_missing_response(found, monkeypatch):
     (section,) = (each for each in writing.study_sections(found) if each.title == "Responses")
     assert list(section.blocks) == []
     assert section.words[0].startswith("root_moment: response = ")
-    page = writing.render("study.html", title="x", sections=[section], explained=writing.explained, found=found)
+    page = writing.render("study.html", title="x", sections=[section], explained=writing.explain_commands, found=found)
     check_page(page, "no arm of the study has it")
 
 

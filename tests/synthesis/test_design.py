@@ -14,14 +14,14 @@ from tests.synthesis.judged import judge_of
 from tfarm import HubFeedback
 from tfarm.case import Case
 from tfarm.errors import ConvergenceError
-from tfarm.loop.continuous import band_of
+from tfarm.loop.continuous import frequency_above_mode
 from tfarm.loop.stability import stability
 from tfarm.synthesis.design import design
 from tfarm.synthesis.models import PERIOD_POINTS
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 BOUNDS = {"K1": (0.0, 20.0), "K2": (-2.0, 1.0)}
-MODEL, TOP = RitzLoop(LAB, 12), band_of(LAB, 2)
+MODEL, TOP = RitzLoop(LAB, 12), frequency_above_mode(LAB, 2)
 RISE, TURN = 1.0, 1.15  # s, rad: the default slew of a chain
 
 

@@ -184,7 +184,7 @@ def least_of(function, low, high, near=None):
     low, high = np.array(low, dtype=float), np.array(high, dtype=float)
     form = SimpleNamespace(name="test", size=low.size, box=(low, high), origin=low)
     lines = []
-    found, of_runs = search.minimised(
+    found, of_runs = search.minimise_runs(
         lambda points, *_: np.array([function(each) for each in points.T]),
         form,
         form.box,

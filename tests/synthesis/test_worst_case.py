@@ -13,7 +13,7 @@ from tfarm.arm import Hub
 from tfarm.synthesis import worst_case
 from tfarm.synthesis.design import design
 from tfarm.synthesis.judge import RESERVE
-from tfarm.synthesis.worst_case import MUCH_WORSE, ArmBox, arms_of, for_the_worst, varied, worst_inside
+from tfarm.synthesis.worst_case import MUCH_WORSE, ArmBox, arms_of, for_the_worst, vary_arm, worst_inside
 
 LAB, T = tfarm.load("sasaki2012-lab"), 0.01
 SHORT = replace(LAB, link=replace(LAB.link, length=0.8 * LAB.length), name="short")
@@ -95,13 +95,13 @@ def test_a_law_for_structures_serves_both_ends_too():
     assert both.value == min(each.value for each in both.arms)
     assert "no proof over the box" in both.worst_case.sentence(3)
     for each in both.arms:
-        arm = varied(LAB, "payload.mass", each.numbers.get("payload.mass", 0.0))
+        arm = vary_arm(LAB, "payload.mass", each.numbers.get("payload.mass", 0.0))
         assert HeldLoop(arm, T).radius(HubFeedback(Kp=5.0, K1=both.coefficients["K1"])) < 1.0
 
 
 def test_a_number_is_named_as_in_the_file_or_as_of_a_locus():
-    assert varied(LAB, "payload.mass", 0.2) == varied(LAB, "payload_mass", 0.2) == LAB.having(payload_mass=0.2)
-    assert varied(LAB, "hub.friction", 0.3).hub == Hub(inertia=LAB.hub.inertia, friction=0.3)
+    assert vary_arm(LAB, "payload.mass", 0.2) == vary_arm(LAB, "payload_mass", 0.2) == LAB.having(payload_mass=0.2)
+    assert vary_arm(LAB, "hub.friction", 0.3).hub == Hub(inertia=LAB.hub.inertia, friction=0.3)
     assert ArmBox(LAB, {"link.damping": (1e-5, 1e-3)}).at(np.array([0.5])).arm.damping == pytest.approx(1e-4)
     assert ArmBox(LAB, {"payload.mass": (0.1, 0.5)}).at(np.array([0.5])).arm.payload.mass == pytest.approx(0.3)
 

@@ -30,11 +30,11 @@ def test_the_guard_is_one_minus_e_to_the_minus_softplus():
     """lo + (hi - lo)(1 - e^-kappa), kappa = ln(1 + e^z), is the sigmoid; and its slope is right."""
     z = np.linspace(-30, 30, 601)
     guard = Limits(0.2, 0.7)
-    values = np.array([kernel.guarded(each, guard) for each in z])
+    values = np.array([kernel.guard_gain(each, guard) for each in z])
     kappa = np.logaddexp(0, z)
     np.testing.assert_allclose(values[:, 0], 0.2 + 0.5 * -np.expm1(-kappa), rtol=1e-14)
     np.testing.assert_allclose(values[:, 1], 0.5 / (2 * np.cosh(z / 2)) ** 2, rtol=1e-13)
-    plain = np.array([kernel.guarded(each, Limits(0.0, np.inf)) for each in z])
+    plain = np.array([kernel.guard_gain(each, Limits(0.0, np.inf)) for each in z])
     np.testing.assert_allclose(plain[:, 0], kappa, rtol=1e-14)
     np.testing.assert_allclose(plain[:, 1], 1 / (1 + np.exp(-z)), rtol=1e-14)
 
@@ -42,7 +42,7 @@ def test_the_guard_is_one_minus_e_to_the_minus_softplus():
 @pytest.mark.parametrize("z", [-1e308, -800.0, -1e-300, 0.0, 36.0, 800.0, 1e308])
 def test_no_sum_leaves_the_guard(z):
     for lo, hi in ((0.1, 0.3), (0.1, np.nextafter(0.1, 1)), (1 / 3, 2 / 3)):
-        K, slope = kernel.guarded(z, Limits(lo, hi))
+        K, slope = kernel.guard_gain(z, Limits(lo, hi))
         assert lo <= K <= hi
         assert slope >= 0
 

@@ -31,7 +31,7 @@ from tfarm.tuner import (
 )
 from tfarm.tuner.guard import MovingGain
 from tfarm.tuner.kernel import Limits
-from tfarm.tuner.trial import judged, usual_rate_gain
+from tfarm.tuner.trial import record_of_simulation, usual_rate_gain
 from tfarm.tuner.tuning import SlewEnd
 
 SECTOR = Limits(0.3, 0.64)
@@ -54,7 +54,7 @@ def test_a_trial_is_that_of_the_simulator(lab, inputs, signals, chain, K1, Kp):
     network = initial_network(3, scales=np.full(inputs, 1.3))
     record = trial.with_network(network, SECTOR)
     gain = TunedGain(network, SECTOR, HubFeedback(K1=K1, Kp=Kp), signals)
-    other = judged(
+    other = record_of_simulation(
         gain.run(Simulator(Case(lab, HubFeedback(), trial.loop.chain), trial.task, count=6)), trial.cost, signals
     )
     np.testing.assert_allclose(other.K, record.K, atol=1e-11)

@@ -22,7 +22,7 @@ from tfarm.arm.feedback import (
     unit_of,
     written_unit,
 )
-from tfarm.arm.law import AnyLaw, Law, arm_and_law, as_law, cancelled, must_not_be_algebraic
+from tfarm.arm.law import AnyLaw, Law, arm_and_law, as_law, must_not_be_algebraic, warn_of_cancellations
 from tfarm.arm.parts import Attachment, Gauge, Hub, Link, Motor, Payload, RotarySpring, Section
 from tfarm.arm.reading import implausible, load, presets
 from tfarm.arm.records import Arm, must_be_arm, must_have_free_hub, must_turn
@@ -64,7 +64,6 @@ __all__ = [
     "Theory",
     "arm_and_law",
     "as_law",
-    "cancelled",
     "implausible",
     "input_words",
     "law_of",
@@ -77,8 +76,12 @@ __all__ = [
     "shown_unit",
     "to_toml",
     "unit_of",
+    "warn_of_cancellations",
     "written_unit",
 ]
 
 # names that this room had up to version 1.0
-__getattr__ = moved(__name__, dict.fromkeys(("full_law", "tracked"), "tfarm.case"))
+__getattr__ = moved(
+    __name__,
+    {"cancelled": "tfarm.arm:warn_of_cancellations", "full_law": "tfarm.case", "tracked": "tfarm.case"},
+)

@@ -101,7 +101,7 @@ class Rational:
         A = np.eye(self.order, k=-1)
         A[:1] = -den[1:]
         C = num[1:] - num[0] * den[1:]
-        return balanced(A, np.eye(self.order, 1), C[None], num[:1, None])
+        return balance_states(A, np.eye(self.order, 1), C[None], num[:1, None])
 
 
 @frozen
@@ -211,7 +211,7 @@ def block_of(key: str, entry: Any) -> tuple[LawBlock, float | None]:
     if all(hasattr(entry, name) for name in "ABCD"):
         system = StateSpace(*(getattr(entry, name) for name in "ABCD"))
         if hasattr(entry, "poles"):  # python-control's, with states of any size
-            system = StateSpace(*balanced(*system.matrices()))
+            system = StateSpace(*balance_states(*system.matrices()))
         return system, period
     if hasattr(entry, "num") and hasattr(entry, "den"):
         remedy = "has several inputs or outputs; give one transfer function a signal, or matrices"
@@ -233,7 +233,7 @@ def _row(part: ArrayLike) -> tuple[float, ...]:
     return tuple(np.atleast_1d(np.asarray(part, dtype=float)).tolist())
 
 
-def balanced(A: Real, B: Real, C: Real, D: Real) -> Matrices:
+def balance_states(A: Real, B: Real, C: Real, D: Real) -> Matrices:
     """Return the same system with states of similar size: diagonal scaling by powers of 2."""
     if not len(A):
         return A, B, C, D

@@ -13,13 +13,13 @@ from tfarm.arm import schema
 from tfarm.arm.checks import above_zero, check_annotated, not_negative, number, positive, positive_if_given, whole
 from tfarm.arm.reading import AnyFile, load_tables
 from tfarm.arm.records import Arm
-from tfarm.arm.schema import ArmTable, TomlTable, validated
+from tfarm.arm.schema import ArmTable, TomlTable, validate_table
 from tfarm.arm.stages import are_linear
 from tfarm.arm.writing import to_toml
-from tfarm.errors import ParameterError, must_be_known, naming, require, unknown_key
+from tfarm.errors import ParameterError, must_be_known, name_file, require, unknown_key
 from tfarm.schema import Quantity
 
-Reading = Literal["vibration", "total"]
+MomentReading = Literal["vibration", "total"]
 # of a converter: of one bit there are no steps, of more than 32 no part
 LEAST_BITS = 2
 MOST_BITS = 32
@@ -150,7 +150,7 @@ class Slew:
 
     travel: float | None = None
     rise_time: Annotated[float, positive, "a rise time is a positive, finite number of seconds"] = 1.0
-    reading: Reading = "vibration"
+    reading: MomentReading = "vibration"
 
     def __post_init__(self) -> None:
         if self.travel is not None:
@@ -185,7 +185,7 @@ class Chain:
     @property
     def is_linear(self) -> bool:
         """Whether all of its stages are: there is neither quantisation nor saturation."""
-        return are_linear(stated(self))
+        return are_linear(stated_keys(self))
 
 
 def chain_or_usual(chain: object) -> Chain:
@@ -214,7 +214,7 @@ def load_chain(name_or_path: AnyFile) -> Chain:
     Raises ParameterError for an unknown key, a wrong type or an invalid value.
     """
     tables, file = load_tables(name_or_path)
-    with naming(file):
+    with name_file(file):
         return chain_of_tables(tables)
 
 
@@ -224,11 +224,11 @@ def chain_of_tables(tables: Mapping[str, Any]) -> Chain:
         known = key in CHAIN_TABLES or key in OF_AN_ARM
         require(known, key, tables[key], unknown_key(key, CHAIN_TABLES))
     given = [name for name in CHAIN_TABLES if name in tables]
-    records = {name: validated(CHAIN_TABLES[name], tables[name], name).build() for name in given}
+    records = {name: validate_table(CHAIN_TABLES[name], tables[name], name).build() for name in given}
     return Chain(**records, period_from="the file's period" if "period" in tables.get("sampling", {}) else "")
 
 
-def stated(chain: Chain) -> dict[str, dict[str, Any]]:
+def stated_keys(chain: Chain) -> dict[str, dict[str, Any]]:
     """Return the keys of each table of a chain that are no default."""
     records = {table: getattr(chain, table) for table in CHAIN_TABLES}
     return {
@@ -243,7 +243,7 @@ def file_text(arm: Arm, chain: Chain | None = None) -> str:
     Python's shortest exact digits are TOML's too, and so is inf; a text needs its quotes.
     """
     text = to_toml(arm)
-    for table, given in stated(chain or Chain()).items():
+    for table, given in stated_keys(chain or Chain()).items():
         lines = [f"{key} = {json.dumps(of) if isinstance(of, str) else repr(of)}\n" for key, of in given.items()]
         text += "".join([f"\n[{table}]\n", *lines]) if lines else ""
     return text

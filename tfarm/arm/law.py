@@ -384,7 +384,7 @@ def must_not_be_algebraic(arm: Arm, key: str, value: object) -> None:
     )
 
 
-def cancelled(law: Law) -> tuple[str, ...]:
+def warn_of_cancellations(law: Law) -> tuple[str, ...]:
     """Return warnings of the law's unstable poles that its own zeros cancel."""
     found = []
     for part in law.parts:

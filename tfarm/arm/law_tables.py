@@ -20,8 +20,8 @@ from pydantic import Field
 
 from tfarm.arm.law import Law
 from tfarm.arm.reading import AnyFile, load_tables
-from tfarm.arm.schema import StrictTable, validated
-from tfarm.errors import MISSING, ParameterError, close_to, listed, must_be_known, naming, require
+from tfarm.arm.schema import StrictTable, validate_table
+from tfarm.errors import MISSING, ParameterError, close_to, list_within, must_be_known, name_file, require
 from tfarm.files import read_mat
 
 
@@ -69,7 +69,7 @@ def load_law(name_or_path: AnyFile) -> Law | None:
     Raises ParameterError, naming the file, for an unknown key, a wrong type or an illegal value.
     """
     tables, file = load_tables(name_or_path)
-    with naming(file):
+    with name_file(file):
         return law_of_table(tables["law"], Path(file).parent) if "law" in tables else None
 
 
@@ -82,7 +82,7 @@ def law_of_table(table: Any, folder: Path) -> Law:
         is_signal = type(value) in (int, float) and not close_to(key, LawTable.model_fields)
         remedy = f"a signal has a table of its own: [law.{key}] with gain = {value}"
         require(not is_signal, f"law.{key}", value, remedy)
-    head = validated(LawTable, others, "law")
+    head = validate_table(LawTable, others, "law")
     common = head.model_dump(include={"name", "input", "delay", "period", "sign", "references", "rule", "prewarp"})
     try:
         if head.matrices is not None:
@@ -93,7 +93,7 @@ def law_of_table(table: Any, folder: Path) -> Law:
         require(is_alone, "matrices", MISSING, "signals, system and scales need a .mat file")
         entries = {}
         for name, values in signals.items():
-            block = validated(SignalTable, values, f"law.{name}")
+            block = validate_table(SignalTable, values, f"law.{name}")
             entries[name if block.x is None else f"{name}@{block.x!r}"] = block.build(f"law.{name}")
         return Law(entries, **common)
     except ParameterError as error:
@@ -111,7 +111,7 @@ def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:
         must_be_known("system", head.system, dict.fromkeys(name.split(".")[0] for name in found if "." in name))
         place = f"{head.system}."
     missing = [name for name in "ABCD" if f"{place}{name}" not in found]
-    remedy = f"holds no {', '.join(missing)}; it has {listed(found, 300)} (system = names a structure)"
+    remedy = f"holds no {', '.join(missing)}; it has {list_within(found, 300)} (system = names a structure)"
     require(not missing, "matrices", head.matrices, remedy)
     A, B, C, D = (found[f"{place}{name}"] for name in "ABCD")
     law = Law.of_matrices(A, B, C, D, signals, **common)

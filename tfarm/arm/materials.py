@@ -67,13 +67,13 @@ def of_material(table: Any) -> tuple[Material, dict[str, float]] | None:
     return found, {key: value for key in lacking if (value := getattr(found, key)) is not None}
 
 
-def filled(table: Any) -> Any:
+def fill_material(table: Any) -> Any:
     """Return the table of a link with the numbers of its material, if it names one."""
     found = of_material(table)
     return table if found is None else {**found[1], **table}
 
 
-def assumed(tables: Iterable[Mapping[str, Any]]) -> list[str]:
+def material_assumptions(tables: Iterable[Mapping[str, Any]]) -> list[str]:
     """Return one assumption for each material of links, with the numbers that are taken from it and their source."""
     texts = (found[0].words(found[1]) for found in map(of_material, tables) if found is not None and found[1])
     return list(dict.fromkeys(texts))

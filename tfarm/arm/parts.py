@@ -253,7 +253,7 @@ class Link:
 # ------------------------------------------------------------ the other parts of a rig
 
 
-def differing(record: Any, always: int) -> dict[str, Any]:
+def repr_fields(record: Any, always: int) -> dict[str, Any]:
     """Return the first `always` fields of a record's repr, and those of the others that differ from their defaults."""
     found = {}
     for i, each in enumerate(known for known in fields(record) if known.repr):
@@ -265,8 +265,8 @@ def differing(record: Any, always: int) -> dict[str, Any]:
 
 
 def brief_repr(record: Any, always: int) -> str:
-    """Return the repr of a record with the fields of `differing` alone."""
-    shown = ", ".join(f"{name}={value!r}" for name, value in differing(record, always).items())
+    """Return the repr of a record with the fields of `repr_fields` alone."""
+    shown = ", ".join(f"{name}={value!r}" for name, value in repr_fields(record, always).items())
     return f"{type(record).__name__}({shown})"
 
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from tfarm.arm.parts import Link
 from tfarm.arm.records import Arm
-from tfarm.errors import ParameterError, did_you_mean, naming, require, shown
+from tfarm.errors import ParameterError, did_you_mean, name_file, require, short_text
 from tfarm.files import read_file
 
 PRESETS = files("tfarm.arm") / "presets"
@@ -39,7 +39,7 @@ def load(name_or_path: AnyFile) -> Arm:
     from tfarm.arm.schema import arm_of_table  # here, as the import of pydantic is slow
 
     tables, name = load_tables(name_or_path)
-    with naming(name):
+    with name_file(name):
         return arm_of_table(tables)
 
 
@@ -59,11 +59,11 @@ def load_tables(name_or_path: AnyFile) -> ArmFile:
         raise ParameterError(key="arm", value=name, remedy=remedy)
     else:
         data = read_file(name, MOST_ARM_BYTES, key="arm", what="a .toml file")
-    with naming(name):
+    with name_file(name):
         return ArmFile(_table_of(data), name)
 
 
-def decoded(data: bytes, remedy: str) -> str:
+def decode_text(data: bytes, remedy: str) -> str:
     """Return the text of a file in UTF-8.  Raises ParameterError, naming the first other byte, with the remedy."""
     try:
         return data.decode("utf-8-sig")
@@ -77,7 +77,7 @@ def _table_of(data: bytes) -> dict[str, Any]:
 
     Raises ParameterError for an error of the parser with its line, the last one where the error has none.
     """
-    text = decoded(data, "is not UTF-8; save the file as UTF-8")
+    text = decode_text(data, "is not UTF-8; save the file as UTF-8")
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -134,7 +134,7 @@ def _segment(key: str, link: Link, length: float) -> Iterator[str]:
     for name, (least, below, most, above) in USUAL.items():
         value = getattr(link, name)
         if not least <= value <= most:
-            yield f"{key}.{name} = {shown(value)}: {below if value < least else above}"
+            yield f"{key}.{name} = {short_text(value)}: {below if value < least else above}"
     depth = math.sqrt(12) * link.section.radius_of_gyration
     sides = link.section.dimensions or (("second_moment means a depth of", depth),)
     for name, side in sides:
@@ -145,7 +145,7 @@ def _segment(key: str, link: Link, length: float) -> Iterator[str]:
     ratio = link.damping * (1.8751040687119611 / length) ** 2 * math.sqrt(link.EI / link.rhoA) / 2
     if ratio > 0.1:
         yield (
-            f"{key}.damping = {shown(link.damping)}: a damping ratio of {ratio:.2g} in the first mode "
+            f"{key}.damping = {short_text(link.damping)}: a damping ratio of {ratio:.2g} in the first mode "
             "of the clamped link; its unit is s, as in E (1 + C s)"
         )
 
@@ -197,4 +197,4 @@ def _parts(arm: Arm) -> Iterator[str]:
         limits.append((f"attachment.{i}.mass", each.mass, each.mass / mass, HEAVIEST, heavy))
     for key, value, ratio, most, text in limits:
         if most < ratio < math.inf:
-            yield f"{key} = {shown(value)}: {text.format(ratio)}"
+            yield f"{key} = {short_text(value)}: {text.format(ratio)}"

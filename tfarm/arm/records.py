@@ -20,12 +20,12 @@ from tfarm.arm.checks import (
     plain_texts,
 )
 from tfarm.arm.parts import Attachment, Gauge, Hub, Link, Motor, Payload, RotarySpring, brief_repr
-from tfarm.errors import ParameterError, must_be_known, require, shown
+from tfarm.errors import ParameterError, must_be_known, require, short_text
 
 MOST_PARTS = 64  # segments, and attachments: a check of the chain has 64 equal pieces
 IDEAL_MOTOR = Motor(resistance=1.0, torque_constant=1.0, back_emf_constant=0.0)  # without inertia, friction and gear
 
-_Part = TypeVar("_Part")
+_PartRecord = TypeVar("_PartRecord")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -372,7 +372,7 @@ def must_be_arm(arm: object) -> None:
     """Raise ParameterError for anything but an Arm."""
     if not isinstance(arm, Arm):
         name = str(arm) if isinstance(arm, str | os.PathLike) else "sasaki2012"
-        raise ParameterError(key="arm", value=arm, remedy=f"is no Arm; give tfarm.load({shown(name)})")
+        raise ParameterError(key="arm", value=arm, remedy=f"is no Arm; give tfarm.load({short_text(name)})")
 
 
 def must_have_free_hub(arm: Arm) -> None:
@@ -393,7 +393,7 @@ def must_turn(arm: Arm) -> None:
         require(value <= 0.0, key, value, "an arm with a spring to ground has no slew; leave the spring out")
 
 
-def _parts(key: str, parts: Any, kind: type[_Part], most: int) -> tuple[_Part, ...]:
+def _parts(key: str, parts: Any, kind: type[_PartRecord], most: int) -> tuple[_PartRecord, ...]:
     """Return a tuple of at most `most` records of one kind.  Raises ParameterError for anything else."""
     is_list = isinstance(parts, list | tuple) and all(isinstance(part, kind) for part in parts)
     require(is_list, key, parts, f"give a tuple of {kind.__name__} records")

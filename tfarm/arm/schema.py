@@ -15,7 +15,7 @@ from typing import Any, ClassVar, TypeVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
-from tfarm.arm.materials import assumed, filled, materials
+from tfarm.arm.materials import fill_material, material_assumptions, materials
 from tfarm.arm.parts import Attachment, Gauge, Hub, Link, Motor, Payload, RotarySpring, Section
 from tfarm.arm.records import MOST_PARTS, Arm
 from tfarm.errors import MISSING, ParameterError, require, unknown_key
@@ -23,7 +23,7 @@ from tfarm.files import read_file
 from tfarm.schema import Quantity
 
 _Strict = TypeVar("_Strict", bound="StrictTable")
-_Table = TypeVar("_Table", bound="TomlTable")
+_AnyTable = TypeVar("_AnyTable", bound="TomlTable")
 LOOP_TABLES = ("sampling", "converters", "actuator", "slew", "law")  # of the loop: read by other rooms
 OF_INPUT = "N m, V or A"  # unit of a limit of the input
 EXPECTED: dict[Any, str] = {
@@ -53,7 +53,7 @@ class TomlTable(StrictTable):
         return type(self).makes(**{name: getattr(self, name) for name in given})
 
 
-def validated(model: type[_Strict], table: Any, place: str) -> _Strict:
+def validate_table(model: type[_Strict], table: Any, place: str) -> _Strict:
     """Return the table headed [place] of a file, "" for its top.
 
     Raises ParameterError for anything but a table and for one wrong key, an unknown one before a missing one.
@@ -93,19 +93,19 @@ def validated_file(model: type[_Strict], path: str | os.PathLike[str], most: int
     raise ParameterError(key=place, value=value, remedy=f"{problem['msg']}; give {what}", file=os.fspath(path))
 
 
-def of(makes: Callable[..., Any]) -> Callable[[type[_Table]], type[_Table]]:
+def of(makes: Callable[..., Any]) -> Callable[[type[_AnyTable]], type[_AnyTable]]:
     """Decorate a table whose keys are the parameters of a constructor, with their names, types and defaults.
 
     Keys of the class itself are kept.
     """
 
-    def with_keys(table: type[_Table]) -> type[_Table]:
+    def with_keys(table: type[_AnyTable]) -> type[_AnyTable]:
         hints = get_type_hints(makes)
         own: dict[str, Any] = {}
         for name, each in signature(makes).parameters.items():
             if name not in table.model_fields and name != "stated_ratio":  # which is poissons_ratio in a file
                 own[name] = hints[name], ... if each.default is Parameter.empty else each.default
-        made: type[_Table] = create_model(table.__name__, __base__=table, __doc__=table.__doc__, **own)
+        made: type[_AnyTable] = create_model(table.__name__, __base__=table, __doc__=table.__doc__, **own)
         made.makes = makes
         return made
 
@@ -134,7 +134,7 @@ class LinkTable(TomlTable):
         nu = self.poissons_ratio
         shape = self.section.get("shape", MISSING)
         require(shape in SHAPE_TABLES, "link.section.shape", shape, f"give one of {', '.join(SHAPE_TABLES)}")
-        section = validated(SHAPE_TABLES[shape], self.section, "link.section").build()
+        section = validate_table(SHAPE_TABLES[shape], self.section, "link.section").build()
         is_isotropic = self.material is None or materials()[self.material].is_isotropic
         if not is_isotropic and section.shear_factor is None:  # Cowper's needs a Poisson's ratio of at most 0.5
             section = replace(section, shear_factor=section.cowper_factor(0.0))
@@ -177,10 +177,10 @@ ARM_TABLES: dict[str, type[StrictTable]] = {"": ArmTable, **PART_TABLES}
 
 def arm_of_table(table: dict[str, Any]) -> Arm:
     """Return the arm of a parsed TOML table.  Raises ParameterError for the first problem."""
-    head = validated(ArmTable, {key: value for key, value in table.items() if key not in LOOP_TABLES}, "")
+    head = validate_table(ArmTable, {key: value for key, value in table.items() if key not in LOOP_TABLES}, "")
     own = head.model_dump(exclude_unset=True)
     parts = parts_of_tables(own)
-    own["assumptions"] = [*head.assumptions, *assumed(_listed(head.link))]
+    own["assumptions"] = [*head.assumptions, *material_assumptions(_listed(head.link))]
     return Arm(**{name: own[name] for name in AT_THE_TOP if name in own}, **parts)
 
 
@@ -235,7 +235,7 @@ def file_key(key: str, arm: Arm | None = None) -> Quantity:
 def _within(name: str, place: str, table: Any) -> Any:
     """Return the record of a table; the key of a ParameterError begins with its place in the file."""
     try:
-        return validated(PART_TABLES[name], filled(table) if name == "link" else table, name).build()
+        return validate_table(PART_TABLES[name], fill_material(table) if name == "link" else table, name).build()
     except ParameterError as error:
         key = ".".join((place, *error.key.split(".")[1:]))
         raise ParameterError(key=key, value=error.value, remedy=error.remedy) from None

@@ -13,7 +13,7 @@ from typing import Any
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Law, Part
 from tfarm.arm.materials import SHEAR
-from tfarm.arm.parts import Link, differing
+from tfarm.arm.parts import Link, repr_fields
 from tfarm.arm.records import MOST_PARTS, Arm
 from tfarm.arm.schema import parts_of_tables
 from tfarm.errors import ParameterError, must_be_known, require
@@ -40,13 +40,13 @@ def arm_table(arm: Arm) -> dict[str, Any]:
         "theory": None if arm.theory == "timoshenko" else arm.theory,
         "input": None if arm.input == "hub_torque" and motor is None else arm.input,  # required with a motor
         "link": links if arm.outer else links[0],
-        "hub": differing(arm.hub, always=1),
-        "clamp": differing(arm.clamp, always=0) or None,
-        "joint": differing(arm.joint, always=0) or None,
-        "motor": motor and differing(motor, always=2),
-        "attachment": [differing(each, always=1) for each in arm.attachments] or None,
+        "hub": repr_fields(arm.hub, always=1),
+        "clamp": repr_fields(arm.clamp, always=0) or None,
+        "joint": repr_fields(arm.joint, always=0) or None,
+        "motor": motor and repr_fields(motor, always=2),
+        "attachment": [repr_fields(each, always=1) for each in arm.attachments] or None,
         "gauge": {"x": arm.gauge.x, "side": arm.gauge.side} if arm.gauge.x else None,
-        "payload": differing(arm.payload, always=2),
+        "payload": repr_fields(arm.payload, always=2),
     }
     if motor is not None and motor.back_emf_constant == motor.torque_constant:  # its default
         del tables["motor"]["back_emf_constant"]
@@ -178,7 +178,7 @@ def numbers_of(arm: Arm) -> dict[str, float]:
     parts |= {f"attachment.{n}": each for n, each in enumerate(arm.attachments, 1)}
     for place, part in parts.items():
         if part is not None:
-            found |= {f"{place}.{name}": value for name, value in differing(part, always=MOST_PARTS).items()}
+            found |= {f"{place}.{name}": value for name, value in repr_fields(part, always=MOST_PARTS).items()}
     return found
 
 

@@ -232,7 +232,7 @@ def card_of(found: Margins | Analysis, chain: Chain, graded: Margins | Analysis 
     return LoopCard(
         **words_of(found.verdict, chain),
         **_margins(graded.in_band, graded.delay_margin_seconds, chain.sampling.period),
-        least_damping=_least_damped(graded.verdict.ringing),
+        least_damping=_least_damped(graded.verdict.oscillating_poles),
         time_constant=slowest if slowest is not None and slowest > 0 else None,
         minimum_damping=None if limit is None else limit.value,
     )

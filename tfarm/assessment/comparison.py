@@ -1,4 +1,4 @@
-"""Two loops compared; each is computed by the functions for one, and `tfarm.schema.compare` finds the differences."""
+"""Two loops compared; each is computed by the functions for one, and `schema.compare_records` finds the differences."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -19,13 +19,12 @@ from tfarm.loop.circle_crossings import FACTOR, stable_windows
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.margins import Margins
 from tfarm.loop.margins import margins as margins_of
-from tfarm.loop.plane import Plane, between, gain_map, plane, ranges_of
+from tfarm.loop.plane import Plane, cell_middles, gain_map, plane, ranges_of
 from tfarm.loop.poles import HUB, closed_loop_poles, poles_by_mode
 from tfarm.loop.sampled_verdict import SAMPLED_LOOP, Analysis, SampledBrief, brief_of, sampled_brief, sampled_verdict
 from tfarm.records import frozen
 from tfarm.response.frequency import Bode, bode, resonant_band
-from tfarm.schema import Difference, Percent, Quantity
-from tfarm.schema import compare as compare_records
+from tfarm.schema import Difference, Percent, Quantity, compare_records
 from tfarm.spectrum import damped_modes
 from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum.gains import default_gains
@@ -135,7 +134,7 @@ class ComparedSide:
             late = loop.chain.sampling.delay_samples + delay / loop.chain.sampling.period
             return [stable_windows(loop.with_delay(each), FACTOR) for each in late.tolist()]
         in_s = ContinuousLoop(self.case)
-        factors = between(0.0, MOST_FACTOR, FACTORS)
+        factors = cell_middles(0.0, MOST_FACTOR, FACTORS)
         return [*plane(in_s, ("delay", "gain"), in_s.law.delay + delay, factors).stable_intervals]
 
 
@@ -288,7 +287,7 @@ class Comparison:
         for n, (name, number) in enumerate(zip(PLANE, (80, 40), strict=True)):  # edges upwards are exact
             own = [1.5 * law[name] for law in laws]  # the plane reaches that far beyond the controllers' own gains
             low, high = zip(*(ranges_of(side.arm)[n] for side in self.sides), strict=True)
-            axes.append(between(min(*low, *own), max(*high, *own), number))
+            axes.append(cell_middles(min(*low, *own), max(*high, *own), number))
         x, y = axes
         x = np.union1d(x, [1e-6 * x[-1]])  # a column just beyond 0, from which most regions begin
         return [gain_map(side.arm, x, y, law.Kp) for side, law in zip(self.sides, laws, strict=True)]

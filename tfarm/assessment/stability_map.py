@@ -86,7 +86,7 @@ def stable_regions(case: Case) -> StableRegions:
     def drawn(K1: Real, K2: Real) -> Complex:
         return np.asarray(wide * np.log(K1) + 1j * K2 / np.ptp(span))
 
-    planes = [outlined(loop, across[(low <= across) & (top >= across)], cut, drawn) for loop in loops]
+    planes = [outline_region(loop, across[(low <= across) & (top >= across)], cut, drawn) for loop in loops]
     every = np.unique(np.concatenate([plane.x for plane in planes]))
     return StableRegions(gain_map(arm, every, cut), tuple(with_more(plane, every) for plane in planes))
 
@@ -99,12 +99,12 @@ def sampled_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> GainMap | None:
         across = with_both_sides(rate_columns(arm, x, SAMPLED_COLUMNS), ends_of_K1(loop))
         across = across[(x.low <= across) & (x.high > across)]
         up = np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])
-        return outlined(loop, across, up, lambda K1, K2: np.asarray(1.5 * x.place(K1) + 1j * y.place(K2)))
+        return outline_region(loop, across, up, lambda K1, K2: np.asarray(1.5 * x.place(K1) + 1j * y.place(K2)))
     except ConvergenceError:
         return None
 
 
-def outlined(loop: Sampled, across: Real, up: Real, drawn: Callable[[Real, Real], Complex]) -> GainMap:
+def outline_region(loop: Sampled, across: Real, up: Real, drawn: Callable[[Real, Real], Complex]) -> GainMap:
     """Return the sampled region cut at these K1, and between them where its outline as it is `drawn` has corners."""
     return rounded_map(sampled_map(loop, across, up), drawn)
 

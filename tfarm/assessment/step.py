@@ -34,8 +34,8 @@ from tfarm.case import Case
 from tfarm.digits import general
 from tfarm.dsp import Chain, traces
 from tfarm.dsp.plant import sensed_plant
-from tfarm.dsp.results import ENOUGH_CHANGE, simulated
-from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, described, resting, scenario
+from tfarm.dsp.results import ENOUGH_CHANGE, simulate_modes
+from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, describe_scenario, rest_scenario, scenario
 from tfarm.dsp.simulate import MOST_BETWEEN, SETTLING_BAND, final_value, first_mode, settling_time
 from tfarm.dsp.stages import admit_case, not_covered
 from tfarm.errors import must_be_known, require
@@ -54,7 +54,7 @@ from tfarm.loop.time_response import (
     usual_poles,
 )
 from tfarm.records import frozen
-from tfarm.response.signals import Controller, controller, placed
+from tfarm.response.signals import ControllerSignals, controller, locate_output
 from tfarm.schema import Column, Percent, Quantity, Table, across
 from tfarm.schema.html import as_html
 from tfarm.spectrum.table import first_frequency
@@ -72,7 +72,9 @@ CONSUMER = Consumer(
 SAMPLED_NAMES = {"reference": "reference", "slew": "slew", "pulse": "pulse", "deflection": "decay"}  # by scenario
 MOMENT = AT_HUB[-1]
 UNSTABLE = "unstable"
-Curve = tuple[Real, Real, Real, Peak | None]  # times [s], values, bounds of their errors, and the peak where known
+SignalCurve = tuple[
+    Real, Real, Real, Peak | None
+]  # times [s], values, bounds of their errors, and the peak where known
 PARTS = ("hub", "tip", "root_moment", "torque")
 TIME_CONSTANTS = 8.0  # of the dominant pole: length of a record after its input, to 3e-4 of the final value
 CONVERGED = 1e-6  # of the peak of each signal: bound on its error, everywhere in the record, of a converged response
@@ -140,7 +142,7 @@ class LoopResponse:
 
 
 @dataclass(frozen=True)
-class _Record:
+class _LoopRecord:
     """Times [s] of the signals of a loop, the names of those of hub and tip, root moment and torque, and references.
 
     `busy_until` [s] is the end of the input, `band` the share of the travel within which a signal settles.
@@ -173,7 +175,7 @@ class _Record:
     def _of_sampled(self, case: Case, task: Scenario, names: Sequence[str]) -> LoopResponse:
         """The sampled loop, with the signals of these names."""
         between = round(task.period / self.t[1]) - 1
-        run, used = simulated(case, task, between=between, outputs=names)
+        run, used = simulate_modes(case, task, between=between, outputs=names)
         signals = {name: traces.continuous(run, name)[1][: self.t.size] for name in names}
         signals[TORQUE] = traces.held_at(run, run.torque, self.t[: signals[MOMENT].size])
         is_converged = used.change is not None and used.change <= ENOUGH_CHANGE
@@ -181,7 +183,7 @@ class _Record:
         curves = {name: (self.t[: y.size], y, 0 * y, None) for name, y in signals.items()}
         return self._loop(word, is_converged, f"{used.modes} modes", curves)
 
-    def _loop(self, stability: str, is_converged: bool, count: str, curves: Mapping[str, Curve]) -> LoopResponse:
+    def _loop(self, stability: str, is_converged: bool, count: str, curves: Mapping[str, SignalCurve]) -> LoopResponse:
         """The figures of a loop; of an unstable one those of its signals are left out."""
         names = zip(PARTS, self.names, strict=True) if stability != UNSTABLE else ()
         of = {part: self._figures(name, *curves[name]) for part, name in names}
@@ -219,7 +221,7 @@ class _Record:
         settled = known["settling_time"]
         return SignalFigures(
             signal=name,
-            unit=unit_of(self.arm, name),
+            unit=signal_unit(self.arm, name),
             **known,
             note="; ".join(words) or None,
             at_rest_after=None if settled is None else self.busy_until + settled,
@@ -266,7 +268,7 @@ class _Record:
 
 
 @frozen(kw_only=True)
-class Step(_Record):
+class Step(_LoopRecord):
     """Time responses of an arm under a controller, continuous-time and sampled, at the times `t` [s].
 
     A law in z has no continuous-time loop; the signals of a sampled loop end where it was stopped.  `names` are the
@@ -274,7 +276,7 @@ class Step(_Record):
     response at any time, `busy_until` [s] the end of the input.
     """
 
-    controller: Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]
+    controller: Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]
     scenario: Annotated[str, Quantity(help="reference, slew, pulse or deflection")]
     scenario_in_words: Annotated[str, Quantity("scenario", help="input with its size")]
     duration: Annotated[float, Quantity("duration", "s", 4, help="length of the record")]
@@ -310,7 +312,7 @@ class Step(_Record):
     def csv_table(self) -> Table:
         """The signals of both loops at the same times, empty where a run was stopped."""
         signals = (
-            Column(prefix + name, unit=unit_of(self.arm, name), of=[*y.tolist(), *[""] * (self.t.size - y.size)])
+            Column(prefix + name, unit=signal_unit(self.arm, name), of=[*y.tolist(), *[""] * (self.t.size - y.size)])
             for prefix, loop in (("", self.continuous), ("sampled_", self.sampled))
             for name, y in (loop.signals.items() if loop else ())
         )
@@ -320,9 +322,9 @@ class Step(_Record):
         return as_html(self.table)
 
 
-def unit_of(arm: Arm, name: str) -> str:
+def signal_unit(arm: Arm, name: str) -> str:
     """SI unit of a signal, or of the input as "torque"."""
-    return arm.input_unit if name == TORQUE else placed(name, arm.length)[0].unit
+    return arm.input_unit if name == TORQUE else locate_output(name, arm.length)[0].unit
 
 
 def step(
@@ -367,14 +369,14 @@ def step(
     is_step = scenario_name == "reference"
     hub = AT_HUB[0]
     if is_step:
-        hub, own = followed(case.law)
+        hub, own = step_reference(case.law)
         case = case.under(own)
     arm = case.arm
     chain = case.chain
     poles = None if case.law.is_discrete else usual_poles(ContinuousLoop(case))
     length = usual_duration(poles, chain) if duration is None else duration
     if is_step:
-        task = resting("reference", arm, chain, length, hub)
+        task = rest_scenario("reference", arm, chain, length, hub)
     else:
         task = scenario(SAMPLED_NAMES[scenario_name], arm, chain, length)
     require(task.t.size > 1, "duration", length, f"at least one sampling period, {task.period:g} s")
@@ -389,16 +391,16 @@ def step(
     t = _times(response, task)
     angle = traces.reference_angle(task, t) if of_angle else np.ones(t.size)
     reference = {hub: angle, tip: arm.reach * angle} if is_step or scenario_name == "slew" else {}
-    found = _Record(arm, (*names[:3], TORQUE), task.busy_until, t, reference, band)
+    found = _LoopRecord(arm, (*names[:3], TORQUE), task.busy_until, t, reference, band)
     return Step(
         **vars(found), controller=controller(case.law, arm), scenario=scenario_name, period=task.period,
-        duration=min(length, float(t[-1])), scenario_in_words=described(task, arm, chain), response=response,
+        duration=min(length, float(t[-1])), scenario_in_words=describe_scenario(task, arm, chain), response=response,
         sampled=found._of_sampled(case, task, names),
         continuous=None if response is None else found._of_continuous(response, not_covered(CONTINUOUS, chain)),
     )  # fmt: skip
 
 
-def followed(law: Law) -> tuple[str, Law]:
+def step_reference(law: Law) -> tuple[str, Law]:
     """Return the signal of the hub whose reference steps, and the law with that reference.
 
     Raises ParameterError for a law that feeds back neither hub angle nor hub rate.

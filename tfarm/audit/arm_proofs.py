@@ -140,12 +140,12 @@ def prove(arm: Arm, chain: Chain | None = None) -> ArmProof:
         has_rigid_mode=arm.has_rigid_mode,
         band=band,
         errors=tuple((output, worst) for output, worst in errors if worst is not None),
-        boxes=tuple(boxed(arm)),
+        boxes=tuple(enclose_poles(arm)),
         **found,
     )
 
 
-def boxed(arm: Arm) -> Iterator[Boxed]:
+def enclose_poles(arm: Arm) -> Iterator[Boxed]:
     """Yield damped modes and the default loop's poles, each enclosed and counted; a failed proof is noted."""
     boxes: dict[str, Callable[[], DampedModes | Poles]] = {}
     if not arm.is_undamped:

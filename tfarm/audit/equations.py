@@ -20,22 +20,22 @@ from .formulas import (
     Expression,
     L,
     at_running_point,
+    balance_residual,
     clauses,
     d_dt,
     d_dx,
-    determinant,
     difference,
     integral_parts,
     jet,
     jets,
-    listed,
+    matrix_of_text,
     mismatch,
-    parsed,
+    parse_expression,
     remainder,
+    residual_text,
     sides,
     symbol,
     symbols,
-    unbalanced,
     x,
 )
 from .rows import formula_of
@@ -53,7 +53,7 @@ def equation(number: int) -> Expression:
 
 def along_arm(field: str, text: str) -> str:
     """(1), (2): against the Euler-Lagrange equation of y or phi along the arm."""
-    l = parsed(DENSITY)
+    l = parse_expression(DENSITY)
     rate = jet(field, t=1)
     slope = jet(field, x=1)
     euler = d_dt(sp.diff(l, rate)) + d_dx(sp.diff(l, slope)) - sp.diff(l, jet(field))
@@ -62,23 +62,25 @@ def along_arm(field: str, text: str) -> str:
 
 def at_tip(field: str, text: str) -> str:
     """(4), (5): against the natural end condition, payload's inertia against the density's flux."""
-    inertia = d_dt(sp.diff(parsed(PAYLOAD), jet(field, t=1, at=AT_TIP)))
-    return remainder(at_running_point(inertia - difference(text)) - sp.diff(parsed(DENSITY), jet(field, x=1)))
+    inertia = d_dt(sp.diff(parse_expression(PAYLOAD), jet(field, t=1, at=AT_TIP)))
+    return remainder(at_running_point(inertia - difference(text)) - sp.diff(parse_expression(DENSITY), jet(field, x=1)))
 
 
 def at_hub(text: str) -> str:
     """(3): against the balance of the whole arm's angular momentum, which has u as its only source."""
     theta_t = jet("theta", t=1)
-    momentum = sp.Function("integral")(sp.diff(parsed(DENSITY), theta_t)) + sp.diff(parsed(PAYLOAD), theta_t)
+    momentum = sp.Function("integral")(sp.diff(parse_expression(DENSITY), theta_t)) + sp.diff(
+        parse_expression(PAYLOAD), theta_t
+    )
     inside, outside = integral_parts(d_dt(momentum))
     of_link = sp.Function("integral")(sp.expand(inside.subs(accelerations()))) + outside.subs(accelerations(AT_TIP))
-    return unbalanced(symbol("I_h") * jet("theta", t=2) - symbol("u") + of_link - difference(text))
+    return balance_residual(symbol("I_h") * jet("theta", t=2) - symbol("u") + of_link - difference(text))
 
 
 def at_clamp(field: str, text: str) -> str:
     """(6), (7): what the clamp would do by its force (or moment) on what the condition leaves free."""
     free = jet(field, t=1, at=AT_ROOT)
-    reaction = -sp.diff(parsed(DENSITY), jet(field, x=1))
+    reaction = -sp.diff(parse_expression(DENSITY), jet(field, x=1))
     solved = sp.solve(d_dt(difference(text)), free)
     return remainder(reaction * (solved[0] if solved else free))
 
@@ -118,7 +120,7 @@ def waves_of(text: str) -> dict[str, Expression]:
 def inserted(number: int, waves: dict[str, Expression], stiffness: str = STIFFNESS) -> Expression:
     """An equation (8)-(14) with Y and Phi, and E as it is in the appendix."""
     places = {"": x, "(0,s)": sp.Integer(0), "(L,s)": L}
-    read = equation(number).subs(symbol("E"), parsed(stiffness) / symbol("I"))
+    read = equation(number).subs(symbol("E"), parse_expression(stiffness) / symbol("I"))
     fields = (each for each in jets(read) if each[1] in waves)
     return read.subs({s: sp.diff(waves[field], x, i).subs(x, places[at]) for s, field, i, _, at in fields})
 
@@ -159,7 +161,7 @@ def is_dispersion(text: str) -> str:
     polynomial = sum(c * square ** (n // 2) for (n,), c in wave_determinant().terms())
     signs = [sp.expand(sp.numer(sp.together(sp.expand(polynomial.subs(symbol("pm"), sign))))) for sign in (1, -1)]
     root = "0" if signs == [0, 0] else "lambda is no root of the determinant of (8), (9)"
-    return listed([mismatch(right, PAPER_UNITS), root])
+    return residual_text([mismatch(right, PAPER_UNITS), root])
 
 
 def are_entries(text: str) -> str:
@@ -183,7 +185,7 @@ def are_entries(text: str) -> str:
 def determinants(text: str) -> dict[str, Expression]:
     """Delta and Delta_k_i of a text, as polynomials in a_ij and U."""
     pairs = (clause.split(" = ") for clause in clauses(text))
-    return {name: determinant(rows).det(method="berkowitz") for name, rows in pairs}
+    return {name: matrix_of_text(rows).det(method="berkowitz") for name, rows in pairs}
 
 
 def are_determinants(text: str) -> str:
@@ -233,7 +235,7 @@ def by_appendix(text: str, v: dict[str, Any]) -> list[Any]:
     Theta = symbol("Theta")
     at_root = sp.solve(Phi.subs(x, 0), Theta)[0]  # by (14)
     psi, w = (motion.subs(Theta, at_root) for motion in (Phi + Theta, Y + x * Theta))
-    ends = (psi.subs(x, 0), w.subs(x, L), psi.subs(x, L), (parsed(STIFFNESS) * sp.diff(psi, x)).subs(x, 0))
+    ends = (psi.subs(x, 0), w.subs(x, L), psi.subs(x, L), (parse_expression(STIFFNESS) * sp.diff(psi, x)).subs(x, 0))
     return [mpmath.mpmathify(number(f)) for f in ends]
 
 

@@ -63,7 +63,7 @@ L = symbol("L")
 
 
 @cache
-def parsed(text: str) -> Expression:
+def parse_expression(text: str) -> Expression:
     """The SymPy expression of a text without = or ;."""
 
     read = _read(text, sp.Function("integral"))
@@ -91,7 +91,7 @@ def tex(text: str) -> str:
 
     def written(part: str) -> str:
         if part.startswith("|"):
-            return str(sp.latex(determinant(part), mat_str="vmatrix", mat_delim=""))
+            return str(sp.latex(matrix_of_text(part), mat_str="vmatrix", mat_delim=""))
         read = _read(part, lambda f: sp.Integral(f, (x, 0, L)), evaluate=False)
         heads = {s: s.name.partition("(") for s in read.free_symbols}
         names = {
@@ -104,9 +104,9 @@ def tex(text: str) -> str:
     return re.sub(r"\b1 (\\cdot )?(?=\\frac\{1\})", "", found.replace(r"+ \pm", r"\pm"))
 
 
-def determinant(text: str) -> Expression:
+def matrix_of_text(text: str) -> Expression:
     """The matrix of a text such as |a11 a12 / a21 a22|."""
-    return sp.Matrix([[parsed(entry) for entry in row.split()] for row in text.strip("|").split(" / ")])
+    return sp.Matrix([[parse_expression(entry) for entry in row.split()] for row in text.strip("|").split(" / ")])
 
 
 def clauses(text: str) -> list[str]:
@@ -117,7 +117,7 @@ def clauses(text: str) -> list[str]:
 def sides(text: str) -> dict[Expression, Expression]:
     """Left and right side of each of a text's equations."""
     pairs = [clause.split(" = ") for clause in clauses(text) if " = " in clause]
-    return {parsed(left): parsed(right) for left, right in pairs}
+    return {parse_expression(left): parse_expression(right) for left, right in pairs}
 
 
 def difference(text: str) -> Expression:
@@ -171,7 +171,7 @@ def at_running_point(f: Expression) -> Expression:
     return f.subs({s: jet(field, i, j) for s, field, i, j, at in jets(f) if at == AT_TIP}).subs(L, x)
 
 
-def unbalanced(f: Expression) -> str:
+def balance_residual(f: Expression) -> str:
     """The rest of f = integral(g) + h(tip, root), which should vanish for every motion: "0" if it does.
 
     Let the arm end at a running x.  f vanishes for every length if it does for length 0, and if its slope
@@ -200,7 +200,7 @@ def unit_dimension(text: str) -> Expression:
 PAPER_UNITS: dict[str, Expression] = {name: unit_dimension(text) for name, text in DATA["units"].items()}
 
 
-def spelled(dimension: Expression) -> str:
+def base_units_text(dimension: Expression) -> str:
     """A dimension in SI base units."""
     powers = dimension.as_powers_dict()
     each = ((name, powers[UNITS[name]]) for name in ("kg", "m", "s"))
@@ -222,7 +222,7 @@ def dimension(f: Expression, units: dict[str, Expression]) -> Expression:
         return parts[0] * METRE
     kinds = {*parts, sp.Integer(1)} if isinstance(f, sp.exp) else set(parts)
     if len(kinds) > 1:
-        raise MismatchError(" + ".join(sorted(spelled(each) for each in kinds)))
+        raise MismatchError(" + ".join(sorted(base_units_text(each) for each in kinds)))
     return kinds.pop()
 
 
@@ -243,6 +243,6 @@ def mismatch(f: Expression, units: dict[str, Expression]) -> str:
     return "0"
 
 
-def listed(found: Iterable[str]) -> str:
+def residual_text(found: Iterable[str]) -> str:
     """Residuals that are not "0", in one text."""
     return "; ".join(each for each in found if each != "0") or "0"

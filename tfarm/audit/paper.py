@@ -1,8 +1,8 @@
 """The audit of the paper: a row for each equation, its table and its appendix.
 
 (15)-(20) and the feedback: integration by parts with payload and with a1, a2, a3 free.  `rate` differentiates a V along
-the motion (1)-(5), which `equations` has checked against Hamilton's principle, and `unbalanced` compares two such rates
-for every motion at once.  Table 1: its values and units.  (21)-(23), and the network's inputs of section 5.
+the motion (1)-(5), which `equations` has checked against Hamilton's principle, and `balance_residual` compares two such
+rates for every motion at once.  Table 1: its values and units.  (21)-(23), and the network's inputs of section 5.
 """
 
 import math
@@ -29,22 +29,22 @@ from .formulas import (
     AT_TIP,
     PAPER_UNITS,
     Expression,
+    balance_residual,
+    base_units_text,
     clauses,
     d_dt,
     difference,
     integral_parts,
     jet,
     jets,
-    listed,
     mismatch,
-    parsed,
+    parse_expression,
     remainder,
+    residual_text,
     sides,
-    spelled,
     symbol,
     symbols,
     tex,
-    unbalanced,
     unit_dimension,
 )
 from .rows import TEXTS, AuditRow, formula_of, is_zero
@@ -57,7 +57,7 @@ MODES = 8  # of the arm whose gain is switched
 SWITCHED = ((0.1, 27.0), (0.6, 25.0))  # K2, and for how long [ms]
 
 
-def pumped(switched: tuple[tuple[float, float], ...]) -> float:
+def growth_per_period(switched: tuple[tuple[float, float], ...]) -> float:
     """Growth per period of the loop (19) on the default arm when K2 is switched: each value with its duration [ms]."""
     model = modal_model(load("sasaki2012"), ["hub_rate", "root_moment"], MODES)
     period = np.eye(model.order)
@@ -76,15 +76,22 @@ def growth() -> dict[str, Any]:
 def pumping() -> dict[str, Any]:
     """A gain that varies between two stable values and drives the arm unstable."""
     low, high = SWITCHED
-    constant = max(pumped((each,)) for each in SWITCHED)
-    return {"K1": K1, "modes": MODES, "low": low, "high": high, "grows": pumped(SWITCHED), "constant": constant}
+    constant = max(growth_per_period((each,)) for each in SWITCHED)
+    return {
+        "K1": K1,
+        "modes": MODES,
+        "low": low,
+        "high": high,
+        "grows": growth_per_period(SWITCHED),
+        "constant": constant,
+    }
 
 
 V = formula_of("(15)")
 CONTROL_LAW = formula_of("(19)")
 a1, a2, a3, u = symbols("a1 a2 a3 u")
 theta_t = jet("theta", t=1)
-M0 = parsed("E*I*phi_x(0,t)")
+M0 = parse_expression("E*I*phi_x(0,t)")
 
 
 def rate(energy_of: Expression, damping: Expression = 0) -> Expression:
@@ -106,7 +113,7 @@ def energy_of(text: str) -> Expression:
     return sides(text)[symbol("V")]
 
 
-def claimed(text: str) -> tuple[Expression, dict[Expression, Expression]]:
+def read_claim(text: str) -> tuple[Expression, dict[Expression, Expression]]:
     """V_t of a text, and the conditions that come with it."""
     found = sides(text)
     return found.pop(jet("V", t=1)), found
@@ -115,32 +122,32 @@ def claimed(text: str) -> tuple[Expression, dict[Expression, Expression]]:
 def is_total_energy(text: str) -> str:
     """(15): with all weights one, the torque's power is all that changes the arm's energy."""
     ones = dict.fromkeys((a1, a2, a3), 1)
-    return unbalanced(rate(energy_of(text).subs(ones)) - u * theta_t)
+    return balance_residual(rate(energy_of(text).subs(ones)) - u * theta_t)
 
 
 def is_derivative(text: str) -> str:
     """(16): against d/dt of (15) as printed, before any equation of motion."""
-    return remainder(*integral_parts(d_dt(energy_of(TEXTS["(15)"]["printed"])) - claimed(text)[0]))
+    return remainder(*integral_parts(d_dt(energy_of(TEXTS["(15)"]["printed"])) - read_claim(text)[0]))
 
 
 def is_substituted(text: str) -> str:
     """(17): (16) with the accelerations of (1)-(3)."""
-    inside, outside = integral_parts(claimed(formula_of("(16)"))[0])
-    there, beyond = integral_parts(claimed(text)[0])
+    inside, outside = integral_parts(read_claim(formula_of("(16)"))[0])
+    there, beyond = integral_parts(read_claim(text)[0])
     return remainder(inside.subs(accelerations()) - there, outside.subs(accelerations(AT_ROOT)) - beyond)
 
 
 def is_power(text: str) -> str:
     """(18): against dV/dt of (15) with its payload, integrated by parts."""
-    value, conditions = claimed(text)
-    return unbalanced((rate(energy_of(V)) - value).subs(conditions))
+    value, conditions = read_claim(text)
+    return balance_residual((rate(energy_of(V)) - value).subs(conditions))
 
 
 def proven_gains(law: Expression) -> dict[str, Expression]:
     """The intervals of K1 and K2 for which some a1, a2 > 0 make the true dV/dt (a3 = a1) a negative square."""
     M = symbol("M(0)")
-    slope = parsed("phi_x(0,t)")
-    power = sp.expand(claimed(formula_of("(18)"))[0].subs(u, law)).subs(slope, M / parsed("E*I"))
+    slope = parse_expression("phi_x(0,t)")
+    power = sp.expand(read_claim(formula_of("(18)"))[0].subs(u, law)).subs(slope, M / parse_expression("E*I"))
     weight = sp.solve(power.coeff(M), a1)[0] / a2  # a1/a2, which must be positive
     damping = -sp.expand(power.subs(M, 0)) / (a2 * theta_t**2)
     positive = {"K1": damping, "K2": weight}
@@ -153,7 +160,7 @@ def are_proven_gains(text: str) -> str:
     wrong = []
     for clause in clauses(text)[1:]:
         low, name, high = clause.split(" < ")
-        allowed = sp.Interval.open(parsed(low), parsed(high))
+        allowed = sp.Interval.open(parse_expression(low), parse_expression(high))
         sets = {"allowed, not proven": allowed - proven[name], "proven, not allowed": proven[name] - allowed}
         left = {what: rest for what, rest in sets.items() if rest is not sp.S.EmptySet}
         wrong += [f"{what}: {name} in {sp.pretty(rest, use_unicode=False)}" for what, rest in left.items()]
@@ -162,28 +169,28 @@ def are_proven_gains(text: str) -> str:
 
 def is_decay(text: str) -> str:
     """(20): (19) in the true dV/dt."""
-    value, stated = claimed(text)
-    weights = stated or claimed(formula_of("(20)"))[1]
+    value, stated = read_claim(text)
+    weights = stated or read_claim(formula_of("(20)"))[1]
     change = rate(energy_of(V)).subs(u, sides(CONTROL_LAW)[u]) - value
-    return unbalanced(change.subs(a3, weights[a3]).subs(a1, weights[a1]))
+    return balance_residual(change.subs(a3, weights[a3]).subs(a1, weights[a1]))
 
 
 def is_damped_decay(text: str) -> str:
     """Section 3 with C > 0: dV/dt may be -a2 K1 theta_t^2 less what the material dissipates, no more."""
     weights = {a1: a2 * (1 - symbol("K2"))}
-    lost = parsed("-a2*K1*theta_t^2 - a1*C*integral(E*I*phi_xt^2)")
+    lost = parse_expression("-a2*K1*theta_t^2 - a1*C*integral(E*I*phi_xt^2)")
     change = rate(energy_of(V).subs(a3, a1), symbol("C")).subs(u, sides(text)[u]) - lost
-    return unbalanced(change.subs(weights))
+    return balance_residual(change.subs(weights))
 
 
 def is_varied_decay(text: str) -> str:
     """The proof with weights that follow K2(t): a1 = a2 (1 - K2) brings in the rate of K2."""
-    value, conditions = claimed(text)
+    value, conditions = read_claim(text)
     weight = conditions[a1]
     K2_t = conditions.get(jet("K2", t=1), jet("K2", t=1))
     law_rate = rate(energy_of(V)).subs(a3, a1).subs(u, sides(CONTROL_LAW)[u])
     moving = sp.diff(energy_of(V).subs(a3, a1), a1) * sp.diff(weight, symbol("K2")) * K2_t
-    return unbalanced((law_rate + moving - value).subs(a1, weight))
+    return balance_residual((law_rate + moving - value).subs(a1, weight))
 
 
 # ------------------------------------------------------------ Table 1, (21)-(23), section 5
@@ -206,7 +213,7 @@ def is_aluminium(text: str) -> str:
     """rho: the relative distance from what aluminium alloys weigh, the material of E and G."""
     name, value, dimension = quantity(text)
     if dimension != PAPER_UNITS[name]:
-        return f"{name} in {spelled(dimension)}"
+        return f"{name} in {base_units_text(dimension)}"
     low, high = ALUMINIUM_DENSITIES
     distance = max(1 - value / low, value / high - 1, 0.0)
     return f"{distance:.4f}" if distance else "0"
@@ -216,14 +223,14 @@ def are_units(text: str) -> str:
     """Every sum in (1), (2), (4), (5) and (A.2) with the units of the text."""
     given = {name: unit_dimension(of) for name, of in (clause.split(": ") for clause in clauses(text))}
     formulas = (*map(equation, (1, 2, 4, 5)), difference(formula_of("(A.2)")))
-    return listed(mismatch(formula, PAPER_UNITS | given) for formula in formulas)
+    return residual_text(mismatch(formula, PAPER_UNITS | given) for formula in formulas)
 
 
 def is_given(name: str, text: str) -> str:
     """Whether a parameter that (2), (3) and the a_ij need has a value of the right dimension."""
     for clause in (clause for clause in clauses(text) if clause.startswith(f"{name} = ")):
         _, value, dimension = quantity(clause)
-        return "0" if value > 0 and dimension == PAPER_UNITS[name] else f"{name} in {spelled(dimension)}"
+        return "0" if value > 0 and dimension == PAPER_UNITS[name] else f"{name} in {base_units_text(dimension)}"
     return f"{name} has no value"
 
 
@@ -269,7 +276,7 @@ def descends(increment: str, update: str) -> str:
 def is_cost(text: str) -> str:
     """(23): e, the control signal of section 5, against the torque of (19) with K for K2, x for the moment; and E."""
     x, e, a, b, u = symbols("x e a b u")
-    moment = {parsed("phi_x(0,t)"): x / parsed("E*I"), symbol("K2"): symbol("K")}
+    moment = {parse_expression("phi_x(0,t)"): x / parse_expression("E*I"), symbol("K2"): symbol("K")}
     torque = sides(CONTROL_LAW)[u].subs(moment)
     given = sides(text)
     signal = given[e].subs(u, given.get(u, torque))  # "control input": the torque, unless the text defines it
@@ -284,11 +291,13 @@ def are_gain_units(text: str) -> str:
         of = unit_dimension(unit)
         for name in (s.name for s in sides(text)[left].coeff(factor).free_symbols if s.name.startswith("K")):
             needs.setdefault(name, {PAPER_UNITS.get(name, of)}).add(of)
-    clashes = [f"{name}: {' and '.join(sorted(map(spelled, two)))}" for name, two in needs.items() if len(two) > 1]
+    clashes = [
+        f"{name}: {' and '.join(sorted(map(base_units_text, two)))}" for name, two in needs.items() if len(two) > 1
+    ]
     return "; ".join(clashes) or "0"
 
 
-def beyond(known: int, separator: str, text: str) -> str:
+def count_statements(known: int, separator: str, text: str) -> str:
     """How many statements, signals of section 5 or the like are in a text beyond those known."""
     return str(len(text.split(separator)) - known)
 
@@ -307,12 +316,12 @@ CHECKS: dict[str, Callable[[str], str]] = {
     "(22)": lambda text: descends(formula_of("(21)"), text),
     "(23)": is_cost,
     "(20), (23): K": are_gain_units,
-    "section 5: inputs": partial(beyond, INPUT_NEURONS, ", "),
-    "section 5: alpha_c": partial(beyond, 1, ";"),
-    "section 5: eta_c": partial(beyond, 1, ";"),
+    "section 5: inputs": partial(count_statements, INPUT_NEURONS, ", "),
+    "section 5: alpha_c": partial(count_statements, 1, ";"),
+    "section 5: eta_c": partial(count_statements, 1, ";"),
     "Table 1 (rho)": is_aluminium,
     "Table 1 (C's unit)": lambda text: mismatch(  # that of C in 1 + C s
-        parsed("1 + C*s"), PAPER_UNITS | {"C": unit_dimension(text.partition(": ")[2])}
+        parse_expression("1 + C*s"), PAPER_UNITS | {"C": unit_dimension(text.partition(": ")[2])}
     ),
     "Table 1 (other units)": are_units,
     "Table 1 (I)": is_section,

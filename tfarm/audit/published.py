@@ -29,8 +29,8 @@ DATA = tomllib.loads((files("tfarm.audit") / "literature.toml").read_text("utf-8
 class PrintedColumn:
     """One column of a table: the arm, the theory it was printed for, and what was printed of modes 1, 2, ...
 
-    `quantity` is one of those of `computed`, w in rad/s; `why` has a reason for each mode whose printed digits are not
-    reached.
+    `quantity` is one of those of `exact_numbers`, w in rad/s; `why` has a reason for each mode whose printed digits are
+    not reached.
     """
 
     name: str
@@ -95,7 +95,7 @@ class PublishedRow:
     why: Annotated[str, Quantity(help="reason of a difference beyond the printed digits; empty where there is none")]
 
 
-class Difference(NamedTuple):
+class PublishedDifference(NamedTuple):
     """Printed numbers of a case that ours do not round to, and why."""
 
     source: Annotated[str, Quantity("source", help="short name of the publication")]
@@ -140,11 +140,11 @@ def case_rows(key: str, case: PrintedColumn) -> list[PublishedRow]:
             agrees=agrees(ours, printed),
             why=case.why.get(mode, ""),
         )
-        for mode, (printed, ours) in enumerate(zip(case.printed, computed(case).tolist(), strict=True), start=1)
+        for mode, (printed, ours) in enumerate(zip(case.printed, exact_numbers(case).tolist(), strict=True), start=1)
     ]
 
 
-def computed(case: PrintedColumn) -> NDArray[np.float64]:
+def exact_numbers(case: PrintedColumn) -> NDArray[np.float64]:
     """The exact solution's numbers for a column, in its quantity."""
     link = case.arm.link
     count = len(case.printed)
@@ -177,13 +177,14 @@ class Validation:
     def differences(
         self,
     ) -> Annotated[
-        list[Difference], Quantity("differences", help="numbers whose printed digits are not reached, a row a reason")
+        list[PublishedDifference],
+        Quantity("differences", help="numbers whose printed digits are not reached, a row a reason"),
     ]:
         """A row a reason."""
         rows = (row for row in self.rows if not row.agrees)
         groups = ((key, list(of)) for key, of in groupby(rows, attrgetter("source", "case", "why")))
         return [
-            Difference(
+            PublishedDifference(
                 source, case, ", ".join(str(row.mode) for row in of), max((r.difference for r in of), key=abs), why
             )
             for (source, case, why), of in groups

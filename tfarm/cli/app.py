@@ -247,8 +247,8 @@ def _with_help(option: Parameter, text: str) -> Parameter:
 def load_arm(file: ArmFile, theory: Theory | None = None, driven: str | None = None) -> Arm:
     """Return the arm of a file, under that theory.
 
-    Values that look like a wrong unit, and a motor without an input (`driven` or the file's), are named on standard
-    error.
+    Values that look like a wrong unit, and a motor without an input (`arm_under_chain` or the file's), are named on
+    standard error.
     """
     arm = tfarm.load(file)
     if "motor" in file.tables and "input" not in file.tables and driven is None:
@@ -296,10 +296,10 @@ def load_loop(
 
 def load_driven_loop(file: ArmFile, *, loop: Any = load_loop) -> tuple[Any, dict[str, Any]]:
     """Return the same of a command without sampling, through the chain of the file and with its analog damping."""
-    from tfarm.dsp.plant import driven
+    from tfarm.dsp.plant import arm_under_chain
 
     case, defaults = loop(file)
-    arm, chain = driven(case.arm, load_chain(file))
+    arm, chain = arm_under_chain(case.arm, load_chain(file))
     return case.on(arm).through(chain), defaults
 
 

@@ -387,4 +387,4 @@ def ring(
     """
     from tfarm.fitting import decays, recording
 
-    show(decays.ring(recording.read_recording(record), signal, start=start, stop=stop, modes=modes))
+    show(decays.fit_ringdown(recording.read_recording(record), signal, start=start, stop=stop, modes=modes))

@@ -35,7 +35,7 @@ from tfarm.errors import require
 from tfarm.files import mat_content, write_file
 
 command = partial(add_command, "Loop")
-ModeCount = Annotated[
+ModelOrder = Annotated[
     int | None, typer.Option("--modes", min=1, max=400, help="flexible modes; by default as many as the result takes")
 ]
 
@@ -172,7 +172,7 @@ def map_plane(
     vary: twice: two numbers of a law and their ranges; gain (a factor on the law), delay, SIGNAL, SIGNAL.num.N or
         SIGNAL.den.N
     """
-    from tfarm.loop.plane import between, ranges_of
+    from tfarm.loop.plane import cell_middles, ranges_of
 
     controller: AnyLaw
     typed = {RATE_GAIN: k1, MOMENT_GAIN: k2}
@@ -187,7 +187,7 @@ def map_plane(
         ranges = {name: typed[name] or usual for name, usual in zip(PLANE, ranges_of(arm), strict=True)}
         controller = tfarm.default_gains(arm).having(ANGLE_GAIN, kp)
     number = points or (60 if vary or law else 101)
-    return controller, {name: between(low, high, number) for name, (low, high) in ranges.items()}
+    return controller, {name: cell_middles(low, high, number) for name, (low, high) in ranges.items()}
 
 
 @command(epilog="map sasaki2012-lab --K1 -1,3 --K2 -2,2 --png map.png", name="map")
@@ -199,7 +199,7 @@ def gain_map(
     The number of unstable poles over two gains, or two numbers of a law; the boundary is exact.
     With --period, --delay-samples or --dsp of the sampled loop.
     """
-    from tfarm.dsp.plant import driven
+    from tfarm.dsp.plant import arm_under_chain
     from tfarm.loop.circle_crossings import sampled_map
     from tfarm.loop.sampled_verdict import sampled_verdict
 
@@ -211,13 +211,13 @@ def gain_map(
         loop = sampled_verdict(tfarm.Case(subject, controller, chain(arm))).full
         found: Any = sampled_map(loop, x, y, vary=names)
     else:
-        found = tfarm.map(driven(subject, chain(arm))[0], x, y, law=controller, vary=names)
+        found = tfarm.map(arm_under_chain(subject, chain(arm))[0], x, y, law=controller, vary=names)
     show(found)
 
 
 @command(epilog="sampled sasaki2012-lab --K1 0.3 --K2 0.3 --period 0.01")
 def sampled(
-    *, arm: ArmName, modes: ModeCount = None, loop: Any = load_loop, chain: Any = load_chain, show: Any = emit_record
+    *, arm: ArmName, modes: ModelOrder = None, loop: Any = load_loop, chain: Any = load_chain, show: Any = emit_record
 ) -> None:
     """Stability, intervals, modes and margins of the sampled loop.
 
@@ -263,7 +263,7 @@ def simulate(
     arm: ArmName,
     scenario: str = "slew",
     duration: float = 3.0,
-    modes: ModeCount = None,
+    modes: ModelOrder = None,
     output: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
     between: Annotated[int, typer.Option(min=0, max=1000)] = 0,
     mat: File = None,

@@ -11,17 +11,18 @@ from tfarm.crossing.line import (
     Line,
     Steps,
     Window,
-    ascending,
     brackets,
-    confirmed,
+    check_ascending,
+    confirm_intervals,
     counts_over,
-    crossed,
     crossings,
     intervals,
-    joined,
+    join_neighbours,
+    locate_crossings,
     zeros_between,
 )
 from tfarm.crossing.turning import RegionPiece, pieces
+from tfarm.moved import moved
 
 __all__ = [
     "Crossing",
@@ -32,14 +33,26 @@ __all__ = [
     "RegionPiece",
     "Steps",
     "Window",
-    "ascending",
     "brackets",
-    "confirmed",
+    "check_ascending",
+    "confirm_intervals",
     "counts_over",
-    "crossed",
     "crossings",
     "intervals",
-    "joined",
+    "join_neighbours",
+    "locate_crossings",
     "pieces",
     "zeros_between",
 ]
+
+# names up to version 1.0
+_LINE = "tfarm.crossing.line"
+__getattr__ = moved(
+    __name__,
+    {
+        "ascending": f"{_LINE}:check_ascending",
+        "confirmed": f"{_LINE}:confirm_intervals",
+        "crossed": f"{_LINE}:locate_crossings",
+        "joined": f"{_LINE}:join_neighbours",
+    },
+)

@@ -160,7 +160,7 @@ class Grid:
         return Steps(self.places[number], self.places[number + 1], lambda at, _: self.terms_at(at))
 
 
-def crossed(places: Real, parts: Parts) -> tuple[Real, Real, Whole]:
+def locate_crossings(places: Real, parts: Parts) -> tuple[Real, Real, Whole]:
     """Gain, place and change of the count (n,) of every crossing between neighbours of a grid of places, ascending."""
     curve = Grid(places, lambda at: np.array(parts(at)))
     (found,) = crossings(curve, [Line(np.array([1.0, 0.0]), np.array([0.0, 1.0]), -np.inf, np.inf)])
@@ -236,7 +236,7 @@ def _share(A: Complex, B: Complex) -> Real:
     return np.asarray((A * B.conj()).imag / np.maximum(abs(A) * abs(B), LEAST_SIZE))
 
 
-def ascending(name: str, values: Any, least: int, most: int) -> Real:
+def check_ascending(name: str, values: Any, least: int, most: int) -> Real:
     """Check the values (n,) of one number of a plane.  Raises ParameterError unless they ascend, `least` to `most`."""
     try:
         values = np.atleast_1d(np.asarray(values, dtype=float))
@@ -261,10 +261,10 @@ def intervals(found: Crossings, low: float, high: float, reference: float, there
     """Return the intervals between `low` and `high` without zeros beyond the curve; `there`: at `reference`."""
     pairs = found.spans(low, high)
     counts = there + found.passed(np.mean(pairs, axis=1)) - found.passed(reference)
-    return joined([pair for pair, count in zip(pairs, counts, strict=True) if not count])
+    return join_neighbours([pair for pair, count in zip(pairs, counts, strict=True) if not count])
 
 
-def confirmed(found: Crossings, low: float, high: float, is_stable: Callable[[float], bool]) -> list[Window]:
+def confirm_intervals(found: Crossings, low: float, high: float, is_stable: Callable[[float], bool]) -> list[Window]:
     """Return the intervals between `low` and `high`, which may be infinite, without zeros beyond the curve.
 
     Between two crossings the count is constant, and may be 0 only where it is least: there `is_stable` is evaluated at
@@ -281,11 +281,11 @@ def confirmed(found: Crossings, low: float, high: float, is_stable: Callable[[fl
     for may_be in (counts == counts.min(), counts > counts.min()):
         stable = [i for i in np.flatnonzero(may_be).tolist() if is_stable(float(middles[i]))]
         if stable:
-            return joined([(float(edges[i]), float(edges[i + 1])) for i in stable])
+            return join_neighbours([(float(edges[i]), float(edges[i + 1])) for i in stable])
     return []
 
 
-def joined(windows: list[Window]) -> list[Window]:
+def join_neighbours(windows: list[Window]) -> list[Window]:
     """Join neighbours with a common edge (two crossings that cancel)."""
     merged: list[Window] = []
     for low, high in windows:

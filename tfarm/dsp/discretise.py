@@ -40,7 +40,7 @@ ROUNDINGS = 8  # of each term of F: of its product of n factors they add up as t
 RULE = Quantity("discretisation", help="rule by which the continuous-time controller is made discrete")
 
 
-def discretised(law: Law, period: float) -> Law:
+def discretise_law(law: Law, period: float) -> Law:
     """Return the law in z with this period [s].
 
     Raises ParameterError for a law in z with another period, and for a law that its rule is not defined for.
@@ -78,14 +78,14 @@ def _in_z(part: Part, law: Law, period: float) -> LawBlock:
     if rule == "zoh":
         return by_scipy(block, period, "zoh")
     if isinstance(block, Rational):
-        return by_factors(block, "matched", period, prewarped(period, 0.0))
+        return by_factors(block, "matched", period, prewarp_speed(period, 0.0))
     remedy = "matched is for zeros and poles of one signal; take tustin or zoh for matrices"
     raise ParameterError(key="rule", value=rule, remedy=remedy)
 
 
 def tustin(block: LawBlock, period: float, prewarp: float = 0.0) -> LawBlock:
     """Return the block with s = c (z - 1)/(z + 1).  Raises ParameterError where it has a pole at s = c."""
-    c = prewarped(period, prewarp)
+    c = prewarp_speed(period, prewarp)
     remedy = f"the law has a pole at {c:g} 1/s, which this rule maps to infinity; take another rule or period"
     if isinstance(block, Rational) and block.excess > 0:
         least = MACHINE_EPS * np.polyval(np.abs(block.den), c)
@@ -96,7 +96,7 @@ def tustin(block: LawBlock, period: float, prewarp: float = 0.0) -> LawBlock:
     return by_scipy(block, 2 / c, "bilinear")
 
 
-def prewarped(period: float, prewarp: float) -> float:
+def prewarp_speed(period: float, prewarp: float) -> float:
     """c [1/s] of s = c (z - 1)/(z + 1)."""
     return prewarp / math.tan(prewarp * period / 2) if prewarp else 2 / period
 
@@ -129,7 +129,7 @@ def acting_law(case: Case, law: Law | None = None) -> tuple[Law, Chain]:
     `law` is its form, by default that of a computer.
 
     Raises ParameterError for a delay that is too long, for a gain that is too large, for a massless hub whose moment is
-    fed back (an algebraic loop), and as `discretised` and `in_single` do.
+    fed back (an algebraic loop), and as `discretise_law` and `in_single` do.
     """
     law = case.in_computer if law is None else law
     gains = case.gains
@@ -142,13 +142,13 @@ def acting_law(case: Case, law: Law | None = None) -> tuple[Law, Chain]:
     samples = sampling.delay_samples + law.delay / sampling.period
     remedy = f"with the delay of the chain it is {samples:.4g} samples; at most {MOST_DELAY:g}"
     require(samples <= MOST_DELAY, "delay", law.delay, remedy)
-    acting = discretised(law, sampling.period)
+    acting = discretise_law(law, sampling.period)
     late = replace(case.chain, sampling=replace(sampling, delay_samples=samples))
     return in_single(acting) if late.converters.is_single else acting, late
 
 
 def in_single(law: Law) -> Law:
-    """Return a law in z with the numbers of `kernel.run` in float32: of its states as realised there.
+    """Return a law in z with the numbers of `kernel.run_samples` in float32: of its states as realised there.
 
     Raises ParameterError for two parts on one signal, whose sum is rounded, and for a number beyond float32.
     """
@@ -201,7 +201,7 @@ def _differenced(part: Part, a: float, T: float) -> Part:
 # ------------------------------------------------------------ factors
 
 
-Column = tuple[int, int, float, Complex]  # part, row of the signal, and g and zeros of g prod(delta - zeros)
+PartColumn = tuple[int, int, float, Complex]  # part, row of the signal, and g and zeros of g prod(delta - zeros)
 
 
 @frozen
@@ -215,7 +215,7 @@ class LawInZ:
 
     signals: tuple[str, ...]
     part_poles: tuple[Complex, ...]
-    columns: tuple[Column, ...]
+    columns: tuple[PartColumn, ...]
     matrices: Matrices
 
     @cached_property
@@ -224,7 +224,7 @@ class LawInZ:
         return np.concatenate(self.part_poles)
 
     @cached_property
-    def terms(self) -> list[Column]:
+    def terms(self) -> list[PartColumn]:
         """The columns as p_i: the poles of other parts are zeros too."""
         poles = [np.empty(0, complex), *self.part_poles]
         others = [np.concatenate(poles[: n + 1] + poles[n + 2 :]) for n in range(len(self.part_poles))]
@@ -272,7 +272,7 @@ def law_in_z(law: Law, acting: Law, chain: Chain) -> LawInZ:
 def _factors(part: Part, law: Law, chain: Chain) -> tuple[Complex, list[tuple[str, float, Complex]]]:
     """The poles of one part in z, and signal, gain and zeros of each column."""
     T = chain.sampling.period
-    poles, found = block_factors(part.block, "none" if law.is_discrete else law.rule, T, prewarped(T, law.prewarp))
+    poles, found = block_factors(part.block, "none" if law.is_discrete else law.rule, T, prewarp_speed(T, law.prewarp))
     columns = [(name, -law.sign * g, zeros) for name, (g, zeros) in zip(part.signals, found, strict=True)]
     columns = [each for each in columns if is_measured(each[0])]
     if chain.converters.hub_rate != "difference" or "hub_rate" not in part.signals:

@@ -1,7 +1,7 @@
 """The compiled heart of the simulation: exact steps of the modal amplitudes between the samples, and the linear law.
 
 All compiled functions are in this one file, for numba's cache does not notice an edited callee elsewhere.  They share
-named tuples: a `Model` of the arm, its `State`, the `Forcing` of a scenario and the `Electronics` of a chain.
+named tuples: a `SampleModel` of the arm, its `State`, the `Forcing` of a scenario and the `Electronics` of a chain.
 """
 
 from typing import Any, NamedTuple
@@ -52,7 +52,7 @@ BEGUN = 2
 YES = 0.5  # a number above it is true among floats
 
 
-class Model(NamedTuple):
+class SampleModel(NamedTuple):
     """The arm between the samples: outputs = Re(weights amplitude) + rates rigid + static torque.
 
     Under a held torque an amplitude circles its rest position, -`rest` torque, `rest` (m,) being 1/p.
@@ -72,7 +72,7 @@ class Model(NamedTuple):
     hub: int
 
 
-def model_of(plant: Plant, kept: Whole, sampling: Sampling, between: int, hub: int) -> Model:
+def model_of(plant: Plant, kept: Whole, sampling: Sampling, between: int, hub: int) -> SampleModel:
     """The model of a plant's poles `kept`, with `between` records in each sample; `hub` is the row of the hub angle."""
     p = plant.poles[kept]
     T = sampling.period
@@ -80,7 +80,7 @@ def model_of(plant: Plant, kept: Whole, sampling: Sampling, between: int, hub: i
     records = T * (np.arange(between) + 1) / (between + 1)
     ends = np.unique(np.r_[records, [f * T] if f else [], T])
     starts = np.r_[0.0, ends[:-1]]
-    return Model(
+    return SampleModel(
         rest=1 / p,
         turn=np.exp(p * (ends - starts)[:, None]),
         push=np.array([held_amplitude(p, float(each)) for each in ends - starts]),
@@ -138,7 +138,7 @@ class Electronics(NamedTuple):
 
 
 @inlined
-def reading(o: int, model: Any, state: Any) -> float:
+def dynamic_output(o: int, model: Any, state: Any) -> float:
     """Output o without its static remainder."""
     value = model.rates[o, DOUBLY] * state.rigid[DOUBLY] + model.rates[o, ONCE] * state.rigid[ONCE]
     for i in range(state.amplitude.size):
@@ -152,17 +152,17 @@ def reading(o: int, model: Any, state: Any) -> float:
 def read_outputs(model: Any, state: Any, torque: float, out: Any) -> None:
     """The outputs under the torque that acts now."""
     for o in range(out.size):
-        out[o] = reading(o, model, state) + model.static[o] * torque
+        out[o] = dynamic_output(o, model, state) + model.static[o] * torque
 
 
 @compiled
-def advance(k: int, model: Any, state: Any, old: float, new: float, push_on: float) -> None:
+def advance_state(k: int, model: Any, state: Any, old: float, new: float, push_on: float) -> None:
     """Advance by sample k: `old` torque up to the switch, `new` after it, `push_on` (a disturbance) throughout.
 
     Fills a row of `fine` at each record, and adds to the work.
     """
     row = 0
-    before = reading(model.hub, model, state)
+    before = dynamic_output(model.hub, model, state)
     for s in range(model.piece.shape[0]):
         torque = (new if model.piece[s, IS_NEW] > YES else old) + push_on
         dt = model.piece[s, DURATION]
@@ -172,7 +172,7 @@ def advance(k: int, model: Any, state: Any, old: float, new: float, push_on: flo
             state.amplitude[i] = model.turn[s, i] * state.amplitude[i] + model.push[s, i] * torque
         state.rigid[DOUBLY] += dt * state.rigid[ONCE] + 0.5 * dt * dt * torque
         state.rigid[ONCE] += dt * torque
-        after = reading(model.hub, model, state)
+        after = dynamic_output(model.hub, model, state)
         done = torque * (after - before)
         state.work[DONE] += done
         state.work[MOVED] += abs(done)
@@ -205,7 +205,7 @@ def estimate(angle: float, rate: float, memory: Any, is_differenced: bool, pole:
     return memory[RATE_BEFORE]
 
 
-def converted(record: Any, saturated: Any, memory: Any, of: Any) -> Any:
+def convert_outputs(record: Any, saturated: Any, memory: Any, of: Any) -> Any:
     """Hub angle, hub rate and root moment of one sample's outputs, through the converters of `Electronics`."""
     angle = quantise(record[ANGLE], of.quantisers[ENCODER], saturated, ENCODER)
     moment = quantise(record[MOMENT], of.quantisers[AMPLIFIER], saturated, AMPLIFIER)
@@ -228,27 +228,27 @@ def after(k: int, u: float, model: Any, state: Any, forcing: Any, of: Any) -> No
         for i in range(state.amplitude.size):
             state.amplitude[i] += forcing.impulse
         state.rigid[ONCE] += forcing.impulse
-    advance(k, model, state, old, state.held[(k - of.delay) % ring], forcing.disturbance[k])
+    advance_state(k, model, state, old, state.held[(k - of.delay) % ring], forcing.disturbance[k])
 
 
 # those of Python loops are plain
 _before = inlined(before)
-_converted = inlined(converted)
+_converted = inlined(convert_outputs)
 _after = inlined(after)
 
 
 @inlined
-def rounded(value: float, single: bool) -> float:
+def to_precision(value: float, single: bool) -> float:
     """A number in the precision of the controller: float32 or float64."""
     return float(np.float32(value)) if single else value
 
 
 @inlined
-def product(row: Any, values: Any, start: float, single: bool) -> float:
+def add_row_product(row: Any, values: Any, start: float, single: bool) -> float:
     """start + row . values, every product and sum in the precision of the controller."""
     total = start
     for j in range(values.size):
-        total = rounded(total + rounded(row[j] * values[j], single), single)
+        total = to_precision(total + to_precision(row[j] * values[j], single), single)
     return total
 
 
@@ -256,11 +256,13 @@ def product(row: Any, values: Any, start: float, single: bool) -> float:
 def law_step(table: Any, z: Any, feedforward: float, single: bool, out: Any) -> None:
     """out = table z of z = [x; e]: the next states, and the output, which begins with the feedforward."""
     for i in range(out.size):
-        out[i] = product(table[i], z, feedforward if i == out.size - 1 else 0.0, single)
+        out[i] = add_row_product(table[i], z, feedforward if i == out.size - 1 else 0.0, single)
 
 
 @compiled
-def run(model: Any, state: Any, forcing: Any, electronics: Any, table: Any, sources: Any, references: Any) -> int:
+def run_samples(
+    model: Any, state: Any, forcing: Any, electronics: Any, table: Any, sources: Any, references: Any
+) -> int:
     """Run a law over all samples; return their number before the root moment passes its bound.
 
     [x_{k+1}; u - r] = table [x; e] of the errors e = reference - signal, `references` (n, columns).  `sources`
@@ -281,8 +283,8 @@ def run(model: Any, state: Any, forcing: Any, electronics: Any, table: Any, sour
         for j in range(sources.size):
             source = sources[j]
             value = 0.0 if source < 0 else known[source] if source < known.size else record[source]
-            z[order + j] = rounded(rounded(references[k, j], single) - rounded(value, single), single)
-        law_step(table, z, rounded(forcing.feedforward[k], single), single, following)
+            z[order + j] = to_precision(to_precision(references[k, j], single) - to_precision(value, single), single)
+        law_step(table, z, to_precision(forcing.feedforward[k], single), single, following)
         for i in range(order):
             z[i] = following[i]
         _after(k, following[order], model, state, forcing, electronics)

@@ -105,7 +105,7 @@ class Plant:
         """G_o(0) of every output that does not turn with the arm (outputs,), and H_o(1) at any period."""
         return self.static - (self.residues / self.poles).sum(axis=1).real
 
-    def braked(self, slower_than: float) -> int | None:
+    def slow_hub_pole(self, slower_than: float) -> int | None:
         """The pole of a hub that friction brings to rest, if |p| is below `slower_than` [1/s]; else None.
 
         Its residues nearly cancel rigid[:, 1], the more the less friction there is.
@@ -120,7 +120,7 @@ class Plant:
         return int(self.mode.max(initial=0))
 
 
-def driven(arm: Arm, chain: Chain) -> tuple[Arm, Chain]:
+def arm_under_chain(arm: Arm, chain: Chain) -> tuple[Arm, Chain]:
     """The arm that a chain drives, with the actuator's analog damping as friction of its hub, and the chain without it.
 
     So it is in every loop of that arm once: in the sampled and in the continuous-time one.
@@ -240,7 +240,7 @@ class SensedPlant:
 
 def sensed_plant(arm: Arm, chain: Chain, names: Sequence[str], count: int) -> SensedPlant:
     """Return the signals of these names with `count` flexible modes, of an arm whose hub a chain may damp."""
-    read = Signals(driven(arm, chain)[0], tuple(names))
+    read = Signals(arm_under_chain(arm, chain)[0], tuple(names))
     plants = []
     for share in dict.fromkeys(read.places):
         here = zip(read.outputs, read.places, strict=True)
@@ -392,7 +392,7 @@ class PulseTransfer:
 
         States: real and imaginary part of the amplitude of each pole with Im p > 0, the amplitude of each real one, the
         double integral and the integral of the torque, and u_{k-1} to u_{k-d-1}.  For a hub that friction brings to
-        rest slowly (`Plant.braked`) the last integral is that of that pole's amplitude.
+        rest slowly (`Plant.slow_hub_pole`) the last integral is that of that pole's amplitude.
         """
         return self._matrices
 
@@ -419,9 +419,9 @@ class PulseTransfer:
         A[:n, -1] = before
         newest = A[:, -2] if d else B
         newest[:n] = now
-        if (braked := self.plant.braked(SLOW / self.sampling.period)) is not None:
-            place = 2 * upper.size + int(np.flatnonzero(real == braked)[0])
-            p = float(self.plant.poles[braked].real)
+        if (slow := self.plant.slow_hub_pole(SLOW / self.sampling.period)) is not None:
+            place = 2 * upper.size + int(np.flatnonzero(real == slow)[0])
+            p = float(self.plant.poles[slow].real)
             self._integrate(A, newest, p, (place, n - 1))
             C[:, place] += self.plant.rigid[:, 1]  # R/s + r/(s - p) = -R p/(s (s - p)) + (r + R)/(s - p)
             C[:, n - 1] = -p * self.plant.rigid[:, 1]

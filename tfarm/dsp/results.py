@@ -20,12 +20,12 @@ from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.case import Case
 from tfarm.dsp.discretise import RULE, rule_in_words
 from tfarm.dsp.plant import MODES_USED
-from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, described, scenario
+from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, describe_scenario, scenario
 from tfarm.dsp.simulate import Simulation, Simulator, Trace
-from tfarm.dsp.traces import resolved
+from tfarm.dsp.traces import resolve_simulations
 from tfarm.errors import ConvergenceError
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.response.signals import Controller, controller
+from tfarm.response.signals import ControllerSignals, controller
 from tfarm.schema import Column, Quantity, Table
 
 MODE_COUNTS = (10, 20, 40)  # flexible modes; 80 would take a heavily damped arm 8 s of CPU time
@@ -106,7 +106,7 @@ class Run:
     tuner: Annotated[dict[str, Any] | None, Quantity("tuner", key="controller", help="that set the moment gain")] = None
 
     @property
-    def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
+    def controller(self) -> Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller."""
         return controller(self.case.feedback, self.arm)
 
@@ -280,15 +280,15 @@ def simulate(
     return simulated_run(case, scenario_name, duration, count=count, between=between, outputs=outputs).simulation
 
 
-def drawn(case: Case, scenario_name: str, duration: float) -> Simulation:
-    """Simulate the same for a picture: 20 records in each period of the fastest visible mode (`traces.resolved`)."""
+def simulate_for_picture(case: Case, scenario_name: str, duration: float) -> Simulation:
+    """Simulate the same for a picture: 20 records a period of the fastest visible mode (`resolve_simulations`)."""
     task = scenario(scenario_name, case.arm, case.chain, duration)
     ideal = case.through(ideal_chain(case.chain))
     used = enough_modes(lambda n: Simulator(ideal, task, count=n).run())
-    return resolved(Simulator(case, task, count=used.modes), case.arm, Simulator.run)[0]
+    return resolve_simulations(Simulator(case, task, count=used.modes), case.arm, Simulator.run)[0]
 
 
-def simulated(
+def simulate_modes(
     case: Case,
     task: Scenario,
     count: int | None = None,
@@ -319,4 +319,6 @@ def simulated_run(
     Raises ParameterError as `simulate` does.
     """
     task = scenario(name, case.arm, case.chain, duration)
-    return Run(case, *simulated(case, task, count, between, outputs), described(task, case.arm, case.chain))
+    return Run(
+        case, *simulate_modes(case, task, count, between, outputs), describe_scenario(task, case.arm, case.chain)
+    )

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import AT_HUB, Arm, must_turn
-from tfarm.arm.chain import PERIOD, TIME_ROUNDING, Chain, Reading
+from tfarm.arm.chain import PERIOD, TIME_ROUNDING, Chain, MomentReading
 from tfarm.arm.checks import positive
 from tfarm.arrays import Real
-from tfarm.dsp.plant import driven
+from tfarm.dsp.plant import arm_under_chain
 from tfarm.errors import must_be_known, require
 from tfarm.records import frozen
 from tfarm.schema import Quantity
@@ -44,7 +44,7 @@ class Scenario:
     impulse: float = 0.0
     tip_offset: float = 0.0
     busy_until: float = 0.0
-    reading: Reading = "vibration"
+    reading: MomentReading = "vibration"
 
     @property
     def t(self) -> Real:
@@ -76,7 +76,7 @@ class Scenario:
         return float(np.sqrt(np.mean(left**2))) if left.size else None
 
 
-def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
+def slew_scenario(arm: Arm, chain: Chain, duration: float) -> Scenario:
     """Return the bang-bang slew: hub acceleration +-4 travel/((r + L) rise^2), means over a sample, fed forward with J.
 
     On a rig also friction, back-EMF and analog damping at the mean rate, all in the unit of its input.
@@ -84,7 +84,7 @@ def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
     arm that cannot turn.
     """
     must_turn(arm)
-    arm, chain = driven(arm, chain)
+    arm, chain = arm_under_chain(arm, chain)
     T = chain.sampling.period
     manoeuvre = chain.slew
     t = T * np.arange(_samples(duration, T) + 1)
@@ -119,7 +119,7 @@ def trial_weights(arm: Arm, chain: Chain) -> tuple[float, float]:
     return float(a), float(b)
 
 
-def resting(name: str, arm: Arm, chain: Chain, duration: float, signal: str = "hub_angle") -> Scenario:
+def rest_scenario(name: str, arm: Arm, chain: Chain, duration: float, signal: str = "hub_angle") -> Scenario:
     """Return a scenario without references, or "reference", one of 1 rad or 1 rad/s of a `signal` of the hub.
 
     A step of the torque r at t = 0, 0.1 of the arm's unit of torque; the decay of the first mode from rest with the tip
@@ -146,7 +146,7 @@ def resting(name: str, arm: Arm, chain: Chain, duration: float, signal: str = "h
     return replace(Scenario(name, T, zero, zero, zero, zero, zero), **sizes[name])
 
 
-def described(task: Scenario, arm: Arm, chain: Chain) -> str:
+def describe_scenario(task: Scenario, arm: Arm, chain: Chain) -> str:
     """A scenario with its size, in words."""
     return {
         "slew": f"a slew: the tip moves {chain.slew.travel_of(arm.reach):.4g} m in {chain.slew.rise_time:g} s",
@@ -161,7 +161,7 @@ def described(task: Scenario, arm: Arm, chain: Chain) -> str:
 def scenario(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:
     """Return the scenario of that name with its usual size.  Raises ParameterError for an unknown one."""
     must_be_known("scenario", name, SCENARIOS)
-    return slew(arm, chain, duration) if name == "slew" else resting(name, arm, chain, duration)
+    return slew_scenario(arm, chain, duration) if name == "slew" else rest_scenario(name, arm, chain, duration)
 
 
 def _samples(duration: float, period: float) -> int:

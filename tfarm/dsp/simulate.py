@@ -103,7 +103,7 @@ class Measurement(NamedTuple):
         return law[ANGLE_GAIN] * angle_off + law[RATE_GAIN] * rate_off
 
 
-Controller = Callable[[Measurement], float]
+ControlFunction = Callable[[Measurement], float]
 
 
 @frozen
@@ -297,10 +297,10 @@ class Simulator:
         sources = np.array([self.measured.index(name) if name in self.measured else -1 for name in columns])
         references = references_of(law, self.scenario)
         state = self._start()
-        done = kernel.run(self.model, state, self._forcing, self.electronics, table, sources, references)
+        done = kernel.run_samples(self.model, state, self._forcing, self.electronics, table, sources, references)
         return self._result(state, int(done), None if gains is None else np.full(state.torque.size, gains.K2))
 
-    def controller(self, controller: Controller) -> Simulation:
+    def controller(self, controller: ControlFunction) -> Simulation:
         """Simulate a callable from a `Measurement` to a torque [N m]; its numbers are float32 if the arithmetic is."""
         return self._stepped(lambda m: (float(controller(m)), 0.0), None)
 
@@ -324,13 +324,13 @@ class Simulator:
     # ------------------------------------------------------------ inside
 
     @cached_property
-    def model(self) -> kernel.Model:
+    def model(self) -> kernel.SampleModel:
         """The plant for the compiled loop, with the records between two samples."""
         row = self.plant.outputs.index("hub_angle", len(self.measured))
         return kernel.model_of(self.plant, self.kept, self.chain.sampling, self.between, row)
 
     def _stepped(self, rule: Callable[[Measurement], tuple[float, float]], gain: Real | None) -> Simulation:
-        """The loop of `kernel.run` in Python."""
+        """The loop of `kernel.run_samples` in Python."""
         model = self.model
         state = self._start()
         memory = np.zeros(3)
@@ -345,7 +345,7 @@ class Simulator:
         for k in range(state.torque.size):
             if not kernel.before(k, model, state, forcing, of):
                 return self._result(state, k, gain)
-            angle, rate, moment = kernel.converted(state.record[k], state.saturated[k], memory, of)
+            angle, rate, moment = kernel.convert_outputs(state.record[k], state.saturated[k], memory, of)
             values = angle, rate, moment, moment - references[k][-1], *references[k]
             u, K = rule(Measurement(k, k * task.period, *map(number, values)))
             require(math.isfinite(u), "controller", u, f"its torque at sample {k} is not finite")

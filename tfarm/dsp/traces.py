@@ -73,7 +73,7 @@ class TimeCurve:
         return Column(f"{name}_low", of=self.low), Column(f"{name}_high", of=self.high)
 
 
-def resolved(simulator: Simulator, arm: Arm, *runs: Callable[[Simulator], Simulation]) -> list[Simulation]:
+def resolve_simulations(simulator: Simulator, arm: Arm, *runs: Callable[[Simulator], Simulation]) -> list[Simulation]:
     """Return the simulations of one picture, with enough records between their samples for its fastest visible mode."""
     needed = max(records_between(arm, run(simulator)) for run in runs)
     # some 30 MB of records

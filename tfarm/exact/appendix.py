@@ -23,8 +23,7 @@ from tfarm.errors import ConvergenceError, ParameterError
 from .outputs import Output, output
 from .series import constant_of
 from .system import system_of
-
-Number = Any  # mpmath.mpf or mpmath.mpc, which come without types
+from .waves import Number
 
 FEWEST_DIGITS = 15  # of agreement, beyond coincidence
 MOST_DIGITS = 10_000  # of working precision
@@ -131,7 +130,7 @@ def determinant(arm: Arm, s: complex, digits: int) -> Number:
         raise ConvergenceError(f"Delta has no value at s = {s}, where a wave number is zero", None, None) from None
 
 
-def response(arm: Arm, name: str | Output, s: complex, digits: int, x: float | None = None) -> Number:
+def output_value(arm: Arm, name: str | Output, s: complex, digits: int, x: float | None = None) -> Number:
     """Return an output for unit torque (for unit hub angle of a locked hub) at s [1/s] to `digits`.
 
     Real and imaginary part have that many right digits each; x [m] is for the outputs along the arm.  Where two of the

@@ -16,24 +16,24 @@ import flint
 
 from . import sweep, waves
 from .compiled import python_of
-from .layout import KINDS, Layout, Reading
+from .layout import KINDS, Layout, OutputFormula
 from .system import Mark, Place, Segment
-from .waves import Plane, Row
+from .waves import SolutionPlane, SolutionRow
 
 _end_plane, _met, _across_rows, _row_across = map(
     python_of, (waves.end_plane, waves.met, waves.across_rows, waves.row_across)
 )
 _transition_rows, across_waves, in_chain = map(python_of, (waves.transition_rows, waves.across_waves, waves.in_chain))
 _inside_element = python_of(sweep.inside)
-_beyond_element = python_of(sweep.beyond)
+_beyond_element = python_of(sweep.carry_beyond)
 Ball = Any  # flint.acb or flint.arb, which come without types
-_Found = TypeVar("_Found")
+_Enclosure = TypeVar("_Enclosure")
 
 
 precision = flint.ctx.workprec  # flint's working precision [bits], inside a `with` block
 
 
-def first_success(bits: Iterable[int], attempt: Callable[[], _Found | None], failure: Exception) -> _Found:
+def first_success(bits: Iterable[int], attempt: Callable[[], _Enclosure | None], failure: Exception) -> _Enclosure:
     """Return the first result other than None of attempts at working precisions [bits].  Raises `failure` else."""
     for working in bits:
         with precision(working):
@@ -92,7 +92,7 @@ def exact_middle(ball: Ball) -> Any:
     return flint.fmpq(whole) * flint.fmpq(2) ** int(power)
 
 
-def summed(z_sum: Any, z_product: Any, count: int) -> list[Any]:
+def sum_series(z_sum: Any, z_product: Any, count: int) -> list[Any]:
     """Return F0..F3 at a segment's end by `count` terms of their series in z1 + z2 and z1 z2, series of flint."""
     h = 0 * z_sum + 1
     before = 0 * z_sum
@@ -116,8 +116,8 @@ class Sweep:
         self.layout, self.s, self.S = layout, s, s * s if S is None else S
         key = self.exact, flint.ctx.prec
         self.elements, tip_mass, tip_inertia, self.A, self.B = layout.numbers(key, self.exact)
-        self._rows: dict[int, tuple[Row, ...]] = {}
-        self.planes: dict[Place, Plane] = {}
+        self._rows: dict[int, tuple[SolutionRow, ...]] = {}
+        self.planes: dict[Place, SolutionPlane] = {}
         p = _end_plane(*self._end(tip_mass), *self._end(tip_inertia))
         for each in self.elements:
             if isinstance(each, Mark):
@@ -144,16 +144,16 @@ class Sweep:
         return self.s * self.B[1] + self.B[0]
 
     @cached_property
-    def states(self) -> dict[Place, Row]:
+    def states(self) -> dict[Place, SolutionRow]:
         """W, Psi, M and Q at each mark."""
         one = self.exact(1) + 0 * self.s
         none = 0 * self.s
         conditions = self.carried_out((one, none, none, none))
         return {place: _met(f, self.planes[place]) for place, f in conditions.items()}
 
-    def carried_out(self, f: Row) -> dict[Place, Row]:
+    def carried_out(self, f: SolutionRow) -> dict[Place, SolutionRow]:
         """Return the condition f z = 0 of the axis at each mark."""
-        found: dict[Place, Row] = {}
+        found: dict[Place, SolutionRow] = {}
         for each in reversed(self.elements):
             if len(found) == len(self.planes):
                 break
@@ -163,12 +163,12 @@ class Sweep:
                 f = self._beyond(each, f)
         return found
 
-    def output(self, one: Reading) -> Any:
+    def output(self, one: OutputFormula) -> Any:
         """Return an output of this response, in SI units."""
         value = self.numerator(one)
         return value / (self.s * self.exact(one.C) + 1) if one.C else value
 
-    def numerator(self, one: Reading) -> Any:
+    def numerator(self, one: OutputFormula) -> Any:
         """Return an output times 1 + C s."""
         exact = self.exact
         value = self.theta * exact(one.theta)
@@ -184,20 +184,20 @@ class Sweep:
         rest, inertia, force = condition
         return self.S * inertia + rest, force
 
-    def _at_mark(self, p: Plane) -> Plane:
+    def _at_mark(self, p: SolutionPlane) -> SolutionPlane:
         return p
 
-    def _inside(self, element: Any, p: Plane) -> Plane:
+    def _inside(self, element: Any, p: SolutionPlane) -> SolutionPlane:
         if isinstance(element, Segment):
             return _across_rows(*self._transition(element), p)
         return _inside_element(KINDS[type(element)], element, self.s, self.S, p)
 
-    def _beyond(self, element: Any, f: Row) -> Row:
+    def _beyond(self, element: Any, f: SolutionRow) -> SolutionRow:
         if isinstance(element, Segment):
             return _row_across(*self._transition(element), f)
         return _beyond_element(KINDS[type(element)], element, self.s, self.S, f)
 
-    def _transition(self, segment: Any) -> tuple[Row, ...]:
+    def _transition(self, segment: Any) -> tuple[SolutionRow, ...]:
         if id(segment) not in self._rows:
             l = segment.length
             (over_d, z_sum, z_product) = self._sums(segment)

@@ -34,13 +34,13 @@ from numpy.typing import NDArray
 from tfarm.arm import Law
 from tfarm.arrays import Complex, Real
 
-from .balls import Ball, Sweep, across_waves, in_chain, point, rational, summed
+from .balls import Ball, Sweep, across_waves, in_chain, point, rational, sum_series
 from .layout import Layout, laid_out, readings
 from .outputs import Output
 from .rationals import polynomials
 from .system import Place, Segment, System
 from .values import free_of, free_slopes
-from .waves import Plane, Row
+from .waves import SolutionPlane, SolutionRow
 
 NEXT_TO_REST = 1e-60  # 1/s, for s = 0: there D over a power of s is at its limit, and no power is 0
 DIFFERENCE_STEP = 1e-6  # of |s|, or of the way to -1/C, for differences
@@ -66,7 +66,7 @@ def characteristic(k: System, s: Complex, at_zero: int = 0) -> Analytic:
     """Return D(s)/s^at_zero of a system without a law and its derivative at s (1-D, complex), in float64."""
     s = off_rest(s) if at_zero else s
     here, slopes = free_slopes(k, [], s, 0.0)
-    return deflated(here.drive, slopes.drive, here.scale, s, at_zero)
+    return deflate(here.drive, slopes.drive, here.scale, s, at_zero)
 
 
 def off_rest(s: Complex) -> Complex:
@@ -74,7 +74,7 @@ def off_rest(s: Complex) -> Complex:
     return np.where(s == 0, NEXT_TO_REST, s)
 
 
-def deflated(value: Complex, slope: Complex, scale: Complex, s: Complex, at_zero: int) -> Analytic:
+def deflate(value: Complex, slope: Complex, scale: Complex, s: Complex, at_zero: int) -> Analytic:
     """Return D/s^at_zero from D and its slope at s, which is not 0."""
     if at_zero:
         value = value / s**at_zero
@@ -129,7 +129,7 @@ class WideSweep(Sweep):
         self._shortest, self.phase = shortest, 0 * s
         super().__init__(layout, s)
 
-    def _inside(self, element: Any, p: Plane) -> Plane:
+    def _inside(self, element: Any, p: SolutionPlane) -> SolutionPlane:
         if not isinstance(element, Segment):
             return super()._inside(element, p)
         _, z_sum, z_product = self._sums(element)
@@ -147,12 +147,12 @@ class WideSweep(Sweep):
         self.phase = self.phase + pair[0][5] + pair[1][5]
         return tuple(part / unit for part in across_waves(one, two, gS, d, p))
 
-    def _at_mark(self, p: Plane) -> Plane:
+    def _at_mark(self, p: SolutionPlane) -> SolutionPlane:
         grown = self.phase.exp()
         return tuple(each * grown for each in p)
 
     @cached_property
-    def states(self) -> dict[Place, Row]:
+    def states(self) -> dict[Place, SolutionRow]:
         """W, Psi, M and Q at each mark, in the scale of the plane at the axis."""
         shrunk = (-self.phase).exp()
         full = super().states
@@ -173,7 +173,7 @@ class WideSweep(Sweep):
         ball = flint.acb(flint.arb(0, tail.upper()), flint.arb(0, tail.upper()))
         terms_kept = z_sum.prec
         rest = flint.acb_series([ball] * terms_kept, prec=terms_kept)
-        return tuple(total + rest for total in summed(z_sum, z_product, count))
+        return tuple(total + rest for total in sum_series(z_sum, z_product, count))
 
 
 def _size(series: Series) -> Ball:

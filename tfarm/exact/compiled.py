@@ -22,7 +22,7 @@ from numba.core.runtime import rtsys
 from numba.core.types.misc import unliteral
 from numba.np import linalg
 
-_Function = TypeVar("_Function", bound=Callable[..., Any])
+_Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 _HERE = Path(__file__).parent
 OPTIONS = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
 
@@ -37,7 +37,7 @@ class _Kept(FunctionCache):  # type: ignore[misc]  # numba comes without types
             return self._load_overload(sig, target_context)
 
 
-def compiled(function: _Function) -> _Function:
+def compiled(function: _Kernel) -> _Kernel:
     """Return the function compiled by numba (nopython, IEEE arithmetic, NumPy's rules for division).
 
     Its cache is below the user's cache folder of numba, or else below this room.
@@ -52,7 +52,7 @@ def compiled(function: _Function) -> _Function:
     return kernel
 
 
-def inlined(function: _Function) -> _Function:
+def inlined(function: _Kernel) -> _Kernel:
     """Return a function compiled and inlined into the kernels that call it, so that loops over it vectorise."""
     kernel = _without_literals(njit(forceinline=True, no_cpython_wrapper=True, **OPTIONS)(function))
     kernel._insert = lambda *_: None  # what Python would call: a null pointer

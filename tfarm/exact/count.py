@@ -29,7 +29,7 @@ from .layout import (
 from .sweep import inside
 from .waves import (
     SERIES_RADIUS,
-    Plane,
+    SolutionPlane,
     Wave,
     across_rows,
     across_waves,
@@ -37,7 +37,7 @@ from .waves import (
     end_plane,
     even_functions,
     in_chain,
-    scaled,
+    scale_plane,
     tip_conditions,
     transition_rows,
     transition_series,
@@ -81,7 +81,7 @@ def chain_count(omega: float, rows: Any, ends: Any) -> int:
 
 
 @inlined
-def _joined(outside: int, omega: float, row: Any, plane: Plane, free: int) -> tuple[int, Plane]:
+def _joined(outside: int, omega: float, row: Any, plane: SolutionPlane, free: int) -> tuple[int, SolutionPlane]:
     """Return the count with one more segment, clamped at its inner end, and the plane carried across it.
 
     `outside` is the count of the outer part clamped at the joint, `free` the number of free motions there.
@@ -105,8 +105,8 @@ def _joined(outside: int, omega: float, row: Any, plane: Plane, free: int) -> tu
         gS = row.of_chain[2] * S
         gap = one[2] - two[2]
         unit = 1.0 / (gS * EI * gap * gap)
-        q = scaled(across_waves(one, two, gS, EI, plane), unit)
-        r = scaled(across_waves(one, two, gS, EI, clamped), unit)
+        q = scale_plane(across_waves(one, two, gS, EI, plane), unit)
+        r = scale_plane(across_waves(one, two, gS, EI, clamped), unit)
     number = _clamped(number, r[1], -1)  # r at the outer end is, up to signs, the plane carried inwards (symmetry)
     number = _clamped(number, -r[0], -1) + outside
     if free == 2:

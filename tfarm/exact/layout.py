@@ -27,9 +27,9 @@ from .system import (
     Segment,
     Spring,
     System,
-    cut,
+    cut_segments,
+    elements_with_places,
     end_condition,
-    placed,
 )
 
 SEGMENT, OFFSET, SPRING, BODY, MARK = range(5)
@@ -46,7 +46,7 @@ W, PSI, M, Q = range(4)  # the fields of a state
 FIELDS = {"W": W, "Y": W, "centre": W, "Psi": PSI, "Phi": PSI, "M": M, "strain": M, "Q": Q}  # of each quantity
 
 
-class Reading(NamedTuple):
+class OutputFormula(NamedTuple):
     """An output:  unit s^power (field at the place + theta theta + rate s theta + input u)/(1 + C s),  in SI units.
 
     The field is one of W, Psi, M and Q, u the input and C [s] the damping at a gauge, or the lag of a motor.
@@ -68,9 +68,9 @@ class Layout:
     `elements` run from the payload inwards.
     """
 
-    def __init__(self, chain: System, places: tuple[Place, ...] = (), each: tuple[Reading, ...] = ()) -> None:
+    def __init__(self, chain: System, places: tuple[Place, ...] = (), each: tuple[OutputFormula, ...] = ()) -> None:
         self.chain, self.places, self.each = chain, places, each
-        elements = list(placed(chain.elements))
+        elements = list(elements_with_places(chain.elements))
         joints = [position for position, _, each in elements if isinstance(each, Segment)] + [ZERO]
         order = {"payload": PAYLOAD, "outer": OUTER, "inner": INNER}
         marks = []
@@ -78,7 +78,7 @@ class Layout:
             away = [abs(joint - place.share) for joint in joints]
             share = joints[away.index(min(away))] if min(away) <= AT_JOINT else place.share
             marks.append((share, order[place.side], Mark(place)))
-        self.elements = cut([*marks, *elements])
+        self.elements = cut_segments([*marks, *elements])
         self._numbers: dict[Any, list[Any]] = {}
 
     def numbers(self, key: Any, exact: Callable[[Any], Any]) -> list[Any]:
@@ -118,9 +118,9 @@ class Layout:
 
     @cached_property
     def table(self) -> Real:
-        """Rows for `sweep.fill_free`: the numbers of `Reading` in their order, the row of the place first."""
+        """Rows for `sweep.fill_free`: the numbers of `OutputFormula` in their order, the row of the place first."""
         rows = [(self.marks.get(one.place, -1), *one[1:]) for one in self.each]
-        return np.asarray(read_only(np.array(rows, dtype=float).reshape(-1, len(Reading._fields))))
+        return np.asarray(read_only(np.array(rows, dtype=float).reshape(-1, len(OutputFormula._fields))))
 
 
 def kernel_row(element: Element) -> tuple[Any, ...]:
@@ -153,7 +153,7 @@ def unit_scale(wanted: Output, k: System) -> Fraction:
     return units.get(wanted.quantity, ONE) / k.drive.unit
 
 
-def reading_of(chain: System, wanted: Output, x: float) -> Reading:
+def reading_of(chain: System, wanted: Output, x: float) -> OutputFormula:
     """Return an output as a reading; x is the share of the length for one along the link."""
     share = Fraction(wanted.share(x))
     drive = chain.drive
@@ -162,9 +162,9 @@ def reading_of(chain: System, wanted: Output, x: float) -> Reading:
         is_driven = drive.per_ampere and drive.turns
         require(is_driven, "output", "motor_current", "needs a [motor] and another input than hub_angle")
         amperes = chain.EI / chain.length / drive.per_ampere / drive.unit  # per dimensionless torque
-        return Reading(None, -1, ZERO, wanted.power, amperes, drive.lag, -drive.back_emf, 1)
+        return OutputFormula(None, -1, ZERO, wanted.power, amperes, drive.lag, -drive.back_emf, 1)
     if wanted.quantity == "theta":
-        return Reading(None, -1, ONE, wanted.power, unit)
+        return OutputFormula(None, -1, ONE, wanted.power, unit)
     place = Place(share, wanted.side)
     if wanted.quantity == "centre":
         place = Place(ONE, "payload")
@@ -176,7 +176,9 @@ def reading_of(chain: System, wanted: Output, x: float) -> Reading:
         require(segment.half_depth is not None, "link.section.shape", "general", remedy)
         unit = Fraction(segment.half_depth or 0) / chain.length / segment.stiffness / drive.unit
     theta = {"Y": -(chain.radius + share), "Phi": Fraction(-1)}.get(wanted.quantity, ZERO)
-    return Reading(place, FIELDS[wanted.quantity], theta, wanted.power, unit, segment.damping if wanted.gauge else 0.0)
+    return OutputFormula(
+        place, FIELDS[wanted.quantity], theta, wanted.power, unit, segment.damping if wanted.gauge else 0.0
+    )
 
 
 def readings(chain: System, wanted: Iterable[Output] = (), x: float = 0.0) -> Layout:

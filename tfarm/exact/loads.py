@@ -19,11 +19,11 @@ from tfarm.errors import ParameterError, require
 
 from .balls import Ball, Sweep, point, rational
 from .compiled import python_of
-from .layout import Layout, M, Q, Reading, reading_of
+from .layout import Layout, M, OutputFormula, Q, reading_of
 from .outputs import Output
 from .system import Place, Spring, System
-from .values import PROVEN_BITS, certified, known
-from .waves import Row, met
+from .values import PROVEN_BITS, accurate_ball, certify_by_precision
+from .waves import SolutionRow, met
 
 _met = python_of(met)
 LOAD_KINDS = {"force": ("N", Q, (1,)), "moment_pair": ("N m", M, (-1, 1))}  # unit, entry of the state, its jumps
@@ -79,15 +79,15 @@ def loaded_value(chain: System, load: Load, wanted: Output, s: complex, x: float
         value = sum(sign * _Loaded(layout, point(s)).quantity(one, at, jump) for sign, layout, at in parts)
         value = value * point(s) ** one.power / (1 + rational(one.C) * point(s))
         value = value * rational(one.unit * chain.drive.unit * unit)
-        return known(value, PROVEN_BITS) if value.is_finite() else None
+        return accurate_ball(value, PROVEN_BITS) if value.is_finite() else None
 
-    return certified(PROVEN_BITS, attempt, f"{PROVEN_BITS} bits", s)
+    return certify_by_precision(PROVEN_BITS, attempt, f"{PROVEN_BITS} bits", s)
 
 
 class _Loaded(Sweep):
     """The sweep with marks at a load and at the place of an output."""
 
-    def _beyond(self, element: Any, f: Row) -> Row:
+    def _beyond(self, element: Any, f: SolutionRow) -> SolutionRow:
         """Return the condition beyond an element, beyond a spring not times its stiffness."""
         f = super()._beyond(element, f)
         if isinstance(element, Spring):
@@ -95,7 +95,7 @@ class _Loaded(Sweep):
             return tuple(each / stiffness for each in f)
         return f
 
-    def quantity(self, one: Reading, load: Place, jump: int) -> Ball:
+    def quantity(self, one: OutputFormula, load: Place, jump: int) -> Ball:
         """Return theta and field of a reading for a unit jump of an entry of the state at the load."""
         none = 0 * self.s
         whole = 1 + 0 * self.s

@@ -19,8 +19,8 @@ from tfarm.errors import must_be_known, require
 # theta, M, Q, W, W - (r + x) theta, Psi - theta: hub angle, moment, shear force, displacement, deflection, rotation;
 # Psi: rotation in space;
 # bending strain at the surface, displacement of the payload's centre of mass, current of the motor
-Quantity = Literal["theta", "M", "Q", "W", "Y", "Phi", "Psi", "strain", "centre", "current"]
-Place = Literal["root", "tip", "x"]
+OutputQuantity = Literal["theta", "M", "Q", "W", "Y", "Phi", "Psi", "strain", "centre", "current"]
+OutputPlace = Literal["root", "tip", "x"]
 Side = Literal["outer", "inner"]  # of a joint of two segments, or of an attachment
 
 MOST_POWER = 4  # of s: rate, acceleration, jerk and its rate
@@ -48,8 +48,8 @@ class Output:
     Raises ParameterError, naming the key and the remedy, for illegal values.
     """
 
-    quantity: Quantity
-    place: Place
+    quantity: OutputQuantity
+    place: OutputPlace
     unit: str = ""
     power: int = 0
     gauge: bool = False

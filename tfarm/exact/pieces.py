@@ -17,8 +17,8 @@ from tfarm.arrays import Complex
 from .compiled import inlined
 from .waves import (
     PARALLEL,
-    Plane,
-    Row,
+    SolutionPlane,
+    SolutionRow,
     Wave,
     across_rows,
     across_waves,
@@ -29,7 +29,7 @@ from .waves import (
     reciprocal,
     row_across,
     row_across_waves,
-    scaled,
+    scale_plane,
     transition_rows,
     transition_series,
     wave_functions,
@@ -45,7 +45,7 @@ FUNCTIONS, PHASE = (BLOCK * j for j in (4, 7))  # of a wave
 F1, F2_LESS_1, F3_LESS_1 = (SERIES + BLOCK * j for j in (1, 4, 5))
 
 
-class Work(NamedTuple):
+class BlockBuffers(NamedTuple):
     """Scratch arrays of a block, many by the row j of an element.
 
     `planes` j + 1 is inside of the element, 0 at the tip's end; that of a mark becomes its state on the way back.  It
@@ -72,7 +72,7 @@ def times(z: complex, factor: float) -> complex:
 
 
 @inlined
-def put(buffer: Any, i: int, numbers: tuple[complex, ...]) -> None:
+def write_point(buffer: Any, i: int, numbers: tuple[complex, ...]) -> None:
     """Write the numbers of a point."""
     for j in range(len(numbers)):
         buffer[BLOCK * j + i] = numbers[j]
@@ -86,19 +86,19 @@ def put_where(chosen: bool, buffer: Any, i: int, numbers: tuple[complex, ...]) -
 
 
 @inlined
-def row_at(buffer: Any, i: int) -> Row:
+def row_at(buffer: Any, i: int) -> SolutionRow:
     """Return four numbers of a point."""
     return buffer[i], buffer[BLOCK + i], buffer[2 * BLOCK + i], buffer[3 * BLOCK + i]
 
 
 @inlined
-def plane_at(buffer: Any, i: int) -> Plane:
+def plane_at(buffer: Any, i: int) -> SolutionPlane:
     """Return the plane of a point."""
     return buffer[i], buffer[BLOCK + i], buffer[2 * BLOCK + i], buffer[3 * BLOCK + i], buffer[4 * BLOCK + i]
 
 
 @inlined
-def cross(points: Any, row: Any, j: int, work: Work, lost: Any) -> None:
+def cross(points: Any, row: Any, j: int, work: BlockBuffers, lost: Any) -> None:
     """Compute the plane at the inner end of a segment, row j, from that at its outer one, at the points of a block.
 
     Scales are added to `work.scale`, lost digits are marked.
@@ -116,7 +116,9 @@ def cross(points: Any, row: Any, j: int, work: Work, lost: Any) -> None:
         for i in range(BLOCK):
             one, two, gS, d = waves_at(row, waves, i)
             gap = one[2] - two[2]
-            put(inner, i, scaled(across_waves(one, two, gS, d, plane_at(outer, i)), reciprocal(gS * d * gap * gap)))
+            write_point(
+                inner, i, scale_plane(across_waves(one, two, gS, d, plane_at(outer, i)), reciprocal(gS * d * gap * gap))
+            )
         for i in range(BLOCK):
             z1 = waves[ONE + i]
             z2 = waves[TWO + i]
@@ -133,14 +135,14 @@ def fill_waves(points: Any, row: Any, waves: Any) -> None:
     """Compute numbers and functions of both waves at every point of a block: the latter alone calls a library."""
     for i in range(BLOCK):
         own, one, two = dispersion(points[i], row)
-        put(waves, S_SQUARED + i, own)
-        put(waves, ONE + i, one)
-        put(waves, TWO + i, two)
+        write_point(waves, S_SQUARED + i, own)
+        write_point(waves, ONE + i, one)
+        write_point(waves, TWO + i, two)
     for i in range(BLOCK):
         (z1, _, t1, dt1) = row_at(waves, ONE + i)
         (z2, _, t2, dt2) = row_at(waves, TWO + i)
-        put(waves, ONE + FUNCTIONS + i, wave_functions(z1, t1, dt1))
-        put(waves, TWO + FUNCTIONS + i, wave_functions(z2, t2, dt2))
+        write_point(waves, ONE + FUNCTIONS + i, wave_functions(z1, t1, dt1))
+        write_point(waves, TWO + FUNCTIONS + i, wave_functions(z2, t2, dt2))
 
 
 @inlined
@@ -159,7 +161,7 @@ def waves_at(row: Any, waves: Any, i: int) -> tuple[Wave, Wave, complex, complex
 
 
 @inlined
-def rows_at(s: complex, row: Any, waves: Any, i: int) -> tuple[Row, Row, Row, Row]:
+def rows_at(s: complex, row: Any, waves: Any, i: int) -> tuple[SolutionRow, SolutionRow, SolutionRow, SolutionRow]:
     """Return the transition matrix of a slow segment at a point from F0..F3 in the chain's units."""
     over_d = times(reciprocal(1.0 + row.damping * s), 1.0 / row.stiffness)
     return transition_rows(row_at(waves, SERIES + i), s * s, over_d, row.of_chain)
@@ -173,11 +175,11 @@ def _fill_series(points: Any, row: Any, waves: Any) -> None:
         _, _, z_sum, z_product = wave_sums(points[i], row)
         F0, F1, F2, F3, F2_less_1, F3_less_1 = transition_series(z_sum, z_product)
         own = times(F0, l * l * l), times(F1, l * l), times(F2, l), F3, times(F2_less_1, l), F3_less_1
-        put(waves, SERIES + i, own)
+        write_point(waves, SERIES + i, own)
 
 
 @inlined
-def cross_back(points: Any, row: Any, j: int, work: Work, scale: Any) -> None:
+def cross_back(points: Any, row: Any, j: int, work: BlockBuffers, scale: Any) -> None:
     """Compute the condition at the outer end of a segment, row j, from that at its inner one, in place; see `cross`.
 
     The scales less those of the plane are added to `scale`.
@@ -223,7 +225,7 @@ def _fade(waves: Any, low: Any, scale: Any) -> None:
 
 
 @inlined
-def finish(points: Any, source: Any, power: int, unit: float, C: float, value: Any) -> None:
+def finish_output(points: Any, source: Any, power: int, unit: float, C: float, value: Any) -> None:
     """Compute the values of an output, those of its source times  unit s^power/(1 + C s),  power at most 4."""
     for i in range(value.size):
         s = points[i]

@@ -18,7 +18,7 @@ from .balls import Sweep, fraction
 from .layout import Layout, readings
 from .outputs import Output
 from .system import Body, Offset, Segment, system_of
-from .waves import Plane, Row
+from .waves import SolutionPlane, SolutionRow
 
 
 def rigid_response(arm: Arm, wanted: Output, s: Complex, x: float = 0.0) -> Complex:
@@ -54,12 +54,12 @@ class RigidSweep(Sweep):
 
     exact = staticmethod(fraction)
 
-    def _inside(self, element: Any, p: Plane) -> Plane:
+    def _inside(self, element: Any, p: SolutionPlane) -> SolutionPlane:
         for each in _rigid(element):
             p = super()._inside(each, p)
         return p
 
-    def _beyond(self, element: Any, f: Row) -> Row:
+    def _beyond(self, element: Any, f: SolutionRow) -> SolutionRow:
         for each in _rigid(element):
             f = super()._beyond(each, f)
         return f

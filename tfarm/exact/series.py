@@ -6,7 +6,7 @@ from typing import Any
 
 import flint
 
-from .balls import Ball, Sweep, precision, rational, summed
+from .balls import Ball, Sweep, precision, rational, sum_series
 from .layout import Layout, readings
 from .outputs import Output
 from .system import Place, System
@@ -23,7 +23,7 @@ class SlowSweep(Sweep):
 
     def _functions(self, z_sum: Any, z_product: Any) -> tuple[Any, ...]:
         """Return F0..F3 by their series in z1 + z2 and z1 z2, which both begin with s^2."""
-        return tuple(summed(z_sum, z_product, 2 * SERIES_ORDER))
+        return tuple(sum_series(z_sum, z_product, 2 * SERIES_ORDER))
 
 
 @lru_cache(SERIES_KEPT)  # loops, models and pages need the same few of a rig

@@ -34,20 +34,20 @@ from .pieces import (
     PLANE_SIZE,
     TURN,
     WAVES_SIZE,
-    Work,
+    BlockBuffers,
     cross,
     cross_back,
-    finish,
+    finish_output,
     plane_at,
-    put,
     row_at,
     rows_at,
     times,
+    write_point,
 )
 from .waves import (
     Number,
-    Plane,
-    Row,
+    SolutionPlane,
+    SolutionRow,
     beyond_body,
     beyond_offset,
     beyond_spring,
@@ -70,11 +70,11 @@ AXIS = read_only(np.array([[1.0], [0.0], [0.0], [0.0]]))  # the condition W = 0 
 
 
 @inlined
-def _work(rows: int) -> Work:
+def _work(rows: int) -> BlockBuffers:
     """Return the scratch arrays of a chain of that number of rows."""
     number = np.complex128
     by_row = (rows, BLOCK)
-    return Work(
+    return BlockBuffers(
         np.empty((rows + 1, PLANE_SIZE), number),
         np.empty((rows, WAVES_SIZE), number),
         np.empty(by_row, np.int64),
@@ -88,10 +88,10 @@ def _work(rows: int) -> Work:
 
 
 @inlined
-def _sweep(points: Any, rows: Any, ends: Any, work: Work, lost: Any) -> None:
+def _sweep(points: Any, rows: Any, ends: Any, work: BlockBuffers, lost: Any) -> None:
     """Compute the plane inside of each element, and the scale of that at the axis; mark lost digits."""
     for i in range(BLOCK):
-        put(work.planes[0], i, end_plane(*tip_conditions(ends, points[i] * points[i])))
+        write_point(work.planes[0], i, end_plane(*tip_conditions(ends, points[i] * points[i])))
         work.scale[i], lost[i] = 0.0, False
     for j in range(len(rows)):
         row = rows[j]
@@ -103,18 +103,18 @@ def _sweep(points: Any, rows: Any, ends: Any, work: Work, lost: Any) -> None:
             cross(points, row, j, work, lost)
         elif row.kind == MARK:
             for i in range(BLOCK):
-                put(inner, i, plane_at(outer, i))
+                write_point(inner, i, plane_at(outer, i))
             continue
         else:
             for i in range(BLOCK):
-                put(inner, i, inside(row.kind, row, points[i], points[i] * points[i], plane_at(outer, i)))
+                write_point(inner, i, inside(row.kind, row, points[i], points[i] * points[i], plane_at(outer, i)))
         _brought_back(inner, 5, work.powers[j])
         for i in range(BLOCK):
             work.scale[i] += work.powers[j, i] * LN_2
 
 
 @inlined
-def inside(kind: int, row: Any, s: Number, S: Number, p: Plane) -> Plane:
+def inside(kind: int, row: Any, s: Number, S: Number, p: SolutionPlane) -> SolutionPlane:
     """Return the plane inside an offset, a spring, a body or a mark."""
     if kind == OFFSET:
         return inside_offset(row.length, p)
@@ -126,7 +126,7 @@ def inside(kind: int, row: Any, s: Number, S: Number, p: Plane) -> Plane:
 
 
 @inlined
-def beyond(kind: int, row: Any, s: Number, S: Number, f: Row) -> Row:
+def carry_beyond(kind: int, row: Any, s: Number, S: Number, f: SolutionRow) -> SolutionRow:
     """Return the condition beyond an offset, a spring or a body."""
     if kind == OFFSET:
         return beyond_offset(row.length, f)
@@ -159,7 +159,7 @@ def _brought_back(buffer: Any, parts: int, powers: Any) -> None:
 
 
 @inlined
-def _go_back(points: Any, rows: Any, outermost: int, work: Work, differs: bool, lost: Any) -> None:
+def _go_back(points: Any, rows: Any, outermost: int, work: BlockBuffers, differs: bool, lost: Any) -> None:
     """Compute the state at each mark, in place of its plane, from the condition of the axis carried outwards."""
     axis = work.planes[len(rows)]
     back = work.back
@@ -192,14 +192,14 @@ def _go_back(points: Any, rows: Any, outermost: int, work: Work, differs: bool, 
 
 
 @inlined
-def _meet(state: Any, work: Work, is_root: bool, reach: float, shift: Any) -> None:
+def _meet(state: Any, work: BlockBuffers, is_root: bool, reach: float, shift: Any) -> None:
     """Compute the state of a mark, its plane's with the condition there, and W - r theta and Psi - theta.
 
     At the root, inside of all segments, W is their sum, without a difference.
     """
     back = work.back
     for i in range(BLOCK):
-        put(state, i, met(row_at(back, i), plane_at(state, i)))
+        write_point(state, i, met(row_at(back, i), plane_at(state, i)))
         if is_root:
             rigid = times(work.theta[i], reach)
             lifted = rigid + back[LIFT + i]
@@ -221,11 +221,11 @@ def _beyond(points: Any, row: Any, inner: Any, back: Any, shift: Any) -> None:
         elif kind == SPRING:
             moment = times(met(f, plane_at(inner, i))[2], math.ldexp(1.0, shift[i]))
             back[TURN + i] += row.compliance * reciprocal(s * row.damping + row.stiffness) * moment
-        put(back, i, beyond(kind, row, s, s * s, f))
+        write_point(back, i, carry_beyond(kind, row, s, s * s, f))
 
 
 @inlined
-def _beyond_segment(points: Any, row: Any, j: int, work: Work, reach: float, shift: Any) -> None:
+def _beyond_segment(points: Any, row: Any, j: int, work: BlockBuffers, reach: float, shift: Any) -> None:
     """Compute W - r theta and Psi - theta beyond a slow segment from the state at its inner end; nan for others.
 
     It is `waves.transition_rows` from the other end, with the other sign of Psi and Q, minus the identity.
@@ -276,9 +276,9 @@ def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, l
 
     It satisfies axis . (W, Psi, M, Q) = 0 on the hub's axis, W = 0 for `AXIS`; `axis` (4, n) has one column, or one for
     each point.  Outputs are those of a unit input with `per_input`, else times e^{-scale}.  A row of `table` is an
-    output (`layout.Reading`): the row of its place (or -1), its field, weight of theta, power of s, unit, C, weights of
-    s theta and of the drive.  Digits are lost where two waves of a segment are nearly one, where an output is a small
-    difference of fast waves, and where the drive is one, near a pole.
+    output (`layout.OutputFormula`): the row of its place (or -1), its field, weight of theta, power of s, unit, C,
+    weights of s theta and of the drive.  Digits are lost where two waves of a segment are nearly one, where an output
+    is a small difference of fast waves, and where the drive is one, near a pole.
     """
     differs = False
     outermost = 0
@@ -335,7 +335,7 @@ def _drive(points: Any, segment: Any, ends: Any, plane: Any, drive: Any, lost: A
 
 
 @inlined
-def _output(points: Any, want: Any, work: Work, drive: Any, over: Any, value: Any, lost: Any) -> None:
+def _output(points: Any, want: Any, work: BlockBuffers, drive: Any, over: Any, value: Any, lost: Any) -> None:
     """Compute an output of the table at every point of a block; digits are lost where it is a small difference.
 
     Until its power of s it is times 2^100: at the tip W would underflow where s^2 W does not.
@@ -373,4 +373,4 @@ def _output(points: Any, want: Any, work: Work, drive: Any, over: Any, value: An
                     lost[i] = lost[i] or magnitude(value[i]) < SMALL_DIFFERENCE * size
     for i in range(BLOCK):
         value[i] *= over[i]
-    finish(points, value, int(want[3]), want[4] / lift, want[5], value)
+    finish_output(points, value, int(want[3]), want[4] / lift, want[5], value)

@@ -172,7 +172,7 @@ PAYLOAD, OUTER, BODY, INNER, NEXT = range(5)  # the order at one point, from the
 Placed = tuple[Fraction, int, Element]  # distance from the clamp (of a segment's outer end), order there, and element
 
 
-def placed(elements: Iterable[Element]) -> Iterator[Placed]:
+def elements_with_places(elements: Iterable[Element]) -> Iterator[Placed]:
     """Yield the elements of a chain, from the payload inwards, with their places."""
     position = ONE
     is_beyond = True
@@ -182,7 +182,7 @@ def placed(elements: Iterable[Element]) -> Iterator[Placed]:
         position -= each.length if isinstance(each, Segment) else 0
 
 
-def cut(elements: Sequence[Placed]) -> tuple[Element, ...]:
+def cut_segments(elements: Sequence[Placed]) -> tuple[Element, ...]:
     """Return elements in their order from the payload inwards, each segment cut where there is another one on it."""
     ordered = sorted(elements, key=lambda each: (-each[0], each[1]))
     found: list[Element] = []
@@ -370,7 +370,9 @@ def system_of(arm: Arm, theory: Theory | None = None) -> System:
         )
         bodies.append((min(Fraction(each.x) / unit_length, ONE), BODY, body))
     return System(
-        elements=cut([*placed([*at_tip, *map(segment, reversed(arm.links)), *at_clamp]), *bodies]),
+        elements=cut_segments(
+            [*elements_with_places([*at_tip, *map(segment, reversed(arm.links)), *at_clamp]), *bodies]
+        ),
         tip_mass=_inertia(arm.payload.mass, translation),
         tip_inertia=_inertia(arm.payload.inertia, rotation),
         drive=hub_drive(arm, rotation),

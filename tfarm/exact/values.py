@@ -25,14 +25,14 @@ from tfarm.records import frozen, read_only
 from tfarm.schema import Quantity
 
 from .balls import Ball, Sweep, first_success, nearest_float, point, rational
-from .layout import Layout, Reading, readings
+from .layout import Layout, OutputFormula, readings
 from .outputs import Output
 from .series import constant_of, expansion_at_zero
 from .sweep import AXIS, fill_free
 from .system import ONE, ZERO, Place, System
 
 AT_A_POLE = 4 * float(np.finfo(float).eps)  # of |s|: the distance of a pole within which no digit is right
-_Found = TypeVar("_Found")
+_Value = TypeVar("_Value")
 
 PROVEN_BITS = 60  # more than a float64 has
 MOST_ENCLOSURE_BITS = 1 << 18  # of working precision: at a pole no number of them is enough
@@ -114,8 +114,8 @@ def free_fields(
     """
 
     def with_states() -> Layout:
-        each = [Reading(place, field, ZERO, 0, ONE) for place in places for field in range(4)]
-        return Layout(chain, tuple(dict.fromkeys(places)), (*each, Reading(None, -1, ONE, 0, ONE)))
+        each = [OutputFormula(place, field, ZERO, 0, ONE) for place in places for field in range(4)]
+        return Layout(chain, tuple(dict.fromkeys(places)), (*each, OutputFormula(None, -1, ONE, 0, ONE)))
 
     layout = chain.keep(tuple(places), with_states)
     found, _ = _filled(layout, s, np.asarray(read_only(np.ascontiguousarray(axis))))
@@ -203,7 +203,7 @@ def output_ball(k: System, wanted: Output, s: Ball, x: float) -> Ball | None:
     return None if sweep.input.contains(0) else sweep.output(one) / sweep.input
 
 
-def known(value: Ball | None, bits: int) -> Ball | None:
+def accurate_ball(value: Ball | None, bits: int) -> Ball | None:
     """Return a ball with that many right bits, or of 0 alone; None for any other."""
     return value if value is not None and (value.rel_accuracy_bits() >= bits or value.is_zero()) else None
 
@@ -213,7 +213,9 @@ def enclose(k: System, wanted: Output, s: complex, *, bits: int, x: float = 0.0)
 
     Raises CertificationError where that needs more than `MOST_ENCLOSURE_BITS`: at a pole or an exact zero.
     """
-    return certified(bits, lambda: known(output_ball(k, wanted, point(s), x), bits), f"{bits} bits", s)
+    return certify_by_precision(
+        bits, lambda: accurate_ball(output_ball(k, wanted, point(s), x), bits), f"{bits} bits", s
+    )
 
 
 def slope(k: System, wanted: Output, s: complex, x: float = 0.0) -> Ball:
@@ -228,7 +230,7 @@ def slope(k: System, wanted: Output, s: complex, x: float = 0.0) -> Ball:
         is_known = (difference + value / point(s)).rel_accuracy_bits() >= PROVEN_BITS or value.is_zero()
         return difference if is_known else None
 
-    return certified(4 * PROVEN_BITS, attempt, "derivative", s)
+    return certify_by_precision(4 * PROVEN_BITS, attempt, "derivative", s)
 
 
 def digits_of(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0) -> tuple[str, str]:
@@ -249,17 +251,17 @@ def digits_of(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0
         zero = flint.arb(0)
         bits = math.ceil(3.33 * digits) + 8
         re, im = (zero if is_zero else part for is_zero, part in zip(vanish, (value.real, value.imag), strict=True))
-        if known(re, bits) is None or known(im, bits) is None:
+        if accurate_ball(re, bits) is None or accurate_ball(im, bits) is None:
             return None
         return written(re), written(im)
 
     def written(part: Ball) -> str:
         return "0.0" if part.is_zero() else str(part.mid().str(digits, radius=False))
 
-    return certified(4 * digits, attempt, f"{digits} digits", s)
+    return certify_by_precision(4 * digits, attempt, f"{digits} digits", s)
 
 
-def certified(bits: int, attempt: Callable[[], _Found | None], number: str, s: complex) -> _Found:
+def certify_by_precision(bits: int, attempt: Callable[[], _Value | None], number: str, s: complex) -> _Value:
     """Return the first result other than None at working precisions for that many right bits, each twice the last.
 
     Raises CertificationError, naming the number and s, where none has one.
@@ -369,5 +371,5 @@ def slow_values(method: Method, arm: Arm, k: System, wanted: Sequence[Output], s
     place = x * arm.link.length
     digits = APPENDIX_DIGITS
     return np.array(
-        [[complex(appendix.response(arm, each, complex(at), digits, place)) for at in s] for each in wanted]
+        [[complex(appendix.output_value(arm, each, complex(at), digits, place)) for at in s] for each in wanted]
     )

@@ -122,7 +122,7 @@ def magnitude(z: complex) -> float:
 
 
 @inlined
-def dispersion(s: complex, k: Any) -> tuple[tuple[complex, complex, complex], Row, Row]:
+def dispersion(s: complex, k: Any) -> tuple[tuple[complex, complex, complex], SolutionRow, SolutionRow]:
     """Return S, d, g S, and for both waves z, v = z - b S, t with its correction dt:  e^{-t_j} = e^{-t} (1 - dt).
 
     `k` is the row of a segment (`layout.ROW`).
@@ -148,7 +148,7 @@ def dispersion(s: complex, k: Any) -> tuple[tuple[complex, complex, complex], Ro
 
 
 @inlined
-def _corrected(z: complex, damper: Double, aS: Double, bS: Double, gS: Double) -> Row:
+def _corrected(z: complex, damper: Double, aS: Double, bS: Double, gS: Double) -> SolutionRow:
     """Return z, v, t, dt after a Newton step on (d z - a S)(z - b S) + g S, a double-double residual."""
     (d, d_low) = damper
     (gS_high, gS_low) = gS
@@ -178,7 +178,7 @@ def fill_wave_numbers(s: Any, rows: Any, found: Any) -> None:
 
 
 @inlined
-def wave_functions(z: complex, t: complex, dt: complex) -> Row:
+def wave_functions(z: complex, t: complex, dt: complex) -> SolutionRow:
     """Return c = cosh t e^{-t}, S = sinh t / t e^{-t}, e = e^{-t} and t, with t + dt for t."""
     e = math.exp(-t.real) * complex(math.cos(t.imag), -math.sin(t.imag))
     # 1 - e^2 would cancel; here e^{-t} is a scale alone, and t that of this very scale: next to the cut-off dt is large
@@ -242,7 +242,7 @@ def even_functions(z: Number) -> tuple[Number, Number]:
 
 
 @inlined
-def tip_conditions(ends: Any, S: Number) -> Row:
+def tip_conditions(ends: Any, S: Number) -> SolutionRow:
     """Return tip_mass, shear, tip_inertia and moment of the tip's conditions at S = s^2 from the vector of ends.
 
     Rest, inertia and force of the mass come first and those of the inertia next (see `system.end_condition`).
@@ -258,12 +258,12 @@ def impedance(S: float, k: Any) -> float:
 
 
 Wave = tuple[Number, Number, Number, Number, Number]  # c, s, z, v, e: c and s are scaled by e = e^{-t}
-Plane = tuple[Number, Number, Number, Number, Number]  # p_WPsi, p_WM, p_WQ = -p_PsiM, p_PsiQ, p_MQ
-Row = tuple[Number, Number, Number, Number]  # f_W, f_Psi, f_M, f_Q
+SolutionPlane = tuple[Number, Number, Number, Number, Number]  # p_WPsi, p_WM, p_WQ = -p_PsiM, p_PsiQ, p_MQ
+SolutionRow = tuple[Number, Number, Number, Number]  # f_W, f_Psi, f_M, f_Q
 
 
 @inlined
-def end_plane(mass: Number, shear: Number, inertia: Number, moment: Number) -> Plane:
+def end_plane(mass: Number, shear: Number, inertia: Number, moment: Number) -> SolutionPlane:
     """Return the plane of states with  mass W + shear Q = 0  and  inertia Psi + moment M = 0, of a body at the end."""
     return shear * moment, -shear * inertia, 0 * shear, mass * moment, -mass * inertia
 
@@ -277,20 +277,20 @@ def in_chain(wave: Wave, length: Number) -> Wave:
 
 
 @inlined
-def scaled(p: Plane, unit: Number) -> Plane:
+def scale_plane(p: SolutionPlane, unit: Number) -> SolutionPlane:
     """Return the plane times a number."""
     return p[0] * unit, p[1] * unit, p[2] * unit, p[3] * unit, p[4] * unit
 
 
 @inlined
-def inside_offset(a: Number, p: Plane) -> Plane:
+def inside_offset(a: Number, p: SolutionPlane) -> SolutionPlane:
     """Return the plane inside a rigid massless offset: W + a Psi and M - a Q are its outer W and M."""
     WPsi, WM, WQ, PsiQ, MQ = p
     return WPsi, WM + a * (2 * WQ - a * PsiQ), WQ - a * PsiQ, PsiQ, MQ
 
 
 @inlined
-def inside_spring(stiffness: Number, compliance: Number, p: Plane) -> Plane:
+def inside_spring(stiffness: Number, compliance: Number, p: SolutionPlane) -> SolutionPlane:
     """Return the plane inside a spring, stiffness (Psi_outer - Psi_inner) = compliance M, times the stiffness."""
     WPsi, WM, WQ, PsiQ, MQ = p
     return (
@@ -303,7 +303,7 @@ def inside_spring(stiffness: Number, compliance: Number, p: Plane) -> Plane:
 
 
 @inlined
-def inside_body(translation: Number, rotation: Number, p: Plane) -> Plane:
+def inside_body(translation: Number, rotation: Number, p: SolutionPlane) -> SolutionPlane:
     """Return the plane inside a body: Q + translation W and M + rotation Psi are its outer Q and M.
 
     translation and rotation are inertia s^2 + spring.
@@ -319,7 +319,7 @@ def inside_body(translation: Number, rotation: Number, p: Plane) -> Plane:
 
 
 @inlined
-def across_waves(one: Wave, two: Wave, gS: Number, d: Number, p: Plane) -> Plane:
+def across_waves(one: Wave, two: Wave, gS: Number, d: Number, p: SolutionPlane) -> SolutionPlane:
     """Return the plane at the inner end of a segment from the outer one, times g S d (z1 - z2)^2 e^{-(t1 + t2)}.
 
     v_j = z_j - b S and v1 v2 = g S/d.
@@ -349,7 +349,9 @@ def across_waves(one: Wave, two: Wave, gS: Number, d: Number, p: Plane) -> Plane
 
 
 @inlined
-def transition_rows(F: Row, S: Number, over_d: Number, k: Any) -> tuple[Row, Row, Row, Row]:
+def transition_rows(
+    F: SolutionRow, S: Number, over_d: Number, k: Any
+) -> tuple[SolutionRow, SolutionRow, SolutionRow, SolutionRow]:
     """Return the matrix from the state at the outer end of a segment to that at the inner end, by F0..F3.
 
     `k` are a, b, g and sigma.
@@ -372,7 +374,7 @@ def transition_rows(F: Row, S: Number, over_d: Number, k: Any) -> tuple[Row, Row
 
 
 @inlined
-def _minor(i: Row, j: Row, p: Plane) -> Number:
+def _minor(i: SolutionRow, j: SolutionRow, p: SolutionPlane) -> Number:
     """Return q_ij of the carried plane: the minors of rows i and j times p."""
     (i0, i1, i2, i3) = i
     (j0, j1, j2, j3) = j
@@ -387,13 +389,13 @@ def _minor(i: Row, j: Row, p: Plane) -> Number:
 
 
 @inlined
-def across_rows(W: Row, Psi: Row, M: Row, Q: Row, p: Plane) -> Plane:
+def across_rows(W: SolutionRow, Psi: SolutionRow, M: SolutionRow, Q: SolutionRow, p: SolutionPlane) -> SolutionPlane:
     """Return the plane carried by `transition_rows`, for slow waves and for balls."""
     return _minor(W, Psi, p), _minor(W, M, p), _minor(W, Q, p), _minor(Psi, Q, p), _minor(M, Q, p)
 
 
 @inlined
-def met(f: Row, p: Plane) -> Row:
+def met(f: SolutionRow, p: SolutionPlane) -> SolutionRow:
     """Return the state (W, Psi, M, Q) of the plane p with f z = 0, up to one factor."""
     WPsi, WM, WQ, PsiQ, MQ = p
     W, Psi, M, Q = f
@@ -406,25 +408,25 @@ def met(f: Row, p: Plane) -> Row:
 
 
 @inlined
-def beyond_offset(a: Number, f: Row) -> Row:
+def beyond_offset(a: Number, f: SolutionRow) -> SolutionRow:
     """Return the condition f z = 0 at the outer side of an offset, from that at its inner one."""
     return f[0], f[1] - a * f[0], f[2], f[3] + a * f[2]
 
 
 @inlined
-def beyond_spring(stiffness: Number, compliance: Number, f: Row) -> Row:
+def beyond_spring(stiffness: Number, compliance: Number, f: SolutionRow) -> SolutionRow:
     """Return the condition beyond a rotational spring, times its stiffness."""
     return stiffness * f[0], stiffness * f[1], stiffness * f[2] - compliance * f[1], stiffness * f[3]
 
 
 @inlined
-def beyond_body(translation: Number, rotation: Number, f: Row) -> Row:
+def beyond_body(translation: Number, rotation: Number, f: SolutionRow) -> SolutionRow:
     """Return the condition beyond a body."""
     return f[0] - translation * f[3], f[1] - rotation * f[2], f[2], f[3]
 
 
 @inlined
-def row_across_waves(one: Wave, two: Wave, gS: Number, d: Number, f: Row) -> Row:
+def row_across_waves(one: Wave, two: Wave, gS: Number, d: Number, f: SolutionRow) -> SolutionRow:
     """Return the condition at the outer end of a segment from that at its inner one, times g S d (z1 - z2).
 
     c, s of both waves are scaled by the same factor.
@@ -447,13 +449,13 @@ def row_across_waves(one: Wave, two: Wave, gS: Number, d: Number, f: Row) -> Row
 
 
 @inlined
-def row_across(W: Row, Psi: Row, M: Row, Q: Row, f: Row) -> Row:
+def row_across(W: SolutionRow, Psi: SolutionRow, M: SolutionRow, Q: SolutionRow, f: SolutionRow) -> SolutionRow:
     """Return the condition carried outwards by `transition_rows`, f T^-1."""
     T = W, Psi, M, Q
     return _column(f, T, 0), _column(f, T, 1), _column(f, T, 2), _column(f, T, 3)
 
 
 @inlined
-def _column(f: Row, T: tuple[Row, Row, Row, Row], j: int) -> Number:
+def _column(f: SolutionRow, T: tuple[SolutionRow, SolutionRow, SolutionRow, SolutionRow], j: int) -> Number:
     """Return entry j of the row f T."""
     return f[0] * T[0][j] + f[1] * T[1][j] + f[2] * T[2][j] + f[3] * T[3][j]

@@ -24,14 +24,14 @@ from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import Real, Whole
 from tfarm.case import Case
-from tfarm.dsp.discretise import discretised, system_matrix
-from tfarm.dsp.kernel import DAC, estimate, law_step, quantise, rounded
+from tfarm.dsp.discretise import discretise_law, system_matrix
+from tfarm.dsp.kernel import DAC, estimate, law_step, quantise, to_precision
 from tfarm.dsp.simulate import quantisers
 from tfarm.errors import must_be_known, require
 from tfarm.exact.compiled import compiled, inlined
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.exported.result import Export, ExportTask, Name, names_of
-from tfarm.exported.texts import facts_of, identifiers, literal, name_in_c, render
+from tfarm.exported.texts import facts_of, identifiers, literal, name_in_c, render_source
 from tfarm.exported.word_length import (
     ANGLE,
     FEEDFORWARD,
@@ -217,10 +217,10 @@ def source_files(
     name = name_in_c(task.name or "controller")
     signals = identifiers(controller.signals, "y_")
     references = identifiers(controller.references, "r_")
-    values = values_of(task, controller, ports_of(task, controller, signals, references))
+    values = template_values(task, controller, ports_of(task, controller, signals, references))
     (own,) = name.values()
     values |= {"name": own, "facts": facts, "bounds": bounds}
-    return {file: render(file, **values) for file in FILES}, names_of(name, signals, references)
+    return {file: render_source(file, **values) for file in FILES}, names_of(name, signals, references)
 
 
 def in_z(case: Case) -> Law:
@@ -234,7 +234,7 @@ def in_z(case: Case) -> Law:
     remedy = f"is {samples:.6g} samples: C code has a delay of whole samples; write another one into the law's states"
     # but for the rounding of a delay
     require(abs(samples - round(samples)) <= 1e-9, "law.delay", law.delay, remedy)
-    law = discretised(law, period)
+    law = discretise_law(law, period)
     return with_system_matrix(law, system_matrix(law))
 
 
@@ -289,13 +289,13 @@ def run_real(table: Any, plan: Any, inputs: Any, dac: Any, hub: Any, single: boo
         status[k] = INPUT_ERROR
         if np.isfinite(inputs[k]).all():
             if hub[0] >= 0.0:
-                known[-2] = rounded(estimate(known[int(hub[0])], 0.0, memory, True, hub[1], hub[2]), single)
+                known[-2] = to_precision(estimate(known[int(hub[0])], 0.0, memory, True, hub[1], hub[2]), single)
             for j in range(plan.shape[0]):
-                z[n + j] = rounded(known[plan[j, MINUEND]] - known[plan[j, SUBTRAHEND]], single)
+                z[n + j] = to_precision(known[plan[j, MINUEND]] - known[plan[j, SUBTRAHEND]], single)
             law_step(table, z, known[forward], single, following)
             if np.isfinite(following).all():
                 z[:n] = following[:n]
-                outputs[k] = rounded(quantise(following[n], dac, clipped, DAC), single)
+                outputs[k] = to_precision(quantise(following[n], dac, clipped, DAC), single)
                 status[k] = SATURATED if clipped[DAC] else 0
             else:
                 memory[:] = before
@@ -303,7 +303,7 @@ def run_real(table: Any, plan: Any, inputs: Any, dac: Any, hub: Any, single: boo
 
 
 @inlined
-def shifted(value: int, shift: int) -> int:
+def shift_right(value: int, shift: int) -> int:
     """value/2^shift, to the nearest whole number, halves upwards."""
     return (value + (1 << (shift - 1))) >> shift
 
@@ -324,8 +324,8 @@ def run_fixed(table: Any, shifts: Any, plan: Any, inputs: Any, dac: Any, outputs
             total = known[forward] << shifts[n] if i == n else 0
             for j in range(z.size):
                 total += table[i, j] * z[j]
-            following[i] = shifted(total, shifts[i])
-        u = shifted(following[n], dac[0]) << dac[0] if dac[0] > 0 else following[n]
+            following[i] = shift_right(total, shifts[i])
+        u = shift_right(following[n], dac[0]) << dac[0] if dac[0] > 0 else following[n]
         outputs[k] = min(max(u, dac[1]), dac[2])
         status[k] = SATURATED if outputs[k] != u else 0
         for i in range(n):
@@ -337,7 +337,7 @@ def run_fixed(table: Any, shifts: Any, plan: Any, inputs: Any, dac: Any, outputs
 # ------------------------------------------------------------ values of the templates
 
 
-def values_of(task: ExportTask, controller: Controller, ports: Sequence[Port]) -> dict[str, Any]:
+def template_values(task: ExportTask, controller: Controller, ports: Sequence[Port]) -> dict[str, Any]:
     """The values of the templates, but for name and facts."""
     word = controller.word
     is_fixed = task.precision == FIXED
@@ -350,7 +350,7 @@ def values_of(task: ExportTask, controller: Controller, ports: Sequence[Port]) -
     return {
         "fixed": is_fixed, "real": real, "wide": "int64_t" if is_fixed else real, "largest": largest, "suffix": suffix,
         "cast": cast, "fields": ports,
-        **recorded(controller.run, ports, task.precision), "header": FILES[0],
+        **self_test_values(controller.run, ports, task.precision), "header": FILES[0],
         "n": word.law.order, "m": len(controller.plan), "shifts": word.shifts,
         "table": [[literal(x, suffix) for x in row] for row in word.table.tolist()],
         "errors": [f"{known[of]} - {known[less]}".strip() for of, less in controller.plan.tolist()],
@@ -386,7 +386,7 @@ def ports_of(task: ExportTask, controller: Controller, *known: dict[str, str]) -
     return [*found, Port(FEEDFORWARD, text, word.feedforward)]
 
 
-def recorded(
+def self_test_values(
     run: Callable[[NDArray[Any]], tuple[NDArray[Any], Whole]], ports: Sequence[Port], precision: str
 ) -> dict[str, Any]:
     """Values of the template of a self-test, whose inputs are those of a linear congruential generator."""

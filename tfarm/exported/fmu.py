@@ -27,13 +27,13 @@ from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex, Real
 from tfarm.dsp import Simulator, scenario
 from tfarm.dsp.plant import MODES_USED, RECORDED
-from tfarm.dsp.results import simulated
+from tfarm.dsp.results import simulate_modes
 from tfarm.dsp.scenarios import TRIAL_DURATION
 from tfarm.errors import ParameterError, one_line, require
 from tfarm.exact.outputs import signal_words
 from tfarm.exported.controller import controller_of, in_z, source_files
 from tfarm.exported.result import ANYWAY, Export, ExportTask, What, is_certified, names_of
-from tfarm.exported.texts import identifiers, literal, render
+from tfarm.exported.texts import identifiers, literal, render_source
 from tfarm.exported.word_length import FEEDFORWARD, FIXED
 from tfarm.files import temporary_folder
 from tfarm.records import frozen
@@ -142,8 +142,8 @@ def fmu(task: ExportTask) -> Export:
     head: dict[str, Any] = {"variables": variables, "has_plant": has_plant, "period": period, "about": about}
     head["guid"] = guid[:32]
     plant = plant_code(prepared)
-    source = render("fmu.c", law=law, functions=FUNCTIONS, errors=ERRORS, sha256=task.sha256, **head, **plant)
-    sources = {"fmi2.h": render("fmi2.h"), "fmu.c": source, **(law.files if law else {})}
+    source = render_source("fmu.c", law=law, functions=FUNCTIONS, errors=ERRORS, sha256=task.sha256, **head, **plant)
+    sources = {"fmi2.h": render_source("fmi2.h"), "fmu.c": source, **(law.files if law else {})}
     binary, compiler = binary_of(sources, own[name])
     files = {f"sources/{name}": content for name, content in sources.items()} | binary
     files["modelDescription.xml"] = model_description(sources, own[name], **head)
@@ -186,7 +186,7 @@ def prepared_simulator(task: ExportTask) -> Simulator:
         run = scenario("slew", case.arm, case.chain, TRIAL_DURATION)
     except ParameterError:  # an arm that cannot turn
         run = scenario("step", case.arm, case.chain, TRIAL_DURATION)
-    modes = 1 if task.what == "controller" else simulated(case, run)[1].modes
+    modes = 1 if task.what == "controller" else simulate_modes(case, run)[1].modes
     return Simulator(case, run, count=modes)
 
 
@@ -223,10 +223,10 @@ def plant_code(of: Simulator) -> dict[str, Any]:
     chain = of.electronics
     model = of.model
     tables = {
-        "turn[PIECES][POLES][2]": parts(model.turn),
-        "push[PIECES][POLES][2]": parts(model.push),
+        "turn[PIECES][POLES][2]": real_and_imaginary(model.turn),
+        "push[PIECES][POLES][2]": real_and_imaginary(model.push),
         "piece[PIECES][2]": model.piece[:, :2],
-        "weights[OUTPUTS - 1][POLES][2]": parts(model.weights),
+        "weights[OUTPUTS - 1][POLES][2]": real_and_imaginary(model.weights),
         "rates[OUTPUTS - 1][2]": model.rates,
         "through[OUTPUTS - 1]": model.static,
         "converters[3][3]": np.clip(chain.quantisers, -LARGEST, LARGEST),
@@ -238,7 +238,7 @@ def plant_code(of: Simulator) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def parts(values: Complex) -> Real:
+def real_and_imaginary(values: Complex) -> Real:
     """Real and imaginary parts, in a further axis."""
     return np.stack([values.real, values.imag], axis=-1)
 

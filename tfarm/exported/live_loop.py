@@ -61,7 +61,7 @@ LIVE_COLUMNS = 90  # values of the gain across at which the continuous region is
 LiveNumbers = dict[str, Any]
 
 
-def packed(values: Any) -> str:
+def pack_doubles(values: Any) -> str:
     """Return the bytes of doubles; of complex numbers real and imaginary parts in turn."""
     array = np.ascontiguousarray(values)
     doubles = array.view(float) if np.iscomplexobj(array) else array.astype(float)
@@ -191,7 +191,7 @@ def _samples(case: Case, corners: Sequence[Case], unit: Law | None) -> tuple[Liv
     own = [abs(s) for block in _blocks(unit) for s in (*block.poles, *block.zeros) if s] if unit else []
     return {
         # by panel, part and point
-        "samples": packed(samples.values.transpose(1, 0, 2)),
+        "samples": pack_doubles(samples.values.transpose(1, 0, 2)),
         "low": samples.low.tolist(),
         "high": samples.high.tolist(),
         "order": samples.order,
@@ -312,8 +312,8 @@ def _sampling(chain: Chain) -> LiveNumbers:
 def _plant(plant: Plant) -> LiveNumbers:
     """Return poles (m,) [1/s] but s = 0, the outputs' residues (outputs, m), and their shares of 1/s^2, 1/s and 1."""
     return {
-        "eigenvalues": packed(plant.poles.astype(complex)),
-        "residues": packed(plant.residues.astype(complex)),
+        "eigenvalues": pack_doubles(plant.poles.astype(complex)),
+        "residues": pack_doubles(plant.residues.astype(complex)),
         "rigid": plant.rigid.tolist(),
         "static": plant.static.tolist(),
     }
@@ -352,7 +352,7 @@ def slew_numbers(case: Case) -> LiveNumbers | None:
             **_sampling(chain),
             **_plant(plant),
             **_shapes(arm, plant),
-            "ideal": packed(np.stack(signals, axis=1)),
+            "ideal": pack_doubles(np.stack(signals, axis=1)),
             "converters": [[x if math.isfinite(x) else None for x in row] for row in quantisers(chain).tolist()],
             "single": chain.converters.is_single,
             "bound": FOLDED_UP * arm.bending_scale,
@@ -385,7 +385,7 @@ def _shapes(arm: Arm, plant: Plant) -> LiveNumbers:
     s = plant.poles.astype(complex) * (1 + 1e-9)
     x = np.linspace(0.0, arm.length, 25)
     shapes = [np.divide(*transfer(arm, ["displacement", "tip_displacement"], x=each)(s)) for each in x.tolist()]
-    return {"x": x.tolist(), "offset": arm.reach - arm.length, "shapes": packed(shapes)}
+    return {"x": x.tolist(), "offset": arm.reach - arm.length, "shapes": pack_doubles(shapes)}
 
 
 # ------------------------------------------------------------ sensors along the arm

@@ -29,12 +29,12 @@ from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex
 from tfarm.case import Case
 from tfarm.dsp.discretise import acting_law, with_estimate
-from tfarm.dsp.plant import USUAL_MODES, PulseTransfer, driven, sensed_plant
+from tfarm.dsp.plant import USUAL_MODES, PulseTransfer, arm_under_chain, sensed_plant
 from tfarm.dsp.stages import not_covered
 from tfarm.errors import require
 from tfarm.exported.result import Export, ExportTask, names_of
-from tfarm.exported.texts import comment, matlab_text, render
-from tfarm.exported.word_length import closed
+from tfarm.exported.texts import comment, matlab_text, render_source
+from tfarm.exported.word_length import close_state_space
 from tfarm.files import is_standard_output, mat_content, write_file
 from tfarm.records import frozen
 from tfarm.reduced import BAND, ReducedModel, modal_model, reduce
@@ -118,7 +118,7 @@ def loop_system(plant: NamedSystem, controller: NamedSystem) -> NamedSystem:
     A, B, C, _ = plant.matrices
     a, b, c, d = controller.matrices
     n = sum(not name.startswith(REFERENCE) for name in controller.inputs)
-    matrix, _, u = closed(A, B, C[:n], a, b[:, :n], c, d[:, :n])
+    matrix, _, u = close_state_space(A, B, C[:n], a, b[:, :n], c, d[:, :n])
     # the input by feedforward and references
     through = np.c_[1.0, d[:, n:]]
     matrices = (
@@ -212,7 +212,7 @@ def linear(task: ExportTask) -> Linear:
     if what == "controller":
         return Linear({what: controller}, head, {}, verdict)
     plant = plant_system(case)
-    read = Signals(driven(case.arm, case.chain)[0], plant.outputs)
+    read = Signals(arm_under_chain(case.arm, case.chain)[0], plant.outputs)
     systems = {"plant": plant, **reduced_systems(read.arm, read.names)}
     if what == "loop":
         systems = {what: loop_system(plant, controller), "controller": controller, **systems}
@@ -228,12 +228,12 @@ def mat(task: ExportTask) -> Export:
 def mat_files(name: str, of: Linear) -> dict[str, bytes]:
     """Return a MATLAB file of that name, and the script that builds its systems, by their names."""
     script = f"load_{re.sub(r'[^A-Za-z0-9_]', '_', Path(name).stem)}.m"
-    first, *others = ((name, entries_of(system)) for name, system in of.systems.items())
+    first, *others = ((name, system_variables(system)) for name, system in of.systems.items())
     content = mat_content({**first[1], **dict(others), **of.response}, "row")
-    return {name: content, script: render("load.m", file=matlab_text(name), of=of)}
+    return {name: content, script: render_source("load.m", file=matlab_text(name), of=of)}
 
 
-def entries_of(system: NamedSystem) -> dict[str, Any]:
+def system_variables(system: NamedSystem) -> dict[str, Any]:
     """Return the variables of one system, with its names and facts."""
     return {
         **dict(zip("ABCD", system.matrices, strict=True)),
@@ -282,16 +282,16 @@ def py(task: ExportTask) -> Export:
     """Return the script of a task."""
     found = linear(task)
     every = [name for each in found.systems.values() for name in (*each.inputs, *each.outputs)]
-    changed = {name: new for name, new in zip(every, plain(every), strict=True) if new != name}
-    contents = {f"{task.what}.py": render("systems.txt", of=found, listed=listed)}
+    changed = {name: new for name, new in zip(every, without_dots(every), strict=True) if new != name}
+    contents = {f"{task.what}.py": render_source("systems.txt", of=found, listed=list_literal)}
     return task.exported(contents, names_of(changed), found.verdict)
 
 
-def plain(names: Iterable[str]) -> list[str]:
+def without_dots(names: Iterable[str]) -> list[str]:
     """Return names of signals without dots, which separate system and signal in python-control."""
     return [name.replace(".", "_") for name in names]
 
 
-def listed(names: Iterable[str]) -> str:
+def list_literal(names: Iterable[str]) -> str:
     """Return a literal of these names."""
-    return f"[{', '.join(map(ascii, plain(names)))}]"
+    return f"[{', '.join(map(ascii, without_dots(names)))}]"

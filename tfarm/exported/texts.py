@@ -61,7 +61,7 @@ def literal(value: float, suffix: str = "") -> str:
 
 
 @cache
-def templates() -> Environment:
+def source_templates() -> Environment:
     """The templates of source files, without the escapes of HTML."""
     folder = Path(__file__).parent / "templates"
     environment = Environment(
@@ -72,9 +72,9 @@ def templates() -> Environment:
     return environment
 
 
-def render(template: str, **values: Any) -> bytes:
+def render_source(template: str, **values: Any) -> bytes:
     """Return a source file from its template."""
-    return templates().get_template(template).render(**values).encode("ascii")
+    return source_templates().get_template(template).render(**values).encode("ascii")
 
 
 def facts_of(record: Any) -> list[tuple[str, str]]:

@@ -37,9 +37,9 @@ from tfarm.arrays import Real, Whole
 from tfarm.dsp import Measurement
 from tfarm.errors import MISSING, ParameterError, must_be_known, require
 from tfarm.exact.compiled import compiled, inlined
-from tfarm.exported.controller import INPUT_ERROR, OVERFLOW, REAL, Port, recorded
+from tfarm.exported.controller import INPUT_ERROR, OVERFLOW, REAL, Port, self_test_values
 from tfarm.exported.result import ANYWAY, Export, ExportTask, names_of
-from tfarm.exported.texts import literal, name_in_c, render
+from tfarm.exported.texts import literal, name_in_c, render_source
 from tfarm.exported.word_length import FEEDFORWARD, FLOATS
 from tfarm.loop.sampled import sampled_loop
 from tfarm.tuner.guard import sector_guard
@@ -61,7 +61,7 @@ U, E, X, K, E_BEFORE, TORQUE = range(6)  # places of the state: the last sample,
 ZERO, ONE = np.array([0.0, 1.0], np.float32)  # exact, and of either precision with another number
 
 
-class Numbers(NamedTuple):
+class TunerConstants(NamedTuple):
     """Numbers of a tuner in one precision.
 
     e^x is 0 up to `lowest`; adding and subtracting `shift` rounds to a whole number; `inverse` is 1/ln 2, ln 2 = `high`
@@ -86,7 +86,7 @@ class Numbers(NamedTuple):
     is_total: bool
 
 
-def numbers_of(saved: SavedTuner, real: Any) -> Numbers:
+def constants_of_tuner(saved: SavedTuner, real: Any) -> TunerConstants:
     """The numbers of a tuner in np.float64 or np.float32, the guard rounded inwards.
 
     Raises ParameterError for a number beyond the range of the precision, and for a tuner without a guard.
@@ -110,11 +110,11 @@ def numbers_of(saved: SavedTuner, real: Any) -> Numbers:
     share = float(scales.min()) / (2 * scales.size * max(1.0, float(abs(W1).max())))
     largest = real(min(1.0, share) * float(np.finfo(real).max))
     own = taylor, W1, w2, scales, real(K1), real(Kp), lo, hi, largest, saved.signals == "total"
-    return Numbers._make([*(real(float(each)) for each in scalars), *own])
+    return TunerConstants._make([*(real(float(each)) for each in scalars), *own])
 
 
 @inlined
-def polynomial(x: float, coefficients: Real) -> float:
+def evaluate_polynomial(x: float, coefficients: Real) -> float:
     """The sum of coefficients[n] x^n, by Horner's rule."""
     total = coefficients[coefficients.size - 1]
     for n in range(coefficients.size - 2, -1, -1):
@@ -123,12 +123,12 @@ def polynomial(x: float, coefficients: Real) -> float:
 
 
 @compiled
-def exponential(x: float, of: Numbers) -> float:
+def exponential(x: float, of: TunerConstants) -> float:
     """e^x for x <= 0; 0 of NaN, which u, e or x then is too: the step is refused."""
     if not x > of.lowest:
         return ZERO
     k = (x * of.inverse + of.shift) - of.shift
-    result = polynomial((x - k * of.high) - k * of.low, of.taylor)
+    result = evaluate_polynomial((x - k * of.high) - k * of.low, of.taylor)
     power = of.half
     n = int(-k)
     while n > 0:  # at most ten times
@@ -140,14 +140,14 @@ def exponential(x: float, of: Numbers) -> float:
 
 
 @compiled
-def sigmoid(z: float, of: Numbers) -> float:
+def sigmoid(z: float, of: TunerConstants) -> float:
     """1/(1 + e^-z)."""
     small = exponential(-z if z > ZERO else z, of)
     return (ONE if z > ZERO else small) / (ONE + small)
 
 
 @inlined
-def network_gain(of: Numbers, row: Real) -> float:
+def network_output(of: TunerConstants, row: Real) -> float:
     """K of a row of inputs."""
     z = ZERO
     for j in range(of.w2.size):
@@ -160,7 +160,7 @@ def network_gain(of: Numbers, row: Real) -> float:
 
 
 @inlined
-def step(of: Numbers, state: Real, inputs: Real) -> int:
+def advance_sample(of: TunerConstants, state: Real, inputs: Real) -> int:
     """Advance by one sample; return 0, or the kind of an error."""
     for value in inputs:
         if not -of.largest <= value <= of.largest:
@@ -169,7 +169,7 @@ def step(of: Numbers, state: Real, inputs: Real) -> int:
     servo = of.Kp * (inputs[WANTED_ANGLE] - inputs[ANGLE]) + of.K1 * (inputs[WANTED_RATE] - inputs[RATE])
     u = servo + inputs[FORWARD] if of.is_total else servo
     row = np.array([u, state[U], state[E], state[E_BEFORE], x, state[X], state[K]])
-    gain = network_gain(of, row)
+    gain = network_output(of, row)
     e = u - gain * x
     torque = (inputs[FORWARD] + servo) - gain * x
     for value in (u, e, x, gain, torque):
@@ -185,10 +185,10 @@ def step(of: Numbers, state: Real, inputs: Real) -> int:
 
 
 @compiled
-def run(of: Numbers, state: Real, inputs: Real, torque: Real, status: Whole) -> None:
+def advance_rows(of: TunerConstants, state: Real, inputs: Real, torque: Real, status: Whole) -> None:
     """Step over rows of inputs."""
     for k in range(status.size):
-        status[k] = step(of, state, inputs[k])
+        status[k] = advance_sample(of, state, inputs[k])
         torque[k] = state[TORQUE]
 
 
@@ -213,7 +213,7 @@ class ExportedTuner:
         must_be_known("precision", precision, FLOATS)
         self.real, _ = FLOATS[precision]
         self.scale = saved.scales[0]
-        self.numbers = numbers_of(saved, self.real)
+        self.numbers = constants_of_tuner(saved, self.real)
         self.inputs = {key: of for key, of in INPUTS.items() if not (self.numbers.is_total and key == "r_root_moment")}
         self.reset()
 
@@ -227,7 +227,7 @@ class ExportedTuner:
         status = np.zeros(len(inputs), np.int64)
         with np.errstate(over="ignore"):
             rows = np.ascontiguousarray(inputs, dtype=self.real)
-        run(self.numbers, self.state, rows, torque, status)
+        advance_rows(self.numbers, self.state, rows, torque, status)
         return torque, status
 
     def __call__(self, m: Measurement) -> float:
@@ -267,11 +267,11 @@ def c_tuner(task: ExportTask) -> Export:
     }  # fmt: skip
     name = name_in_c(task.name or "tuner")
     (own,) = name.values()
-    return task.exported(written(task, tuner, own, facts), names_of(name), certainty)
+    return task.exported(tuner_files(task, tuner, own, facts), names_of(name), certainty)
 
 
-def written(task: ExportTask, tuner: ExportedTuner, name: str, facts: dict[str, str]) -> dict[str, bytes]:
-    """The files by name; constants have the names of `Numbers`."""
+def tuner_files(task: ExportTask, tuner: ExportedTuner, name: str, facts: dict[str, str]) -> dict[str, bytes]:
+    """The files by name; constants have the names of `TunerConstants`."""
     of = tuner.numbers
     real, suffix, _ = REAL[task.precision]
     kept: dict[str, Any] = of._asdict()
@@ -288,6 +288,6 @@ def written(task: ExportTask, tuner: ExportedTuner, name: str, facts: dict[str, 
             key: [literal(x, suffix) for x in each.ravel().tolist()]
             for key, each in kept.items() if isinstance(each, np.ndarray)
         },
-        **recorded(tuner.run, ports, task.precision),
+        **self_test_values(tuner.run, ports, task.precision),
     }  # fmt: skip
-    return {file: render(file, **values) for file in ("tuner.h", "tuner.c", "self_test.c")}
+    return {file: render_source(file, **values) for file in ("tuner.h", "tuner.c", "self_test.c")}

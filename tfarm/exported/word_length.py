@@ -70,7 +70,7 @@ class NoiseGain(NamedTuple):
             help="variance of the output by roundings, for states of unit variance, in the closed loop")]  # fmt: skip
 
 
-class Bounds(NamedTuple):
+class WordLengthBounds(NamedTuple):
     """Bounds on the states as exported, on the error of the returned u, and on u of the law, for inputs within ranges.
 
     `is_whole` where they are over all samples.
@@ -82,7 +82,7 @@ class Bounds(NamedTuple):
     output: float
 
 
-class Around(NamedTuple):
+class StateSpaceLoop(NamedTuple):
     """The closed loop around a law of one state space: matrix, input of each signal and of each rounding, output u.
 
     `of_signals` (n, signals), `of_rounding` (n, states + 1) (the last is a rounding of u), `output` (n,), `reads`
@@ -105,21 +105,21 @@ def with_system_matrix(law: Law, S: Real) -> Law:
     return replace(law, parts=(part,), sign=-1)
 
 
-def closed(A: Real, B: Real, C: Real, a: Real, b: Real, c: Real, d: Real) -> tuple[Real, Real, Real]:
+def close_state_space(A: Real, B: Real, C: Real, a: Real, b: Real, c: Real, d: Real) -> tuple[Real, Real, Real]:
     """Matrix, rows of y and row of u of the loop of x' = A x + B u, y = C x and k' = a k + b y, u = c k + d y."""
     y = np.pad(C, ((0, 0), (0, len(a))))
     u = np.c_[d @ C, c]
     return block_diag(A, a) + np.r_[B @ u, b @ y], y, u
 
 
-def around(law: Law, loop: Sampled) -> Around:
+def close_around_law(law: Law, loop: Sampled) -> StateSpaceLoop:
     """The closed loop of `Sampled.matrix`, around a law of one state space."""
     A, B, C = loop.pulse.matrices()
     own, Bk, Ck, Dk = with_estimate(law, loop.chain).matrices(loop.in_z.signals)
-    matrix, reads, output = closed(A, B[:, None], C, own, Bk, -Ck, -Dk)
+    matrix, reads, output = close_state_space(A, B[:, None], C, own, Bk, -Ck, -Dk)
     states = slice(len(A), len(A) + law.order)
     push = np.r_[B, np.zeros(len(own))]
-    return Around(
+    return StateSpaceLoop(
         matrix=matrix,
         of_signals=np.r_[np.outer(B, -Dk[0]), Bk],
         of_rounding=np.c_[np.eye(len(matrix))[:, states], push],
@@ -129,7 +129,7 @@ def around(law: Law, loop: Sampled) -> Around:
     )
 
 
-def sum_of_squares(M: Real, Q: Real, rows: slice) -> Real | None:
+def gramian_sum(M: Real, Q: Real, rows: slice) -> Real | None:
     """Q + M Q M^T + M^2 Q M^2^T + ...; None where the sum of these rows does not converge."""
     with np.errstate(over="ignore", invalid="ignore"):
         for _ in range(MOST_DOUBLINGS):
@@ -141,15 +141,15 @@ def sum_of_squares(M: Real, Q: Real, rows: slice) -> Real | None:
     return None
 
 
-def gramians(of: Around) -> tuple[Real, Real] | None:
+def gramians(of: StateSpaceLoop) -> tuple[Real, Real] | None:
     """K over the variance of u, and W, of the states of the law; None where their sums do not converge."""
     rows = of.states
-    K = sum_of_squares(of.matrix, of.of_signals @ of.of_signals.T, rows)
-    W = sum_of_squares(of.matrix.T, np.outer(of.output, of.output), rows)
+    K = gramian_sum(of.matrix, of.of_signals @ of.of_signals.T, rows)
+    W = gramian_sum(of.matrix.T, np.outer(of.output, of.output), rows)
     return None if K is None or W is None else (K[rows, rows] / (of.output @ K @ of.output), W[rows, rows])
 
 
-def balancing(K: Real, W: Real) -> Real | None:
+def balancing_transform(K: Real, W: Real) -> Real | None:
     """T with T^-1 K T^-T = T^T W T = diag(sigma); None where a state is not controllable or not observable."""
     size, vectors = np.linalg.eigh(K)
     root = vectors * np.sqrt(np.maximum(size, 0.0))
@@ -158,7 +158,7 @@ def balancing(K: Real, W: Real) -> Real | None:
     return root @ turned / square**0.25 if is_minimal else None
 
 
-def sections(A: Real, K: Real, W: Real) -> Real | None:
+def second_order_sections(A: Real, K: Real, W: Real) -> Real | None:
     """T of second-order sections, a pair of poles each, and first-order ones, each balanced; None of multiple poles."""
     poles, vectors = np.linalg.eig(A)
     _, modal = cdf2rdf(poles, vectors)
@@ -168,7 +168,9 @@ def sections(A: Real, K: Real, W: Real) -> Real | None:
     begins = np.flatnonzero(poles.imag >= 0)[1:]  # of a section, after the first
     blocks = np.split(modal, begins, axis=1)
     duals = np.split(np.linalg.inv(modal), begins)
-    own = [balancing(dual @ K @ dual.T, block.T @ W @ block) for block, dual in zip(blocks, duals, strict=True)]
+    own = [
+        balancing_transform(dual @ K @ dual.T, block.T @ W @ block) for block, dual in zip(blocks, duals, strict=True)
+    ]
     known = [each for each in own if each is not None]
     return modal @ block_diag(*known) if len(known) == len(own) else None
 
@@ -177,11 +179,11 @@ def candidates(law: Law, loop: Sampled) -> list[tuple[NoiseGain, Real]]:
     """The realisations [A B; C D] of a law in z of one state space, that of the law as given first."""
     S = system_matrix(law)
     n = law.order
-    found = gramians(around(law, loop)) if n else None
+    found = gramians(close_around_law(law, loop)) if n else None
     if found is None:
         return [(NoiseGain(GIVEN, None if n else 0.0), S)]
     K, W = found
-    changes = {GIVEN: np.eye(n), SECTIONS: sections(S[:n, :n], K, W), BALANCED: balancing(K, W)}
+    changes = {GIVEN: np.eye(n), SECTIONS: second_order_sections(S[:n, :n], K, W), BALANCED: balancing_transform(K, W)}
     known = [(name, T, np.linalg.inv(T)) for name, T in changes.items() if T is not None]
     gains = [abs(float(np.diag(inverse @ K @ inverse.T) @ np.diag(T.T @ W @ T))) for _, T, inverse in known]
     return [(NoiseGain(name, gain), similar(S, T)) for gain, (name, T, _) in zip(gains, known, strict=True)]
@@ -266,7 +268,7 @@ class Word:
         return terms * unit / (1 - terms * unit), tiny + of_dac
 
     @cached_property
-    def bounds(self) -> Bounds:
+    def bounds(self) -> WordLengthBounds:
         """Bounds on what the code returns, against the law in exact arithmetic.
 
         The error d of the states obeys d' = A d + w, w = |dS| [X; E] + roundings; X includes d.  In fixed point a state
@@ -287,7 +289,7 @@ class Word:
         if np.isfinite(sums[:n, :n]).all():
             lost = n * unit * max(abs(np.linalg.eigvals(abs(A) @ sums[:n, :n])), default=0.0)
         if lost > 1e-3:
-            return Bounds(np.full(n, np.inf), False, math.inf, math.inf)
+            return WordLengthBounds(np.full(n, np.inf), False, math.inf, math.inf)
         S, X = np.hsplit(sums * (1 + lost), [n])
         largest = X @ self.sizes
         output = float(largest[n] + abs(exact[n, n:]) @ self.sizes + self.feedforward)
@@ -296,9 +298,9 @@ class Word:
         states = least_solution(S[:n] @ V[:n, :n], largest[:n] + S[:n] @ rest[:n])
         states = np.minimum(states, 1.0 if self.precision == FIXED else np.inf)
         if not np.isfinite(states).all():
-            return Bounds(states, is_whole, math.inf, output)
+            return WordLengthBounds(states, is_whole, math.inf, output)
         w = V[:, :n] @ states + rest
-        return Bounds(states, is_whole, float(S[n] @ w[:n] + w[n] + relative * self.feedforward), output)
+        return WordLengthBounds(states, is_whole, float(S[n] @ w[:n] + w[n] + relative * self.feedforward), output)
 
     def limit_cycle(self, loop: Sampled) -> float | None:
         """Bound on u in a limit cycle that roundings sustain in a loop at rest; None where none was found.
@@ -312,10 +314,10 @@ class Word:
         read = loop.in_z.signals
         if not set(signals) <= set(read):  # an estimated rate
             return None
-        of = around(self.rounded, loop)
+        of = close_around_law(self.rounded, loop)
         at = [read.index(name) for name in signals]
         left = np.vstack([np.eye(len(of.matrix))[of.states], of.reads[at], of.output])
-        S, is_whole = absolute_sum(observed(of.matrix, left), left, np.c_[of.of_rounding, of.of_signals[:, at]])
+        S, is_whole = absolute_sum(observable_part(of.matrix, left), left, np.c_[of.of_rounding, of.of_signals[:, at]])
         if not is_whole:
             return None
         Q = abs(system_matrix(self.rounded))[:, : n + len(at)]  # references are at rest
@@ -334,7 +336,7 @@ def least_solution(P: Real, q: Real) -> Real:
     return np.full(q.size, np.inf)
 
 
-def observed(M: Real, left: Real) -> Real:
+def observable_part(M: Real, left: Real) -> Real:
     """The matrix without poles on the unit circle that no row of `left` shows, such as z = 1 of a free hub angle."""
     poles, vectors = np.linalg.eig(M)
     seen = abs(left @ vectors).max(axis=0) / abs(left).max()

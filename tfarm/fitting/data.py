@@ -26,10 +26,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import INPUTS
-from tfarm.arm.reading import decoded
+from tfarm.arm.reading import decode_text
 from tfarm.arrays import Complex, Real
 from tfarm.digits import general, singly
-from tfarm.errors import MISSING, ParameterError, did_you_mean, naming, require
+from tfarm.errors import MISSING, ParameterError, did_you_mean, name_file, require
 from tfarm.exact.outputs import OUTPUTS, signal_words, unit_over
 from tfarm.files import read_file
 from tfarm.foreign import read_arrays
@@ -248,8 +248,10 @@ def read_sheet(path: str | os.PathLike[str], key: str) -> Sheet:
     number; naming `key` where the file cannot be read.
     """
     data = read_file(path, MOST_RECORD_BYTES, key=key, what="a .csv file")
-    with naming(path):
-        numbered = enumerate(decoded(data, "is not UTF-8 text; save the file as CSV in UTF-8").splitlines(), start=1)
+    with name_file(path):
+        numbered = enumerate(
+            decode_text(data, "is not UTF-8 text; save the file as CSV in UTF-8").splitlines(), start=1
+        )
         rows = [(number, line) for number, line in numbered if line.strip() and not line.lstrip().startswith("#")]
         require(rows, "header", MISSING, "the file is empty; begin with the names of columns")
         separator = next((each for each in "\t;" if each in rows[0][1]), ",")
@@ -326,7 +328,7 @@ def read_measured(path: str | os.PathLike[str], output: str, input: str) -> Meas
     if uff := re.fullmatch(r"(.*\.(?:uff|unv|uf))(?:#(\d{1,9}))?", name, re.DOTALL | re.IGNORECASE):
         return _of_uff(uff[1], uff[2] or "", output, input)
     sheet = read_sheet(path, key=f"{output}/{input}")
-    with naming(name):
+    with name_file(name):
         omega = _frequencies(sheet)
         values = _values(sheet)
         averages = sheet.columns.get("averages")
@@ -400,7 +402,7 @@ def _of_uff(path: str, number: str, output: str, input: str) -> Measured:
     remedy = "is not installed, and reads UFF files: pip install 'tfarm[uff]', or export the response as CSV"
     require(find_spec("pyuff"), "package", "pyuff", remedy)
     found = read_arrays("uff", path, key=key, remedy="no UFF file that can be read")
-    with naming(path):
+    with name_file(path):
         count = len(found) // 2  # frequencies and values of each
         require(count, "data set", 58, "the file holds no frequency response function (type 58, function 4)")
         remedy = f"the file holds {count} responses; choose one by its number, as file.uff#2"

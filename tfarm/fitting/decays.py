@@ -73,7 +73,7 @@ class DecayMode(NamedTuple):
 
 
 @frozen(kw_only=True)
-class Ring:
+class RingdownFit:
     """Modes of a decay, that of most energy first; intervals hold the true value in 95 of 100 records.
 
     `residual` is the root mean square of the residuals, `white` the probability of residuals as correlated as these if
@@ -119,9 +119,9 @@ class Ring:
         return self.white >= NOT_WHITE
 
 
-def ring(
+def fit_ringdown(
     recording: Recording, name: str, *, start: float | None = None, stop: float | None = None, modes: int = 1
-) -> Ring:
+) -> RingdownFit:
     """Frequency and damping of the decay of one signal between two times [s] of the record.
 
     Raises ParameterError for a signal or times that are not there and for too few samples, ConvergenceError where the
@@ -159,7 +159,7 @@ def ring(
                 f"mode {number} rings at {first:.4g} Hz in its first half, {second:.4g} Hz in its "
                 "second: no linear decay, or friction, or another mode"
             )
-    return Ring(
+    return RingdownFit(
         signal=name,
         source=recording.source,
         start=float(times[0]),

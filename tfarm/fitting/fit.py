@@ -23,24 +23,24 @@ from tfarm.arm import Arm, must_be_arm
 from tfarm.arm.schema import file_key
 from tfarm.arm.writing import to_toml
 from tfarm.arrays import Complex, Real
-from tfarm.digits import listed
+from tfarm.digits import join_words
 from tfarm.errors import ConvergenceError, one_line, require
 from tfarm.files import is_standard_output, write_file
 from tfarm.loop.plane import gain_map
 from tfarm.records import frozen
 from tfarm.response import transfer
 from tfarm.schema import Quantity
+from tfarm.stopping import Progress
 
 from .data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of, rms
 from .misses import Miss, Remedy, misses_of, remedies_of
-from .model import SENSOR_DELAY, SENSOR_GAIN, Problem, Response, RingMode, parameters
+from .model import SENSOR_DELAY, SENSOR_GAIN, FitResponse, Problem, RingMode, free_parameters
 from .overlay import ResonanceShift, ratio_of, resonance_shifts
 from .posterior import SUFFIX, Posterior, Repeats, posterior_of, repeats
 from .solve import (
     FIT_SEED,
     BetterError,
     Fitted,
-    Progress,
     Solution,
     best_solution,
     confidence_intervals,
@@ -316,12 +316,12 @@ def _assumptions(fit: Fit, before: Sequence[str]) -> tuple[str, ...]:
     texts: list[str] = []
     for text in before:
         labels = [file_key(key).label for key in family.keys if is_named(key, family.value(key), text)]
-        mark = f"Before the fit of {listed(labels)}: " if labels else ""
+        mark = f"Before the fit of {join_words(labels)}: " if labels else ""
         texts.append(mark + text.removeprefix(mark))
     numbers = [each for each in fit.parameters if "." in each.key]
     values = [f"{each.label} = {each.value:.6g} {file_key(each.key).unit}".rstrip() for each in numbers]
     values = values or ["sensors alone"]
-    texts.append(f"Fitted: {listed(values)}, from the arm {fit.before.name}; {fit.in_words}.")
+    texts.append(f"Fitted: {join_words(values)}, from the arm {fit.before.name}; {fit.in_words}.")
     for each in fit.responses:
         digest = each.digest or "none"
         texts.append(f"Fitted to {each.label} of {one_line(Path(each.source).name, LONGEST_NAME)}, SHA-256 {digest}.")
@@ -348,10 +348,10 @@ def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: An
         must_be_measured(each)
     require(data or rings, "data", 0, "give at least one measured response, or a decay (--mode)")
     keys = [str(key) for key in free if key not in (SENSOR_GAIN, SENSOR_DELAY)]
-    family, numbers = parameters(arm, keys, start=start or {}, bounds=bounds or {}, priors=priors or {})
+    family, numbers = free_parameters(arm, keys, start=start or {}, bounds=bounds or {}, priors=priors or {})
     for each in data:
         ratio_of(arm, each)
-    responses = tuple(Response(each, noise_of(each)) for each in data)
+    responses = tuple(FitResponse(each, noise_of(each)) for each in data)
     subject = Problem(family, numbers, responses, tuple(rings)).with_sensors(free)
     count = len(subject.parameters)
     require(count, "free", "nothing", "name what is free, such as link.youngs_modulus")

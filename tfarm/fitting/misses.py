@@ -14,12 +14,12 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from tfarm.arrays import Complex
-from tfarm.digits import listed
+from tfarm.digits import join_words
 from tfarm.response.frequency import HERTZ
 from tfarm.schema import Quantity
 
 from .data import rms
-from .model import SENSOR_DELAY, SENSOR_GAIN, Problem, Response, parameters
+from .model import SENSOR_DELAY, SENSOR_GAIN, FitResponse, Problem, free_parameters
 from .solve import EXCLUDED, Solution, best_solution, is_explained
 
 
@@ -64,7 +64,7 @@ def misses_of(found: Solution) -> tuple[Miss, ...]:
     return tuple(miss for one, H in pairs if (miss := _miss(one, H)) is not None)
 
 
-def _miss(one: Response, computed: Complex) -> Miss | None:
+def _miss(one: FitResponse, computed: Complex) -> Miss | None:
     """Return how one response is missed, None where it is not."""
     data = one.data
     kept = np.isfinite(one.noise.sigma) & (data.values != 0)
@@ -118,12 +118,12 @@ def _tries(found: Solution) -> Iterator[tuple[str, Solution]]:
             continue
         there = _searched(problem.with_sensors((key,)))
         values = [there.problem.value(there.point, getattr(each, key)) for each in there.problem.responses]
-        yield f"a free {key} (--free {key}): {listed([f'{each:.4g}{unit}' for each in values])}", there
+        yield f"a free {key} (--free {key}): {join_words([f'{each:.4g}{unit}' for each in values])}", there
         if min(values) < 0 and key == SENSOR_GAIN:
             pairs = list(zip(problem.responses, values, strict=True))
             names = [each.data.name for each, value in pairs if value < 0]
             turned = (replace(each, data=replace(each.data, values=np.sign(x) * each.data.values)) for each, x in pairs)
-            yield f"the other sign of {listed(names)}", _searched(replace(problem, responses=tuple(turned)))
+            yield f"the other sign of {join_words(names)}", _searched(replace(problem, responses=tuple(turned)))
     yield from _beyond_bounds(found)
 
 
@@ -133,7 +133,7 @@ def _beyond_bounds(found: Solution) -> Iterator[tuple[str, Solution]]:
     low, high = problem.bounds
     # of a coordinate: a search that ends so near to a bound has ended there
     is_at_end = np.minimum(found.point - low, high - found.point) < 0.01
-    _, unbound = parameters(problem.arm(found.point), problem.family.keys, start={}, bounds={}, priors={})
+    _, unbound = free_parameters(problem.arm(found.point), problem.family.keys, start={}, bounds={}, priors={})
     numbers = [
         replace(free, prior=each.prior) if at_end or (each.low, each.high) != (free.low, free.high) else each
         for each, free, at_end in zip(problem.of_the_arm, unbound, is_at_end, strict=False)
@@ -142,4 +142,4 @@ def _beyond_bounds(found: Solution) -> Iterator[tuple[str, Solution]]:
         there = _searched(replace(problem, parameters=(*numbers, *problem.parameters[len(numbers) :])))
         rows = zip(numbers, problem.of_the_arm, there.point.tolist(), strict=False)
         values = [f"{each.key} = {each.value(x):.6g}" for each, before, x in rows if each != before]
-        yield f"no bound of {listed(values)}", there
+        yield f"no bound of {join_words(values)}", there

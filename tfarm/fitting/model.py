@@ -83,7 +83,7 @@ class Parameter:
         return found if self.start > 0 or self.size else found[::-1]
 
 
-def parameters(
+def free_parameters(
     arm: Arm,
     keys: Sequence[str],
     *,
@@ -193,13 +193,13 @@ def eigenvalue(arm: Arm, number: int) -> complex:
     return complex(found[0])
 
 
-# of a sensor, as `Response` has them: free like the arm's numbers
+# of a sensor, as `FitResponse` has them: free like the arm's numbers
 SENSOR_GAIN = "gain"
 SENSOR_DELAY = "delay"
 
 
 @dataclass(frozen=True)
-class Response:
+class FitResponse:
     """One measured response as the arm has it: its data, noise, and which numbers are its own gain and delay."""
 
     data: Measured
@@ -217,7 +217,7 @@ class Response:
         kept = np.isfinite(self.noise.sigma)
         return in_parts(values[kept] / self.noise.sigma[kept])
 
-    def at(self, omega: Real, values: Complex, sigma: Real) -> Response:
+    def at(self, omega: Real, values: Complex, sigma: Real) -> FitResponse:
         """The response at other frequencies."""
         data = replace(self.data, omega=omega, values=values, sigma=None, coherence=None)
         return replace(self, data=data, noise=replace(self.noise, sigma=sigma))
@@ -237,7 +237,7 @@ class Problem:
 
     family: KeyedArms
     parameters: tuple[Parameter, ...]
-    responses: tuple[Response, ...]
+    responses: tuple[FitResponse, ...]
     rings: tuple[RingMode, ...] = ()
 
     @cached_property
@@ -370,7 +370,7 @@ class Problem:
         return np.array(rows)
 
 
-def walled(residuals: Callable[[Real], Real], first: Real) -> Callable[[Real], Real]:
+def penalize(residuals: Callable[[Real], Real], first: Real) -> Callable[[Real], Real]:
     """The residuals, and where there is no arm (a mass beyond the tip) a wall, so high that no search goes on there."""
     near = residuals(first)
     wall = np.full(near.size, 10.0 * max(abs(near).max(initial=0.0), 1.0))

@@ -26,14 +26,14 @@ from tfarm.exact.outputs import unit_over
 from tfarm.records import frozen
 from tfarm.response import TransferFunction, transfer
 from tfarm.response.frequency import HERTZ, refined_grid, without_cancelled
-from tfarm.response.signals import Signals, placed
+from tfarm.response.signals import Signals, locate_output
 from tfarm.response.transfer import Roots
 from tfarm.schema import Column, Quantity, Table
 from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum import modes_below
 
 from .data import Measured, Noise, check_signal, must_be_measured, noise_of, rms
-from .model import Response
+from .model import FitResponse
 from .resonances import (
     PARTNERS_BEYOND,
     Resonance,
@@ -155,7 +155,7 @@ class Ratio:
 
 def _transfer(arm: Arm, name: str) -> TransferFunction:
     """To a signal with its place after an @."""
-    wanted, x = placed(name, arm.length)
+    wanted, x = locate_output(name, arm.length)
     return transfer(arm, wanted, x=x if wanted.place == "x" else None)
 
 
@@ -432,7 +432,7 @@ class ResonanceShift(NamedTuple):
     measured: Annotated[float, Quantity("measured", "Hz", help="peak of the measured response")]
 
 
-def resonance_shifts(before: Arm, after: Arm, responses: Sequence[Response]) -> list[ResonanceShift]:
+def resonance_shifts(before: Arm, after: Arm, responses: Sequence[FitResponse]) -> list[ResonanceShift]:
     """Each measured peak of all responses, with those of the arm before and after a fit.
 
     A peak is a pole of its response: a natural frequency, with the hub held where the response is over the hub's angle.

@@ -22,7 +22,7 @@ from pydantic import ConfigDict, Field
 
 from tfarm.arm.schema import StrictTable, validated_file
 from tfarm.arrays import LEAST_SIZE, Real
-from tfarm.digits import listed
+from tfarm.digits import join_words
 from tfarm.errors import require
 from tfarm.records import frozen
 from tfarm.schema import Quantity
@@ -174,7 +174,7 @@ class Repeats:
         """The numbers whose scatter is larger than the noise explains."""
         # a scatter that is 1.5 times that by the noise is named
         larger = [f"{key} {times:.3g} times" for key, times in self.times_wider.items() if times > 1.5]
-        return f"larger than the noise explains: {listed(larger)}" if larger else "as the noise explains"
+        return f"larger than the noise explains: {join_words(larger)}" if larger else "as the noise explains"
 
 
 def repeats(fit: Solution, fitted: Sequence[Fitted], draws: int = 40) -> Repeats | None:

@@ -39,13 +39,13 @@ from numpy.typing import NDArray
 
 from tfarm.arm.chain import TIME_ROUNDING
 from tfarm.arm.reading import AnyFile, load_tables
-from tfarm.arm.schema import StrictTable, validated
+from tfarm.arm.schema import StrictTable, validate_table
 from tfarm.arrays import Complex, Real
 from tfarm.case import Case
-from tfarm.dsp.results import simulated
+from tfarm.dsp.results import simulate_modes
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator
-from tfarm.errors import MISSING, did_you_mean, listed, must_be_known, naming, require
+from tfarm.errors import MISSING, did_you_mean, list_within, must_be_known, name_file, require
 from tfarm.files import read_mat
 from tfarm.records import frozen
 from tfarm.schema import Quantity, Table
@@ -112,10 +112,10 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
         held = sheet.columns
         units = sheet.units
         digest = sheet.digest
-    with naming(name):
+    with name_file(name):
         of_times = next((each for each in ("t", "time") if each in held), "")
         columns = _columns(held, held[of_times].size) if of_times else {}
-        remedy = f"a record has a column t, in seconds; this one has {listed(held, 300) or 'none'}"
+        remedy = f"a record has a column t, in seconds; this one has {list_within(held, 300) or 'none'}"
         require(of_times in columns, "t", MISSING, remedy)
         require(units[of_times] in ("", "s"), f"unit of {of_times}", units[of_times], "times are in seconds")
         start, period, jitter = _timing(columns.pop(of_times))
@@ -214,7 +214,7 @@ def compare_run(case: Case, measured: MeasuredRun) -> RunComparison:
 
     Raises ParameterError as `simulate` does.
     """
-    run, _ = simulated(case, measured.scenario(case.chain.sampling.period))
+    run, _ = simulate_modes(case, measured.scenario(case.chain.sampling.period))
     return RunComparison(measured, run)
 
 
@@ -246,8 +246,8 @@ def load_run(name_or_path: AnyFile) -> MeasuredRun | None:
     tables, file = load_tables(name_or_path)
     if "measured" not in tables:
         return None
-    with naming(file):
-        table = validated(RunTable, tables["measured"], "measured")
+    with name_file(file):
+        table = validate_table(RunTable, tables["measured"], "measured")
         found = read_recording(Path(file).parent / table.file)
         reference = found.signal("reference:hub_angle", "measured.file")
         require(

@@ -27,7 +27,10 @@ from tfarm.response.frequency import HERTZ
 
 from .data import Measured, in_parts
 
-__getattr__ = moved(__name__, dict.fromkeys(("ring", "Ring", "DecayMode"), "tfarm.fitting.decays"))
+_DECAYS = "tfarm.fitting.decays"
+__getattr__ = moved(
+    __name__, {"DecayMode": _DECAYS, "Ring": f"{_DECAYS}:RingdownFit", "ring": f"{_DECAYS}:fit_ringdown"}
+)
 
 UNPAIRED = 0.3  # of ln w: what a peak or a pole in the band costs without a partner; so partners are 1.8 apart at most
 PARTNERS_BEYOND = 1.8  # times the ends of the range: partners are looked for up to there

@@ -32,9 +32,10 @@ from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.records import frozen
 from tfarm.schema import Quantity
+from tfarm.stopping import Progress
 
 from .data import CONFIDENCE, in_parts
-from .model import Problem, walled
+from .model import Problem, penalize
 
 LINES = 400  # of a response, at most
 FIT_SEED = 852780  # of all that a fit draws: the number of the paper's article, any would do
@@ -48,7 +49,7 @@ def start_by(problem: Problem, draws: int, shares: Sequence[float]) -> tuple[Pro
     point = problem.start
     for share in shares:
         whole, first = with_gains(problem, point)
-        thin = thinned(whole, LINES)
+        thin = thin_problem(whole, LINES)
 
         def errors(x: Real, thin: Problem = thin, first: Real = first, share: float = share) -> Real:
             # of ln p, over that of an equation error: what the data do not know stays where it is
@@ -56,7 +57,7 @@ def start_by(problem: Problem, draws: int, shares: Sequence[float]) -> tuple[Pro
 
         # equation errors beyond 0.1 count less and less
         found = least_squares(
-            walled(errors, first), first, bounds=thin.bounds, loss="soft_l1", f_scale=0.1, max_nfev=40, xtol=1e-4,
+            penalize(errors, first), first, bounds=thin.bounds, loss="soft_l1", f_scale=0.1, max_nfev=40, xtol=1e-4,
             ftol=1e-4,
         )  # fmt: skip
         point = found.x
@@ -119,7 +120,7 @@ def aligning_delay(omega: Real, ratio: Complex) -> float:
     return float(delays[aligned.argmax()]) if aligned.max() > 1.5 * aligned[count] else 0.0
 
 
-def thinned(problem: Problem, most: int) -> Problem:
+def thin_problem(problem: Problem, most: int) -> Problem:
     """The problem at a number of each response's frequencies at most."""
     responses = []
     for each in problem.responses:
@@ -284,7 +285,7 @@ def nearest_minimum(problem: Problem, start: Real, held: dict[int, float] | None
     first = problem.inside(point)[free]
     low, high = problem.bounds
     found = least_squares(
-        walled(lambda x: problem.residuals(at(x)), first),
+        penalize(lambda x: problem.residuals(at(x)), first),
         first,
         jac=jacobian,
         bounds=(low[free], high[free]),
@@ -312,8 +313,6 @@ def _rescaled(found: Solution) -> Solution:
         found = nearest_minimum(replace(found.problem, responses=tuple(responses)), found.point)
     return found
 
-
-Progress = Callable[[int, int, str], object]
 
 TAKES_PART = 0.1  # of a unit vector: a smaller component has no part in it
 

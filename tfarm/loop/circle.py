@@ -49,7 +49,7 @@ from numpy.typing import NDArray
 from tfarm.arrays import MACHINE_EPS, Complex, Real
 from tfarm.dsp.plant import SLOW, phi
 from tfarm.errors import ConvergenceError
-from tfarm.loop.sampled import Sampled, resized
+from tfarm.loop.sampled import Sampled, with_more_modes
 from tfarm.records import frozen
 from tfarm.spectrum import modes
 from tfarm.spectrum.box import TOWARD_SINGULAR, Box, winding_number
@@ -181,7 +181,7 @@ class Circle:
         signals = [self._output(row, arcs, sums[row] + sums[n + row] * arcs.turned(1), sums[-1]) for row in range(n)]
         found = [arcs.x]
         for _, row, _, roots in self.terms:
-            term = product(arcs.x, roots[roots != 0]) * arcs.turned(order - roots.size)
+            term = root_ratio(arcs.x, roots[roots != 0]) * arcs.turned(order - roots.size)
             found.append(term if row < 0 else term * signals[row])
         return Discs(np.array([each.middle for each in found]), np.array([each.radius for each in found]))
 
@@ -201,7 +201,9 @@ class Circle:
         if order == 2:  # then there is no 1/s: an arm that turns freely has no friction at the hub
             total = total + ((push * late).times(T) + x * arcs.polynomial(*pulse.ramps)).times(twice) * late
         elif order == 1:
-            total = total + (push * late if self.braked is None else pair * self._braked_pair(arcs)).times(once)
+            total = total + (push * late if self.slow_hub_pole is None else pair * self._slow_hub_pair(arcs)).times(
+                once
+            )
         return total * arcs.turned(pulse.sampling.whole_delay)
 
     # ------------------------------------------------------------ arcs
@@ -232,23 +234,23 @@ class Circle:
         p = plant.poles
         T = sampling.period
         late = sampling.late
-        is_braked = np.arange(p.size) == (-1 if self.braked is None else self.braked)
-        share = (plant.residues + np.outer(plant.rigid[:, 1], is_braked)) / p  # the rest is in `_braked_pair`
+        is_braked = np.arange(p.size) == (-1 if self.slow_hub_pole is None else self.slow_hub_pole)
+        share = (plant.residues + np.outer(plant.rigid[:, 1], is_braked)) / p  # the rest is in `_slow_hub_pair`
         now = np.expm1(p * (T - late))
         before = np.exp(p * (T - late)) * np.expm1(p * late)
         return np.vstack([*np.where(self.kept, [share * now, share * before], 0.0), np.where(is_braked, -p, 0.0)])
 
     @cached_property
-    def braked(self) -> int | None:
+    def slow_hub_pole(self) -> int | None:
         """The pole of a hub that friction brings to rest, if it is slow and kept; else None."""
-        found = self.loop.plant.braked(SLOW / self.loop.chain.sampling.period)
+        found = self.loop.plant.slow_hub_pole(SLOW / self.loop.chain.sampling.period)
         return found if found is not None and self.kept[found] else None
 
-    def _braked_pair(self, arcs: Arcs) -> Discs:
+    def _slow_hub_pair(self, arcs: Arcs) -> Discs:
         """(c0 + c1/z + c2/z^2): x times the pulse transfer function of 1/s - 1/(s - p), without -p/(z - e^{pT})."""
         T = self.loop.chain.sampling.period
         late = self.loop.chain.sampling.late
-        p = float(self.loop.plant.poles[self.braked].real)
+        p = float(self.loop.plant.poles[self.slow_hub_pole].real)
         first = (T - late) ** 2 * phi(p * (T - late))
         last = late**2 * np.exp(p * T) * phi(-p * late)
         middle = T * np.expm1(p * T) / p - first - last
@@ -282,7 +284,7 @@ def power(x: Discs, n: int) -> Discs:
     return reduce(Discs.__mul__, [x] * n, one)
 
 
-def product(x: Discs, roots: Complex) -> Discs:
+def root_ratio(x: Discs, roots: Complex) -> Discs:
     """prod((z - r)/z) for x = 1 - 1/z in discs, each root r given as r - 1."""
     factors = x.middle[:, None] * (1 + roots) - roots
     sizes = abs(factors)
@@ -317,7 +319,7 @@ class Band:
     @cached_property
     def full(self) -> Sampled:
         """The loop with all modes of the band, and at least one."""
-        return resized(self.loop, max(1, self.modes))
+        return with_more_modes(self.loop, max(1, self.modes))
 
     @cached_property
     def circle(self) -> Circle:

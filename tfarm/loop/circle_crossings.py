@@ -24,8 +24,8 @@ from tfarm.crossing import (
     Crossings,
     Line,
     Window,
-    ascending,
-    confirmed,
+    check_ascending,
+    confirm_intervals,
     counts_over,
     crossings,
     pieces,
@@ -98,7 +98,7 @@ def _real_gain(A: Any, B: Any) -> float:
 # ------------------------------------------------------------ windows
 
 
-def windows_of(loop: Sampled, names: Sequence[str]) -> dict[str, list[Window]]:
+def windows_on_circle(loop: Sampled, names: Sequence[str]) -> dict[str, list[Window]]:
     """Return every stability interval of some numbers of the law, the others constant, confirmed by the poles."""
     lines = [line_of(loop, name) for name in names]
     windows = []
@@ -107,16 +107,16 @@ def windows_of(loop: Sampled, names: Sequence[str]) -> dict[str, list[Window]]:
         def is_stable(value: float, line: Line = line) -> bool:
             return loop.weighted((line.others + value * line.alone)[1:].tolist()).is_stable
 
-        windows.append(confirmed(found, 0.0 if name == FACTOR else -math.inf, math.inf, is_stable))
+        windows.append(confirm_intervals(found, 0.0 if name == FACTOR else -math.inf, math.inf, is_stable))
     return dict(zip(names, windows, strict=True))
 
 
 def stable_windows(loop: Sampled, name: str) -> list[Window]:
     """Return every stability interval of one number of the law, or of a positive factor on it (`FACTOR`)."""
-    return windows_of(loop, [name])[name]
+    return windows_on_circle(loop, [name])[name]
 
 
-def around(windows: list[Window], gain: float) -> Window | None:
+def interval_around(windows: list[Window], gain: float) -> Window | None:
     """The interval that contains a gain."""
     return next((window for window in windows if window[0] < gain < window[1]), None)
 
@@ -162,8 +162,8 @@ def sampled_map(
     (D-decomposition) for two gains of its parts, and along such a gain for each value of any other number.  For two
     others poles are counted at every point.  Raises ConvergenceError where crossings and a count by eigenvalues differ.
     """
-    x = ascending(vary[0], x, 1, MOST_GAINS)
-    y = ascending(vary[1], y, 1, MOST_GAINS)
+    x = check_ascending(vary[0], x, 1, MOST_GAINS)
+    y = check_ascending(vary[1], y, 1, MOST_GAINS)
     across, up = (loop.place(name) for name in vary)
     if up is None and across is not None:
         turned = sampled_map(loop, y, x, (vary[1], vary[0]))

@@ -33,12 +33,12 @@ from tfarm.arm import (
 from tfarm.arrays import Complex
 from tfarm.case import Case
 from tfarm.errors import require
-from tfarm.exact.characteristic import Analytic, Feedback, LoopParts, deflated, difference_steps, feedback
+from tfarm.exact.characteristic import Analytic, Feedback, LoopParts, deflate, difference_steps, feedback
 from tfarm.exact.system import System
 from tfarm.loop.loop import Loop
 from tfarm.loop.theorem import Theorem, theorem_of
 from tfarm.records import frozen
-from tfarm.response.signals import Controller, Signals, controller
+from tfarm.response.signals import ControllerSignals, Signals, controller
 from tfarm.schema import Quantity
 from tfarm.spectrum import flexible_frequencies, modes, modes_below
 from tfarm.spectrum.frequencies import ARMS_KEPT
@@ -99,7 +99,7 @@ class ContinuousLoop(Loop):
         return self.case.feedback
 
     @property
-    def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
+    def controller(self) -> Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller, without gains of 0."""
         return controller(self.case.law, self.arm)
 
@@ -210,7 +210,7 @@ def by_differences(
     with np.errstate(over="ignore", invalid="ignore"):  # far from where it is large: no number, and no start
         D, scale = characteristic(np.array([s, s + h, s - h]))
         up, down = D[1:] * np.exp(scale[1:] - scale[0])
-        return deflated(D[0], (up - down) / (2 * h), scale[0], s, at_zero)
+        return deflate(D[0], (up - down) / (2 * h), scale[0], s, at_zero)
 
 
 def _must_not_be_algebraic(loop: ContinuousLoop) -> None:
@@ -271,7 +271,7 @@ def grid(arm: Arm, up_to: float) -> Any:
 
 
 @lru_cache(maxsize=ARMS_KEPT)
-def band_of(arm: Arm, number: int) -> float:
+def frequency_above_mode(arm: Arm, number: int) -> float:
     """A frequency [rad/s] half-way between two natural ones, with `number` flexible modes below."""
     omega = modes(arm, number + 1).natural_frequency
     return float((omega[-1] + omega[-2]) / 2)

@@ -140,7 +140,7 @@ class LoopVerdict(ABC):
 
     @property
     @abstractmethod
-    def ringing(self) -> list[tuple[int, complex]]:
+    def oscillating_poles(self) -> list[tuple[int, complex]]:
         """The oscillating poles s [1/s], Im s > 0, each with its mode, 0 without one."""
 
     @property
@@ -174,7 +174,7 @@ class LoopVerdict(ABC):
         """The loop function on a grid that resolves it."""
         loop = self.full
         omega = self.frequencies
-        omega, L = refined(loop.loop_function, omega[omega >= lowest_drawn(loop.arm, self.in_band)])
+        omega, L = refine_frequencies(loop.loop_function, omega[omega >= lowest_drawn(loop.arm, self.in_band)])
         return LoopCurve(
             arm=loop.arm,
             law=loop.law,
@@ -217,7 +217,7 @@ def next_limits(factors: Iterable[float]) -> tuple[float, float]:
     return max((t for t in factors if 0 <= t < 1), default=0.0), min((t for t in factors if t > 1), default=math.inf)
 
 
-def refined(L: Callable[[Complex], Complex], omega: Real, rounds: int = 6) -> tuple[Real, Complex]:
+def refine_frequencies(L: Callable[[Complex], Complex], omega: Real, rounds: int = 6) -> tuple[Real, Complex]:
     """Return frequencies (n,), more of them where L or 1 + L (s = i w) changes by much between two, and L there."""
     for number in range(rounds):
         values = np.asarray(L(1j * omega), dtype=np.complex128)

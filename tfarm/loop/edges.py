@@ -26,7 +26,7 @@ from tfarm.dsp.discretise import acting_law
 from tfarm.dsp.plant import FORGOTTEN, OVERDAMPED, first_distinct, held_amplitude
 from tfarm.loop.circle import Band, complete_band
 from tfarm.loop.circle_crossings import stable_windows
-from tfarm.loop.sampled import Sampled, resized, sampled_loop
+from tfarm.loop.sampled import Sampled, sampled_loop, with_more_modes
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes_below
@@ -42,7 +42,7 @@ OTHER_DIGITS = 4
 
 Proof = tuple[bool | None, float]  # whether a loop is stable (None: not shown), and the band [rad/s] of that proof
 Test = Callable[[float], Proof]
-Found = TypeVar("Found")
+Edge = TypeVar("Edge")
 
 
 @frozen
@@ -124,13 +124,13 @@ def log_radius_with(loop: Sampled, C: float, count: int) -> float:
     def damped(nudge: float) -> Sampled:
         arm = loop.plant.arm.having(damping=C * (1 + nudge))
         # 2 modes are kept beyond the last one that does not decay within a sample
-        return loop.on(arm, min(count, 2 + outliving(arm, loop.chain)))
+        return loop.on(arm, min(count, 2 + count_lasting_modes(arm, loop.chain)))
 
     # shares of C, tried in turn where two damped modes are one at it
     return first_distinct(damped, (0.0, 1e-6, -1e-6)).poles.log_spectral_radius
 
 
-def outliving(arm: Arm, chain: Chain) -> int:
+def count_lasting_modes(arm: Arm, chain: Chain) -> int:
     """Number of bending modes of a damped arm that outlive a sample, C w^2 T (1 - f)/2 below 40, and still ring.
 
     Overdamped modes have their slow poles next to -1/C, where those of the remainder are too.
@@ -143,7 +143,7 @@ def outliving(arm: Arm, chain: Chain) -> int:
 def most_modes(arm: Arm, chain: Chain) -> int:
     """Largest number of modes of a loop: of a damped arm those that outlive a sample, and a few; at most 128."""
     # 4 modes of a whole loop decay within a sample
-    return min(MOST_LOOP_MODES, 4 + outliving(arm, chain)) if arm.least_damping else MOST_LOOP_MODES
+    return min(MOST_LOOP_MODES, 4 + count_lasting_modes(arm, chain)) if arm.least_damping else MOST_LOOP_MODES
 
 
 def whole_loop(case: Case) -> Sampled:
@@ -205,7 +205,7 @@ class LowerBound(float):
         return f"≥ {general(self, digits)}"
 
 
-Interval = tuple[Figure, Figure]  # both edges of a stable interval
+FigurePair = tuple[Figure, Figure]  # both edges of a stable interval
 
 
 @dataclass(frozen=True)
@@ -262,7 +262,7 @@ class Limit:
         return min(band, narrower) if still is False else 0.0
 
 
-def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[Interval]:
+def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[FigurePair]:
     """Return the stability intervals of a number, with more and more modes until all digits are certified."""
 
     def proof(value: float) -> Proof:
@@ -289,22 +289,26 @@ def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[Interval]
 
 
 def _most_certain(
-    loop: Sampled, band: Band | None, most: int, found: Callable[[Sampled], Found], is_sharp: Callable[[Found], bool]
-) -> Found:
+    loop: Sampled,
+    band: Band | None,
+    most: int,
+    found: Callable[[Sampled], Edge],
+    is_sharp: Callable[[Edge], bool],
+) -> Edge:
     """What is found with at most MOST_EDGE_MODES modes; in a certified band with twice as many until it `is_sharp`."""
-    loop = resized(loop, min(loop.plant.count, MOST_EDGE_MODES))
+    loop = with_more_modes(loop, min(loop.plant.count, MOST_EDGE_MODES))
     result = found(loop)
     count = loop.plant.count
     most = min(most, _most(loop)) if band is not None else 0
     while count < most and not is_sharp(result):
         count = min(2 * count, most)
-        result = found(resized(loop, count))
+        result = found(with_more_modes(loop, count))
     return result
 
 
 def _with_others(loop: Sampled) -> Callable[[], Sampled]:
     """The loop with another number of modes to compare with, made at its first use."""
-    return cache(lambda: resized(loop, another(loop.plant.count, _most(loop))))
+    return cache(lambda: with_more_modes(loop, another(loop.plant.count, _most(loop))))
 
 
 def another(count: int, most: int) -> int:

@@ -42,7 +42,7 @@ class Inversion:
         return np.array([np.interp(t, self.t, each) for each in self.error])
 
 
-def inverted(transform: Callable[[Complex], Complex], end: float, growth: float = 0.0) -> Inversion:
+def invert_transform(transform: Callable[[Complex], Complex], end: float, growth: float = 0.0) -> Inversion:
     """Return the inverse of a transform, (signals, n) at s (n,), from 0 to `end` [s]; poles have Re s <= `growth`."""
     period = PERIODS * end
     shift = growth + ALIASED / period

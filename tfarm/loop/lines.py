@@ -28,7 +28,7 @@ from tfarm.loop.continuous import FAR_RIGHT, LONG_PATH, SLOWEST, ContinuousLoop,
 from tfarm.loop.poles import box_of
 from tfarm.loop.stability import MARGIN_OF_ZERO
 from tfarm.response.signals import Signals
-from tfarm.spectrum.box import FIRST_POINTS, NEAREST_TO_ZERO, TRIED_HEIGHTS, turned
+from tfarm.spectrum.box import FIRST_POINTS, NEAREST_TO_ZERO, TRIED_HEIGHTS, argument_change
 from tfarm.spectrum.table import first_frequency
 
 LEADING = ".den.0"  # how the name of a leading coefficient ends
@@ -134,7 +134,7 @@ class Along(NamedTuple):
     line: Line
 
 
-def crossed(arm: Arm, terms: LawTerms, band: float, loops: Sequence[Along]) -> Iterator[Callable[[], Crossings]]:
+def cross_axis(arm: Arm, terms: LawTerms, band: float, loops: Sequence[Along]) -> Iterator[Callable[[], Crossings]]:
     """Return for each line what makes its crossings of the axis, between its limits.
 
     It raises ConvergenceError where poles meet at s = 0 that cannot be counted.
@@ -165,10 +165,10 @@ def _with_real_poles(along: Along, found: list[Crossing], N: Complex, P: Complex
         found.append(rest if is_single else rest._replace(change=_change_at(along, rest.t, found, band)))
     if 0.0 in critical(along.name, limits)[1:-1] and (change := through_infinity(N[4:], P[4:])):
         found.append(Crossing(0.0, math.inf, change))
-    return Crossings.of(each._replace(t=rounded(each.t, limits)) for each in found)
+    return Crossings.of(each._replace(t=round_on_line(each.t, limits)) for each in found)
 
 
-def rounded(t: float, limits: Window) -> float:
+def round_on_line(t: float, limits: Window) -> float:
     """A number along a line; one that is 0 but for the rounding of its range is 0."""
     return 0.0 if abs(t) <= 4 * MACHINE_EPS * (limits[1] - limits[0]) else t
 
@@ -179,7 +179,7 @@ def line_crossings(loop: ContinuousLoop, name: str, low: float, high: float, ban
     Raises ConvergenceError where poles meet at s = 0 that cannot be counted.
     """
     terms = LawTerms(loop.signals, loop.law, [name])
-    (found,) = crossed(loop.arm, terms, band, [Along(lambda: loop, name, terms.line(name, low, high))])
+    (found,) = cross_axis(loop.arm, terms, band, [Along(lambda: loop, name, terms.line(name, low, high))])
     return found()
 
 
@@ -212,7 +212,7 @@ def through_origin(N: Complex, P: Complex, limits: Window) -> Crossing | None:
     # 1.5 times the gain at the farther of two small s: more at the nearer one is a gain without a limit
     if not abs(near) < 1.5 * abs(far):
         return None
-    return Crossing(rounded(float(2 * near - far), limits), 0.0, 1 if far > near else -1)
+    return Crossing(round_on_line(float(2 * near - far), limits), 0.0, 1 if far > near else -1)
 
 
 def through_infinity(N: Complex, P: Complex) -> int:
@@ -240,7 +240,7 @@ def unstable_below(loop: ContinuousLoop, band: float) -> int:
         above = np.linspace(right, 0.0, FIRST_POINTS) + 1j * top
         path = np.r_[side, above[1:-1], 1j * np.asarray(grid(loop.arm, top))[::-1], 0.0]
         try:
-            return round(turned(loop.function, path, abs(right + 1j * top), nearest) / math.pi)
+            return round(argument_change(loop.function, path, abs(right + 1j * top), nearest) / math.pi)
         except ConvergenceError as error:
             if factor == TRIED_HEIGHTS[-1] or error.best.real == 0:
                 raise

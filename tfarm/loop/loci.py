@@ -23,7 +23,7 @@ from tfarm.records import frozen
 from tfarm.reduced import modal_model
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
-from tfarm.spectrum.following import between
+from tfarm.spectrum.following import interpolate_roots
 
 if TYPE_CHECKING:
     import control
@@ -162,7 +162,9 @@ def most_damped(found: Locus) -> MostDamped | None:
     if 0 < at < ratios.size - 1 and (branch.imag > 0).all():
 
         def ratio(value: float) -> float:
-            return -float(damping_ratios(between(found.varied, gain, branch[:, None], np.array([value])))[0, 0])
+            return -float(
+                damping_ratios(interpolate_roots(found.varied, gain, branch[:, None], np.array([value])))[0, 0]
+            )
 
         # 1e-7 of the gain: a damping ratio, flat there, is known to 1e-14 of its curvature
         ends = (float(gain[0]), float(gain[2]))

@@ -34,11 +34,11 @@ from tfarm.loop.varied import ARM_PARAMETERS, OF_THE_LAW, Title, Varied
 from tfarm.loop.windows import without_losses
 from tfarm.records import frozen
 from tfarm.response.frequency import AXIS_SHARE
-from tfarm.response.signals import Controller, controller
+from tfarm.response.signals import ControllerSignals, controller
 from tfarm.schema import Quantity
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.box import Box
-from tfarm.spectrum.following import assigned, between, follow
+from tfarm.spectrum.following import assign_roots, follow, interpolate_roots
 
 MOST_LOCUS_POINTS = 100_000  # values, those between that make it round among them
 MOST_BRANCHES = 200  # and flexible modes below the top of the box
@@ -89,7 +89,7 @@ class Locus:
     @cached_property
     def smooth(self) -> Locus:
         """The same with the values between that round lines take."""
-        return rounded(self)
+        return refine_branches(self)
 
     @property
     def finding(self) -> str:
@@ -102,7 +102,7 @@ class Locus:
         return f"a pole becomes {first}{f' and {more} more' if more > 0 else ''}"
 
     @property
-    def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
+    def controller(self) -> Annotated[ControllerSignals, Quantity(flat=True)]:
         """Names of the arm and the controller."""
         return controller(self.law, self.arm)
 
@@ -180,14 +180,14 @@ def locus(
     points = whole("points", points, 2, MOST_LOCUS_POINTS, f"a whole number from 2 to {MOST_LOCUS_POINTS}")
     branches = whole("branches", branches, 1, MOST_BRANCHES, f"a whole number from 1 to {MOST_BRANCHES}")
     number = branches if in_box else max(1, branches - 2 * case.arm.has_rigid_mode)
-    family = Varied(case, vary, start, stop).boxed(number)
+    family = Varied(case, vary, start, stop).with_box(number)
     gain = np.linspace(start, stop, points)
-    rows, origin = followed(family, gain, number)
+    rows, origin = follow_poles(family, gain, number)
     is_shown = family.box.holds(rows) if in_box else ~np.isnan(rows)
     is_upper = (rows.imag >= 0).any(axis=1)  # others are mirror images throughout
     listed = np.flatnonzero(is_shown.any(axis=1) & is_upper)[: None if in_box else branches - family.pinned]
     pinned = min(family.pinned, branches)
-    found = shown(rows, listed, pinned, family.box if in_box else None)
+    found = branches_in_box(rows, listed, pinned, family.box if in_box else None)
     if len(found) < branches and not in_box:
         raise ConvergenceError(f"only {len(found)} branches could be followed: ask for fewer", found, branches)
     origin = np.r_[at_origin(family.first)[:pinned], origin[listed]]
@@ -196,18 +196,18 @@ def locus(
     return Locus(case.on(family.first.arm), vary, gain, found, origin, family.box, crossings, rows, listed, in_box)
 
 
-def shown(rows: Complex, listed: Whole, pinned: int, box: Box | None) -> Complex:
+def branches_in_box(rows: Complex, listed: Whole, pinned: int, box: Box | None) -> Complex:
     """The branches listed after the poles pinned at 0, NaN outside the box where there is one."""
     found: Complex = np.concatenate([np.zeros((pinned, rows.shape[1]), complex), rows[listed]])
     found += 0.0  # no -0
     return found if box is None else np.where(box.holds(found), found, np.nan)
 
 
-def followed(family: Varied, gain: Real, modes: int) -> tuple[Complex, Whole]:
+def follow_poles(family: Varied, gain: Real, modes: int) -> tuple[Complex, Whole]:
     """All poles (b, n) but those at 0 at every value, mirror images included, and the origin of each."""
     # 2 flexible modes are followed beyond the box, whose poles may come into it
-    row, origin = named(family, modes + 2)
-    row = np.r_[row, missing(family, family.start, row)]
+    row, origin = continue_from_rig(family, modes + 2)
+    row = np.r_[row, missing_poles(family, family.start, row)]
     rows = row[:, None]
     low = 0
     # 3 values after the first at which the poles of the box are counted
@@ -221,7 +221,7 @@ def followed(family: Varied, gain: Real, modes: int) -> tuple[Complex, Whole]:
                 raise
             nodes.insert(0, (low + high) // 2)
             continue
-        new = missing(family, float(gain[high]), part[-1])
+        new = missing_poles(family, float(gain[high]), part[-1])
         if new.size:
             back = follow(family, gain[low : high + 1][::-1], np.r_[part[-1], new])
             part = np.hstack([part, back[::-1, part.shape[1] :]])
@@ -231,7 +231,7 @@ def followed(family: Varied, gain: Real, modes: int) -> tuple[Complex, Whole]:
     return rows, np.r_[origin, np.full(len(rows) - origin.size, OTHER)]
 
 
-def missing(family: Varied, value: float, row: Complex) -> Complex:
+def missing_poles(family: Varied, value: float, row: Complex) -> Complex:
     """The poles of the box at a value that are not among these (b,): none where their number is that of the box."""
     inside = row[family.box.holds(row) & (row != 0)]
     try:
@@ -249,7 +249,7 @@ def missing(family: Varied, value: float, row: Complex) -> Complex:
     return every[away > 1e-6 * abs(every)]
 
 
-def named(family: Varied, number: int) -> tuple[Complex, Whole]:
+def continue_from_rig(family: Varied, number: int) -> tuple[Complex, Whole]:
     """Poles at the first value (b,) that continue from the open rig's, and their origins; without those pinned at 0.
 
     In the order of the modes, `number` flexible ones; poles of a law come last.
@@ -265,7 +265,7 @@ def named(family: Varied, number: int) -> tuple[Complex, Whole]:
         try:
             row = follow(grown, np.array([0.0, 1.0]), row)[1]
         except ConvergenceError:  # of poles that come in from afar, as under a delay
-            row = assigned(grown, 1.0, row)
+            row = assign_roots(grown, 1.0, row)
     of_first = resting[family.pinned : grown.pinned]  # at 0 at the first value alone
     row = np.r_[np.zeros(of_first.size, complex), row]
     origin = np.r_[of_first, origin]
@@ -290,7 +290,7 @@ def open_poles(arm: Arm, number: int) -> tuple[Complex, Whole]:
     return row[alive], origin[alive]
 
 
-def rounded(found: Locus) -> Locus:
+def refine_branches(found: Locus) -> Locus:
     """Return the same locus with more values, until no branch turns by more than 5 degrees as it is drawn.
 
     Each is drawn in a picture of its own and in one of all, down to pieces of a pixel.
@@ -311,10 +311,10 @@ def rounded(found: Locus) -> Locus:
         if not more.size or more.size + gain.size > MOST_LOCUS_POINTS:
             break
         order = np.argsort(way * np.r_[gain, more], kind="stable")
-        added = between(family, gain[::way], rows[:, ::way].T, more).T
+        added = interpolate_roots(family, gain[::way], rows[:, ::way].T, more).T
         gain = np.r_[gain, more][order]
         rows = np.hstack([rows, added])[:, order]
-        branches = shown(rows, found.listed, pinned, box if found.in_box else None)
+        branches = branches_in_box(rows, found.listed, pinned, box if found.in_box else None)
     return replace(found, gain=gain, branches=branches, followed=rows)
 
 

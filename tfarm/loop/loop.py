@@ -16,9 +16,9 @@ from typing import Annotated, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback, Law, cancelled
+from tfarm.arm import Arm, HubFeedback, Law, warn_of_cancellations
 from tfarm.arrays import Complex
-from tfarm.response.signals import Controller, controller
+from tfarm.response.signals import ControllerSignals, controller
 from tfarm.schema import Quantity
 
 
@@ -41,7 +41,7 @@ class Loop(ABC):
         return None
 
     @property
-    def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
+    def controller(self) -> Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller."""
         return controller(self.law, self.arm)
 
@@ -50,7 +50,7 @@ class Loop(ABC):
         self,
     ) -> Annotated[tuple[str, ...], Quantity("warnings", help="unstable controller poles that its zeros cancel")]:
         """Unstable poles of the law that its own zeros cancel."""
-        return cancelled(self.law)
+        return warn_of_cancellations(self.law)
 
     @property
     @abstractmethod

@@ -16,7 +16,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from tfarm.arrays import LEAST_SIZE, Complex, Real
-from tfarm.crossing import brackets, crossed, zeros_between
+from tfarm.crossing import brackets, locate_crossings, zeros_between
 from tfarm.loop.loop import Loop
 from tfarm.records import frozen
 from tfarm.schema import At, Quantity
@@ -129,8 +129,8 @@ def margins_along(
     crossed = unit_crossings(loop, omega)
     apart = _spread(lambda w: loop.loop_function(1j * w), crossed)  # of size 1: what its angle moves by [rad]
     minus = -loop.loop_function(1j * crossed)
-    angle = held(np.degrees(np.angle(minus)), np.degrees(apart), CROSSOVER_DIGITS)  # 0 where L = -1
-    delay = held(np.radians(np.mod(angle, 360)) / crossed, apart / crossed)
+    angle = round_near_poles(np.degrees(np.angle(minus)), np.degrees(apart), CROSSOVER_DIGITS)  # 0 where L = -1
+    delay = round_near_poles(np.radians(np.mod(angle, 360)) / crossed, apart / crossed)
     lag = angle > 0
     lead = angle < 0
     least = {
@@ -152,7 +152,7 @@ def margins_along(
     return LoopMargins(band, gain, **values, at=places, gain_crossovers=by_gain, phase_crossovers=by_phase)
 
 
-def held(values: Real, spread: Real, most: int = 9) -> Real:
+def round_near_poles(values: Real, spread: Real, most: int = 9) -> Real:
     """Round values (n,) to the digits that are significant next to poles of L, where L is rounded.
 
     These are `most` digits, or fewer where a value changes by its `spread` (n,) among the next doubles.
@@ -194,7 +194,7 @@ def phase_crossovers(loop: Loop, omega: Real) -> tuple[PhaseCrossover, ...]:
         drive, fed_back = loop.parts(1j * w)
         return np.asarray((drive * fed_back.conj()).imag)
 
-    factor, place, _ = crossed(omega, lambda w: loop.parts(1j * w))
+    factor, place, _ = locate_crossings(omega, lambda w: loop.parts(1j * w))
     # shares of a frequency on either side, until rounding no longer decides the side of the axis that L is on
     farther = 8.0 ** np.arange(-16, -5)
     sides = place * (1 + np.multiply.outer([-1.0, 1.0], farther)[..., None])  # (2, shares, n)
@@ -207,7 +207,7 @@ def phase_crossovers(loop: Loop, omega: Real) -> tuple[PhaseCrossover, ...]:
     crosses = (factor > AT_POLE) & (factor < 1 / AT_POLE) & ~turns
     place = place[crosses]
     factor = factor[crosses]
-    factor = held(factor, _spread(lambda w: _factor(loop, w), place), CROSSOVER_DIGITS)
+    factor = round_near_poles(factor, _spread(lambda w: _factor(loop, w), place), CROSSOVER_DIGITS)
     found = list(map(PhaseCrossover, place.tolist(), factor.tolist()))
     low, lower = _factor(loop, omega[0] * np.array([1.0, 0.5]))
     # at rest -1/L is real, and does not change further down
@@ -254,7 +254,7 @@ def lowest(
         lowest_one = depth.argmin(axis=0)[None]
         low, high = (np.take_along_axis(inside, np.clip(lowest_one + way, 0, points - 1), 0)[0] for way in (-1, 1))
     least, at = min(zip(depth.ravel().tolist(), inside.ravel().tolist(), strict=True))
-    (least,) = held(np.array([least]), _spread(f, np.array([at])))
+    (least,) = round_near_poles(np.array([least]), _spread(f, np.array([at])))
     return float(least), at
 
 
@@ -263,7 +263,7 @@ def highest(inverse: Callable[[Real], Real], omega: Real) -> tuple[float, float]
     dip, at = lowest(inverse, omega)
     if not dip:
         return math.inf, at
-    (peak,) = held(np.array([1.0 / dip]), _spread(lambda w: 1.0 / inverse(w), np.array([at])))
+    (peak,) = round_near_poles(np.array([1.0 / dip]), _spread(lambda w: 1.0 / inverse(w), np.array([at])))
     return float(peak), at
 
 

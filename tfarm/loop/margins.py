@@ -26,7 +26,7 @@ from tfarm.loop.loop_margins import (
     LoopMargins,
     PhaseCrossover,
 )
-from tfarm.loop.plane import between, plane
+from tfarm.loop.plane import cell_middles, plane
 from tfarm.loop.stability import Stability, is_quiet, stability
 from tfarm.loop.theorem import Lyapunov, Signs, lyapunov, signs_of_loop
 from tfarm.loop.windows import Windows, reach_words, windows_of
@@ -110,7 +110,7 @@ class Margins(LoopAnalysis):
     def factor_intervals(self, delays: Real) -> list[Sequence[Window]]:
         """Return the intervals of a factor on the law, 0 to 4, at each further delay [s] (n,), from a map of both."""
         loop = self.stability.loop
-        return [*plane(loop, ("delay", "gain"), loop.law.delay + delays, between(0.0, 4.0, 40)).stable_intervals]
+        return [*plane(loop, ("delay", "gain"), loop.law.delay + delays, cell_middles(0.0, 4.0, 40)).stable_intervals]
 
     @cached_property
     def windows(self) -> dict[str, Windows]:

@@ -23,9 +23,9 @@ from tfarm.exact.characteristic import Analytic
 from tfarm.records import frozen
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.schema import At, Quantity
-from tfarm.spectrum.box import turned
+from tfarm.spectrum.box import argument_change
 
-from .continuous import band_of
+from .continuous import frequency_above_mode
 from .curve import LoopContour, LoopVerdict
 from .loop import Loop
 from .stability import Stability, stability
@@ -91,7 +91,7 @@ def nyquist_of(verdict: LoopVerdict) -> Nyquist:
     contour = verdict.contour
     s, is_arc = smooth(loop, *upper_contour(loop, contour, verdict.margins_end))
     path = np.r_[s, contour.closing]
-    angle = turned(lambda at: _difference(loop, at), path, float(abs(path).max()))
+    angle = argument_change(lambda at: _difference(loop, at), path, float(abs(path).max()))
     encirclements = round(angle / math.pi)
     open_poles = contour.unstable_open
     plot = Nyquist(s, loop.loop_function(s), is_arc, contour.on_curve, encirclements, verdict, open_poles)
@@ -116,7 +116,7 @@ def upper_contour(loop: Loop, contour: LoopContour, band: float) -> tuple[Comple
     """
     poles = contour.on_curve
     omega = contour.grid
-    scale = np.where(poles == 0, band_of(loop.arm, 1), poles)
+    scale = np.where(poles == 0, frequency_above_mode(loop.arm, 1), poles)
     pole = poles[:, None]
     step = RESIDUE_AT * scale
     away = abs(contour.closed - 1j * pole)
@@ -138,7 +138,7 @@ def upper_contour(loop: Loop, contour: LoopContour, band: float) -> tuple[Comple
 def smooth(loop: Loop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, NDArray[np.bool_]]:
     """The contour with more points on the axis where the drawn curve would have corners."""
     for _ in range(TURN_ROUNDS):
-        length = abs(np.diff(compressed(loop.loop_function(s))))
+        length = abs(np.diff(compress_radius(loop.loop_function(s))))
         (coarse,) = np.nonzero((length > LONGEST_PIECE) & ~is_arc[1:] & ~is_arc[:-1])
         if not coarse.size:
             break
@@ -147,7 +147,7 @@ def smooth(loop: Loop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, 
     return s, is_arc
 
 
-def compressed(L: Complex) -> Complex:
+def compress_radius(L: Complex) -> Complex:
     """L with its size r mapped to r/(1 + r): 1 is half-way, infinity is the rim, at a pole its point 1."""
     size = abs(L)
     inside = np.where(np.isinf(size), 1.0, L)

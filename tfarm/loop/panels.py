@@ -28,7 +28,7 @@ from tfarm.response import transfer
 from tfarm.response.signals import Signals
 from tfarm.spectrum import Modes, modes
 
-from .continuous import ContinuousLoop, band_of, steep_places
+from .continuous import ContinuousLoop, frequency_above_mode, steep_places
 
 PANEL_SAMPLES = 24  # of order 1/2 as the parts are, few more never help where a panel holds one mode
 STEEP_A_PANEL = 3  # steep places a panel: each mode has one of the own, the locked and the free hub
@@ -164,7 +164,7 @@ def positions(arm: Arm, sensor: Sensor, x: Real, count: int) -> Positions:
     must_turn(arm)
     found = modes(arm, count)
     field = _fields(found, sensor, x)
-    band = band_of(arm, count)
+    band = frequency_above_mode(arm, count)
     zeros = []
     for place in x.tolist():
         every = transfer(arm, sensor, x=place).zeros(up_to=band).values

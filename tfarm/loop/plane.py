@@ -28,7 +28,7 @@ from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, AnyLaw, Arm, Hu
 from tfarm.arm.feedback import ON
 from tfarm.arrays import Real
 from tfarm.case import Case
-from tfarm.crossing import Crossings, Window, ascending, counts_over
+from tfarm.crossing import Crossings, Window, check_ascending, counts_over
 from tfarm.crossing.shown import PlaneOfCounts
 from tfarm.errors import ConvergenceError, ParameterError, require
 from tfarm.loop.continuous import ContinuousLoop, grid
@@ -36,9 +36,9 @@ from tfarm.loop.lines import (
     LEADING,
     Along,
     LawTerms,
-    crossed,
+    cross_axis,
     line_crossings,
-    rounded,
+    round_on_line,
     static_edge,
     unstable_below,
     with_numbers,
@@ -46,7 +46,7 @@ from tfarm.loop.lines import (
 from tfarm.loop.stability import band_of_family, verdict_on
 from tfarm.loop.windows import theorem_edges, theorem_windows
 from tfarm.records import frozen
-from tfarm.response.signals import Controller, controller
+from tfarm.response.signals import ControllerSignals, controller
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.gains import PAPER_GAINS, default_gains, rate_unit
@@ -112,7 +112,7 @@ class Plane(PlaneOfCounts):
         return self.loop.law
 
     @property
-    def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
+    def controller(self) -> Annotated[ControllerSignals, Quantity(flat=True)]:
         """Names of the arm and the controller."""
         return controller(self.law, self.arm)
 
@@ -213,8 +213,8 @@ def plane(loop: ContinuousLoop, vary: tuple[str, str], x: Real, y: Real) -> Plan
         loop = loop.under(with_numbers(loop.law, dict.fromkeys(PLANE, 0.0)))
     # most values of a map, along one number of a law, and along one gain
     most = 2000 if loop.is_of_gains else 400
-    x = ascending(vary[0], x, 2, most)
-    y = ascending(vary[1], y, 2, most)
+    x = check_ascending(vary[0], x, 2, most)
+    y = check_ascending(vary[1], y, 2, most)
     across = (float(x[0]), float(x[-1]))
     up = (float(y[0]), float(y[-1]))
     for name, (low, high) in zip(vary, (across, up), strict=True):
@@ -259,7 +259,7 @@ def _columns(loop: ContinuousLoop, vary: tuple[str, str], x: Real, up: Window, b
     lines = [terms.having(vary[0], value).line(vary[1], *up) for value in x.tolist()]
     members = (partial(loop.having, vary[0], value) for value in x.tolist())
     loops = [Along(member, vary[1], line) for member, line in zip(members, lines, strict=True)]
-    return [column() for column in crossed(loop.arm, terms, band, loops)]
+    return [column() for column in cross_axis(loop.arm, terms, band, loops)]
 
 
 def _at(loop: ContinuousLoop, vary: tuple[str, str], point: tuple[float, ...]) -> ContinuousLoop:
@@ -327,10 +327,10 @@ def ranges_of(arm: Arm) -> tuple[tuple[float, float], tuple[float, float]]:
     return (low * K1, high * K1), (lower * K2, upper * K2)
 
 
-def between(low: float, high: float, number: int) -> Real:
+def cell_middles(low: float, high: float, number: int) -> Real:
     """The middles of `number` equal parts from low to high: none of them on a line K1 = 0 unless by chance."""
     values = low + (high - low) * (np.arange(number) + 0.5) / number
-    return np.array([rounded(value, (low, high)) for value in values.tolist()])
+    return np.array([round_on_line(value, (low, high)) for value in values.tolist()])
 
 
 @dataclass(frozen=True)
@@ -354,7 +354,7 @@ class Axis:
     def grid(self, number: int) -> Real:
         """Values at `number` places of even distance."""
         low, high = self._stretched(np.array([self.low, self.high]))
-        y = between(low, high, number)
+        y = cell_middles(low, high, number)
         if self.is_linear:
             return y
         size = abs(y) / LINEAR_SHARE, abs(y) - LINEAR_SHARE
@@ -405,7 +405,7 @@ def moment_axis(arm: Arm, x: Axis) -> Axis:
     # 32 columns of the picture in which unstable gains are searched
     across = x.grid(32)
     # 400 values between, at which they are searched
-    deep = gain_map(arm, across[across > 0], between(deepest, low, 400))
+    deep = gain_map(arm, across[across > 0], cell_middles(deepest, low, 400))
     rows = np.nonzero(~deep.stable.all(axis=1))[0]
     if not rows.size:
         return Axis(low, high)

@@ -22,15 +22,15 @@ from tfarm.case import Case
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, require
 from tfarm.records import frozen
-from tfarm.reduced.modal import closed, in_series, pade
+from tfarm.reduced.modal import closed_loop_matrix, in_series, pade
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.schema import Quantity
-from tfarm.spectrum.box import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SINGULAR, TRIED_HEIGHTS, Box, complete
-from tfarm.spectrum.proofs import Disc, disjoint, enclosed, proven_count
+from tfarm.spectrum.box import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SINGULAR, TRIED_HEIGHTS, Box, complete_zeros
+from tfarm.spectrum.proofs import Disc, disjoint, enclose_zero, proven_count
 from tfarm.spectrum.starts import damped_starts
 from tfarm.spectrum.table import first_frequency
 
-from .continuous import ContinuousLoop, band_of, steep_places
+from .continuous import ContinuousLoop, frequency_above_mode, steep_places
 from .theorem import CONSERVES, GIVES
 
 MOST_POLES = 1000  # that may be asked for
@@ -127,7 +127,7 @@ class Poles:
         """
         k = self.loop.k
         law = self.loop.exact
-        discs = tuple(enclosed(k, complex(pole), digits, law) for pole in self.moving)
+        discs = tuple(enclose_zero(k, complex(pole), digits, law) for pole in self.moving)
         if not disjoint(discs):
             raise CertificationError("the discs of two poles touch: ask for more digits")
         proven = proven_count(k, self.box, law)
@@ -149,7 +149,7 @@ def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles:
     wanted, limit = (USUAL_POLES, loop.arm.shear_cutoff) if count is None else (count, math.inf)
     number = wanted + 2
     while True:
-        height = band_of(loop.arm, number)
+        height = frequency_above_mode(loop.arm, number)
         if height >= limit:
             poles = poles_below(loop, limit, factors=SHRUNK_HEIGHTS)
             if poles.values.size <= wanted:
@@ -175,7 +175,7 @@ def poles_below(
     """
     starts = starting_points(loop, STARTS_REACH * height)
     known = slow_poles(loop, SLOW_SHARE * height)
-    found, box = complete(loop.function, lambda top: box_of(loop, top, late), height, starts, known, factors)
+    found, box = complete_zeros(loop.function, lambda top: box_of(loop, top, late), height, starts, known, factors)
     # without losses a simple zero is its own mirror image, and its real part is rounding
     is_even = loop.is_lossless or (loop.arm.is_undamped and loop.theorem.energy == CONSERVES)
     on_axis = is_even & (abs(found.real) <= AXIS_SHARE * abs(found))
@@ -287,7 +287,7 @@ def poles_of_model(loop: ContinuousLoop, plant: Matrices) -> Complex:
     law = loop.law.matrices()
     if loop.law.delay:
         law = in_series(law, pade(loop.law.delay, PADE).matrices())
-    return np.linalg.eigvals(closed(plant, law)).astype(complex)
+    return np.linalg.eigvals(closed_loop_matrix(plant, law)).astype(complex)
 
 
 def first_poles(poles: Poles, count: int | None) -> Poles:

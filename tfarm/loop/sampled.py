@@ -55,7 +55,7 @@ from tfarm.errors import ParameterError, did_you_mean
 from tfarm.loop.loop import Loop
 from tfarm.loop.sampled_rig import SampledRig
 from tfarm.records import frozen
-from tfarm.response.signals import Controller
+from tfarm.response.signals import ControllerSignals
 from tfarm.schema import Quantity
 
 MOST_STEPS = 200  # of all roots together: a cluster of nine takes 24
@@ -360,7 +360,7 @@ class OfLoop:
     loop: Sampled
 
     @property
-    def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
+    def controller(self) -> Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller."""
         return self.loop.controller
 
@@ -442,7 +442,7 @@ def sampled_loop(case: Case, *, count: int = USUAL_MODES) -> Sampled:
     """Return the loop of a case with `count` flexible modes.
 
     Raises ParameterError for a locked hub, an unknown signal, a law in z of another period, a massless hub whose moment
-    is fed back (an algebraic loop), and as `discretised` does.
+    is fed back (an algebraic loop), and as `discretise_law` does.
     """
     law = case.feedback
     acting, chain = acting_law(case, law)
@@ -455,7 +455,7 @@ def sampled_loop(case: Case, *, count: int = USUAL_MODES) -> Sampled:
     return Sampled(SampledRig(sensed_plant(case.arm, chain, in_z.signals, count), chain, in_z), law, tuple(weights))
 
 
-def resized(loop: Sampled, count: int) -> Sampled:
+def with_more_modes(loop: Sampled, count: int) -> Sampled:
     """The loop with another number of flexible modes, or up to two more or less where two damped modes are one."""
     if count == loop.plant.count:
         return loop

@@ -19,12 +19,12 @@ from tfarm.dsp.discretise import RULE, rule_in_words
 from tfarm.dsp.stages import admit_case, not_covered
 from tfarm.errors import ConvergenceError
 from tfarm.loop.circle import Band, complete_band
-from tfarm.loop.circle_crossings import FACTOR, around, stable_windows, windows_of
+from tfarm.loop.circle_crossings import FACTOR, interval_around, stable_windows, windows_on_circle
 from tfarm.loop.curve import LoopAnalysis, LoopContour, LoopVerdict, next_limits
 from tfarm.loop.edges import (
     DelayMargin,
     Figure,
-    Interval,
+    FigurePair,
     Limit,
     LowerBound,
     damping_limit,
@@ -34,7 +34,7 @@ from tfarm.loop.edges import (
     whole_loop,
 )
 from tfarm.loop.loop_margins import LoopMargins, PhaseCrossover
-from tfarm.loop.sampled import OfLoop, Sampled, resized, sampled_loop
+from tfarm.loop.sampled import OfLoop, Sampled, sampled_loop, with_more_modes
 from tfarm.loop.sampled_modes import ModeTable, dominant, mode_table
 from tfarm.records import frozen
 from tfarm.schema import Quantity
@@ -163,7 +163,7 @@ class Verdict(OfLoop, LoopVerdict):
         return -self.loop.chain.sampling.period / self.log_radius if self.log_radius else None
 
     @property
-    def ringing(self) -> list[tuple[int, complex]]:
+    def oscillating_poles(self) -> list[tuple[int, complex]]:
         """The oscillating poles s = ln(z)/T by mode, each at the frequency that is nearest to that of its mode."""
         return [*unaliased_poles(self.full).items()]
 
@@ -203,7 +203,7 @@ class Verdict(OfLoop, LoopVerdict):
 
     def gain_limits(self, by_phase: tuple[PhaseCrossover, ...]) -> tuple[float, float]:
         """Return the stability interval of that factor, or what the phase crossovers show."""
-        return around(self.factors, 1.0) or next_limits(t for _, t in by_phase)
+        return interval_around(self.factors, 1.0) or next_limits(t for _, t in by_phase)
 
 
 def unaliased_poles(loop: Sampled) -> dict[int, complex]:
@@ -253,7 +253,7 @@ def sampled_verdict(case: Case, *, count: int | None = None) -> Verdict:
     # 8 modes of the smallest loop, twice as many in each next
     few = min(8, full.plant.count // 2)
     most = full.plant.count
-    loops = (resized(full, few << n) for n in range(most.bit_length()) if 0 < few << n < most)
+    loops = (with_more_modes(full, few << n) for n in range(most.bit_length()) if 0 < few << n < most)
     loop = next(filter(agrees, loops), full)
     is_proven = proven is not None and loop.poles.is_determined and (proven == 0) == (loop.poles.unstable == 0)
     return Verdict(loop, band if is_proven else None, is_converged=loop is not full)
@@ -264,7 +264,7 @@ class SampledNumber(NamedTuple):
 
     number: Annotated[str, Quantity("gain or coefficient", help="name of a number of the controller")]
     value: Annotated[float, Quantity("value", help="present value of the number")]
-    windows: Annotated[Sequence[Window | Interval], Quantity("stability intervals", key="intervals",
+    windows: Annotated[Sequence[Window | FigurePair], Quantity("stability intervals", key="intervals",
             help="all intervals of the number in which the loop is stable, the others constant")]  # fmt: skip
     interval: Annotated[Window | None, Quantity(help="the interval that contains the present value")]
 
@@ -291,8 +291,8 @@ class Analysis(LoopAnalysis):
         """One row for each gain at the hub, or number of another law, the others constant."""
         if not self.loop.is_of_gains:
             values = {name: value for name, value in self.loop.numbers.items() if value}
-            found = windows_of(self.loop, [*values]) if values else {}
-            return [SampledNumber(n, values[n], each, around(each, values[n])) for n, each in found.items()]
+            found = windows_on_circle(self.loop, [*values]) if values else {}
+            return [SampledNumber(n, values[n], each, interval_around(each, values[n])) for n, each in found.items()]
         return [SampledNumber(n, self.loop.number(n), each, self.interval(n)) for n, each in self.shown.items()]
 
     @property
@@ -332,7 +332,7 @@ class Analysis(LoopAnalysis):
         return self.verdict.loop
 
     @cached_property
-    def shown(self) -> Mapping[str, list[Interval]]:
+    def shown(self) -> Mapping[str, list[FigurePair]]:
         """The stability intervals of each gain at the hub, the others constant, by name."""
         without_loop = (MOMENT_GAIN,) if self.loop.plant.arm.has_massless_hub else ()
         return {
@@ -345,7 +345,7 @@ class Analysis(LoopAnalysis):
         windows = self.windows[name]
         if name == ANGLE_GAIN and value == 0.0 and self.verdict.is_stable:
             return next((window for window in windows if window[0] <= 0.0 < window[1]), None)
-        return around(windows, value)
+        return interval_around(windows, value)
 
     @property
     def windows(self) -> Mapping[str, list[Window]]:
@@ -411,7 +411,7 @@ class Analysis(LoopAnalysis):
     def gain_factors(self) -> Annotated[Window | None, Quantity("gain margin, factors down and up",
             help="interval around 1 of a factor on the whole controller in which the loop is stable")]:  # fmt: skip
         """The stability interval around 1 of a factor on the law; None unless the loop is stable."""
-        return around(self.verdict.factors, 1.0)
+        return interval_around(self.verdict.factors, 1.0)
 
     @property
     def warnings(self) -> Annotated[tuple[str, ...], Quantity("warnings",

@@ -39,7 +39,7 @@ from tfarm.response.frequency import AXIS_SHARE
 from tfarm.schema import Quantity
 from tfarm.spectrum import flexible_frequencies, modes, modes_below
 
-from .continuous import MOST_BAND_MODES, QUIET_REACH, ContinuousLoop, band_of, grid, quiet_places
+from .continuous import MOST_BAND_MODES, QUIET_REACH, ContinuousLoop, frequency_above_mode, grid, quiet_places
 from .curve import LoopContour, LoopVerdict, next_limits
 from .loop_margins import PhaseCrossover
 from .poles import HUB, Poles, box_of, count_with_mirrors, poles_below, poles_by_mode, poles_of_model
@@ -139,7 +139,7 @@ class Stability(LoopVerdict):
         return -1 / self.spectral_abscissa if self.spectral_abscissa else None
 
     @property
-    def ringing(self) -> list[tuple[int, complex]]:
+    def oscillating_poles(self) -> list[tuple[int, complex]]:
         """The oscillating poles by mode."""
         moving = self.poles.moving
         table = modes(self.loop.arm, up_to=self.band)
@@ -293,8 +293,8 @@ def band_of_loop(loop: ContinuousLoop) -> tuple[float, bool]:
     own = loop.law.poles
     ringing = own[own.real > -DULL * abs(own)]
     fastest = BEYOND_LAW_POLES * float(abs(ringing).max(initial=0.0))
-    highest = band_of(arm, MOST_BAND_MODES)
-    least = max(band_of(arm, LEAST_BAND_MODES), min(fastest, highest))
+    highest = frequency_above_mode(arm, MOST_BAND_MODES)
+    least = max(frequency_above_mode(arm, LEAST_BAND_MODES), min(fastest, highest))
     is_decided = theorem.energy is not None and (arm.has_elastic_link or not loop.law.is_static)
     if arm.loses_at_hub_alone or is_decided or fastest > highest:
         return least, False

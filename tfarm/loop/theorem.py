@@ -9,7 +9,8 @@ k_theta + C(0) > 0 (Lanzon and Petersen 2008; positive position feedback is of t
 Both need hub torque on the hub's own angle or rate, no delay, no inductance, no sampling.  The signs of real
 polynomials are decided in exact arithmetic, by Sturm's theorem, at all frequencies.
 
-Feedback of the moment M on the hub, u = -C - k M, is absorbed by the hub of another rig (`absorbed`).  Its equation
+Feedback of the moment M on the hub, u = -C - k M, is absorbed by the hub of another rig (`cancel_hub_moment`).  Its
+equation
 
     I theta_tt + b theta_t + c theta = u + M   divided by 1 - k   is that of inertia I/(1-k), friction b/(1-k),
                                                                   stiffness c/(1-k) and the law C/(1-k)
@@ -89,7 +90,7 @@ DAMPED = "C = 0: every mode beyond is damped (Lyapunov), with a decay rate that 
 DRIVEN = "C = 0: every flexible mode beyond is unstable too, with a growth rate that tends to 0"
 
 
-def absorbed(loop: Loop) -> tuple[float, Law] | None:
+def cancel_hub_moment(loop: Loop) -> tuple[float, Law] | None:
     """The share k of the moment on the hub that a law cancels, and the rest of the law.
 
     None for laws on other signals than the hub's angle and rate and, statically, the moment that acts on the hub.  With
@@ -116,7 +117,7 @@ def absorbed(loop: Loop) -> tuple[float, Law] | None:
 def theorem_of(loop: Loop) -> Theorem:
     """Return the theorem that decides the stability of every mode of a loop."""
     arm = loop.arm
-    parts = absorbed(loop)
+    parts = cancel_hub_moment(loop)
     if parts is None or (arm.input_lags and loop.feeds_back):
         return NO_THEOREM
     share, rest = parts
@@ -159,17 +160,17 @@ def signs_of(law: Law, friction: float = 0.0) -> Signs:
         values = dict(zip(law.signals, law.values(np.ones(1, complex))[:, 0].real.tolist(), strict=True))
         return _of_signs(values.get("hub_rate", 0.0) + friction, values.get("hub_angle", 0.0))
     # of the whole law as one fraction on the angle
-    num = polynomial([0.0])
-    den = polynomial([1.0])
+    num = exact_polynomial([0.0])
+    den = exact_polynomial([1.0])
     for part in law.parts:
         assert isinstance(part.block, Rational)  # seen above
-        p = polynomial(part.block.num) * -law.sign
-        q = polynomial(part.block.den)
+        p = exact_polynomial(part.block.num) * -law.sign
+        q = exact_polynomial(part.block.den)
         if part.signals == ("hub_rate",):
-            p = p * polynomial([1.0, 0.0])
+            p = p * exact_polynomial([1.0, 0.0])
         num = num * q + p * den
         den = den * q
-    passive = _positive_real(num + polynomial([friction, 0.0]) * den, den)
+    passive = _positive_real(num + exact_polynomial([friction, 0.0]) * den, den)
     if passive is not None and passive.kind:
         return passive
     if is_hurwitz(den) and num.degree() <= den.degree() and definite(on_axis(num, den)[1]) == "above":
@@ -267,7 +268,7 @@ def lyapunov(loop: Loop) -> Lyapunov:
 # ------------------------------------------------------------ polynomials, exactly
 
 
-def polynomial(coefficients: Sequence[float]) -> Poly:
+def exact_polynomial(coefficients: Sequence[float]) -> Poly:
     """The polynomial in w with these doubles as coefficients, descending, exact."""
     from sympy import QQ, Poly, Rational, Symbol
 
@@ -278,7 +279,7 @@ def on_axis(num: Poly, den: Poly) -> tuple[Poly, Poly]:
     """Real part, and imaginary part over w, of num(i w) conj den(i w): polynomials in v = w^2."""
     (a, b) = _split(num)
     (c, d) = _split(den)
-    v = polynomial([1.0, 0.0])
+    v = exact_polynomial([1.0, 0.0])
     return a * c + v * b * d, b * c - a * d
 
 

@@ -38,8 +38,8 @@ from tfarm.records import frozen
 from tfarm.response.signals import Signals
 from tfarm.spectrum.table import first_frequency
 
-from .continuous import FAR_RIGHT, ContinuousLoop, band_of
-from .inversion import POINTS, Inversion, inverted
+from .continuous import FAR_RIGHT, ContinuousLoop, frequency_above_mode
+from .inversion import POINTS, Inversion, invert_transform
 from .poles import Poles, poles_below
 
 # the input of the arm as a place of excitation, and as a signal
@@ -92,7 +92,7 @@ class Peak(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Part:
+class DelayedResponse:
     """What an excitation does with one delay [s]: h of each signal, (signals, n) at t >= 0.
 
     `late` are exponents and amplitudes (signals, m) of the poles, `direct` those of the direct response, `rests`
@@ -143,7 +143,7 @@ class TimeResponse:
     names: tuple[str, ...]
     excitation: Excitation
     poles: Poles
-    parts: tuple[Part, ...]
+    parts: tuple[DelayedResponse, ...]
 
     @cached_property
     def starts(self) -> Real:
@@ -152,14 +152,19 @@ class TimeResponse:
 
     def at(self, t: Real, *, before: bool = False) -> Real:
         """Return the signals (signals, n) at times t [s], after a jump, or before it."""
-        return self._summed(t, Part.values, before=before)
+        return self._summed(t, DelayedResponse.values, before=before)
 
     def remainder(self, t: Real) -> Real:
         """Return the bound (signals, n) on the error of the signals at times t [s]."""
-        return self._summed(t, Part.errors, np.abs)
+        return self._summed(t, DelayedResponse.errors, np.abs)
 
     def _summed(
-        self, t: Real, h: Callable[[Part, Real], Real], size: Callable[[float], float] = float, *, before: bool = False
+        self,
+        t: Real,
+        h: Callable[[DelayedResponse, Real], Real],
+        size: Callable[[float], float] = float,
+        *,
+        before: bool = False,
     ) -> Real:
         """Sum of w_i h(t - t_i), the weights or their sizes, in blocks of times."""
         found = np.zeros((len(self.names), t.size))
@@ -236,7 +241,7 @@ def usual_poles(loop: ContinuousLoop, count: int = USUAL_COUNT) -> Poles:
     Raises ConvergenceError where they are not complete.
     """
     seen = loop.under(of_common_blocks(loop.law))
-    return replace(poles_below(seen, band_of(loop.arm, count)), loop=loop)
+    return replace(poles_below(seen, frequency_above_mode(loop.arm, count)), loop=loop)
 
 
 def time_response(poles: Poles, names: tuple[str, ...], excitation: Excitation, duration: float) -> TimeResponse:
@@ -316,7 +321,7 @@ class Transforms:
         return whole, direct, rest
 
 
-def _part(poles: Poles, of: Transforms, start: float, duration: float) -> Part:
+def _part(poles: Poles, of: Transforms, start: float, duration: float) -> DelayedResponse:
     """The response to a part of the excitation."""
     left, _, _, top = poles.box
     own = np.array(of.excitation.poles, complex)
@@ -332,9 +337,9 @@ def _part(poles: Poles, of: Transforms, start: float, duration: float) -> Part:
     growth = float(known.real.max(initial=0.0))
     end = min(end, 10 / max(growth, LEAST_SIZE))  # where an unstable pole has grown by e^10
     # a first inversion ends 64 times sooner, for what begins as the root of time
-    rests = tuple(inverted(lambda s: of.parts(s)[2], each, growth) for each in (end / 64, end))
+    rests = tuple(invert_transform(lambda s: of.parts(s)[2], each, growth) for each in (end / 64, end))
     direct = _terms(np.r_[own, of.loop.law.poles], [], math.inf, lambda s: of.parts(s)[1], end)
-    part = Part(start, late, direct, rests, np.zeros(0), slowest, np.zeros(0))
+    part = DelayedResponse(start, late, direct, rests, np.zeros(0), slowest, np.zeros(0))
 
     t = np.linspace(0.8 * end, end, 400)
     ends = _summed(late, t)

@@ -23,12 +23,12 @@ from tfarm.crossing import Line
 from tfarm.errors import ConvergenceError, require
 from tfarm.exact.characteristic import Analytic
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.loop.continuous import NEAREST_TO_ORIGIN, ORDER_READ_AT, ContinuousLoop, band_of, by_differences
+from tfarm.loop.continuous import NEAREST_TO_ORIGIN, ORDER_READ_AT, ContinuousLoop, by_differences, frequency_above_mode
 from tfarm.loop.lines import LawTerms
 from tfarm.loop.poles import box_of, poles_below, slow_poles
 from tfarm.records import frozen
 from tfarm.spectrum.box import Box, winding_number
-from tfarm.spectrum.following import settled
+from tfarm.spectrum.following import polish_roots
 from tfarm.spectrum.table import first_frequency
 
 OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}  # units, as of the arm's below
@@ -202,7 +202,9 @@ class Varied:
         for n in np.flatnonzero((wanted & (guess == 0)).any(axis=1)):
             leaving = wanted[n] & (guess[n] == 0)
             found[n, leaving] = self.slow(float(values[n]), int(leaving.sum()))
-        found[wanted] = settled(self.function, found[wanted], np.broadcast_to(values[:, None], guess.shape)[wanted])
+        found[wanted] = polish_roots(
+            self.function, found[wanted], np.broadcast_to(values[:, None], guess.shape)[wanted]
+        )
         found[rests] = 0.0
         return found
 
@@ -230,12 +232,12 @@ class Varied:
 
     # ------------------------------------------------------------ complete in a box
 
-    def boxed(self, modes: int) -> Varied:
+    def with_box(self, modes: int) -> Varied:
         """The same with a box for all values, as high as `modes` modes, no pole on its edge at the first value."""
         loops = [self.at(value) for value in self.few]
         # heights of the box, until no pole is on its edge at the first value
         for factor in (1.0, 1.013, 1.031, 1.057, 0.985, 1.09):
-            height = factor * max(band_of(loop.arm, modes) for loop in loops)
+            height = factor * max(frequency_above_mode(loop.arm, modes) for loop in loops)
             left, right, _, _ = np.max([box_of(loop, height) for loop in loops], axis=0).tolist()
             found = replace(self, box=Box(left, right, -height, height))
             with suppress(ConvergenceError):

@@ -12,12 +12,12 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, shown_unit
-from tfarm.crossing import Crossing, Crossings, Window, intervals, joined
+from tfarm.crossing import Crossing, Crossings, Window, intervals, join_neighbours
 from tfarm.errors import ConvergenceError
 from tfarm.loop.continuous import ContinuousLoop
-from tfarm.loop.lines import LEADING, Along, LawTerms, critical, crossed, static_edge, unstable_below
+from tfarm.loop.lines import LEADING, Along, LawTerms, critical, cross_axis, static_edge, unstable_below
 from tfarm.loop.stability import Stability, band_of_family, is_known_without, verdict_on
-from tfarm.loop.theorem import TAKES, absorbed
+from tfarm.loop.theorem import TAKES, cancel_hub_moment
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.gains import gain_unit, most_gain
@@ -162,7 +162,7 @@ def _lines(verdict: Stability, ranges: dict[str, Window]) -> tuple[dict[str, Cal
         band = max(band, band_of_family(ends)[0])
     terms = LawTerms(loop.signals, loop.law, ranges)
     lines = [Along(lambda: loop, name, terms.line(name, *pair)) for name, pair in ranges.items()]
-    return dict(zip(ranges, crossed(loop.arm, terms, band, lines), strict=True)), band
+    return dict(zip(ranges, cross_axis(loop.arm, terms, band, lines), strict=True)), band
 
 
 def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, band: float) -> list[Window]:
@@ -193,7 +193,7 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
 
         carried = count + found.passed(np.array(limits)) - found.passed(at)
         if carried.tolist() != [unstable_at(end) for end in limits]:
-            stable = joined([pair for pair in pairs if unstable_at(sum(pair) / 2) == 0])
+            stable = join_neighbours([pair for pair in pairs if unstable_at(sum(pair) / 2) == 0])
     if name == RATE_GAIN and not loop.arm.hub_side_inertia:
         least = 0.0 - loop.arm.rate_loss  # where friction is cancelled a pole of such a hub passes through infinity
         stable = [(max(start, least), end) for start, end in stable if end > least]
@@ -243,12 +243,12 @@ def theorem_edges(loop: ContinuousLoop, name: str, limits: Window) -> Crossings:
 
 def theorem_windows(loop: ContinuousLoop, name: str, limits: Window, edges: Crossings) -> list[Window]:
     """The stability intervals of such a gain: there every mode is damped, and the static stiffness is positive."""
-    return joined([pair for pair in edges.spans(*limits) if is_held(loop.having(name, sum(pair) / 2))])
+    return join_neighbours([pair for pair in edges.spans(*limits) if is_held(loop.having(name, sum(pair) / 2))])
 
 
 def is_held(loop: ContinuousLoop) -> bool:
     """Whether a theorem excludes unstable poles: every mode is damped, and the static stiffness is positive."""
-    parts = absorbed(loop)
+    parts = cancel_hub_moment(loop)
     if parts is None or not parts[0] < 1 or loop.theorem.energy != TAKES:
         return False
     # 1e-9 of the lowest frequency: L there is that of an arm at rest

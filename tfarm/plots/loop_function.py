@@ -18,7 +18,7 @@ from tfarm.digits import general, plain
 from tfarm.loop.curve import LoopCurve, decibels, gain_margin
 from tfarm.loop.loop_margins import LoopMargins
 from tfarm.loop.margins import Margins
-from tfarm.loop.nyquist import Nyquist, compressed
+from tfarm.loop.nyquist import Nyquist, compress_radius
 
 from .frequency import FREQUENCY, Drawn, draw_curves, over_frequency, parted
 from .style import BLUE, FAINT, GREY, INK, UNSTABLE, Axes, gains_words, note, picture, safe
@@ -258,7 +258,7 @@ def disc(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     ax.set(aspect="equal", yticks=[], xlim=(-REACH, REACH), ylim=(-REACH, REACH), frame_on=False)
     for radius in radii:
         ax.add_patch(Circle((0, 0), radius, fill=False, ec=GREY if radius in (0.5, 1.0) else FAINT, lw=0.7, zorder=0.6))
-    _curve(np.where(data.is_arc, np.nan, compressed(data.L)), -0.5, 1.0, ax)
+    _curve(np.where(data.is_arc, np.nan, compress_radius(data.L)), -0.5, 1.0, ax)
     _arcs(data, ax)
     ax.set_xlabel("|L| at the rings [−]", loc="right")
     ax.set_xticks(radii, [plain(size).replace("inf", "∞") for size in RING_SIZES], fontsize=7.5)
@@ -291,7 +291,7 @@ def arrows(z: Complex, ax: Axes, shares: Sequence[float] = (0.5,), color: str = 
 
 def _arcs(data: Nyquist, ax: Axes) -> None:
     """Past poles as arcs beyond the rim, one for all that turn alike."""
-    z = compressed(data.L)
+    z = compress_radius(data.L)
     alike: dict[tuple[int, int], list[tuple[Whole, float, float]]] = {}
     for piece in np.split(np.arange(z.size), np.flatnonzero(np.diff(data.is_arc.astype(int))) + 1):
         if data.is_arc[piece[0]]:

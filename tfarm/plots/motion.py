@@ -233,7 +233,7 @@ def _input_label(arm: Arm) -> str:
     return "motor torque [N m]" if arm.input_unit == "N m" else f"motor [{arm.input_unit}]"
 
 
-FIGURES[Run] = lambda run: slew.figure(run.arm, run.simulation, run.scenario_in_words)
+FIGURES.update({Run: lambda run: slew.figure(run.arm, run.simulation, run.scenario_in_words)})
 
 
 def _measured_rows(each: Mapping[str, RunComparison]) -> int:

@@ -244,7 +244,7 @@ def locus(exact: Locus, reduced: ReducedLocus | None = None, *, ax: Axes) -> Non
     _panel(exact, reduced, range(len(exact.branches)), ax)
 
 
-FIGURES[Loci] = lambda data: locus.figure(data.exact, data.reduced)
+FIGURES.update({Loci: lambda data: locus.figure(data.exact, data.reduced)})
 
 
 @picture(

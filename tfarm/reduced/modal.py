@@ -33,7 +33,7 @@ from tfarm.exact.values import evaluate_outputs, free_slopes
 from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.response.signals import Signals
 from tfarm.spectrum import Modes, modes
-from tfarm.spectrum.damped import damped_modes, entered
+from tfarm.spectrum.damped import damped_modes, missing_real_eigenvalues
 from tfarm.spectrum.naming import single_zeros
 
 from .partial_fractions import PartialFractions
@@ -228,7 +228,7 @@ def _eigenvalues(arm: Arm, table: Modes, reach: float) -> tuple[NDArray[np.int64
     whole = np.isfinite(pairs).all(axis=1)
     rings = more[:, 0].imag > 0
     halves = pairs[~whole & np.isfinite(pairs[:, 0]), 0].real
-    single = np.r_[damped.single, halves, more[~rings, 0].real, entered(damped)]
+    single = np.r_[damped.single, halves, more[~rings, 0].real, missing_real_eigenvalues(damped)]
     return np.r_[index[whole], np.zeros(rings.sum(), np.int64)], np.r_[pairs[whole], more[rings]], single
 
 
@@ -279,7 +279,7 @@ def sensed_model(arm: Arm, signals: Sequence[str], count: int) -> Matrices:
     return A, B, C, D
 
 
-def closed(plant: Matrices, law: Matrices) -> Real:
+def closed_loop_matrix(plant: Matrices, law: Matrices) -> Real:
     """Return the matrix of the loop v = -(law of y), the plant's states first.
 
     Raises ParameterError for an algebraic loop.

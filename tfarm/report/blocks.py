@@ -20,7 +20,7 @@ from pydantic import TypeAdapter
 import tfarm
 from tfarm.arm import ANGLE_GAIN, LISTED, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, load, presets
 from tfarm.assessment.card import LoopCard
-from tfarm.digits import how_many, kept_digits, listed, plain, scientific, significant
+from tfarm.digits import how_many, join_words, kept_digits, plain, scientific, significant
 from tfarm.plots.style import Figure, drawn_for, save_figure
 from tfarm.schema import Column, Table, quantities, save_table, text, to_json
 from tfarm.schema.html import as_html, with_symbols
@@ -85,7 +85,7 @@ def templates() -> Environment:
         significant=significant,
         scientific=scientific,
         upper_first=upper,
-        listed=listed,
+        listed=join_words,
         how_many=how_many,
         as_html=as_html,
     )
@@ -251,7 +251,7 @@ def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> 
     return SavedBlock(block.stem, block.title, shape.picture(block, files, narrow), shape.image(block, narrow))
 
 
-def explained(text: str, words: str = "") -> Markup:
+def explain_commands(text: str, words: str = "") -> Markup:
     """A sentence as a page shows it, commands in `...`; a promise leads to its meaning on the page `words`, if any."""
     shown = re.sub("`(.+?)`", r"<code>\1</code>", str(with_symbols(text)))
     for word in PROMISES if words else ():
@@ -287,7 +287,7 @@ def kept_in(folder: Path, kind: str, record: type[T]) -> T | None:
         return None
 
 
-def kept(out: Path, kind: str, record: type[T]) -> dict[Path, T]:
+def read_records(out: Path, kind: str, record: type[T]) -> dict[Path, T]:
     """The records of that kind in the folders of arms, by folder; what is none of ours is passed over."""
     folders = sorted((f for f in out.iterdir() if f.is_dir() and not f.name.startswith(".")), key=lambda f: f.name)
     found = {folder: each for folder in folders if (each := kept_in(folder, kind, record)) is not None}

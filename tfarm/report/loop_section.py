@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Annotated, NamedTuple
 
-from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, cancelled, unit_of
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, unit_of, warn_of_cancellations
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import REFERENCE, is_measured
 from tfarm.assessment.card import POOR
@@ -100,7 +100,7 @@ def law_section(report: ArmReport) -> PageSection:
             "law",
             each=each,
             convention=sign_convention(each.law, each.arm),
-            warnings=cancelled(each.law),
+            warnings=warn_of_cancellations(each.law),
             rule=rule_in_words(each.law),
             period=report.chain.sampling.period,
         )
@@ -108,7 +108,7 @@ def law_section(report: ArmReport) -> PageSection:
     ]
     words.append(sign_words(report.arm))
     words.append(prose("not_on_page", discrete=[each.name for each in named if each.law.is_discrete]))
-    blocks = [sheet("law_entries", table([entry for each in named for entry in entries_of(each)]))]
+    blocks = [sheet("law_entries", table([entry for each in named for entry in signal_entries(each)]))]
     return PageSection(
         title="The controller" + "s" * (len(named) > 1), answer=prose("laws", each=named), words=words, blocks=blocks
     )
@@ -125,7 +125,7 @@ class LawEntry(NamedTuple):
     denominator: Annotated[list[float] | str, Quantity("denominator", help="coefficients in descending powers")]
 
 
-def entries_of(each: PageCase) -> Iterator[LawEntry]:
+def signal_entries(each: PageCase) -> Iterator[LawEntry]:
     """Every signal of a law with every digit; matrices are in its file alone."""
     law = each.law
     for part in law.parts:
@@ -164,10 +164,10 @@ def map_section(report: ArmReport) -> PageSection:
         unit=f"{plain(report.rate_unit, 4)} {unit_of(RATE_GAIN, arm)}",
         deepest=DEEPEST_MOMENT_GAIN * arm.input_per_torque,
     )
-    return PageSection(title="Stability region of both gains", facts=interval_facts(report), blocks=(drawn,))
+    return PageSection(title="Stability region of both gains", facts=continuous_interval_facts(report), blocks=(drawn,))
 
 
-def interval_facts(report: ArmReport) -> list[Fact]:
+def continuous_interval_facts(report: ArmReport) -> list[Fact]:
     """The stability intervals of each gain of the continuous-time loop, the other at its default."""
     return [
         Fact(f"{row.name}, continuous", text(row.intervals, 4) or "no value", row.unit)

@@ -40,7 +40,7 @@ from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import ARMS, Fit, ResponseBand, ShareOfArms, arms_drawn, response_band, stable_share
 from tfarm.fitting.overlay import Overlay, overlay
 from tfarm.fitting.recording import MeasuredRun, RunComparison, compare_run, departures
-from tfarm.loop.continuous import ContinuousLoop, band_of
+from tfarm.loop.continuous import ContinuousLoop, frequency_above_mode
 from tfarm.loop.curve import LoopCurve
 from tfarm.loop.loci import Loci, loci
 from tfarm.loop.margins import Margins, margins
@@ -199,7 +199,7 @@ class PageCase:
     def slew(self) -> Simulation:
         """The slew of the sampled loop, with the records that a picture needs."""
         duration = traces.RECORD_LENGTH * self.chain.slew.rise_time
-        return results.drawn(self.case, "slew", duration)
+        return results.simulate_for_picture(self.case, "slew", duration)
 
     def film(self, run: Simulation) -> traces.Motion:
         """Return the motion of a slew, and of what follows for half as long."""
@@ -330,7 +330,7 @@ class ArmReport(NamedTuple):
     @property
     def band(self) -> float:
         """The frequency range [rad/s] in which damping is designed for."""
-        return band_of(self.arm, DESIGNED_MODES)
+        return frequency_above_mode(self.arm, DESIGNED_MODES)
 
     @property
     def rate_unit(self) -> float:

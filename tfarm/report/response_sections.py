@@ -14,7 +14,7 @@ from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, Theory, implausible, input_wo
 from tfarm.arm.chain import file_text
 from tfarm.arm.schema import file_key
 from tfarm.audit.arm_proofs import BRACKET_DIGITS
-from tfarm.digits import fixed, kept_digits, lined, listed, plain, significant, unit
+from tfarm.digits import column_format, fix_decimals, join_words, kept_digits, plain, significant, unit
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.fitting.fit import ARMS
 from tfarm.plots import arm_sketch, frequency, motion
@@ -50,7 +50,7 @@ def arm_section(report: ArmReport) -> PageSection:
             picture("arm", arm_sketch.sketch.figure(arm), arm=arm, input=input),
             sheet(
                 "parameters",
-                table([*parameters(arm, tomllib.loads(file_text(arm, report.chain)))]),
+                table([*file_parameters(arm, tomllib.loads(file_text(arm, report.chain)))]),
                 is_rig=not arm.is_uniform,
             ),
             derived_table(arm),
@@ -83,7 +83,7 @@ def headline_numbers(modes: Modes) -> tuple[Fact, ...]:
     )
 
 
-class Parameter(NamedTuple):
+class FileParameter(NamedTuple):
     """A number of the arm's file."""
 
     label: Annotated[str, Quantity("parameter", help="what the number is in the model")]
@@ -92,16 +92,18 @@ class Parameter(NamedTuple):
     key: Annotated[str, Quantity("key of the file", help="table and key of the TOML file")]
 
 
-def parameters(arm: Arm, table: Mapping[str, Any], under: str = "") -> Iterator[Parameter]:
+def file_parameters(arm: Arm, table: Mapping[str, Any], under: str = "") -> Iterator[FileParameter]:
     """The numbers of a table of an arm's file by their keys, those of tables in it too."""
     for key, value in table.items():
         if isinstance(value, dict):
-            yield from parameters(arm, value, f"{under}{key}.")
+            yield from file_parameters(arm, value, f"{under}{key}.")
         elif isinstance(value, list) and all(isinstance(each, dict) for each in value):
-            yield from parameters(arm, {str(number): each for number, each in enumerate(value, 1)}, f"{under}{key}.")
+            yield from file_parameters(
+                arm, {str(number): each for number, each in enumerate(value, 1)}, f"{under}{key}."
+            )
         elif key not in ("name", "assumptions"):  # which are in other places of the page
             of = file_key(f"{under}{key}", arm)
-            yield Parameter(of.label, value, unit(of.unit), f"{under}{key}")
+            yield FileParameter(of.label, value, unit(of.unit), f"{under}{key}")
 
 
 class Derived(NamedTuple):
@@ -275,7 +277,7 @@ def theories(found: Mapping[Theory, Modes]) -> Table:
     columns = (
         Column("mode", "mode", of=range(1, TABLED_MODES + 1)),
         *(
-            Column(f"{theory.replace('-', '_')}_rad_s", theory.title(), "rad/s", of=each, digits=lined(8, 7))
+            Column(f"{theory.replace('-', '_')}_rad_s", theory.title(), "rad/s", of=each, digits=column_format(8, 7))
             for theory, each in omega.items()
         ),
         *(
@@ -284,7 +286,7 @@ def theories(found: Mapping[Theory, Modes]) -> Table:
                 f"{theory.title()}, difference",
                 "%",
                 of=each,
-                digits=lined(5, 3),
+                digits=column_format(5, 3),
             )
             for theory, each in differences.items()
         ),
@@ -309,7 +311,7 @@ def sensitivity_table(modes: Modes) -> Table:
                 f"mode {number}",
                 "%/%",
                 of=values,
-                digits=partial(fixed, decimals=3),
+                digits=partial(fix_decimals, decimals=3),
                 tint=list(map(tint, values)),
             )
             for number, values in by_mode
@@ -373,7 +375,7 @@ def fit_section(report: ArmReport, count: int = ARMS) -> PageSection:
     words += [f"Remedy: {fit.advice}."] * bool(fit.misses)
     blocks: list[Picture | Table] = []
     if fit.responses:
-        names = listed([f"{each.label} [{each.unit}]" for each in fit.responses])
+        names = join_words([f"{each.label} [{each.unit}]" for each in fit.responses])
         blocks.append(picture("fit_overlay", frequency.fitted.figure(fit), names=names))
     blocks += [
         sheet("fitted", table(fit.parameters), stem="fit"),

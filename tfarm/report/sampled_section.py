@@ -40,7 +40,7 @@ def sampled_section(report: ArmReport) -> PageSection:
         # the gains of the arm itself
         (_, own), *_ = found
         blocks = [overlay_picture(report, own), *blocks, loci_picture(report, own)]
-        facts = [*interval_facts(own), *facts]
+        facts = [*sampled_interval_facts(own), *facts]
     of_whole_law = ("index", "natural_frequency", "band", "aliased", "first_order", "by_damping", "log_radius")
     for each, it in found:
         modes = table(it.modes, () if it.loop.is_of_gains else of_whole_law)
@@ -57,7 +57,7 @@ def sampled_section(report: ArmReport) -> PageSection:
 # ------------------------------------------------------------ verdict
 
 
-def interval_facts(found: Analysis) -> Iterator[Fact]:
+def sampled_interval_facts(found: Analysis) -> Iterator[Fact]:
     """The stability intervals of both gains of a sampled loop."""
     period = plain(1e3 * found.loop.chain.sampling.period)
     modes = f" (first {found.verdict.modes_used} modes)"

@@ -33,7 +33,7 @@ from tfarm.report.blocks import (
     anchor,
     argument,
     keep,
-    kept,
+    read_records,
     render,
     save_section,
     sheet,
@@ -53,7 +53,7 @@ def save_proof(report: ArmReport, folder: Path) -> None:
 
 def written_proofs(out: Path) -> Sequence[ArmProof]:
     """The proofs of all arms in the folder of reports, by name; what is none of ours is passed over."""
-    return list(kept(out, "proof", ArmProof).values())
+    return list(read_records(out, "proof", ArmProof).values())
 
 
 # ------------------------------------------------------------ tables

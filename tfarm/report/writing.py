@@ -18,7 +18,7 @@ from tfarm.arm import Arm
 from tfarm.assessment import Comparison
 from tfarm.digits import how_many
 from tfarm.dsp import Chain
-from tfarm.dsp.plant import driven
+from tfarm.dsp.plant import arm_under_chain
 from tfarm.errors import TfarmError, must_be_known, one_line, require
 from tfarm.exact.outputs import signal_words
 from tfarm.files import move_into, place_in, temporary_folder
@@ -27,19 +27,19 @@ from tfarm.fitting.fit import Fit
 from tfarm.plots import studies
 from tfarm.plots.regions import comparison
 from tfarm.plots.style import drawn_for
-from tfarm.processes import shared
+from tfarm.processes import share_tasks
 from tfarm.report import loop_section, response_sections
 from tfarm.report.blocks import (
     Fact,
     PageSection,
     Picture,
     anchor,
-    explained,
+    explain_commands,
     keep,
-    kept,
     kept_in,
     picture,
     prose,
+    read_records,
     render,
     save_section,
     sheet,
@@ -53,9 +53,9 @@ from tfarm.report.response_sections import bode_section
 from tfarm.report.sampled_section import sampled_section, tuner_section
 from tfarm.report.trust import TRUST_FOLDER, save_proof, write_trust, written_proofs
 from tfarm.schema import Column, Table, quantities, table, text
+from tfarm.stopping import Progress
 from tfarm.studies.study import Study
 
-ReportProgress = Callable[[int, int, str], object]
 Calls = Mapping[str, Sequence[Callable[[], Any]]]  # by task: what one process does in turn
 MOST_WORKERS = 2  # processes that share the pieces of a report: as many cores as a small machine has
 EVIDENCE = "method and proofs"  # a task of no arm
@@ -82,7 +82,7 @@ RESERVED_NAMES = {
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class SectionSpec:
     """A section of an arm's pages: a name for the progress bar, the section's anchor, and how to make it of a report.
 
     A report that it does not suit has no such section.  The page that has it is called by the first word of its anchor,
@@ -120,37 +120,43 @@ def _of_gains(report: ArmReport) -> bool:
 
 
 PIECES = (
-    Piece("stability region of both gains", MAP, loop_section.map_section, _of_gains, task=LOOP_TASK),
-    Piece("recommended gains", "margins-recommended", loop_section.recommended_section, _of_gains, task=LOOP_TASK),
-    Piece("stability margins", "margins", loop_section.margins_section, _in_s, "Gains and margins", task=LOOP_TASK),
-    Piece("Nyquist plot", "margins-nyquist", loop_section.nyquist_section, _in_s, task=LOOP_TASK),
-    Piece(
+    SectionSpec("stability region of both gains", MAP, loop_section.map_section, _of_gains, task=LOOP_TASK),
+    SectionSpec(
+        "recommended gains", "margins-recommended", loop_section.recommended_section, _of_gains, task=LOOP_TASK
+    ),
+    SectionSpec(
+        "stability margins", "margins", loop_section.margins_section, _in_s, "Gains and margins", task=LOOP_TASK
+    ),
+    SectionSpec("Nyquist plot", "margins-nyquist", loop_section.nyquist_section, _in_s, task=LOOP_TASK),
+    SectionSpec(
         "response of the root moment",
         "bode-root-moment",
         partial(bode_section, output="root_moment"),
         title="Bode plots",
     ),
-    Piece("response of the tip", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),
-    Piece("measured responses", "bode-measured", response_sections.measured_section, attrgetter("measured")),
-    Piece("the arm", "arm", response_sections.arm_section, on="modes"),
-    Piece("modes", "modes", response_sections.modes_section, title="Arm and modes"),
-    Piece("root loci", "locus", loop_section.locus_section, _in_s, "Root loci", task=LOOP_TASK),
-    Piece("sampled loop", "sampled", sampled_section, attrgetter("has_loop"), "The sampled loop", task=SAMPLED_TASK),
-    Piece("controllers", "law", loop_section.law_section, _of_laws, "The controller"),
-    Piece("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", task=SAMPLED_TASK),
-    Piece("fit to measurements", "fit", response_sections.fit_section, attrgetter("fit"), "Fitted numbers"),
-    Piece("assumptions", "assumptions", response_sections.assumptions_section, title="Assumptions"),
+    SectionSpec("response of the tip", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),
+    SectionSpec("measured responses", "bode-measured", response_sections.measured_section, attrgetter("measured")),
+    SectionSpec("the arm", "arm", response_sections.arm_section, on="modes"),
+    SectionSpec("modes", "modes", response_sections.modes_section, title="Arm and modes"),
+    SectionSpec("root loci", "locus", loop_section.locus_section, _in_s, "Root loci", task=LOOP_TASK),
+    SectionSpec(
+        "sampled loop", "sampled", sampled_section, attrgetter("has_loop"), "The sampled loop", task=SAMPLED_TASK
+    ),
+    SectionSpec("controllers", "law", loop_section.law_section, _of_laws, "The controller"),
+    SectionSpec("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", task=SAMPLED_TASK),
+    SectionSpec("fit to measurements", "fit", response_sections.fit_section, attrgetter("fit"), "Fitted numbers"),
+    SectionSpec("assumptions", "assumptions", response_sections.assumptions_section, title="Assumptions"),
 )
 QUESTIONS = {piece.page: piece.title for piece in PIECES if piece.title}  # pages that may be asked for alone
 PAGES = {"index": "Overview", "live": "Live loop", **QUESTIONS}
 
 
-def pieces_of(report: ArmReport) -> list[Piece]:
+def pieces_of(report: ArmReport) -> list[SectionSpec]:
     """The sections of a report, in their order."""
     return [piece for piece in PIECES if piece.suits(report)]
 
 
-def make_section(piece: Piece, report: ArmReport, folder: Path) -> PageSection:
+def make_section(piece: SectionSpec, report: ArmReport, folder: Path) -> PageSection:
     """Return a section saved in the arm's folder, or the reason why tfarm could not make it; a bug of ours is loud."""
     try:
         with drawn_for("page"):
@@ -178,7 +184,7 @@ def write(
     measured: Sequence[Measured] = (),
     only: tuple[str, ...] | None = None,
     paper: bool = False,
-    progress: ReportProgress | None = None,
+    progress: Progress | None = None,
     notice: Callable[[str], object] | None = None,
     announce: Callable[[str], object] | None = None,
 ) -> Path:
@@ -203,7 +209,10 @@ def write(
     only = only or ()
     _check(names, only)
     each = zip(arms, chains or [Chain()] * n, laws or [()] * n, fits or [None] * n, strict=True)
-    reports = [ArmReport(*driven(arm, chain), tuple(own), fit, tuple(measured), paper) for arm, chain, own, fit in each]
+    reports = [
+        ArmReport(*arm_under_chain(arm, chain), tuple(own), fit, tuple(measured), paper)
+        for arm, chain, own, fit in each
+    ]
     for report in reports:
         for case in report.cases if report.laws and not report.arm.is_locked else ():
             case.check()
@@ -231,7 +240,7 @@ def _written(
     out: Path,
     place: Path,
     only: tuple[str, ...],
-    progress: ReportProgress | None,
+    progress: Progress | None,
     announce: Callable[[str], object] | None,
 ) -> list[tuple[str, PageSection]]:
     """Make all pages in `place` and move them to `out`, the index last; every section with the name of its arm."""
@@ -304,7 +313,7 @@ def _results(calls: Sequence[Callable[[], Any]]) -> list[Any]:
     return [call() for call in calls]
 
 
-def make_all(tasks: Calls, progress: ReportProgress | None) -> dict[str, Sequence[Any]]:
+def make_all(tasks: Calls, progress: Progress | None) -> dict[str, Sequence[Any]]:
     """The results of all calls, by task."""
     # those of five seconds and more are begun first
     longest = sorted(tasks, key=lambda task: not task.endswith((SAMPLED_TASK, LOOP_TASK, EVIDENCE)))
@@ -317,7 +326,7 @@ def make_all(tasks: Calls, progress: ReportProgress | None) -> dict[str, Sequenc
     # a second process takes a second or two to start
     count = MOST_WORKERS if len(tasks) >= 8 else 1
     calls = ((task, partial(_results, tasks[task])) for task in longest)
-    for task, results in shared(calls, count, begun, joins=True):
+    for task, results in share_tasks(calls, count, begun, joins=True):
         done[task] = results  # noqa: PERF403  `begun` counts them meanwhile
     begun(["pages"])
     return done
@@ -354,7 +363,7 @@ def _write_pages(
         "open_pictures": 2,  # of a section: those that answer its question; the rest is a click away
         "has_proof": (folder / "proof.json").is_file(),
         "sha256": hashlib.sha256(file.encode()).hexdigest(),
-        "explained": partial(explained, words=f"../{trust}" if trust else ""),
+        "explained": partial(explain_commands, words=f"../{trust}" if trust else ""),
     }
     for name in written:
         title = f"{report.arm.name}: {QUESTIONS[name]}" if name in QUESTIONS else report.arm.name
@@ -391,7 +400,7 @@ def trust_in(out: Path) -> str:
 
 def write_index(out: Path, stage: Path) -> None:
     """Write the page that leads to all others in a folder of reports, through a folder next to it."""
-    cards = [(card, pages) for folder, card in kept(out, "card", Card).items() if (pages := pages_in(folder))]
+    cards = [(card, pages) for folder, card in read_records(out, "card", Card).items() if (pages := pages_in(folder))]
     compared = kept_comparison(out)["title"]
     page = render("index.html", title="tfarm reports", cards=cards, trust=trust_in(out), compared=compared, short=SHORT)
     write_text(stage / "index.html", page)
@@ -447,7 +456,7 @@ def write_study(found: Study) -> Path:
             saved = [save_section(each, made) for each in study_sections(found)]
         sections = [each for each in saved if each.words or each.blocks]
         title = f"{found.arm}: study of {how_many(found.rows, 'arm')}"
-        page = render("study.html", title=title, sections=sections, explained=explained, found=found)
+        page = render("study.html", title=title, sections=sections, explained=explain_commands, found=found)
         write_text(made / "index.html", page)
         move_into(made, folder)
     return folder / "index.html"

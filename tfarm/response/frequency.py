@@ -62,7 +62,7 @@ def worst_error(arm: Arm, output: str, band: tuple[float, float]) -> float | Non
 HERTZ = 2 * math.pi  # rad/s
 NARROWEST = 4 * float(np.finfo(float).eps)  # relative width below which no interval is halved
 
-Response = Callable[[Complex], Any]
+ResponseFunction = Callable[[Complex], Any]
 
 
 class Extremum(NamedTuple):
@@ -91,7 +91,7 @@ class Root(NamedTuple):
 
 
 def extrema(
-    G: Response, omega: Real, value: Complex, roots: Complex, infinite: Real, vanishing: Real
+    G: ResponseFunction, omega: Real, value: Complex, roots: Complex, infinite: Real, vanishing: Real
 ) -> tuple[tuple[Extremum, ...], tuple[Extremum, ...]]:
     """Return peaks and dips between the ends of a grid omega [rad/s] (ascending) that resolves poles and zeros.
 
@@ -113,7 +113,7 @@ def extrema(
     return _refined(G, at, height, maxima), _refined(G, at, height, minima)
 
 
-def _height(G: Response, omega: Real) -> Real:
+def _height(G: ResponseFunction, omega: Real) -> Real:
     """Return ln |G(i omega)|."""
     return np.log(abs(G(1j * omega)))
 
@@ -125,7 +125,7 @@ def _least(omega: Real, roots: Complex) -> Real:
     return 1e-9 + 1e-14 * omega / np.maximum(distance, NARROWEST * omega)
 
 
-def _halved(G: Response, omega: Real, height: Real, roots: Complex) -> tuple[Real, Real]:
+def _halved(G: ResponseFunction, omega: Real, height: Real, roots: Complex) -> tuple[Real, Real]:
     """Return the grid with more points where the slope of ln |G| may vanish between two of its points."""
     # 40 halvings of an interval: to the spacing of float64 numbers
     for _ in range(40):
@@ -147,7 +147,7 @@ def _halved(G: Response, omega: Real, height: Real, roots: Complex) -> tuple[Rea
     return omega, height
 
 
-def _refined(G: Response, omega: Real, height: Real, places: Whole) -> tuple[Extremum, ...]:
+def _refined(G: ResponseFunction, omega: Real, height: Real, places: Whole) -> tuple[Extremum, ...]:
     """Return the extrema near these indices, finite ones at the vertex of a parabola through three points."""
     at = places[np.isfinite(height[places])]
     middle = (omega[1:] + omega[:-1]) / 2

@@ -103,10 +103,10 @@ class Signals:
     @cached_property
     def _placed(self) -> tuple[tuple[Output, float], ...]:
         """The output of each name and its place [m]."""
-        return tuple(placed(name, self.arm.length) for name in self.names)
+        return tuple(locate_output(name, self.arm.length) for name in self.names)
 
 
-def placed(name: str, length: float) -> tuple[Output, float]:
+def locate_output(name: str, length: float) -> tuple[Output, float]:
     """Return the output of a name and its place [m] on an arm of this length.  Raises ParameterError for others."""
     plain, at, text = name.partition("@")
     wanted = known_output(plain)
@@ -122,7 +122,7 @@ def placed(name: str, length: float) -> tuple[Output, float]:
 
 
 @dataclass(frozen=True)
-class Controller:
+class ControllerSignals:
     """A law on an arm.  `gains` are those at the hub, empty of another law; `signals` have their SI units."""
 
     arm: Annotated[str, Quantity("arm", help="name of the arm")]
@@ -136,11 +136,11 @@ class Controller:
     input: Annotated[str, Quantity("input", help="actuating signal")]
 
 
-def controller(law: Law, arm: Arm) -> Controller:
+def controller(law: Law, arm: Arm) -> ControllerSignals:
     """Return the description of a law on an arm."""
     gains = {} if law.gains is None else law.gains.by_name
     units = {gain.name: unit_of(gain.name, arm) for gain in LISTED} if gains else {}
-    return Controller(
+    return ControllerSignals(
         arm=arm.name,
         law=", ".join(f"{name} = {value:g}" for name, value in gains.items()) or law.name,
         gains=gains,

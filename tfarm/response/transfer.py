@@ -1,7 +1,7 @@
 """The exact transfer function, with the names of python-control.
 
-Its poles and zeros are complete: by a count for real spectra, else by a winding number.  `Points` are values of one
-response at points s, `ByMethods` those by each method.
+Its poles and zeros are complete: by a count for real spectra, else by a winding number.  `TransferPoints` are values of
+one response at points s, `ByMethods` those by each method.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import MISSING, require
 from tfarm.exact.balls import nearest_float
-from tfarm.exact.characteristic import Analytic, characteristic, deflated, off_rest
+from tfarm.exact.characteristic import Analytic, characteristic, deflate, off_rest
 from tfarm.exact.loads import is_load, load_of, loaded_value
 from tfarm.exact.outputs import Output, output
 from tfarm.exact.series import constant_of, expansion_at_zero, order_at_zero
@@ -43,7 +43,7 @@ from tfarm.exact.values import (
 from tfarm.records import frozen
 from tfarm.schema import Column, Quantity, Table, roots_table
 from tfarm.spectrum import flexible_frequencies
-from tfarm.spectrum.box import REAL_SHARE, TOWARD_SINGULAR, Box, Function, complete
+from tfarm.spectrum.box import REAL_SHARE, TOWARD_SINGULAR, Box, Function, complete_zeros
 from tfarm.spectrum.starts import damped_starts
 
 
@@ -116,7 +116,7 @@ def _numerator(k: System, base: Output, order: int, x: float) -> Function:
     def function(s: Complex) -> Analytic:
         s = off_rest(s)
         here, slopes = free_slopes(k, [base], s, x)
-        return deflated(here.outputs[0], slopes.outputs[0], here.scale, s, order)
+        return deflate(here.outputs[0], slopes.outputs[0], here.scale, s, order)
 
     return function
 
@@ -127,7 +127,7 @@ def _in_box(k: System, function: Function, at_zero: int, up_to: float, starts: C
     def box_of(height: float) -> Box:
         return Box(-min(TOWARD_SINGULAR / k.damping, height) if k.damping else -height, height, -height, height)
 
-    found, box = complete(function, box_of, up_to, starts)
+    found, box = complete_zeros(function, box_of, up_to, starts)
     if k.is_undamped:  # zeros come in +- pairs too
         found = np.where(abs(found.real) < REAL_SHARE * abs(found), 1j * found.imag, found)
     found = found[np.lexsort((-found.imag, found.real.round(9), abs(found.imag).round(9)))]
@@ -350,7 +350,7 @@ def _finite(s: ArrayLike) -> Complex:
 
 
 @frozen
-class Points:
+class TransferPoints:
     """G(s) of one output at `s`; `value` are pairs of texts for more than 15 digits."""
 
     s: Annotated[Complex, Quantity("s", "1/s", help="Laplace variable", curve=True)]
@@ -400,11 +400,11 @@ class Points:
         return Table(columns=(*names, *values))
 
 
-def values_at(G: TransferFunction, s: Complex, digits: int | None = None) -> Points:
+def values_at(G: TransferFunction, s: Complex, digits: int | None = None) -> TransferPoints:
     """Return the response at s, with certified digits for more than 15 of them."""
     right = digits or 0
     value = np.asarray(G(s)) if right <= DOUBLE_DIGITS else [list(G.digits(complex(each), right)) for each in s]
-    return Points(s, value, G.arm.name, G.input, G.input_unit, G.outputs[0], G.units[0], G.x, G.method)
+    return TransferPoints(s, value, G.arm.name, G.input, G.input_unit, G.outputs[0], G.units[0], G.x, G.method)
 
 
 @dataclass(frozen=True)

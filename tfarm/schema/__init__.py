@@ -5,9 +5,11 @@
         delay: Annotated[float, Quantity("delay margin", "s", 4, "smallest further delay that destabilises the loop")]
 
 JSON, CSV, terminals, pages, axes, the documentation and the comparison of two records have its name, unit, digits and
-meaning from here.  `to_dict` and `sections` read a record, `table` records of one class, `compare` two of them;
+meaning from here.  `to_dict` and `sections` read a record, `table` records of one class, `compare_records` two of them;
 `schema.terminal` and `schema.html` render tables, `schema.glossary` has every declared quantity.
 """
+
+from tfarm.moved import moved
 
 from .printed import Tabled
 from .quantities import (
@@ -15,7 +17,7 @@ from .quantities import (
     Difference,
     Percent,
     Quantity,
-    compare,
+    compare_records,
     entries,
     quantities,
     text,
@@ -24,7 +26,7 @@ from .quantities import (
 )
 from .tables import (
     Column,
-    Section,
+    RecordSection,
     Table,
     across,
     as_csv,
@@ -44,13 +46,13 @@ __all__ = [
     "Difference",
     "Percent",
     "Quantity",
-    "Section",
+    "RecordSection",
     "Table",
     "Tabled",
     "across",
     "as_csv",
     "as_json",
-    "compare",
+    "compare_records",
     "curve_table",
     "entries",
     "json_value",
@@ -64,3 +66,6 @@ __all__ = [
     "to_json",
     "with_unit",
 ]
+
+# names up to version 1.0
+__getattr__ = moved(__name__, {"Section": "tfarm.schema:RecordSection", "compare": "tfarm.schema:compare_records"})

@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 
-from tfarm.digits import general, within
+from tfarm.digits import general, round_to_error
 
 SLUGS = {"s": "s", "m": "m", "rad/s": "rad_s", "Hz": "hz", "deg": "deg", "samples": "samples"}  # of units in keys
 COMPLEX_ERROR = 2e-14  # of the size of a pole or zero: what rounding leaves in its parts (tests: 1e-14 to 50 digits)
@@ -202,7 +202,7 @@ def text(value: Any, digits: int = 6) -> str:
     if isinstance(value, float):
         return general(value, digits)
     if isinstance(value, complex):
-        re, im = parts(value, digits)
+        re, im = round_parts(value, digits)
         return re if not value.imag else f"{re}{'' if im.startswith('-') else '+'}{im}i"
     if isinstance(value, Mapping):
         return ", ".join(f"{key} {text(entry, digits)}" for key, entry in value.items())
@@ -211,10 +211,10 @@ def text(value: Any, digits: int = 6) -> str:
     return f"({shown})" if is_pair else shown
 
 
-def parts(value: complex, digits: int) -> tuple[str, str]:
+def round_parts(value: complex, digits: int) -> tuple[str, str]:
     """Both parts in digits that rounding leaves of the number's size."""
     error = COMPLEX_ERROR * abs(value)
-    re, im = (within(part, error, digits) if error else "0" for part in (value.real, value.imag))
+    re, im = (round_to_error(part, error, digits) if error else "0" for part in (value.real, value.imag))
     return re, im
 
 
@@ -255,7 +255,7 @@ class Difference(NamedTuple):
         return PercentagePoints(gap) if isinstance(one, Percent) else gap
 
 
-def compare(one: Any, other: Any, names: tuple[str, str] = NAMES) -> list[Difference]:
+def compare_records(one: Any, other: Any, names: tuple[str, str] = NAMES) -> list[Difference]:
     """The quantities that two records have, or the records in two lists, row by row.
 
     Records in lists, and rows of tables, are paired by their first quantity, a name or a number.

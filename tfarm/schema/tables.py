@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from tfarm.digits import TEXTS, CellsOf, within
+from tfarm.digits import TEXTS, CellsOf, round_to_error
 
 from .quantities import (
     COMPLEX_ERROR,
@@ -26,8 +26,8 @@ from .quantities import (
     is_declared,
     is_list_of_records,
     is_table,
-    parts,
     quantities_of,
+    round_parts,
     text,
     to_json_value,
     with_flat,
@@ -152,14 +152,14 @@ def across(records: Mapping[str, Any], *, keys: Sequence[str] = (), title: str =
 def roots_table(values: Any, of: Quantity) -> Table:
     """A row a complex number: its real and imaginary part, and of a pole or zero in 1/s its damping ratio."""
     roots = [complex(value) for value in values]
-    shown = [parts(root, of.digits) for root in roots]
+    shown = [round_parts(root, of.digits) for root in roots]
     columns = [
         Column("re", f"Re {of.label}", of.unit, of=[s.real for s in roots], shown=[re for re, _ in shown]),
         Column("im", f"Im {of.label}", of.unit.replace("1/s", "rad/s"), of=[s.imag for s in roots],
                shown=[im for _, im in shown]),
     ]  # fmt: skip
     if of.unit == "1/s":
-        ratios = [within(-s.real / abs(s), COMPLEX_ERROR, RATIO_DIGITS) if s.imag else NO_VALUE for s in roots]
+        ratios = [round_to_error(-s.real / abs(s), COMPLEX_ERROR, RATIO_DIGITS) if s.imag else NO_VALUE for s in roots]
         columns.append(Column("damping_ratio", "damping ratio", of=ratios))
     return Table(columns=tuple(columns))
 
@@ -187,7 +187,7 @@ def curve_table(record: Any) -> Table:
 
 
 @dataclass(frozen=True, slots=True)
-class Section:
+class RecordSection:
     """What is read of a record one below the other: pairs of label and text, or a table, under a title."""
 
     title: str = ""
@@ -196,28 +196,28 @@ class Section:
     drawing: str = ""
 
 
-def sections(record: Any, title: str = "") -> list[Section]:
+def sections(record: Any, title: str = "") -> list[RecordSection]:
     """A record as a person reads it: tables declared `first`, single values, other tables, the records inside it."""
-    own = Section(title)
-    first: list[Section] = []
-    later: list[Section] = []
+    own = RecordSection(title)
+    first: list[RecordSection] = []
+    later: list[RecordSection] = []
     for value, of, owner in with_flat(record):
         if not of.label:
             continue
         if value is None or of.curve:
             own.pairs.extend([(of.label, NO_VALUE)] * of.is_number)
         elif is_table(value) or is_list_of_records(value):
-            (first if of.first else later).append(Section(of.label, table=table(value, parent=owner)))
+            (first if of.first else later).append(RecordSection(of.label, table=table(value, parent=owner)))
         elif is_declared(value) and not isinstance(value, At) and not hasattr(value, "as_text"):
             later += sections(value, of.label)
         elif isinstance(value, np.ndarray) and np.iscomplexobj(value) and value.size:
-            later.append(Section(of.help or of.label, table=roots_table(value, of)))
+            later.append(RecordSection(of.help or of.label, table=roots_table(value, of)))
         elif shown := with_unit(value, of):
             own.pairs.append((of.label, shown))
     if isinstance(whole := getattr(record, "table", None), Table):
-        later.append(Section(whole.title, table=whole))
+        later.append(RecordSection(whole.title, table=whole))
     if hasattr(record, "drawing"):
-        later.append(Section(drawing=record.drawing))
+        later.append(RecordSection(drawing=record.drawing))
     return [*first, own, *later]
 
 

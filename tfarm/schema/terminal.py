@@ -17,7 +17,7 @@ from rich.console import Console, RenderableType
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from .tables import Column, Section, Table, sections
+from .tables import Column, RecordSection, Table, sections
 
 COLUMN_GAP = 2  # spaces between two columns
 LEAST_FOLDED = 20  # characters to which a text may be folded
@@ -29,7 +29,7 @@ LEAST_IN_PIPE = 48
 def show(record: Any, rows: Table | None = None, last: str = "") -> None:
     """Print a record as a person reads it, then a table of points and a last line of text, if there are any."""
     shown, left_out = (None, "") if rows is None else first_and_last(rows)
-    for number, each in enumerate([*sections(record), Section(table=shown)]):
+    for number, each in enumerate([*sections(record), RecordSection(table=shown)]):
         if each.pairs or each.table or each.drawing:
             print(end="\n" * bool(number))
             show_text(each.title)
@@ -51,7 +51,7 @@ def show_table(table: Table) -> None:
 def show_text(text: str) -> None:
     """Print a text, folded in the width of the terminal."""
     if text:
-        print("\n".join(rendered(Text(text), terminal_width())))
+        print("\n".join(render_lines(Text(text), terminal_width())))
 
 
 def first_and_last(table: Table, most: int = 40) -> tuple[Table, str]:
@@ -119,11 +119,11 @@ def table_lines(table: Table, width: int | None = None) -> list[str]:
             grid.add_column(Text(column.heading), justify=cast("Any", side), width=fixed, min_width=size)
         for row in zip(*(column.cells for column in block), strict=True):
             grid.add_row(*map(Text, row))
-        lines += [""] * bool(lines) + rendered(grid, max(width, least_width(block, shortest)))
+        lines += [""] * bool(lines) + render_lines(grid, max(width, least_width(block, shortest)))
     return lines
 
 
-def rendered(shown: RenderableType, width: int | None) -> list[str]:
+def render_lines(shown: RenderableType, width: int | None) -> list[str]:
     """Return the lines of a text or of a table of rich in that width; without one, in that of a pipe."""
     console = Console(file=io.StringIO(), width=width or PIPE_WIDTH, color_system=None, legacy_windows=False)
     with console.capture() as captured:

@@ -93,10 +93,10 @@ def winding_number(function: Function, box: Box, points: int = FIRST_POINTS) -> 
         corners = np.array([box.re_max, *box.corners[2:], box.re_min])
         turn = math.pi
     path = [np.linspace(a, b, points, endpoint=False) for a, b in pairwise(corners)]
-    return round(turned(function, np.append(path, corners[-1]), box.across) / turn)
+    return round(argument_change(function, np.append(path, corners[-1]), box.across) / turn)
 
 
-def turned(function: Function, path: Complex, across: float, nearest: float = NEAREST_TO_ZERO) -> float:
+def argument_change(function: Function, path: Complex, across: float, nearest: float = NEAREST_TO_ZERO) -> float:
     """Return the change of the argument [rad] of a function along a path of points, which is refined.
 
     A step is halved above 0.6 rad.  Raises ConvergenceError where a zero is nearer to the path than the share `nearest`
@@ -182,7 +182,7 @@ def _at_most(length: Any, move: Complex) -> Any:
     return move * np.minimum(1.0, length / np.maximum(abs(move), LEAST_SIZE))
 
 
-def repelled(function: Function, starts: Complex, zeros: Complex, box: Box, missing: int) -> Complex:
+def find_other_zeros(function: Function, starts: Complex, zeros: Complex, box: Box, missing: int) -> Complex:
     """Return points next to zeros in a box that are not known, by Newton's method with the known ones divided out.
 
     After Ehrlich (1967) and Aberth (1973):  1/step = f'/f - sum of 1/(s - z),  z being the known zeros and the other
@@ -217,7 +217,7 @@ def _apart(
 ) -> tuple[Complex, Complex, Real]:
     """Return the points s without those whose step is infinite, their steps, and their distance from an unknown zero.
 
-    See `repelled`; that distance is the step without the other points.
+    See `find_other_zeros`; that distance is the step without the other points.
     """
     at = function(s)
     with np.errstate(all="ignore"):
@@ -268,7 +268,7 @@ def zeros_in_box(function: Function, box: Box, starts: Complex, known: Complex =
     return _search(counted, box, starts, known, NOTHING_KNOWN, depth=0)
 
 
-def complete(
+def complete_zeros(
     function: Function,
     box_of: Callable[[float], Box],
     height: float,
@@ -283,7 +283,7 @@ def complete(
     """
     for factor in factors[:-1]:
         with suppress(ConvergenceError):
-            return complete(function, box_of, factor * height, starts, known, (1.0,))
+            return complete_zeros(function, box_of, factor * height, starts, known, (1.0,))
     box = box_of(factors[-1] * height)
     found = zeros_in_box(function, box, starts, known)
     return np.where(abs(found.imag) < REAL_SHARE * abs(found), found.real, found), box
@@ -316,7 +316,7 @@ def _search(function: Function, box: Box, starts: Complex, known: Complex, found
     if missing > 0:
         missing = math.ceil(missing / (1 + mirrored))
         zeros = distinct(np.r_[known, found, found.conj()] if mirrored else np.r_[known, found])
-        near = repelled(function, starts_here, zeros, box, missing)
+        near = find_other_zeros(function, starts_here, zeros, box, missing)
         if near.size:
             found = np.r_[found, newton(function, near)]
             inside = listed(found)
@@ -378,7 +378,7 @@ def filled_box(
     top = first.imag[is_right(first, C) & (first.imag < height)].max(initial=0.0)
     if top > 0:
         height = float(top + min(others[:, 0].imag[others[:, 0].imag > top], default=ABOVE_LAST * top)) / 2
-    found, box = complete(f, lambda tried: _box(tried, starts, C), height, starts)
+    found, box = complete_zeros(f, lambda tried: _box(tried, starts, C), height, starts)
     return box, found
 
 

@@ -28,8 +28,8 @@ from tfarm.schema import Quantity
 from .box import TOWARD_SINGULAR, Box, complete_box, filled_box, is_among
 from .following import LOST
 from .frequencies import LISTS_KEPT
-from .naming import function_of, named
-from .proofs import Disc, disjoint, enclosed, proven_count
+from .naming import function_of, name_eigenvalues
+from .proofs import Disc, disjoint, enclose_zero, proven_count
 from .shapes import mode_field
 from .starts import damped_starts
 from .table import Modes, first_frequency, modes
@@ -114,7 +114,7 @@ class DampedModes:
         discs = []
         for pair in self._listed:
             wanted = pair[:1] if pair[0].imag > 0 else pair[np.isfinite(pair)]
-            discs.append(tuple(enclosed(k, complex(zero), digits) for zero in wanted))
+            discs.append(tuple(enclose_zero(k, complex(zero), digits) for zero in wanted))
             for zero, disc in zip(wanted.tolist(), discs[-1], strict=True):
                 apart = max(abs(pair[0] - pair[-1]) if np.isfinite(pair[-1]) else abs(zero), LEAST_SIZE)
                 away = abs(complex(float(disc.re), float(disc.im)) - zero)
@@ -220,7 +220,7 @@ def _searched(undamped: Modes, steps: float, reach: float) -> DampedModes:
     theory = undamped.theory
     count = int(undamped.index.max())
     omega = modes(arm, count + COMPANY, theory=theory).flexible
-    single, every = named(undamped, count + int((k.damping * omega[count:] < reach).sum()), steps)
+    single, every = name_eigenvalues(undamped, count + int((k.damping * omega[count:] < reach).sum()), steps)
     pairs = every[:count]
     company = every[count:]
     omega = omega[: count + 1]
@@ -312,7 +312,7 @@ def origins_of(k: System, s: Complex) -> list[str]:
     return [" and ".join(names) or NOT_ASSIGNED for names in found]
 
 
-def entered(damped: DampedModes) -> Real:
+def missing_real_eigenvalues(damped: DampedModes) -> Real:
     """Return real eigenvalues (n,) [1/s] right of -1/C, or nearer than the last mode, that the record lacks.
 
     Friction at a hub without inertia, and a dashpot at clamp or joint, add one from -inf: it continues from no mode.

@@ -27,7 +27,7 @@ PAST = 4  # values of the predicting polynomials
 PLAIN_MOVE = 0.1  # of the distance to the next root: largest distance from the prediction
 
 
-def settled(function: Callable[..., Analytic], guess: Complex, *values: Real) -> Complex:
+def polish_roots(function: Callable[..., Analytic], guess: Complex, *values: Real) -> Complex:
     """Return the zero next to each guess (n,) by Newton's method, a real one for a real guess, or NaN.
 
     The function is of s and, where these are given, of `values` (n,).
@@ -96,8 +96,8 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
         before, last = past[-1]
         at = np.array([value for value, _ in block])
         known, roots = map(np.array, zip(*past, strict=True))
-        guess = predicted(known, roots, at, last)
-        found = corrected(family, at, guess, last)
+        guess = predict_roots(known, roots, at, last)
+        found = correct_roots(family, at, guess, last)
         are_plain = which_plain(guess, found, last, family.singular(at), family.blur)
         good = int(np.argmin(np.r_[are_plain.all(axis=1), False]))
         if not good and len(block) == 1:
@@ -111,7 +111,7 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
                     raise ConvergenceError(f"branches are not separable beyond {before:.10g}", past[-1], stray)
             elif not good:
                 good = 1
-                near = assigned(family, float(at[0]), guess[0])
+                near = assign_roots(family, float(at[0]), guess[0])
                 # no root jumps by half its size
                 found = np.where((abs(near - last) > 0.5 * abs(last)) & (last != 0), np.nan, near)[None]
         many = min(2 * many, most) if good == len(block) else max(1, good)
@@ -140,7 +140,7 @@ def are_alone(
     return not (nearest(found)[1] <= 1e-9 * abs(found)).any()
 
 
-def between(family: Family, values: Real, rows: Complex, wanted: Real) -> Complex:
+def interpolate_roots(family: Family, values: Real, rows: Complex, wanted: Real) -> Complex:
     """Return the roots (m, b) at wanted values (m,) between the known ones (n,), ascending.
 
     By interpolation, or where that is uncertain by following them from the known value below.
@@ -154,8 +154,8 @@ def between(family: Family, values: Real, rows: Complex, wanted: Real) -> Comple
         low = int(np.clip(n - PAST // 2, 0, max(0, values.size - PAST)))
         here = np.flatnonzero(right == n)
         near = slice(low, low + PAST)
-        guess = predicted(values[near], rows[near], wanted[here], rows[n - 1])
-        found[here] = corrected(family, wanted[here], guess, rows[n - 1])
+        guess = predict_roots(values[near], rows[near], wanted[here], rows[n - 1])
+        found[here] = correct_roots(family, wanted[here], guess, rows[n - 1])
         singular = family.singular(wanted[here])
         for each in here[~which_plain(guess, found[here], rows[n - 1], singular, family.blur).all(axis=1)]:
             found[each] = follow(family, np.array([values[n - 1], wanted[each]]), rows[n - 1])[1]
@@ -170,7 +170,7 @@ def is_over(family: Family, value: float, row: Complex) -> NDArray[np.bool_]:
     return (row.imag == 0) & is_near.any(axis=1)
 
 
-def assigned(family: Family, value: float, guess: Complex) -> Complex:
+def assign_roots(family: Family, value: float, guess: Complex) -> Complex:
     """Return the complete set at a value in the order of the guesses (b,); NaN where there are fewer."""
     from scipy.optimize import linear_sum_assignment  # half a second to import, and rarely needed
 
@@ -209,7 +209,7 @@ def couples(row: Any) -> Any:
 
 
 @compiled
-def predicted(at: Any, rows: Any, wanted: Any, base: Any) -> Any:
+def predict_roots(at: Any, rows: Any, wanted: Any, base: Any) -> Any:
     """Return guesses (m, b) by polynomials through known roots (k, b) at k values; `base` (b,) has the couples.
 
     Roots from before two of them met are left out.
@@ -261,7 +261,7 @@ def _of_couple(weights: Any, first: Any, second: Any, base: Any, other: Any) -> 
     return (middle - root, middle + root) if way < 0.0 else (middle + root, middle - root)
 
 
-def corrected(family: Family, values: Real, guess: Complex, base: Complex) -> Complex:
+def correct_roots(family: Family, values: Real, guess: Complex, base: Complex) -> Complex:
     """Return the roots (m, b) next to the guesses, those below the real axis as mirror images."""
     own = np.arange(base.size)
     partner = couples(np.where(base.imag == 0, base, np.nan))

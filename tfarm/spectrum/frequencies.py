@@ -27,7 +27,7 @@ from tfarm.exact.balls import Ball, Sweep, across_waves, first_success, in_chain
 from tfarm.exact.count import DOUBLINGS, chain_counts, list_steps, rows_to_count
 from tfarm.exact.layout import Layout, readings
 from tfarm.exact.system import Segment, Spring, System
-from tfarm.exact.waves import Plane
+from tfarm.exact.waves import SolutionPlane
 from tfarm.records import read_only
 
 
@@ -92,7 +92,7 @@ class AxisSweep(Sweep):
         """D(i omega)."""
         return self.input + self.S * self.A[2] * self.theta
 
-    def _inside(self, element: Any, p: Plane) -> Plane:
+    def _inside(self, element: Any, p: SolutionPlane) -> SolutionPlane:
         if isinstance(element, Segment):
             return self._joined(element, p)
         p = super()._inside(element, p)
@@ -100,7 +100,7 @@ class AxisSweep(Sweep):
             self._step(p[0], 1)
         return p
 
-    def _joined(self, element: Any, p: Plane) -> Plane:
+    def _joined(self, element: Any, p: SolutionPlane) -> SolutionPlane:
         a, b, g, *_ = element
         own = real_waves(a, b, g, self.S)
         l = element.length
@@ -118,7 +118,7 @@ class AxisSweep(Sweep):
         self._free = 2
         return inside
 
-    def _count_segment(self, z: Sequence[Ball], p: Plane, q: Plane, r: Sequence[Ball]) -> None:
+    def _count_segment(self, z: Sequence[Ball], p: SolutionPlane, q: SolutionPlane, r: Sequence[Ball]) -> None:
         outside = self.number
         pinned = pinned_count(z)
         if pinned is None:
@@ -140,7 +140,7 @@ class AxisSweep(Sweep):
             raise UncertainError
         self.number += step * ((self.number % 2 == 1) != bool(value < 0))
 
-    def released(self) -> int:
+    def count_released(self) -> int:
         """Return the count with the hub released, where it is not locked."""
         if self.layout.chain.drive.turns:
             self._step(self.drive, 1)
@@ -160,7 +160,7 @@ class RealAxis:
     def count(self, omega: Ball) -> int | None:
         """Return N(omega), with the rigid-body mode; None if a sign or a half wave is uncertain."""
         try:
-            return AxisSweep(self._system, omega, counting=True).released()
+            return AxisSweep(self._system, omega, counting=True).count_released()
         except UncertainError:
             return None
 

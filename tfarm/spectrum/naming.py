@@ -15,18 +15,18 @@ from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import DIFFERENCE_STEP, has_slope, quick_characteristics
 from tfarm.exact.compiled import compiled
-from tfarm.exact.layout import OF_ELEMENT, ROW, Reading, readings
+from tfarm.exact.layout import OF_ELEMENT, ROW, OutputFormula, readings
 from tfarm.exact.sweep import AXIS, fill_free
 from tfarm.exact.system import Segment, System
 from tfarm.records import read_only
 
 from .box import REAL_SHARE, Function, newton
-from .following import LOST, NEWTON_STEPS, SETTLED, follow, settled
+from .following import LOST, NEWTON_STEPS, SETTLED, follow, polish_roots
 from .table import Modes, modes
 
 HALVINGS = (250, *[80] * 8)  # of steps, after which stray branches are lost and the others followed
 AROUND = np.array([1, 1.02, 0.98, 1 + 0.02j, 1 - 0.02j, 1.2, 0.8, 1 + 0.2j, 1 - 0.2j])  # starts next to a guess, of it
-NO_OUTPUT = np.empty((0, len(Reading._fields)))  # the table of a layout
+NO_OUTPUT = np.empty((0, len(OutputFormula._fields)))  # the table of a layout
 
 
 def function_of(k: System) -> Function:
@@ -37,7 +37,7 @@ def function_of(k: System) -> Function:
 
 @compiled
 def _newton(s: Any, rows: Any, ends: Any, at_rest: int, singular: Any) -> None:
-    """Replace guesses s (n,) by the zeros of D/s^at_rest next to them, or NaN, as `following.settled` does."""
+    """Replace guesses s (n,) by the zeros of D/s^at_rest next to them, or NaN, as `following.polish_roots` does."""
     moving = np.flatnonzero(~np.isnan(s))
     for _ in range(NEWTON_STEPS):
         here = s[moving]
@@ -137,7 +137,7 @@ def single_zeros(undamped: Modes, share: float = 1.0) -> list[float]:
     return turning + ([-1.0 / float(k.drive.lag)] if k.drive.lag else [])
 
 
-def named(undamped: Modes, count: int, steps: float) -> tuple[Complex, Complex]:
+def name_eigenvalues(undamped: Modes, count: int, steps: float) -> tuple[Complex, Complex]:
     """Return the eigenvalues of `single_zeros` (m,) and of the first `count` flexible modes (count, 2), NaN if lost.
 
     A mode has a conjugate pair, Im > 0 first, or two real ones, the slower first.  After `steps` steps those that are
@@ -168,7 +168,7 @@ def named(undamped: Modes, count: int, steps: float) -> tuple[Complex, Complex]:
             (share, start) = lost.best
             stray = lost.residual
             start = np.where(stray, LOST, start)
-    found = np.full(start.size, LOST) if ends else settled(function_of(k), start / family.level)
+    found = np.full(start.size, LOST) if ends else polish_roots(function_of(k), start / family.level)
     with np.errstate(invalid="ignore"):  # of lost ones
         found[~has_slope(k, found)] = LOST  # so far out that Newton's method converges anywhere
     again = np.triu(abs(found[:, None] - found) <= REAL_SHARE * abs(found), 1).any(axis=0)

@@ -191,7 +191,7 @@ def _turning(k: System, law: Feedback | None, a: Ball, b: Ball) -> Ball:
     return total
 
 
-def enclosed(k: System, near: complex, digits: int, law: Feedback | None = None) -> Disc:
+def enclose_zero(k: System, near: complex, digits: int, law: Feedback | None = None) -> Disc:
     """Return a disc with one zero, its radius one unit in the last of `digits` significant digits of |s| or less.
 
     Raises CertificationError where none is certified, as around a double zero.

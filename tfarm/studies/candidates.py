@@ -24,12 +24,12 @@ from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.gains import default_gains
+from tfarm.stopping import Progress
 from tfarm.tuner import LearningCurves, Tuning, compare_controllers, tried_loops, tune
 from tfarm.tuner.baselines import Outcomes, quantised_chain
-from tfarm.tuner.tuning import tuned, usual_plan
+from tfarm.tuner.tuning import tune_by_default, usual_plan
 
 from .quantities import FREQUENCY, INTERVAL, STABILITY, intervals_of, prepare
-from .running import Progress
 from .space import Subjects
 
 STUDIED_MODES = 4  # flexible modes, by default
@@ -243,7 +243,9 @@ def learning_curves(
     found: list[tuner.Training] = []
     # compiled loops let other threads run; a report uses no more cores
     with ThreadPoolExecutor(2) as pool:
-        for training in pool.map(lambda n: tuned(arm, chain, plan, seed=plan.seed + n).training, range(seeds)):
+        for training in pool.map(
+            lambda n: tune_by_default(arm, chain, plan, seed=plan.seed + n).training, range(seeds)
+        ):
             costs[len(found), : training.costs.size] = training.costs
             found.append(training)
             progress(len(found), seeds, "learning curves")
@@ -313,7 +315,7 @@ def curve_seeds(samples: int) -> int:
 
 
 def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
-    without, tuned = traces.resolved(
+    without, tuned = traces.resolve_simulations(
         tuning.trial.simulator(chain=chain),
         tuning.trial.arm,
         lambda each: each.linear(tuning.gain().servo),

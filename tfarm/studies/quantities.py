@@ -38,7 +38,7 @@ from tfarm.schema import Percent, Quantity, quantities
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.frequencies import list_frequencies
 from tfarm.spectrum.shapes import PARAMETERS
-from tfarm.tuner.tuning import tuned
+from tfarm.tuner.tuning import tune_by_default
 
 from .space import Subject, Subjects
 
@@ -62,7 +62,7 @@ CONFIDENCE = 0.95
 QUANTILES = {"least": 0.0, "low": 0.05, "median": 0.5, "high": 0.95, "largest": 1.0}
 STABLE = "stable"
 Values = Callable[[Subject, Set[str]], Mapping[str, Any]]  # of an arm, in these columns
-Asked = tuple[Mapping[str, Quantity], Values]  # columns, and their values
+ColumnSource = tuple[Mapping[str, Quantity], Values]  # columns, and their values
 
 
 def first_of(name: str) -> str:
@@ -121,7 +121,7 @@ def _kinds(kind: Any) -> dict[str, tuple[Any, ...]]:
     }
 
 
-def _card_of(loop: str) -> Asked:
+def _card_of(loop: str) -> ColumnSource:
     """Return the entries of the card of a loop, of which stability and its certainty need the verdict alone."""
 
     def values(one: Subject, names: Set[str]) -> dict[str, Any]:
@@ -202,7 +202,7 @@ def _columns(name: str, label: str, unit: str, meaning: str) -> dict[str, Quanti
 
 
 def _tuner_of(one: Subject, _: Set[str]) -> dict[str, Any]:
-    tuning = tuned(one.case.arm, one.case.chain, None, **one.tuner)
+    tuning = tune_by_default(one.case.arm, one.case.chain, None, **one.tuner)
     training = tuning.training
     return {
         **_numbered(TRIAL_COST, training.costs),
@@ -214,7 +214,7 @@ def _tuner_of(one: Subject, _: Set[str]) -> dict[str, Any]:
     }
 
 
-ASKED: tuple[Asked, ...] = (
+ASKED: tuple[ColumnSource, ...] = (
     *map(_card_of, LOOPS),
     (_columns(FREQUENCY, "natural frequency, mode", "rad/s", "of the undamped arm"), _modes_of),
     ({name: column for parameter in PARAMETERS for name, column in _columns(
@@ -427,7 +427,9 @@ class StudyBand(NamedTuple):
     unit: str
 
 
-def band_of(subjects: Subjects, rows: Sequence[Sequence[float]], output: str, points: int = 1200) -> StudyBand:
+def response_quantiles(
+    subjects: Subjects, rows: Sequence[Sequence[float]], output: str, points: int = 1200
+) -> StudyBand:
     """Return the exact responses of the arms of some rows, and their quantiles at each frequency.
 
     Raises ParameterError for an unknown output, and where no arm has that response.

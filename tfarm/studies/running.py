@@ -28,15 +28,15 @@ from tfarm.case import Case
 from tfarm.errors import ConvergenceError, ParameterError, TfarmError, one_line, require
 from tfarm.files import write_file
 from tfarm.records import frozen
+from tfarm.stopping import Progress
 
 from .quantities import FAILED, Values, prepare, quantity_of, sources_of, values_of
 from .space import Space, Subject, Subjects, extra, parquet
 
-Progress = Callable[[int, int, str], object]
 Chunk = dict[str, list[Any]]  # columns of a range of rows
 Row = dict[str, Any]  # the columns of one
-Task = tuple[int, Callable[[], Chunk]]  # number of a part, and the call that returns its table
-Engine = Callable[[Iterator[Task]], Iterator[tuple[int, Chunk]]]  # yields each task with its table as it comes
+ChunkTask = tuple[int, Callable[[], Chunk]]  # number of a part, and the call that returns its table
+Engine = Callable[[Iterator[ChunkTask]], Iterator[tuple[int, Chunk]]]  # yields each task with its table as it comes
 # keys of errors
 OUT = "--out"
 SCHEDULER = "--scheduler"
@@ -57,7 +57,7 @@ PACKAGES = ("tfarm", "numpy", "scipy", "numba")  # versions that all workers hav
 
 
 @frozen
-class Plan:
+class StudyPlan:
     """A study: a case, its varied numbers and the columns that are asked for."""
 
     case: Case
@@ -86,12 +86,12 @@ class Plan:
         return Subjects(self.case, self.space.keys, fitted)
 
 
-def chunk(plan: Plan, first: int, last: int, listed: Real | None = None) -> Chunk:
+def chunk(plan: StudyPlan, first: int, last: int, listed: Real | None = None) -> Chunk:
     """Return the table of rows first to last - 1: column by column, with the reason where a row has no result."""
     return table_of(plan, first, plan.space.rows(first, last, listed))
 
 
-def table_of(plan: Plan, first: int, rows: Real) -> Chunk:
+def table_of(plan: StudyPlan, first: int, rows: Real) -> Chunk:
     """Return the table of rows of values (rows, keys), numbered from `first`."""
     table: Chunk = {name: [] for name in plan.columns}
     for start in range(0, len(rows), BATCH):
@@ -124,7 +124,7 @@ def _attempt(function: Callable[..., Any], *arguments: Any) -> Any:
 # ------------------------------------------------------------------------------------------------------------ parts
 
 
-def seconds_an_arm(plan: Plan, rows: Real) -> float:
+def seconds_an_arm(plan: StudyPlan, rows: Real) -> float:
     """Return the mean time of the first rows of values (rows, keys) [s]."""
     table_of(plan, 0, rows[:1])  # which compiles
     pilot = rows[-PILOT:]
@@ -141,11 +141,11 @@ def rows_a_chunk(cost: float, count: int, workers: int) -> int:
 
 
 @frozen
-class Parts:
+class StudyFolder:
     """The folder of a study, with the parts that are written."""
 
     folder: Path
-    plan: Plan
+    plan: StudyPlan
     digest: str
     rows: int  # of a part
     suffix: str
@@ -157,7 +157,7 @@ class Parts:
         """Number of all parts."""
         return math.ceil(self.size / self.rows)
 
-    def others(self, prefix: str, size: int, rows: int, names: Sequence[str]) -> "Parts":
+    def others(self, prefix: str, size: int, rows: int, names: Sequence[str]) -> "StudyFolder":
         """Return parts of that many other rows with these columns, in the same folder; at most `rows` in one."""
         return replace(
             self, plan=replace(self.plan, names=tuple(names)), prefix=prefix, size=size, rows=min(self.rows, rows)
@@ -223,7 +223,9 @@ class StudyRecord(StrictTable):
     rows_a_part: int
 
 
-def opened(folder: Path, plan: Plan, files: Mapping[str, bytes], workers: int, size: int | None, rows: Real) -> Parts:
+def open_study(
+    folder: Path, plan: StudyPlan, files: Mapping[str, bytes], workers: int, size: int | None, rows: Real
+) -> StudyFolder:
     """Return the parts of a study in a folder, a new one or that of an interrupted run, with the files that declare it.
 
     `rows` are the values of the first rows.  Raises ParameterError for a folder that has another study.
@@ -252,7 +254,7 @@ def opened(folder: Path, plan: Plan, files: Mapping[str, bytes], workers: int, s
     else:
         count = size or rows_a_chunk(seconds_an_arm(plan, rows[:PILOT]), space.count, workers)
     digest = hashlib.sha256(json.dumps([inputs, count]).encode()).hexdigest()
-    parts = Parts(folder, plan, digest, count, suffix, space.count)
+    parts = StudyFolder(folder, plan, digest, count, suffix, space.count)
     parts.written()  # is refused before a file is written
     text = StudyRecord(inputs=inputs, rows_a_part=count).model_dump_json(indent=1)
     for name, content in {**files, FILE: f"{text}\n".encode()}.items() if not file.exists() else ():
@@ -273,34 +275,34 @@ def versions() -> dict[str, str]:
 # ------------------------------------------------------------------------------------------------------------ runs
 
 
-def run(
+def run_parts(
     folder: Path,
-    plan: Plan,
+    plan: StudyPlan,
     files: Mapping[str, bytes],
     engine: Engine,
     workers: int,
     deadline: float,
     size: int | None,
     progress: Progress,
-) -> Parts:
+) -> StudyFolder:
     """Write the missing parts of a study to its folder."""
     count = min(CHECKED, plan.space.count)
     listing = plan.space.listing
     rows = plan.space.rows(0, count, None if listing is None else next(listing.blocks([(0, count)])))
     check_rows(plan, rows)
-    parts = opened(folder, plan, files, workers, size, rows)
+    parts = open_study(folder, plan, files, workers, size, rows)
 
     def calls(ends: Sequence[tuple[int, int]]) -> Iterator[Callable[[], Chunk]]:
         blocks = [None] * len(ends) if listing is None else listing.blocks(ends)
         for (first, last), listed in zip(ends, blocks, strict=True):
             yield partial(chunk, plan, first, last, listed)
 
-    complete(parts, calls, engine, deadline, progress, "parts of the study")
+    write_missing_parts(parts, calls, engine, deadline, progress, "parts of the study")
     return parts
 
 
-def complete(
-    parts: Parts,
+def write_missing_parts(
+    parts: StudyFolder,
     calls: Callable[[Sequence[tuple[int, int]]], Iterable[Callable[[], Chunk]]],
     engine: Engine,
     deadline: float,
@@ -320,7 +322,9 @@ def complete(
         progress(len(done) + ready, parts.count, f"{text}, {left:.0f} s left")
 
 
-def searched(parts: Parts, search: Callable[[Callable[[Real], Row]], object], deadline: float) -> list[Row] | None:
+def search_rows(
+    parts: StudyFolder, search: Callable[[Callable[[Real], Row]], object], deadline: float
+) -> list[Row] | None:
     """Return the rows of a search, which asks for the results of one row of values (1, keys) after another.
 
     Each is written as a part and computed once: an interrupted search goes on where it was.  None where it has no end
@@ -347,7 +351,7 @@ def searched(parts: Parts, search: Callable[[Callable[[Real], Row]], object], de
     return seen
 
 
-def check_rows(plan: Plan, rows: Real) -> None:
+def check_rows(plan: StudyPlan, rows: Real) -> None:
     """Raise ParameterError where some of the first rows are illegal, with their number and the first reason."""
     # which refuse an unknown key, before any row
     subjects = plan.subjects
@@ -388,7 +392,7 @@ def cluster(scheduler: str) -> Any:
     return client
 
 
-def on_cluster(tasks: Iterator[Task], client: Any) -> Iterator[tuple[int, Chunk]]:
+def on_cluster(tasks: Iterator[ChunkTask], client: Any) -> Iterator[tuple[int, Chunk]]:
     """Yield each task with its table as it comes from the workers of a Dask client, at most one a worker unread.
 
     A task of a lost worker goes to another one.  Raises ConvergenceError where the scheduler is gone, or the workers of

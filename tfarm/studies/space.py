@@ -27,7 +27,7 @@ from tfarm.arm.feedback import OUTPUT_OF
 from tfarm.arm.writing import KeyedArms, numbers_of
 from tfarm.arrays import Real
 from tfarm.case import Case
-from tfarm.errors import ParameterError, must_be_known, naming, require
+from tfarm.errors import ParameterError, must_be_known, name_file, require
 from tfarm.files import open_file
 from tfarm.fitting.posterior import Posterior
 from tfarm.foreign import read_by_child
@@ -267,7 +267,7 @@ def lines_of(path: Path) -> Iterator[Any]:
     """
     lines = _cells(path)
     names = tuple(next(lines, ()))
-    with naming(path):
+    with name_file(path):
         for name in names:
             require(name and names.count(name) == 1, "column", name, "each column has a key of its own as its name")
         yield names

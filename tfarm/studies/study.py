@@ -30,17 +30,18 @@ from tfarm.arm.chain import Chain, file_text, load_chain
 from tfarm.arm.checks import whole
 from tfarm.arm.law_tables import load_law
 from tfarm.arm.reading import AnyFile, load, load_tables, presets
-from tfarm.arm.schema import StrictTable, validated
+from tfarm.arm.schema import StrictTable, validate_table
 from tfarm.arm.writing import law_head, law_toml, toml_tables, toml_text
 from tfarm.arrays import Real
 from tfarm.case import Case
-from tfarm.errors import ParameterError, naming, require
+from tfarm.errors import ParameterError, name_file, require
 from tfarm.files import locked_folder, mat_content, write_file
 from tfarm.fitting.posterior import load_posterior
-from tfarm.processes import shared
+from tfarm.processes import share_tasks
 from tfarm.records import frozen
 from tfarm.schema import Column, Quantity, Table
 from tfarm.spectrum.gains import default_gains
+from tfarm.stopping import Progress
 
 from .quantities import (
     CARD,
@@ -50,11 +51,11 @@ from .quantities import (
     Spread,
     StableShare,
     StudyBand,
-    band_of,
     column_names,
     failures_of,
     order_of,
     quantity_of,
+    response_quantiles,
     shares_of,
     spreads_of,
 )
@@ -63,17 +64,16 @@ from .running import (
     ROW,
     STUDY_FILE,
     Engine,
-    Parts,
-    Plan,
-    Progress,
     Row,
-    complete,
+    StudyFolder,
+    StudyPlan,
     on_cluster,
     rows_of,
-    run,
-    searched,
+    run_parts,
+    search_rows,
     seconds_an_arm,
     table_of,
+    write_missing_parts,
 )
 from .space import ENDS, MOST_SEED, listing_of, space_of
 
@@ -127,7 +127,7 @@ class StudyTable(dict[str, Any]):
 class Study:
     """Results of a study, as far as it has been run, with its findings."""
 
-    parts: Parts
+    parts: StudyFolder
     arm: Annotated[str, Quantity("arm", help="arm whose numbers are varied")]
     rows: Annotated[int, Quantity("arms", help="rows of the whole study")]
     rows_a_part: Annotated[int, Quantity(help="rows of one file of the results")]
@@ -175,7 +175,7 @@ class Study:
         """
         plan = self.parts.plan
         rows = np.column_stack([self._table[key] for key in plan.space.keys])
-        return band_of(plan.subjects, rows[:: max(1, -(-self.done // most))].tolist(), output)
+        return response_quantiles(plan.subjects, rows[:: max(1, -(-self.done // most))].tolist(), output)
 
     @property
     def shear(self) -> Annotated[str, Quantity("shear modulus", help="with a varied Young's modulus; else empty")]:
@@ -268,16 +268,16 @@ def study(
         over or {}, draws=draws, seed=seed, posterior=known, listing=None if rows is None else listing_of(Path(rows))
     )
     order = order_of(worst) if worst else ()
-    plan = Plan(case, space, column_names([*ask, *order]))
+    plan = StudyPlan(case, space, column_names([*ask, *order]))
     require(sobol >= 0 and sobol & (sobol - 1) == 0, "sobol", sobol, "a power of 2, such as 256; 0 for no indices")
     is_possible = not sobol or (space.is_independent and posterior is None and len(space.keys) > 1)
     require(is_possible, "sobol", sobol, "needs two or more independent distributions")
     files = files_of(case, {"over": over or {}, "ask": ask, "draws": draws, "seed": seed, "rows": rows,
                                        "posterior": posterior, "worst": worst, "sobol": sobol})  # fmt: skip
-    engine = partial(shared, count=workers) if client is None else partial(on_cluster, client=client)
+    engine = partial(share_tasks, count=workers) if client is None else partial(on_cluster, client=client)
     deadline = time.monotonic() + (math.inf if stop_after is None else stop_after)
     with locked_folder(Path(out), key=OUT):
-        parts = run(Path(out), plan, files, engine, workers, deadline, part, progress)
+        parts = run_parts(Path(out), plan, files, engine, workers, deadline, part, progress)
         found = Study(parts=parts, arm=arm.name, rows=space.count, rows_a_part=parts.rows)
         if found.is_complete:
             indices = sobol_indices(parts, sobol, workers, engine, deadline, progress) if sobol else ()
@@ -317,8 +317,8 @@ def load_study(name_or_path: AnyFile) -> dict[str, Any]:
     """
     tables, file = load_tables(name_or_path)
     folder = Path(file).parent
-    with naming(file):
-        declared = validated(StudyFile, tables, "").model_dump(exclude_unset=True)
+    with name_file(file):
+        declared = validate_table(StudyFile, tables, "").model_dump(exclude_unset=True)
     arm = load_tables(declared["arm"] if declared["arm"] in presets() else str(folder / declared["arm"]))
     law = load_law(folder / declared["law"] if "law" in declared else arm)
     own = {key: folder / value if key in PATHS else value for key, value in declared.items()}
@@ -389,7 +389,7 @@ def worst_arm(study: Study, order: Sequence[str], deadline: float) -> WorstArm |
     )  # fmt: skip
 
 
-def search_worst(parts: Parts, order: Sequence[str], first: int, deadline: float) -> list[Row] | None:
+def search_worst(parts: StudyFolder, order: Sequence[str], first: int, deadline: float) -> list[Row] | None:
     """Return the rows of a search of the worst arm, by Nelder and Mead's simplex from row `first`.
 
     It stays within the range of a bounded distribution of n draws, else within its quantiles 1/(2 n) and 1 - 1/(2 n).
@@ -413,10 +413,10 @@ def search_worst(parts: Parts, order: Sequence[str], first: int, deadline: float
             options={"maxfev": most, "initial_simplex": [start, *(start + steps)]},
         )  # fmt: skip
 
-    return searched(parts.others(f"_worst-{order[0]}-", most, 1, order), search, deadline)
+    return search_rows(parts.others(f"_worst-{order[0]}-", most, 1, order), search, deadline)
 
 
-def write_case(parts: Parts, numbers: Mapping[str, float]) -> Path:
+def write_case(parts: StudyFolder, numbers: Mapping[str, float]) -> Path:
     """Write the arm with these numbers, its chain and its controller, and return the file."""
     plan = parts.plan
     file = parts.folder / "worst.toml"
@@ -432,7 +432,7 @@ def write_case(parts: Parts, numbers: Mapping[str, float]) -> Path:
 
 
 def sobol_indices(
-    study: Parts, size: int, workers: int, engine: Engine, deadline: float, progress: Progress
+    study: StudyFolder, size: int, workers: int, engine: Engine, deadline: float, progress: Progress
 ) -> tuple[SobolIndex, ...]:
     """Return Sobol' indices of every quantity, of a sample of its own of N (numbers + 2) arms, written as parts.
 
@@ -450,7 +450,7 @@ def sobol_indices(
         seconds = seconds_an_arm(plan, rows) * len(rows) / workers
         progress(0, 0, f"Sobol' indices of {len(rows):,} further arms, about {seconds:.0f} s")
     calls = partial(map, lambda ends: partial(table_of, plan, ends[0], rows[slice(*ends)]))
-    complete(parts, calls, engine, deadline, progress, "parts of Sobol' indices")
+    write_missing_parts(parts, calls, engine, deadline, progress, "parts of Sobol' indices")
     table = parts.column(*names) if parts.is_complete else {}
     return tuple(index for name, values in table.items() for index in _indices(name, keys, values))
 

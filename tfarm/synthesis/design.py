@@ -76,7 +76,7 @@ class OnArm:
         return self.sampled.short
 
 
-class Coefficient(NamedTuple):
+class OptimalCoefficient(NamedTuple):
     """A coefficient of a design, the width of the optimum along it, and its bounds."""
 
     name: Annotated[str, Quantity("coefficient", key="name", help="a number of the law")]
@@ -135,13 +135,13 @@ class Design:
     @property
     def rows(
         self,
-    ) -> Annotated[list[Coefficient], Quantity("coefficients", key="coefficients", help="numbers of the law")]:
+    ) -> Annotated[list[OptimalCoefficient], Quantity("coefficients", key="coefficients", help="numbers of the law")]:
         """One row for each coefficient."""
         optima = dict.fromkeys(self.bounds, "inside") | dict.fromkeys(self.widened, "inside bounds that were widened")
         optima |= dict.fromkeys(self.at_bound, "none: search cut off at the bound")
         optima |= dict.fromkeys(self.at_limit, "at the physical limit")
         return [
-            Coefficient(name, value, self.flat.get(name), self.bounds.get(name), optima.get(name, "given"))
+            OptimalCoefficient(name, value, self.flat.get(name), self.bounds.get(name), optima.get(name, "given"))
             for name, value in self.coefficients.items()
         ]
 
@@ -227,12 +227,12 @@ def design(
         ContinuousLoop(Case(each.arm, form.record_at(form.origin)))
         check_bounds(form, each.arm)
     tell = progress or (lambda text: None)
-    task = _Task(arm, objective, form, modes, chain, continuous, tell)
+    task = _DesignTask(arm, objective, form, modes, chain, continuous, tell)
     return task.design(*for_the_worst(arms, box, task.find, task.score_on, tell))
 
 
 @frozen
-class _Task:
+class _DesignTask:
     """A task of design: the arm of the slews, an objective, and a structure with its bounds."""
 
     arm: Arm

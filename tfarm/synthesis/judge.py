@@ -28,15 +28,15 @@ from tfarm.arm.blocks import Rational
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.case import Case
 from tfarm.dsp import Chain
-from tfarm.dsp.plant import driven
-from tfarm.dsp.results import simulated
+from tfarm.dsp.plant import arm_under_chain
+from tfarm.dsp.results import simulate_modes
 from tfarm.errors import ConvergenceError
 from tfarm.loop.edges import LowerBound, most_modes
 from tfarm.loop.loop_margins import lowest
 from tfarm.loop.sampled_verdict import UNDAMPED_MODES, sampled_verdict
 from tfarm.loop.stability import stability
 from tfarm.records import frozen
-from tfarm.synthesis.models import Model, Slews, continuous_model, sampled_model, slew_and_after
+from tfarm.synthesis.models import DesignModel, Slews, continuous_model, sampled_model, slew_and_after
 from tfarm.synthesis.structures import Entry
 
 LONGEST_MARGIN = 100.0  # samples, or s: the longest delay margin, and that where |L| is nowhere 1
@@ -45,7 +45,7 @@ FEWEST_MODES = 8  # of the first model; more where its best laws are unstable
 LOST = 1e30  # score where a loop is unstable, and as much for each later condition: above any value in SI units
 
 
-def damping_of(model: Model, poles: Complex) -> Real:
+def damping_of(model: DesignModel, poles: Complex) -> Real:
     """The least damping ratio (laws,) of oscillating poles (laws, n); 1 where a law has none.
 
     One of each pair counts.  The poles nearest to those of `higher` modes are left out.
@@ -68,7 +68,7 @@ def disk_of(L: Complex) -> Real:
     return 2 * abs(1 + L) / np.maximum(abs(1 - L), LEAST_SIZE)
 
 
-def delay(model: Model, L: Complex) -> Real:
+def delay(model: DesignModel, L: Complex) -> Real:
     """The delay [s] that turns L to -1 where |L| passes 1, between two points of the grid along straight lines.
 
     A law is without limit where `RESERVE` L passes 1 nowhere either: a resonance peaks between two points of the grid.
@@ -77,12 +77,12 @@ def delay(model: Model, L: Complex) -> Real:
     return np.where(late < longest_delay(model), late, _passing_delay(model, RESERVE * L))
 
 
-def longest_delay(model: Model) -> float:
+def longest_delay(model: DesignModel) -> float:
     """The longest delay [s] that is looked for."""
     return (model.period or 1.0) * LONGEST_MARGIN
 
 
-def _passing_delay(model: Model, L: Complex) -> Real:
+def _passing_delay(model: DesignModel, L: Complex) -> Real:
     """That delay [s] by the passages between points of the grid alone, at most the longest."""
     q = model.angles
     around = 2 * np.pi
@@ -127,8 +127,8 @@ class Judge:
     chain: Chain
     objective: Objective
     modes: int
-    model: Model
-    also: tuple[Model, ...]
+    model: DesignModel
+    also: tuple[DesignModel, ...]
 
     @property
     def is_sampled(self) -> bool:
@@ -141,7 +141,7 @@ class Judge:
         return Slews(self.model, self.arm, self.known, self.chain)
 
     @cached_property
-    def conditions(self) -> list[tuple[Model, float]]:
+    def conditions(self) -> list[tuple[DesignModel, float]]:
         """The models that have to be stable, each with a factor on the law: most unstable laws fail the first.
 
         An objective of poles has the model itself.
@@ -223,7 +223,7 @@ class Judge:
         if not self.is_sampled:
             return self.score(law)
         case = self.case(law)
-        run, _ = simulated(case, slew_and_after(case.arm, self.known, case.chain))
+        run, _ = simulate_modes(case, slew_and_after(case.arm, self.known, case.chain))
         return np.inf if run.residual_moment is None else run.residual_moment
 
     def holds(self, law: AnyLaw) -> bool:
@@ -289,8 +289,8 @@ def judge_of(
     """The judge of laws on these signals, with `count` flexible modes; more of the continuous-time loop."""
     aim = OBJECTIVES[objective]
     signals = tuple(dict.fromkeys((*signals, *("root_moment",) * aim.of_slew)))
-    known, _ = driven(known, chain)
-    arm, chain = driven(arm, chain)
+    known, _ = arm_under_chain(known, chain)
+    arm, chain = arm_under_chain(arm, chain)
     own = continuous_model(arm, signals, modes, (2 if continuous else 1) * count, 2 / chain.sampling.period)
     if continuous:
         return Judge(arm, known, chain, aim, modes, own, ())

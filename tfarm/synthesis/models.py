@@ -26,7 +26,7 @@ from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain, Scenario, scenario
 from tfarm.dsp.plant import PulseTransfer, sensed_plant
 from tfarm.dsp.scenarios import TRIAL_SLEWS, trial_weights
-from tfarm.loop.continuous import band_of, grid
+from tfarm.loop.continuous import frequency_above_mode, grid
 from tfarm.records import frozen
 from tfarm.reduced.modal import ALGEBRAIC, sensed_model
 from tfarm.response.signals import Signals
@@ -35,7 +35,7 @@ from tfarm.synthesis.structures import Entry
 
 
 @frozen
-class Model:
+class DesignModel:
     """A, B, C, D from the input to `signals`, of few modes; at samples of `period` [s], or in continuous time (None).
 
     `speed` [1/s] is c, the unit of a law's s.  `grid` gives angles (m,) of the circle [rad] or frequencies [rad/s], and
@@ -157,7 +157,7 @@ class Model:
         return np.asarray(total)
 
 
-def continuous_model(arm: Arm, signals: tuple[str, ...], modes: int, count: int, speed: float) -> Model:
+def continuous_model(arm: Arm, signals: tuple[str, ...], modes: int, count: int, speed: float) -> DesignModel:
     """The continuous-time loop of `count` flexible modes; its response is that of the exact arm."""
     A, B, C, D = sensed_model(arm, signals, count)
     if arm.has_rigid_mode and "hub_angle" not in signals:  # an angle without feedback is no state of the loop
@@ -165,14 +165,14 @@ def continuous_model(arm: Arm, signals: tuple[str, ...], modes: int, count: int,
         B = B[1:]
         C = C[:, 1:]
     read = Signals(arm, signals)
-    top = band_of(arm, modes)
+    top = frequency_above_mode(arm, modes)
     moment = C[signals.index("root_moment")] if "root_moment" in signals else np.zeros(len(A))
-    return Model(
+    return DesignModel(
         (A, B, C, D), signals, speed, None, lambda: grid(arm, top), lambda w: read.values(1j * w), top, (), 0, moment
     )
 
 
-def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, count: int) -> Model:
+def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, count: int) -> DesignModel:
     """The loop at the samples of a chain, of `count` flexible modes.
 
     Poles of higher modes, which alias into the same angles, are those nearest to the open-loop ones: a held torque
@@ -195,7 +195,7 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
         a = np.exp(-chain.converters.rate_filter * T)
         n = read.index("hub_angle")
         row = signals.index("hub_rate")
-        A, B, C = differenced(A, B, C, n, row, a, T, first + damped if turns else None)
+        A, B, C = difference_rate(A, B, C, n, row, a, T, first + damped if turns else None)
         own = np.append(own, 0.0)
 
         def response(z: Complex) -> Complex:
@@ -208,14 +208,14 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
     C = np.delete(C, gone, 1)[: len(signals)]
     beyond = np.nonzero((pulse.mode > modes) & (pulse.poles.imag >= 0))[0]
     higher = pulse.multipliers[beyond[np.argsort(-pulse.mode[beyond], kind="stable")]]  # the highest come first
-    return Model(
+    return DesignModel(
         (A, B[:, None], C, np.zeros((len(C), 1))), signals, 2 / T, T, lambda: circle_angles(pulse),
         lambda q: response(np.exp(1j * q))[: len(signals)], np.inf,
         tuple(complex(each.real, abs(each.imag)) for each in higher), first + 2 - len(gone), np.delete(own, gone),
     )  # fmt: skip
 
 
-def differenced(
+def difference_rate(
     A: Real, B: Real, C: Real, angle: int, rate: int, a: float, T: float, state: int | None
 ) -> tuple[Real, Real, Real]:
     """The plant with the rate as the filtered difference of the angle, (1 - a)/T (z - 1)/(z - a).
@@ -332,7 +332,7 @@ def trial_slew(known: Arm, chain: Chain) -> Scenario:
 class Slews:
     """Slews of an arm in a model, with references of the arm `known`."""
 
-    model: Model
+    model: DesignModel
     arm: Arm
     known: Arm
     chain: Chain

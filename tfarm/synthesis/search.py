@@ -89,7 +89,9 @@ def search(judge: Worst, form: Structure, tell: Tell, near: Real | None = None, 
     """
     movable = form.ends(physical=False)
     region = form.wider(movable, BEYOND)
-    (x, scores), of_runs = minimised(partial(judge.scores, region), form, region.box, judge.work, tell, near, effort)
+    (x, scores), of_runs = minimise_runs(
+        partial(judge.scores, region), form, region.box, judge.work, tell, near, effort
+    )
     for place, end in region.ends(physical=True):
         moved = x[:, :1].copy()
         moved[place] = region.box[end][place]
@@ -104,7 +106,7 @@ def search(judge: Worst, form: Structure, tell: Tell, near: Real | None = None, 
     return Search(form.wider(beyond, BEYOND), found, len(of_runs), agreed, widened)
 
 
-def minimised(
+def minimise_runs(
     score: Score, form: Structure, box: tuple[Real, Real], work: float, tell: Tell, near: Real | None, effort: Effort
 ) -> tuple[Points, list[float]]:
     """Return the last points of all runs, and the best score of each.
@@ -122,7 +124,7 @@ def minimised(
     ended: list[Points] = []
 
     def run(points: Real, rounds: int) -> None:
-        ended.append(evolved(score, box, points, rounds, len(ended)))
+        ended.append(evolve_points(score, box, points, rounds, len(ended)))
         best = min(each.scores[0] for each in ended)
         tell(f"{form.name}: search {len(ended)}, best so far {best:.6g}")
 
@@ -151,7 +153,7 @@ def minimised(
     return found, [float(found.scores[0]), *(float(each.scores[0]) for each in ended[:runs])]
 
 
-def evolved(score: Score, box: tuple[Real, Real], points: Real, rounds: int, seed: int) -> Points:
+def evolve_points(score: Score, box: tuple[Real, Real], points: Real, rounds: int, seed: int) -> Points:
     """The last points of a run of differential evolution that begins with `points` (n, m)."""
     strategy, recombination = STRATEGIES[seed % len(STRATEGIES)]
     limits = np.full(points.shape[1], np.inf)

@@ -23,7 +23,7 @@ import numpy as np
 from tfarm.arm import ANGLE_GAIN, PLANE, TWO_GAINS, AnyLaw, Arm, HubFeedback, Law, must_not_be_algebraic
 from tfarm.arrays import Real
 from tfarm.errors import must_be_known, require
-from tfarm.loop.continuous import band_of
+from tfarm.loop.continuous import frequency_above_mode
 from tfarm.records import frozen
 from tfarm.spectrum import modes as natural_modes
 from tfarm.spectrum.gains import check_gains, rate_unit, turning_inertia
@@ -56,12 +56,12 @@ class Coefficient(NamedTuple):
     start: float
 
 
-def positive(name: str, start: float, most: float = np.inf, reach: float = REACH) -> Coefficient:
+def positive_coefficient(name: str, start: float, most: float = np.inf, reach: float = REACH) -> Coefficient:
     """A coefficient above 0, at most `most`, of the usual size `start`."""
     return Coefficient(name, LOGARITHMIC * start, (start / reach, min(start * reach, most)), (0.0, most), start)
 
 
-def signed(name: str, size: float) -> Coefficient:
+def signed_coefficient(name: str, size: float) -> Coefficient:
     """A coefficient of either sign and this usual size; 0 is its start."""
     return Coefficient(name, size, (-REACH * size, REACH * size), (-np.inf, np.inf), 0.0)
 
@@ -187,7 +187,7 @@ def check_bounds(form: Structure, arm: Arm) -> None:
             check_gains(arm, HubFeedback(**form.fixed, **dict(zip(form.names, bounds, strict=True))))
 
 
-def product(first: Real, second: Real) -> Real:
+def multiply_polynomials(first: Real, second: Real) -> Real:
     """The product of polynomials (degree + 1, laws)."""
     shape = (len(first) + len(second) - 1, max(first.shape[1], second.shape[1]))
     total = np.zeros(shape)
@@ -196,7 +196,7 @@ def product(first: Real, second: Real) -> Real:
     return total
 
 
-def polynomial(*coefficients: Any) -> Real:
+def polynomial_of(*coefficients: Any) -> Real:
     """A polynomial (degree + 1, laws) of coefficients that are numbers or (laws,)."""
     return np.array(np.broadcast_arrays(*(np.atleast_1d(each) for each in coefficients)))
 
@@ -226,7 +226,7 @@ def structure(name: str, formula: str) -> Callable[[Callable[[Arm, float, int, f
 
 def _rate_gain(arm: Arm, Kp: float, name: str = "K1") -> Coefficient:
     """K1, usually that of damping ratio 1/sqrt(2) of the rigid arm under Kp, without friction."""
-    return positive(name, float(np.sqrt(2 * Kp * turning_inertia(arm))))
+    return positive_coefficient(name, float(np.sqrt(2 * Kp * turning_inertia(arm))))
 
 
 def _integral_gain(arm: Arm, Kp: float) -> Coefficient:
@@ -237,17 +237,17 @@ def _integral_gain(arm: Arm, Kp: float) -> Coefficient:
 
 def _pole(period: float) -> Coefficient:
     """The pole of a filter, at most the fastest of a sampled signal."""
-    return positive("pole_rad_s", 2 / period, 2 / period)
+    return positive_coefficient("pole_rad_s", 2 / period, 2 / period)
 
 
 def _servo(Kp: float, K1: Real) -> tuple[Entry, Entry]:
     """Kp on the angle, K1 (laws,) on its rate."""
-    return Entry("hub_angle", polynomial(Kp), ONE), Entry("hub_rate", polynomial(K1), ONE)
+    return Entry("hub_angle", polynomial_of(Kp), ONE), Entry("hub_rate", polynomial_of(K1), ONE)
 
 
 def _second_order(w: Real, damping: Real) -> Real:
     """s^2 + 2 damping w s + w^2."""
-    return polynomial(1.0, 2 * damping * w, w * w)
+    return polynomial_of(1.0, 2 * damping * w, w * w)
 
 
 @structure(TWO_GAINS, r"$v = -K_p \theta - K_1 \theta_t - K_2 M$")
@@ -255,12 +255,12 @@ def _two_gains(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     """The gains of the paper's law, with physical ends: no damping at K1 = 0, a hub at rest at K2 = 1 (of a torque)."""
     unit = arm.input_per_torque
     rate = rate_unit(arm)
-    most = 2.0 * turning_inertia(arm) * band_of(arm, 1)
+    most = 2.0 * turning_inertia(arm) * frequency_above_mode(arm, 1)
     K1 = Coefficient(PLANE[0], LOGARITHMIC * rate, (0.0, most), (0.0, np.inf), 0.1 * rate)
     K2 = Coefficient(PLANE[1], unit, (-3.0 * unit, unit), (-np.inf, unit), 0.0)
 
     def entries(c: Real) -> tuple[Entry, ...]:
-        moment = Entry("root_moment", polynomial(c[1]), ONE)
+        moment = Entry("root_moment", polynomial_of(c[1]), ONE)
         return (*_servo(Kp, c[0])[0 if Kp else 1 :], moment)
 
     return (K1, K2), entries
@@ -275,15 +275,15 @@ def _pd(arm: Arm, Kp: float, modes: int, period: float) -> Built:
 def _pd_notch(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     def entries(c: Real) -> tuple[Entry, ...]:
         K1, pole, w, a, b = c
-        num = product(polynomial(K1 + Kp / pole, Kp), _second_order(w, a))
-        return (Entry("hub_angle", num, product(polynomial(1 / pole, 1.0), _second_order(w, b))),)
+        num = multiply_polynomials(polynomial_of(K1 + Kp / pole, Kp), _second_order(w, a))
+        return (Entry("hub_angle", num, multiply_polynomials(polynomial_of(1 / pole, 1.0), _second_order(w, b))),)
 
     free = (
         _rate_gain(arm, Kp),
         _pole(period),
-        positive("notch_rad_s", min(first_frequency(arm), 1 / period), 2 / period),
-        positive("notch_zero_damping", 0.1),
-        positive("notch_pole_damping", 0.7),
+        positive_coefficient("notch_rad_s", min(first_frequency(arm), 1 / period), 2 / period),
+        positive_coefficient("notch_zero_damping", 0.1),
+        positive_coefficient("notch_pole_damping", 0.7),
     )
     return free, entries
 
@@ -292,23 +292,23 @@ def _pd_notch(arm: Arm, Kp: float, modes: int, period: float) -> Built:
 def _lead(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     def entries(c: Real) -> tuple[Entry, ...]:
         zero, pole = c
-        return (Entry("hub_angle", polynomial(Kp / zero, Kp), polynomial(1 / pole, 1.0)),)
+        return (Entry("hub_angle", polynomial_of(Kp / zero, Kp), polynomial_of(1 / pole, 1.0)),)
 
-    return (positive("zero_rad_s", Kp / _rate_gain(arm, Kp).start), _pole(period)), entries
+    return (positive_coefficient("zero_rad_s", Kp / _rate_gain(arm, Kp).start), _pole(period)), entries
 
 
 @structure("PI", r"$v = -(K_p + K_i/s) \, \theta$, for a hub with friction or back-EMF")
 def _pi(arm: Arm, Kp: float, modes: int, period: float) -> Built:
-    den = polynomial(1.0, 0.0)
-    return (_integral_gain(arm, Kp),), lambda c: (Entry("hub_angle", polynomial(Kp, c[0]), den),)
+    den = polynomial_of(1.0, 0.0)
+    return (_integral_gain(arm, Kp),), lambda c: (Entry("hub_angle", polynomial_of(Kp, c[0]), den),)
 
 
 @structure("PID", r"$v = -(K_p + K_i/s + K_d s/(1 + s/p)) \, \theta$")
 def _pid(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     def entries(c: Real) -> tuple[Entry, ...]:
         Ki, Kd, pole = c
-        num = polynomial(Kd + Kp / pole, Kp + Ki / pole, Ki)
-        return (Entry("hub_angle", num, polynomial(1 / pole, 1.0, 0.0)),)
+        num = polynomial_of(Kd + Kp / pole, Kp + Ki / pole, Ki)
+        return (Entry("hub_angle", num, polynomial_of(1 / pole, 1.0, 0.0)),)
 
     return (_integral_gain(arm, Kp), _rate_gain(arm, Kp, "Kd"), _pole(period)), entries
 
@@ -323,18 +323,18 @@ def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Built:
         den = ONE
         for g, w, zeta in c[1:].reshape(modes, 3, -1):
             own = _second_order(w, zeta)
-            num = product(num, own)
+            num = multiply_polynomials(num, own)
             num[2:] += g * w * w * den
-            den = product(den, own)
+            den = multiply_polynomials(den, own)
         return (*_servo(Kp, c[0]), Entry("root_moment", num, den))
 
     reach = np.exp(2.0)  # of frequency and damping of a filter
     free = [_rate_gain(arm, Kp)]
     for n, w in enumerate(natural_modes(arm, modes).natural_frequency[-modes:].tolist(), 1):
         free += [
-            signed(f"gain_{n}", 0.1 * arm.input_per_torque),
-            positive(f"filter_rad_s_{n}", min(w, 1 / period), 2 / period, reach),
-            positive(f"filter_damping_{n}", 0.3, reach=reach),
+            signed_coefficient(f"gain_{n}", 0.1 * arm.input_per_torque),
+            positive_coefficient(f"filter_rad_s_{n}", min(w, 1 / period), 2 / period, reach),
+            positive_coefficient(f"filter_damping_{n}", 0.3, reach=reach),
         ]
     return free, entries
 
@@ -343,7 +343,7 @@ def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Built:
 def _strain_rate(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     def entries(c: Real) -> tuple[Entry, ...]:
         K1, g, pole = c
-        return (*_servo(Kp, K1), Entry("root_moment", polynomial(g, 0.0), polynomial(1 / pole, 1.0)))
+        return (*_servo(Kp, K1), Entry("root_moment", polynomial_of(g, 0.0), polynomial_of(1 / pole, 1.0)))
 
-    gain = signed("gain_s", 0.1 * arm.input_per_torque / first_frequency(arm))
+    gain = signed_coefficient("gain_s", 0.1 * arm.input_per_torque / first_frequency(arm))
     return (_rate_gain(arm, Kp), gain, _pole(period)), entries

@@ -22,7 +22,7 @@ from tfarm.errors import ConvergenceError, require
 from tfarm.records import frozen
 from tfarm.synthesis.structures import Bounds
 
-_Found = TypeVar("_Found")
+_Robust = TypeVar("_Robust")
 Effort = Literal["whole", "near", "sketch"]  # of a search: all runs; one run, and all that follows; one run
 Tell = Callable[[str], None]  # is called with one line of progress
 
@@ -40,7 +40,7 @@ class NamedArm(NamedTuple):
     numbers: dict[str, float]
 
 
-def varied(arm: Arm, key: str, value: float) -> Arm:
+def vary_arm(arm: Arm, key: str, value: float) -> Arm:
     """The arm with another value of one number, named as in its file ("payload.mass", "hub.friction") or in a locus.
 
     Raises ParameterError for an unknown key, and for a value as its parts do.
@@ -86,7 +86,7 @@ class ArmBox:
             far = low > 0 and high > 10.0 * low
             inside = low * (high / low) ** share if far else low + share * (high - low)
             numbers[key] = low if share == 0 else high if share == 1 else float(inside)
-            arm = varied(arm, key, numbers[key])
+            arm = vary_arm(arm, key, numbers[key])
         values = ", ".join(f"{key} = {value:.6g}" for key, value in numbers.items())
         return NamedArm(f"{self.arm.name}, {values}", arm, numbers)
 
@@ -147,9 +147,9 @@ class WorstCase(NamedTuple):
 
 
 def for_the_worst(
-    arms: Sequence[NamedArm], box: ArmBox | None, find: Callable[[Sequence[NamedArm], _Found | None, Effort], _Found],
-    score_on: Callable[[_Found, Arm], float], tell: Tell,
-) -> tuple[_Found, list[NamedArm], WorstCase]:  # fmt: skip
+    arms: Sequence[NamedArm], box: ArmBox | None, find: Callable[[Sequence[NamedArm], _Robust | None, Effort], _Robust],
+    score_on: Callable[[_Robust, Arm], float], tell: Tell,
+) -> tuple[_Robust, list[NamedArm], WorstCase]:  # fmt: skip
     """Return the result of `find` for the arms and for worse ones inside the box, with all of these arms.
 
     The first worse arms are those of sketches, so that the whole search already has them.  `find` is given the arms,

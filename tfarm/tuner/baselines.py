@@ -45,7 +45,7 @@ from tfarm.loop.sampled import Sampled
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import first_frequency
 from tfarm.tuner.guard import Guard, MovingGain, constant_windows
-from tfarm.tuner.trial import Record, Trial, TunedGain, judged, residual_rms, tip_off
+from tfarm.tuner.trial import Record, Trial, TunedGain, record_of_simulation, residual_rms, tip_off
 
 Shaper = Literal["ZV", "EI"]
 SHAPERS: tuple[Shaper, ...] = ("ZV", "EI")
@@ -148,7 +148,7 @@ def shaper(loop: Sampled, kind: Shaper, modes: int = 2) -> Real:
     return impulses
 
 
-def shaped(task: Scenario, impulses: Real) -> Scenario:
+def shape_scenario(task: Scenario, impulses: Real) -> Scenario:
     """The scenario with every reference passed through the impulses; its slew ends later by their length."""
     names = ("feedforward", "hub_angle", "hub_rate", "rigid_moment")
     through: dict[str, Any] = {name: np.convolve(getattr(task, name), impulses)[: task.t.size] for name in names}
@@ -161,7 +161,7 @@ def shaped_trial(trial: Trial, kind: Shaper) -> Trial:
     x is then the moment less the rigid arm's under the shaped slew, which arrives later.  The linear-quadratic bound of
     the unshaped slew is no bound of it.
     """
-    return replace(trial, task=shaped(trial.task, shaper(trial.loop, kind)))
+    return replace(trial, task=shape_scenario(trial.task, shaper(trial.loop, kind)))
 
 
 class Outcome(NamedTuple):
@@ -310,4 +310,4 @@ def _constant(trial: Trial, K: float) -> Outcome:
 
 def _outcome(run: Simulation, trial: Trial) -> Outcome:
     """The outcome of a simulation, by the cost of a trial."""
-    return Outcome(judged(run, trial.cost, trial.signals).cost, run.residual_moment, tip_off(run, trial))
+    return Outcome(record_of_simulation(run, trial.cost, trial.signals).cost, run.residual_moment, tip_off(run, trial))

@@ -49,7 +49,7 @@ from tfarm.dsp.plant import first_distinct, held_amplitude
 from tfarm.dsp.stages import not_covered
 from tfarm.errors import CertificationError, ConvergenceError, must_be_known
 from tfarm.exact.rationals import exact_matrix, falls, is_positive_definite
-from tfarm.loop.circle_crossings import around, stable_windows
+from tfarm.loop.circle_crossings import interval_around, stable_windows
 from tfarm.loop.loop_margins import lowest
 from tfarm.loop.sampled import Sampled
 from tfarm.records import frozen
@@ -222,7 +222,7 @@ class Guard:
 
     @property
     def limits(self) -> Limits:
-        """The interval for `kernel.guarded`."""
+        """The interval for `kernel.guard_gain`."""
         return Limits(self.lo, self.hi)
 
     @property
@@ -275,7 +275,9 @@ def _frozen(loops: list[Sampled], best_constant: float) -> Guard | None:
     for windows in map(constant_windows, loops):
         if not windows:
             return None
-        found.append(around(windows, best_constant) or min(windows, key=lambda w: abs(sum(w) / 2 - best_constant)))
+        found.append(
+            interval_around(windows, best_constant) or min(windows, key=lambda w: abs(sum(w) / 2 - best_constant))
+        )
     low = max(low for low, _ in found)
     high = min(high for _, high in found)
     edge = (1 - RADIUS_SHARE) * (high - low)

@@ -42,7 +42,7 @@ class Limits(NamedTuple):
     hi: float
 
 
-class Model(NamedTuple):
+class TrialModel(NamedTuple):
     """s' = A s + B torque from sample to sample; servo.s are angle and rate by their gains, moment.s is the moment.
 
     `own`.s is the arm's own root moment, before the anti-alias filter.
@@ -82,14 +82,14 @@ class Numbers(NamedTuple):
 class Setting(NamedTuple):
     """Constants of the training; `scales` (m,) divide the network's inputs."""
 
-    model: Model
+    model: TrialModel
     reference: Reference
     numbers: Numbers
     scales: Real
     limits: Limits
 
 
-class Run(NamedTuple):
+class TrialSignals(NamedTuple):
     """Record of a trial, one row for each sample: the network's inputs (N, m) and hidden neurons (N, h), signals (N,).
 
     These are x, u, e [N m], gain K, its slope dK/dz by the output neuron's sum, and the arm's own root moment [N m].
@@ -105,7 +105,7 @@ class Run(NamedTuple):
     moment: Real
 
 
-class Work(NamedTuple):
+class SampleBuffers(NamedTuple):
     """Buffers of one sample: `state` and `spare` (n,), `by_input` (m,)."""
 
     state: Real
@@ -123,7 +123,7 @@ def logistic(z: float) -> float:
 
 
 @compiled
-def guarded(z: float, limits: Limits) -> tuple[float, float]:
+def guard_gain(z: float, limits: Limits) -> tuple[float, float]:
     """The gain and its derivative for the output neuron's sum z.
 
     kappa = ln(1 + e^z) without a guard; lo + (hi - lo)(1 - e^-kappa) with one.
@@ -147,7 +147,7 @@ def network_gain(weights: Real, inputs: Real, hidden: Real, limits: Limits) -> t
             net += weights[j * m + i] * inputs[i]
         hidden[j] = logistic(net)
         z += weights[h * m + j] * hidden[j]
-    return guarded(z, limits)
+    return guard_gain(z, limits)
 
 
 @compiled
@@ -165,7 +165,7 @@ def gain_gradient(weights: Real, inputs: Real, hidden: Real, by_sum: float, out:
 
 
 @inlined
-def copied(source: Real, target: Real) -> None:
+def copy_into(source: Real, target: Real) -> None:
     """target = source, element by element: an assignment of arrays takes numba seconds to compile, and a loop none."""
     for i in range(target.size):
         target[i] = source[i]
@@ -191,7 +191,7 @@ def dot(a: Real, b: Real) -> float:
 
 
 @inlined
-def sense(k: int, setting: Setting, run: Run, work: Work) -> bool:
+def sense(k: int, setting: Setting, run: TrialSignals, work: SampleBuffers) -> bool:
     """Read x and u at sample k and fill the network's inputs there; False where the moment passes the bound."""
     model = setting.model
     reference = setting.reference
@@ -219,7 +219,7 @@ def sense(k: int, setting: Setting, run: Run, work: Work) -> bool:
 
 
 @inlined
-def act(k: int, setting: Setting, weights: Real, run: Run, work: Work) -> None:
+def act(k: int, setting: Setting, weights: Real, run: TrialSignals, work: SampleBuffers) -> None:
     """Set the gain, e and the torque at sample k; advance by one sample."""
     model = setting.model
     state = work.state
@@ -233,7 +233,7 @@ def act(k: int, setting: Setting, weights: Real, run: Run, work: Work) -> None:
 
 
 @compiled
-def trial_cost(done: int, numbers: Numbers, run: Run) -> float:
+def trial_cost(done: int, numbers: Numbers, run: TrialSignals) -> float:
     """T times the sum of a x^2/2 + b e^2/2 over the first `done` samples."""
     total = 0.0
     for k in range(done):
@@ -242,7 +242,7 @@ def trial_cost(done: int, numbers: Numbers, run: Run) -> float:
 
 
 @compiled
-def forward(setting: Setting, weights: Real, run: Run, work: Work) -> int:
+def forward(setting: Setting, weights: Real, run: TrialSignals, work: SampleBuffers) -> int:
     """Run one trial with fixed weights into `run`; return the number of samples before the bound is passed."""
     work.state.fill(0.0)
     n = run.x.size
@@ -254,7 +254,7 @@ def forward(setting: Setting, weights: Real, run: Run, work: Work) -> int:
 
 
 @compiled
-def backward(setting: Setting, weights: Real, run: Run, work: Work, gradient: Real) -> None:
+def backward(setting: Setting, weights: Real, run: TrialSignals, work: SampleBuffers, gradient: Real) -> None:
     """Set the gradient of the cost of the trial in `run`, through network, plant and time (reverse accumulation).
 
     `back` is the derivative by the state of the next sample.  `late_e`, `late_u`, `late_x`, `late_K` are derivatives
@@ -287,7 +287,7 @@ def backward(setting: Setting, weights: Real, run: Run, work: Work, gradient: Re
 
 @compiled
 def sample_gradient(
-    k: int, numbers: Numbers, x_next: float, run: Run, weights: Real, out: Real, by_input: Real
+    k: int, numbers: Numbers, x_next: float, run: TrialSignals, weights: Real, out: Real, by_input: Real
 ) -> None:
     """Set the gradient of a x_next^2/2 + b e^2/2 by the weights of K at sample k."""
     by_gain = -run.x[k] * (numbers.a * x_next * numbers.reply + numbers.b * run.e[k])
@@ -337,7 +337,7 @@ class Network:
         return Network(weights[:first].reshape(self.W1.shape), weights[first:], self.scales)
 
     def gain(self, signals: Real, guard: Limits) -> float:
-        """K for one row of inputs [N m], not scaled; `guard` as in `guarded`."""
+        """K for one row of inputs [N m], not scaled; `guard` as in `guard_gain`."""
         return float(network_gain(self.weights, signals / self.scales, np.zeros(self.w2.size), guard)[0])
 
 

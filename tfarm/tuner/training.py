@@ -29,12 +29,12 @@ from tfarm.schema import Quantity
 from tfarm.tuner.guard import Guard
 from tfarm.tuner.kernel import (
     Network,
-    Run,
+    SampleBuffers,
     Setting,
-    Work,
+    TrialSignals,
     act,
     backward,
-    copied,
+    copy_into,
     forward,
     gain_gradient,
     sample_gradient,
@@ -51,7 +51,7 @@ BEFORE = 4  # rows further are those of the sample before, and as many further a
 INPUT_ROWS = (U, U + BEFORE, E + BEFORE, E + 2 * BEFORE, X, X + BEFORE, K + BEFORE)  # of each input of the network
 
 
-class Steps(NamedTuple):
+class DescentSettings(NamedTuple):
     """Constants of (21) and (22): learning rate, momentum, largest norm of a gradient (inf: any).
 
     `enough` is the root mean square of x [N m] over a trial that is small enough to stop.
@@ -73,7 +73,7 @@ def _rms(x: Real) -> float:
 
 
 @inlined
-def _step(weights: Real, change: Real, gradient: Real, steps: Steps, share: float) -> None:
+def _step(weights: Real, change: Real, gradient: Real, steps: DescentSettings, share: float) -> None:
     """Take a step of (21) and (22): dw = -eta g + alpha dw, w = w + dw; eta times `share`, g clipped to `longest`."""
     norm = 0.0
     for i in range(gradient.size):
@@ -87,7 +87,13 @@ def _step(weights: Real, change: Real, gradient: Real, steps: Steps, share: floa
 
 @compiled
 def learn_by_trials(
-    setting: Setting, steps: Steps, weights: Real, costs: Real, run: Run, work: Work, takes_back: bool
+    setting: Setting,
+    steps: DescentSettings,
+    weights: Real,
+    costs: Real,
+    run: TrialSignals,
+    work: SampleBuffers,
+    takes_back: bool,
 ) -> tuple[int, int]:
     """Learn after each trial: fill `costs`, change `weights`.
 
@@ -109,30 +115,32 @@ def learn_by_trials(
         costs[trial] = cost
         if takes_back and not cost <= best and best < np.inf:
             share *= 0.5
-            copied(kept, weights)
+            copy_into(kept, weights)
             change.fill(0.0)
             _step(weights, change, slope, steps, share)
             continue
         if not isfinite(cost):
-            copied(kept, weights)
+            copy_into(kept, weights)
             return trial + 1, done
         if _rms(run.x) < steps.enough:
             return trial + 1, ENOUGH
         backward(setting, weights, run, work, gradient)
-        copied(weights, kept)
+        copy_into(weights, kept)
         if takes_back:
-            copied(gradient, slope)
+            copy_into(gradient, slope)
             # the step is whole again after four good trials
             share = min(1.0, 1.2 * share)
             best = cost
         _step(weights, change, gradient, steps, share)
     if takes_back:
-        copied(kept, weights)
+        copy_into(kept, weights)
     return costs.size, NEVER
 
 
 @inlined
-def derive(k: int, setting: Setting, weights: Real, run: Run, work: Work, S: Real, spare: Real, D: Real) -> None:
+def derive(
+    k: int, setting: Setting, weights: Real, run: TrialSignals, work: SampleBuffers, S: Real, spare: Real, D: Real
+) -> None:
     """Set derivatives at sample k by every weight, forward: rows of D are those of x, u, e, K now and 1, 2 samples ago.
 
     S (n, weights) is that of the state, and advances by one sample.
@@ -141,7 +149,7 @@ def derive(k: int, setting: Setting, weights: Real, run: Run, work: Work, S: Rea
     model = setting.model
     by_input = work.by_input
     for row in range(D.shape[0] - 1, BEFORE - 1, -1):
-        copied(D[row - BEFORE], D[row])
+        copy_into(D[row - BEFORE], D[row])
     for row in range(BEFORE):
         D[row].fill(0.0)
     for i in range(states):
@@ -163,12 +171,18 @@ def derive(k: int, setting: Setting, weights: Real, run: Run, work: Work, S: Rea
         for p in range(size):
             spare[i, p] += model.B[i] * D[E, p]
     for i in range(states):
-        copied(spare[i], S[i])
+        copy_into(spare[i], S[i])
 
 
 @compiled
 def learn_by_samples(
-    setting: Setting, steps: Steps, weights: Real, costs: Real, run: Run, work: Work, is_whole: bool
+    setting: Setting,
+    steps: DescentSettings,
+    weights: Real,
+    costs: Real,
+    run: TrialSignals,
+    work: SampleBuffers,
+    is_whole: bool,
 ) -> tuple[int, int]:
     """Learn at every sample, from x by the weights of its torque; return as `learn_by_trials`.
 
@@ -188,14 +202,14 @@ def learn_by_samples(
     room = np.zeros((states, size))
     D = np.zeros((3 * BEFORE, size))
     for trial in range(costs.size):
-        copied(weights, kept)
+        copy_into(weights, kept)
         work.state.fill(0.0)
         S.fill(0.0)
         D.fill(0.0)
         for k in range(n):
             if not sense(k, setting, run, work):
                 costs[trial] = np.inf
-                copied(kept, weights)
+                copy_into(kept, weights)
                 return trial + 1, k
             if is_whole:
                 act(k, setting, weights, run, work)
@@ -208,7 +222,7 @@ def learn_by_samples(
             if k >= numbers.lag:
                 sample_gradient(k - numbers.lag, numbers, run.x[k], run, made, gradient, work.by_input)
                 _step(weights, change, gradient, steps, 1.0)
-            copied(weights, made)
+            copy_into(weights, made)
             act(k, setting, weights, run, work)
         costs[trial] = trial_cost(n, numbers, run)
         if _rms(run.x) < steps.enough:
@@ -328,7 +342,7 @@ def train(trial: Trial, network: Network, guard: Guard, learning: Learning, tria
     weights = network.weights
     costs = np.zeros(trials)
     longest = math.inf if learning.rule == "plain" else learning.clip
-    steps = Steps(learning.eta, learning.alpha, longest, learning.enough)
+    steps = DescentSettings(learning.eta, learning.alpha, longest, learning.enough)
     common = (trial.setting(network, guard.limits), steps, weights, costs, *trial.room(network))
     if learning.mode == "trial":
         made, sample = learn_by_trials(*common, learning.rule == "dynamic")

@@ -30,7 +30,7 @@ import numpy as np
 from pydantic import Field
 
 from tfarm.arm import FED_BACK, Arm, HubFeedback, must_not_be_algebraic
-from tfarm.arm.chain import Reading
+from tfarm.arm.chain import MomentReading
 from tfarm.arm.checks import check_annotated, not_negative, positive
 from tfarm.arm.schema import StrictTable, validated_file
 from tfarm.arrays import Real
@@ -39,7 +39,7 @@ from tfarm.dsp import Chain, Measurement, Scenario, Simulation, Simulator, scena
 from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
 from tfarm.dsp.simulate import FOLDED_UP
 from tfarm.dsp.stages import admit
-from tfarm.errors import must_be_known, naming, require
+from tfarm.errors import must_be_known, name_file, require
 from tfarm.files import write_file
 from tfarm.loop.sampled import Sampled, sampled_loop
 from tfarm.records import frozen
@@ -95,7 +95,7 @@ class Trial:
     loop: Sampled
     task: Scenario
     cost: Cost
-    signals: Reading
+    signals: MomentReading
 
     @property
     def arm(self) -> Arm:
@@ -108,7 +108,7 @@ class Trial:
         return self.task.feedforward.size
 
     @cached_property
-    def model(self) -> kernel.Model:
+    def model(self) -> kernel.TrialModel:
         """The loop from sample to sample, open at the torque, and the rows of the servo and the moment."""
         loop = self.loop
         last = loop.pulse.integrals_at + 2
@@ -118,7 +118,7 @@ class Trial:
         moment = -loop.times(0.0).having("K2", 1.0).matrix()[last]
         own = loop.rig.sensed.own_moment(loop.chain.sampling)
         own = np.pad(own, (0, drive.size - own.size))
-        return kernel.Model(*(np.ascontiguousarray(each) for each in (A.T, A, drive, servo, moment, own)))
+        return kernel.TrialModel(*(np.ascontiguousarray(each) for each in (A.T, A, drive, servo, moment, own)))
 
     @cached_property
     def reference(self) -> kernel.Reference:
@@ -158,13 +158,13 @@ class Trial:
         case = self.case if chain is None else self.case.through(chain)
         return Simulator(case, self.task, count=self.loop.plant.count)
 
-    def room(self, network: Network) -> tuple[kernel.Run, kernel.Work]:
+    def room(self, network: Network) -> tuple[kernel.TrialSignals, kernel.SampleBuffers]:
         """Empty record and buffers of a trial with that network."""
         hidden, inputs = network.W1.shape
         n = self.n
         states = self.model.B.size
-        run = kernel.Run(np.zeros((n, inputs)), np.zeros((n, hidden)), *np.zeros((6, n)))
-        return run, kernel.Work(np.zeros(states), np.zeros(states), np.zeros(inputs))
+        run = kernel.TrialSignals(np.zeros((n, inputs)), np.zeros((n, hidden)), *np.zeros((6, n)))
+        return run, kernel.SampleBuffers(np.zeros(states), np.zeros(states), np.zeros(inputs))
 
     # ------------------------------------------------------------ one trial
 
@@ -190,7 +190,7 @@ def slew_trial(
     K1: float | None = None,
     Kp: float = 0.0,
     cost: Cost = DEFAULT_COST,
-    signals: Reading = "vibration",
+    signals: MomentReading = "vibration",
     duration: float = TRIAL_DURATION,
     count: int = TRIAL_MODES,
 ) -> Trial:
@@ -199,7 +199,7 @@ def slew_trial(
     `K1` is by default that of `default_gains`, or with a `Kp` that of `usual_rate_gain`.  Raises ParameterError for an
     arm that cannot turn, a hub without inertia, and numbers out of range.
     """
-    must_be_known("signals", signals, get_args(Reading))
+    must_be_known("signals", signals, get_args(MomentReading))
     Kp = not_negative("Kp", Kp, ANGLE_REMEDY)
     arm, chain = admit(CONSUMER, arm, chain)
     gains = HubFeedback(K1=usual_rate_gain(arm, Kp) if K1 is None else K1, K2=1.0, Kp=Kp)
@@ -224,7 +224,7 @@ def usual_rate_gain(arm: Arm, Kp: float) -> float:
     return max(0.0, math.sqrt(2 * Kp * arm.turned_inertia) - arm.rate_loss)
 
 
-def with_signals(chain: Chain, signals: Reading) -> Chain:
+def with_signals(chain: Chain, signals: MomentReading) -> Chain:
     """The chain with that reading of the moment during the slew."""
     return replace(chain, slew=replace(chain.slew, reading=signals))
 
@@ -251,7 +251,7 @@ class TunedGain:
     network: Network
     guard: Limits
     servo: HubFeedback
-    signals: Reading
+    signals: MomentReading
     _past: tuple[float, ...] = field(default=(), init=False)
 
     def run(self, simulator: Simulator) -> Simulation:
@@ -271,7 +271,7 @@ class TunedGain:
         return K
 
 
-def judged(simulation: Simulation, cost: Cost, signals: Reading) -> Record:
+def record_of_simulation(simulation: Simulation, cost: Cost, signals: MomentReading) -> Record:
     """Return a simulation as a record of a trial: x before the converters, e from the torque after them.
 
     So x has passed the anti-alias filter where there is one, but no quantisation.
@@ -307,7 +307,7 @@ class SavedTuner(StrictTable):
     period: Annotated[Finite, Field(gt=0)]
     K1: Finite
     Kp: Annotated[Finite, Field(ge=0)] = 0.0  # absent in files of tuners without a servo
-    signals: Reading
+    signals: MomentReading
     a: Finite
     b: Finite
     guard_kind: GuardKind
@@ -348,7 +348,7 @@ def load_tuner(path: str | os.PathLike[str], key: str = "controller") -> SavedTu
     # more bytes than a network of the most neurons takes
     most = 4_000_000
     found = validated_file(SavedTuner, path, most, key=key, what="a tuner's file of tfarm tune ARM --save FILE.json")
-    with naming(path):
+    with name_file(path):
         found.gain()  # refuses parts that do not match
         Cost(a=found.a, b=found.b)
     return found

@@ -10,13 +10,13 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, must_be_arm
-from tfarm.arm.chain import Reading
+from tfarm.arm.chain import MomentReading
 from tfarm.arm.checks import check_annotated, positive
 from tfarm.arrays import Real
 from tfarm.case import Case
 from tfarm.dsp import Chain, scenario
-from tfarm.dsp.results import Run, simulated
-from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, described, torque_unit
+from tfarm.dsp.results import Run, simulate_modes
+from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, describe_scenario, torque_unit
 from tfarm.dsp.simulate import RESIDUAL
 from tfarm.errors import require
 from tfarm.records import frozen
@@ -56,7 +56,7 @@ class Plan:
 
     cost: Cost = field(default_factory=Cost)
     learning: Learning = field(default_factory=Learning)
-    signals: Reading = "vibration"
+    signals: MomentReading = "vibration"
     guard: GuardKind = "time-varying"
     trials: int = 100
     seed: int = 0
@@ -173,7 +173,7 @@ def _baselines(arm: Arm, chain: Chain | None, plan: Plan) -> tuple[Trial, Guard,
     )
 
 
-def tuned(arm: Arm, chain: Chain, plan: Plan | None = None, **numbers: float) -> Tuning:
+def tune_by_default(arm: Arm, chain: Chain, plan: Plan | None = None, **numbers: float) -> Tuning:
     """Tune with a plan, the usual one by default, and other values of some of its numbers: seed, eta, alpha ..."""
     plan = usual_plan(arm, chain) if plan is None else plan
     learning: dict[str, Any] = {name: value for name, value in numbers.items() if name in NUMBERS_OF_LEARNING}
@@ -358,10 +358,10 @@ def controlled_run(
     gain = saved.gain()
     case = Case(arm, gain.servo, chain)
     task = scenario(name, arm, chain, duration)
-    run, used = simulated(case, task, count, between, outputs, gain.run)
+    run, used = simulate_modes(case, task, count, between, outputs, gain.run)
     trained = {
         "trained_on": saved.arm, "guard_kind": saved.guard_kind, "guard": list(gain.guard), "K1": saved.K1,
         "Kp": saved.Kp, "signals": saved.signals, "period_s": saved.period, "a": saved.a, "b": saved.b,
         "cost_unit_N_m": saved.scales[0],
     }  # fmt: skip
-    return Run(case, run, used, described(task, arm, chain), tuner=trained)
+    return Run(case, run, used, describe_scenario(task, arm, chain), tuner=trained)
