@@ -28,9 +28,8 @@ from tfarm.exact.system import system_of
 from tfarm.loop.locus import open_poles
 from tfarm.report.page import ArmReport
 from tfarm.report.response_sections import damped_tables, locked_table
-from tfarm.spectrum.damped import NOT_ASSIGNED, DampedModes, damped_modes, origins_of
+from tfarm.spectrum.damped import NOT_ASSIGNED, DampedModes, damped_modes, damped_starts, origins_of
 from tfarm.spectrum.naming import function_of
-from tfarm.spectrum.starts import damped_starts
 
 EPS = np.finfo(float).eps
 EXTREMES = ((0.0, 0.0, 0.0), (math.inf, math.inf, math.inf), (0.0, math.inf, 0.0), (1.0, 0.0, math.inf))

@@ -148,7 +148,7 @@ def new(
     period: sampling period of the controller [s]
     force: replace the file
     """
-    from tfarm.arm.starting import first_file
+    from tfarm.arm.writing import first_file
     from tfarm.assessment.arm_check import with_damping
 
     if presets:

@@ -26,8 +26,8 @@ from tfarm.reduced.modal import closed_loop_matrix, in_series, pade
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.schema import Quantity
 from tfarm.spectrum.box import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SINGULAR, TRIED_HEIGHTS, Box, complete_zeros
+from tfarm.spectrum.damped import damped_starts
 from tfarm.spectrum.proofs import Disc, disjoint, enclose_zero, proven_count
-from tfarm.spectrum.starts import damped_starts
 from tfarm.spectrum.table import first_frequency
 
 from .continuous import ContinuousLoop, frequency_above_mode, steep_places

@@ -44,7 +44,7 @@ from tfarm.records import frozen
 from tfarm.schema import Column, Quantity, Table, roots_table
 from tfarm.spectrum import flexible_frequencies
 from tfarm.spectrum.box import REAL_SHARE, TOWARD_SINGULAR, Box, Function, complete_zeros
-from tfarm.spectrum.starts import damped_starts
+from tfarm.spectrum.damped import damped_starts
 
 
 @frozen(slots=True)
