@@ -100,6 +100,24 @@ class Case:
         return replace(self, chain=chain)
 
 
+class OfCase:
+    """A record of a case, with its arm and its controller."""
+
+    if TYPE_CHECKING:
+        # a field here would come before those of each record in its tables
+        case: Case
+
+    @property
+    def arm(self) -> Arm:
+        """The arm with the input of the controller."""
+        return self.case.arm
+
+    @property
+    def law(self) -> Law:
+        """The controller."""
+        return self.case.law
+
+
 def _follows_all(law: Law) -> bool:
     """Whether each signal of a controller follows a reference."""
     return set(law.signals) <= set(law.references)

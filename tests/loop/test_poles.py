@@ -358,7 +358,8 @@ def test_an_end_that_no_mode_moves_is_no_place_for_a_sensor():
 
 
 def test_an_arm_that_cannot_turn_has_no_such_zeros():
-    refusal(positions, tfarm.load("sasaki2012").having(hub_inertia=math.inf), "moment", np.array([0.1]), 2)
+    locked = tfarm.load("sasaki2012").having(hub_inertia=math.inf)
+    assert "an arm that cannot turn" in str(refusal(positions, locked, "moment", np.array([0.1]), 2))
 
 
 def test_poles_of_a_long_delay_have_starts_next_to_them():

@@ -17,7 +17,7 @@ import numpy as np
 from tfarm.arm import AnyLaw, Arm
 from tfarm.arm.chain import Chain, Converters
 from tfarm.arrays import LEAST_SIZE, Real
-from tfarm.case import Case
+from tfarm.case import Case, OfCase
 from tfarm.dsp.discretise import RULE, rule_in_words
 from tfarm.dsp.plant import MODES_USED
 from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, describe_scenario, scenario
@@ -95,7 +95,7 @@ class LimitCycle:
 
 
 @dataclass(frozen=True)
-class Run:
+class Run(OfCase):
     """A simulated scenario: its signals, and figures of these."""
 
     case: Case
@@ -109,11 +109,6 @@ class Run:
     def controller(self) -> Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller."""
         return controller(self.case.feedback, self.arm)
-
-    @property
-    def arm(self) -> Arm:
-        """The arm with the input of the controller."""
-        return self.case.arm
 
     @property
     def references(self) -> Annotated[list[str], Quantity(help="signals that follow a reference")]:

@@ -21,10 +21,10 @@ from typing import Annotated, cast
 import numpy as np
 from scipy.optimize import brentq
 
-from tfarm.arm import FED_BACK, NAMES, PLANE, AnyLaw, Arm, HubFeedback, Law
+from tfarm.arm import FED_BACK, NAMES, PLANE, AnyLaw, Arm, HubFeedback
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real, Whole
-from tfarm.case import Case
+from tfarm.case import Case, OfCase
 from tfarm.crossing import Crossing
 from tfarm.crossing.turning import loose
 from tfarm.errors import ConvergenceError, must_be_known, require
@@ -62,7 +62,7 @@ def origin_name(origin: int) -> str:
 
 
 @frozen
-class Locus:
+class Locus(OfCase):
     """The closed-loop poles of an arm under a law, as one number varies.
 
     `gain` (n,) are the values of what `vary` names: a number of the law, "all" (a factor on it) or of the arm;
@@ -70,6 +70,7 @@ class Locus:
     (`origin` (b,): its number, or one of `ORIGINS`).  The mirror image of a branch is left out, unless the two meet on
     the real axis and part there: then it is a branch of its own, with Im s < 0 where they are a pair.  A branch is NaN
     where it is not followed (`ends`).  `box` holds no other pole at its nodes.
+    `arm` is that at the first value where a number of it varies.
     `followed` are all poles but those at 0 all the way, mirror images too, `listed` the numbers of those in
     `branches`, which with `in_box` are NaN outside the box.
     `crossings` are those of the imaginary axis, ascending along the way.
@@ -105,16 +106,6 @@ class Locus:
     def controller(self) -> Annotated[ControllerSignals, Quantity(flat=True)]:
         """Names of the arm and the controller."""
         return controller(self.law, self.arm)
-
-    @property
-    def arm(self) -> Arm:
-        """The arm, at the first value where a number of it varies."""
-        return self.case.arm
-
-    @property
-    def law(self) -> Law:
-        """The law of the case."""
-        return self.case.law
 
     @property
     def mode(self) -> Whole:

@@ -15,7 +15,7 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
 
-from tfarm.arm import MOMENT_GAIN, RATE_GAIN, AnyLaw, Arm, HubFeedback, Law, Theory, load, presets
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN, AnyLaw, Arm, HubFeedback, Theory, load, presets
 from tfarm.arm.chain import MOST_DELAY, file_text
 from tfarm.arm.writing import law_toml
 from tfarm.assessment.card import ResultCard, margins_of, result_card, sampled_of
@@ -31,7 +31,7 @@ from tfarm.assessment.step import Step, step
 from tfarm.audit import AuditRow, kept_audit
 from tfarm.audit.arm_proofs import ArmProof, prove, proven_damped_modes, proven_modes
 from tfarm.audit.published import PublishedRow, validate
-from tfarm.case import Case
+from tfarm.case import Case, OfCase
 from tfarm.dsp import Chain, Simulation, load_chain, results, traces
 from tfarm.dsp.discretise import acting_law
 from tfarm.errors import ConvergenceError, ParameterError, one_line
@@ -85,7 +85,7 @@ class GivenLaw:
 
 
 @frozen
-class PageCase:
+class PageCase(OfCase):
     """A case of a page with its records.
 
     `name` is for reading, `key` for the columns and names of files, "law" or of several "law_1", "law_2" ...
@@ -96,16 +96,6 @@ class PageCase:
     name: str
     key: str
     given: GivenLaw
-
-    @property
-    def arm(self) -> Arm:
-        """The arm with the input of the controller."""
-        return self.case.arm
-
-    @property
-    def law(self) -> Law:
-        """The controller."""
-        return self.case.law
 
     @property
     def chain(self) -> Chain:

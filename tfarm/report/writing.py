@@ -19,7 +19,7 @@ from tfarm.assessment import Comparison
 from tfarm.digits import how_many
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import arm_under_chain
-from tfarm.errors import TfarmError, must_be_known, one_line, require
+from tfarm.errors import TfarmError, must_be_known, require
 from tfarm.exact.outputs import signal_words
 from tfarm.files import move_into, place_in, temporary_folder
 from tfarm.fitting.data import Measured
@@ -52,7 +52,7 @@ from tfarm.report.page import ArmReport, GivenLaw, command_of, file_of, gather, 
 from tfarm.report.response_sections import bode_section
 from tfarm.report.sampled_section import sampled_section, tuner_section
 from tfarm.report.trust import TRUST_FOLDER, save_proof, write_trust, written_proofs
-from tfarm.schema import Column, Table, quantities, table, text
+from tfarm.schema import Table, quantities, table
 from tfarm.stopping import Progress
 from tfarm.studies.study import Study
 
@@ -482,7 +482,7 @@ def study_sections(found: Study) -> list[PageSection]:
             responses.append(picture("study_band", figure, stem=f"study-{output.replace('_', '-')}", name=name))
         except TfarmError as error:
             missing.append(f"{output}: {error}.")
-    numbers = [sheet("study_ranges", table(found.spreads)), sheet("study_numbers", varied_numbers(found), found=found)]
+    numbers = [sheet("study_ranges", table(found.spreads)), sheet("study_numbers", found.varied_numbers, found=found)]
     worst = [] if found.worst is None else [prose("study_worst", worst=found.worst)]
     sections = (
         PageSection(title="Findings", facts=facts, words=[prose("study", found=found)], blocks=numbers),
@@ -493,17 +493,3 @@ def study_sections(found: Study) -> list[PageSection]:
         PageSection(title="Arms without a result", blocks=[sheet("study_failures", table(found.failures))]),
     )
     return [replace(each, anchor=anchor("study", each.title)) for each in sections]
-
-
-def varied_numbers(found: Study) -> list[Column]:
-    """Return a row a varied number: its distribution or grid, and its value of the worst arm where that was found."""
-    space = found.parts.plan.space
-    kinds = {key: one_line(f"{each.kind} {', '.join(map(text, each.numbers))}", 60) for key, each in space.over.items()}
-    columns = [
-        Column("key", "number", of=space.keys),
-        Column("distribution", "distribution", of=[kinds.get(key, "list or posterior") for key in space.keys]),
-    ]
-    if found.worst is not None:
-        worst = list(found.worst.numbers.values())
-        columns.append(Column("worst", "worst arm", of=worst, shown=list(map(text, worst))))
-    return columns

@@ -34,12 +34,12 @@ from tfarm.arm.schema import StrictTable, validate_table
 from tfarm.arm.writing import law_head, law_toml, toml_tables, toml_text
 from tfarm.arrays import Real
 from tfarm.case import Case
-from tfarm.errors import ParameterError, name_file, require
+from tfarm.errors import ParameterError, name_file, one_line, require
 from tfarm.files import locked_folder, mat_content, write_file
 from tfarm.fitting.posterior import load_posterior
 from tfarm.processes import share_tasks
 from tfarm.records import frozen
-from tfarm.schema import Column, Quantity, Table
+from tfarm.schema import Column, Quantity, Table, text
 from tfarm.spectrum.gains import default_gains
 from tfarm.stopping import Progress
 
@@ -187,6 +187,22 @@ class Study:
         """Stable arms of each loop."""
         words = [f"{each.loop}: {each.finding}" for each in self.shares]
         return "; ".join(words) or f"{self.done:,} of {self.rows:,} arms computed"
+
+    @property
+    def varied_numbers(self) -> list[Column]:
+        """A row a varied number: its distribution or grid, and its value of the worst arm where that was found."""
+        space = self.parts.plan.space
+        kinds = {
+            key: one_line(f"{each.kind} {', '.join(map(text, each.numbers))}", 60) for key, each in space.over.items()
+        }
+        columns = [
+            Column("key", "number", of=space.keys),
+            Column("distribution", "distribution", of=[kinds.get(key, "list or posterior") for key in space.keys]),
+        ]
+        if self.worst is not None:
+            worst = list(self.worst.numbers.values())
+            columns.append(Column("worst", "worst arm", of=worst, shown=list(map(text, worst))))
+        return columns
 
     @property
     def csv_table(self) -> Table:
